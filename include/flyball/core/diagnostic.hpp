@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace flyball {
+
+/// How much a diagnostic matters.
+enum class Severity { info, warning, error };
+
+[[nodiscard]] std::string_view to_string(Severity severity);
+
+/// Something worth telling about data that was still usable (or the reason why it was not).
+struct Diagnostic {
+  std::string code;  ///< A stable snake_case identifier, such as "repeated_rows".
+  Severity severity = Severity::info;
+  std::string message;  ///< One sentence: what was seen, how much of it, what was done about it.
+};
+
+}  // namespace flyball

@@ -1,0 +1,137 @@
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include <flyball/core/argument.hpp>
+
+namespace flyball {
+
+namespace {
+
+std::string shape_text(const MatrixRef& M) {
+  return fmt::format("{}x{}", M.rows(), M.cols());
+}
+
+std::string with_unit(double value, std::string_view unit) {
+  return fmt::format("{}{}{}", format_number(value), unit.empty() ? "" : " ", unit);
+}
+
+}  // namespace
+
+std::string format_number(double value, int digits) {
+  return fmt::format("{:.{}g}", value, digits);
+}
+
+Expected<void> check_shape(const MatrixRef& M, Eigen::Index rows, Eigen::Index columns,
+                           std::string_view where, std::string_view name,
+                           std::string_view meaning) {
+  if (M.rows() == rows && M.cols() == columns) {
+    return {};
+  }
+  return tl::unexpected(Error(ArgumentError::wrong_shape)
+                            .in(std::string(where))
+                            .about(std::string(name))
+                            .got(shape_text(M))
+                            .expected(meaning.empty()
+                                          ? fmt::format("{}x{}", rows, columns)
+                                          : fmt::format("{} ({}x{})", meaning, rows, columns)));
+}
+
+Expected<void> check_square(const MatrixRef& M, std::string_view where, std::string_view name) {
+  if (M.size() == 0) {
+    return tl::unexpected(Error(ArgumentError::empty)
+                              .in(std::string(where))
+                              .about(std::string(name))
+                              .got("empty")
+                              .expected("a square matrix with at least one row"));
+  }
+  if (M.rows() != M.cols()) {
+    return tl::unexpected(Error(ArgumentError::wrong_shape)
+                              .in(std::string(where))
+                              .about(std::string(name))
+                              .got(shape_text(M))
+                              .expected("square"));
+  }
+  return {};
+}
+
+Expected<void> check_finite(const MatrixRef& M, std::string_view where, std::string_view name) {
+  for (Eigen::Index j = 0; j < M.cols(); ++j) {
+    for (Eigen::Index i = 0; i < M.rows(); ++i) {
+      if (!std::isfinite(M(i, j))) {
+        return tl::unexpected(Error(ArgumentError::not_finite)
+                                  .in(std::string(where))
+                                  .about(fmt::format("{}({}, {})", name, i, j))
+                                  .got(format_number(M(i, j)))
+                                  .expected("a finite number"));
+      }
+    }
+  }
+  return {};
+}
+
+Expected<void> check_finite(double value, std::string_view where, std::string_view name) {
+  if (std::isfinite(value)) {
+    return {};
+  }
+  return tl::unexpected(Error(ArgumentError::not_finite)
+                            .in(std::string(where))
+                            .about(std::string(name))
+                            .got(format_number(value))
+                            .expected("a finite number"));
+}
+
+Expected<void> check_symmetric(const MatrixRef& M, std::string_view where, std::string_view name) {
+  if (auto square = check_square(M, where, name); !square) {
+    return square;
+  }
+  const double limit = 1e-10 * M.cwiseAbs().maxCoeff();
+  for (Eigen::Index j = 0; j < M.cols(); ++j) {
+    for (Eigen::Index i = 0; i < j; ++i) {
+      if (!(std::abs(M(i, j) - M(j, i)) <= limit)) {
+        return tl::unexpected(
+            Error(ArgumentError::not_symmetric)
+                .in(std::string(where))
+                .about(std::string(name))
+                .got(
+                    fmt::format("not symmetric: entries ({0}, {1}) and ({1}, {0}) are {2:.17g} and "
+                                "{3:.17g}",
+                                i, j, M(i, j), M(j, i)))
+                .expected("symmetric"));
+      }
+    }
+  }
+  return {};
+}
+
+Expected<void> check_positive(double value, std::string_view where, std::string_view name,
+                              std::string_view unit) {
+  if (auto finite = check_finite(value, where, name); !finite) {
+    return finite;
+  }
+  if (value > 0.0) {
+    return {};
+  }
+  return tl::unexpected(Error(ArgumentError::not_positive)
+                            .in(std::string(where))
+                            .about(std::string(name))
+                            .got(with_unit(value, unit))
+                            .expected("greater than zero"));
+}
+
+Expected<void> check_not_negative(double value, std::string_view where, std::string_view name,
+                                  std::string_view unit) {
+  if (auto finite = check_finite(value, where, name); !finite) {
+    return finite;
+  }
+  if (value >= 0.0) {
+    return {};
+  }
+  return tl::unexpected(Error(ArgumentError::out_of_range)
+                            .in(std::string(where))
+                            .about(std::string(name))
+                            .got(with_unit(value, unit))
+                            .expected("zero or greater"));
+}
+
+}  // namespace flyball

@@ -1,0 +1,115 @@
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <flyball/core/error.hpp>
+
+namespace flyball {
+
+Error&& Error::in(std::string where) && {
+  where_ = std::move(where);
+  return std::move(*this);
+}
+
+Error&& Error::about(std::string subject) && {
+  subject_ = std::move(subject);
+  return std::move(*this);
+}
+
+Error&& Error::expected(std::string what) && {
+  expected_ = std::move(what);
+  return std::move(*this);
+}
+
+Error&& Error::got(std::string what) && {
+  got_ = std::move(what);
+  return std::move(*this);
+}
+
+Error&& Error::hint(std::string how_to_mend) && {
+  hint_ = std::move(how_to_mend);
+  return std::move(*this);
+}
+
+Error&& Error::with(std::string name, double value) && {
+  evidence_.push_back({std::move(name), {value}, {}});
+  return std::move(*this);
+}
+
+Error&& Error::with(std::string name, std::vector<double> values) && {
+  evidence_.push_back({std::move(name), std::move(values), {}});
+  return std::move(*this);
+}
+
+Error&& Error::with(std::string name, std::string text) && {
+  evidence_.push_back({std::move(name), {}, std::move(text)});
+  return std::move(*this);
+}
+
+std::string to_string(const Error& error) {
+  std::string text;
+  if (!error.where_.empty()) {
+    text += error.where_ + ": ";
+  }
+  if (!error.subject_.empty() && !error.got_.empty()) {
+    text += fmt::format("{} is {}", error.subject_, error.got_);
+  } else if (!error.subject_.empty()) {
+    text += fmt::format("{}: {}", error.subject_, error.info_.summary);
+  } else if (!error.got_.empty()) {
+    text += fmt::format("{}: got {}", error.info_.summary, error.got_);
+  } else {
+    text += error.info_.summary;
+  }
+  if (!error.expected_.empty()) {
+    text += fmt::format("; it must be {}", error.expected_);
+  }
+  if (!error.hint_.empty()) {
+    text += "; " + error.hint_;
+  }
+  if (!error.evidence_.empty()) {
+    text += " (";
+    for (std::size_t i = 0; i < error.evidence_.size(); ++i) {
+      const Evidence& evidence = error.evidence_[i];
+      text += i == 0 ? "" : ", ";
+      if (evidence.values.size() == 1) {
+        text += fmt::format("{} = {:.6g}", evidence.name, evidence.values.front());
+      } else if (!evidence.values.empty()) {
+        text += fmt::format("{} = [{:.6g}]", evidence.name, fmt::join(evidence.values, ", "));
+      } else {
+        text += fmt::format("{}: {}", evidence.name, evidence.text);
+      }
+    }
+    text += ")";
+  }
+  return text;
+}
+
+ErrorInfo error_info(ArgumentError code) {
+  constexpr std::string_view family = "argument";
+  switch (code) {
+    case ArgumentError::wrong_shape:
+      return {family, "wrong_shape", "the shape does not fit", ErrorKind::misuse};
+    case ArgumentError::not_finite:
+      return {family, "not_finite", "NaN or infinity", ErrorKind::misuse};
+    case ArgumentError::not_symmetric:
+      return {family, "not_symmetric", "the matrix is not symmetric", ErrorKind::misuse};
+    case ArgumentError::not_positive:
+      return {family, "not_positive", "the value is not positive", ErrorKind::misuse};
+    case ArgumentError::out_of_range:
+      return {family, "out_of_range", "the value is out of range", ErrorKind::misuse};
+    case ArgumentError::empty:
+      return {family, "empty", "nothing is given", ErrorKind::misuse};
+    case ArgumentError::wrong_unit:
+      return {family, "wrong_unit", "the unit does not fit", ErrorKind::misuse};
+    case ArgumentError::unknown_name:
+      return {family, "unknown_name", "the name is not known", ErrorKind::misuse};
+    case ArgumentError::ambiguous_name:
+      return {family, "ambiguous_name", "the name fits several", ErrorKind::misuse};
+    case ArgumentError::malformed:
+      return {family, "malformed", "the text cannot be read", ErrorKind::misuse};
+  }
+  return {family, "unknown", "unknown error", ErrorKind::defect};
+}
+
+}  // namespace flyball
