@@ -1,8 +1,8 @@
+#include <flyball/core/argument.hpp>
+
 #include <cmath>
 
 #include <fmt/format.h>
-
-#include <flyball/core/argument.hpp>
 
 namespace flyball {
 

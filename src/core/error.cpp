@@ -1,9 +1,9 @@
+#include <flyball/core/error.hpp>
+
 #include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-
-#include <flyball/core/error.hpp>
 
 namespace flyball {
 

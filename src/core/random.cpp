@@ -1,7 +1,7 @@
+#include <flyball/core/random.hpp>
+
 #include <bit>
 #include <cmath>
-
-#include <flyball/core/random.hpp>
 
 namespace flyball {
 

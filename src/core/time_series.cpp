@@ -1,10 +1,10 @@
+#include <flyball/core/time_series.hpp>
+
 #include <algorithm>
 #include <cassert>
 #include <utility>
 
 #include <fmt/format.h>
-
-#include <flyball/core/time_series.hpp>
 
 namespace flyball {
 
