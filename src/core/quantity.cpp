@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <flyball/core/quantity.hpp>
+#include <flyball/core/text.hpp>
 
 namespace flyball {
 
@@ -212,35 +213,12 @@ const NamedUnit* find_unit(std::string_view text) {
   return match(singular(folded), true);
 }
 
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) {
-    row[j] = j;
-  }
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
-      diagonal = above;
-    }
-  }
-  return row[b.size()];
-}
-
-std::string_view nearest_unit(std::string_view text) {
-  const std::string wanted = canonical(text);
-  std::string_view best;
-  std::size_t best_distance = 3;
+std::string nearest_unit(std::string_view text) {
+  std::vector<std::string_view> names;
   for (const NamedUnit& unit : units) {
-    const std::size_t distance = edit_distance(wanted, unit.text);
-    if (!unit.text.empty() && distance < best_distance) {
-      best_distance = distance;
-      best = unit.text;
-    }
+    names.push_back(unit.text);
   }
-  return best;
+  return nearest_name(canonical(text), names);
 }
 
 std::string_view example(Dimension dimension) {
@@ -377,7 +355,7 @@ Expected<Unit> parse_unit(std::string_view text) {
   if (const NamedUnit* unit = find_unit(trim(text))) {
     return Unit{unit->dimension, unit->factor};
   }
-  const std::string_view nearest = nearest_unit(text);
+  const std::string nearest = nearest_unit(text);
   return tl::unexpected(Error(ArgumentError::wrong_unit)
                             .about("unit")
                             .got(fmt::format("\"{}\", which is not known", text))
@@ -417,7 +395,7 @@ Expected<double> parse_quantity(std::string_view text, Dimension dimension, std:
   }
   auto unit = parse_unit(unit_text);
   if (!unit) {
-    const std::string_view nearest = nearest_unit(unit_text);
+    const std::string nearest = nearest_unit(unit_text);
     return tl::unexpected(Error(ArgumentError::wrong_unit)
                               .about(std::string(name))
                               .got(fmt::format("\"{}\", in an unknown unit", text))

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/core/quantity.hpp>
+
+namespace flyball {
+
+/// A continuous linear time-invariant system, sized at compile time or dynamic.
+///
+/// dx/dt = A x + B u, y = C x + D u (Definition 6.3.1).
+template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic, int Outputs = Eigen::Dynamic>
+struct ContinuousSystem {
+  Eigen::Matrix<double, States, States> A;   ///< States x states, system matrix.
+  Eigen::Matrix<double, States, Inputs> B;   ///< States x inputs, input matrix.
+  Eigen::Matrix<double, Outputs, States> C;  ///< Outputs x states, output matrix.
+  Eigen::Matrix<double, Outputs, Inputs> D;  ///< Outputs x inputs, feedthrough matrix.
+};
+
+/// A discrete linear time-invariant system; it carries its sample period, and is a type of its own
+/// so that a continuous model cannot be passed for it.
+///
+/// x_{k+1} = A x_k + B u_k, y_k = C x_k + D u_k (Definition 7.4.1).
+template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic, int Outputs = Eigen::Dynamic>
+struct DiscreteSystem {
+  Eigen::Matrix<double, States, States> A;   ///< States x states, system matrix.
+  Eigen::Matrix<double, States, Inputs> B;   ///< States x inputs, input matrix.
+  Eigen::Matrix<double, Outputs, States> C;  ///< Outputs x states, output matrix.
+  Eigen::Matrix<double, Outputs, Inputs> D;  ///< Outputs x inputs, feedthrough matrix.
+  Time period;                               ///< Sample period, s.
+};
+
+/// Shapes that fit each other and finite entries (Table 6.1).
+/// @param where  The function that asks, for the message.
+/// @errors ArgumentError::wrong_shape, empty, not_finite.
+[[nodiscard]] Expected<void> check_system(const MatrixRef& A, const MatrixRef& B,
+                                          const MatrixRef& C, const MatrixRef& D,
+                                          std::string_view where);
+
+template <int States, int Inputs, int Outputs>
+[[nodiscard]] Expected<void> check_system(const ContinuousSystem<States, Inputs, Outputs>& system,
+                                          std::string_view where) {
+  return check_system(system.A, system.B, system.C, system.D, where);
+}
+
+/// As for a continuous system; the period must be positive.
+template <int States, int Inputs, int Outputs>
+[[nodiscard]] Expected<void> check_system(const DiscreteSystem<States, Inputs, Outputs>& system,
+                                          std::string_view where) {
+  auto period = check_positive(system.period.si(), where, "period", "s");
+  return period ? check_system(system.A, system.B, system.C, system.D, where) : period;
+}
+
+/// The eigenvalues of A: the poles, in no particular order.
+/// @param A  n x n. @return n eigenvalues.
+/// @errors ArgumentError::wrong_shape, empty, not_finite; malformed if the QR iteration fails.
+/// Cost: O(n³), allocates.
+[[nodiscard]] Expected<Eigen::VectorXcd> poles(const MatrixRef& A);
+
+/// Poles of a system (section 6.4 for the continuous, 7.1 for the discrete case).
+template <class System>
+[[nodiscard]] Expected<Eigen::VectorXcd> poles(const System& system)
+  requires requires { system.A; }
+{
+  return poles(MatrixRef(system.A));
+}
+
+/// Whether every pole has a negative real part (section 6.4).
+[[nodiscard]] bool is_stable_continuous(const Eigen::VectorXcd& poles) noexcept;
+/// Whether every pole lies within the unit circle (section 7.1.1).
+[[nodiscard]] bool is_stable_discrete(const Eigen::VectorXcd& poles) noexcept;
+
+template <int States, int Inputs, int Outputs>
+[[nodiscard]] Expected<bool> is_stable(const ContinuousSystem<States, Inputs, Outputs>& system) {
+  return poles(system).map(is_stable_continuous);
+}
+template <int States, int Inputs, int Outputs>
+[[nodiscard]] Expected<bool> is_stable(const DiscreteSystem<States, Inputs, Outputs>& system) {
+  return poles(system).map(is_stable_discrete);
+}
+
+}  // namespace flyball

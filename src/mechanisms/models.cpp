@@ -1,0 +1,147 @@
+#include <flyball/mechanisms/arm.hpp>
+#include <flyball/mechanisms/elevator.hpp>
+#include <flyball/mechanisms/flywheel.hpp>
+#include <flyball/mechanisms/velocity_servo.hpp>
+
+namespace flyball::mechanisms {
+
+namespace {
+
+constexpr std::string_view gearing_hint =
+    "; write motor turns per output turn, above 1 for a reduction";
+
+Expected<void> check_drive(const DcMotor& motor, double gearing, std::string_view where) {
+  if (motor.count < 1) {
+    return tl::unexpected(Error(ArgumentError::out_of_range)
+                              .in(std::string(where))
+                              .about("motor count")
+                              .got(std::to_string(motor.count))
+                              .expected("at least 1"));
+  }
+  if (auto checked = check_all(check_positive(motor.R, where, "motor.R", "Ohm"),
+                               check_positive(motor.Kt, where, "motor.Kt", "N m/A"),
+                               check_positive(motor.Kv, where, "motor.Kv", "rad/s/V"));
+      !checked) {
+    return checked;
+  }
+  if (!(gearing > 0.0) || !std::isfinite(gearing)) {
+    return tl::unexpected(Error(ArgumentError::not_positive)
+                              .in(std::string(where))
+                              .about("gearing")
+                              .got(format_number(gearing))
+                              .expected("greater than zero" + std::string(gearing_hint)));
+  }
+  return {};
+}
+
+Expected<void> check_gains(const FeedforwardGains& gains, std::string_view where) {
+  return check_all(check_positive(gains.kV, where, "kV"), check_positive(gains.kA, where, "kA"),
+                   check_not_negative(gains.kS, where, "kS", "V"),
+                   check_finite(gains.kG, where, "kG"),
+                   check_finite(gains.angle_offset, where, "angle_offset"));
+}
+
+Flywheel velocity_model(const FeedforwardGains& gains, double nominal_voltage) {
+  Flywheel model;
+  model.A << -gains.kV / gains.kA;
+  model.B << 1.0 / gains.kA;
+  model.C << 1.0;
+  model.D << 0.0;
+  model.kind = MechanismKind::flywheel;
+  model.gains = gains;
+  model.nominal_voltage = nominal_voltage;
+  return model;
+}
+
+Mechanism<2> position_model(MechanismKind kind, const FeedforwardGains& gains,
+                            double nominal_voltage) {
+  Mechanism<2> model;
+  model.A << 0.0, 1.0, 0.0, -gains.kV / gains.kA;
+  model.B << 0.0, 1.0 / gains.kA;
+  model.C << 1.0, 0.0;
+  model.D << 0.0;
+  model.kind = kind;
+  model.gains = gains;
+  model.nominal_voltage = nominal_voltage;
+  return model;
+}
+
+// The theorems' matrices are -kV/kA and 1/kA of these gains:
+// kV = G/K_v volts a rad/s at the output, kA = R J/(G K_t).
+FeedforwardGains rotational_gains(const DcMotor& motor, double G, double J) {
+  return {.kS = 0.0, .kV = G / motor.Kv, .kA = motor.R * J / (G * motor.Kt)};
+}
+
+}  // namespace
+
+Expected<Flywheel> flywheel(const FlywheelParameters& parameters) {
+  constexpr std::string_view where = "flywheel";
+  const auto& [motor, G, J] = parameters;
+  if (auto checked = check_all(check_drive(motor, G, where),
+                               check_positive(J.si(), where, "moment_of_inertia", "kg m^2"));
+      !checked) {
+    return tl::unexpected(checked.error());
+  }
+  return velocity_model(rotational_gains(motor, G, J.si()), motor.nominal_voltage);
+}
+
+Expected<Elevator> elevator(const ElevatorParameters& parameters) {
+  constexpr std::string_view where = "elevator";
+  const auto& [motor, G, mass, drum_radius] = parameters;
+  const double m = mass.si();
+  const double r = drum_radius.si();
+  if (auto checked = check_all(check_drive(motor, G, where), check_positive(m, where, "mass", "kg"),
+                               check_positive(r, where, "drum_radius", "m"));
+      !checked) {
+    return tl::unexpected(checked.error());
+  }
+  const FeedforwardGains gains{.kS = 0.0,
+                               .kV = G / (motor.Kv * r),
+                               .kA = motor.R * r * m / (G * motor.Kt),
+                               .kG = motor.R * r * m * standard_gravity / (G * motor.Kt)};
+  return position_model(MechanismKind::elevator, gains, motor.nominal_voltage);
+}
+
+Expected<Arm> arm(const ArmParameters& parameters) {
+  constexpr std::string_view where = "arm";
+  const auto& [motor, G, J, mass, center_of_mass] = parameters;
+  const double m = mass.si();
+  const double l = center_of_mass.si();
+  if (auto checked = check_all(check_drive(motor, G, where),
+                               check_positive(J.si(), where, "moment_of_inertia", "kg m^2"),
+                               check_not_negative(m, where, "mass", "kg"),
+                               check_not_negative(l, where, "center_of_mass", "m"));
+      !checked) {
+    return tl::unexpected(checked.error());
+  }
+  FeedforwardGains gains = rotational_gains(motor, G, J.si());
+  gains.kG = motor.R * m * standard_gravity * l / (G * motor.Kt);
+  return position_model(MechanismKind::arm, gains, motor.nominal_voltage);
+}
+
+Expected<Flywheel> flywheel(const FeedforwardGains& gains) {
+  return check_gains(gains, "flywheel").map([&] { return velocity_model(gains, 12.0); });
+}
+
+Expected<Elevator> elevator(const FeedforwardGains& gains) {
+  return check_gains(gains, "elevator").map([&] {
+    return position_model(MechanismKind::elevator, gains, 12.0);
+  });
+}
+
+Expected<Arm> arm(const FeedforwardGains& gains) {
+  return check_gains(gains, "arm").map([&] {
+    return position_model(MechanismKind::arm, gains, 12.0);
+  });
+}
+
+ContinuousSystem<1, 1, 1> velocity_servo() {
+  ContinuousSystem<1, 1, 1> system;
+  system.A << 0.0;
+  system.B << 1.0;
+  system.C << 1.0;
+  system.D << 0.0;
+  return system;
+}
+
+}  // namespace flyball::mechanisms
