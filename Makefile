@@ -1,0 +1,55 @@
+# Thin: each target is a script or a preset. `make help` lists them.
+JOBS ?= $(shell nproc)
+BUILD := build/release
+
+ifneq ($(shell command -v ccache),)
+LAUNCHER := -DCMAKE_CXX_COMPILER_LAUNCHER=ccache
+export CCACHE_SLOPPINESS := pch_defines,time_macros
+endif
+
+.PHONY: help demo test build bench format format-check lint docs install clean configure
+.DEFAULT_GOAL := help
+
+help:  ## Show this list
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 22
+
+demo:  ## Install what is missing, build the command, tune an example log
+	@scripts/install-deps
+	@$(MAKE) --no-print-directory configure
+	@cmake --build $(BUILD) --parallel $(JOBS) --target flyball_command
+	@scripts/demo
+
+test:  ## Install what is missing, build everything, run every test
+	@scripts/install-deps --dev
+	@$(MAKE) --no-print-directory build
+	@ctest --preset release --parallel $(JOBS)
+
+build: configure  ## Build everything
+	@cmake --build $(BUILD) --parallel $(JOBS)
+
+bench:  ## Build and run the benchmarks: ratios against named peers
+	@scripts/install-deps --dev
+	@scripts/bench $(JOBS)
+
+format:  ## Format every C++ file
+	@scripts/format
+
+format-check:  ## Fail if a C++ file is not formatted
+	@scripts/format --check
+
+lint:  ## clang-tidy over all sources; CHANGED=1: only what differs from main
+	@scripts/install-deps --dev
+	@scripts/lint $(if $(CHANGED),--changed)
+
+docs:  ## Doxygen pages of the public headers, in docs/html
+	@scripts/install-deps --dev
+	@scripts/docs
+
+install: build  ## Install library and command; PREFIX=... says where
+	@cmake --install $(BUILD) $(if $(PREFIX),--prefix $(PREFIX))
+
+clean:  ## Remove what was built
+	@rm -rf build docs/html
+
+configure:
+	@cmake --preset release --log-level=WARNING $(LAUNCHER)

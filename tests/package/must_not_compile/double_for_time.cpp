@@ -1,0 +1,14 @@
+// error: no known conversion|no matching function|could not convert|cannot convert
+#include <flyball/core/quantity.hpp>
+
+using namespace flyball::literals;
+
+void sample(flyball::Time period);
+
+void run() {
+#ifdef WRONG
+  sample(0.02);
+#else
+  sample(20_ms);
+#endif
+}
