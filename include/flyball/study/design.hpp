@@ -1,0 +1,161 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <flyball/core/diagnostic.hpp>
+#include <flyball/core/expected.hpp>
+#include <flyball/core/time_series.hpp>
+#include <flyball/mechanisms/mechanism.hpp>
+#include <flyball/mechanisms/motor.hpp>
+
+namespace flyball::study {
+
+/// The mechanism to be controlled: gains (identified, or computed from mass, gearing and motors).
+struct PlantDescription {
+  mechanisms::MechanismKind kind{};
+  std::string unit = "rad";  ///< "m" or "rad".
+  mechanisms::FeedforwardGains gains;
+  bool kA_determined = true;                 ///< If not, Theorem 14.3.2 is the plant.
+  double kA_upper_bound = 0.0;               ///< V·s²/unit, if not determined.
+  std::optional<mechanisms::DcMotor> motor;  ///< If known: current and battery sag are simulated.
+  double gearing = 1.0;                      ///< Motor turns per output turn.
+  double drum_radius = 0.0;                  ///< m, elevators with a known drum, else 0.
+  double nominal_voltage = 12.0;             ///< V
+};
+
+/// What the controller has to do and what it works with. Empty optionals get a default that the
+/// result's diagnostics tell.
+struct ControllerOptions {
+  double period = 0.020;                ///< s
+  std::vector<double> state_tolerance;  ///< Bryson's largest acceptable errors; empty: chosen.
+  double input_tolerance = 12.0;        ///< V
+  double max_voltage = 12.0;            ///< V, the input's limit.
+  std::optional<double> delay;          ///< s, from sensing to acting; identified or 0 if absent.
+};
+
+/// What is measured, per sample, and how far the model is trusted.
+struct EstimatorOptions {
+  std::optional<double> measurement_std;  ///< unit (position) or unit/s (flywheel).
+  std::vector<double> model_std;          ///< Per sample and state; empty: chosen.
+};
+
+struct SensorOptions {
+  double resolution = 0.0;  ///< unit, smallest step of the sensor; 0 for none.
+};
+
+struct BatteryOptions {
+  double open_circuit_voltage = 12.5;  ///< V
+  double resistance = 0.020;           ///< Ohm
+};
+
+struct ProfileOptions {
+  std::optional<double> goal;              ///< unit (or unit/s for a flywheel).
+  std::optional<double> max_velocity;      ///< unit/s; the fastest the motor can follow if absent.
+  std::optional<double> max_acceleration;  ///< unit/s²
+};
+
+/// Design a controller for a mechanism.
+struct DesignJob {
+  PlantDescription plant;
+  ControllerOptions controller;
+  EstimatorOptions estimator;
+  SensorOptions sensor;
+  BatteryOptions battery;
+  ProfileOptions profile;
+  unsigned long long seed = 1;
+};
+
+/// Robustness of the loop broken at the plant input, with the delay in it.
+struct LoopMargins {
+  double gain_margin = 0.0;     ///< Ratio > 1 by which the gain may rise; infinity if any.
+  double gain_reduction = 0.0;  ///< Ratio < 1 to which the gain may fall; 0 if any.
+  double phase_margin = 0.0;    ///< rad
+  double delay_margin = 0.0;    ///< s, further delay that is tolerated.
+  double disk_margin = 0.0;     ///< Symmetric disk margin α.
+  double crossover = 0.0;       ///< rad/s, gain crossover that limits the phase; 0 if none.
+};
+
+/// One point of the grid over inertia and gain errors.
+struct RobustnessPoint {
+  double inertia_factor = 1.0;  ///< True inertia over the model's.
+  double gain_factor = 1.0;     ///< True actuator gain over the model's.
+  bool stable = false;
+  double spectral_radius = 0.0;  ///< Of the closed loop.
+  double overshoot = 0.0;        ///< Of a small step, as a share of it; infinity if unstable.
+};
+
+/// The fastest trapezoid that the motor can follow with its voltage.
+struct MotionLimits {
+  double max_velocity = 0.0;      ///< unit/s
+  double max_acceleration = 0.0;  ///< unit/s²
+  double goal = 0.0;              ///< unit (unit/s for a flywheel), of the simulated motion.
+  double duration = 0.0;          ///< s
+  double voltage_reserve = 0.0;   ///< V kept back for feedback.
+};
+
+/// Gains in the unit that other tools want, per output unit named by `per`.
+struct PasteGains {
+  std::string per;  ///< "rad", "m", "rotation", "RPM", …
+  double kP = 0.0;  ///< V/unit (position) or V/(unit/s) (flywheel).
+  double kD = 0.0;  ///< V/(unit/s)
+  double kS = 0.0;  ///< V
+  double kV = 0.0;  ///< V/(unit/s)
+  double kA = 0.0;  ///< V/(unit/s²)
+  double kG = 0.0;  ///< V
+};
+
+/// A designed loop: what to implement, how well it holds, how it behaves.
+///
+/// States are [position, velocity] for elevators and arms, [velocity] for a flywheel, and
+/// [position] when kA is not determined (then the input u is a velocity and the volts are
+/// kS sgn(u) + kV u + gravity).
+struct DesignResult {
+  DesignJob job;                    ///< As run, with every default filled in.
+  std::vector<std::string> states;  ///< Names with units: "position (m)", …
+  bool velocity_servo = false;      ///< Theorem 14.3.2 is the plant.
+
+  Eigen::MatrixXd A_continuous, B_continuous;
+  Eigen::MatrixXd A, B, C;      ///< Discrete plant (Theorem 7.3.1) and its output.
+  Eigen::MatrixXd Q, R;         ///< LQR weights (Bryson).
+  Eigen::MatrixXd K;            ///< LQR gain, u = K (r - x).
+  Eigen::MatrixXd K_delayed;    ///< The gain with the delay compensated (B.12); what is used.
+  Eigen::VectorXcd poles;       ///< Closed-loop poles of A - B K.
+  Eigen::MatrixXd kalman_gain;  ///< Filter form (9.22).
+  Eigen::VectorXcd estimator_poles;
+  Eigen::MatrixXd inversion;  ///< B⁺ of the plant inversion u = B⁺ (r' - A r).
+
+  LoopMargins margins;
+  std::vector<RobustnessPoint> robustness;
+  bool robust = false;  ///< Whether every point of the grid is stable.
+  double worst_overshoot = 0.0;
+
+  MotionLimits motion;
+  TimeSeries response;  ///< The simulated closed loop: columns in the order of `simulate_loop`.
+  double tracking_error_rms =
+      0.0;  ///< unit, of the true position (velocity) against the reference.
+  double tracking_error_max = 0.0;
+
+  std::vector<PasteGains> paste;
+  std::vector<Diagnostic> diagnostics;
+};
+
+/// Runs the job: discretise, LQR by Bryson's rule, delay compensation, steady-state Kalman gain,
+/// feedforward, margins, robustness grid, and a simulated trapezoid with noise, quantisation, delay
+/// and battery sag.
+/// @errors ArgumentError for meaningless options; RiccatiError when no controller exists;
+///         DesignError.
+[[nodiscard]] Expected<DesignResult> design(const DesignJob& job);
+
+/// Why a well-formed job has no design.
+enum class DesignError {
+  gravity_too_strong,  ///< The motor cannot hold the mechanism within its voltage.
+  no_motion_possible,  ///< Friction and gravity leave no voltage to move with.
+  margins_lost,        ///< The loop with its delay is unstable for every tolerance tried.
+};
+[[nodiscard]] ErrorInfo error_info(DesignError code);
+
+}  // namespace flyball::study

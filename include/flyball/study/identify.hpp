@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+
+#include <flyball/identification/feedforward_fit.hpp>
+#include <flyball/study/recording.hpp>
+
+namespace flyball::study {
+
+/// Identify a mechanism from a log.
+struct IdentifyJob {
+  std::string log;  ///< Path.
+  LogSelection selection;
+};
+
+/// A log, read and fitted. A refused fit still carries everything that can be shown of the log.
+struct IdentifyResult {
+  LoadedRecording source;
+  identification::FitReport
+      report;  ///< `report.fit` is the gains or the reason why there are none.
+  mechanisms::MechanismKind mechanism{};
+  std::string unit;  ///< "m" or "rad".
+
+  /// Everything found while reading, preparing and fitting, in that order.
+  [[nodiscard]] std::vector<Diagnostic> diagnostics() const;
+};
+
+/// Runs the job. An error means that the log could not be read as a recording at all; a fit that
+/// was refused is in `report.fit`.
+/// @errors as `load_recording`.
+[[nodiscard]] Expected<IdentifyResult> identify(const IdentifyJob& job);
+
+}  // namespace flyball::study

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <flyball/core/expected.hpp>
+#include <flyball/study/design.hpp>
+
+namespace flyball::study {
+
+/// What is wrong with a project file; each error carries file, line and column in `where`.
+enum class ProjectError {
+  syntax,       ///< Not TOML.
+  unknown_key,  ///< A key that means nothing; the nearest valid one is the hint.
+  missing_key,  ///< A key without which the mechanism is not defined.
+  wrong_type,   ///< A number where a text with a unit is needed, or the like.
+  wrong_value,  ///< A value that cannot be.
+};
+[[nodiscard]] ErrorInfo error_info(ProjectError code);
+
+/// A TOML project file: the design job it describes. `has_plant` tells whether it defines the
+/// mechanism (a file that only sets controller options can accompany a log).
+struct Project {
+  std::string path;
+  bool has_plant = false;
+  bool sets_state_tolerance = false;
+  std::optional<mechanisms::MechanismKind> mechanism;
+  DesignJob job;
+};
+
+/// Reads a project file. @errors ProjectError, io::FileError, ArgumentError (units, motors).
+[[nodiscard]] Expected<Project> read_project(const std::string& path);
+
+/// Parses its text. @param name  The file's name for messages.
+[[nodiscard]] Expected<Project> parse_project(std::string_view text, const std::string& name);
+
+}  // namespace flyball::study
