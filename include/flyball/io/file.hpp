@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <flyball/core/expected.hpp>
+
+namespace flyball {
+
+/// What the file system refused.
+enum class FileError {
+  not_found,      ///< There is no such file (or no folder to put it in).
+  is_a_folder,    ///< A folder where a file is needed.
+  not_a_folder,   ///< A file where a folder is needed.
+  not_readable,   ///< It exists and cannot be read.
+  not_writable,   ///< It cannot be created, written or renamed into place.
+  too_large,      ///< More bytes than the caller is willing to hold.
+  folder_in_use,  ///< A non-empty output folder that Flyball did not make.
+};
+[[nodiscard]] ErrorInfo error_info(FileError code);
+
+/// The largest file that is read unless the caller says otherwise: 512 MiB.
+inline constexpr std::size_t default_max_file_bytes = std::size_t{512} << 20;
+
+/// The bytes of a file.
+/// @param path       The file; pipes and other streams are read to their end.
+/// @param max_bytes  More is refused before it is held in memory.
+/// @errors FileError::not_found, is_a_folder, not_readable, too_large.
+[[nodiscard]] Expected<std::string> read_file(const std::string& path,
+                                              std::size_t max_bytes = default_max_file_bytes);
+
+/// Writes a file so that a reader sees the old contents or the new ones, never half: a temporary
+/// name in the same folder, then rename. On an error nothing is left behind. A symbolic link keeps
+/// pointing at its target, whose contents are replaced; devices and pipes are written directly.
+/// @errors FileError::not_found (the folder), is_a_folder, not_writable.
+[[nodiscard]] Expected<void> write_file_atomically(const std::string& path,
+                                                   std::string_view contents);
+
+/// A report folder that appears whole or not at all: it is built under a temporary name beside its
+/// destination and renamed into place by `commit`; without a commit, the destructor removes every
+/// trace.
+///
+/// The folder carries a marker file, `.flyball-report`, by which a later run knows that it may
+/// replace it.
+class OutputFolder {
+ public:
+  static constexpr std::string_view marker = ".flyball-report";
+
+  /// @param path  The destination. It may not exist, be empty, or hold an earlier report; missing
+  ///              parents are made.
+  /// @errors FileError::folder_in_use, not_a_folder, not_writable.
+  [[nodiscard]] static Expected<OutputFolder> create(const std::string& path);
+
+  OutputFolder(OutputFolder&& other) noexcept;
+  OutputFolder& operator=(OutputFolder&& other) noexcept;
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+  ~OutputFolder();
+
+  /// Where to write until `commit`: the temporary folder.
+  [[nodiscard]] const std::string& path() const noexcept { return building_; }
+  /// Where the folder will stand.
+  [[nodiscard]] const std::string& destination() const noexcept { return destination_; }
+
+  /// Writes a file of the report. @param name  Relative, such as "gains.toml" or "data/fit.csv".
+  /// @errors FileError::not_writable, also for a name that leads out of the folder.
+  [[nodiscard]] Expected<void> write(std::string_view name, std::string_view contents) const;
+
+  /// Renames the folder into place. @errors FileError::folder_in_use (somebody filled the
+  /// destination meanwhile), not_writable; the destination is then as it was.
+  [[nodiscard]] Expected<void> commit();
+
+ private:
+  OutputFolder() = default;
+  void discard() noexcept;
+
+  std::string building_;  ///< Empty once committed or moved from.
+  std::string destination_;
+  std::vector<std::string> made_parents_;  ///< Outermost first.
+};
+
+}  // namespace flyball

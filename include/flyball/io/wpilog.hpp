@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <flyball/core/expected.hpp>
+#include <flyball/io/log.hpp>
+
+namespace flyball {
+
+/// Decodes a WPILOG 1.x, WPILib's robot data log.
+///
+/// Decoded: double, float, int64, boolean, their arrays (element i of `name` is `name[i]`, up to 64
+/// of them), string and json. Everything else is listed in `Log::skipped`. A channel's unit is its
+/// metadata ("Volt"), or the "unit" of metadata that is JSON. Entries of one name and type are one
+/// channel, also when an id is finished and reused.
+///
+/// No length in the file is believed before it is compared with the bytes that are there; a record
+/// that does not fit ends the log (`truncated_log`), which is what a power cut leaves behind.
+///
+/// @errors LogError::wrong_magic, wrong_version, malformed (a header that is cut), no_data.
+/// Source: WPILib Data Log File Format Specification, version 1.0.
+[[nodiscard]] Expected<Log> parse_wpilog(std::string_view bytes, const std::string& source);
+
+/// Builds a WPILOG 1.0 in memory.
+class WpilogWriter {
+ public:
+  using Id = std::uint32_t;
+
+  /// @param extra  The header's free text.
+  explicit WpilogWriter(std::string_view extra = "Flyball");
+
+  /// Opens a channel. @param type  "double", "string", …: what will be appended.
+  /// @param metadata  The unit's name, or JSON. @param time  s, as all times here.
+  Id start(std::string_view name, std::string_view type, std::string_view metadata = {},
+           double time = 0.0);
+  void finish(Id id, double time);
+  void set_metadata(Id id, std::string_view metadata, double time);
+
+  void append(Id id, double time, double value);
+  void append(Id id, double time, float value);
+  void append(Id id, double time, std::int64_t value);
+  void append(Id id, double time, bool value);
+  void append(Id id, double time, std::string_view value);
+  void append(Id id, double time, const char* value) { append(id, time, std::string_view(value)); }
+  void append(Id id, double time, std::span<const double> values);
+  /// A payload of a type that this class does not encode.
+  void append_raw(Id id, double time, std::string_view payload);
+
+  [[nodiscard]] const std::string& bytes() const noexcept { return bytes_; }
+
+ private:
+  void record(Id id, double time, std::string_view payload);
+
+  std::string bytes_;
+  Id next_ = 1;
+};
+
+/// Writes the signals (as double, their unit as metadata) and texts (as string) of a log in time
+/// order, atomically. Times are rounded to microseconds, which is what the format holds.
+/// @errors FileError, ArgumentError::not_finite or out_of_range (a time that is negative),
+///         wrong_shape.
+[[nodiscard]] Expected<void> write_wpilog(const std::string& path, const Log& log);
+
+/// The bytes that `write_wpilog` writes. @errors The same, without FileError.
+[[nodiscard]] Expected<std::string> to_wpilog(const Log& log);
+
+}  // namespace flyball

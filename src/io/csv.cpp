@@ -1,0 +1,340 @@
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <flyball/core/quantity.hpp>
+#include <flyball/io/csv.hpp>
+#include <flyball/io/file.hpp>
+
+#include "io/csv_table.hpp"
+#include "io/signals.hpp"
+#include "io/text.hpp"
+
+namespace flyball {
+namespace {
+
+using io::CsvTable;
+
+struct Header {
+  std::string name;
+  std::string unit;
+};
+
+/// "Velocity (m/s)", "Velocity [m/s]" and "Position(m)" into name and unit.
+Header split_header(std::string_view text) {
+  text = io::trim(text);
+  for (const auto& [open, close] : {std::pair{'(', ')'}, std::pair{'[', ']'}}) {
+    const std::size_t at = text.rfind(open);
+    if (text.ends_with(close) && at != std::string_view::npos && at > 0) {
+      const std::string_view unit = io::trim(text.substr(at + 1, text.size() - at - 2));
+      // "pose[0]" is an element of an array, not a unit.
+      const bool index =
+          !unit.empty() && unit.find_first_not_of("0123456789") == std::string_view::npos;
+      if (!index) {
+        return {std::string(io::trim(text.substr(0, at))), std::string(unit)};
+      }
+    }
+  }
+  return {std::string(text), {}};
+}
+
+bool is_time_name(std::string_view name) {
+  const std::string word = io::lower(name);
+  return word == "timestamp" || word == "time" || word == "t" || word == "seconds" ||
+         word == "elapsed time" || word == "elapsedtime" || word == "times";
+}
+
+/// A cell's value: a number, or true and false as 1 and 0.
+std::optional<double> cell_number(std::string_view cell, bool decimal_comma) {
+  const std::string word = io::lower(io::trim(cell));
+  if (word == "true" || word == "false") {
+    return word == "true" ? 1.0 : 0.0;
+  }
+  if (decimal_comma && std::count(word.begin(), word.end(), ',') == 1 &&
+      word.find('.') == std::string::npos) {
+    std::string with_point = word;
+    std::replace(with_point.begin(), with_point.end(), ',', '.');
+    return io::parse_number(with_point);
+  }
+  return io::parse_number(word);
+}
+
+class Reader {
+ public:
+  Reader(CsvTable table, const std::string& source) : table_(std::move(table)), source_(source) {
+    log_.source = source;
+    log_.format = "CSV";
+  }
+
+  Expected<Log> read() {
+    if (Expected<void> ok = read_header(); !ok) {
+      return tl::unexpected(std::move(ok).error());
+    }
+    if (is_list()) {
+      read_list();
+    } else if (Expected<void> ok = read_table(); !ok) {
+      return tl::unexpected(std::move(ok).error());
+    }
+    if (bad_times_ > 0) {
+      log_.diagnostics.push_back(
+          {"malformed_rows", Severity::warning,
+           fmt::format("{} without a time dropped", io::counted(bad_times_, "row"))});
+    }
+    if (bad_cells_ > 0) {
+      log_.diagnostics.push_back(
+          {"non_numeric_cells", Severity::warning,
+           fmt::format("{} in columns of numbers held words and were dropped",
+                       io::counted(bad_cells_, "cell"))});
+    }
+    io::tidy(log_);
+    if (log_.signals.empty() && log_.texts.empty()) {
+      Error error = Error(LogError::no_data)
+                        .in(source_)
+                        .about("the table")
+                        .got("without one row that has a time and a value");
+      for (const Diagnostic& diagnostic : log_.diagnostics) {
+        error = std::move(error).with(diagnostic.code, diagnostic.message);
+      }
+      return tl::unexpected(std::move(error));
+    }
+    return std::move(log_);
+  }
+
+ private:
+  std::optional<double> number(std::string_view cell) const {
+    return cell_number(cell, table_.delimiter != ',');
+  }
+
+  Expected<void> read_header() {
+    if (table_.rows.empty() || table_.rows.front().size() < 2) {
+      return tl::unexpected(
+          Error(LogError::not_a_log)
+              .in(source_)
+              .about("the file")
+              .got("text without a table")
+              .expected("a CSV with a header and at least two columns, a SysId JSON or a WPILOG"));
+    }
+    const std::vector<std::string>& first = table_.rows.front();
+    const bool headless = std::all_of(first.begin(), first.end(), [&](const std::string& cell) {
+      return io::trim(cell).empty() || number(cell).has_value();
+    });
+    for (std::size_t c = 0; c < first.size(); ++c) {
+      headers_.push_back(headless ? Header{fmt::format("column {}", c + 1), {}}
+                                  : split_header(first[c]));
+    }
+    first_row_ = headless ? 0 : 1;
+    if (headless) {
+      log_.diagnostics.push_back({"no_header", Severity::warning,
+                                  "the table has no header; its columns are numbered and the first "
+                                  "is taken for time in seconds"});
+    }
+    return {};
+  }
+
+  bool is_list() const {
+    return headers_.size() == 3 && is_time_name(headers_[0].name) &&
+           io::lower(headers_[1].name) == "key" && io::lower(headers_[2].name) == "value";
+  }
+
+  std::string_view cell(std::size_t row, std::size_t column) const {
+    const std::vector<std::string>& cells = table_.rows[row];
+    return column < cells.size() ? io::trim(cells[column]) : std::string_view();
+  }
+
+  /// The time column, by name or because the first column's numbers ascend.
+  Expected<std::size_t> time_column() const {
+    for (std::size_t c = 0; c < headers_.size(); ++c) {
+      if (is_time_name(headers_[c].name)) {
+        return c;
+      }
+    }
+    std::optional<double> last;
+    for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
+      const std::optional<double> value = number(cell(row, 0));
+      if (!value || (last && !(*value >= *last))) {
+        return tl::unexpected(
+            Error(LogError::no_time)
+                .in(fmt::format("{}:{}", source_, table_.lines[row]))
+                .about("the table")
+                .got("without a column of time")
+                .expected("a table with a column named Timestamp, Time or t, or with a first "
+                          "column whose numbers ascend")
+                .hint("name the column of time \"Time (s)\" in the header"));
+      }
+      last = value;
+    }
+    return std::size_t{0};
+  }
+
+  /// Seconds per unit of the time column.
+  double time_scale(const Header& header) {
+    if (header.unit.empty()) {
+      return 1.0;
+    }
+    const Expected<Unit> unit = parse_unit(header.unit);
+    if (unit && unit->dimension == Dimension::time) {
+      return unit->factor;
+    }
+    log_.diagnostics.push_back(
+        {"unknown_time_unit", Severity::warning,
+         fmt::format("the time column's unit \"{}\" is not a unit of time; seconds are assumed",
+                     io::printable(header.unit, 20))});
+    return 1.0;
+  }
+
+  Expected<void> read_table() {
+    const Expected<std::size_t> found = time_column();
+    if (!found) {
+      return tl::unexpected(found.error());
+    }
+    const std::size_t clock = *found;
+    const double scale = time_scale(headers_[clock]);
+    std::vector<std::optional<double>> time(table_.rows.size());
+    for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
+      time[row] = number(cell(row, clock));
+      if (!time[row] || !std::isfinite(*time[row])) {
+        time[row].reset();
+        ++bad_times_;
+      } else {
+        *time[row] *= scale;
+      }
+    }
+    for (std::size_t c = 0; c < headers_.size(); ++c) {
+      if (c != clock) {
+        read_column(c, time);
+      }
+    }
+    return {};
+  }
+
+  void read_column(std::size_t column, const std::vector<std::optional<double>>& time) {
+    Signal signal{headers_[column].name, headers_[column].unit, {}, {}};
+    TextSignal text{headers_[column].name, {}, {}};
+    for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
+      const std::string_view value = cell(row, column);
+      if (value.empty() || !time[row]) {
+        continue;
+      }
+      text.time.push_back(*time[row]);
+      text.value.emplace_back(value);
+      if (const std::optional<double> parsed = number(value)) {
+        signal.time.push_back(*time[row]);
+        signal.value.push_back(*parsed);
+      }
+    }
+    // A few words in a column of numbers are a logger's hiccup; more, and it is a column of words.
+    if (2 * signal.time.size() >= text.time.size()) {
+      bad_cells_ += text.time.size() - signal.time.size();
+      log_.signals.push_back(std::move(signal));
+    } else {
+      log_.texts.push_back(std::move(text));
+    }
+  }
+
+  void read_list() {
+    const double scale = time_scale(headers_[0]);
+    struct Samples {
+      std::vector<double> time;
+      std::vector<std::string_view> value;
+    };
+    std::vector<Samples> samples;
+    std::vector<std::string> keys;
+    std::map<std::string, std::size_t, std::less<>> index;
+    for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
+      const std::optional<double> time = number(cell(row, 0));
+      if (!time || !std::isfinite(*time)) {
+        ++bad_times_;
+        continue;
+      }
+      const std::string_view key = cell(row, 1);
+      const auto [found, added] = index.try_emplace(std::string(key), keys.size());
+      if (added) {
+        keys.emplace_back(key);
+        samples.emplace_back();
+      }
+      samples[found->second].time.push_back(*time * scale);
+      samples[found->second].value.push_back(cell(row, 2));
+    }
+    for (std::size_t k = 0; k < keys.size(); ++k) {
+      Signal signal{keys[k], {}, {}, {}};
+      bool all_numbers = true;
+      for (std::size_t i = 0; i < samples[k].time.size() && all_numbers; ++i) {
+        const std::optional<double> value = number(samples[k].value[i]);
+        all_numbers = value.has_value();
+        if (value) {
+          signal.time.push_back(samples[k].time[i]);
+          signal.value.push_back(*value);
+        }
+      }
+      if (all_numbers) {
+        log_.signals.push_back(std::move(signal));
+      } else {
+        log_.texts.push_back({keys[k],
+                              std::move(samples[k].time),
+                              {samples[k].value.begin(), samples[k].value.end()}});
+      }
+    }
+  }
+
+  CsvTable table_;
+  const std::string& source_;
+  Log log_;
+  std::vector<Header> headers_;
+  std::size_t first_row_ = 1;
+  std::size_t bad_times_ = 0;
+  std::size_t bad_cells_ = 0;
+};
+
+std::string quoted_cell(const std::string& text) {
+  if (text.find_first_of(",\"\n\r;") == std::string::npos && !text.starts_with('#')) {
+    return text;
+  }
+  std::string result = "\"";
+  for (const char c : text) {
+    result += c == '"' ? std::string("\"\"") : std::string(1, c);
+  }
+  return result + "\"";
+}
+
+std::string header_cell(const std::string& name, const std::string& unit) {
+  return quoted_cell(unit.empty() ? name : fmt::format("{} ({})", name, unit));
+}
+
+}  // namespace
+
+Expected<Log> parse_csv(std::string_view text, const std::string& source) {
+  return io::split_csv(text, source).and_then([&](CsvTable table) {
+    return Reader(std::move(table), source).read();
+  });
+}
+
+std::string to_csv(const TimeSeries& series) {
+  std::string text = "time (s)";
+  for (const TimeSeries::Column& column : series.columns()) {
+    text += "," + header_cell(column.name, column.unit);
+  }
+  text += "\n";
+  for (std::size_t row = 0; row < series.rows(); ++row) {
+    fmt::format_to(std::back_inserter(text), "{}", series.time()[row]);
+    for (const TimeSeries::Column& column : series.columns()) {
+      text += ",";
+      if (!std::isnan(column.values[row])) {
+        fmt::format_to(std::back_inserter(text), "{}", column.values[row]);
+      }
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+Expected<void> write_csv(const std::string& path, const TimeSeries& series) {
+  return write_file_atomically(path, to_csv(series));
+}
+
+}  // namespace flyball

@@ -1,0 +1,205 @@
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <flyball/io/file.hpp>
+
+namespace flyball {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A file descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (fd_ >= 0) {
+      ::close(fd_);
+    }
+  }
+  [[nodiscard]] int get() const { return fd_; }
+  /// Closes now; false if the system only then finds that the bytes do not fit.
+  bool close() { return ::close(std::exchange(fd_, -1)) == 0; }
+
+ private:
+  int fd_;
+};
+
+std::string reason(int error) {
+  return std::generic_category().message(error);
+}
+
+Error cannot_write(const std::string& path, int error) {
+  switch (error) {
+    case ENOENT:
+      return Error(FileError::not_found)
+          .in(path)
+          .about("the folder of the file")
+          .got("missing")
+          .hint("make the folder, or give another path");
+    case EISDIR:
+      return Error(FileError::is_a_folder)
+          .in(path)
+          .about("the path")
+          .got("a folder")
+          .expected("a file")
+          .hint("give a file name in it");
+    default:
+      return Error(FileError::not_writable)
+          .in(path)
+          .hint("give a path in a folder that you may write to")
+          .with("system", reason(error));
+  }
+}
+
+/// Writes all bytes; 0, or errno.
+int write_all(int fd, std::string_view contents) {
+  while (!contents.empty()) {
+    const ssize_t written = ::write(fd, contents.data(), contents.size());
+    if (written < 0 && errno != EINTR) {
+      return errno;
+    }
+    contents.remove_prefix(written < 0 ? 0 : static_cast<std::size_t>(written));
+  }
+  return 0;
+}
+
+/// A name beside `path` that nobody else uses: the process and a counter make it unique.
+std::string temporary_beside(const std::string& path) {
+  static std::atomic<unsigned> counter{0};
+  const fs::path target(path);
+  return (target.parent_path() /
+          fmt::format(".{}.{}-{}.tmp", target.filename().string(), ::getpid(), ++counter))
+      .string();
+}
+
+}  // namespace
+
+ErrorInfo error_info(FileError code) {
+  constexpr std::string_view family = "file";
+  switch (code) {
+    case FileError::not_found:
+      return {family, "not_found", "there is no such file", ErrorKind::environment};
+    case FileError::is_a_folder:
+      return {family, "is_a_folder", "the path is a folder", ErrorKind::misuse};
+    case FileError::not_a_folder:
+      return {family, "not_a_folder", "the path is not a folder", ErrorKind::misuse};
+    case FileError::not_readable:
+      return {family, "not_readable", "the file cannot be read", ErrorKind::environment};
+    case FileError::not_writable:
+      return {family, "not_writable", "the path cannot be written", ErrorKind::environment};
+    case FileError::too_large:
+      return {family, "too_large", "the file is too large", ErrorKind::misuse};
+    case FileError::folder_in_use:
+      return {family, "folder_in_use", "the folder holds something else", ErrorKind::misuse};
+  }
+  return {family, "unknown", "unknown error", ErrorKind::defect};
+}
+
+Expected<std::string> read_file(const std::string& path, std::size_t max_bytes) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.get() < 0) {
+    const int error = errno;
+    if (error == ENOENT || error == ENOTDIR) {
+      return tl::unexpected(Error(FileError::not_found)
+                                .in(path)
+                                .about("the file")
+                                .got("missing")
+                                .hint("check the spelling and the folder"));
+    }
+    return tl::unexpected(Error(FileError::not_readable)
+                              .in(path)
+                              .hint("check its permissions")
+                              .with("system", reason(error)));
+  }
+  struct stat status{};
+  if (::fstat(file.get(), &status) == 0 && S_ISDIR(status.st_mode)) {
+    return tl::unexpected(Error(FileError::is_a_folder)
+                              .in(path)
+                              .about("the path")
+                              .got("a folder")
+                              .expected("a file")
+                              .hint("give one of the files in it"));
+  }
+  std::string contents;
+  // A regular file says its size, which is a hint and not a promise; pipes say 0.
+  const auto announced = static_cast<std::size_t>(status.st_size > 0 ? status.st_size : 0);
+  std::size_t used = 0;
+  for (;;) {
+    if (used > max_bytes || announced > max_bytes) {
+      return tl::unexpected(
+          Error(FileError::too_large)
+              .in(path)
+              .about("the file")
+              .got(fmt::format("longer than {} bytes", max_bytes))
+              .hint("cut out the part with the tests, for example with AdvantageScope"));
+    }
+    constexpr std::size_t chunk = std::size_t{1} << 16;
+    contents.resize(used == 0 ? std::max(announced + 1, chunk)
+                              : std::max(contents.size(), used + chunk));
+    const ssize_t got = ::read(file.get(), contents.data() + used, contents.size() - used);
+    if (got < 0 && errno == EINTR) {
+      continue;
+    }
+    if (got < 0) {
+      return tl::unexpected(Error(FileError::not_readable).in(path).with("system", reason(errno)));
+    }
+    if (got == 0) {
+      break;
+    }
+    used += static_cast<std::size_t>(got);
+  }
+  contents.resize(used);
+  contents.shrink_to_fit();
+  return contents;
+}
+
+Expected<void> write_file_atomically(const std::string& path, std::string_view contents) {
+  struct stat status{};
+  const bool exists = ::stat(path.c_str(), &status) == 0;
+  if (exists && S_ISDIR(status.st_mode)) {
+    return tl::unexpected(cannot_write(path, EISDIR));
+  }
+  if (exists && !S_ISREG(status.st_mode)) {
+    const Descriptor device(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+    const int error = device.get() < 0 ? errno : write_all(device.get(), contents);
+    return error == 0 ? Expected<void>{} : tl::unexpected(cannot_write(path, error));
+  }
+  std::error_code ignored;
+  const std::string target =
+      fs::is_symlink(path, ignored) && exists ? fs::canonical(path, ignored).string() : path;
+  const std::string temporary = temporary_beside(target);
+  Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (file.get() < 0) {
+    return tl::unexpected(cannot_write(path, errno));
+  }
+  if (exists) {
+    ::fchmod(file.get(), status.st_mode & 07777);
+  }
+  int error = write_all(file.get(), contents);
+  if (!file.close() && error == 0) {
+    error = errno;
+  }
+  if (error == 0 && ::rename(temporary.c_str(), target.c_str()) != 0) {
+    error = errno;
+  }
+  if (error != 0) {
+    ::unlink(temporary.c_str());
+    return tl::unexpected(cannot_write(path, error));
+  }
+  return {};
+}
+
+}  // namespace flyball

@@ -1,0 +1,415 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <flyball/io/log_error.hpp>
+#include <flyball/io/sysid_json.hpp>
+
+#include "io/sysid_columns.hpp"
+#include "io/text.hpp"
+
+namespace flyball {
+namespace {
+
+using io::run_names;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t max_columns = io::columns_2020.size();
+
+using Row = std::array<double, max_columns>;
+
+/// A test's rows as they stand in the file.
+struct Table {
+  bool present = false;
+  std::vector<Row> rows;
+  std::vector<unsigned char> widths;
+};
+
+/// Collects complete rows while the parser walks through the text, so that whatever precedes a cut
+/// or an error is already there.
+class Handler : public nlohmann::json_sax<nlohmann::json> {
+ public:
+  std::array<Table, run_names.size()> tables;
+  std::string test;
+  std::string units;
+  std::optional<double> units_per_rotation;
+  bool sysid = false;
+  std::optional<std::string> first_key;
+  std::vector<std::string> unknown_keys;
+  std::size_t odd_rows = 0;  ///< Neither 4, 9 nor 10 numbers.
+  bool top_is_object = false;
+  std::size_t error_at = 0;
+  std::string error_text;
+
+  bool null() override { return scalar(nan); }
+  bool boolean(bool value) override {
+    sysid = sysid || (depth_ == 1 && key_ == "sysid" && value);
+    return scalar(nan);
+  }
+  bool number_integer(number_integer_t value) override {
+    return scalar(static_cast<double>(value));
+  }
+  bool number_unsigned(number_unsigned_t value) override {
+    return scalar(static_cast<double>(value));
+  }
+  bool number_float(number_float_t value, const string_t& /*text*/) override {
+    return scalar(value);
+  }
+  bool string(string_t& value) override {
+    if (depth_ == 1 && key_ == "test") {
+      test = value;
+    } else if (depth_ == 1 && key_ == "units") {
+      units = value;
+    }
+    return scalar(nan);
+  }
+  bool binary(binary_t& /*value*/) override { return scalar(nan); }
+
+  bool start_object(std::size_t /*elements*/) override {
+    top_is_object = top_is_object || depth_ == 0;
+    row_is_odd_ = row_is_odd_ || in_row();
+    ++depth_;
+    return true;
+  }
+  bool key(string_t& value) override {
+    if (depth_ != 1) {
+      return true;
+    }
+    key_ = value;
+    if (!first_key) {
+      first_key = value;
+    }
+    const auto run = std::find(run_names.begin(), run_names.end(), value);
+    run_ = static_cast<std::size_t>(run - run_names.begin());
+    if (run != run_names.end()) {
+      tables[run_].present = true;
+    } else if (value != "sysid" && value != "test" && value != "units" &&
+               value != "unitsPerRotation") {
+      unknown_keys.push_back(value);
+    }
+    return true;
+  }
+  bool end_object() override {
+    --depth_;
+    return true;
+  }
+  bool start_array(std::size_t /*elements*/) override {
+    row_is_odd_ = in_row();
+    ++depth_;
+    if (in_row()) {
+      width_ = 0;
+    }
+    return true;
+  }
+  bool end_array() override {
+    if (in_row()) {
+      const bool known = width_ == 4 || width_ == 9 || width_ == 10;
+      if (known && !row_is_odd_) {
+        tables[run_].rows.push_back(row_);
+        tables[run_].widths.push_back(static_cast<unsigned char>(width_));
+      } else {
+        ++odd_rows;
+      }
+    }
+    --depth_;
+    return true;
+  }
+  bool parse_error(std::size_t position, const std::string& /*last_token*/,
+                   const nlohmann::detail::exception& error) override {
+    error_at = position;
+    error_text = error.what();
+    return false;
+  }
+
+ private:
+  /// Directly in a row: {"slow-forward": [[ here ]]}.
+  bool in_row() const { return depth_ == 3 && top_is_object && run_ < run_names.size(); }
+
+  bool scalar(double value) {
+    if (in_row()) {
+      if (width_ < max_columns) {
+        row_[width_] = value;
+      }
+      ++width_;
+    } else if (depth_ == 1 && key_ == "unitsPerRotation" && std::isfinite(value)) {
+      units_per_rotation = value;
+    } else if (depth_ == 2 && run_ < run_names.size()) {
+      ++odd_rows;
+    }
+    return true;
+  }
+
+  std::size_t depth_ = 0;
+  std::string key_;
+  std::size_t run_ = run_names.size();
+  Row row_{};
+  std::size_t width_ = 0;
+  bool row_is_odd_ = false;
+};
+
+/// Python and JavaScript write NaN and Infinity, which JSON has no word for: each is replaced by an
+/// empty string of the same length, which the handler takes for "not a number".
+std::string without_nan_words(std::string_view text) {
+  std::string result(text);
+  bool quoted = false;
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    if (result[i] == '"') {
+      quoted = !quoted;
+    } else if (quoted) {
+      i += result[i] == '\\' ? 1 : 0;
+    } else {
+      for (const std::string_view word :
+           {"NaN", "-Infinity", "Infinity", "-NaN", "nan", "inf", "-inf"}) {
+        if (result.compare(i, word.size(), word) == 0) {
+          result.replace(i, word.size(), word.size(), ' ');
+          result[i] = '"';
+          result[i + 1] = '"';
+          i += word.size() - 1;
+          break;
+        }
+      }
+    }
+  }
+  return result;
+}
+
+Error not_sysid(const std::string& source, std::string got) {
+  return Error(LogError::not_a_log)
+      .in(source)
+      .about("the JSON")
+      .got(std::move(got))
+      .expected("an object with slow-forward, slow-backward, fast-forward and fast-backward")
+      .hint("give the sysid_data….json that the logger wrote");
+}
+
+void warn(SysIdJson& log, std::string code, std::string message) {
+  log.diagnostics.push_back({std::move(code), Severity::warning, std::move(message)});
+}
+
+/// Which layout the rows have: by their width, and 9 columns by what else the file says.
+SysIdJson::Layout layout_of(const Handler& handler, std::size_t columns, bool truncated) {
+  if (columns == 4) {
+    return SysIdJson::Layout::mechanism;
+  }
+  if (columns == 10) {
+    return SysIdJson::Layout::characterization_2020;
+  }
+  // SysId says `sysid`, `test` and `units`, but at the end, where a cut takes them away; it also
+  // sorts its keys, which its forerunner did not.
+  const bool says_so = handler.sysid || !handler.test.empty() || !handler.units.empty();
+  const bool sorted = truncated && handler.first_key == "fast-backward";
+  return says_so || sorted ? SysIdJson::Layout::drive : SysIdJson::Layout::characterization_2019;
+}
+
+/// How many numbers most rows have.
+std::size_t common_width(const Handler& handler) {
+  std::array<std::size_t, max_columns + 1> count{};
+  for (const Table& table : handler.tables) {
+    for (const unsigned char width : table.widths) {
+      ++count[width];
+    }
+  }
+  return static_cast<std::size_t>(std::max_element(count.begin(), count.end()) - count.begin());
+}
+
+struct Dropped {
+  std::size_t non_finite = 0;
+  std::size_t other_width = 0;
+  std::size_t backward = 0;
+};
+
+/// A table's good rows in time order, spread over the columns of a run.
+SysIdJson::Run to_run(std::string name, Table& table, SysIdJson::Layout layout, std::size_t columns,
+                      Dropped& dropped) {
+  std::vector<Row> rows;
+  rows.reserve(table.rows.size());
+  for (std::size_t i = 0; i < table.rows.size(); ++i) {
+    const Row& row = table.rows[i];
+    if (table.widths[i] != columns) {
+      ++dropped.other_width;
+    } else if (!std::all_of(row.begin(), row.begin() + static_cast<std::ptrdiff_t>(columns),
+                            [](double value) { return std::isfinite(value); })) {
+      ++dropped.non_finite;
+    } else {
+      dropped.backward += !rows.empty() && row[0] < rows.back()[0] ? 1 : 0;
+      rows.push_back(row);
+    }
+  }
+  table = {};
+  std::stable_sort(rows.begin(), rows.end(),
+                   [](const Row& a, const Row& b) { return a[0] < b[0]; });
+  SysIdJson::Run run;
+  run.name = std::move(name);
+  const auto members = io::columns_of(layout);
+  for (std::size_t c = 0; c < members.size(); ++c) {
+    if (members[c] != nullptr) {
+      std::vector<double>& column = run.*members[c];
+      column.reserve(rows.size());
+      for (const Row& row : rows) {
+        column.push_back(row[c]);
+      }
+    }
+  }
+  return run;
+}
+
+void tell_missing(SysIdJson& log, const Handler& handler) {
+  for (std::size_t i = 0; i < run_names.size(); ++i) {
+    if (log.find(run_names[i]) == nullptr) {
+      const bool present = handler.tables[i].present;
+      if (!present) {
+        log.missing.emplace_back(run_names[i]);
+      }
+      warn(log, "missing_run",
+           fmt::format("the test {} {}", run_names[i],
+                       present ? "has no usable row" : "is not in the file"));
+    }
+  }
+  const bool legacy = log.layout == SysIdJson::Layout::characterization_2019 ||
+                      log.layout == SysIdJson::Layout::characterization_2020;
+  const auto tell = [&](std::string_view key, std::string_view consequence) {
+    log.missing.emplace_back(key);
+    log.diagnostics.push_back({"missing_key", legacy ? Severity::info : Severity::warning,
+                               fmt::format("\"{}\" is not in the file; {}", key, consequence)});
+  };
+  if (log.test.empty()) {
+    tell("test", "it does not say which mechanism was tested");
+  }
+  if (log.units.empty()) {
+    tell("units", "it does not say the unit of position");
+  }
+  if (!log.units_per_rotation) {
+    tell("unitsPerRotation", "positions cannot be scaled from rotations by the file alone");
+  }
+  if (legacy) {
+    log.diagnostics.push_back(
+        {"frc_characterization", Severity::info,
+         fmt::format("a drive log of frc-characterization {}, the forerunner of SysId",
+                     log.layout == SysIdJson::Layout::characterization_2019 ? "2019" : "2020")});
+  }
+}
+
+}  // namespace
+
+const SysIdJson::Run* SysIdJson::find(std::string_view name) const noexcept {
+  const auto run =
+      std::find_if(runs.begin(), runs.end(), [&](const Run& r) { return r.name == name; });
+  return run == runs.end() ? nullptr : &*run;
+}
+
+Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& source) {
+  if (io::trim(text).empty()) {
+    return tl::unexpected(Error(LogError::empty)
+                              .in(source)
+                              .about("the file")
+                              .got("empty")
+                              .expected("a SysId JSON")
+                              .hint("record it again, or copy it again"));
+  }
+  Handler handler;
+  bool complete = nlohmann::json::sax_parse(text.begin(), text.end(), &handler);
+  if (!complete) {
+    const std::string replaced = without_nan_words(text);
+    if (replaced != text) {
+      handler = Handler();
+      complete = nlohmann::json::sax_parse(replaced.begin(), replaced.end(), &handler);
+    }
+  }
+  // The parser counts from 1 and calls a NUL the end, which an allocated but unfilled tail is.
+  const std::size_t content_end = text.find_last_not_of(std::string_view(" \t\r\n\0", 5)) + 1;
+  const bool truncated = !complete && handler.error_at > content_end;
+  if (!complete && !truncated) {
+    const std::size_t detail = handler.error_text.rfind("; ");
+    return tl::unexpected(
+        Error(LogError::malformed)
+            .in(io::place(source, text, handler.error_at == 0 ? 0 : handler.error_at - 1))
+            .about("the JSON")
+            .got("broken")
+            .expected("valid JSON")
+            .hint("copy the file again, or mend that place")
+            .with("parser",
+                  io::printable(detail == std::string::npos
+                                    ? std::string_view(handler.error_text)
+                                    : std::string_view(handler.error_text).substr(detail + 2),
+                                120)));
+  }
+  if (!handler.top_is_object) {
+    return tl::unexpected(not_sysid(source, "a list or a single value"));
+  }
+  const bool any_test = std::any_of(handler.tables.begin(), handler.tables.end(),
+                                    [](const Table& table) { return table.present; });
+  if (!any_test && !handler.sysid && !truncated) {
+    return tl::unexpected(not_sysid(source, handler.first_key
+                                                ? fmt::format("an object that begins with \"{}\"",
+                                                              io::printable(*handler.first_key, 30))
+                                                : std::string("an empty object")));
+  }
+
+  SysIdJson log;
+  log.test = handler.test;
+  log.units = handler.units;
+  log.units_per_rotation = handler.units_per_rotation;
+  const std::size_t columns = common_width(handler);
+  log.layout = layout_of(handler, columns, truncated);
+  if (truncated) {
+    warn(
+        log, "truncated_log",
+        fmt::format("the file ends in the middle, after {} bytes; the complete rows before the cut "
+                    "are used",
+                    text.size()));
+  }
+  Dropped dropped;
+  dropped.other_width = handler.odd_rows;
+  for (std::size_t i = 0; i < run_names.size(); ++i) {
+    SysIdJson::Run run =
+        to_run(std::string(run_names[i]), handler.tables[i], log.layout, columns, dropped);
+    if (!run.time.empty()) {
+      log.runs.push_back(std::move(run));
+    }
+  }
+  if (dropped.non_finite > 0) {
+    warn(log, "non_finite_rows",
+         fmt::format("{} with null, NaN or infinity dropped",
+                     io::counted(dropped.non_finite, "row")));
+  }
+  if (dropped.other_width > 0) {
+    warn(log, "malformed_rows",
+         fmt::format("{} without exactly {} numbers dropped",
+                     io::counted(dropped.other_width, "row"),
+                     columns == 0 ? std::string("4, 9 or 10") : std::to_string(columns)));
+  }
+  if (dropped.backward > 0) {
+    warn(log, "unsorted_time",
+         fmt::format("time runs backwards {}; the rows were sorted",
+                     io::counted(dropped.backward, "time")));
+  }
+  if (!handler.unknown_keys.empty()) {
+    log.diagnostics.push_back(
+        {"unknown_keys", Severity::info,
+         fmt::format("{} not used, such as \"{}\"", io::counted(handler.unknown_keys.size(), "key"),
+                     io::printable(handler.unknown_keys.front(), 30))});
+  }
+  if (log.runs.empty()) {
+    Error error = Error(LogError::no_data)
+                      .in(source)
+                      .about("the SysId JSON")
+                      .got(truncated ? "cut before its first complete row"
+                                     : "without one complete row of finite numbers")
+                      .hint("record the tests again");
+    for (const Diagnostic& diagnostic : log.diagnostics) {
+      error = std::move(error).with(diagnostic.code, diagnostic.message);
+    }
+    return tl::unexpected(std::move(error));
+  }
+  tell_missing(log, handler);
+  return log;
+}
+
+}  // namespace flyball

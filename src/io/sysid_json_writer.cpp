@@ -1,0 +1,105 @@
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/io/file.hpp>
+#include <flyball/io/sysid_json.hpp>
+
+#include "io/sysid_columns.hpp"
+
+namespace flyball {
+namespace {
+
+/// The shortest decimal that reads back to the same double, with a point or an exponent so that it
+/// stays a floating-point number everywhere.
+std::string number(double value) {
+  std::string text = fmt::format("{}", value);
+  if (text.find_first_of(".e") == std::string::npos) {
+    text += ".0";
+  }
+  return text;
+}
+
+std::string quoted(const std::string& text) {
+  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+Expected<void> check_run(const io::Run& run, std::span<const io::Column> columns) {
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    if (columns[c] == nullptr) {
+      continue;
+    }
+    const std::vector<double>& values = run.*columns[c];
+    if (values.size() != run.time.size()) {
+      return tl::unexpected(Error(ArgumentError::wrong_shape)
+                                .in("to_sysid_json")
+                                .about(fmt::format("column {} of {}", c, run.name))
+                                .got(fmt::format("{} values long", values.size()))
+                                .expected(fmt::format("one value a row ({})", run.time.size())));
+    }
+    for (const double value : values) {
+      if (Expected<void> ok = check_finite(value, "to_sysid_json", run.name); !ok) {
+        return ok;
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Expected<std::string> to_sysid_json(const SysIdJson& log) {
+  const std::span<const io::Column> columns = io::columns_of(log.layout);
+  std::string text = "{";
+  const char* separator = "\n";
+  for (const io::Run& run : log.runs) {
+    if (Expected<void> ok = check_run(run, columns); !ok) {
+      return tl::unexpected(std::move(ok).error());
+    }
+    text += fmt::format("{}  {}: [", separator, quoted(run.name));
+    separator = ",\n";
+    for (std::size_t i = 0; i < run.time.size(); ++i) {
+      text += i == 0 ? "\n    [" : ",\n    [";
+      for (std::size_t c = 0; c < columns.size(); ++c) {
+        text += c == 0 ? "" : ", ";
+        text += columns[c] == nullptr ? "0.0" : number((run.*columns[c])[i]);
+      }
+      text += "]";
+    }
+    text += "\n  ]";
+  }
+  const bool legacy = log.layout == SysIdJson::Layout::characterization_2019 ||
+                      log.layout == SysIdJson::Layout::characterization_2020;
+  if (!legacy) {
+    text += fmt::format("{}  \"sysid\": true", separator);
+    separator = ",\n";
+  }
+  if (!log.test.empty()) {
+    text += fmt::format("{}  \"test\": {}", separator, quoted(log.test));
+    separator = ",\n";
+  }
+  if (!log.units.empty()) {
+    text += fmt::format("{}  \"units\": {}", separator, quoted(log.units));
+    separator = ",\n";
+  }
+  if (log.units_per_rotation) {
+    if (Expected<void> ok =
+            check_finite(*log.units_per_rotation, "to_sysid_json", "units_per_rotation");
+        !ok) {
+      return tl::unexpected(std::move(ok).error());
+    }
+    text += fmt::format("{}  \"unitsPerRotation\": {}", separator, number(*log.units_per_rotation));
+  }
+  return text + "\n}\n";
+}
+
+Expected<void> write_sysid_json(const std::string& path, const SysIdJson& log) {
+  return to_sysid_json(log).and_then(
+      [&](const std::string& text) { return write_file_atomically(path, text); });
+}
+
+}  // namespace flyball
