@@ -1,3 +1,5 @@
+#include <flyball/io/csv.hpp>
+
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -9,7 +11,6 @@
 #include <fmt/format.h>
 
 #include <flyball/core/quantity.hpp>
-#include <flyball/io/csv.hpp>
 #include <flyball/io/file.hpp>
 
 #include "io/csv_table.hpp"
@@ -130,9 +131,8 @@ class Reader {
     }
     first_row_ = headless ? 0 : 1;
     if (headless) {
-      log_.diagnostics.push_back({"no_header", Severity::warning,
-                                  "the table has no header; its columns are numbered and the first "
-                                  "is taken for time in seconds"});
+      log_.diagnostics.push_back(
+          {"no_header", Severity::warning, "the table has no header; its columns are numbered"});
     }
     return {};
   }
@@ -147,20 +147,22 @@ class Reader {
     return column < cells.size() ? io::trim(cells[column]) : std::string_view();
   }
 
-  /// The time column, by name or because the first column's numbers ascend.
-  Expected<std::size_t> time_column() const {
+  /// The time column: by name, or the first, if its numbers ascend and its unit does not deny it.
+  Expected<std::size_t> time_column() {
     for (std::size_t c = 0; c < headers_.size(); ++c) {
       if (is_time_name(headers_[c].name)) {
         return c;
       }
     }
+    const Expected<Unit> unit = parse_unit(headers_[0].unit);
+    const bool other_unit = !headers_[0].unit.empty() && unit && unit->dimension != Dimension::time;
     std::optional<double> last;
     for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
       const std::optional<double> value = number(cell(row, 0));
-      if (!value || (last && !(*value >= *last))) {
+      if (other_unit || !value || (last && !(*value >= *last))) {
         return tl::unexpected(
             Error(LogError::no_time)
-                .in(fmt::format("{}:{}", source_, table_.lines[row]))
+                .in(fmt::format("{}:{}", source_, table_.lines[other_unit ? 0 : row]))
                 .about("the table")
                 .got("without a column of time")
                 .expected("a table with a column named Timestamp, Time or t, or with a first "
@@ -169,6 +171,11 @@ class Reader {
       }
       last = value;
     }
+    log_.diagnostics.push_back(
+        {"assumed_time_column", Severity::warning,
+         fmt::format(
+             "no column is named Timestamp, Time or t; the first, \"{}\", is taken for time",
+             io::printable(headers_[0].name, 40))});
     return std::size_t{0};
   }
 
