@@ -1,3 +1,5 @@
+#include <flyball/core/quantity.hpp>
+
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -7,7 +9,6 @@
 
 #include <fmt/format.h>
 
-#include <flyball/core/quantity.hpp>
 #include <flyball/core/text.hpp>
 
 namespace flyball {
@@ -169,9 +170,10 @@ std::string canonical(std::string_view text) {
   replace_all(out, "^2", "2");
   replace_all(out, "µ", "u");
   replace_all(out, "μ", "u");
-  replace_all(out, " per ", "/");
-  replace_all(out, " Per ", "/");
-  replace_all(out, "_per_", "/");
+  replace_all(out, "\u2126", "Ω");  // OHM SIGN, which looks like the Greek letter
+  for (const std::string_view per : {" per ", " Per ", " PER ", "_per_"}) {
+    replace_all(out, per, "/");
+  }
   for (const std::string_view separator : {"·", "⋅", "*", " ", "\t", "-", "_"}) {
     replace_all(out, separator, "");
   }
@@ -195,10 +197,22 @@ std::string singular(const std::string& text) {
   return out;
 }
 
+// mV, mA, mNm, mOhm: written with a capital M they would be a thousand million times as much.
+bool has_milli_prefix(const NamedUnit& unit) {
+  if (unit.text.size() < 2 || unit.text[0] != 'm') {
+    return false;
+  }
+  const auto symbol = static_cast<unsigned char>(unit.text[1]);
+  return (symbol >= 'A' && symbol <= 'Z') || symbol >= 0x80;
+}
+
 const NamedUnit* find_unit(std::string_view text) {
   const std::string exact = canonical(text);
-  const auto match = [](const std::string& wanted, bool fold) -> const NamedUnit* {
+  const auto match = [&](const std::string& wanted, bool fold) -> const NamedUnit* {
     const auto found = std::find_if(units.begin(), units.end(), [&](const NamedUnit& unit) {
+      if (fold && exact.starts_with('M') && has_milli_prefix(unit)) {
+        return false;
+      }
       return fold ? lower(unit.text) == wanted : unit.text == wanted;
     });
     return found == units.end() ? nullptr : &*found;
@@ -372,18 +386,21 @@ Expected<double> parse_quantity(std::string_view text, Dimension dimension, std:
   const auto expected = [&] {
     return fmt::format("{} such as {}", article(dimension), example(dimension));
   };
-  if (status != std::errc{} || end == digits.data()) {
+  if (status != std::errc{} || end == digits.data() || trimmed.starts_with("+-")) {
     return tl::unexpected(Error(status == std::errc::result_out_of_range ? ArgumentError::not_finite
                                                                          : ArgumentError::malformed)
                               .about(std::string(name))
                               .got(fmt::format("\"{}\"", text))
                               .expected(expected()));
   }
-  if (!std::isfinite(number)) {
+  const auto not_finite = [&] {
     return tl::unexpected(Error(ArgumentError::not_finite)
                               .about(std::string(name))
                               .got(fmt::format("\"{}\"", text))
                               .expected(fmt::format("finite, {}", expected())));
+  };
+  if (!std::isfinite(number)) {
+    return not_finite();
   }
   const std::string_view unit_text =
       trim(digits.substr(static_cast<std::size_t>(end - digits.data())));
@@ -410,7 +427,11 @@ Expected<double> parse_quantity(std::string_view text, Dimension dimension, std:
                               .got(fmt::format("\"{}\", {}", text, article(unit->dimension)))
                               .expected(expected()));
   }
-  return number * unit->factor;
+  const double si = number * unit->factor;
+  if (!std::isfinite(si)) {
+    return not_finite();
+  }
+  return si;
 }
 
 std::string to_text(double si, Dimension dimension) {
