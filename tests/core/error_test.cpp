@@ -1,0 +1,128 @@
+#include <flyball/core/error.hpp>
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <flyball/core/diagnostic.hpp>
+
+namespace flyball {
+
+// A family as a domain would write it, in a namespace of its own so that ADL has to find it.
+namespace kettle {
+
+enum class KettleError { too_hot, empty };
+
+ErrorInfo error_info(KettleError code) {
+  switch (code) {
+    case KettleError::too_hot:
+      return {"kettle", "too_hot", "the water boils", ErrorKind::no_answer};
+    case KettleError::empty:
+      return {"kettle", "empty", "there is no water", ErrorKind::environment};
+  }
+  return {"kettle", "unknown", "unknown error", ErrorKind::defect};
+}
+
+}  // namespace kettle
+
+namespace {
+
+using kettle::KettleError;
+
+static_assert(ErrorEnum<ArgumentError> && ErrorEnum<KettleError>);
+static_assert(!ErrorEnum<Severity> && !ErrorEnum<int>);
+
+TEST(Error, SaysItsSummaryIfNothingElseIsKnown) {
+  EXPECT_EQ(to_string(Error(KettleError::too_hot)), "the water boils");
+}
+
+TEST(Error, NamesWhereItHappened) {
+  EXPECT_EQ(to_string(Error(KettleError::too_hot).in("brew")), "brew: the water boils");
+}
+
+TEST(Error, ASubjectWithoutWhatWasGotIsFollowedByTheSummary) {
+  EXPECT_EQ(to_string(Error(KettleError::too_hot).about("pot 2")), "pot 2: the water boils");
+}
+
+TEST(Error, ASubjectIsWhatWasGot) {
+  EXPECT_EQ(to_string(Error(KettleError::too_hot).about("pot 2").got("120 degrees")),
+            "pot 2 is 120 degrees");
+}
+
+TEST(Error, WhatWasGotWithoutASubjectFollowsTheSummary) {
+  EXPECT_EQ(to_string(Error(KettleError::too_hot).got("120 degrees")),
+            "the water boils: got 120 degrees");
+}
+
+TEST(Error, SaysWhatItMustBeAndHowToMendIt) {
+  EXPECT_EQ(to_string(Error(KettleError::too_hot).expected("below 100").hint("wait a minute")),
+            "the water boils; it must be below 100; wait a minute");
+}
+
+TEST(Error, ListsItsEvidenceInTheOrderGiven) {
+  EXPECT_EQ(to_string(Error(KettleError::too_hot)
+                          .with("temperature", 373.15)
+                          .with("eigenvalue", std::vector<double>{1.02, -0.5})
+                          .with("sensor", std::string("left"))),
+            "the water boils (temperature = 373.15, eigenvalue = [1.02, -0.5], sensor: left)");
+}
+
+TEST(Error, PutsAllPartsTogether) {
+  const Error error = Error(KettleError::too_hot)
+                          .in("tea.toml:3:7")
+                          .about("pot 2")
+                          .got("120 degrees")
+                          .expected("below 100")
+                          .hint("wait a minute")
+                          .with("pressure", 2.0);
+  EXPECT_EQ(to_string(error),
+            "tea.toml:3:7: pot 2 is 120 degrees; it must be below 100; wait a minute (pressure = "
+            "2)");
+  EXPECT_EQ(error.where(), "tea.toml:3:7");
+  EXPECT_EQ(error.subject(), "pot 2");
+  ASSERT_EQ(error.evidence().size(), 1U);
+  EXPECT_EQ(error.evidence()[0].name, "pressure");
+  EXPECT_EQ(error.evidence()[0].values, std::vector<double>{2.0});
+}
+
+TEST(Error, KnowsItsCodeAndKind) {
+  const Error error(KettleError::empty);
+  EXPECT_TRUE(error.is(KettleError::empty));
+  EXPECT_FALSE(error.is(KettleError::too_hot));
+  EXPECT_EQ(error.kind(), ErrorKind::environment);
+  EXPECT_EQ(error.code(), "empty");
+  EXPECT_EQ(error.info().family, "kettle");
+}
+
+TEST(Error, TheSameNameInAnotherFamilyIsAnotherError) {
+  EXPECT_FALSE(Error(KettleError::empty).is(ArgumentError::empty));
+  EXPECT_FALSE(Error(ArgumentError::empty).is(KettleError::empty));
+}
+
+TEST(ArgumentError, EveryCodeDescribesItselfOnce) {
+  std::vector<std::string_view> names;
+  for (const ArgumentError code :
+       {ArgumentError::wrong_shape, ArgumentError::not_finite, ArgumentError::not_symmetric,
+        ArgumentError::not_positive, ArgumentError::out_of_range, ArgumentError::empty,
+        ArgumentError::wrong_unit, ArgumentError::unknown_name, ArgumentError::ambiguous_name,
+        ArgumentError::malformed}) {
+    const ErrorInfo info = error_info(code);
+    EXPECT_EQ(info.family, "argument");
+    EXPECT_EQ(info.kind, ErrorKind::misuse);
+    EXPECT_FALSE(info.summary.empty());
+    EXPECT_FALSE(info.summary.ends_with('.'));
+    EXPECT_EQ(std::count(names.begin(), names.end(), info.name), 0) << info.name;
+    names.push_back(info.name);
+  }
+}
+
+TEST(Diagnostic, SeveritiesHaveTheNamesOfTheSchema) {
+  EXPECT_EQ(to_string(Severity::info), "info");
+  EXPECT_EQ(to_string(Severity::warning), "warning");
+  EXPECT_EQ(to_string(Severity::error), "error");
+}
+
+}  // namespace
+}  // namespace flyball

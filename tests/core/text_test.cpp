@@ -1,0 +1,54 @@
+#include <flyball/core/text.hpp>
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+#include <rapidcheck/gtest.h>
+
+namespace flyball {
+namespace {
+
+TEST(EditDistance, OfTextbookPairs) {
+  EXPECT_EQ(edit_distance("kitten", "sitting"), 3U);  // k→s, e→i, +g
+  EXPECT_EQ(edit_distance("flaw", "lawn"), 2U);       // -f, +n
+  EXPECT_EQ(edit_distance("", "abc"), 3U);
+  EXPECT_EQ(edit_distance("abc", ""), 3U);
+  EXPECT_EQ(edit_distance("same", "same"), 0U);
+}
+
+// A distance is symmetric, zero only between equals, at least the difference in length, and obeys
+// the triangle inequality.
+RC_GTEST_PROP(EditDistance, IsAMetric, ()) {
+  const auto text = rc::gen::container<std::string>(rc::gen::inRange('a', 'd'));
+  const std::string a = *text;
+  const std::string b = *text;
+  const std::string c = *text;
+  const std::size_t ab = edit_distance(a, b);
+  RC_ASSERT(ab == edit_distance(b, a));
+  RC_ASSERT((ab == 0) == (a == b));
+  RC_ASSERT(ab >= std::max(a.size(), b.size()) - std::min(a.size(), b.size()));
+  RC_ASSERT(ab <= std::max(a.size(), b.size()));
+  RC_ASSERT(edit_distance(a, c) <= ab + edit_distance(b, c));
+}
+
+constexpr std::array<std::string_view, 5> names{"drum_radius", "gearing", "mass", "motor",
+                                                "motor_count"};
+
+TEST(NearestName, FindsTheNameMeant) {
+  EXPECT_EQ(nearest_name("drum_raduis", names), "drum_radius");
+  EXPECT_EQ(nearest_name("Gearing", names), "gearing");
+  EXPECT_EQ(nearest_name("motr", names), "motor");
+  EXPECT_EQ(nearest_name("motorcount", names), "motor_count");
+}
+
+TEST(NearestName, AnswersNothingIfNothingIsNear) {
+  EXPECT_EQ(nearest_name("battery", names), "");
+  EXPECT_EQ(nearest_name("", names), "");
+  EXPECT_EQ(nearest_name("mass", {}), "");
+}
+
+}  // namespace
+}  // namespace flyball
