@@ -10,6 +10,7 @@
 /// names the function, the argument, what was expected and what was got.
 namespace flyball {
 
+/// How a design-time function takes a matrix: any size, fixed or dynamic, without a copy.
 using MatrixRef = Eigen::Ref<const Eigen::MatrixXd>;
 
 /// @param M        The matrix. @param rows, columns  The expected shape.

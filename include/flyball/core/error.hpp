@@ -48,6 +48,7 @@ struct Evidence {
 /// ```
 class Error {
  public:
+  /// An error that is no more than its code yet.
   template <ErrorEnum E>
   explicit Error(E code) : info_(error_info(code)) {}
 
@@ -56,6 +57,7 @@ class Error {
   Error&& expected(std::string what) &&;     ///< What it must be.
   Error&& got(std::string what) &&;          ///< What it is.
   Error&& hint(std::string how_to_mend) &&;  ///< What to do about it.
+  /// Evidence, listed in the order given.
   Error&& with(std::string name, double value) &&;
   Error&& with(std::string name, std::vector<double> values) &&;
   Error&& with(std::string name, std::string text) &&;

@@ -42,6 +42,7 @@ class Quantity {
   static constexpr Dimension dimension = D;
 
   constexpr Quantity() noexcept = default;
+  /// @param si  The value in the SI unit of the dimension.
   constexpr explicit Quantity(double si) noexcept : si_(si) {}
 
   [[nodiscard]] constexpr double si() const noexcept { return si_; }
@@ -52,6 +53,7 @@ class Quantity {
   double si_ = 0.0;
 };
 
+/// What interfaces take.
 using Mass = Quantity<Dimension::mass>;
 using Length = Quantity<Dimension::length>;
 using Time = Quantity<Dimension::time>;

@@ -12,6 +12,7 @@ namespace flyball {
 /// pseudorandom number generators", ACM TOMS 47 (2021).
 class Random {
  public:
+  /// @param seed  Any number; neighbouring seeds give unrelated sequences.
   explicit Random(std::uint64_t seed) noexcept;
 
   std::uint64_t bits() noexcept;                     ///< 64 random bits.

@@ -20,6 +20,7 @@ struct Signal {
 /// Named columns on one clock: what simulations record, what tables and pictures show.
 class TimeSeries {
  public:
+  /// A quantity on the clock: as many values as there are rows.
   struct Column {
     std::string name;
     std::string unit;
