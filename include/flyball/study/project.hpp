@@ -19,17 +19,16 @@ enum class ProjectError {
 };
 [[nodiscard]] ErrorInfo error_info(ProjectError code);
 
-/// A TOML project file: the design job it describes. `has_plant` tells whether it defines the
-/// mechanism (a file that only sets controller options can accompany a log).
+/// A TOML project file: the design job it describes. A file that only sets controller options can
+/// accompany a log; then `plant_error` tells what it would need to stand alone.
 struct Project {
   std::string path;
-  bool has_plant = false;
-  bool sets_state_tolerance = false;
+  std::optional<Error> plant_error;  ///< Why the file does not define a mechanism, if it does not.
   std::optional<mechanisms::MechanismKind> mechanism;
   DesignJob job;
 };
 
-/// Reads a project file. @errors ProjectError, io::FileError, ArgumentError (units, motors).
+/// Reads a project file. @errors ProjectError, FileError, ArgumentError (units, motors).
 [[nodiscard]] Expected<Project> read_project(const std::string& path);
 
 /// Parses its text. @param name  The file's name for messages.

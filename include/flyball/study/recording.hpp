@@ -8,7 +8,7 @@
 #include <flyball/core/expected.hpp>
 #include <flyball/identification/recording.hpp>
 
-namespace flyball::io {
+namespace flyball {
 struct Log;
 }
 
@@ -43,18 +43,19 @@ struct LoadedRecording {
   std::string format;   ///< "SysId JSON", "WPILOG", "CSV".
   std::string subject;  ///< The mechanism's name in the log, or empty.
   identification::Recording recording;
-  std::vector<Diagnostic>
-      diagnostics;  ///< What reading it found, and what was assumed (code "assumed").
+  std::vector<Diagnostic> diagnostics;  ///< What was found; assumptions have the code "assumed".
+  /// Why the recording can be shown but not identified: a drivetrain's.
+  std::optional<Error> refusal;
 };
 
 /// Reads a log and finds the tests in it: channels by name, type and unit; runs by the test state;
 /// channels are joined by time onto the voltage's clock.
-/// @errors io::LogError, io::FileError, RecordingError.
+/// @errors LogError, FileError, RecordingError.
 [[nodiscard]] Expected<LoadedRecording> load_recording(const std::string& path,
                                                        const LogSelection& selection = {});
 
 /// The same from a log in memory.
-[[nodiscard]] Expected<LoadedRecording> recording_from_log(const io::Log& log,
+[[nodiscard]] Expected<LoadedRecording> recording_from_log(const Log& log,
                                                            const LogSelection& selection = {});
 
 }  // namespace flyball::study

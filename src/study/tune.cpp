@@ -1,0 +1,57 @@
+#include <flyball/study/tune.hpp>
+
+#include <algorithm>
+#include <utility>
+
+namespace flyball::study {
+
+PlantDescription plant_from_fit(const identification::FeedforwardFit& fit) {
+  PlantDescription plant;
+  plant.kind = fit.mechanism;
+  plant.unit = fit.unit;
+  plant.gains.kS = fit.kS.value;
+  plant.gains.kV = fit.kV.value;
+  plant.gains.kA = fit.kA.determined ? fit.kA.value : 0.0;
+  plant.kA_determined = fit.kA.determined;
+  plant.kA_upper_bound = fit.kA.determined ? 0.0 : fit.kA.upper_bound;
+  plant.gains.kG = fit.kG ? fit.kG->value : 0.0;
+  plant.gains.angle_offset = fit.angle_offset ? fit.angle_offset->value : 0.0;
+  return plant;
+}
+
+Expected<TuneResult> tune(const TuneJob& job) {
+  auto identified = identify(job.identification);
+  if (!identified) {
+    return tl::unexpected(std::move(identified).error());
+  }
+  TuneResult result{.identification = *std::move(identified), .design = std::nullopt};
+  if (!result.identification.report.fit) {
+    return result;
+  }
+  const identification::FeedforwardFit& fit = *result.identification.report.fit;
+
+  DesignJob design_job = job.design;
+  PlantDescription plant = plant_from_fit(fit);
+  plant.motor = job.design.plant.motor;
+  plant.gearing = job.design.plant.gearing;
+  plant.drum_radius = job.design.plant.drum_radius;
+  design_job.plant = std::move(plant);
+
+  const bool velocity_loop = fit.mechanism == mechanisms::MechanismKind::flywheel;
+  const double seen_delay = velocity_loop ? fit.velocity_delay : fit.position_delay;
+  if (!design_job.controller.delay) {
+    // A sensor cannot show the future; a negative delay is skew between the logger's channels.
+    design_job.controller.delay = std::max(0.0, seen_delay);
+  }
+  const double seen_noise = velocity_loop ? fit.velocity_noise : fit.position_noise;
+  if (!design_job.estimator.measurement_std && seen_noise > 0.0) {
+    design_job.estimator.measurement_std = seen_noise;
+  }
+  if (!velocity_loop && design_job.sensor.resolution == 0.0) {
+    design_job.sensor.resolution = result.identification.report.prepared.position_quantum;
+  }
+  result.design = design(design_job);
+  return result;
+}
+
+}  // namespace flyball::study
