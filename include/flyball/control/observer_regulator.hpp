@@ -1,0 +1,107 @@
+#pragma once
+
+#include <limits>
+
+#include <flyball/control/feedforward.hpp>
+#include <flyball/control/state_feedback.hpp>
+#include <flyball/estimation/observer.hpp>
+
+namespace flyball {
+
+/// The observer-based regulator: steady-state Kalman filter, LQR state feedback and plant
+/// inversion.
+///
+/// One step, as the book orders it:
+///   x_hat⁻ = A x_hat + B u_model,  x_hat = x_hat⁻ + K_e (y - C x_hat⁻)   (9.20, 9.23)
+///   u = clamp(K (r - x_hat) + B⁺ (r_next - A r) + extra)                  (7.15, 7.16)
+///   u_model = u - extra
+/// where extra is what the linear model does not hold, such as gravity and friction: it is added
+/// before the limits, and the observer is told only what the linear model saw.
+///
+/// Run-time object: noexcept, finite for finite input, and for sizes known at compile time
+/// allocation-free. Source: book, Theorems 7.7.1, 7.8.1 and 9.6.3.
+template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic, int Outputs = Eigen::Dynamic>
+class Lqg {
+ public:
+  using Plant = DiscreteSystem<States, Inputs, Outputs>;
+  using StateVector = Eigen::Matrix<double, States, 1>;
+  using InputVector = Eigen::Matrix<double, Inputs, 1>;
+  using OutputVector = Eigen::Matrix<double, Outputs, 1>;
+  using FeedbackGain = Eigen::Matrix<double, Inputs, States>;
+  using EstimatorGain = Eigen::Matrix<double, States, Outputs>;
+
+  /// @param plant  The discrete model. @param K  m x n, such as LqrDesign::K.
+  /// @param K_e    n x p, filter form, such as KalmanGain::K.
+  /// @param u_min, u_max  m x 1, limits of the input, V.
+  /// @errors ArgumentError for shapes, entries, and limits that are NaN or leave nothing between
+  ///         them (out_of_range).
+  [[nodiscard]] static Expected<Lqg> create(const Plant& plant, const FeedbackGain& K,
+                                            const EstimatorGain& K_e, const InputVector& u_min,
+                                            const InputVector& u_max);
+
+  /// One period. @param r  The reference now. @param r_next  One period later.
+  /// @param y  The measurement of now; one that is not finite is left out.
+  /// @param extra  What to add for what is not in the linear model, V.
+  /// @return u, V.
+  [[nodiscard]] InputVector step(const StateVector& r, const StateVector& r_next,
+                                 const OutputVector& y, const InputVector& extra) noexcept;
+  [[nodiscard]] InputVector step(const StateVector& r, const StateVector& r_next,
+                                 const OutputVector& y) noexcept;
+  /// The same with a measured rail: no more voltage is asked for than the rail has, so that the
+  /// observer knows what the motor sees. Send `VoltageCompensation::command(u, rail)` to it.
+  /// @param rail_voltage  V, > 0; `VoltageCompensation::rail` makes a measurement believable.
+  [[nodiscard]] InputVector step(const StateVector& r, const StateVector& r_next,
+                                 const OutputVector& y, const InputVector& extra,
+                                 double rail_voltage) noexcept;
+
+  /// Declares a state to be an angle that wraps, see StateFeedback.
+  void make_continuous(int state, double turn) noexcept { feedback_.make_continuous(state, turn); }
+
+  /// Starts again at an estimate, as after a time without control: the next step predicts from it.
+  void reset(const StateVector& x_hat) noexcept {
+    observer_.reset(x_hat);
+    u_model_.setZero();
+  }
+
+  [[nodiscard]] const StateVector& x_hat() const noexcept { return observer_.x_hat(); }
+  /// The input of the last step less `extra`: what the linear model saw.
+  [[nodiscard]] const InputVector& u_model() const noexcept { return u_model_; }
+  [[nodiscard]] const Plant& plant() const noexcept { return observer_.plant(); }
+  [[nodiscard]] const FeedbackGain& K() const noexcept { return feedback_.K(); }
+  [[nodiscard]] const EstimatorGain& K_e() const noexcept { return observer_.K(); }
+  [[nodiscard]] const LinearPlantInversion<States, Inputs>& feedforward() const noexcept {
+    return inversion_;
+  }
+
+ private:
+  Lqg(const Plant& plant, const FeedbackGain& K, const EstimatorGain& K_e,
+      const LinearPlantInversion<States, Inputs>& inversion, const InputVector& u_min,
+      const InputVector& u_max);
+
+  Observer<States, Inputs, Outputs> observer_;
+  StateFeedback<States, Inputs> feedback_;
+  LinearPlantInversion<States, Inputs> inversion_;
+  InputVector u_model_;
+};
+
+/// `Lqg::create` with the sizes of the plant and one limit for every input: |u| <= u_limit.
+template <int States, int Inputs, int Outputs>
+[[nodiscard]] Expected<Lqg<States, Inputs, Outputs>> lqg(
+    const DiscreteSystem<States, Inputs, Outputs>& plant,
+    const Eigen::Matrix<double, Inputs, States>& K,
+    const Eigen::Matrix<double, States, Outputs>& K_e,
+    double u_limit = std::numeric_limits<double>::infinity()) {
+  using Input = Eigen::Matrix<double, Inputs, 1>;
+  const Input limit = Input::Constant(plant.B.cols(), u_limit);
+  return Lqg<States, Inputs, Outputs>::create(plant, K, K_e, -limit, limit);
+}
+
+extern template class Lqg<1, 1, 1>;
+extern template class Lqg<2, 1, 1>;
+extern template class Lqg<2, 1, 2>;
+extern template class Lqg<2, 2, 2>;
+extern template class Lqg<3, 1, 1>;
+extern template class Lqg<3, 1, 2>;
+extern template class Lqg<Eigen::Dynamic, Eigen::Dynamic, Eigen::Dynamic>;
+
+}  // namespace flyball

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <complex>
+
+#include <Eigen/Core>
+
+#include <flyball/estimation/covariance.hpp>
+#include <flyball/systems/system.hpp>
+
+namespace flyball {
+
+/// The steady state of a Kalman filter.
+template <int States = Eigen::Dynamic, int Outputs = Eigen::Dynamic>
+struct KalmanGain {
+  Eigen::Matrix<double, States, Outputs> K;           ///< Filter form P Cᵀ (C P Cᵀ + R)⁻¹ (9.22).
+  Eigen::Matrix<double, States, Outputs> L;           ///< Predictor form A K.
+  Eigen::Matrix<double, States, States> P_prior;      ///< Error covariance before an update.
+  Eigen::Matrix<double, States, States> P_posterior;  ///< Error covariance after it.
+  Eigen::Matrix<std::complex<double>, States, 1> poles;  ///< Eigenvalues of A - L C.
+  double residual = 0.0;   ///< Relative residual of the Riccati equation.
+  double condition = 0.0;  ///< Condition estimate of its solution.
+};
+
+/// The gain that the filter of Theorem 9.6.3 converges to, from the Riccati equation's dual:
+/// P = A P Aᵀ + Q - A P Cᵀ (C P Cᵀ + R)⁻¹ C P Aᵀ.
+///
+/// @param A  n x n, discrete. @param C  p x n.
+/// @param Q  n x n, process noise covariance per sample. @param R  p x p, measurement noise
+///           covariance per sample.
+/// @errors ArgumentError for shapes, entries and asymmetry; the error of a covariance's maker;
+///         RiccatiError as `dare` of (Aᵀ, Cᵀ): not_stabilizable there means that (A, C) is not
+///         detectable, with the mode that no output shows.
+/// Cost: one Riccati solution; allocates. Source: book, section 9.6, equations 9.21 to 9.24.
+[[nodiscard]] Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C,
+                                                 const Covariance& Q, const Covariance& R);
+
+template <int States, int Inputs, int Outputs>
+[[nodiscard]] Expected<KalmanGain<States, Outputs>> kalman_gain(
+    const DiscreteSystem<States, Inputs, Outputs>& plant, const Covariance& Q,
+    const Covariance& R) {
+  return kalman_gain(plant.A, plant.C, Q, R).map([](const KalmanGain<>& gain) {
+    return KalmanGain<States, Outputs>{gain.K,     gain.L,        gain.P_prior,  gain.P_posterior,
+                                       gain.poles, gain.residual, gain.condition};
+  });
+}
+
+template <int States, int Inputs, int Outputs, class... Rest>
+void kalman_gain(const ContinuousSystem<States, Inputs, Outputs>& plant, const Rest&...) = delete;
+
+}  // namespace flyball
