@@ -1,0 +1,125 @@
+#include <cmath>
+#include <complex>
+#include <limits>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+
+#include "math/riccati_robust.hpp"
+
+namespace flyball::detail {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+std::vector<double> parts(std::complex<double> value) {
+  return {value.real(), value.imag()};
+}
+
+}  // namespace
+
+Error diagnose_riccati(const RiccatiProblem& p) {
+  const Index n = p.A.rows();
+  const Index m = p.B.cols();
+
+  // Popov-Belevitch-Hautus: λ is reached by the inputs exactly if [A - λI, B] has rank n. B's size
+  // is the user's unit, so its columns are compared in A's.
+  const double size_A = p.A.norm();
+  const double size_B = p.B.norm();
+  const double unit = size_B > 0.0 && size_A > 0.0 ? size_A / size_B : 1.0;
+  const Eigen::VectorXcd eigenvalues = p.A.eigenvalues();
+  for (Index k = 0; k < n; ++k) {
+    if (std::abs(eigenvalues(k)) < 1.0 - 1e-7) {
+      continue;
+    }
+    MatrixXcd pencil(n, n + m);
+    pencil << p.A.cast<std::complex<double>>() - eigenvalues(k) * MatrixXcd::Identity(n, n),
+        (unit * p.B).cast<std::complex<double>>();
+    const double smallest = pencil.jacobiSvd().singularValues()(n - 1);
+    if (smallest <= 1e-12 * static_cast<double>(n) * std::max(1.0, size_A)) {
+      return Error(RiccatiError::not_stabilizable)
+          .in("dare")
+          .about("(A, B)")
+          .hint("give this mode an input, or take it out of the model")
+          .with("eigenvalue", parts(eigenvalues(k)))
+          .with("magnitude", std::abs(eigenvalues(k)));
+    }
+  }
+
+  // det(λM - L) of the pencil without R: the shift keeps its eigenvalues and makes R regular.
+  MatrixXd shift = MatrixXd::Zero(n, n);
+  double best = 0.0;
+  RiccatiProblem regular;
+  for (const double factor : {0.0, 1.0, 0.37, -0.61}) {
+    Eigen::VectorXd uneven(n);
+    for (Index i = 0; i < n; ++i) {
+      uneven(i) = factor * (1.0 + 0.3 * static_cast<double>(i % 5));
+    }
+    const RiccatiProblem candidate = shifted(p, uneven.asDiagonal());
+    double rcond = 0.0;
+    (void)solve_equilibrated(candidate.R, MatrixXd::Identity(m, m), rcond);
+    if (rcond > best) {
+      best = rcond;
+      regular = candidate;
+    }
+  }
+  if (!(best > 10.0 * epsilon)) {
+    return Error(RiccatiError::singular)
+        .in("dare")
+        .about("R + B'XB")
+        .got("singular for every X")
+        .expected("invertible")
+        .hint("weigh every input in R, or remove inputs that do the same")
+        .with("reciprocal condition", best);
+  }
+  double rcond = 0.0;
+  MatrixXd rhs(m, 2 * n);
+  rhs << regular.B.transpose(), regular.N.transpose();
+  const MatrixXd solved = solve_equilibrated(regular.R, rhs, rcond);
+  MatrixXd L = MatrixXd::Zero(2 * n, 2 * n);
+  MatrixXd M = MatrixXd::Zero(2 * n, 2 * n);
+  L.topLeftCorner(n, n) = regular.A - regular.B * solved.rightCols(n);
+  L.bottomLeftCorner(n, n) = -(regular.Q - regular.N * solved.rightCols(n));
+  L.bottomRightCorner(n, n).setIdentity();
+  M.topLeftCorner(n, n).setIdentity();
+  M.topRightCorner(n, n) = regular.B * solved.leftCols(n);
+  M.bottomRightCorner(n, n) = L.topLeftCorner(n, n).transpose();
+  // The Cayley transform w = (λ - 1)/(λ + 1) sends the unit circle to the imaginary axis and
+  // leaves no eigenvalue at infinity but λ = -1.
+  const Eigen::GeneralizedEigenSolver<MatrixXd> pencil(L, M, false);
+  double closest = std::numeric_limits<double>::infinity();
+  std::complex<double> on_circle;
+  if (pencil.info() == Eigen::Success) {
+    for (Index k = 0; k < 2 * n; ++k) {
+      const std::complex<double> lambda = pencil.alphas()(k) / pencil.betas()(k);
+      const double distance = std::abs(std::abs(lambda) - 1.0);
+      if (distance < closest) {
+        closest = distance;
+        on_circle = lambda;
+      }
+    }
+  }
+  if (closest < 1e-5) {
+    return Error(RiccatiError::no_stabilizing_solution)
+        .in("dare")
+        .about("the closed loop")
+        .got("left with a mode on the unit circle")
+        .expected("inside it")
+        .hint("weigh that mode in Q, so that the controller has to move it")
+        .with("eigenvalue", parts(on_circle))
+        .with("distance from the unit circle", closest);
+  }
+  return Error(RiccatiError::no_convergence)
+      .in("dare")
+      .about("X")
+      .hint("check the scaling of A, B, Q and R, and whether Q and R are the weights of a minimum")
+      .with("distance of the pencil's eigenvalues from the unit circle", closest);
+}
+
+}  // namespace flyball::detail
