@@ -110,13 +110,18 @@ struct PasteGains {
 
 /// A designed loop: what to implement, how well it holds, how it behaves.
 ///
-/// States are [position, velocity] for elevators and arms, [velocity] for a flywheel, and
-/// [position] when kA is not determined (then the input u is a velocity and the volts are
-/// kS sgn(u) + kV u + gravity).
+/// States are [position, velocity] for elevators and arms and [velocity] for a flywheel. When kA is
+/// not determined, a position mechanism has the state [position] alone (Theorem 14.3.2) and a
+/// flywheel's velocity follows within one period. The input is always a voltage: the part of it
+/// that the linear model sees, to which kS sgn(v) and gravity are added.
+///
+/// The loop, each period (Lqg of control/observer_regulator.hpp): the measurement, which is `delay`
+/// old, is moved along the reference to now, y + delay dr/dt, so that a moving reference causes no
+/// error; the observer predicts and corrects; u = K_delayed (r - x_hat) + B⁺ (r' - A r) + kS + kG.
 struct DesignResult {
   DesignJob job;                    ///< As run, with every default filled in.
   std::vector<std::string> states;  ///< Names with units: "position (m)", …
-  bool velocity_servo = false;      ///< Theorem 14.3.2 is the plant.
+  bool velocity_servo = false;      ///< kA is not determined: Theorem 14.3.2 is the plant.
 
   Eigen::MatrixXd A_continuous, B_continuous;
   Eigen::MatrixXd A, B, C;      ///< Discrete plant (Theorem 7.3.1) and its output.

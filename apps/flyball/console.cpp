@@ -1,0 +1,95 @@
+#include <cstdio>
+#include <cstdlib>
+
+#include <unistd.h>
+
+#include <flyball/study/schema.hpp>
+
+#include "console.hpp"
+
+namespace flyball::app {
+
+int exit_status(const Error& error) {
+  return error.kind() == ErrorKind::no_answer ? no_answer : bad_input;
+}
+
+void add_common_options(CLI::App& command, CommonOptions& options, const std::string& report) {
+  command.add_flag("--json", options.json, "Answer one JSON object on one line (docs/schemas.md)");
+  command.add_option("--out", options.out, report)->type_name("DIR");
+}
+
+void add_log_options(CLI::App& command, LogOptions& options) {
+  study::LogSelection& selection = options.selection;
+  command
+      .add_option("--mechanism", options.mechanism,
+                  "What the log is of: flywheel, elevator or arm (if it does not say)")
+      ->type_name("KIND");
+  command
+      .add_option("--unit", selection.unit,
+                  "Unit of the recorded position: rotations, rad, deg, m, in, …")
+      ->type_name("UNIT");
+  command
+      .add_option("--scale", selection.scale,
+                  "Multiplies recorded positions and velocities; 1/gearing for a motor's encoder, "
+                  "metres per rotation for an elevator recorded in rotations")
+      ->type_name("NUMBER");
+  command.add_option("--state", selection.state_channel, "Channel that names the running test")
+      ->type_name("CHANNEL");
+  command.add_option("--voltage", selection.voltage_channel, "Channel of the applied voltage")
+      ->type_name("CHANNEL");
+  command.add_option("--position", selection.position_channel, "Channel of the position")
+      ->type_name("CHANNEL");
+  command.add_option("--velocity", selection.velocity_channel, "Channel of the velocity")
+      ->type_name("CHANNEL");
+}
+
+Expected<study::LogSelection> selection_of(const LogOptions& options) {
+  study::LogSelection selection = options.selection;
+  if (!options.mechanism.empty()) {
+    auto kind = mechanisms::parse_mechanism_kind(options.mechanism);
+    if (!kind) {
+      return tl::unexpected(std::move(kind).error().in("--mechanism"));
+    }
+    selection.mechanism = *kind;
+  }
+  return selection;
+}
+
+report::TerminalStyle terminal_style() {
+  const char* no_color = std::getenv("NO_COLOR");
+  const bool wanted = no_color == nullptr || *no_color == '\0';
+  return {.color = wanted && ::isatty(STDOUT_FILENO) == 1};
+}
+
+void print(const std::string& text) {
+  std::fwrite(text.data(), 1, text.size(), stdout);
+  if (text.empty() || text.back() != '\n') {
+    std::fputc('\n', stdout);
+  }
+}
+
+int fail(const Error& error, const CommonOptions& options, const std::string& schema) {
+  if (options.json) {
+    print(study::to_json(error, schema));
+  }
+  std::fflush(stdout);
+  std::fprintf(stderr, "flyball: %s\n", to_string(error).c_str());
+  return exit_status(error);
+}
+
+std::optional<std::string> report_folder(const CommonOptions& options, bool by_default) {
+  if (!options.out.empty()) {
+    return options.out;
+  }
+  if (by_default && !options.json) {
+    return "flyball-report";
+  }
+  return std::nullopt;
+}
+
+void warn(const std::string& text) {
+  std::fflush(stdout);
+  std::fprintf(stderr, "flyball: warning: %s\n", text.c_str());
+}
+
+}  // namespace flyball::app

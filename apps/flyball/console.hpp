@@ -1,0 +1,56 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include <flyball/core/expected.hpp>
+#include <flyball/report/terminal.hpp>
+#include <flyball/study/recording.hpp>
+
+/// What every command of the program shares: where text goes and how it ends.
+namespace flyball::app {
+
+/// 0 success; 1 well-formed input whose answer is no; 2 bad usage or malformed input.
+enum ExitStatus : int { success = 0, no_answer = 1, bad_input = 2 };
+
+[[nodiscard]] int exit_status(const Error& error);
+
+/// Options that every command has.
+struct CommonOptions {
+  bool json = false;
+  std::string out;
+  unsigned long long seed = 1;
+};
+
+/// Adds --json and --out. @param report  What --out writes, for the help.
+void add_common_options(CLI::App& command, CommonOptions& options, const std::string& report);
+
+/// What a person may say about a log.
+struct LogOptions {
+  std::string mechanism;
+  study::LogSelection selection;
+};
+void add_log_options(CLI::App& command, LogOptions& options);
+/// @errors ArgumentError::unknown_name for the mechanism.
+[[nodiscard]] Expected<study::LogSelection> selection_of(const LogOptions& options);
+
+/// Colours when standard output is a terminal and NO_COLOR is not set.
+[[nodiscard]] report::TerminalStyle terminal_style();
+
+/// Prints a result on standard output.
+void print(const std::string& text);
+
+/// Tells an error: its words on standard error and, with --json, an object on standard output.
+/// @return The exit status.
+int fail(const Error& error, const CommonOptions& options, const std::string& schema);
+
+/// Where a report goes: --out, or `flyball-report` unless --json was asked for.
+[[nodiscard]] std::optional<std::string> report_folder(const CommonOptions& options,
+                                                       bool by_default);
+
+/// Words for a report that could not be written where nobody asked for it.
+void warn(const std::string& text);
+
+}  // namespace flyball::app

@@ -1,0 +1,62 @@
+#include <memory>
+
+#include <flyball/report/write_report.hpp>
+#include <flyball/study/schema.hpp>
+
+#include "commands.hpp"
+#include "console.hpp"
+
+namespace flyball::app {
+
+namespace {
+
+constexpr const char* schema = "flyball.identify/1";
+
+struct Options {
+  CommonOptions common;
+  LogOptions log;
+  std::string path;
+};
+
+int run(const Options& options) {
+  auto selection = selection_of(options.log);
+  if (!selection) {
+    return fail(selection.error(), options.common, schema);
+  }
+  auto result = study::identify({.log = options.path, .selection = *selection});
+  if (!result) {
+    return fail(result.error(), options.common, schema);
+  }
+  std::string written;
+  if (const auto folder = report_folder(options.common, false)) {
+    if (auto report = report::write_identify_report(*result, *folder); !report) {
+      return fail(report.error(), options.common, schema);
+    }
+    written = *folder;
+  }
+  print(options.common.json ? study::to_json(*result)
+                            : report::to_terminal(*result, terminal_style(), written));
+  if (!result->report.fit) {
+    const Error& refusal = result->report.fit.error();
+    warn(to_string(refusal));
+    return exit_status(refusal);
+  }
+  return success;
+}
+
+}  // namespace
+
+void add_identify_command(CLI::App& program, int& status) {
+  CLI::App* command = program.add_subcommand(
+      "identify", "Identify kS, kV, kA and kG of a mechanism from a log of it moving");
+  command->footer(
+      "LOG is a SysId JSON, a WPILOG or a CSV with the four characterisation tests (quasistatic\n"
+      "and dynamic, forward and reverse). What the log does not say is detected and told.");
+  auto options = std::make_shared<Options>();
+  command->add_option("LOG", options->path, "The log")->required();
+  add_log_options(*command, options->log);
+  add_common_options(*command, options->common, "Write the report into this folder");
+  command->callback([options, &status] { status = run(*options); });
+}
+
+}  // namespace flyball::app

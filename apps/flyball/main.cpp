@@ -1,0 +1,51 @@
+#include <cstdio>
+#include <exception>
+
+#include <CLI/CLI.hpp>
+
+#include <flyball/core/version.hpp>
+
+#include "commands.hpp"
+#include "console.hpp"
+
+int main(int argc, char** argv) {
+  CLI::App program{
+      "Flyball takes a mechanism from its first log, or from its drawing, to a controller that "
+      "has\n"
+      "been proven before it touches the robot.\n"
+      "\n"
+      "  flyball tune arm.json                      a log of an arm, to gains, report and C++\n"
+      "  flyball tune lift.wpilog --mechanism elevator --period 20ms --out report/\n"
+      "  flyball identify shooter.json --json       only the gains, for other programs\n"
+      "  flyball design elevator.toml               no robot yet: mass, gearing and motors\n"
+      "  flyball motors kraken                      what the motor table knows\n"
+      "  flyball book 6.3                           a figure of the book, from this library\n"
+      "\n"
+      "Results go to standard output, errors to standard error. Exit status: 0 success, 1 the "
+      "input\n"
+      "is well formed but the answer is no (a log without motion), 2 bad usage or malformed input.",
+      "flyball"};
+  program.set_version_flag("--version", "flyball " + std::string(flyball::version));
+  program.require_subcommand(1);
+
+  int status = flyball::app::success;
+  flyball::app::add_identify_command(program, status);
+  flyball::app::add_design_command(program, status);
+  flyball::app::add_tune_command(program, status);
+  flyball::app::add_motors_command(program, status);
+  flyball::app::add_book_command(program, status);
+
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::Success& answer) {
+    return program.exit(answer);
+  } catch (const CLI::ParseError& problem) {
+    std::fprintf(stderr, "flyball: %s\n", problem.what());
+    std::fprintf(stderr, "Run with --help for the commands and their options.\n");
+    return flyball::app::bad_input;
+  } catch (const std::exception& defect) {
+    std::fprintf(stderr, "flyball: a defect of Flyball: %s\n", defect.what());
+    return flyball::app::bad_input;
+  }
+  return status;
+}

@@ -1,0 +1,71 @@
+#include <memory>
+
+#include <nlohmann/json.hpp>
+
+#include <flyball/mechanisms/motor.hpp>
+#include <flyball/report/terminal.hpp>
+
+#include "commands.hpp"
+#include "console.hpp"
+
+namespace flyball::app {
+
+namespace {
+
+struct Options {
+  CommonOptions common;
+  std::string name;
+};
+
+constexpr const char* schema = "flyball.motors/1";
+
+nlohmann::ordered_json motor_json(const mechanisms::DcMotor& motor) {
+  return {{"name", motor.name},
+          {"nominal_voltage", motor.nominal_voltage},
+          {"stall_torque", motor.stall_torque},
+          {"stall_current", motor.stall_current},
+          {"free_current", motor.free_current},
+          {"free_speed", motor.free_speed},
+          {"R", motor.R},
+          {"Kt", motor.Kt},
+          {"Kv", motor.Kv}};
+}
+
+int run(const Options& options) {
+  std::vector<mechanisms::DcMotor> motors;
+  if (options.name.empty()) {
+    for (const mechanisms::MotorTableEntry& entry : mechanisms::motor_table()) {
+      motors.push_back(mechanisms::motor(entry.name).value());
+    }
+  } else {
+    auto motor = mechanisms::motor(options.name);
+    if (!motor) {
+      return fail(motor.error(), options.common, schema);
+    }
+    motors.push_back(*std::move(motor));
+  }
+  if (options.common.json) {
+    nlohmann::ordered_json list = nlohmann::ordered_json::array();
+    for (const mechanisms::DcMotor& motor : motors) {
+      list.push_back(motor_json(motor));
+    }
+    print(nlohmann::ordered_json{{"schema", schema}, {"motors", std::move(list)}}.dump());
+    return success;
+  }
+  print(report::motors_to_terminal(motors, terminal_style()));
+  return success;
+}
+
+}  // namespace
+
+void add_motors_command(CLI::App& program, int& status) {
+  CLI::App* command =
+      program.add_subcommand("motors", "List the motors by their datasheet numbers");
+  auto options = std::make_shared<Options>();
+  command->add_option("NAME", options->name,
+                      "One motor; case, spaces and punctuation do not matter (krakenX60foc)");
+  command->add_flag("--json", options->common.json, "Answer one JSON object on one line");
+  command->callback([options, &status] { status = run(*options); });
+}
+
+}  // namespace flyball::app
