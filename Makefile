@@ -16,7 +16,7 @@ help:  ## Show this list
 demo:  ## Install what is missing, build the command, tune an example log
 	@scripts/install-deps
 	@$(MAKE) --no-print-directory configure
-	@cmake --build $(BUILD) --parallel $(JOBS) --target flyball_command
+	@cmake --build $(BUILD) --parallel $(JOBS) --target flyball_command example_true_versus_identified
 	@scripts/demo
 
 test:  ## Install what is missing, build everything, run every test
