@@ -1,0 +1,141 @@
+// Monte Carlo of the identification: recordings of known mechanisms, what is recovered of them.
+//
+//   bench_identification [--seeds N] [--seed FIRST] [--only NAME]
+//
+// Per mechanism and gain: median and 90th percentile of the relative error, share of the 95 %
+// intervals that hold the truth, median relative half-width; and the time of a fit.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <flyball/identification/feedforward_fit.hpp>
+
+#include "scenarios.hpp"
+
+namespace {
+
+using flyball::identification::FeedforwardFit;
+using flyball::identification::GainEstimate;
+
+struct Tally {
+  std::string_view name;
+  double truth;
+  std::vector<double> errors;
+  std::vector<double> widths;
+  std::size_t covered = 0;
+  std::size_t undetermined = 0;
+
+  void add(const GainEstimate& gain) {
+    const double scale = std::abs(truth) > 0.0 ? std::abs(truth) : 1.0;
+    errors.push_back((gain.value - truth) / scale);
+    widths.push_back(0.5 * (gain.interval[1] - gain.interval[0]) / scale);
+    covered += gain.interval[0] <= truth && truth <= gain.interval[1] ? 1U : 0U;
+    undetermined += gain.determined ? 0U : 1U;
+  }
+};
+
+double quantile(std::vector<double> values, double q) {
+  if (values.empty()) {
+    return 0.0;
+  }
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
+}
+
+void print(const Tally& tally) {
+  std::vector<double> magnitudes;
+  for (const double error : tally.errors) {
+    magnitudes.push_back(std::abs(error));
+  }
+  std::printf(
+      "  %-6s median error %6.2f %%   p90 %6.2f %%   bias %+6.2f %%   covered %5.1f %%   "
+      "half-width %6.2f %%   undetermined %zu\n",
+      std::string(tally.name).c_str(), 100.0 * quantile(magnitudes, 0.5),
+      100.0 * quantile(magnitudes, 0.9), 100.0 * quantile(tally.errors, 0.5),
+      100.0 * static_cast<double>(tally.covered) /
+          std::max(1.0, static_cast<double>(tally.errors.size())),
+      100.0 * quantile(tally.widths, 0.5), tally.undetermined);
+}
+
+void run(const scenarios::Truth& truth, std::uint64_t first, std::uint64_t seeds) {
+  std::vector<Tally> tallies{{"kS", truth.kS, {}, {}},
+                             {"kV", truth.kV, {}, {}},
+                             {"kA", truth.kA, {}, {}},
+                             {"kG", truth.kG, {}, {}},
+                             {"offset", truth.offset, {}, {}}};
+  std::vector<double> seconds;
+  std::vector<double> ols_kA;
+  std::size_t refused = 0;
+  for (std::uint64_t seed = first; seed < first + seeds; ++seed) {
+    const auto recording =
+        flyball::simulation::record_test_session(scenarios::session(truth, seed));
+    if (!recording) {
+      std::printf("%s\n", to_string(recording.error()).c_str());
+      std::exit(1);
+    }
+    const auto start = std::chrono::steady_clock::now();
+    const auto fit = flyball::identification::fit_feedforward(*recording);
+    seconds.push_back(
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    if (!fit) {
+      ++refused;
+      std::printf("  seed %llu: %s\n", static_cast<unsigned long long>(seed),
+                  to_string(fit.error()).c_str());
+      continue;
+    }
+    tallies[0].add(fit->kS);
+    tallies[1].add(fit->kV);
+    tallies[2].add(fit->kA);
+    if (fit->kG) {
+      tallies[3].add(*fit->kG);
+    }
+    if (fit->angle_offset) {
+      tallies[4].add(*fit->angle_offset);
+    }
+    if (fit->one_step) {
+      ols_kA.push_back(std::abs(fit->one_step->kA / truth.kA - 1.0));
+    }
+  }
+  std::printf(
+      "%s: %llu seeds, %zu refused, %.0f ms a fit (worst %.0f), one-step OLS kA error %.0f %%\n",
+      std::string(truth.name).c_str(), static_cast<unsigned long long>(seeds), refused,
+      1e3 * quantile(seconds, 0.5), 1e3 * quantile(seconds, 1.0), 100.0 * quantile(ols_kA, 0.5));
+  for (const Tally& tally : tallies) {
+    if (!tally.errors.empty()) {
+      print(tally);
+    }
+  }
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::uint64_t seeds = 1000;
+  std::uint64_t first = 1;
+  std::string_view only;
+  for (int i = 1; i + 1 < argc; i += 2) {
+    const std::string_view option = argv[i];
+    if (option == "--seeds") {
+      seeds = std::strtoull(argv[i + 1], nullptr, 10);
+    } else if (option == "--seed") {
+      first = std::strtoull(argv[i + 1], nullptr, 10);
+    } else if (option == "--only") {
+      only = argv[i + 1];
+    } else {
+      std::fprintf(stderr, "usage: %s [--seeds N] [--seed FIRST] [--only NAME]\n", argv[0]);
+      return 2;
+    }
+  }
+  for (const scenarios::Truth& truth : scenarios::kMechanisms) {
+    if (only.empty() || truth.name.find(only) != std::string_view::npos) {
+      run(truth, first, seeds);
+    }
+  }
+  return 0;
+}

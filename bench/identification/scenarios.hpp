@@ -1,0 +1,64 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <numbers>
+#include <string_view>
+
+#include <flyball/core/random.hpp>
+#include <flyball/simulation/test_session.hpp>
+
+/// The six mechanisms that the identification is measured on.
+namespace scenarios {
+
+using flyball::mechanisms::MechanismKind;
+using flyball::simulation::TestSessionOptions;
+
+struct Truth {
+  std::string_view name;
+  MechanismKind kind;
+  double kS, kV, kA, kG, offset;
+};
+
+inline constexpr std::array<Truth, 6> kMechanisms{{
+    {"flywheel 1", MechanismKind::flywheel, 0.2, 0.02, 0.004, 0.0, 0.0},
+    {"flywheel 2", MechanismKind::flywheel, 0.5, 0.12, 0.05, 0.0, 0.0},
+    {"elevator 1", MechanismKind::elevator, 0.15, 4.0, 0.3, 0.6, 0.0},
+    {"elevator 2", MechanismKind::elevator, 0.4, 9.4, 0.8, 0.36, 0.0},
+    {"arm 1", MechanismKind::arm, 0.1, 1.2, 0.15, 0.65, 0.2},
+    {"arm 2", MechanismKind::arm, 0.25, 0.9, 0.06, 0.5, -0.4},
+}};
+
+/// A session of that mechanism; whatever the description leaves open varies with the seed.
+inline TestSessionOptions session(const Truth& truth, std::uint64_t seed) {
+  flyball::Random random(seed * 7919 + 17);
+  TestSessionOptions options;
+  options.mechanism = truth.kind;
+  options.kS = truth.kS;
+  options.kV = truth.kV;
+  options.kA = truth.kA;
+  options.kG = truth.kG;
+  options.angle_offset = truth.offset;
+  options.resolution =
+      truth.kind == MechanismKind::elevator ? 1e-4 : 2.0 * std::numbers::pi / 4096.0;
+  if (truth.kind == MechanismKind::elevator) {
+    const double travel = random.uniform(0.9, 1.5);
+    options.travel_low = 0.0;
+    options.travel_high = travel;
+    options.travel_margin = random.uniform(0.02, 0.1) * travel;
+  } else if (truth.kind == MechanismKind::arm) {
+    options.travel_low = -random.uniform(0.8, 1.3);
+    options.travel_high = random.uniform(0.8, 1.5);
+    options.travel_margin = random.uniform(0.02, 0.1);
+  }
+  options.ramp_limit = truth.kind == MechanismKind::flywheel ? random.uniform(3.0, 6.0) : 10.0;
+  options.step_duration = random.uniform(1.5, 3.0);
+  options.rest_before = 0.005 * static_cast<double>(1 + static_cast<int>(random.uniform() * 20.0));
+  options.coast_after = random.uniform(0.0, 0.2);
+  options.noise_per_row = random.uniform() < 0.5;
+  options.sensor_delay = random.uniform(0.0, 0.02);
+  options.seed = seed;
+  return options;
+}
+
+}  // namespace scenarios

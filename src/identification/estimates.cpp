@@ -1,0 +1,206 @@
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "identification/estimates.hpp"
+#include "identification/output_error.hpp"
+
+namespace flyball::identification {
+namespace {
+
+using mechanisms::MechanismKind;
+
+constexpr double kNormal95 = 1.96;
+constexpr double kOneSided95 = 1.645;
+constexpr double kWidestTimeConstant = 0.6;  // relative half-width beyond which kA is unknown
+
+GainEstimate symmetric(double value, double standard_error) {
+  return {value,
+          standard_error,
+          {value - kNormal95 * standard_error, value + kNormal95 * standard_error},
+          true,
+          0.0,
+          {}};
+}
+
+void mark_undetermined(GainEstimate& gain, double upper_bound, std::string reason) {
+  gain.determined = false;
+  gain.upper_bound = upper_bound;
+  gain.reason = std::move(reason);
+}
+
+Eigen::VectorXd unit_gradient(Eigen::Index size, Eigen::Index at) {
+  return Eigen::VectorXd::Unit(size, at);
+}
+
+/// kA = τ kV, positive: its interval is symmetric in the logarithm.
+GainEstimate inertia_gain(const PreparedRecording& prepared, const Eigen::VectorXd& x,
+                          const Covariances& spread, const Bounds& bounds) {
+  const double tau = std::exp(x[kLogTimeConstant]);
+  const double kV = x[kVelocityGain];
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(x.size());
+  gradient[kLogTimeConstant] = 1.0;
+  gradient[kVelocityGain] = 1.0 / kV;
+  const double relative = spread.standard_error(gradient);
+  GainEstimate kA;
+  kA.value = tau * kV;
+  kA.standard_error = relative * kA.value;
+  const double reach = std::min(kNormal95 * relative, 20.0);
+  kA.interval = {kA.value * std::exp(-reach), kA.value * std::exp(reach)};
+
+  const double refresh = std::max(
+      {prepared.row_period, prepared.position_refresh_period, prepared.velocity_refresh_period});
+  const double ceiling =
+      std::max(kA.value * std::exp(std::min(kOneSided95 * relative, 5.0)), refresh * kV);
+  if (x[kLogTimeConstant] <= bounds.lower[kLogTimeConstant] + 1e-6) {
+    mark_undetermined(
+        kA, ceiling,
+        fmt::format("the speed-up is over within one sensor value ({:.0f} ms)", 1e3 * refresh));
+  } else if (x[kLogTimeConstant] >= bounds.upper[kLogTimeConstant] - 1e-6) {
+    mark_undetermined(kA, kA.interval[1], "the speed hardly settles within the tests");
+  } else if (tau < refresh) {
+    mark_undetermined(kA, ceiling,
+                      fmt::format("the time constant kA/kV = {:.1f} ms is shorter than the {:.0f} "
+                                  "ms between sensor values",
+                                  1e3 * tau, 1e3 * refresh));
+  } else if (kNormal95 * relative > kWidestTimeConstant) {
+    mark_undetermined(kA, ceiling,
+                      fmt::format("its 95 % interval is ±{:.0f} %: it trades against the sensors' "
+                                  "delay and averaging",
+                                  100.0 * kNormal95 * relative));
+  }
+  return kA;
+}
+
+void gravity_gains(const Eigen::VectorXd& x, const Covariances& spread, FeedforwardFit& fit) {
+  const double cosine = x[kGravityCosine];
+  const double sine = x[kGravitySine];
+  if (fit.mechanism == MechanismKind::elevator) {
+    fit.kG = symmetric(cosine, spread.standard_error(unit_gradient(x.size(), kGravityCosine)));
+  } else if (fit.mechanism == MechanismKind::arm) {
+    // kG cos(θ + offset) = kG cos(offset) cos θ − kG sin(offset) sin θ
+    const double amplitude = std::max(std::hypot(cosine, sine), 1e-12);
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(x.size());
+    gradient[kGravityCosine] = cosine / amplitude;
+    gradient[kGravitySine] = sine / amplitude;
+    fit.kG = symmetric(amplitude, spread.standard_error(gradient));
+    gradient[kGravityCosine] = sine / (amplitude * amplitude);
+    gradient[kGravitySine] = -cosine / (amplitude * amplitude);
+    fit.angle_offset = symmetric(std::atan2(-sine, cosine), spread.standard_error(gradient));
+  } else {
+    return;
+  }
+  GainEstimate& kG = *fit.kG;
+  if (kG.interval[0] <= 0.0 && kG.interval[1] >= 0.0) {
+    mark_undetermined(kG, std::max(std::abs(kG.interval[0]), std::abs(kG.interval[1])),
+                      "gravity cannot be told from zero (a counterbalance or a horizontal axis?)");
+    if (fit.angle_offset) {
+      mark_undetermined(*fit.angle_offset, 3.141592653589793, "without gravity there is no zero");
+    }
+  }
+}
+
+}  // namespace
+
+Expected<void> estimate_gains(const PreparedRecording& prepared, const Eigen::VectorXd& x,
+                              const Covariances& spread, const Bounds& bounds,
+                              FeedforwardFit& fit) {
+  if (spread.singular) {
+    return tl::unexpected(Error(IdentificationError::singular)
+                              .in("identify")
+                              .hint("record ramps and steps in both directions with more travel"));
+  }
+  fit.kS = symmetric(x[kStaticFriction],
+                     spread.standard_error(unit_gradient(x.size(), kStaticFriction)));
+  fit.kS.interval[0] = std::max(0.0, fit.kS.interval[0]);
+  if (fit.kS.interval[0] <= 0.0) {
+    mark_undetermined(fit.kS, std::max(fit.kS.interval[1], 1e-3),
+                      "static friction cannot be told from zero");
+  }
+  fit.kV =
+      symmetric(x[kVelocityGain], spread.standard_error(unit_gradient(x.size(), kVelocityGain)));
+  fit.kA = inertia_gain(prepared, x, spread, bounds);
+  gravity_gains(x, spread, fit);
+
+  const bool kV_at_bound = x[kVelocityGain] <= 1.001 * bounds.lower[kVelocityGain];
+  if (!(fit.kV.value > 0.0) || kV_at_bound) {
+    return tl::unexpected(Error(IdentificationError::unphysical_gains)
+                              .in("identify")
+                              .about("kV")
+                              .got(fmt::format("{:.4g} V/({}/s)", fit.kV.value, fit.unit))
+                              .expected("positive")
+                              .hint("check the signs and units of voltage and velocity"));
+  }
+  if (kNormal95 * fit.kV.standard_error > 0.5 * fit.kV.value) {
+    return tl::unexpected(Error(IdentificationError::singular)
+                              .in("identify")
+                              .about("kV")
+                              .got(fmt::format("{:.4g} ± {:.2g} V/({}/s)", fit.kV.value,
+                                               kNormal95 * fit.kV.standard_error, fit.unit))
+                              .expected("known to better than 50 %")
+                              .hint("record longer tests with more travel"));
+  }
+  if (fit.r_squared < 0.5) {
+    return tl::unexpected(
+        Error(IdentificationError::unphysical_gains)
+            .in("identify")
+            .about("the simulated velocity")
+            .got(fmt::format("unlike the measured one (R² = {:.2f})", fit.r_squared))
+            .hint("no gains of this model explain the log; check the mechanism's kind, the units "
+                  "and the signs"));
+  }
+  return {};
+}
+
+void report_fit(const PreparedRecording& prepared, const FeedforwardFit& fit,
+                std::vector<Diagnostic>& diagnostics) {
+  const std::string& unit = fit.unit;
+  if (!fit.kA.determined) {
+    diagnostics.push_back({"kA_not_determined", Severity::warning,
+                           fmt::format("kA is below {:.3g} V·s²/{} but not determined: {}",
+                                       fit.kA.upper_bound, unit, fit.kA.reason)});
+  }
+  if (!fit.kS.determined) {
+    diagnostics.push_back(
+        {"kS_indistinguishable", Severity::info,
+         fmt::format("kS is below {:.3g} V: {}", fit.kS.upper_bound, fit.kS.reason)});
+  }
+  if (fit.kG && !fit.kG->determined) {
+    diagnostics.push_back(
+        {"kG_indistinguishable", Severity::warning,
+         fmt::format("|kG| is below {:.3g} V: {}", fit.kG->upper_bound, fit.kG->reason)});
+  }
+  if (prepared.has_velocity && fit.averaging_width > 0.03) {
+    diagnostics.push_back(
+        {"velocity_filtered", Severity::info,
+         fmt::format("the velocity column is averaged over about {:.0f} ms; a controller that uses "
+                     "it sees the velocity {:.0f} ms late",
+                     1e3 * fit.averaging_width, 1e3 * std::max(0.0, fit.velocity_delay))});
+  }
+  if (prepared.has_position && prepared.has_velocity &&
+      std::abs(fit.velocity_delay - 0.5 * fit.averaging_width - fit.position_delay) > 0.015) {
+    diagnostics.push_back(
+        {"channel_skew", Severity::info,
+         fmt::format("position is {:.0f} ms and velocity {:.0f} ms older than the voltage of the "
+                     "same row (averaging taken off); the fit accounts for it",
+                     1e3 * fit.position_delay,
+                     1e3 * (fit.velocity_delay - 0.5 * fit.averaging_width))});
+  } else if (prepared.has_position && fit.position_delay > 0.015) {
+    diagnostics.push_back(
+        {"channel_delay", Severity::info,
+         fmt::format("the encoder's values are {:.0f} ms older than the voltage of "
+                     "the same row; the fit accounts for it",
+                     1e3 * fit.position_delay)});
+  }
+  if (fit.velocity_nrmse > 0.2) {
+    diagnostics.push_back(
+        {"poor_fit", Severity::warning,
+         fmt::format("the simulated velocity misses {:.0f} % of the measured one's spread (R² = "
+                     "{:.3f}): the mechanism does more than the model says",
+                     100.0 * fit.velocity_nrmse, fit.r_squared)});
+  }
+}
+
+}  // namespace flyball::identification

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <flyball/identification/feedforward_fit.hpp>
+
+#include "identification/robust_fit.hpp"
+
+namespace flyball::identification {
+
+/// Gains with intervals from the parameters; what the data do not determine is marked.
+/// @errors IdentificationError::singular, unphysical_gains.
+[[nodiscard]] Expected<void> estimate_gains(const PreparedRecording& prepared,
+                                            const Eigen::VectorXd& x, const Covariances& spread,
+                                            const Bounds& bounds, FeedforwardFit& fit);
+
+/// What there is to say about a fit: undetermined gains, delays, filters, poor agreement.
+void report_fit(const PreparedRecording& prepared, const FeedforwardFit& fit,
+                std::vector<Diagnostic>& diagnostics);
+
+}  // namespace flyball::identification

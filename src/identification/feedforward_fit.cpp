@@ -1,0 +1,300 @@
+#include <flyball/identification/feedforward_fit.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <flyball/core/argument.hpp>
+
+#include "identification/estimates.hpp"
+#include "identification/output_error.hpp"
+#include "identification/robust_fit.hpp"
+#include "identification/start.hpp"
+#include "identification/statistics.hpp"
+
+namespace flyball::identification {
+namespace {
+
+using mechanisms::MechanismKind;
+
+constexpr std::string_view kWhere = "identify";
+constexpr double kShortestTimeConstant = 0.002;  // s
+constexpr double kLongestTimeConstant = 10.0;    // s
+constexpr int kScaleRefreshes = 4;
+
+Expected<void> check_tests(const PreparedRecording& prepared) {
+  bool any = false;
+  bool ramps = false;
+  bool steps = false;
+  bool forward = false;
+  bool backward = false;
+  std::string unusable;
+  for (const PreparedRun& run : prepared.runs) {
+    any = any || run.moved;
+    if (run.moved) {
+      const bool ramp = is_quasistatic(run.run.kind);
+      ramps = ramps || ramp;
+      steps = steps || !ramp;
+      forward = forward || run.direction > 0.0;
+      backward = backward || run.direction < 0.0;
+    }
+  }
+  if (prepared.runs.empty()) {
+    return tl::unexpected(Error(IdentificationError::no_data)
+                              .in(std::string(kWhere))
+                              .hint("record the four tests again"));
+  }
+  if (!any) {
+    double voltage = 0.0;
+    double travel = 0.0;
+    for (const PreparedRun& run : prepared.runs) {
+      for (const double value : run.run.voltage) {
+        voltage = std::max(voltage, std::abs(value));
+      }
+      if (!run.run.position.empty()) {
+        const auto [low, high] =
+            std::minmax_element(run.run.position.begin(), run.run.position.end());
+        travel = std::max(travel, *high - *low);
+      }
+    }
+    return tl::unexpected(
+        Error(IdentificationError::no_motion)
+            .in(std::string(kWhere))
+            .hint(voltage < 0.1
+                      ? "no voltage was applied either: the log was started but no test ran"
+                      : "check that the encoder counts and that the mechanism is free")
+            .with("largest voltage, V", voltage)
+            .with("largest travel, " + prepared.unit, travel));
+  }
+  if (!ramps || !steps) {
+    return tl::unexpected(
+        Error(IdentificationError::missing_tests)
+            .in(std::string(kWhere))
+            .about(ramps ? "dynamic tests (steps)" : "quasistatic tests (ramps)")
+            .got("missing or without usable motion")
+            .hint(ramps ? "ramps alone do not tell kA; record dynamic-forward and dynamic-reverse"
+                        : "steps alone do not tell friction from speed; record quasistatic-forward "
+                          "and quasistatic-reverse"));
+  }
+  if (prepared.mechanism != MechanismKind::flywheel && !(forward && backward)) {
+    return tl::unexpected(Error(IdentificationError::missing_tests)
+                              .in(std::string(kWhere))
+                              .about(forward ? "motion in reverse" : "motion forward")
+                              .got("missing")
+                              .hint("in one direction alone friction and gravity are one number; "
+                                    "record both directions"));
+  }
+  return {};
+}
+
+Bounds make_bounds(const OutputErrorProblem& problem, const StartGains& start,
+                   const FitOptions& options) {
+  const Eigen::Index n = problem.parameters();
+  constexpr double kUnbounded = 1e12;
+  Bounds bounds{Eigen::VectorXd::Constant(n, -kUnbounded),
+                Eigen::VectorXd::Constant(n, kUnbounded)};
+  bounds.lower[kStaticFriction] = 0.0;
+  bounds.lower[kVelocityGain] = 1e-3 * start.kV;
+  bounds.upper[kVelocityGain] = 1e3 * start.kV;
+  bounds.lower[kLogTimeConstant] = std::log(kShortestTimeConstant);
+  bounds.upper[kLogTimeConstant] = std::log(kLongestTimeConstant);
+  bounds.lower[kPositionDelay] = -0.04;
+  bounds.upper[kPositionDelay] = options.max_delay;
+  bounds.lower[kAveragingWidth] = 0.0;
+  bounds.upper[kAveragingWidth] = 0.15;
+  bounds.lower[kVelocityDelay] = -0.04;
+  bounds.upper[kVelocityDelay] = options.max_delay + 0.06;
+  bounds.lower[kVelocityScale] = 0.3;
+  bounds.upper[kVelocityScale] = 3.0;
+  return bounds;
+}
+
+Eigen::VectorXd make_start(const OutputErrorProblem& problem, const StartGains& gains,
+                           double time_constant) {
+  const PreparedRecording& recording = problem.recording();
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.parameters());
+  x[kStaticFriction] = gains.kS;
+  x[kVelocityGain] = gains.kV;
+  x[kLogTimeConstant] = std::log(time_constant);
+  x[kGravityCosine] = gains.gravity_cosine;
+  x[kGravitySine] = gains.gravity_sine;
+  x[kPositionDelay] = recording.has_position ? 0.01 : 0.0;
+  x[kVelocityDelay] = recording.has_velocity ? 0.03 : 0.0;
+  x[kAveragingWidth] = recording.has_velocity ? 0.03 : 0.0;
+  x[kVelocityScale] = recording.has_position && recording.has_velocity &&
+                              std::abs(recording.velocity_scale - 1.0) > 0.03
+                          ? recording.velocity_scale
+                          : 1.0;
+  for (std::size_t i = 0; i < problem.runs().size(); ++i) {
+    const ResidualRun& run = problem.runs()[i];
+    const PreparedRun& prepared = recording.runs[run.prepared];
+    x[kSharedParameters + static_cast<Eigen::Index>(i)] =
+        run.starts_at_rest ? 0.0 : prepared.smoothed_velocity[prepared.first];
+  }
+  return x;
+}
+
+/// From several time constants a few iterations each, then the best one to convergence with scales
+/// and angles refreshed.
+RobustFit fit_gains(OutputErrorProblem& problem, const StartGains& gains, const Bounds& bounds,
+                    const FitOptions& options, ChannelScales& scales) {
+  const std::vector<bool> free = problem.free_parameters();
+  const double top = problem.recording().top_speed;
+  scales = {problem.recording().has_position ? 0.02 * top * options.difference_span : 0.0,
+            problem.recording().has_velocity ? 0.02 * top : 0.0};
+  RobustFit best;
+  int iterations = 0;
+  for (const double time_constant : {0.03, 0.15, 0.7}) {
+    RobustFit fit = minimize(problem, make_start(problem, gains, time_constant), free, bounds,
+                             scales, std::min(12, options.max_iterations / 8));
+    iterations += fit.iterations;
+    if (best.x.size() == 0 || fit.cost < best.cost) {
+      best = std::move(fit);
+    }
+  }
+  for (int refresh = 0; refresh < kScaleRefreshes; ++refresh) {
+    problem.set_angle_delay(best.x[kPositionDelay]);
+    scales = residual_scales(problem, best.x);
+    best = minimize(problem, best.x, free, bounds, scales,
+                    std::max(1, std::min(60, options.max_iterations - iterations)));
+    iterations += best.iterations;
+  }
+  best.iterations = iterations;
+  return best;
+}
+
+/// What the simulation says about each run, and how well.
+void add_runs(OutputErrorProblem& problem, const Eigen::VectorXd& x, FeedforwardFit& fit) {
+  const PreparedRecording& recording = problem.recording();
+  fit.runs.resize(recording.runs.size());
+  for (std::size_t i = 0; i < recording.runs.size(); ++i) {
+    fit.runs[i].kind = recording.runs[i].run.kind;
+    fit.runs[i].source = recording.runs[i].source;
+  }
+  double squared_error = 0.0;
+  double sum = 0.0;
+  double squares = 0.0;
+  double count = 0.0;
+  std::vector<double> velocity_residuals;
+  std::vector<double> difference_residuals;
+  ResidualBlock block;
+  for (std::size_t index = 0; index < problem.runs().size(); ++index) {
+    const ResidualRun& run = problem.runs()[index];
+    const PreparedRun& prepared = recording.runs[run.prepared];
+    problem.evaluate(index, x, false, block);
+    difference_residuals.insert(difference_residuals.end(), block.difference.begin(),
+                                block.difference.end());
+    FittedRun& fitted = fit.runs[run.prepared];
+    fitted.used = true;
+    std::vector<double> offsets;
+    for (std::size_t row = prepared.first; row < prepared.last; ++row) {
+      const double time = prepared.run.time[row];
+      fitted.time.push_back(time);
+      fitted.voltage.push_back(prepared.run.voltage[row]);
+      fitted.velocity.push_back(recording.has_velocity ? prepared.run.velocity[row]
+                                                       : prepared.smoothed_velocity[row]);
+      fitted.velocity_hat.push_back(problem.velocity_shown(index, x, time));
+      fitted.velocity_residual.push_back(fitted.velocity.back() - fitted.velocity_hat.back());
+      if (recording.has_position) {
+        fitted.position.push_back(prepared.run.position[row]);
+        fitted.position_hat.push_back(problem.position_shown(index, x, time));
+        offsets.push_back(fitted.position.back() - fitted.position_hat.back());
+      }
+      squared_error += fitted.velocity_residual.back() * fitted.velocity_residual.back();
+      sum += fitted.velocity.back();
+      squares += fitted.velocity.back() * fitted.velocity.back();
+      count += 1.0;
+    }
+    velocity_residuals.insert(velocity_residuals.end(), fitted.velocity_residual.begin(),
+                              fitted.velocity_residual.end());
+    const double offset = median(std::move(offsets));
+    for (double& position : fitted.position_hat) {
+      position += offset;
+    }
+  }
+  const double variance = squares - sum * sum / std::max(1.0, count);
+  fit.r_squared = variance > 0.0 ? 1.0 - squared_error / variance : 0.0;
+  fit.velocity_nrmse = variance > 0.0 ? std::sqrt(squared_error / variance) : 0.0;
+  fit.velocity_noise = mad_scale(velocity_residuals);
+  fit.position_noise = mad_scale(difference_residuals) / std::sqrt(2.0);
+}
+
+Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const FitOptions& options,
+                                      std::vector<Diagnostic>& diagnostics) {
+  if (!prepared.mechanism) {
+    return tl::unexpected(Error(IdentificationError::unknown_mechanism)
+                              .in(std::string(kWhere))
+                              .hint("say which: flywheel, elevator or arm"));
+  }
+  if (auto tests = check_tests(prepared); !tests) {
+    return tl::unexpected(std::move(tests).error());
+  }
+  if (*prepared.mechanism == MechanismKind::arm && !prepared.has_position) {
+    return tl::unexpected(Error(IdentificationError::singular)
+                              .in(std::string(kWhere))
+                              .about("the position")
+                              .got("missing or constant")
+                              .expected("the arm's angle, which its gravity depends on"));
+  }
+  auto gains = regress_gains(prepared);
+  if (!gains) {
+    return tl::unexpected(std::move(gains).error());
+  }
+  OutputErrorProblem problem(prepared, options);
+  if (problem.residuals() < 10 * static_cast<std::size_t>(problem.parameters())) {
+    return tl::unexpected(Error(IdentificationError::too_short)
+                              .in(std::string(kWhere))
+                              .hint("record longer tests")
+                              .with("usable values", static_cast<double>(problem.residuals())));
+  }
+  const Bounds bounds = make_bounds(problem, *gains, options);
+  ChannelScales scales;
+  const RobustFit best = fit_gains(problem, *gains, bounds, options, scales);
+  const Covariances spread =
+      covariances(problem, best.x, problem.free_parameters(), bounds, scales);
+
+  FeedforwardFit fit;
+  fit.mechanism = *prepared.mechanism;
+  fit.unit = prepared.unit;
+  fit.iterations = best.iterations;
+  fit.residuals = problem.residuals();
+  fit.position_delay = best.x[kPositionDelay];
+  fit.velocity_delay = best.x[kVelocityDelay];
+  fit.averaging_width = best.x[kAveragingWidth];
+  fit.velocity_scale = best.x[kVelocityScale];
+  add_runs(problem, best.x, fit);
+  if (auto physical = estimate_gains(prepared, best.x, spread, bounds, fit); !physical) {
+    return tl::unexpected(std::move(physical).error());
+  }
+  if (auto one_step = fit_one_step(prepared)) {
+    fit.one_step = *std::move(one_step);
+  }
+  report_fit(prepared, fit, diagnostics);
+  return fit;
+}
+
+}  // namespace
+
+FitReport identify_feedforward(const Recording& recording, const FitOptions& options) {
+  PreparationOptions preparation = options.preparation;
+  if (options.mechanism) {
+    preparation.mechanism = options.mechanism;
+  }
+  auto prepared = prepare(recording, preparation);
+  if (!prepared) {
+    return {{}, {}, tl::unexpected(std::move(prepared).error())};
+  }
+  FitReport report{*std::move(prepared), {}, tl::unexpected(Error(IdentificationError::no_data))};
+  report.diagnostics = report.prepared.diagnostics;
+  report.fit = fit_prepared(report.prepared, options, report.diagnostics);
+  return report;
+}
+
+Expected<FeedforwardFit> fit_feedforward(const Recording& recording, const FitOptions& options) {
+  return identify_feedforward(recording, options).fit;
+}
+
+}  // namespace flyball::identification

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <flyball/identification/feedforward_fit.hpp>
+
+#include "identification/response.hpp"
+
+/// The comparison of a recording with its simulation, as a least-squares problem.
+namespace flyball::identification {
+
+/// Parameters that all runs share; after them, the initial velocity of each run.
+enum SharedParameter : int {
+  // 0 to 4 are those of SimulationParameter.
+  kPositionDelay = 5,   ///< s.
+  kVelocityDelay = 6,   ///< s, to the middle of the averaging window.
+  kAveragingWidth = 7,  ///< s.
+  kVelocityScale = 8,   ///< Velocity column over true velocity.
+};
+inline constexpr int kSharedParameters = 9;
+/// Columns of a run's Jacobian: the shared parameters and the run's initial velocity.
+inline constexpr int kLocalParameters = 10;
+
+enum class Channel { position, velocity };
+
+/// One run's share of the problem.
+struct ResidualRun {
+  std::size_t prepared = 0;  ///< Index in PreparedRecording::runs.
+  bool ramp = false;
+  bool starts_at_rest = false;
+  double window_end = 0.0;
+  RunInput input;
+  /// Rows of the prepared run (from, to) whose position difference is compared.
+  std::vector<std::pair<std::size_t, std::size_t>> differences;
+  std::vector<std::size_t> velocities;  ///< Rows whose velocity is compared.
+  std::vector<double> angle_time;       ///< Fresh position rows, for the angle under gravity.
+  std::vector<double> angle;
+};
+
+/// Measured − simulated with its Jacobian, in units of the channel; differences first.
+struct ResidualBlock {
+  Eigen::VectorXd difference;
+  Eigen::VectorXd velocity;
+  using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, kLocalParameters, Eigen::RowMajor>;
+  Jacobian difference_jacobian;
+  Jacobian velocity_jacobian;
+};
+
+class OutputErrorProblem {
+ public:
+  OutputErrorProblem(const PreparedRecording& recording, const FitOptions& options);
+
+  [[nodiscard]] const std::vector<ResidualRun>& runs() const { return runs_; }
+  [[nodiscard]] const PreparedRecording& recording() const { return recording_; }
+  [[nodiscard]] mechanisms::MechanismKind mechanism() const { return mechanism_; }
+  [[nodiscard]] int parameters() const {
+    return kSharedParameters + static_cast<int>(runs_.size());
+  }
+  [[nodiscard]] std::size_t residuals() const;
+
+  /// The angle under gravity is the measured one, `delay` later; only arms depend on it.
+  void set_angle_delay(double delay);
+
+  /// Residuals (and Jacobians) of one run. @param x  All parameters.
+  void evaluate(std::size_t run, const Eigen::VectorXd& x, bool jacobian, ResidualBlock& block);
+
+  /// The velocity (as the column shows it) and the position at the given times of a run.
+  [[nodiscard]] double velocity_shown(std::size_t run, const Eigen::VectorXd& x, double time) const;
+  [[nodiscard]] double position_shown(std::size_t run, const Eigen::VectorXd& x, double time) const;
+
+  /// Which parameters the data can move at all.
+  [[nodiscard]] std::vector<bool> free_parameters() const;
+
+ private:
+  const PreparedRecording& recording_;
+  mechanisms::MechanismKind mechanism_;
+  std::vector<ResidualRun> runs_;
+  std::vector<Response> responses_;
+};
+
+}  // namespace flyball::identification

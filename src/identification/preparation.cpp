@@ -1,0 +1,247 @@
+#include <flyball/identification/preparation.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+
+#include <fmt/format.h>
+
+#include <flyball/core/argument.hpp>
+
+#include "identification/channels.hpp"
+#include "identification/statistics.hpp"
+#include "identification/trimming.hpp"
+
+namespace flyball::identification {
+namespace {
+
+constexpr std::string_view kWhere = "prepare";
+
+Expected<void> check_columns(const TestRun& run, std::size_t index) {
+  const std::size_t rows = run.time.size();
+  const auto fits = [rows](const std::vector<double>& column) {
+    return column.empty() || column.size() == rows;
+  };
+  const bool sized = run.voltage.size() == rows && fits(run.position) && fits(run.velocity);
+  const bool moves = rows == 0 || !run.position.empty() || !run.velocity.empty();
+  if (sized && moves) {
+    return {};
+  }
+  return tl::unexpected(
+      Error(ArgumentError::wrong_shape)
+          .in(std::string(kWhere))
+          .about(fmt::format("run {} ({})", index, to_string(run.kind)))
+          .got(fmt::format("{} times, {} voltages, {} positions, {} velocities", rows,
+                           run.voltage.size(), run.position.size(), run.velocity.size()))
+          .expected("columns of one length, position or velocity among them"));
+}
+
+/// Keeps the rows listed, in their order.
+void keep_rows(TestRun& run, const std::vector<std::size_t>& rows) {
+  for (std::vector<double> TestRun::* column :
+       {&TestRun::time, &TestRun::voltage, &TestRun::position, &TestRun::velocity}) {
+    std::vector<double>& values = run.*column;
+    if (values.empty()) {
+      continue;
+    }
+    std::vector<double> kept(rows.size());
+    std::transform(rows.begin(), rows.end(), kept.begin(),
+                   [&](std::size_t row) { return values[row]; });
+    values = std::move(kept);
+  }
+}
+
+struct RowDefects {
+  std::size_t not_finite = 0;
+  std::size_t unsorted = 0;
+  std::size_t same_time = 0;
+  std::size_t outliers = 0;
+  std::size_t total = 0;
+};
+
+void drop_not_finite(TestRun& run, RowDefects& defects) {
+  std::vector<std::size_t> rows;
+  for (std::size_t i = 0; i < run.time.size(); ++i) {
+    const bool finite = std::isfinite(run.time[i]) && std::isfinite(run.voltage[i]) &&
+                        (run.position.empty() || std::isfinite(run.position[i])) &&
+                        (run.velocity.empty() || std::isfinite(run.velocity[i]));
+    if (finite) {
+      rows.push_back(i);
+    }
+  }
+  if (rows.size() < run.time.size()) {
+    defects.not_finite += run.time.size() - rows.size();
+    keep_rows(run, rows);
+  }
+}
+
+void sort_rows(TestRun& run, RowDefects& defects) {
+  std::size_t inversions = 0;
+  for (std::size_t i = 1; i < run.time.size(); ++i) {
+    inversions += run.time[i] < run.time[i - 1] ? 1U : 0U;
+  }
+  std::vector<std::size_t> rows(run.time.size());
+  std::iota(rows.begin(), rows.end(), std::size_t{0});
+  if (inversions > 0) {
+    defects.unsorted += inversions;
+    std::stable_sort(rows.begin(), rows.end(),
+                     [&](std::size_t a, std::size_t b) { return run.time[a] < run.time[b]; });
+  }
+  // Two rows of one instant cannot both be true: the later one stands.
+  std::vector<std::size_t> distinct;
+  for (const std::size_t row : rows) {
+    if (!distinct.empty() && run.time[row] == run.time[distinct.back()]) {
+      distinct.back() = row;
+      ++defects.same_time;
+    } else {
+      distinct.push_back(row);
+    }
+  }
+  if (inversions > 0 || distinct.size() < rows.size()) {
+    keep_rows(run, distinct);
+  }
+}
+
+/// Rows whose value is far outside the run's range and not shared by the neighbours.
+void drop_outliers(TestRun& run, RowDefects& defects) {
+  std::vector<bool> bad(run.time.size(), false);
+  for (const std::vector<double> TestRun::* column :
+       {&TestRun::voltage, &TestRun::position, &TestRun::velocity}) {
+    const std::vector<double>& values = run.*column;
+    if (values.size() < 20) {
+      continue;
+    }
+    const double low = quantile(values, 0.01);
+    const double high = quantile(values, 0.99);
+    const double spread = std::max(high - low, 1e-3 * std::max(std::abs(low), std::abs(high)));
+    for (std::size_t i = 0; spread > 0.0 && i < values.size(); ++i) {
+      const double beyond = std::max(low - values[i], values[i] - high);
+      bad[i] = bad[i] || beyond > 2.0 * spread;
+    }
+  }
+  std::vector<std::size_t> rows;
+  for (std::size_t i = 0; i < bad.size(); ++i) {
+    if (!bad[i]) {
+      rows.push_back(i);
+    }
+  }
+  if (rows.size() < bad.size()) {
+    defects.outliers += bad.size() - rows.size();
+    keep_rows(run, rows);
+  }
+}
+
+void report_rows(const RowDefects& defects, std::vector<Diagnostic>& diagnostics) {
+  const auto tell = [&](std::size_t count, std::string code, std::string_view what,
+                        std::string_view done) {
+    if (count > 0) {
+      diagnostics.push_back(
+          {std::move(code), Severity::warning,
+           fmt::format("{} of {} rows {}; {}", count, defects.total, what, done)});
+    }
+  };
+  tell(defects.not_finite, "non_finite_rows", "hold NaN or infinity", "they were dropped");
+  tell(defects.unsorted, "unsorted_time", "go back in time", "the rows were sorted");
+  tell(defects.same_time, "duplicate_times", "repeat the time of the row before",
+       "the later one was kept");
+  tell(defects.outliers, "outliers", "hold a value far outside the test's range",
+       "they were dropped");
+}
+
+bool any_changes(const std::vector<PreparedRun>& runs, std::vector<double> TestRun::* column) {
+  return std::any_of(runs.begin(), runs.end(), [column](const PreparedRun& run) {
+    const std::vector<double>& values = run.run.*column;
+    return std::adjacent_find(values.begin(), values.end(), std::not_equal_to<>{}) != values.end();
+  });
+}
+
+bool all_have(const std::vector<PreparedRun>& runs, std::vector<double> TestRun::* column) {
+  return !runs.empty() && std::none_of(runs.begin(), runs.end(), [column](const PreparedRun& run) {
+    return (run.run.*column).empty();
+  });
+}
+
+void choose_channels(PreparedRecording& prepared) {
+  prepared.has_position =
+      all_have(prepared.runs, &TestRun::position) && any_changes(prepared.runs, &TestRun::position);
+  prepared.has_velocity =
+      all_have(prepared.runs, &TestRun::velocity) && any_changes(prepared.runs, &TestRun::velocity);
+  std::vector<double> steps;
+  for (const PreparedRun& run : prepared.runs) {
+    for (std::size_t i = 1; i < run.run.time.size(); ++i) {
+      steps.push_back(run.run.time[i] - run.run.time[i - 1]);
+    }
+  }
+  prepared.row_period = median(std::move(steps));
+  prepared.position_quantum = column_quantum(prepared.runs, &TestRun::position);
+  prepared.velocity_quantum = column_quantum(prepared.runs, &TestRun::velocity);
+  prepared.position_refresh_period = refresh_period(prepared.runs, &TestRun::position);
+  prepared.velocity_refresh_period = refresh_period(prepared.runs, &TestRun::velocity);
+}
+
+void report_repeats(PreparedRecording& prepared) {
+  const double share = repeated_share(prepared.runs);
+  if (share > 0.2) {
+    prepared.diagnostics.push_back(
+        {"repeated_rows", Severity::info,
+         fmt::format(
+             "{:.0f} % of the rows repeat the encoder value before (rows every {:.1f} ms, "
+             "new values every {:.1f} ms); only rows with new values are compared with the "
+             "simulation",
+             100.0 * share, 1e3 * prepared.row_period,
+             1e3 * std::max(prepared.position_refresh_period, prepared.velocity_refresh_period))});
+  }
+}
+
+void report_missing_tests(PreparedRecording& prepared) {
+  for (const TestKind kind : {TestKind::quasistatic_forward, TestKind::quasistatic_reverse,
+                              TestKind::dynamic_forward, TestKind::dynamic_reverse}) {
+    const bool present =
+        std::any_of(prepared.runs.begin(), prepared.runs.end(),
+                    [kind](const PreparedRun& run) { return run.run.kind == kind; });
+    if (!present) {
+      prepared.diagnostics.push_back(
+          {"missing_test", Severity::warning,
+           fmt::format("the {} test is missing from the log", to_string(kind))});
+    }
+  }
+}
+
+}  // namespace
+
+Expected<PreparedRecording> prepare(const Recording& recording, const PreparationOptions& options) {
+  PreparedRecording prepared;
+  prepared.mechanism = options.mechanism ? options.mechanism : recording.mechanism;
+  prepared.unit = recording.unit;
+
+  RowDefects defects;
+  for (std::size_t i = 0; i < recording.runs.size(); ++i) {
+    if (auto valid = check_columns(recording.runs[i], i); !valid) {
+      return tl::unexpected(std::move(valid).error());
+    }
+    PreparedRun run;
+    run.run = recording.runs[i];
+    run.source = i;
+    defects.total += run.run.time.size();
+    drop_not_finite(run.run, defects);
+    sort_rows(run.run, defects);
+    drop_outliers(run.run, defects);
+    if (run.run.time.size() >= 2) {
+      prepared.runs.push_back(std::move(run));
+    }
+  }
+  report_rows(defects, prepared.diagnostics);
+  report_missing_tests(prepared);
+
+  choose_channels(prepared);
+  refresh_derived_columns(prepared);
+  detect_motion(prepared);
+  mend_signs(prepared);
+  trim_runs(prepared, options);
+  check_velocity_scale(prepared);
+  report_repeats(prepared);
+  return prepared;
+}
+
+}  // namespace flyball::identification

@@ -1,0 +1,48 @@
+#include <flyball/identification/recording.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <utility>
+
+namespace flyball::identification {
+namespace {
+
+constexpr std::array<std::pair<std::string_view, TestKind>, 8> kNames{{
+    {"quasistatic-forward", TestKind::quasistatic_forward},
+    {"quasistatic-reverse", TestKind::quasistatic_reverse},
+    {"dynamic-forward", TestKind::dynamic_forward},
+    {"dynamic-reverse", TestKind::dynamic_reverse},
+    {"slow-forward", TestKind::quasistatic_forward},
+    {"slow-backward", TestKind::quasistatic_reverse},
+    {"fast-forward", TestKind::dynamic_forward},
+    {"fast-backward", TestKind::dynamic_reverse},
+}};
+
+}  // namespace
+
+std::string_view to_string(TestKind kind) {
+  const auto* const entry = std::find_if(kNames.begin(), kNames.end(),
+                                         [&](const auto& name) { return name.second == kind; });
+  return entry != kNames.end() ? entry->first : "unknown";
+}
+
+Expected<TestKind> parse_test_kind(std::string_view name) {
+  std::string plain(name);
+  std::transform(plain.begin(), plain.end(), plain.begin(), [](unsigned char letter) {
+    return letter == '_' || letter == ' ' ? '-' : static_cast<char>(std::tolower(letter));
+  });
+  for (const auto& [known, kind] : kNames) {
+    if (plain == known) {
+      return kind;
+    }
+  }
+  return tl::unexpected(Error(ArgumentError::unknown_name)
+                            .in("parse_test_kind")
+                            .about("the test")
+                            .got("'" + std::string(name) + "'")
+                            .expected("quasistatic-forward, quasistatic-reverse, dynamic-forward "
+                                      "or dynamic-reverse"));
+}
+
+}  // namespace flyball::identification

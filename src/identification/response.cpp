@@ -1,0 +1,156 @@
+#include <algorithm>
+#include <cmath>
+
+#include "identification/response.hpp"
+#include "identification/statistics.hpp"
+
+namespace flyball::identification {
+namespace {
+
+using Gradient = Eigen::Matrix<double, 1, kSimulationParameters>;
+
+/// The state with its derivatives by the parameters.
+struct State {
+  double velocity;
+  double position;
+  Gradient velocity_gradient;
+  Gradient position_gradient;
+};
+
+struct Drive {
+  double force;  ///< Voltage − gravity, V.
+  double cosine;
+  double sine;
+};
+
+/// Slides for `duration` with friction against `sign`:
+/// v' = a v + b w, p' = p + c v + d w with w = force − sign kS, a = exp(−T/τ), c = τ(1 − a),
+/// b = (1 − a)/kV, d = (T − c)/kV.
+void slide(State& state, const Drive& drive, double sign, double duration,
+           const SimulationVector& x, double tau, bool sensitivities) {
+  const double a = std::exp(-duration / tau);
+  const double c = tau * (1.0 - a);
+  const double kV = x[kVelocityGain];
+  const double b = (1.0 - a) / kV;
+  const double d = (duration - c) / kV;
+  const double w = drive.force - sign * x[kStaticFriction];
+  if (sensitivities) {
+    // ∂a/∂ln τ = a T/τ, ∂c/∂ln τ = c − a T.
+    const double a_log = a * duration / tau;
+    const double c_log = c - a * duration;
+    Gradient force = Gradient::Zero();
+    force[kStaticFriction] = -sign;
+    force[kGravityCosine] = -drive.cosine;
+    force[kGravitySine] = -drive.sine;
+    state.position_gradient += c * state.velocity_gradient + d * force;
+    state.position_gradient[kVelocityGain] -= d * w / kV;
+    state.position_gradient[kLogTimeConstant] += c_log * (state.velocity - w / kV);
+    state.velocity_gradient = a * state.velocity_gradient + b * force;
+    state.velocity_gradient[kVelocityGain] -= b * w / kV;
+    state.velocity_gradient[kLogTimeConstant] += a_log * (state.velocity - w / kV);
+  }
+  state.position += c * state.velocity + d * w;
+  state.velocity = a * state.velocity + b * w;
+}
+
+void advance(State& state, const Drive& drive, double duration, const SimulationVector& x,
+             bool sensitivities) {
+  const double tau = std::exp(x[kLogTimeConstant]);
+  const double kS = std::max(0.0, x[kStaticFriction]);
+  double remaining = duration;
+  // At most: slow down to rest, then slip the other way.
+  for (int piece = 0; piece < 2 && remaining > 0.0; ++piece) {
+    if (state.velocity == 0.0 && std::abs(drive.force) <= kS) {
+      return;
+    }
+    const bool moving = state.velocity != 0.0;
+    const double sign = std::copysign(1.0, moving ? state.velocity : drive.force);
+    const double final_velocity = (drive.force - sign * x[kStaticFriction]) / x[kVelocityGain];
+    double passed = remaining;
+    bool stops = false;
+    if (moving && sign * final_velocity < 0.0) {
+      const double until_rest = tau * std::log((state.velocity - final_velocity) / -final_velocity);
+      stops = until_rest < remaining;
+      passed = stops ? until_rest : remaining;
+    }
+    slide(state, drive, sign, passed, x, tau, sensitivities);
+    remaining -= passed;
+    if (stops) {
+      state.velocity = 0.0;
+      if (sensitivities) {
+        // The instant of the stop moves with the parameters: dv⁺ = (v̇⁺/v̇⁻) dv⁻, 0 if it sticks.
+        const double reversed = drive.force + sign * x[kStaticFriction];
+        const bool sticks = std::abs(drive.force) <= kS || sign * reversed > 0.0;
+        const double before = drive.force - sign * x[kStaticFriction];
+        state.velocity_gradient *= sticks || before == 0.0 ? 0.0 : reversed / before;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void Response::simulate(const RunInput& input, const SimulationVector& parameters,
+                        bool sensitivities) {
+  input_ = &input;
+  const auto rows = static_cast<Eigen::Index>(input.time.size());
+  velocity_.resize(rows);
+  position_.resize(rows);
+  if (sensitivities) {
+    velocity_gradient_.resize(rows, kSimulationParameters);
+    position_gradient_.resize(rows, kSimulationParameters);
+  }
+  State state{parameters[kInitialVelocity], 0.0, Gradient::Zero(), Gradient::Zero()};
+  state.velocity_gradient[kInitialVelocity] = 1.0;
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    velocity_[row] = state.velocity;
+    position_[row] = state.position;
+    if (sensitivities) {
+      velocity_gradient_.row(row) = state.velocity_gradient;
+      position_gradient_.row(row) = state.position_gradient;
+    }
+    if (row + 1 < rows) {
+      const auto i = static_cast<std::size_t>(row);
+      const double gravity = parameters[kGravityCosine] * input.gravity_cosine[i] +
+                             parameters[kGravitySine] * input.gravity_sine[i];
+      advance(state, {input.voltage[i] - gravity, input.gravity_cosine[i], input.gravity_sine[i]},
+              input.time[i + 1] - input.time[i], parameters, sensitivities);
+    }
+  }
+}
+
+Response::Sample Response::at(double time, bool gradient) const {
+  const std::vector<double>& knots = input_->time;
+  Sample sample;
+  if (time <= knots.front() || time >= knots.back()) {
+    const Eigen::Index row = time <= knots.front() ? 0 : velocity_.size() - 1;
+    const double beyond = time - knots[static_cast<std::size_t>(row)];
+    sample.velocity = velocity_[row];
+    sample.position = position_[row] + beyond * velocity_[row];
+    for (int j = 0; gradient && j < kSimulationParameters; ++j) {
+      sample.position_gradient[static_cast<std::size_t>(j)] =
+          position_gradient_(row, j) + beyond * velocity_gradient_(row, j);
+    }
+    return sample;
+  }
+  const std::size_t next = std::max<std::size_t>(1, lower_index(knots, time));
+  const auto k = static_cast<Eigen::Index>(next) - 1;
+  const double width = knots[next] - knots[next - 1];
+  const double s = (time - knots[next - 1]) / width;
+  // Cubic Hermite basis of values (h00, h01) and slopes (h10, h11).
+  const double h01 = s * s * (3.0 - 2.0 * s);
+  const double h00 = 1.0 - h01;
+  const double h10 = width * s * (1.0 - s) * (1.0 - s);
+  const double h11 = width * s * s * (s - 1.0);
+  sample.position =
+      h00 * position_[k] + h10 * velocity_[k] + h01 * position_[k + 1] + h11 * velocity_[k + 1];
+  sample.velocity = (1.0 - s) * velocity_[k] + s * velocity_[k + 1];
+  for (int j = 0; gradient && j < kSimulationParameters; ++j) {
+    sample.position_gradient[static_cast<std::size_t>(j)] =
+        h00 * position_gradient_(k, j) + h10 * velocity_gradient_(k, j) +
+        h01 * position_gradient_(k + 1, j) + h11 * velocity_gradient_(k + 1, j);
+  }
+  return sample;
+}
+
+}  // namespace flyball::identification

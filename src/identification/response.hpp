@@ -1,0 +1,59 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+/// The mechanism's response to a recorded voltage, with its sensitivities.
+namespace flyball::identification {
+
+/// What a run's simulation depends on, in the order of the sensitivities' columns.
+enum SimulationParameter : int {
+  kStaticFriction = 0,   ///< kS, V.
+  kVelocityGain = 1,     ///< kV, V/(unit/s).
+  kLogTimeConstant = 2,  ///< ln(kA/kV), kA/kV in s.
+  kGravityCosine = 3,    ///< Factor of the first gravity input (1 or cos θ), V.
+  kGravitySine = 4,      ///< Factor of the second gravity input (sin θ), V.
+  kInitialVelocity = 5,  ///< Of this run, unit/s.
+};
+inline constexpr int kSimulationParameters = 6;
+using SimulationVector = std::array<double, kSimulationParameters>;
+
+/// What drives a run: everything is held from a row to the next.
+struct RunInput {
+  std::vector<double> time;            ///< s, ascending.
+  std::vector<double> voltage;         ///< V.
+  std::vector<double> gravity_cosine;  ///< First gravity input.
+  std::vector<double> gravity_sine;    ///< Second gravity input.
+};
+
+/// Position (from 0) and velocity at the rows, and between them by cubic Hermite interpolation.
+class Response {
+ public:
+  struct Sample {
+    double position = 0.0;
+    double velocity = 0.0;
+    SimulationVector position_gradient{};
+  };
+
+  /// Integrates kA v̇ = V − kS sgn(v) − kV v − gravity exactly from row to row: exponential pieces,
+  /// split where the velocity reaches zero (there it sticks if |V − gravity| ≤ kS).
+  void simulate(const RunInput& input, const SimulationVector& parameters, bool sensitivities);
+
+  /// Before the first row the velocity is the initial one, after the last row it stays.
+  [[nodiscard]] Sample at(double time, bool gradient) const;
+  [[nodiscard]] double position_at(double time) const { return at(time, false).position; }
+
+ private:
+  using Gradients = Eigen::Matrix<double, Eigen::Dynamic, kSimulationParameters, Eigen::RowMajor>;
+
+  const RunInput* input_ = nullptr;
+  Eigen::VectorXd velocity_;
+  Eigen::VectorXd position_;
+  Gradients velocity_gradient_;
+  Gradients position_gradient_;
+};
+
+}  // namespace flyball::identification

@@ -1,0 +1,277 @@
+#include <flyball/simulation/test_session.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string_view>
+#include <vector>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/core/random.hpp>
+
+namespace flyball::simulation {
+namespace {
+
+using identification::Recording;
+using identification::TestKind;
+using identification::TestRun;
+using mechanisms::MechanismKind;
+
+constexpr std::string_view kWhere = "record_test_session";
+constexpr double kStep = 0.25e-3;       // s, gravity and friction are constant over it
+constexpr double kSensorMemory = 0.5;   // s of rest before the first row that sensors may look at
+constexpr double kMaxDuration = 120.0;  // s, of one test
+
+Expected<void> check_in(double value, double low, double high, std::string_view name) {
+  if (const auto finite = check_finite(value, kWhere, name); !finite) {
+    return finite;
+  }
+  if (value < low || value > high) {
+    return tl::unexpected(
+        Error(ArgumentError::out_of_range)
+            .in(std::string(kWhere))
+            .about(std::string(name))
+            .expected("in [" + format_number(low) + ", " + format_number(high) + "]")
+            .got(format_number(value)));
+  }
+  return {};
+}
+
+Expected<void> check_options(const TestSessionOptions& options) {
+  const bool travels = options.mechanism != MechanismKind::flywheel;
+  return check_all(
+      check_not_negative(options.kS, kWhere, "kS", "V"), check_positive(options.kV, kWhere, "kV"),
+      check_positive(options.kA, kWhere, "kA"), check_finite(options.kG, kWhere, "kG"),
+      check_finite(options.angle_offset, kWhere, "angle_offset"),
+      check_in(options.friction_variation, 0.0, 0.99, "friction_variation"),
+      check_in(options.breakaway, 1.0, 100.0, "breakaway"),
+      check_positive(options.ramp_rate, kWhere, "ramp_rate", "V/s"),
+      check_positive(options.step_voltage, kWhere, "step_voltage", "V"),
+      check_in(options.ramp_limit, 0.0, options.ramp_rate * kMaxDuration, "ramp_limit"),
+      check_in(options.step_duration, 0.0, kMaxDuration, "step_duration"),
+      check_in(options.rest_before, 0.0, 10.0, "rest_before"),
+      check_in(options.coast_after, 0.0, 10.0, "coast_after"),
+      check_in(options.row_period, 1e-3, 1.0, "row_period"),
+      check_in(options.row_jitter, 0.0, options.row_period / 4.0, "row_jitter"),
+      check_in(options.sensor_refresh, 0.0, 1.0, "sensor_refresh"),
+      check_in(options.sensor_delay, 0.0, kSensorMemory / 2.0, "sensor_delay"),
+      check_not_negative(options.resolution, kWhere, "resolution"),
+      check_in(options.velocity_window, 0.0, kSensorMemory / 2.0, "velocity_window"),
+      check_not_negative(options.velocity_noise.value_or(0.0), kWhere, "velocity_noise"),
+      check_not_negative(options.voltage_noise, kWhere, "voltage_noise", "V"),
+      travels
+          ? check_positive(options.travel_high - options.travel_low - 2.0 * options.travel_margin,
+                           kWhere, "travel_high - travel_low - 2 travel_margin")
+          : Expected<void>{});
+}
+
+/// kA v̇ = V − kS sgn(v) − kV v − gravity between hard stops.
+class Mechanism {
+ public:
+  Mechanism(const TestSessionOptions& options, double position)
+      : options_(options), position_(position) {}
+
+  [[nodiscard]] double position() const { return position_; }
+  void hold() { velocity_ = 0.0; }
+
+  /// Advances by kStep with friction and gravity frozen: exact exponential pieces, split where the
+  /// velocity crosses zero.
+  void advance(double voltage) {
+    const double friction = friction_here();
+    const double drive = voltage - gravity_here();
+    double remaining = kStep;
+    // At most: decelerate to rest, then slip the other way.
+    for (int piece = 0; piece < 3 && remaining > 0.0; ++piece) {
+      if (velocity_ == 0.0 && std::abs(drive) <= friction * options_.breakaway) {
+        break;
+      }
+      const double sign =
+          velocity_ != 0.0 ? std::copysign(1.0, velocity_) : std::copysign(1.0, drive);
+      remaining -= slide(drive - sign * friction, sign, remaining);
+    }
+    if (options_.mechanism != MechanismKind::flywheel) {
+      const double stopped = std::clamp(position_, options_.travel_low, options_.travel_high);
+      if (stopped != position_) {
+        position_ = stopped;
+        velocity_ = 0.0;
+      }
+    }
+  }
+
+ private:
+  /// Slides for `duration` at most, ending early at rest; returns the time that passed.
+  double slide(double drive, double sign, double duration) {
+    const double tau = options_.kA / options_.kV;
+    const double final_velocity = drive / options_.kV;
+    const double decay = std::exp(-duration / tau);
+    const double next = final_velocity + (velocity_ - final_velocity) * decay;
+    if (next * sign >= 0.0) {
+      position_ += final_velocity * duration + (velocity_ - final_velocity) * tau * (1.0 - decay);
+      velocity_ = next;
+      return duration;
+    }
+    const double passed =
+        std::min(duration, tau * std::log((velocity_ - final_velocity) / -final_velocity));
+    position_ += final_velocity * passed + velocity_ * tau;
+    velocity_ = 0.0;
+    return passed;
+  }
+
+  [[nodiscard]] double friction_here() const {
+    const double length = options_.mechanism == MechanismKind::flywheel
+                              ? 2.0 * std::numbers::pi
+                              : 0.5 * (options_.travel_high - options_.travel_low);
+    return options_.kS * (1.0 + options_.friction_variation *
+                                    std::sin(2.0 * std::numbers::pi * position_ / length));
+  }
+
+  [[nodiscard]] double gravity_here() const {
+    switch (options_.mechanism) {
+      case MechanismKind::elevator:
+        return options_.kG;
+      case MechanismKind::arm:
+        return options_.kG * std::cos(position_);
+      case MechanismKind::flywheel:
+        break;
+    }
+    return 0.0;
+  }
+
+  const TestSessionOptions& options_;
+  double position_;
+  double velocity_ = 0.0;
+};
+
+/// The true position on a fine grid, at rest before time 0.
+class History {
+ public:
+  explicit History(double position) : start_(position), positions_{position} {}
+  void append(double position) { positions_.push_back(position); }
+
+  [[nodiscard]] double at(double time) const {
+    if (time <= 0.0) {
+      return start_;
+    }
+    const double place = time / kStep;
+    const auto index = std::min(static_cast<std::size_t>(place), positions_.size() - 1);
+    const std::size_t next = std::min(index + 1, positions_.size() - 1);
+    const double fraction = place - static_cast<double>(index);
+    return positions_[index] + std::min(fraction, 1.0) * (positions_[next] - positions_[index]);
+  }
+
+ private:
+  double start_;
+  std::vector<double> positions_;
+};
+
+struct Applied {
+  std::vector<double> time;
+  std::vector<double> voltage;
+  History history;
+};
+
+/// Drives one test and keeps what was truly applied and where the mechanism truly was.
+Applied drive(const TestSessionOptions& options, TestKind kind, Random random) {
+  const double sign = identification::is_forward(kind) ? 1.0 : -1.0;
+  const bool ramp = identification::is_quasistatic(kind);
+  const bool travels = options.mechanism != MechanismKind::flywheel;
+  const double start = travels ? (sign > 0.0 ? options.travel_low : options.travel_high) : 0.0;
+  const double end = sign > 0.0 ? options.travel_high - options.travel_margin
+                                : options.travel_low + options.travel_margin;
+  const double duration = ramp ? options.ramp_limit / options.ramp_rate : options.step_duration;
+
+  Mechanism mechanism(options, start);
+  Applied applied{{}, {}, History(start)};
+  double cut = -1.0;
+  long steps = 0;
+  for (long row = 0;; ++row) {
+    const double nominal = static_cast<double>(row) * options.row_period;
+    const double time =
+        std::max(static_cast<double>(steps) * kStep,
+                 std::round((nominal + options.row_jitter * random.normal()) / kStep) * kStep);
+    for (; static_cast<double>(steps) * kStep < time - kStep / 2.0; ++steps) {
+      if (nominal <= options.rest_before) {
+        mechanism.hold();
+      } else {
+        mechanism.advance(applied.voltage.back());
+      }
+      applied.history.append(mechanism.position());
+    }
+    const double driven = time - options.rest_before;
+    const bool arrived = travels && sign * (mechanism.position() - end) >= 0.0;
+    if (cut < 0.0 && (driven > duration || arrived)) {
+      cut = time;
+    }
+    if (cut >= 0.0 && time > cut + options.coast_after) {
+      return applied;
+    }
+    double voltage = 0.0;
+    if (cut < 0.0 && driven >= 0.0) {
+      voltage = sign * (ramp ? options.ramp_rate * driven : options.step_voltage);
+    }
+    applied.time.push_back(time);
+    applied.voltage.push_back(voltage);
+  }
+}
+
+TestRun record(const TestSessionOptions& options, TestKind kind, Random random) {
+  const Applied applied = drive(options, kind, random.split());
+  Random voltage_noise = random.split();
+  Random velocity_noise = random.split();
+  const double refresh_phase = random.uniform() * options.sensor_refresh;
+  const double velocity_std = options.velocity_noise.value_or(
+      0.005 * std::abs(options.step_voltage - options.kS) / options.kV);
+  const double true_zero = options.mechanism == MechanismKind::arm ? options.angle_offset : 0.0;
+
+  TestRun run;
+  run.kind = kind;
+  double refreshed = -1.0;
+  double position = 0.0;
+  double velocity = 0.0;
+  for (std::size_t row = 0; row < applied.time.size(); ++row) {
+    const double time = applied.time[row];
+    double latest = time;
+    if (options.sensor_refresh > 0.0) {
+      latest = std::floor((time - refresh_phase) / options.sensor_refresh + 1e-9) *
+                   options.sensor_refresh +
+               refresh_phase;
+    }
+    const bool fresh = row == 0 || latest > refreshed + 1e-9;
+    if (fresh) {
+      refreshed = latest;
+      const double instant = latest - options.sensor_delay;
+      position = applied.history.at(instant) - true_zero;
+      if (options.resolution > 0.0) {
+        position = std::floor(position / options.resolution) * options.resolution;
+      }
+      const double window = std::max(options.velocity_window, kStep);
+      velocity = (applied.history.at(instant) - applied.history.at(instant - window)) / window;
+      velocity += options.noise_per_row ? 0.0 : velocity_std * velocity_noise.normal();
+    }
+    run.time.push_back(time);
+    run.voltage.push_back(applied.voltage[row] + options.voltage_noise * voltage_noise.normal());
+    run.position.push_back(position);
+    run.velocity.push_back(velocity +
+                           (options.noise_per_row ? velocity_std * velocity_noise.normal() : 0.0));
+  }
+  return run;
+}
+
+}  // namespace
+
+Expected<Recording> record_test_session(const TestSessionOptions& options) {
+  if (auto valid = check_options(options); !valid) {
+    return tl::unexpected(std::move(valid).error());
+  }
+  Recording recording;
+  recording.mechanism = options.mechanism;
+  recording.unit = std::string(mechanisms::position_unit(options.mechanism));
+  Random random(options.seed);
+  for (const TestKind kind : {TestKind::quasistatic_forward, TestKind::quasistatic_reverse,
+                              TestKind::dynamic_forward, TestKind::dynamic_reverse}) {
+    recording.runs.push_back(record(options, kind, random.split()));
+  }
+  return recording;
+}
+
+}  // namespace flyball::simulation
