@@ -1,0 +1,195 @@
+#include <flyball/study/design.hpp>
+
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include <flyball/study/simulate.hpp>
+
+namespace flyball::study {
+namespace {
+
+using mechanisms::MechanismKind;
+
+DesignJob arm_job() {
+  DesignJob job;
+  job.plant.kind = MechanismKind::arm;
+  job.plant.unit = "rad";
+  job.plant.gains = {.kS = 0.1, .kV = 1.2, .kA = 0.15, .kG = 0.65, .angle_offset = 0.2};
+  job.controller.delay = 0.020;
+  return job;
+}
+
+DesignJob elevator_job() {
+  DesignJob job;
+  job.plant.kind = MechanismKind::elevator;
+  job.plant.unit = "m";
+  job.plant.gains = {.kS = 0.15, .kV = 4.0, .kA = 0.3, .kG = 0.6};
+  job.controller.delay = 0.015;
+  return job;
+}
+
+DesignJob flywheel_job() {
+  DesignJob job;
+  job.plant.kind = MechanismKind::flywheel;
+  job.plant.unit = "rad";
+  job.plant.gains = {.kS = 0.2, .kV = 0.02, .kA = 0.004};
+  job.controller.delay = 0.030;
+  return job;
+}
+
+double spectral_radius(const Eigen::MatrixXd& M) {
+  return M.eigenvalues().cwiseAbs().maxCoeff();
+}
+
+TEST(Design, ChoosesTolerancesThatKeepTheMargins) {
+  for (const DesignJob& job : {arm_job(), elevator_job(), flywheel_job()}) {
+    const auto result = design(job);
+    ASSERT_TRUE(result) << to_string(result.error());
+    EXPECT_GE(result->margins.gain_margin, 2.0);
+    EXPECT_GE(result->margins.phase_margin, std::numbers::pi / 4.0);
+    EXPECT_GE(result->margins.disk_margin, 0.5);
+    EXPECT_TRUE(result->robust);
+    EXPECT_LT(spectral_radius(result->A - result->B * result->K), 1.0);
+    EXPECT_FALSE(result->job.controller.state_tolerance.empty());
+    EXPECT_EQ(result->robustness.size(), 25u);
+    EXPECT_GT(result->response.rows(), 20u);
+  }
+}
+
+TEST(Design, IsTheLqrOfItsWeights) {
+  DesignJob job = elevator_job();
+  job.controller.state_tolerance = {0.05, 1.0};
+  job.controller.delay = 0.0;
+  const auto result = design(job);
+  ASSERT_TRUE(result) << to_string(result.error());
+  EXPECT_DOUBLE_EQ(result->Q(0, 0), 1.0 / (0.05 * 0.05));
+  EXPECT_DOUBLE_EQ(result->R(0, 0), 1.0 / 144.0);
+  // K satisfies (BᵀSB + R) K = BᵀSA for the S of its own cost: S = Q + KᵀRK + (A-BK)ᵀS(A-BK).
+  const Eigen::MatrixXd closed = result->A - result->B * result->K;
+  const Eigen::MatrixXd stage = result->Q + result->K.transpose() * result->R * result->K;
+  Eigen::MatrixXd S = stage;
+  Eigen::MatrixXd power = closed;
+  for (int i = 0; i < 60; ++i) {
+    S += power.transpose() * S * power;
+    power = power * power;
+  }
+  const Eigen::MatrixXd left = (result->B.transpose() * S * result->B + result->R) * result->K;
+  const Eigen::MatrixXd right = result->B.transpose() * S * result->A;
+  EXPECT_LT((left - right).norm(), 1e-9 * right.norm());
+  EXPECT_TRUE(result->K_delayed.isApprox(result->K, 1e-14));
+}
+
+TEST(Design, TheTrapezoidUsesTheVoltageThereIs) {
+  const auto result = design(elevator_job());
+  ASSERT_TRUE(result) << to_string(result.error());
+  const mechanisms::FeedforwardGains& g = result->job.plant.gains;
+  // At the end of the acceleration upwards: kS + kG + kV v + kA a = 12 V less a tenth.
+  const double peak =
+      g.kS + g.kG + g.kV * result->motion.max_velocity + g.kA * result->motion.max_acceleration;
+  EXPECT_NEAR(peak, 12.0 - 1.2, 1e-6);
+  // No other cruise velocity with its own acceleration is faster.
+  const auto time = [&](double v) {
+    const double a = (12.0 - 1.2 - g.kS - g.kG - g.kV * v) / g.kA;
+    return 1.0 >= v * v / a ? 1.0 / v + v / a : 2.0 * std::sqrt(1.0 / a);
+  };
+  for (double v = 0.05; v < 2.5; v += 0.01) {
+    EXPECT_GE(time(v), result->motion.duration - 1e-9);
+  }
+}
+
+TEST(Design, TracksItsTrapezoidDespiteDelayNoiseAndFriction) {
+  const auto elevator = design(elevator_job());
+  ASSERT_TRUE(elevator) << to_string(elevator.error());
+  EXPECT_LT(elevator->tracking_error_max, 0.03);
+  const auto arm = design(arm_job());
+  ASSERT_TRUE(arm) << to_string(arm.error());
+  EXPECT_LT(arm->tracking_error_max, 0.08);
+}
+
+TEST(Design, GoesOnWithoutKA) {
+  for (DesignJob job : {arm_job(), elevator_job(), flywheel_job()}) {
+    job.plant.kA_determined = false;
+    job.plant.gains.kA = 0.0;
+    job.plant.kA_upper_bound = 0.02 * job.plant.gains.kV;
+    const auto result = design(job);
+    ASSERT_TRUE(result) << to_string(result.error());
+    EXPECT_TRUE(result->velocity_servo);
+    EXPECT_EQ(result->K.cols(), 1);
+    EXPECT_TRUE(result->robust);
+    if (job.plant.kind == MechanismKind::flywheel) {
+      EXPECT_DOUBLE_EQ(result->K(0, 0), 0.0);
+      EXPECT_NEAR(result->inversion(0, 0), job.plant.gains.kV, 1e-15);
+    } else {
+      EXPECT_GT(result->K(0, 0), 0.0);
+    }
+    EXPECT_TRUE(std::isfinite(result->tracking_error_max));
+  }
+}
+
+TEST(Design, RefusesWhatCannotBe) {
+  DesignJob job = elevator_job();
+  job.plant.gains.kG = 13.0;
+  auto result = design(job);
+  ASSERT_FALSE(result);
+  EXPECT_TRUE(result.error().is(DesignError::gravity_too_strong)) << to_string(result.error());
+
+  job = elevator_job();
+  job.plant.gains.kS = 11.0;
+  result = design(job);
+  ASSERT_FALSE(result);
+  EXPECT_TRUE(result.error().is(DesignError::no_motion_possible)) << to_string(result.error());
+
+  job = elevator_job();
+  job.controller.period = 0.0;
+  result = design(job);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().kind(), ErrorKind::misuse);
+
+  job = elevator_job();
+  job.plant.gains.kV = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(design(job));
+
+  job = elevator_job();
+  job.controller.state_tolerance = {0.02};
+  result = design(job);
+  ASSERT_FALSE(result);
+  EXPECT_TRUE(result.error().is(ArgumentError::wrong_shape)) << to_string(result.error());
+
+  job = elevator_job();
+  job.controller.state_tolerance = {1e-5, 1e-5};
+  job.controller.delay = 0.1;
+  result = design(job);
+  ASSERT_FALSE(result);
+  EXPECT_TRUE(result.error().is(DesignError::margins_lost)) << to_string(result.error());
+}
+
+TEST(Design, PastesTheSameGainsInOtherUnits) {
+  const auto result = design(arm_job());
+  ASSERT_TRUE(result) << to_string(result.error());
+  ASSERT_EQ(result->paste.size(), 3u);
+  constexpr double two_pi = 2.0 * std::numbers::pi;
+  EXPECT_NEAR(result->paste[1].kV, result->paste[0].kV * two_pi, 1e-12);
+  EXPECT_NEAR(result->paste[2].kV, result->paste[0].kV * two_pi / 60.0, 1e-12);
+  EXPECT_NEAR(result->paste[1].kP, result->K_delayed(0, 0) * two_pi, 1e-9);
+  EXPECT_DOUBLE_EQ(result->paste[1].kG, 0.65);
+}
+
+TEST(Simulate, IsDeterministicAndSeeded) {
+  const auto result = design(arm_job());
+  ASSERT_TRUE(result) << to_string(result.error());
+  const SimulateJob job{.measurement_noise = 0.01, .seed = 7};
+  const auto a = simulate(*result, job);
+  const auto b = simulate(*result, job);
+  ASSERT_TRUE(a);
+  ASSERT_TRUE(b);
+  EXPECT_EQ(*a->series.find("position"), *b->series.find("position"));
+  const auto c = simulate(*result, {.measurement_noise = 0.01, .seed = 8});
+  ASSERT_TRUE(c);
+  EXPECT_NE(*a->series.find("position"), *c->series.find("position"));
+  EXPECT_FALSE(simulate(*result, {.inertia_factor = 0.0}));
+}
+
+}  // namespace
+}  // namespace flyball::study

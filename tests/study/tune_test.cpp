@@ -1,0 +1,125 @@
+#include <flyball/study/tune.hpp>
+
+#include <algorithm>
+#include <filesystem>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <flyball/io/sysid_json.hpp>
+#include <flyball/simulation/test_session.hpp>
+#include <flyball/study/schema.hpp>
+
+namespace flyball::study {
+namespace {
+
+using mechanisms::MechanismKind;
+
+const char* sysid_name(identification::TestKind kind) {
+  constexpr const char* names[] = {"slow-forward", "slow-backward", "fast-forward",
+                                   "fast-backward"};
+  return names[static_cast<int>(kind)];
+}
+
+// A simulated session in a file of its own, removed with it.
+class SessionFile {
+ public:
+  SessionFile(const simulation::TestSessionOptions& session, const std::string& test,
+              const std::string& name)
+      : path_((std::filesystem::temp_directory_path() / name).string()) {
+    const auto recording = simulation::record_test_session(session);
+    EXPECT_TRUE(recording);
+    SysIdJson log;
+    log.test = test;
+    log.units = test == "Elevator" ? "Meters" : "Radians";
+    log.units_per_rotation = 1.0;
+    for (const identification::TestRun& run : recording->runs) {
+      SysIdJson::Run rows;
+      rows.name = sysid_name(run.kind);
+      rows.time = run.time;
+      rows.voltage = run.voltage;
+      rows.position = run.position;
+      rows.velocity = run.velocity;
+      log.runs.push_back(rows);
+    }
+    EXPECT_TRUE(write_sysid_json(path_, log));
+  }
+  ~SessionFile() { std::filesystem::remove(path_); }
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+TEST(Tune, GoesFromALogToAProvenController) {
+  simulation::TestSessionOptions session;
+  session.mechanism = MechanismKind::arm;
+  session.kS = 0.1;
+  session.kV = 1.2;
+  session.kA = 0.15;
+  session.kG = 0.65;
+  session.angle_offset = 0.2;
+  session.resolution = 2.0 * 3.141592653589793 / 4096.0;
+  session.sensor_delay = 0.010;
+  session.seed = 5;
+  const SessionFile file(session, "Arm", "flyball_tune_test_arm.json");
+
+  TuneJob job;
+  job.identification.log = file.path();
+  const auto result = tune(job);
+  ASSERT_TRUE(result) << to_string(result.error());
+  ASSERT_TRUE(result->identification.report.fit)
+      << to_string(result->identification.report.fit.error());
+  const identification::FeedforwardFit& fit = *result->identification.report.fit;
+  EXPECT_NEAR(fit.kV.value, 1.2, 0.03 * 1.2);
+  EXPECT_NEAR(fit.kG->value, 0.65, 0.05 * 0.65);
+  EXPECT_NEAR(fit.angle_offset->value, 0.2, 0.05);
+  ASSERT_TRUE(result->design);
+  ASSERT_TRUE(*result->design) << to_string(result->design->error());
+  const DesignResult& design = **result->design;
+  EXPECT_TRUE(design.robust);
+  // The delay that the log shows is the one that the loop is designed for.
+  EXPECT_NEAR(*design.job.controller.delay, std::max(0.0, fit.position_delay), 1e-12);
+
+  const auto json = nlohmann::json::parse(to_json(*result));
+  EXPECT_EQ(json["schema"], "flyball.tune/1");
+  EXPECT_EQ(json["identification"]["schema"], "flyball.identify/1");
+  EXPECT_EQ(json["identification"]["gains"]["kV"]["value"].get<double>(), fit.kV.value);
+  EXPECT_EQ(json["identification"]["gains"]["kV"]["unit"], "V·s/rad");
+  EXPECT_EQ(json["design"]["K"][0][0].get<double>(), design.K(0, 0));
+  for (const char* key : {"kalman_gain", "poles", "feedforward", "margins"}) {
+    EXPECT_TRUE(json["design"].contains(key)) << key;
+  }
+}
+
+TEST(Tune, ARefusedLogHasNoDesignAndSaysWhy) {
+  simulation::TestSessionOptions session;
+  session.mechanism = MechanismKind::elevator;
+  session.kS = 20.0;  // friction that no test overcomes
+  session.kV = 4.0;
+  session.kA = 0.3;
+  session.kG = 0.0;
+  const SessionFile file(session, "Elevator", "flyball_tune_test_stuck.json");
+  TuneJob job;
+  job.identification.log = file.path();
+  const auto result = tune(job);
+  ASSERT_TRUE(result) << to_string(result.error());
+  ASSERT_FALSE(result->identification.report.fit);
+  EXPECT_TRUE(
+      result->identification.report.fit.error().is(identification::IdentificationError::no_motion));
+  EXPECT_FALSE(result->design);
+  const auto json = nlohmann::json::parse(to_json(*result));
+  EXPECT_EQ(json["error"]["code"], "no_motion");
+  EXPECT_FALSE(json.contains("design"));
+}
+
+TEST(Tune, AMissingLogIsAnError) {
+  TuneJob job;
+  job.identification.log = "/nowhere/to/be/found.json";
+  const auto result = tune(job);
+  ASSERT_FALSE(result);
+  EXPECT_NE(to_string(result.error()).find("found.json"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace flyball::study
