@@ -1,5 +1,5 @@
 # Compiles SOURCE without WRONG (must succeed) and with it (must fail, and say what the first line
-# of the file expects).
+# of the file expects, a regular expression in which "no conversion" stands for a wrong type).
 set(compile ${COMPILER} -std=c++20 -fsyntax-only @${FLAGS})
 
 execute_process(COMMAND ${compile} ${SOURCE} RESULT_VARIABLE status ERROR_VARIABLE output)
@@ -12,6 +12,13 @@ if(NOT first MATCHES "^// error: (.+)$")
   message(FATAL_ERROR "${SOURCE} must begin with \"// error: <regular expression>\"")
 endif()
 set(expected "${CMAKE_MATCH_1}")
+# Every wording of g++ and clang for an argument of the wrong type.
+string(
+  REPLACE
+    "no conversion"
+    "no known conversion|could not convert|cannot convert|no viable conversion|no matching function|invalid initialization"
+    expected
+    "${expected}")
 
 execute_process(
   COMMAND ${CMAKE_COMMAND} -E env LC_ALL=C ${compile} -DWRONG ${SOURCE}

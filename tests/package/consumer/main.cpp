@@ -1,19 +1,27 @@
 #include <cstdio>
 
-#include <flyball/core/argument.hpp>
-#include <flyball/core/quantity.hpp>
-#include <flyball/core/random.hpp>
 #include <flyball/core/version.hpp>
+#include <flyball/mechanisms/elevator.hpp>
+#include <flyball/mechanisms/motor.hpp>
+#include <flyball/systems/discretize.hpp>
 
+using namespace flyball;
 using namespace flyball::literals;
 
 int main() {
-  const auto mass = flyball::parse_quantity<flyball::Mass>("8 kg", "mass");
-  const auto refused = flyball::parse_quantity<flyball::Mass>("8 m", "mass");
-  const auto shape = flyball::check_shape(Eigen::MatrixXd::Identity(2, 2), 1, 1, "lqr", "R");
-  if (!mass || *mass != 8_kg || refused || shape || flyball::version.empty()) {
+  const auto motor = mechanisms::motor("NEO", 2);
+  const auto refused = mechanisms::elevator(
+      {.motor = motor.value(), .gearing = 0.0, .mass = 8_kg, .drum_radius = 2.54_cm});
+  const auto elevator = mechanisms::elevator(
+      {.motor = motor.value(), .gearing = 10.0, .mass = 8_kg, .drum_radius = 2.54_cm});
+  if (refused || !elevator) {
     return 1;
   }
   std::puts(to_string(refused.error()).c_str());
+  const auto plant = discretize(*elevator, 20_ms);
+  if (!plant || plant->period != 20_ms || !(plant->B(1, 0) > 0.0)) {
+    return 1;
+  }
+  std::printf("Flyball %s: B = [%g %g]\n", version.data(), plant->B(0, 0), plant->B(1, 0));
   return 0;
 }

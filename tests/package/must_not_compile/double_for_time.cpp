@@ -1,4 +1,4 @@
-// error: no known conversion|no matching function|could not convert|cannot convert
+// error: no conversion
 #include <flyball/core/quantity.hpp>
 
 using namespace flyball::literals;

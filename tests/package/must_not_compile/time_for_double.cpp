@@ -1,4 +1,4 @@
-// error: cannot convert|no viable conversion|no suitable
+// error: no conversion
 #include <flyball/core/quantity.hpp>
 
 using namespace flyball::literals;
