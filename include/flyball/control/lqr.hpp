@@ -48,9 +48,9 @@ struct LqrDesign {
 /// Cost: one Riccati solution, O(n³) a step; allocates; not for the control loop.
 /// Source: book, Theorem 7.7.1; the cross term: appendix B.1.
 [[nodiscard]] Expected<LqrDesign<>> lqr(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
-                                        const Weight& R);
-[[nodiscard]] Expected<LqrDesign<>> lqr(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
                                         const Weight& R, const MatrixRef& N);
+[[nodiscard]] Expected<LqrDesign<>> lqr(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
+                                        const Weight& R);
 
 /// The same for a discrete plant, with the plant's sizes.
 template <int States, int Inputs, int Outputs>

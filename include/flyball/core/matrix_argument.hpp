@@ -15,6 +15,7 @@ template <class Tag>
 class MatrixArgument {
  public:
   // NOLINTBEGIN(google-explicit-constructor): being implicit is its purpose.
+  /// A matrix, a matrix expression, or what a design-time function answered.
   template <class Derived>
   MatrixArgument(const Eigen::MatrixBase<Derived>& value) : value_(Eigen::MatrixXd(value)) {}
   MatrixArgument(Eigen::MatrixXd value) : value_(std::move(value)) {}

@@ -46,6 +46,7 @@ class KalmanFilter {
 
   [[nodiscard]] const StateVector& x_hat() const noexcept { return x_hat_; }
   [[nodiscard]] const StateMatrix& P() const noexcept { return P_; }
+  /// Starts again from x_hat; P stays unless it is given.
   void reset(const StateVector& x_hat) noexcept { x_hat_ = x_hat; }
   void reset(const StateVector& x_hat, const StateMatrix& P) noexcept {
     x_hat_ = x_hat;

@@ -21,6 +21,7 @@ class Observer {
   Observer(const Plant& plant, const Gain& K)
       : plant_(plant), K_(K), x_hat_(StateVector::Zero(plant.A.rows())) {}
 
+  /// x_hat <- A x_hat + B u.
   void predict(const InputVector& u) noexcept;
   /// Corrects; a measurement that is not finite is left out and answered with false.
   bool update(const OutputVector& y, const InputVector& u) noexcept;
@@ -28,6 +29,7 @@ class Observer {
   [[nodiscard]] const StateVector& x_hat() const noexcept { return x_hat_; }
   [[nodiscard]] const Plant& plant() const noexcept { return plant_; }
   [[nodiscard]] const Gain& K() const noexcept { return K_; }
+  /// Starts again from x_hat.
   void reset(const StateVector& x_hat) noexcept { x_hat_ = x_hat; }
 
  private:

@@ -52,6 +52,7 @@ struct SysIdJson {
   std::vector<Diagnostic> diagnostics;
 
   [[nodiscard]] bool is_drive() const { return layout != Layout::mechanism; }
+  /// The run of that name, or nullptr.
   [[nodiscard]] const Run* find(std::string_view name) const noexcept;
 };
 

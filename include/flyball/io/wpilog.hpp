@@ -40,6 +40,7 @@ class WpilogWriter {
   void finish(Id id, double time);
   void set_metadata(Id id, std::string_view metadata, double time);
 
+  /// A value of the type that the channel was started with. @param time  s.
   void append(Id id, double time, double value);
   void append(Id id, double time, float value);
   void append(Id id, double time, std::int64_t value);

@@ -55,9 +55,9 @@ struct RiccatiSolution {
 /// Fan, Lin and Wang, "Structure-preserving algorithms for periodic discrete-time algebraic Riccati
 /// equations", Int. J. Control 77 (2004). Newton: Hewer, IEEE Trans. Automatic Control 16 (1971).
 [[nodiscard]] Expected<RiccatiSolution> dare(const MatrixRef& A, const MatrixRef& B,
-                                             const MatrixRef& Q, const MatrixRef& R);
-[[nodiscard]] Expected<RiccatiSolution> dare(const MatrixRef& A, const MatrixRef& B,
                                              const MatrixRef& Q, const MatrixRef& R,
                                              const MatrixRef& N);
+[[nodiscard]] Expected<RiccatiSolution> dare(const MatrixRef& A, const MatrixRef& B,
+                                             const MatrixRef& Q, const MatrixRef& R);
 
 }  // namespace flyball

@@ -43,15 +43,18 @@ struct EstimatorOptions {
   std::vector<double> model_std;          ///< Per sample and state; empty: chosen.
 };
 
+/// The sensor that the simulated loop reads.
 struct SensorOptions {
   double resolution = 0.0;  ///< unit, smallest step of the sensor; 0 for none.
 };
 
+/// The battery whose voltage sags under load.
 struct BatteryOptions {
   double open_circuit_voltage = 12.5;  ///< V
   double resistance = 0.020;           ///< Ohm
 };
 
+/// The reference that the simulated loop follows: a trapezoid from 0 to the goal.
 struct ProfileOptions {
   std::optional<double> goal;              ///< unit (or unit/s for a flywheel).
   std::optional<double> max_velocity;      ///< unit/s; the fastest the motor can follow if absent.

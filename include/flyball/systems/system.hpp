@@ -71,6 +71,7 @@ template <class System>
 /// Whether every pole lies within the unit circle (section 7.1.1).
 [[nodiscard]] bool is_stable_discrete(const Eigen::VectorXcd& poles) noexcept;
 
+/// Whether every pole is where a stable system has it. @errors As `poles`.
 template <int States, int Inputs, int Outputs>
 [[nodiscard]] Expected<bool> is_stable(const ContinuousSystem<States, Inputs, Outputs>& system) {
   return poles(system).map(is_stable_continuous);
