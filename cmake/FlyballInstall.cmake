@@ -17,7 +17,7 @@ install(
   FILES_MATCHING
   PATTERN "*.hpp"
   PATTERN "*.tpp")
-if(FLYBALL_BUILD_APPS)
+if(TARGET flyball_command)
   install(TARGETS flyball_command RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()
 
