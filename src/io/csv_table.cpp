@@ -1,5 +1,3 @@
-#include "io/csv_table.hpp"
-
 #include <algorithm>
 #include <utility>
 
@@ -7,6 +5,7 @@
 
 #include <flyball/io/log_error.hpp>
 
+#include "io/csv_table.hpp"
 #include "io/text.hpp"
 
 namespace flyball::io {

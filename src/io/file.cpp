@@ -1,3 +1,5 @@
+#include <flyball/io/file.hpp>
+
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
@@ -10,8 +12,6 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-#include <flyball/io/file.hpp>
 
 namespace flyball {
 namespace {

@@ -1,3 +1,5 @@
+#include <flyball/io/log.hpp>
+
 #include <algorithm>
 #include <array>
 #include <utility>
@@ -6,7 +8,6 @@
 
 #include <flyball/io/csv.hpp>
 #include <flyball/io/file.hpp>
-#include <flyball/io/log.hpp>
 #include <flyball/io/wpilog.hpp>
 
 #include "io/text.hpp"

@@ -1,5 +1,3 @@
-#include "io/signals.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -10,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "io/signals.hpp"
 #include "io/text.hpp"
 
 namespace flyball::io {

@@ -1,3 +1,5 @@
+#include <flyball/io/sysid_json.hpp>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,7 +12,6 @@
 #include <nlohmann/json.hpp>
 
 #include <flyball/io/log_error.hpp>
-#include <flyball/io/sysid_json.hpp>
 
 #include "io/sysid_columns.hpp"
 #include "io/text.hpp"

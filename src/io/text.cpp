@@ -1,5 +1,3 @@
-#include "io/text.hpp"
-
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -7,6 +5,8 @@
 #include <limits>
 
 #include <fmt/format.h>
+
+#include "io/text.hpp"
 
 namespace flyball::io {
 namespace {

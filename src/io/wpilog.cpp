@@ -1,3 +1,5 @@
+#include <flyball/io/wpilog.hpp>
+
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -9,8 +11,6 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-
-#include <flyball/io/wpilog.hpp>
 
 #include "io/signals.hpp"
 #include "io/text.hpp"

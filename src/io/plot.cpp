@@ -1,0 +1,185 @@
+#include <flyball/io/plot.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+
+#include <flyball/io/file.hpp>
+
+#include "io/plot_script.hpp"
+#include "io/process.hpp"
+#include "io/text.hpp"
+
+namespace flyball {
+namespace {
+
+using io::PictureFormat;
+using io::ProcessResult;
+
+/// The picture that gnuplot makes of a program. No shell, no files of the user's settings (-d).
+Expected<std::string> run_gnuplot(const std::string& script) {
+  ProcessResult result = io::run_process({"gnuplot", "-d", "-"}, script, 30.0);
+  std::replace_if(
+      result.err.begin(), result.err.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
+  const std::string words = io::printable(io::trim(result.err), 400);
+  switch (result.end) {
+    case ProcessResult::End::not_found:
+      return tl::unexpected(
+          Error(PlotError::gnuplot_missing)
+              .in("plot")
+              .hint("install it (Debian and Ubuntu: apt install gnuplot-nox), or run "
+                    "without pictures"));
+    case ProcessResult::End::timed_out:
+      return tl::unexpected(Error(PlotError::timed_out).in("plot").with("gnuplot", words));
+    case ProcessResult::End::not_started:
+    case ProcessResult::End::signalled:
+      break;
+    case ProcessResult::End::exited:
+      if (result.code == 0 && !result.out.empty()) {
+        return std::move(result.out);
+      }
+      break;
+  }
+  return tl::unexpected(Error(PlotError::gnuplot_failed)
+                            .in("plot")
+                            .with("code", static_cast<double>(result.code))
+                            .with("gnuplot", words));
+}
+
+void replace_all(std::string& text, std::string_view from, std::string_view to) {
+  std::string result;
+  std::size_t at = 0;
+  for (std::size_t next = text.find(from); next != std::string::npos; next = text.find(from, at)) {
+    result.append(text, at, next - at).append(to);
+    at = next + from.size();
+  }
+  text = result.append(text, at);
+}
+
+/// Removes what stands from each `begin` to the `end` that follows it, both included.
+void remove_all(std::string& text, std::string_view begin, std::string_view end) {
+  std::size_t at = text.find(begin);
+  while (at != std::string::npos) {
+    const std::size_t stop = text.find(end, at + begin.size());
+    if (stop == std::string::npos) {
+      return;
+    }
+    text.erase(at, stop + end.size() - at);
+    at = text.find(begin, at);
+  }
+}
+
+std::string xml_escaped(std::string text) {
+  replace_all(text, "&", "&amp;");
+  replace_all(text, "<", "&lt;");
+  replace_all(text, ">", "&gt;");
+  return text;
+}
+
+/// The element alone, with the picture's title for readers of screens, fonts that browsers without
+/// DejaVu fall back to, and without ids and tooltips ("gnuplot_plot_1a") that would clash when
+/// several pictures stand in one page.
+std::string tidy_svg(std::string svg, const std::string& title) {
+  const std::size_t element = svg.find("<svg");
+  svg.erase(0, element == std::string::npos ? 0 : element);
+  remove_all(svg, "<title>gnuplot_plot_", "</title>");
+  remove_all(svg, " id=\"gnuplot_", "\"");
+  replace_all(svg, "<title>Gnuplot</title>",
+              "<title>" + xml_escaped(io::printable(title, 400)) + "</title>");
+  replace_all(svg, "\"DejaVu Sans\"", "\"DejaVu Sans, Verdana, sans-serif\"");
+  return svg;
+}
+
+template <class AnyPlot>
+Expected<std::string> svg_of(const AnyPlot& plot) {
+  return io::gnuplot_script(plot, PictureFormat::svg)
+      .and_then(run_gnuplot)
+      .map([&](std::string svg) { return tidy_svg(std::move(svg), plot.title); });
+}
+
+template <class AnyPlot>
+Expected<std::string> png_of(const AnyPlot& plot) {
+  return io::gnuplot_script(plot, PictureFormat::png).and_then(run_gnuplot);
+}
+
+Expected<void> save(const std::string& path, const Expected<std::string>& picture) {
+  return picture.and_then(
+      [&](const std::string& bytes) { return write_file_atomically(path, bytes); });
+}
+
+}  // namespace
+
+ErrorInfo error_info(PlotError code) {
+  constexpr std::string_view family = "plot";
+  switch (code) {
+    case PlotError::gnuplot_missing:
+      return {family, "gnuplot_missing", "gnuplot is not installed", ErrorKind::environment};
+    case PlotError::gnuplot_failed:
+      return {family, "gnuplot_failed", "gnuplot did not draw the picture", ErrorKind::environment};
+    case PlotError::timed_out:
+      return {family, "timed_out", "gnuplot did not finish within 30 s", ErrorKind::environment};
+  }
+  return {family, "unknown", "unknown error", ErrorKind::defect};
+}
+
+Plot pole_plot(std::string title, const std::vector<PolePlotGroup>& groups, bool discrete) {
+  Plot plot;
+  plot.title = std::move(title);
+  plot.x_label = discrete ? "Real part" : "Real part (rad/s)";
+  plot.equal_axes = true;
+  plot.unit_circle = discrete;
+  plot.width = 640;
+  PlotPanel panel;
+  panel.y_label = discrete ? "Imaginary part" : "Imaginary part (rad/s)";
+  panel.marks.push_back({0.0, {}, true});
+  panel.marks.push_back({0.0, {}, false});
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const auto line = [&](const std::vector<std::complex<double>>& roots, LineStyle style,
+                          std::string_view kind) {
+      if (roots.empty()) {
+        return;
+      }
+      PlotLine& added = panel.lines.emplace_back();
+      added.label =
+          groups[g].label.empty() ? std::string(kind) : groups[g].label + " " + std::string(kind);
+      added.style = style;
+      added.color = static_cast<int>(g);
+      for (const std::complex<double>& root : roots) {
+        added.x.push_back(root.real());
+        added.y.push_back(root.imag());
+      }
+    };
+    line(groups[g].poles, LineStyle::crosses, "poles");
+    line(groups[g].zeros, LineStyle::circles, "zeros");
+  }
+  plot.panels.push_back(std::move(panel));
+  return plot;
+}
+
+Expected<std::string> render_svg(const Plot& plot) {
+  return svg_of(plot);
+}
+Expected<std::string> render_svg(const SurfacePlot& plot) {
+  return svg_of(plot);
+}
+Expected<std::string> render_png(const Plot& plot) {
+  return png_of(plot);
+}
+Expected<std::string> render_png(const SurfacePlot& plot) {
+  return png_of(plot);
+}
+
+Expected<void> write_svg(const std::string& path, const Plot& plot) {
+  return save(path, render_svg(plot));
+}
+Expected<void> write_svg(const std::string& path, const SurfacePlot& plot) {
+  return save(path, render_svg(plot));
+}
+Expected<void> write_png(const std::string& path, const Plot& plot) {
+  return save(path, render_png(plot));
+}
+Expected<void> write_png(const std::string& path, const SurfacePlot& plot) {
+  return save(path, render_png(plot));
+}
+
+}  // namespace flyball

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <flyball/io/plot.hpp>
+
+/// What is drawn of long series, and the ranges of axes; private to io.
+namespace flyball::io {
+
+struct Points {
+  std::vector<double> x;
+  std::vector<double> y;
+};
+
+/// Thins a curve whose x ascends so that it looks the same on `pixels` columns: of each column the
+/// first, least, greatest and last value stay, in their order, and so do gaps. Other curves are
+/// returned as they are.
+[[nodiscard]] Points thin_curve(const std::vector<double>& x, const std::vector<double>& y,
+                                std::size_t pixels);
+
+/// Thins a scatter to one point in each cell of a `columns` by `rows` grid.
+[[nodiscard]] Points thin_scatter(const std::vector<double>& x, const std::vector<double>& y,
+                                  std::size_t columns, std::size_t rows);
+
+/// The finite (and, for a logarithmic axis, positive) extent of data.
+class Range {
+ public:
+  explicit Range(bool logarithmic = false) : logarithmic_(logarithmic) {}
+
+  void include(double value);
+  void include(const std::vector<double>& values);
+  [[nodiscard]] bool empty() const { return low_ > high_; }
+  /// Opens a degenerate range and adds `fraction` of the span at either end.
+  void pad(double fraction);
+  /// Widens the range about its centre to `span`.
+  void widen_to(double span);
+  [[nodiscard]] double low() const { return low_; }
+  [[nodiscard]] double high() const { return high_; }
+  [[nodiscard]] double span() const { return high_ - low_; }
+
+ private:
+  bool logarithmic_;
+  double low_ = 1.0;
+  double high_ = -1.0;
+};
+
+}  // namespace flyball::io

@@ -1,0 +1,470 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "io/plot_data.hpp"
+#include "io/plot_script.hpp"
+#include "io/text.hpp"
+
+namespace flyball::io {
+namespace {
+
+/// Okabe and Ito, "Color universal design" (2008), the yellow left out: it is too light on white.
+constexpr std::array<std::string_view, 7> palette = {"#0072B2", "#D55E00", "#009E73", "#CC79A7",
+                                                     "#E69F00", "#56B4E9", "#333333"};
+
+// The layout in pixels.
+constexpr int left_margin = 96;
+constexpr int right_margin = 28;
+constexpr int title_height = 40;
+constexpr int bottom_margin = 66;
+constexpr int legend_row = 20;
+constexpr int panel_gap = 14;
+
+constexpr std::size_t max_scatter = 4000;
+
+int color_index(int wanted, std::size_t& next) {
+  const std::size_t index = wanted >= 0 ? static_cast<std::size_t>(wanted) : next++;
+  return static_cast<int>(index % palette.size());
+}
+
+/// Characters, not bytes, of UTF-8.
+std::size_t length(std::string_view text) {
+  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) {
+    return (static_cast<unsigned char>(c) & 0xC0) != 0x80;
+  }));
+}
+
+/// How a panel's legend is laid out: so many columns and rows.
+struct Legend {
+  int columns = 1;
+  int rows = 0;
+};
+
+Legend legend_of(const PlotPanel& panel, int width) {
+  std::size_t entries = 0;
+  std::size_t longest = 0;
+  const auto add = [&](const std::string& label) {
+    entries += label.empty() ? 0 : 1;
+    longest = std::max(longest, length(label));
+  };
+  for (const PlotBand& band : panel.bands) {
+    add(band.label);
+  }
+  for (const PlotLine& line : panel.lines) {
+    add(line.label);
+  }
+  Legend legend;
+  if (entries > 0) {
+    const int each = 60 + 8 * static_cast<int>(std::min<std::size_t>(longest, 100));
+    legend.columns = std::clamp(width / each, 1, static_cast<int>(entries));
+    legend.rows = (static_cast<int>(entries) + legend.columns - 1) / legend.columns;
+  }
+  return legend;
+}
+
+Expected<void> check_lengths(const std::string& label, std::size_t x, std::size_t y) {
+  if (x != y) {
+    return tl::unexpected(Error(ArgumentError::wrong_shape)
+                              .in("plot")
+                              .about(fmt::format("the curve \"{}\"", label))
+                              .got(fmt::format("{} x and {} y long", x, y))
+                              .expected("as long in x as in y"));
+  }
+  return {};
+}
+
+Expected<void> check(const Plot& plot) {
+  if (plot.panels.empty()) {
+    return tl::unexpected(Error(ArgumentError::empty).in("plot").about("panels"));
+  }
+  if (plot.width < 200 || plot.width > 8000 || plot.height < 0 || plot.height > 8000) {
+    return tl::unexpected(Error(ArgumentError::out_of_range)
+                              .in("plot")
+                              .about("the size")
+                              .got(fmt::format("{}x{} pixels", plot.width, plot.height))
+                              .expected("200 to 8000 wide and at most 8000 high"));
+  }
+  for (const PlotPanel& panel : plot.panels) {
+    for (const PlotLine& line : panel.lines) {
+      if (Expected<void> ok = check_lengths(line.label, line.x.size(), line.y.size()); !ok) {
+        return ok;
+      }
+    }
+    for (const PlotBand& band : panel.bands) {
+      Expected<void> ok = check_lengths(band.label, band.x.size(), band.low.size());
+      if (ok) {
+        ok = check_lengths(band.label, band.x.size(), band.high.size());
+      }
+      if (!ok) {
+        return ok;
+      }
+    }
+  }
+  return {};
+}
+
+bool scattered(LineStyle style) {
+  return style == LineStyle::points || style == LineStyle::crosses || style == LineStyle::circles;
+}
+
+class Script {
+ public:
+  explicit Script(const Plot& plot)
+      : plot_(plot), x_(plot.log_x), box_width_(plot.width - left_margin - right_margin) {}
+
+  std::string build(PictureFormat format) {
+    lay_out();
+    script_ = script_head(format, plot_.width, height_);
+    // Data first: gnuplot does not take data blocks inside a multiplot's plot command.
+    for (const PlotPanel& panel : plot_.panels) {
+      for (const PlotBand& band : panel.bands) {
+        add_band(band);
+      }
+      for (const PlotLine& line : panel.lines) {
+        add_line(line, panel.log_y);
+      }
+    }
+    if (plot_.unit_circle) {
+      add_unit_circle();
+    }
+    fmt::format_to(out(),
+                   "set multiplot\nset border 3 lc rgb '#555555' lw 1\n"
+                   "set tics out nomirror textcolor rgb '#333333' scale 0.6\n"
+                   "set grid xtics ytics lc rgb '#DDDDDD' lw 1 lt 1\nset style fill noborder\n"
+                   "set xrange [{}:{}]\n",
+                   x_.low(), x_.high());
+    if (plot_.log_x) {
+      script_ += "set logscale x\n";
+    }
+    if (!plot_.title.empty()) {
+      fmt::format_to(out(), "set label 1 {} at screen 0.5, screen {} center font ',15'\n",
+                     literal(plot_.title), 1.0 - 22.0 / height_);
+    }
+    for (std::size_t i = 0; i < plot_.panels.size(); ++i) {
+      draw_panel(i);
+    }
+    return script_ + "unset multiplot\n";
+  }
+
+ private:
+  struct Box {
+    int top;
+    int bottom;
+    Legend legend;
+    Range y;
+  };
+
+  std::back_insert_iterator<std::string> out() { return std::back_inserter(script_); }
+
+  void lay_out() {
+    const std::size_t count = plot_.panels.size();
+    int above = plot_.title.empty() ? 12 : title_height;
+    int overhead = above + bottom_margin;
+    std::vector<Legend> legends;
+    for (const PlotPanel& panel : plot_.panels) {
+      legends.push_back(legend_of(panel, box_width_));
+      overhead += legends.back().rows * legend_row + panel_gap;
+    }
+    const int usual = plot_.equal_axes ? box_width_ * 2 / 3
+                      : count == 1     ? 380
+                      : count == 2     ? 230
+                                       : 170;
+    const int given = (plot_.height - overhead) / static_cast<int>(count);
+    const int box_height = plot_.height > 0 ? std::max(given, 40) : usual;
+    height_ = overhead + box_height * static_cast<int>(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      above += legends[i].rows * legend_row + panel_gap;
+      boxes_.push_back({above, above + box_height, legends[i], y_range(plot_.panels[i])});
+      above += box_height;
+    }
+    bool scatter = true;  // nothing but points: they should not lie on the frame
+    for (const PlotPanel& panel : plot_.panels) {
+      for (const PlotLine& line : panel.lines) {
+        x_.include(line.x);
+        scatter = scatter && scattered(line.style);
+      }
+      for (const PlotBand& band : panel.bands) {
+        x_.include(band.x);
+      }
+      for (const PlotMark& mark : panel.marks) {
+        if (mark.vertical) {
+          x_.include(mark.at);
+        }
+      }
+    }
+    if (plot_.unit_circle) {
+      x_.include(-1.0);
+      x_.include(1.0);
+    }
+    x_.pad(scatter || plot_.equal_axes ? 0.05 : 0.0);
+    if (plot_.equal_axes) {
+      for (Box& box : boxes_) {
+        const double per_pixel =
+            std::max(x_.span() / box_width_, box.y.span() / (box.bottom - box.top));
+        x_.widen_to(per_pixel * box_width_);
+        box.y.widen_to(per_pixel * (box.bottom - box.top));
+      }
+    }
+  }
+
+  Range y_range(const PlotPanel& panel) const {
+    Range range(panel.log_y);
+    for (const PlotLine& line : panel.lines) {
+      range.include(line.y);
+    }
+    for (const PlotBand& band : panel.bands) {
+      range.include(band.low);
+      range.include(band.high);
+    }
+    for (const PlotMark& mark : panel.marks) {
+      if (!mark.vertical) {
+        range.include(mark.at);
+      }
+    }
+    if (plot_.unit_circle) {
+      range.include(-1.0);
+      range.include(1.0);
+    }
+    range.pad(0.06);
+    return range;
+  }
+
+  void add_line(const PlotLine& line, bool log_y) {
+    const auto pixels = static_cast<std::size_t>(box_width_);
+    Points points;
+    if (scattered(line.style)) {
+      // Coarser cells until the picture stays small.
+      for (std::size_t cells = 2 * pixels; cells > 16; cells /= 2) {
+        points = thin_scatter(line.x, line.y, cells, cells / 2);
+        if (points.x.size() <= max_scatter) {
+          break;
+        }
+      }
+    } else {
+      points = thin_curve(line.x, line.y, pixels);
+    }
+    fmt::format_to(out(), "$d{} << EOD\n", blocks_++);
+    bool any = false;
+    for (std::size_t i = 0; i < points.x.size(); ++i) {
+      const bool shown = std::isfinite(points.x[i]) && std::isfinite(points.y[i]) &&
+                         !(plot_.log_x && points.x[i] <= 0.0) && !(log_y && points.y[i] <= 0.0);
+      if (shown) {
+        fmt::format_to(out(), "{:.7g} {:.7g}\n", points.x[i], points.y[i]);
+      } else {
+        script_ += "\n";
+      }
+      any = any || shown;
+    }
+    finish_block(any);
+  }
+
+  void add_band(const PlotBand& band) {
+    const Points low = thin_curve(band.x, band.low, static_cast<std::size_t>(box_width_));
+    const Points high = thin_curve(band.x, band.high, static_cast<std::size_t>(box_width_));
+    fmt::format_to(out(), "$d{} << EOD\n", blocks_++);
+    bool any = false;
+    // A closed polygon: along the low edge and back along the high one.
+    const auto add = [&](double x, double y) {
+      if (std::isfinite(x) && std::isfinite(y)) {
+        fmt::format_to(out(), "{:.7g} {:.7g}\n", x, y);
+        any = true;
+      }
+    };
+    for (std::size_t i = 0; i < low.x.size(); ++i) {
+      add(low.x[i], low.y[i]);
+    }
+    for (std::size_t i = high.x.size(); i-- > 0;) {
+      add(high.x[i], high.y[i]);
+    }
+    finish_block(any);
+  }
+
+  void add_unit_circle() {
+    fmt::format_to(out(), "$circle << EOD\n");
+    for (int i = 0; i <= 180; ++i) {
+      const double angle = std::numbers::pi * i / 90.0;
+      fmt::format_to(out(), "{:.6f} {:.6f}\n", std::cos(angle), std::sin(angle));
+    }
+    script_ += "EOD\n";
+  }
+
+  void finish_block(bool any) {
+    script_ += "EOD\n";
+    drawable_.push_back(any);
+  }
+
+  void draw_panel(std::size_t index) {
+    const PlotPanel& panel = plot_.panels[index];
+    const Box& box = boxes_[index];
+    const bool last = index + 1 == plot_.panels.size();
+    fmt::format_to(out(),
+                   "set lmargin at screen {}\nset rmargin at screen {}\nset tmargin at screen {}\n"
+                   "set bmargin at screen {}\nset yrange [{}:{}]\nset label {} at screen {}, "
+                   "screen {} center rotate by 90 textcolor rgb '#333333'\n",
+                   static_cast<double>(left_margin) / plot_.width,
+                   1.0 - static_cast<double>(right_margin) / plot_.width,
+                   1.0 - static_cast<double>(box.top) / height_,
+                   1.0 - static_cast<double>(box.bottom) / height_, box.y.low(), box.y.high(),
+                   literal(panel.y_label), 20.0 / plot_.width,
+                   1.0 - 0.5 * (box.top + box.bottom) / height_);
+    script_ += panel.log_y ? "set logscale y\n" : "unset logscale y\n";
+    if (last) {
+      fmt::format_to(out(), "set label {} at screen {}, screen {} center textcolor rgb '#333333'\n",
+                     literal(plot_.x_label), (left_margin + 0.5 * box_width_) / plot_.width,
+                     18.0 / height_);
+      script_ += "set format x '%g'\n";
+    } else {
+      script_ += "set format x ''\n";
+    }
+    fmt::format_to(
+        out(),
+        "set key at graph 0, screen {} left bottom horizontal Left reverse maxcols {} samplen 2\n",
+        1.0 - static_cast<double>(box.top - 4) / height_, box.legend.columns);
+    draw_marks(panel);
+    draw_curves(panel);
+    // The title belongs to the first panel only: a label drawn again and again grows bold.
+    script_ += "unset label\nunset arrow\n";
+  }
+
+  void draw_marks(const PlotPanel& panel) {
+    for (std::size_t i = 0; i < panel.marks.size(); ++i) {
+      const PlotMark& mark = panel.marks[i];
+      if (!std::isfinite(mark.at)) {
+        continue;
+      }
+      const std::string from = mark.vertical ? fmt::format("first {}, graph 0", mark.at)
+                                             : fmt::format("graph 0, first {}", mark.at);
+      const std::string to = mark.vertical ? fmt::format("first {}, graph 1", mark.at)
+                                           : fmt::format("graph 1, first {}", mark.at);
+      fmt::format_to(out(), "set arrow from {} to {} nohead dt (8,6) lc rgb '#777777' lw 1.2\n",
+                     from, to);
+      if (mark.label.empty()) {
+        continue;
+      }
+      const std::string label = literal(mark.label);
+      if (mark.vertical) {
+        fmt::format_to(out(), "set label {} at first {}, graph 0.96 left offset character 0.5, 0",
+                       label, mark.at);
+      } else {
+        fmt::format_to(out(),
+                       "set label {} at graph 0.995, first {} right offset 0, character -0.6",
+                       label, mark.at);
+      }
+      script_ += " font ',10' textcolor rgb '#555555' front\n";
+    }
+  }
+
+  void draw_curves(const PlotPanel& panel) {
+    std::string curves;
+    const auto add = [&](std::string text) {
+      curves += (curves.empty() ? "" : ", ") + std::move(text);
+    };
+    const auto title = [](const std::string& label) {
+      return label.empty() ? std::string("notitle") : "title " + literal(label);
+    };
+    std::size_t next = 0;
+    if (plot_.unit_circle) {
+      add("$circle with lines lc rgb '#999999' lw 1.2 notitle");
+    }
+    for (const PlotBand& band : panel.bands) {
+      const int color = color_index(band.color, next);
+      if (drawable_[drawn_]) {
+        add(fmt::format(
+            "$d{} with filledcurves closed fc rgb '{}' fs transparent solid 0.2 noborder {}",
+            drawn_, palette[static_cast<std::size_t>(color)], title(band.label)));
+      }
+      ++drawn_;
+    }
+    for (const PlotLine& line : panel.lines) {
+      const int color = color_index(line.color, next);
+      if (drawable_[drawn_]) {
+        const std::string_view rgb = palette[static_cast<std::size_t>(color)];
+        // Dots too small to tell their colour get a larger one in the legend.
+        const bool dots = line.style == LineStyle::points && !line.label.empty();
+        add(fmt::format("$d{} {} lc rgb '{}' {}", drawn_, style(line), rgb,
+                        dots ? "notitle" : title(line.label)));
+        if (dots) {
+          add(fmt::format("keyentry with points pt 7 ps 0.7 lc rgb '{}' {}", rgb,
+                          title(line.label)));
+        }
+      }
+      ++drawn_;
+    }
+    if (curves.empty()) {
+      script_ += "set label 'no data' at graph 0.5, graph 0.5 center textcolor rgb '#999999'\n";
+      curves = "NaN notitle";
+    }
+    script_ += "plot " + curves + "\n";
+  }
+
+  static std::string style(const PlotLine& line) {
+    switch (line.style) {
+      case LineStyle::solid:
+        return "with lines lw 1.8";
+      case LineStyle::dashed:
+        return "with lines lw 1.8 dt (18,8)";
+      case LineStyle::steps:
+        return "with steps lw 1.8";
+      case LineStyle::crosses:
+        return "with points pt 2 ps 1.2 lw 2";
+      case LineStyle::circles:
+        return "with points pt 6 ps 1.2 lw 2";
+      case LineStyle::points:
+        break;
+    }
+    return fmt::format("with points pt 7 ps {}", line.x.size() > 300  ? 0.22
+                                                 : line.x.size() > 60 ? 0.4
+                                                                      : 0.7);
+  }
+
+  const Plot& plot_;
+  std::string script_;
+  Range x_;
+  int box_width_;
+  int height_ = 0;
+  std::vector<Box> boxes_;
+  std::vector<bool> drawable_;  ///< Whether a data block has a point; gnuplot fails on one without.
+  std::size_t blocks_ = 0;
+  std::size_t drawn_ = 0;
+};
+
+}  // namespace
+
+std::string literal(std::string_view text) {
+  std::string result = "'";
+  for (const char c : printable(text, 400)) {
+    result += c == '\'' ? std::string("''") : std::string(1, c);
+  }
+  return result + "'";
+}
+
+std::string script_head(PictureFormat format, int width, int height) {
+  const std::string_view fonts = "DejaVu Sans,12";
+  if (format == PictureFormat::svg) {
+    return fmt::format(
+        "set encoding utf8\nset terminal svg size {},{} dynamic noenhanced font '{}' background "
+        "'#FFFFFF'\n",
+        width, height, fonts);
+  }
+  constexpr double scale = 1.5;
+  return fmt::format(
+      "set encoding utf8\nset terminal pngcairo size {},{} noenhanced font '{}' fontscale {} "
+      "linewidth {} "
+      "pointscale {} background '#FFFFFF'\n",
+      std::lround(width * scale), std::lround(height * scale), fonts, scale, scale, scale);
+}
+
+Expected<std::string> gnuplot_script(const Plot& plot, PictureFormat format) {
+  if (Expected<void> ok = check(plot); !ok) {
+    return tl::unexpected(std::move(ok).error());
+  }
+  return Script(plot).build(format);
+}
+
+}  // namespace flyball::io
