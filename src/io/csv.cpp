@@ -99,10 +99,7 @@ class Reader {
                         .in(source_)
                         .about("the table")
                         .got("without one row that has a time and a value");
-      for (const Diagnostic& diagnostic : log_.diagnostics) {
-        error = std::move(error).with(diagnostic.code, diagnostic.message);
-      }
-      return tl::unexpected(std::move(error));
+      return tl::unexpected(io::with_diagnostics(std::move(error), log_.diagnostics));
     }
     return std::move(log_);
   }

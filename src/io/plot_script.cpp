@@ -439,7 +439,7 @@ class Script {
 std::string literal(std::string_view text) {
   std::string result = "'";
   for (const char c : printable(text, 400)) {
-    result += c == '\'' ? std::string("''") : std::string(1, c);
+    result += c == '\'' ? std::string("\u2019") : std::string(1, c);
   }
   return result + "'";
 }

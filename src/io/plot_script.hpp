@@ -16,8 +16,10 @@ enum class PictureFormat { svg, png };
 /// The commands that every picture begins with: terminal, fonts, encoding.
 [[nodiscard]] std::string script_head(PictureFormat format, int width, int height);
 
-/// A text as a gnuplot literal. Single quotes, in which neither backslash nor backtick means
-/// anything; control characters are removed.
+/// A text as a gnuplot literal in single quotes, in which neither backslash nor backtick means
+/// anything. An apostrophe becomes the typographic one: gnuplot 5.4 takes a doubled quote at the
+/// beginning of a literal for an empty literal, and what follows for commands. Control characters
+/// are replaced.
 [[nodiscard]] std::string literal(std::string_view text);
 
 }  // namespace flyball::io

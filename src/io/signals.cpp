@@ -98,4 +98,11 @@ void tidy(Log& log) {
   }
 }
 
+Error with_diagnostics(Error error, const std::vector<Diagnostic>& diagnostics) {
+  for (const Diagnostic& diagnostic : diagnostics) {
+    std::move(error).with(diagnostic.code, diagnostic.message);
+  }
+  return error;
+}
+
 }  // namespace flyball::io

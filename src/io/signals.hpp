@@ -8,4 +8,7 @@ namespace flyball::io {
 /// tells both in the diagnostics. Channels that lose all their samples are removed.
 void tidy(Log& log);
 
+/// An error with what was told on the way to it as evidence.
+[[nodiscard]] Error with_diagnostics(Error error, const std::vector<Diagnostic>& diagnostics);
+
 }  // namespace flyball::io

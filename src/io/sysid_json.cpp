@@ -13,6 +13,7 @@
 
 #include <flyball/io/log_error.hpp>
 
+#include "io/signals.hpp"
 #include "io/sysid_columns.hpp"
 #include "io/text.hpp"
 
@@ -243,7 +244,8 @@ SysIdJson::Run to_run(std::string name, Table& table, SysIdJson::Layout layout, 
       rows.push_back(row);
     }
   }
-  table = {};
+  table.rows = {};
+  table.widths = {};
   std::stable_sort(rows.begin(), rows.end(),
                    [](const Row& a, const Row& b) { return a[0] < b[0]; });
   SysIdJson::Run run;
@@ -404,10 +406,7 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
                       .got(truncated ? "cut before its first complete row"
                                      : "without one complete row of finite numbers")
                       .hint("record the tests again");
-    for (const Diagnostic& diagnostic : log.diagnostics) {
-      error = std::move(error).with(diagnostic.code, diagnostic.message);
-    }
-    return tl::unexpected(std::move(error));
+    return tl::unexpected(io::with_diagnostics(std::move(error), log.diagnostics));
   }
   tell_missing(log, handler);
   return log;

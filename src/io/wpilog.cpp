@@ -379,10 +379,7 @@ class Reader {
                         .about("the WPILOG")
                         .got("without a number or a text that can be decoded")
                         .hint("check that the robot program logs the mechanism (SysIdRoutineLog)");
-      for (const Diagnostic& diagnostic : log_.diagnostics) {
-        error = std::move(error).with(diagnostic.code, diagnostic.message);
-      }
-      return tl::unexpected(std::move(error));
+      return tl::unexpected(io::with_diagnostics(std::move(error), log_.diagnostics));
     }
     return std::move(log_);
   }

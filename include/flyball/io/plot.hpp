@@ -25,42 +25,42 @@ enum class LineStyle { solid, dashed, points, steps, crosses, circles };
 
 /// One curve of a panel.
 struct PlotLine {
-  std::string label;  ///< In the legend; empty: not in it.
-  std::vector<double> x;
-  std::vector<double> y;  ///< As many as `x`.
+  std::string label = {};  ///< In the legend; empty: not in it.
+  std::vector<double> x = {};
+  std::vector<double> y = {};  ///< As many as `x`.
   LineStyle style = LineStyle::solid;
   int color = -1;  ///< Index of the palette (0 to 6), so that panels agree; -1: the next one.
 };
 
 /// A shaded region between two curves, such as a confidence interval.
 struct PlotBand {
-  std::string label;
-  std::vector<double> x;
-  std::vector<double> low;
-  std::vector<double> high;
+  std::string label = {};
+  std::vector<double> x = {};
+  std::vector<double> low = {};
+  std::vector<double> high = {};
   int color = -1;
 };
 
 /// A thin line across the panel, such as a limit or an event.
 struct PlotMark {
   double at = 0.0;
-  std::string label;
+  std::string label = {};
   bool vertical = false;
 };
 
 /// One pair of axes. Panels of a plot stand above each other and share the x axis.
 struct PlotPanel {
-  std::string y_label;  ///< With its unit: "Velocity (m/s)".
-  std::vector<PlotLine> lines;
-  std::vector<PlotBand> bands;
-  std::vector<PlotMark> marks;
+  std::string y_label = {};  ///< With its unit: "Velocity (m/s)".
+  std::vector<PlotLine> lines = {};
+  std::vector<PlotBand> bands = {};
+  std::vector<PlotMark> marks = {};
   bool log_y = false;
 };
 
 struct Plot {
-  std::string title;
-  std::string x_label;  ///< With its unit: "Time (s)".
-  std::vector<PlotPanel> panels;
+  std::string title = {};
+  std::string x_label = {};  ///< With its unit: "Time (s)".
+  std::vector<PlotPanel> panels = {};
   bool log_x = false;
   bool equal_axes = false;  ///< One unit is as long on x as on y.
   bool unit_circle = false;
@@ -70,13 +70,13 @@ struct Plot {
 
 /// A function of two variables: a surface in perspective, or coloured from above.
 struct SurfacePlot {
-  std::string title;
-  std::string x_label;
-  std::string y_label;
-  std::string z_label;
-  std::vector<double> x;
-  std::vector<double> y;
-  std::vector<double> z;  ///< z[i * x.size() + j] belongs to (x[j], y[i]).
+  std::string title = {};
+  std::string x_label = {};
+  std::string y_label = {};
+  std::string z_label = {};
+  std::vector<double> x = {};
+  std::vector<double> y = {};
+  std::vector<double> z = {};  ///< z[i * x.size() + j] belongs to (x[j], y[i]).
   bool from_above = false;
   int width = 900;
   int height = 620;
@@ -85,9 +85,9 @@ struct SurfacePlot {
 /// Closed-loop or open-loop poles (and zeros) in the complex plane, poles as crosses, zeros as
 /// circles; of a discrete system with the unit circle, of a continuous one with the imaginary axis.
 struct PolePlotGroup {
-  std::string label;
-  std::vector<std::complex<double>> poles;
-  std::vector<std::complex<double>> zeros;
+  std::string label = {};
+  std::vector<std::complex<double>> poles = {};
+  std::vector<std::complex<double>> zeros = {};
 };
 [[nodiscard]] Plot pole_plot(std::string title, const std::vector<PolePlotGroup>& groups,
                              bool discrete);

@@ -1,0 +1,224 @@
+#include <flyball/io/plot.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/io/file.hpp>
+
+#include "io/examples.hpp"
+#include "io/temporary_folder.hpp"
+
+namespace flyball {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+Plot example(std::size_t points) {
+  Plot plot;
+  plot.title = "Velocity";
+  plot.x_label = "Time (s)";
+  PlotLine line{"measured", {}, {}};
+  for (std::size_t i = 0; i < points; ++i) {
+    line.x.push_back(static_cast<double>(i) / static_cast<double>(points));
+    line.y.push_back(std::sin(20.0 * line.x.back()));
+  }
+  PlotBand band{"interval", line.x, line.y, line.y};
+  PlotPanel panel{"Velocity (m/s)", {line}, {band}, {{0.5, "step", true}, {1.2, "limit"}}};
+  for (const LineStyle style : {LineStyle::dashed, LineStyle::points, LineStyle::steps,
+                                LineStyle::crosses, LineStyle::circles}) {
+    panel.lines.push_back({"", {0.1, 0.2}, {0.1, 0.2}, style});
+  }
+  plot.panels = {panel, {"Voltage (V)", {line}}};
+  return plot;
+}
+
+SurfacePlot example_surface() {
+  return {"Cost-to-go", "x (m)", "v (m/s)", "cost", {0, 1, 2}, {0, 1}, {0, 1, 4, 1, nan, 5}};
+}
+
+TEST(Plot, SvgIsOneElementWithTheTexts) {
+  const Expected<std::string> svg = render_svg(example(50));
+  ASSERT_TRUE(svg) << to_string(svg.error());
+  EXPECT_TRUE(svg->starts_with("<svg"));
+  EXPECT_TRUE(svg->ends_with("</svg>\n") || svg->ends_with("</svg>\n\n"));
+  for (const char* text : {"<title>Velocity</title>", "Time (s)", "Velocity (m/s)", "Voltage (V)",
+                           "measured", "interval", "step", "limit", "#0072B2"}) {
+    EXPECT_TRUE(contains(*svg, text) || contains(*svg, "0, 114, 178")) << text;
+  }
+}
+
+TEST(Plot, PngIsAPng) {
+  const Expected<std::string> png = render_png(example(50));
+  ASSERT_TRUE(png) << to_string(png.error());
+  EXPECT_TRUE(png->starts_with("\x89PNG\r\n\x1A\n"));
+  // IHDR's width, big endian at byte 16: 900 pixels at 1.5.
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>((*png)[i]); };
+  EXPECT_EQ(byte(18) * 256 + byte(19), 1350);
+}
+
+TEST(Plot, TheSamePlotGivesTheSameBytes) {
+  EXPECT_EQ(render_svg(example(50)).value(), render_svg(example(50)).value());
+  EXPECT_EQ(render_png(example(50)).value(), render_png(example(50)).value());
+}
+
+TEST(Plot, TextIsNeverAProgram) {
+  const TemporaryFolder folder;
+  const std::string bait = folder.file("owned");
+  Plot plot = example(3);
+  const std::string evil = "'\n`touch " + bait + "` $(touch " + bait + ") \"; system('touch " +
+                           bait + "') @x {/Symbol a} \\n <b>&amp; θ̇";
+  plot.title = evil;
+  plot.x_label = evil;
+  plot.panels[0].y_label = evil;
+  plot.panels[0].lines[0].label = evil;
+  plot.panels[0].bands[0].label = evil;
+  plot.panels[0].marks[0].label = evil;
+  const Expected<std::string> svg = render_svg(plot);
+  ASSERT_TRUE(svg) << to_string(svg.error());
+  EXPECT_TRUE(contains(*svg, "{/Symbol a} \\n &lt;b&gt;&amp;amp; θ̇"));
+  EXPECT_EQ(folder.names(), std::set<std::string>{});
+}
+
+TEST(Plot, LongSeriesStaySmallAndKeepTheirExtremes) {
+  Plot plot;
+  PlotLine line{"", {}, {}};
+  for (int i = 0; i < 300'000; ++i) {
+    line.x.push_back(i);
+    line.y.push_back(i == 123'456 ? 5.0 : std::sin(0.37 * i));
+  }
+  PlotLine scatter = line;
+  scatter.style = LineStyle::points;
+  plot.panels = {{"", {line}}};
+  const Expected<std::string> svg = render_svg(plot);
+  ASSERT_TRUE(svg) << to_string(svg.error());
+  EXPECT_LT(svg->size(), 120'000U);
+  plot.panels = {{"", {scatter}}};
+  EXPECT_LT(render_svg(plot).value().size(), 500'000U);
+
+  // The single spike decides the height of the curve: without it the picture differs.
+  const std::string with = render_svg({.panels = {{"", {line}}}}).value();
+  line.y[123'456] = 0.0;
+  PlotPanel flat{"", {line}};
+  flat.marks.push_back({5.0, "", false});  // the same range of y
+  EXPECT_NE(with, render_svg({.panels = {flat}}).value());
+}
+
+TEST(Plot, GapsConstantsAndNothing) {
+  Plot plot = example(3);
+  plot.panels = {
+      {"gap", {{"", {0, 1, 2, 3}, {1, nan, std::numeric_limits<double>::infinity(), 2}}}},
+      {"constant", {{"", {0, 1}, {5, 5}}}},
+      {"one point", {{"", {1}, {1}}}},
+      {"tiny", {{"", {0, 1}, {1e-320, 2e-320}}}},
+      {"huge", {{"", {0, 1}, {-1e308, 1e308}}}},
+      {"nothing", {{"", {}, {}}}, {{"", {}, {}, {}}}},
+      {"nan", {{"", {nan}, {nan}}}, {}, {{nan, "lost"}}}};
+  const Expected<std::string> svg = render_svg(plot);
+  ASSERT_TRUE(svg) << to_string(svg.error());
+  EXPECT_TRUE(contains(*svg, "no data"));
+}
+
+TEST(Plot, LogarithmicAxesSkipWhatHasNoLogarithm) {
+  Plot plot;
+  plot.log_x = true;
+  plot.panels = {{"gain", {{"", {-1, 0, 0.1, 10, 100}, {1, 1, 1, 0, 1e-3}}}, {}, {}, true}};
+  const Expected<std::string> svg = render_svg(plot);
+  ASSERT_TRUE(svg) << to_string(svg.error());
+  plot.panels = {{"nothing positive", {{"", {1, 2}, {-1, -2}}}, {}, {}, true}};
+  EXPECT_TRUE(render_svg(plot));
+}
+
+TEST(Plot, PolesInTheUnitCircle) {
+  const Plot plot =
+      pole_plot("Poles", {{"controller", {{0.5, 0.5}, {0.5, -0.5}}, {{0.0, 0.0}}}}, true);
+  EXPECT_TRUE(plot.unit_circle);
+  EXPECT_TRUE(plot.equal_axes);
+  EXPECT_EQ(plot.panels[0].lines.size(), 2U);
+  EXPECT_TRUE(render_svg(plot));
+  EXPECT_TRUE(render_svg(pole_plot("Poles", {{"plant", {{-3.0, 0.0}}, {}}}, false)));
+  EXPECT_TRUE(render_svg(pole_plot("None", {}, false)));
+}
+
+TEST(Plot, Surfaces) {
+  SurfacePlot surface = example_surface();
+  EXPECT_TRUE(contains(render_svg(surface).value(), "Cost-to-go"));
+  surface.from_above = true;
+  EXPECT_TRUE(render_png(surface).value().starts_with("\x89PNG"));
+  surface.z.pop_back();
+  EXPECT_TRUE(render_svg(surface).error().is(ArgumentError::wrong_shape));
+  surface.z.assign(6, nan);
+  EXPECT_TRUE(render_svg(surface).error().is(ArgumentError::empty));
+  surface = example_surface();
+  surface.width = 1;
+  EXPECT_TRUE(render_svg(surface).error().is(ArgumentError::out_of_range));
+}
+
+TEST(Plot, Misuse) {
+  EXPECT_TRUE(render_svg(Plot()).error().is(ArgumentError::empty));
+  Plot plot = example(3);
+  plot.panels[0].lines[0].y.pop_back();
+  EXPECT_TRUE(render_svg(plot).error().is(ArgumentError::wrong_shape));
+  plot = example(3);
+  plot.panels[0].bands[0].high.pop_back();
+  EXPECT_TRUE(render_svg(plot).error().is(ArgumentError::wrong_shape));
+  plot = example(3);
+  plot.width = 1;
+  EXPECT_TRUE(render_svg(plot).error().is(ArgumentError::out_of_range));
+}
+
+TEST(Plot, WritesFiles) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_svg(folder.file("a.svg"), example(3)));
+  ASSERT_TRUE(write_png(folder.file("a.png"), example(3)));
+  ASSERT_TRUE(write_svg(folder.file("b.svg"), example_surface()));
+  ASSERT_TRUE(write_png(folder.file("b.png"), example_surface()));
+  EXPECT_EQ(folder.get("a.svg"), render_svg(example(3)).value());
+  EXPECT_TRUE(write_svg(folder.file("no/a.svg"), example(3)).error().is(FileError::not_found));
+  EXPECT_EQ(folder.names(), (std::set<std::string>{"a.svg", "a.png", "b.svg", "b.png"}));
+}
+
+/// Runs with another PATH, and restores it.
+class WithPath {
+ public:
+  explicit WithPath(const std::string& path) : before_(::getenv("PATH")) {
+    ::setenv("PATH", path.c_str(), 1);
+  }
+  WithPath(const WithPath&) = delete;
+  WithPath& operator=(const WithPath&) = delete;
+  ~WithPath() { ::setenv("PATH", before_.c_str(), 1); }
+
+ private:
+  std::string before_;
+};
+
+TEST(Plot, AMissingGnuplotIsToldWithTheMend) {
+  const TemporaryFolder folder;
+  const WithPath empty(folder.file("."));
+  const Expected<std::string> svg = render_svg(example(3));
+  ASSERT_FALSE(svg);
+  EXPECT_TRUE(svg.error().is(PlotError::gnuplot_missing));
+  EXPECT_EQ(svg.error().kind(), ErrorKind::environment);
+  EXPECT_TRUE(contains(to_string(svg.error()), "apt install gnuplot-nox"));
+}
+
+TEST(Plot, WhatGnuplotComplainsAboutIsTold) {
+  const TemporaryFolder folder;
+  const std::string fake =
+      folder.put("gnuplot", "#!/bin/sh\necho 'line 7: no such terminal' >&2\nexit 3\n");
+  std::filesystem::permissions(fake, std::filesystem::perms::owner_all);
+  const WithPath only(folder.file("."));
+  const Expected<std::string> svg = render_svg(example(3));
+  ASSERT_FALSE(svg);
+  EXPECT_TRUE(svg.error().is(PlotError::gnuplot_failed));
+  EXPECT_TRUE(contains(to_string(svg.error()), "no such terminal"));
+  EXPECT_TRUE(contains(to_string(svg.error()), "code = 3"));
+}
+
+}  // namespace
+}  // namespace flyball
