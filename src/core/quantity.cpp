@@ -229,6 +229,7 @@ const NamedUnit* find_unit(std::string_view text) {
 
 std::string nearest_unit(std::string_view text) {
   std::vector<std::string_view> names;
+  names.reserve(units.size());
   for (const NamedUnit& unit : units) {
     names.push_back(unit.text);
   }

@@ -1,7 +1,7 @@
+#include <flyball/core/text.hpp>
+
 #include <algorithm>
 #include <vector>
-
-#include <flyball/core/text.hpp>
 
 namespace flyball {
 

@@ -1,8 +1,8 @@
+#include <flyball/mechanisms/mechanism_kind.hpp>
+
 #include <algorithm>
 #include <cctype>
 #include <string>
-
-#include <flyball/mechanisms/mechanism_kind.hpp>
 
 namespace flyball::mechanisms {
 

@@ -1,3 +1,5 @@
+#include <flyball/mechanisms/motor.hpp>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -9,7 +11,6 @@
 
 #include <flyball/core/argument.hpp>
 #include <flyball/core/text.hpp>
-#include <flyball/mechanisms/motor.hpp>
 
 namespace flyball::mechanisms {
 

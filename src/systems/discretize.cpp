@@ -1,9 +1,10 @@
+#include <flyball/systems/discretize.hpp>
+
 #include <cmath>
 
 #include <fmt/format.h>
 
 #include <flyball/math/matrix_exponential.hpp>
-#include <flyball/systems/discretize.hpp>
 
 namespace flyball {
 

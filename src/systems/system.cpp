@@ -1,9 +1,9 @@
+#include <flyball/systems/system.hpp>
+
 #include <complex>
 #include <string>
 
 #include <Eigen/Eigenvalues>
-
-#include <flyball/systems/system.hpp>
 
 namespace flyball {
 
