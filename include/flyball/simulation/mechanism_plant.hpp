@@ -14,11 +14,12 @@ struct MechanismState {
 /// with friction that sticks: at rest it holds whatever does not exceed breakaway kS.
 ///
 /// A flywheel and an elevator are integrated exactly, with the instants at which the velocity
-/// changes sign; an arm by Runge-Kutta steps of at most `arm_step`, those instants found on the
-/// step. With kA = 0 the velocity follows the voltage at once (Theorem 14.3.2).
+/// changes sign. An arm is integrated in steps of at most `arm_step` which are exact but for the
+/// gravity, taken at the middle of the step (second order, and stable however small kA is). With
+/// kA = 0 the velocity follows the voltage at once (Theorem 14.3.2).
 class MechanismPlant {
  public:
-  static constexpr double arm_step = 5e-4;  ///< s
+  static constexpr double arm_step = 2.5e-4;  ///< s
 
   /// @param breakaway  Static over sliding friction, >= 1.
   /// @errors ArgumentError: kV not positive, kA or kS negative, breakaway below one, not finite.
@@ -41,13 +42,11 @@ class MechanismPlant {
                  double breakaway) noexcept
       : kind_(kind), gains_(gains), breakaway_(breakaway) {}
 
-  [[nodiscard]] int direction(const MechanismState& state, double voltage) const noexcept;
-  [[nodiscard]] MechanismState step_exact(MechanismState state, double voltage,
-                                          double duration) const noexcept;
-  [[nodiscard]] MechanismState step_arm(MechanismState state, double voltage,
-                                        double duration) const noexcept;
-  [[nodiscard]] MechanismState arm_rk4(const MechanismState& state, double drive,
-                                       double duration) const noexcept;
+  /// The way it moves or sets off: -1, 0 (sticks) or 1, under V - gravity.
+  [[nodiscard]] int direction(double velocity, double drive) const noexcept;
+  /// Exact for a constant drive V - gravity.
+  [[nodiscard]] MechanismState step_constant(MechanismState state, double drive,
+                                             double duration) const noexcept;
 
   mechanisms::MechanismKind kind_;
   mechanisms::FeedforwardGains gains_;

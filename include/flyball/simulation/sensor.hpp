@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include <flyball/core/expected.hpp>
 #include <flyball/core/quantity.hpp>
 #include <flyball/core/random.hpp>
 

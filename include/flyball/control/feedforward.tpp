@@ -1,0 +1,15 @@
+#pragma once
+
+#include <flyball/control/feedforward.hpp>
+
+namespace flyball {
+
+template <int States, int Inputs>
+auto LinearPlantInversion<States, Inputs>::calculate(const StateVector& r,
+                                                     const StateVector& r_next) const noexcept
+    -> InputVector {
+  const StateVector demand = r_next - A_ * r;
+  return B_pinv_ * demand;
+}
+
+}  // namespace flyball

@@ -1,0 +1,54 @@
+#include <flyball/control/feedforward.hpp>
+
+#include <cmath>
+
+#include <Eigen/QR>
+
+#include <flyball/control/feedforward.tpp>
+
+namespace flyball {
+
+Expected<Eigen::MatrixXd> pseudo_inverse(const MatrixRef& B) {
+  constexpr std::string_view where = "pseudo_inverse";
+  if (B.size() == 0) {
+    return tl::unexpected(Error(ArgumentError::empty)
+                              .in(std::string(where))
+                              .about("B")
+                              .got("empty")
+                              .expected("a matrix with at least one entry"));
+  }
+  if (auto finite = check_finite(B, where, "B"); !finite) {
+    return tl::unexpected(finite.error());
+  }
+  return Eigen::MatrixXd(
+      Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>(B).pseudoInverse());
+}
+
+SimpleFeedforward::SimpleFeedforward(mechanisms::MechanismKind kind,
+                                     const mechanisms::FeedforwardGains& gains,
+                                     Time period) noexcept
+    : kind_(kind), gains_(gains) {
+  // A_d = e^{-T kV/kA}; an expm1 keeps 1 - A_d when the period is short.
+  const double decay = gains.kA > 0.0 ? period.si() * gains.kV / gains.kA : 0.0;
+  next_gain_ = gains.kA > 0.0 ? gains.kV / -std::expm1(-decay) : gains.kV;
+  gain_ = gains.kA > 0.0 ? std::exp(-decay) * next_gain_ : 0.0;
+}
+
+Expected<SimpleFeedforward> SimpleFeedforward::create(mechanisms::MechanismKind kind,
+                                                      const mechanisms::FeedforwardGains& gains,
+                                                      Time period) {
+  constexpr std::string_view where = "SimpleFeedforward";
+  return check_all(check_positive(gains.kV, where, "kV"), check_not_negative(gains.kS, where, "kS"),
+                   check_not_negative(gains.kA, where, "kA"), check_finite(gains.kG, where, "kG"),
+                   check_finite(gains.angle_offset, where, "angle_offset"),
+                   check_positive(period.si(), where, "period", "s"))
+      .map([&] { return SimpleFeedforward(kind, gains, period); });
+}
+
+template class LinearPlantInversion<1, 1>;
+template class LinearPlantInversion<2, 1>;
+template class LinearPlantInversion<2, 2>;
+template class LinearPlantInversion<3, 1>;
+template class LinearPlantInversion<Eigen::Dynamic, Eigen::Dynamic>;
+
+}  // namespace flyball

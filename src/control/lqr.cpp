@@ -1,0 +1,110 @@
+#include <flyball/control/lqr.hpp>
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include <flyball/math/riccati.hpp>
+
+namespace flyball {
+
+namespace {
+
+constexpr std::string_view where = "lqr";
+
+Expected<LqrDesign<>> solve(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
+                            const Weight& R, const Eigen::MatrixXd* N) {
+  if (!Q.get()) {
+    return tl::unexpected(Q.get().error());
+  }
+  if (!R.get()) {
+    return tl::unexpected(R.get().error());
+  }
+  const Eigen::MatrixXd& weight_Q = *Q.get();
+  const Eigen::MatrixXd& weight_R = *R.get();
+  if (auto square = check_square(A, where, "A"); !square) {
+    return tl::unexpected(square.error());
+  }
+  const Eigen::Index n = A.rows();
+  const Eigen::Index m = B.cols();
+  if (auto checked = check_all(
+          check_shape(B, n, m, where, "B", "states x inputs"),
+          check_shape(weight_Q, n, n, where, "Q", "states x states"),
+          check_shape(weight_R, m, m, where, "R", "inputs x inputs"),
+          N == nullptr ? Expected<void>{} : check_shape(*N, n, m, where, "N", "states x inputs"));
+      !checked) {
+    return tl::unexpected(checked.error());
+  }
+  auto solution =
+      N == nullptr ? dare(A, B, weight_Q, weight_R) : dare(A, B, weight_Q, weight_R, *N);
+  if (!solution) {
+    return tl::unexpected(Error(std::move(solution.error()).in(std::string(where))));
+  }
+  return LqrDesign<>{std::move(solution->K), std::move(solution->X), std::move(solution->poles),
+                     solution->residual, solution->condition};
+}
+
+}  // namespace
+
+Expected<Eigen::MatrixXd> bryson(std::span<const double> tolerances, double rho) {
+  constexpr std::string_view name = "bryson";
+  if (tolerances.empty()) {
+    return tl::unexpected(Error(ArgumentError::empty)
+                              .in(std::string(name))
+                              .about("tolerances")
+                              .got("empty")
+                              .expected("one tolerance a state or input"));
+  }
+  if (auto checked = check_positive(rho, name, "rho"); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  const auto n = static_cast<Eigen::Index>(tolerances.size());
+  Eigen::MatrixXd weight = Eigen::MatrixXd::Zero(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double tolerance = tolerances[static_cast<std::size_t>(i)];
+    if (std::isinf(tolerance) && tolerance > 0.0) {
+      continue;
+    }
+    const std::string entry = fmt::format("tolerance {}", i);
+    if (auto checked = check_positive(tolerance, name, entry); !checked) {
+      return tl::unexpected(
+          Error(std::move(checked.error()))
+              .hint("give the largest acceptable excursion, or infinity if it does not matter"));
+    }
+    const double value = rho / (tolerance * tolerance);
+    if (!std::isfinite(value) || value == 0.0) {
+      return tl::unexpected(Error(ArgumentError::out_of_range)
+                                .in(std::string(name))
+                                .about(entry)
+                                .got(format_number(tolerance))
+                                .expected("such that rho / tolerance^2 is a normal number"));
+    }
+    weight(i, i) = value;
+  }
+  return weight;
+}
+
+Expected<Eigen::MatrixXd> bryson(std::initializer_list<double> tolerances, double rho) {
+  return bryson(std::span<const double>(tolerances.begin(), tolerances.size()), rho);
+}
+
+Expected<LqrDesign<>> lqr(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
+                          const Weight& R) {
+  return solve(A, B, Q, R, nullptr);
+}
+
+Expected<LqrDesign<>> lqr(const MatrixRef& A, const MatrixRef& B, const Weight& Q, const Weight& R,
+                          const MatrixRef& N) {
+  const Eigen::MatrixXd cross = N;
+  return solve(A, B, Q, R, &cross);
+}
+
+FLYBALL_LQR(, 1, 1, 1);
+FLYBALL_LQR(, 2, 1, 1);
+FLYBALL_LQR(, 2, 1, 2);
+FLYBALL_LQR(, 2, 2, 2);
+FLYBALL_LQR(, 3, 1, 1);
+FLYBALL_LQR(, 3, 1, 2);
+FLYBALL_LQR(, Eigen::Dynamic, Eigen::Dynamic, Eigen::Dynamic);
+
+}  // namespace flyball

@@ -1,0 +1,52 @@
+#include <flyball/control/observer_regulator.tpp>
+
+#include <fmt/format.h>
+
+namespace flyball {
+
+namespace detail {
+
+Expected<void> check_regulator(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
+                               const MatrixRef& D, Time period, const MatrixRef& K,
+                               const MatrixRef& K_e, const MatrixRef& u_min,
+                               const MatrixRef& u_max) {
+  constexpr std::string_view where = "Lqg";
+  if (auto checked = check_system(A, B, C, D, where); !checked) {
+    return checked;
+  }
+  const Eigen::Index n = A.rows();
+  const Eigen::Index m = B.cols();
+  const Eigen::Index p = C.rows();
+  if (auto checked = check_all(check_positive(period.si(), where, "period", "s"),
+                               check_shape(K, m, n, where, "K", "inputs x states"),
+                               check_shape(K_e, n, p, where, "K_e", "states x outputs"),
+                               check_shape(u_min, m, 1, where, "u_min", "inputs x 1"),
+                               check_shape(u_max, m, 1, where, "u_max", "inputs x 1"),
+                               check_finite(K, where, "K"), check_finite(K_e, where, "K_e"));
+      !checked) {
+    return checked;
+  }
+  for (Eigen::Index i = 0; i < m; ++i) {
+    if (!(u_min(i, 0) < u_max(i, 0))) {
+      return tl::unexpected(Error(ArgumentError::out_of_range)
+                                .in(std::string(where))
+                                .about(fmt::format("u_min({})", i))
+                                .got(format_number(u_min(i, 0)))
+                                .expected(fmt::format("below u_max({}), which is {}", i,
+                                                      format_number(u_max(i, 0)))));
+    }
+  }
+  return {};
+}
+
+}  // namespace detail
+
+template class Lqg<1, 1, 1>;
+template class Lqg<2, 1, 1>;
+template class Lqg<2, 1, 2>;
+template class Lqg<2, 2, 2>;
+template class Lqg<3, 1, 1>;
+template class Lqg<3, 1, 2>;
+template class Lqg<Eigen::Dynamic, Eigen::Dynamic, Eigen::Dynamic>;
+
+}  // namespace flyball

@@ -1,0 +1,35 @@
+#include <flyball/estimation/covariance.hpp>
+
+#include <fmt/format.h>
+
+#include <flyball/core/argument.hpp>
+
+namespace flyball {
+
+Expected<Eigen::MatrixXd> standard_deviations(std::span<const double> sigmas) {
+  constexpr std::string_view where = "standard_deviations";
+  if (sigmas.empty()) {
+    return tl::unexpected(Error(ArgumentError::empty)
+                              .in(std::string(where))
+                              .about("sigmas")
+                              .got("empty")
+                              .expected("one standard deviation a state or output"));
+  }
+  const auto n = static_cast<Eigen::Index>(sigmas.size());
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double sigma = sigmas[static_cast<std::size_t>(i)];
+    if (auto checked = check_not_negative(sigma, where, fmt::format("standard deviation {}", i));
+        !checked) {
+      return tl::unexpected(checked.error());
+    }
+    covariance(i, i) = sigma * sigma;
+  }
+  return covariance;
+}
+
+Expected<Eigen::MatrixXd> standard_deviations(std::initializer_list<double> sigmas) {
+  return standard_deviations(std::span<const double>(sigmas.begin(), sigmas.size()));
+}
+
+}  // namespace flyball
