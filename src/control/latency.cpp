@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <complex>
+#include <vector>
 
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
@@ -30,7 +31,7 @@ Error no_real_power(double p, const std::complex<double>& eigenvalue, std::strin
       .about(fmt::format("the power {}", format_number(p)))
       .got(fmt::format("not real: {}", what))
       .hint("round the power to a whole number")
-      .with("eigenvalue", {eigenvalue.real(), eigenvalue.imag()});
+      .with("eigenvalue", std::vector<double>{eigenvalue.real(), eigenvalue.imag()});
 }
 
 // M^f, 0 < f < 1.

@@ -43,7 +43,10 @@ TrapezoidProfile::TrapezoidProfile(const MotionLimits& limits, const MotionState
   const double covered = 0.5 * (v_0 + c) * t_1 + 0.5 * (c + v_g) * t_3;
   const double t_2 = c > 0.0 && peak > v_max ? std::max(0.0, (d - covered) / c) : 0.0;
   const double total = t_1 + t_2 + t_3;
-  if (!std::isfinite(total) || !std::isfinite(covered)) {
+  // No place on the way may overflow, even if the ends do not.
+  const double reach =
+      (std::abs(v_0) + std::abs(c)) * t_1 + std::abs(c) * t_2 + (std::abs(c) + std::abs(v_g)) * t_3;
+  if (!std::isfinite(total) || !std::isfinite(reach)) {
     goal_.velocity = 0.0;
     start_ = goal_;
     return;

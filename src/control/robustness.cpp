@@ -1,0 +1,126 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/LU>
+#include <fmt/format.h>
+
+#include <flyball/control/margins.hpp>
+
+#include "control/sampled_loop.hpp"
+
+namespace flyball {
+
+namespace {
+
+constexpr std::string_view where = "robustness_grid";
+
+struct StepResponse {
+  double overshoot;
+  double steady_error;
+};
+
+// The response to a unit step of the first reference. The reference enters the input through
+// F = K + B⁺(I - A), and the observer through the input.
+StepResponse step_response(const detail::SampledLoop& loop, const Eigen::MatrixXd& C,
+                           const DiscreteSystem<>& model, double feedforward, double radius) {
+  const Eigen::MatrixXd M = loop.closed(1.0);
+  Eigen::VectorXd drive = Eigen::VectorXd::Zero(M.rows());
+  drive.head(loop.delayed_states()) = loop.delayed_B() * feedforward;
+  drive.tail(model.A.rows()) = model.B * feedforward;
+  const Eigen::RowVectorXd output = C.row(0);
+
+  const Eigen::Index n = loop.plant_states();
+  const Eigen::MatrixXd I_M = Eigen::MatrixXd::Identity(M.rows(), M.cols()) - M;
+  const Eigen::VectorXd settled = I_M.partialPivLu().solve(drive);
+  const double final_value = output.dot(settled.head(n));
+
+  // Until what is left of the transient is below 1e-9, within reason.
+  constexpr double most_samples = 20000.0;
+  const double decay = std::log(std::clamp(radius, 1e-3, 1.0 - 1e-12));
+  const auto samples = static_cast<int>(std::min(std::log(1e-9) / decay + 10.0, most_samples));
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(M.rows());
+  double peak = 0.0;
+  for (int k = 0; k < samples; ++k) {
+    x = (M * x + drive).eval();
+    peak = std::max(peak, output.dot(x.head(n)) / final_value);
+  }
+  return {std::max(0.0, peak - 1.0), final_value - 1.0};
+}
+
+Expected<void> check_factors(const std::vector<double>& factors, std::string_view name) {
+  if (factors.empty()) {
+    return tl::unexpected(Error(ArgumentError::empty)
+                              .in(std::string(where))
+                              .about(std::string(name))
+                              .got("empty")
+                              .expected("at least one factor"));
+  }
+  for (std::size_t i = 0; i < factors.size(); ++i) {
+    if (auto checked = check_positive(factors[i], where, fmt::format("{} factor {}", name, i));
+        !checked) {
+      return checked;
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Expected<RobustnessGrid> robustness_grid(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
+                                         const DiscreteSystem<>& model, const MatrixRef& K,
+                                         const MatrixRef& K_e, Time delay,
+                                         const RobustnessOptions& options) {
+  if (auto checked = observer_regulator_loop(A, B, C, model, K, K_e, delay); !checked) {
+    return tl::unexpected(Error(std::move(checked.error()).in(std::string(where))));
+  }
+  if (auto checked = check_factors(options.inertia, "inertia"); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  if (auto checked = check_factors(options.gain, "gain"); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  auto B_pinv = pseudo_inverse(model.B);
+  if (!B_pinv) {
+    return tl::unexpected(B_pinv.error());
+  }
+  const Eigen::Index n = model.A.rows();
+  const Eigen::MatrixXd F = K + *B_pinv * (Eigen::MatrixXd::Identity(n, n) - model.A);
+
+  RobustnessGrid grid;
+  grid.all_stable = true;
+  for (const double inertia : options.inertia) {
+    for (const double gain : options.gain) {
+      Eigen::MatrixXd true_A = A;
+      Eigen::MatrixXd true_B = B * gain;
+      true_A.bottomRows(1) /= inertia;
+      true_B.bottomRows(1) /= inertia;
+      auto loop = observer_regulator_loop(true_A, true_B, C, model, K, K_e, delay);
+      if (!loop) {
+        return tl::unexpected(loop.error());
+      }
+      auto sampled = detail::SampledLoop::create(*loop);
+      if (!sampled) {
+        return tl::unexpected(sampled.error());
+      }
+      RobustnessCase result{.inertia = inertia, .gain = gain};
+      result.spectral_radius = detail::spectral_radius(sampled->closed(1.0));
+      result.stable = result.spectral_radius < 1.0;
+      if (result.stable) {
+        const StepResponse step =
+            step_response(*sampled, C, model, F(0, 0), result.spectral_radius);
+        result.overshoot = step.overshoot;
+        result.steady_error = step.steady_error;
+      } else {
+        result.overshoot = std::numeric_limits<double>::infinity();
+        result.steady_error = std::numeric_limits<double>::infinity();
+      }
+      grid.all_stable = grid.all_stable && result.stable;
+      grid.worst_overshoot = std::max(grid.worst_overshoot, result.overshoot);
+      grid.cases.push_back(result);
+    }
+  }
+  return grid;
+}
+
+}  // namespace flyball

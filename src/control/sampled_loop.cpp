@@ -1,0 +1,195 @@
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include <flyball/systems/input_delay.hpp>
+
+#include "control/sampled_loop.hpp"
+
+namespace flyball {
+
+namespace detail {
+
+double spectral_radius(const Eigen::MatrixXd& M) {
+  return M.size() == 0 ? 0.0 : M.eigenvalues().cwiseAbs().maxCoeff();
+}
+
+Expected<void> check_loop(const PlantInputLoop& loop, std::string_view where) {
+  if (auto square = check_square(loop.A, where, "A"); !square) {
+    return square;
+  }
+  const Eigen::Index n = loop.A.rows();
+  const Eigen::Index p = loop.C.rows();
+  const Eigen::Index q = loop.A_c.rows();
+  if (auto checked = check_all(check_shape(loop.B, n, 1, where, "B", "states x 1"),
+                               check_shape(loop.C, p, n, where, "C", "outputs x states"),
+                               check_shape(loop.A_c, q, q, where, "A_c"),
+                               check_shape(loop.B_c, q, p, where, "B_c"),
+                               check_shape(loop.C_c, 1, q, where, "C_c"),
+                               check_shape(loop.D_c, 1, p, where, "D_c", "1 x outputs"));
+      !checked) {
+    return checked;
+  }
+  return check_all(check_finite(loop.A, where, "A"), check_finite(loop.B, where, "B"),
+                   check_finite(loop.C, where, "C"), check_finite(loop.A_c, where, "A_c"),
+                   check_finite(loop.B_c, where, "B_c"), check_finite(loop.C_c, where, "C_c"),
+                   check_finite(loop.D_c, where, "D_c"),
+                   check_positive(loop.period.si(), where, "period", "s"),
+                   check_not_negative(loop.delay.si(), where, "delay", "s"));
+}
+
+Expected<SampledLoop> SampledLoop::create(const PlantInputLoop& loop, Time further_delay) {
+  const Time delay(loop.delay.si() + further_delay.si());
+  auto parts = discretize_delayed_input(loop.A, loop.B, loop.period, delay);
+  if (!parts) {
+    return tl::unexpected(parts.error());
+  }
+  const Eigen::Index p = loop.C.rows();
+  const ContinuousSystem<> plant{loop.A, loop.B, loop.C, Eigen::MatrixXd::Zero(p, 1)};
+  auto delayed = discretize_with_input_delay(plant, loop.period, delay);
+  if (!delayed) {
+    return tl::unexpected(delayed.error());
+  }
+  SampledLoop sampled;
+  sampled.A_ = std::move(parts->A);
+  sampled.B_0_ = std::move(parts->B_0);
+  sampled.B_1_ = std::move(parts->B_1);
+  sampled.C_ = loop.C;
+  sampled.whole_delays_ = parts->whole_periods;
+  sampled.A_c_ = loop.A_c;
+  sampled.B_c_ = loop.B_c;
+  sampled.C_c_ = loop.C_c;
+  sampled.D_c_ = loop.D_c;
+  sampled.delayed_A_ = std::move(delayed->A);
+  sampled.delayed_B_ = std::move(delayed->B);
+  return sampled;
+}
+
+std::complex<double> SampledLoop::response(double theta) const {
+  using Complex = std::complex<double>;
+  // At the ends z is real, and so is L.
+  const bool nyquist = theta >= std::numbers::pi;
+  const Complex z = nyquist ? Complex(-1.0) : std::polar(1.0, theta);
+  const Complex delay = nyquist ? Complex(std::fmod(whole_delays_, 2.0) == 0.0 ? 1.0 : -1.0)
+                                : std::polar(1.0, -theta * whole_delays_);
+  const auto resolvent = [&](const Eigen::MatrixXd& M, const Eigen::MatrixXcd& right) {
+    Eigen::MatrixXcd zI_M = -M.cast<Complex>();
+    zI_M.diagonal().array() += z;
+    return Eigen::MatrixXcd(zI_M.partialPivLu().solve(right));
+  };
+  const Eigen::MatrixXcd u = B_0_.cast<Complex>() + B_1_.cast<Complex>() / z;
+  const Eigen::MatrixXcd y = C_.cast<Complex>() * resolvent(A_, u);
+  Complex v = (D_c_.cast<Complex>() * y)(0, 0);
+  if (A_c_.rows() > 0) {
+    v += (C_c_.cast<Complex>() * resolvent(A_c_, B_c_.cast<Complex>() * y))(0, 0);
+  }
+  return v * delay;
+}
+
+Eigen::MatrixXd SampledLoop::closed(double gain) const {
+  const Eigen::Index n = A_.rows();
+  const Eigen::Index n_delayed = delayed_A_.rows();
+  const Eigen::Index q = A_c_.rows();
+  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(n_delayed + q, n_delayed + q);
+  M.topLeftCorner(n_delayed, n_delayed) = delayed_A_;
+  M.topLeftCorner(n_delayed, n) -= gain * delayed_B_ * (D_c_ * C_);
+  M.topRightCorner(n_delayed, q) = -gain * delayed_B_ * C_c_;
+  M.bottomLeftCorner(q, n) = B_c_ * C_;
+  M.bottomRightCorner(q, q) = A_c_;
+  return M;
+}
+
+}  // namespace detail
+
+Expected<PlantInputLoop> state_feedback_loop(const MatrixRef& A, const MatrixRef& B,
+                                             const MatrixRef& K, Time period, Time delay) {
+  const Eigen::Index n = A.rows();
+  PlantInputLoop loop{A,
+                      B,
+                      Eigen::MatrixXd::Identity(n, n),
+                      period,
+                      delay,
+                      Eigen::MatrixXd(0, 0),
+                      Eigen::MatrixXd(0, n),
+                      Eigen::MatrixXd(1, 0),
+                      K};
+  constexpr std::string_view where = "state_feedback_loop";
+  if (auto shape = check_shape(K, 1, n, where, "K", "1 x states"); !shape) {
+    return tl::unexpected(shape.error());
+  }
+  return detail::check_loop(loop, where).map([&] { return std::move(loop); });
+}
+
+Expected<PlantInputLoop> observer_regulator_loop(const MatrixRef& A, const MatrixRef& B,
+                                                 const MatrixRef& C, const DiscreteSystem<>& model,
+                                                 const MatrixRef& K, const MatrixRef& K_e,
+                                                 Time delay) {
+  constexpr std::string_view where = "observer_regulator_loop";
+  if (auto checked = check_system(model, where); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  const Eigen::Index n = model.A.rows();
+  const Eigen::Index p = model.C.rows();
+  if (auto checked = check_all(check_shape(model.B, n, 1, where, "the model's B", "states x 1"),
+                               check_shape(C, p, A.rows(), where, "C", "outputs x states"),
+                               check_shape(K, 1, n, where, "K", "1 x states"),
+                               check_shape(K_e, n, p, where, "K_e", "states x outputs"));
+      !checked) {
+    return tl::unexpected(checked.error());
+  }
+  if (!model.D.isZero(0.0)) {
+    return tl::unexpected(
+        Error(ArgumentError::out_of_range)
+            .in(std::string(where))
+            .about("the model's D")
+            .got("not zero")
+            .expected("zero: a measurement that contains the input closes a second loop"));
+  }
+  // With the prediction q = x_hat⁻: x_hat = q + K_e (y - C q), u = -K x_hat, q⁺ = A x_hat + B u.
+  const Eigen::MatrixXd I_KC = Eigen::MatrixXd::Identity(n, n) - K_e * model.C;
+  const Eigen::MatrixXd A_BK = model.A - model.B * K;
+  PlantInputLoop loop{A, B, C, model.period, delay, A_BK * I_KC, A_BK * K_e, K * I_KC, K * K_e};
+  return detail::check_loop(loop, where).map([&] { return std::move(loop); });
+}
+
+Expected<double> closed_loop_radius(const PlantInputLoop& loop, double gain, Time further_delay) {
+  constexpr std::string_view where = "closed_loop_radius";
+  if (auto checked = detail::check_loop(loop, where); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  if (auto checked = check_all(check_finite(gain, where, "gain"),
+                               check_not_negative(further_delay.si(), where, "further_delay", "s"));
+      !checked) {
+    return tl::unexpected(checked.error());
+  }
+  return detail::SampledLoop::create(loop, further_delay)
+      .map([&](const detail::SampledLoop& sampled) {
+        return detail::spectral_radius(sampled.closed(gain));
+      });
+}
+
+Expected<std::complex<double>> loop_response(const PlantInputLoop& loop, double frequency) {
+  constexpr std::string_view where = "loop_response";
+  if (auto checked = detail::check_loop(loop, where); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  if (auto checked = check_not_negative(frequency, where, "frequency", "rad/s"); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  const double nyquist = std::numbers::pi / loop.period.si();
+  if (frequency > nyquist * (1.0 + 1e-12)) {
+    return tl::unexpected(
+        Error(ArgumentError::out_of_range)
+            .in(std::string(where))
+            .about("frequency")
+            .got(format_number(frequency) + " rad/s")
+            .expected("at most the Nyquist frequency, " + format_number(nyquist) + " rad/s"));
+  }
+  return detail::SampledLoop::create(loop).map([&](const detail::SampledLoop& sampled) {
+    return sampled.response(frequency * loop.period.si());
+  });
+}
+
+}  // namespace flyball

@@ -1,0 +1,164 @@
+#include <flyball/planning/trapezoid_profile.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include <flyball/core/random.hpp>
+
+#include "support/allocation_count.hpp"
+
+namespace flyball {
+namespace {
+
+// Rest to rest over 50 with v 7, a 3.5: 2 s up, 5.142857 s cruise, 2 s down.
+TEST(TrapezoidProfile, RestToRest) {
+  const TrapezoidProfile profile({7.0, 3.5}, {}, {50.0, 0.0});
+  EXPECT_NEAR(profile.total_time(), 9.142857142857142, 1e-14);
+  EXPECT_DOUBLE_EQ(profile.sample(1.0).position, 1.75);
+  EXPECT_DOUBLE_EQ(profile.sample(1.0).velocity, 3.5);
+  EXPECT_EQ(profile.sample(1.0).acceleration, 3.5);
+  EXPECT_NEAR(profile.sample(4.0).position, 7.0 + 14.0, 1e-13);
+  EXPECT_EQ(profile.sample(4.0).acceleration, 0.0);
+  EXPECT_NEAR(profile.sample(profile.total_time() - 1.0).position, 50.0 - 1.75, 1e-12);
+  EXPECT_EQ(profile.sample(100.0).position, 50.0);
+  EXPECT_EQ(profile.sample(100.0).velocity, 0.0);
+  EXPECT_EQ(profile.sample(-1.0).position, 0.0);
+}
+
+// Too short to reach 10: the peak is sqrt(a d) = 2, each side takes 1 s. Backwards is the mirror.
+TEST(TrapezoidProfile, TriangleBothWays) {
+  const TrapezoidProfile there({10.0, 2.0}, {1.0, 0.0}, {3.0, 0.0});
+  EXPECT_DOUBLE_EQ(there.total_time(), 2.0);
+  EXPECT_DOUBLE_EQ(there.cruise_velocity(), 2.0);
+  EXPECT_DOUBLE_EQ(there.sample(1.0).position, 2.0);
+  const TrapezoidProfile back({10.0, 2.0}, {3.0, 0.0}, {1.0, 0.0});
+  EXPECT_DOUBLE_EQ(back.total_time(), 2.0);
+  EXPECT_DOUBLE_EQ(back.cruise_velocity(), -2.0);
+  EXPECT_DOUBLE_EQ(back.sample(0.5).position, 2.75);
+}
+
+// At 4 with the limit 2 and a = 1: 2 s down to 2 covers 6; then 2 (t - 2); 2 s down covers 2.
+// 20 = 6 + 12 + 2, so 2 + 6 + 2 = 10 s.
+TEST(TrapezoidProfile, BrakesAnOverspeedStart) {
+  const TrapezoidProfile profile({2.0, 1.0}, {0.0, 4.0}, {20.0, 0.0});
+  EXPECT_DOUBLE_EQ(profile.total_time(), 10.0);
+  EXPECT_DOUBLE_EQ(profile.sample(1.0).velocity, 3.0);
+  EXPECT_DOUBLE_EQ(profile.sample(2.0).position, 6.0);
+  EXPECT_DOUBLE_EQ(profile.sample(5.0).velocity, 2.0);
+}
+
+// v_0 = 4, a = 2, goal 1: it stops at 4, beyond the goal, and comes back 3 with the peak
+// sqrt(2·3): 2 s + 2 sqrt(3/2) s.
+TEST(TrapezoidProfile, ComesBackWhenItCannotStopInTime) {
+  const TrapezoidProfile profile({10.0, 2.0}, {0.0, 4.0}, {1.0, 0.0});
+  EXPECT_NEAR(profile.total_time(), 2.0 + 2.0 * std::sqrt(1.5), 1e-14);
+  EXPECT_NEAR(profile.sample(2.0).position, 4.0, 1e-14);
+  EXPECT_NEAR(profile.sample(2.0).velocity, 0.0, 1e-14);
+}
+
+TEST(TrapezoidProfile, NothingToDo) {
+  const TrapezoidProfile profile({1.0, 1.0}, {2.0, 0.0}, {2.0, 0.0});
+  EXPECT_EQ(profile.total_time(), 0.0);
+  EXPECT_EQ(profile.sample(0.0).position, 2.0);
+  EXPECT_EQ(profile.sample(0.0).acceleration, 0.0);
+}
+
+// Any states: it starts and ends where it should, position is the integral of velocity, velocity
+// the integral of acceleration, and both limits hold (but for a start that breaks them).
+TEST(TrapezoidProfile, KeepsItsLaws) {
+  Random random(11);
+  for (int trial = 0; trial < 2000; ++trial) {
+    const MotionLimits limits{std::exp(random.uniform(-3.0, 3.0)),
+                              std::exp(random.uniform(-3.0, 3.0))};
+    const MotionState start{random.uniform(-10.0, 10.0), random.normal() * limits.velocity};
+    const MotionState goal{random.uniform(-10.0, 10.0),
+                           trial % 2 == 0 ? 0.0 : random.uniform(-1.0, 1.0) * limits.velocity};
+    const TrapezoidProfile profile(limits, start, goal);
+    const double end = profile.total_time();
+    ASSERT_TRUE(std::isfinite(end));
+    const double size = 1e-10 * (20.0 + end * (std::abs(start.velocity) + limits.velocity));
+    const MotionState last = profile.sample(end * (1.0 - 1e-15));
+    ASSERT_NEAR(last.position, goal.position, size);
+    ASSERT_NEAR(last.velocity, goal.velocity, 1e-9 * (limits.velocity + std::abs(start.velocity)));
+    const double speed_limit = std::max(limits.velocity, std::abs(start.velocity));
+    MotionState before = profile.sample(0.0);
+    ASSERT_EQ(before.position, start.position);
+    ASSERT_EQ(before.velocity, start.velocity);
+    constexpr int samples = 40;
+    for (int i = 1; i <= samples; ++i) {
+      const double h = end / samples;
+      const MotionState now = profile.sample(i * h);
+      ASSERT_LE(std::abs(now.velocity), speed_limit * (1.0 + 1e-12));
+      ASSERT_LE(std::abs(now.acceleration), limits.acceleration);
+      ASSERT_LE(std::abs(now.velocity - before.velocity),
+                limits.acceleration * h * (1.0 + 1e-9) + 1e-12);
+      // The mean of the end velocities is off by less than a h²/4 where a phase ends inside.
+      ASSERT_NEAR(now.position - before.position, 0.5 * h * (now.velocity + before.velocity),
+                  0.2501 * limits.acceleration * h * h + size);
+      before = now;
+    }
+  }
+}
+
+// A brute-force check of time optimality: no bang-bang-with-cruise motion of the other sign, and no
+// slower peak, arrives earlier. From rest, time falls with the peak, so the limit or the triangle
+// is best; the same with a moving start is compared with a grid of peaks.
+TEST(TrapezoidProfile, IsTheFastest) {
+  Random random(5);
+  for (int trial = 0; trial < 200; ++trial) {
+    const MotionLimits limits{random.uniform(0.5, 2.0), random.uniform(0.5, 2.0)};
+    const MotionState start{0.0, random.uniform(-1.0, 1.0) * limits.velocity};
+    const MotionState goal{random.uniform(-3.0, 3.0), 0.0};
+    const double best = TrapezoidProfile(limits, start, goal).total_time();
+    for (int i = -400; i <= 400; ++i) {
+      const double c = limits.velocity * i / 400.0;
+      const double t_1 = std::abs(c - start.velocity) / limits.acceleration;
+      const double t_3 = std::abs(c) / limits.acceleration;
+      const double rest = goal.position - 0.5 * (start.velocity + c) * t_1 - 0.5 * c * t_3;
+      if (c != 0.0 && rest / c >= 0.0) {
+        ASSERT_GE(t_1 + rest / c + t_3, best - 1e-9);
+      }
+    }
+  }
+}
+
+TEST(TrapezoidProfile, IsFiniteForAnything) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double values[] = {0.0, 1.0, -2.0, 1e-300, 1e300, -1e300, infinity, -infinity, nan};
+  for (const double v : values) {
+    for (const double a : values) {
+      for (const double x : values) {
+        for (const double w : values) {
+          const TrapezoidProfile profile({v, a}, {x, w}, {1.0, w});
+          ASSERT_TRUE(std::isfinite(profile.total_time()));
+          for (const double t : {0.0, 0.5, 1e10, infinity, nan, -1.0}) {
+            const MotionState state = profile.sample(t);
+            ASSERT_TRUE(std::isfinite(state.position) && std::isfinite(state.velocity) &&
+                        std::isfinite(state.acceleration));
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(TrapezoidProfile, AllocatesNothing) {
+  if (!test::counts_allocations()) {
+    GTEST_SKIP() << "a sanitizer has its own allocator";
+  }
+  const test::AllocationCounter counter;
+  double sum = 0.0;
+  for (int i = 0; i < 100; ++i) {
+    const TrapezoidProfile profile({1.0, 2.0}, {0.1 * i, 0.2}, {3.0, 0.0});
+    sum += profile.sample(0.5).position;
+  }
+  EXPECT_EQ(counter.count(), 0u);
+  EXPECT_TRUE(std::isfinite(sum));
+}
+
+}  // namespace
+}  // namespace flyball
