@@ -1,0 +1,60 @@
+#include <algorithm>
+
+#include "book/drawing.hpp"
+
+namespace flyball::book {
+
+namespace {
+
+const std::vector<double>* find_column(const FigureResult& figure, const std::string& name) {
+  const auto found = std::ranges::find(figure.columns, name, &TimeSeries::Column::name);
+  return found == figure.columns.end() ? nullptr : &found->values;
+}
+
+}  // namespace
+
+Plot response_plot(const FigureResult& figure, const std::vector<ResponsePanel>& panels) {
+  constexpr int reference_color = 1;
+  constexpr int state_color = 0;
+  Plot plot;
+  plot.title = figure.title;
+  plot.x_label = "Time (s)";
+  const std::vector<double>& time = figure.columns.front().values;
+  for (const ResponsePanel& panel : panels) {
+    PlotPanel drawn;
+    drawn.y_label = panel.y_label;
+    if (const auto* state = find_column(figure, panel.column)) {
+      drawn.lines.push_back({.label = panel.label, .x = time, .y = *state, .color = state_color});
+    }
+    // Above the state, where its dashes show even if the two agree.
+    if (const auto* reference = find_column(figure, "reference_" + panel.column)) {
+      drawn.lines.push_back({.label = panel.reference_label,
+                             .x = time,
+                             .y = *reference,
+                             .style = LineStyle::dashed,
+                             .color = reference_color});
+    }
+    plot.panels.push_back(std::move(drawn));
+  }
+  return plot;
+}
+
+Eigen::MatrixXd pulse_reference(double height, Eigen::Index states, Time period) {
+  const auto samples = static_cast<Eigen::Index>(10.2 / period.si() + 0.5);
+  Eigen::MatrixXd r = Eigen::MatrixXd::Zero(states, samples);
+  for (Eigen::Index k = 0; k < samples; ++k) {
+    const double t = static_cast<double>(k) * period.si();
+    r(0, k) = t >= 0.1 && t < 5.1 ? height : 0.0;
+  }
+  return r;
+}
+
+Eigen::MatrixXd profile_reference(const TimeSeries& profile) {
+  const auto samples = static_cast<Eigen::Index>(profile.rows());
+  Eigen::MatrixXd r(2, samples);
+  r.row(0) = Eigen::RowVectorXd::Map(profile.find("position")->data(), samples);
+  r.row(1) = Eigen::RowVectorXd::Map(profile.find("velocity")->data(), samples);
+  return r;
+}
+
+}  // namespace flyball::book

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <flyball/core/quantity.hpp>
+
+#include "book/figures.hpp"
+
+/// What the figures share, so that each file holds the control engineering and nothing else.
+namespace flyball::book {
+
+/// The entries of a vector or a row.
+template <class Derived>
+[[nodiscard]] std::vector<double> values(const Eigen::MatrixBase<Derived>& row) {
+  std::vector<double> entries;
+  entries.reserve(static_cast<std::size_t>(row.size()));
+  for (Eigen::Index i = 0; i < row.size(); ++i) {
+    entries.push_back(row(i));
+  }
+  return entries;
+}
+
+/// One of the panels of a closed loop's response: the column "reference_<column>" dashed, if there
+/// is one, and <column> solid.
+struct ResponsePanel {
+  std::string y_label;  ///< With its unit: "Position (m)".
+  std::string column;
+  std::string label = "State";
+  std::string reference_label = "Reference";
+};
+
+/// Panels above each other over the first column, time.
+[[nodiscard]] Plot response_plot(const FigureResult& figure,
+                                 const std::vector<ResponsePanel>& panels);
+
+/// The reference of the book's step responses: `height` for 0.1 s <= t < 5.1 s, otherwise 0, until
+/// 10.2 s. One column a sample; the first state gets it, the others stay 0.
+[[nodiscard]] Eigen::MatrixXd pulse_reference(double height, Eigen::Index states, Time period);
+
+/// The references of a position and its velocity along a profile, one column a sample.
+[[nodiscard]] Eigen::MatrixXd profile_reference(const TimeSeries& profile);
+
+}  // namespace flyball::book

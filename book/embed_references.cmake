@@ -1,0 +1,30 @@
+# cmake -D OUTPUT=<file.cpp> -D REFERENCES=<a.json|b.json…> -P embed_references.cmake
+#
+# Puts the reference files into a source, so that the library finds them wherever it runs.
+string(REPLACE "|" ";" REFERENCES "${REFERENCES}")
+set(literals "")
+foreach(file IN LISTS REFERENCES)
+  file(READ "${file}" json)
+  string(APPEND literals "    R\"reference(${json})reference\",\n")
+endforeach()
+file(
+  WRITE "${OUTPUT}"
+  "#include <array>
+
+#include \"book/reference.hpp\"
+
+namespace flyball::book {
+
+namespace {
+
+constexpr auto references = std::to_array<std::string_view>({
+${literals}});
+
+}  // namespace
+
+std::span<const std::string_view> embedded_references() {
+  return references;
+}
+
+}  // namespace flyball::book
+")

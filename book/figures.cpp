@@ -1,0 +1,142 @@
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <filesystem>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include <flyball/core/text.hpp>
+#include <flyball/io/file.hpp>
+
+#include "book/figure_functions.hpp"
+#include "book/figures.hpp"
+
+namespace flyball::book {
+
+namespace {
+
+/// A figure function's refusal as the error that it is.
+template <FigureResult (*figure)()>
+Expected<FigureResult> compute() {
+  try {
+    return figure();
+  } catch (const tl::bad_expected_access<Error>& refusal) {
+    return tl::unexpected(refusal.error());
+  }
+}
+
+constexpr std::array table{
+    FigureEntry{"2.3", "PD controller on an elevator", "2.2", compute<figure_2_3>},
+    FigureEntry{"6.3", "Elevator response", "6.9.4", compute<figure_6_3>},
+    FigureEntry{"6.5", "Flywheel response", "6.10.3", compute<figure_6_5>},
+    FigureEntry{"6.9", "Single-jointed arm response", "6.11.4", compute<figure_6_9>},
+    FigureEntry{"7.7", "Cost-to-go for elevator model", "7.7.2", compute<figure_7_7>},
+};
+
+/// "6.3" of "Figure 6.3", "fig. 6.3" or " 6.3 "; figures of the appendices begin with a capital.
+std::string bare_id(std::string_view text) {
+  std::string id;
+  for (const char c : text) {
+    if (std::isspace(static_cast<unsigned char>(c)) == 0) {
+      id += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    }
+  }
+  for (const std::string_view word : {"FIGURE", "FIG.", "FIG"}) {
+    if (id.starts_with(word)) {
+      return id.substr(word.size());
+    }
+  }
+  return id;
+}
+
+/// The figures whose numbers differ the least from one that is not there.
+std::string nearest_ids(std::string_view id) {
+  std::size_t least = std::numeric_limits<std::size_t>::max();
+  for (const FigureEntry& entry : table) {
+    least = std::min(least, edit_distance(id, entry.id));
+  }
+  std::string listed;
+  for (const FigureEntry& entry : table) {
+    if (edit_distance(id, entry.id) == least) {
+      listed += fmt::format("{}{}", listed.empty() ? "" : ", ", entry.id);
+    }
+  }
+  return listed;
+}
+
+}  // namespace
+
+std::span<const FigureEntry> figures() {
+  return table;
+}
+
+Expected<const FigureEntry*> find_figure(std::string_view id) {
+  const std::string wanted = bare_id(id);
+  const auto* found = std::ranges::find(table, wanted, &FigureEntry::id);
+  if (found != table.end()) {
+    return found;
+  }
+  return tl::unexpected(Error(ArgumentError::unknown_name)
+                            .in("book")
+                            .about("figure")
+                            .got(fmt::format("\"{}\"", id))
+                            .expected("a figure that is there")
+                            .hint(fmt::format("the nearest: {}; `flyball book --list` shows all",
+                                              nearest_ids(wanted))));
+}
+
+std::string to_csv(const FigureResult& figure) {
+  std::string text;
+  for (const TimeSeries::Column& column : figure.columns) {
+    text += fmt::format("{}{}", text.empty() ? "" : ",", column.name);
+    text += column.unit.empty() ? "" : fmt::format(" ({})", column.unit);
+  }
+  text += '\n';
+  const std::size_t rows = figure.columns.empty() ? 0 : figure.columns.front().values.size();
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (std::size_t i = 0; i < figure.columns.size(); ++i) {
+      text += fmt::format("{}{}", i == 0 ? "" : ",", figure.columns[i].values[row]);
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+std::string file_stem(const FigureResult& figure) {
+  std::string stem = "figure_" + figure.id;
+  std::ranges::replace(stem, '.', '_');
+  return stem;
+}
+
+Expected<std::vector<std::string>> write_figure(const FigureResult& figure,
+                                                const std::string& folder) {
+  const auto png = std::visit([](const auto& plot) { return render_png(plot); }, figure.picture);
+  const auto svg = std::visit([](const auto& plot) { return render_svg(plot); }, figure.picture);
+  for (const auto* picture : {&png, &svg}) {
+    if (!*picture) {
+      return tl::unexpected(picture->error());
+    }
+  }
+  std::error_code failure;
+  std::filesystem::create_directories(folder, failure);
+  if (failure) {
+    return tl::unexpected(Error(FileError::not_writable)
+                              .about(folder)
+                              .got(failure.message())
+                              .hint("choose another folder"));
+  }
+  const auto path = (std::filesystem::path(folder) / file_stem(figure)).string();
+  const std::array<std::pair<std::string, std::string>, 3> files{
+      {{path + ".png", *png}, {path + ".svg", *svg}, {path + ".csv", to_csv(figure)}}};
+  std::vector<std::string> written;
+  for (const auto& [name, contents] : files) {
+    if (auto done = write_file_atomically(name, contents); !done) {
+      return tl::unexpected(done.error());
+    }
+    written.push_back(name);
+  }
+  return written;
+}
+
+}  // namespace flyball::book
