@@ -90,7 +90,7 @@ Expected<std::string> gnuplot_script(const SurfacePlot& plot, PictureFormat form
   } else {
     fmt::format_to(out,
                    "set xlabel {} rotate parallel offset 0, -0.5\nset ylabel {} rotate parallel\n"
-                   "set zlabel {} rotate by 90 offset 1\nset view 58, 325, 1.0, 1.0\nset xyplane "
+                   "set zlabel {} rotate by 90 offset -3\nset view 58, 325, 1.0, 1.0\nset xyplane "
                    "relative 0.08\n"
                    "set border 15 lc rgb '#555555'\nset grid x y z lc rgb '#DDDDDD'\n"
                    "set pm3d depthorder border lc rgb '#40FFFFFF' lw 0.4\nunset colorbox\n"
