@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
 #include <flyball/core/random.hpp>

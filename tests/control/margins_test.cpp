@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 #include <flyball/control/lqr.hpp>

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 #include <flyball/core/random.hpp>
