@@ -1,0 +1,293 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "report/format.hpp"
+#include "report/sections.hpp"
+
+namespace flyball::report {
+
+namespace {
+
+using mechanisms::MechanismKind;
+using study::DesignResult;
+
+double degrees(double radians) {
+  return radians * 180.0 / std::numbers::pi;
+}
+
+std::string state_name(const DesignResult& result, Eigen::Index i) {
+  const auto at = static_cast<std::size_t>(i);
+  return at < result.states.size() ? result.states[at] : fmt::format("x{}", i + 1);
+}
+
+std::string input_unit(const DesignResult& result) {
+  return result.velocity_servo ? result.job.plant.unit + "/s" : "V";
+}
+
+void add_poles(Table& table, const std::string& which, const Eigen::VectorXcd& poles,
+               double period) {
+  for (Eigen::Index i = 0; i < poles.size(); ++i) {
+    const std::complex<double> pole = poles(i);
+    if (pole.imag() < 0.0 && i > 0 && std::abs(poles(i - 1) - std::conj(pole)) < 1e-9) {
+      continue;  // shown with its conjugate
+    }
+    const double radius = std::abs(pole);
+    const double settles = radius < 1.0 ? -period / std::log(radius) : INFINITY;
+    table.rows.push_back({which,
+                          complex_number(pole),
+                          {number(radius, 4), radius < 1.0 ? Tone::plain : Tone::bad},
+                          radius > 0.0 ? seconds(settles) : "0 ms"});
+  }
+}
+
+std::string entry(const std::vector<double>& values, Eigen::Index i) {
+  const auto at = static_cast<std::size_t>(i);
+  return at < values.size() ? number(values[at]) : "";
+}
+
+std::string matrix_entry(const Eigen::MatrixXd& M, Eigen::Index i, Eigen::Index j) {
+  return i < M.rows() && j < M.cols() ? number(M(i, j), 6) : "";
+}
+
+Tone tone_of_margin(double value, double good, double poor) {
+  return value >= good ? Tone::good : value >= poor ? Tone::caution : Tone::bad;
+}
+
+std::vector<double> distinct(const std::vector<study::RobustnessPoint>& points,
+                             double study::RobustnessPoint::* factor) {
+  std::vector<double> values;
+  for (const study::RobustnessPoint& point : points) {
+    if (std::find(values.begin(), values.end(), point.*factor) == values.end()) {
+      values.push_back(point.*factor);
+    }
+  }
+  std::sort(values.begin(), values.end());
+  return values;
+}
+
+Table robustness_table(const DesignResult& result) {
+  const std::vector<double> gains =
+      distinct(result.robustness, &study::RobustnessPoint::gain_factor);
+  Table table;
+  table.caption = "Overshoot of a small step if the mechanism is not as it was modelled:";
+  table.header = {"inertia"};
+  for (const double gain : gains) {
+    table.header.push_back("gain × " + number(gain));
+  }
+  for (const double inertia :
+       distinct(result.robustness, &study::RobustnessPoint::inertia_factor)) {
+    std::vector<Table::Cell> row{"× " + number(inertia)};
+    for (const double gain : gains) {
+      Table::Cell cell("");
+      for (const study::RobustnessPoint& point : result.robustness) {
+        if (point.inertia_factor == inertia && point.gain_factor == gain) {
+          cell = point.stable ? Table::Cell(percent(point.overshoot, 2))
+                              : Table::Cell("unstable", Tone::bad);
+        }
+      }
+      row.push_back(std::move(cell));
+    }
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+double largest(const TimeSeries& series, std::string_view column) {
+  double found = NAN;
+  if (const std::vector<double>* values = series.find(column)) {
+    for (const double value : *values) {
+      found = std::isnan(found) ? std::abs(value) : std::max(found, std::abs(value));
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+std::string measured_name(MechanismKind kind) {
+  return kind == MechanismKind::flywheel ? "velocity" : "position";
+}
+
+std::string controlled_unit(const study::PlantDescription& plant) {
+  return plant.kind == MechanismKind::flywheel ? plant.unit + "/s" : plant.unit;
+}
+
+Section plant_section(const DesignResult& result) {
+  const study::PlantDescription& plant = result.job.plant;
+  const std::string& unit = plant.unit;
+  Section section{"plant", "Plant", {}};
+  Facts facts;
+  facts.add("mechanism", std::string(to_string(plant.kind)));
+  if (plant.motor) {
+    const mechanisms::DcMotor& motor = *plant.motor;
+    facts.add("motor",
+              fmt::format("{} {}, R {} Ω, Kt {} N·m/A, Kv {} rad/s/V", motor.count, motor.name,
+                          number(motor.R), number(motor.Kt), number(motor.Kv)));
+    facts.add("gearing", number(plant.gearing) + " motor turns per output turn");
+  }
+  if (plant.drum_radius > 0.0) {
+    facts.add("drum radius", number(plant.drum_radius) + " m");
+  }
+  std::string gains =
+      fmt::format("kS {} V, kV {} V·s/{}", number(plant.gains.kS), number(plant.gains.kV), unit);
+  gains += plant.kA_determined
+               ? fmt::format(", kA {} V·s²/{}", number(plant.gains.kA), unit)
+               : fmt::format(", kA below {} V·s²/{}", number(plant.kA_upper_bound), unit);
+  if (plant.kind != MechanismKind::flywheel) {
+    gains += fmt::format(", kG {} V", number(plant.gains.kG));
+  }
+  if (plant.kind == MechanismKind::arm) {
+    gains += fmt::format(", angle offset {} rad", number(plant.gains.angle_offset));
+  }
+  facts.add("gains", gains);
+  facts.add("states", enumerate(result.states));
+  facts.add("input",
+            result.velocity_servo
+                ? fmt::format("velocity ({0}/s); the volts are kS sgn(u) + kV u{1} "
+                              "(Theorem 14.3.2)",
+                              unit, plant.kind == MechanismKind::flywheel ? "" : " + gravity")
+                : "voltage (V)");
+  facts.add("continuous", fmt::format("A = {}, B = {}", matrix(result.A_continuous),
+                                      matrix(result.B_continuous)));
+  facts.add("discrete",
+            fmt::format("A = {}, B = {}, C = {}, T = {}", matrix(result.A), matrix(result.B),
+                        matrix(result.C), seconds(result.job.controller.period)));
+  section.blocks.emplace_back(std::move(facts));
+  return section;
+}
+
+Section controller_section(const DesignResult& result) {
+  const study::ControllerOptions& controller = result.job.controller;
+  const study::PlantDescription& plant = result.job.plant;
+  const bool has_gravity = plant.kind != MechanismKind::flywheel;
+  const double delay = controller.delay.value_or(0.0);
+  Section section{"controller", "Controller", {}};
+  section.blocks.emplace_back(
+      Paragraph{fmt::format("Every {}: u = K (r − x̂) + B⁺ (r_next − A r){}, limited to ±{} V; x̂ is "
+                            "predicted by the plant and corrected by the measured {}.",
+                            seconds(controller.period),
+                            result.velocity_servo ? ", then volts = kV u + kS sgn + gravity"
+                            : has_gravity         ? " + kS sgn(v) + gravity"
+                                                  : " + kS sgn(v)",
+                            number(controller.max_voltage), measured_name(plant.kind))});
+  Table table;
+  const bool delayed = result.K_delayed.size() > 0 && delay > 0.0;
+  table.header = {"state", "tolerance", "K"};
+  if (delayed) {
+    table.header.emplace_back("K, delay " + seconds(delay));
+  }
+  table.header.emplace_back("B⁺");
+  table.header.emplace_back("Kalman gain");
+  table.header.emplace_back("model std");
+  for (Eigen::Index i = 0; i < result.A.rows(); ++i) {
+    std::vector<Table::Cell> row{state_name(result, i), entry(controller.state_tolerance, i),
+                                 matrix_entry(result.K, 0, i)};
+    if (delayed) {
+      row.emplace_back(matrix_entry(result.K_delayed, 0, i));
+    }
+    row.emplace_back(matrix_entry(result.inversion, 0, i));
+    row.emplace_back(matrix_entry(result.kalman_gain, i, 0));
+    row.emplace_back(entry(result.job.estimator.model_std, i));
+    table.rows.push_back(std::move(row));
+  }
+  section.blocks.emplace_back(std::move(table));
+
+  Facts facts;
+  facts.add("units", fmt::format("K and B⁺: {} per unit of the state; Kalman gain: unit of the "
+                                 "state per {}",
+                                 input_unit(result), controlled_unit(plant)));
+  if (delayed) {
+    facts.add("used", fmt::format("the gain for a state that is {} old (B.12)", seconds(delay)));
+  } else if (controller.delay) {
+    facts.add("delay", seconds(delay));
+  }
+  facts.add("input tolerance", number(controller.input_tolerance) + " V");
+  facts.add("weights",
+            fmt::format("Q = {}, R = {} (Bryson's rule)", matrix(result.Q), matrix(result.R)));
+  if (result.job.estimator.measurement_std) {
+    facts.add("measurement std", fmt::format("{} {}", number(*result.job.estimator.measurement_std),
+                                             controlled_unit(plant)));
+  }
+  section.blocks.emplace_back(std::move(facts));
+
+  Table poles;
+  poles.header = {"poles", "z", "|z|", "time constant"};
+  add_poles(poles, "closed loop", result.poles, controller.period);
+  add_poles(poles, "estimator", result.estimator_poles, controller.period);
+  section.blocks.emplace_back(std::move(poles));
+  return section;
+}
+
+Section robustness_section(const DesignResult& result) {
+  const study::LoopMargins& margins = result.margins;
+  Section section{"robustness", "Robustness", {}};
+  Facts facts;
+  facts.add(
+      "gain margin",
+      fmt::format("the gain may rise {} × ({} dB) and fall to {} ×", number(margins.gain_margin, 3),
+                  number(20.0 * std::log10(margins.gain_margin), 3),
+                  number(margins.gain_reduction, 3)),
+      tone_of_margin(margins.gain_margin, 2.0, 1.4));
+  std::string phase = number(degrees(margins.phase_margin), 3) + "°";
+  if (margins.crossover > 0.0) {
+    phase += fmt::format(" at {} rad/s ({} Hz)", number(margins.crossover, 3),
+                         number(margins.crossover / (2.0 * std::numbers::pi), 3));
+  }
+  facts.add("phase margin", phase, tone_of_margin(degrees(margins.phase_margin), 30.0, 20.0));
+  facts.add(
+      "delay margin",
+      fmt::format("{} more{}", seconds(margins.delay_margin),
+                  result.job.controller.delay ? fmt::format(", beyond the {} in the loop",
+                                                            seconds(*result.job.controller.delay))
+                                              : ""),
+      tone_of_margin(margins.delay_margin, result.job.controller.period,
+                     0.25 * result.job.controller.period));
+  facts.add("disk margin", number(margins.disk_margin, 3),
+            tone_of_margin(margins.disk_margin, 0.5, 0.3));
+  section.blocks.emplace_back(
+      Paragraph{"Of the loop opened at the plant input, with the delay in it:"});
+  section.blocks.emplace_back(std::move(facts));
+  if (!result.robustness.empty()) {
+    section.blocks.emplace_back(robustness_table(result));
+    section.blocks.emplace_back(
+        result.robust ? Paragraph{fmt::format("Stable in the whole grid, worst overshoot {}.",
+                                              percent(result.worst_overshoot, 2)),
+                                  Tone::good}
+                      : Paragraph{"Not stable in the whole grid.", Tone::bad});
+  }
+  return section;
+}
+
+Section motion_section(const DesignResult& result) {
+  const study::MotionLimits& motion = result.motion;
+  const study::PlantDescription& plant = result.job.plant;
+  const bool flywheel = plant.kind == MechanismKind::flywheel;
+  Section section{"motion", flywheel ? "Fastest ramp" : "Fastest trapezoid", {}};
+  Facts facts;
+  facts.add("velocity", fmt::format("{} {}/s", number(motion.max_velocity), plant.unit));
+  facts.add("acceleration", fmt::format("{} {}/s²", number(motion.max_acceleration), plant.unit));
+  facts.add("voltage reserve",
+            fmt::format("{} V of {} V kept back for feedback", number(motion.voltage_reserve),
+                        number(result.job.controller.max_voltage)));
+  facts.add("simulated", fmt::format("to {} {} in {}", number(motion.goal), controlled_unit(plant),
+                                     seconds(motion.duration)));
+  facts.add("tracking error",
+            fmt::format("{} {} RMS, {} {} at most", number(result.tracking_error_rms, 3),
+                        controlled_unit(plant), number(result.tracking_error_max, 3),
+                        controlled_unit(plant)));
+  const double voltage = largest(result.response, "motor_voltage");
+  if (!std::isnan(voltage)) {
+    facts.add("peak voltage", number(voltage, 3) + " V");
+  }
+  const double current = largest(result.response, "current");
+  if (!std::isnan(current) && current > 0.0) {
+    facts.add("peak current", number(current, 3) + " A of the battery");
+  }
+  section.blocks.emplace_back(std::move(facts));
+  return section;
+}
+
+}  // namespace flyball::report

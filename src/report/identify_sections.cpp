@@ -1,0 +1,277 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "report/format.hpp"
+#include "report/sections.hpp"
+
+namespace flyball::report {
+
+namespace {
+
+using identification::FeedforwardFit;
+using identification::FittedRun;
+using identification::GainEstimate;
+using identification::PreparedRun;
+using identification::TestKind;
+
+double largest_magnitude(const std::vector<double>& values) {
+  double largest = 0.0;
+  for (const double value : values) {
+    largest = std::max(largest, std::abs(value));
+  }
+  return largest;
+}
+
+double duration(const std::vector<double>& time) {
+  return time.empty() ? 0.0 : time.back() - time.front();
+}
+
+/// How often a channel has a new value, and in what steps.
+std::string channel_text(double refresh, double row_period, double quantum,
+                         const std::string& unit) {
+  std::string text = refresh > 0.0 ? "a new value every " + seconds(refresh) : "recorded";
+  if (row_period > 0.0 && refresh > 1.5 * row_period) {
+    text += fmt::format(" (repeated over {} rows)", number(std::round(refresh / row_period)));
+  }
+  return quantum > 0.0 ? fmt::format("{}, steps of {} {}", text, number(quantum, 3), unit) : text;
+}
+
+const FittedRun* fitted_run(const study::IdentifyResult& result, std::size_t source) {
+  if (!result.report.fit) {
+    return nullptr;
+  }
+  for (const FittedRun& run : result.report.fit->runs) {
+    if (run.source == source) {
+      return &run;
+    }
+  }
+  return nullptr;
+}
+
+Table runs_table(const study::IdentifyResult& result) {
+  const std::string rate = result.unit + "/s";
+  const std::vector<PreparedRun> shown = shown_runs(result);
+  Table table;
+  table.header = {"test",      "rows",        "time (s)",
+                  "used (s)",  "voltage (V)", "top speed (" + rate + ")",
+                  "in the fit"};
+  table.words = {0, 6};
+  constexpr std::array kinds{TestKind::quasistatic_forward, TestKind::quasistatic_reverse,
+                             TestKind::dynamic_forward, TestKind::dynamic_reverse};
+  for (const TestKind kind : kinds) {
+    bool found = false;
+    for (const PreparedRun& prepared : shown) {
+      if (prepared.run.kind != kind) {
+        continue;
+      }
+      found = true;
+      const FittedRun* fitted = fitted_run(result, prepared.source);
+      const bool used = fitted != nullptr && fitted->used;
+      const std::vector<double>& speed =
+          prepared.run.velocity.empty() ? prepared.smoothed_velocity : prepared.run.velocity;
+      Table::Cell state = used ? Table::Cell("yes", Tone::good) : Table::Cell("no", Tone::caution);
+      if (!prepared.moved) {
+        state = {"did not move", Tone::bad};
+      }
+      table.rows.push_back({std::string(to_string(kind)), fmt::to_string(prepared.run.time.size()),
+                            number(duration(prepared.run.time), 3),
+                            fitted != nullptr ? number(duration(fitted->time), 3) : "",
+                            number(largest_magnitude(prepared.run.voltage), 3),
+                            number(largest_magnitude(speed), 3), state});
+    }
+    if (!found) {
+      table.rows.push_back({std::string(to_string(kind)), "0", "", "", "", "",
+                            Table::Cell("missing", Tone::caution)});
+    }
+  }
+  return table;
+}
+
+std::string interval_text(const GainEstimate& gain) {
+  const double half = 0.5 * (gain.interval[1] - gain.interval[0]);
+  return fmt::format("{} to {}", in_digits_of(gain.interval[0], half),
+                     in_digits_of(gain.interval[1], half));
+}
+
+std::vector<Table::Cell> gain_row(const std::string& name, const GainEstimate& gain,
+                                  const std::string& unit, double one_step, bool has_one_step,
+                                  const std::string& meaning) {
+  std::vector<Table::Cell> row{name};
+  if (gain.determined) {
+    row.emplace_back(with_half_width(gain.value, 0.5 * (gain.interval[1] - gain.interval[0])));
+    row.emplace_back(interval_text(gain));
+  } else {
+    row.emplace_back("not determined", Tone::caution);
+    row.emplace_back("below " + number(gain.upper_bound, 3), Tone::caution);
+  }
+  row.emplace_back(unit);
+  row.emplace_back(has_one_step ? number(one_step, 4) : "", Tone::quiet);
+  row.emplace_back(meaning);
+  return row;
+}
+
+Table gains_table(const FeedforwardFit& fit) {
+  const std::string speed = fit.unit + "/s";
+  Table table;
+  table.header = {"gain", "value", "95 % interval", "unit", "one-step", "volts it takes to"};
+  table.words = {0, 3, 5};
+  const bool has = fit.one_step.has_value();
+  const auto one = fit.one_step.value_or(identification::OneStepFit{});
+  table.rows.push_back(gain_row("kS", fit.kS, "V", one.kS, has, "overcome friction"));
+  table.rows.push_back(
+      gain_row("kV", fit.kV, "V·s/" + fit.unit, one.kV, has, "hold a speed of 1 " + speed));
+  table.rows.push_back(
+      gain_row("kA", fit.kA, "V·s²/" + fit.unit, one.kA, has, "speed up by 1 " + speed + "²"));
+  if (fit.kG) {
+    const bool arm = fit.mechanism == mechanisms::MechanismKind::arm;
+    table.rows.push_back(
+        gain_row("kG", *fit.kG, "V", one.kG, has, arm ? "hold the arm level" : "hold it up"));
+  }
+  if (fit.angle_offset) {
+    table.rows.push_back(gain_row("offset", *fit.angle_offset, "rad", one.angle_offset, has,
+                                  "(true angle − measured)"));
+  }
+  return table;
+}
+
+}  // namespace
+
+std::vector<PreparedRun> shown_runs(const study::IdentifyResult& result) {
+  std::vector<PreparedRun> runs = result.report.prepared.runs;
+  if (runs.empty()) {
+    for (const identification::TestRun& run : result.source.recording.runs) {
+      PreparedRun shown;
+      shown.run = run;
+      shown.source = runs.size();
+      shown.moved = true;  // not looked at
+      runs.push_back(std::move(shown));
+    }
+  }
+  return runs;
+}
+
+std::string capitalized(mechanisms::MechanismKind kind) {
+  std::string name(to_string(kind));
+  if (!name.empty() && name.front() >= 'a' && name.front() <= 'z') {
+    name.front() = static_cast<char>(name.front() - 'a' + 'A');
+  }
+  return name;
+}
+
+Section data_section(const study::IdentifyResult& result) {
+  const identification::PreparedRecording& data = result.report.prepared;
+  const std::string rate = result.unit + "/s";
+  Section section{"data", "Data", {}};
+  Facts facts;
+  facts.add("log",
+            result.source.path +
+                (result.source.format.empty() ? "" : fmt::format(" ({})", result.source.format)));
+  facts.add(
+      "mechanism",
+      fmt::format("{}{}, position in {}", to_string(result.mechanism),
+                  result.source.subject.empty() ? "" : fmt::format(" “{}”", result.source.subject),
+                  result.unit));
+  std::size_t rows = 0;
+  const std::vector<PreparedRun> runs = shown_runs(result);
+  for (const PreparedRun& run : runs) {
+    rows += run.run.time.size();
+  }
+  std::string size = count(runs.size(), "run") + ", " + count(rows, "row");
+  if (data.row_period > 0.0) {
+    size += ", one every " + seconds(data.row_period);
+  }
+  facts.add("size", size);
+  if (data.has_position) {
+    facts.add("position", channel_text(data.position_refresh_period, data.row_period,
+                                       data.position_quantum, result.unit));
+  } else if (!data.runs.empty()) {
+    facts.add("position", "not recorded", Tone::caution);
+  }
+  if (data.has_velocity) {
+    facts.add("velocity", channel_text(data.velocity_refresh_period, data.row_period,
+                                       data.velocity_quantum, rate));
+  } else if (!data.runs.empty()) {
+    facts.add("velocity", "not recorded; derived from the position", Tone::caution);
+  }
+  if (!data.runs.empty()) {
+    facts.add("top speed", number(data.top_speed, 4) + " " + rate);
+  }
+  if (result.report.fit) {
+    const FeedforwardFit& fit = *result.report.fit;
+    if (data.has_position) {
+      facts.add("position delay", seconds(fit.position_delay));
+    }
+    facts.add("velocity delay",
+              fmt::format("{}, with half of its averaging over {}", seconds(fit.velocity_delay),
+                          seconds(fit.averaging_width)));
+    if (data.has_position && data.has_velocity) {
+      facts.add("velocity scale",
+                fmt::format("{} of the position's derivative", number(fit.velocity_scale, 4)));
+    }
+    facts.add("noise",
+              data.has_position
+                  ? fmt::format("{} {} (velocity), {} {} (position)", number(fit.velocity_noise, 3),
+                                rate, number(fit.position_noise, 3), result.unit)
+                  : fmt::format("{} {} (velocity)", number(fit.velocity_noise, 3), rate));
+  }
+  section.blocks.emplace_back(std::move(facts));
+  section.blocks.emplace_back(runs_table(result));
+  return section;
+}
+
+Section gains_section(const study::IdentifyResult& result) {
+  Section section{"gains", "Gains", {}};
+  if (!result.report.fit) {
+    section.blocks.emplace_back(
+        Paragraph{"No gains: " + to_string(result.report.fit.error()) + ".", Tone::bad});
+    section.blocks.emplace_back(
+        Paragraph{"The log is shown as it is; record it again with the mend above.", Tone::plain});
+    return section;
+  }
+  const FeedforwardFit& fit = *result.report.fit;
+  section.blocks.emplace_back(gains_table(fit));
+  if (!fit.kA.determined) {
+    section.blocks.emplace_back(Paragraph{
+        fmt::format("kA is not determined, below {} V·s²/{} (95 %): {}. The design takes the "
+                    "velocity to follow the voltage at once (Theorem 14.3.2).",
+                    number(fit.kA.upper_bound, 3), fit.unit, fit.kA.reason),
+        Tone::caution});
+  }
+  const auto explain = [&](const char* name, const GainEstimate& gain) {
+    if (!gain.determined) {
+      section.blocks.emplace_back(
+          Paragraph{fmt::format("{} is not determined: {}.", name, gain.reason), Tone::caution});
+    }
+  };
+  explain("kS", fit.kS);
+  explain("kV", fit.kV);
+  if (fit.kG) {
+    explain("kG", *fit.kG);
+  }
+  if (fit.angle_offset) {
+    explain("The angle offset", *fit.angle_offset);
+  }
+  Facts quality;
+  quality.add("R²", fmt::format("{} of the velocity, simulated in free run from the recorded "
+                                "voltage",
+                                number(fit.r_squared, 4)));
+  quality.add("NRMSE",
+              fmt::format("{} of the velocity's standard deviation", percent(fit.velocity_nrmse)));
+  quality.add("fit", fmt::format("output error, {} in {}", count(fit.residuals, "residual"),
+                                 count(static_cast<std::size_t>(std::max(0, fit.iterations)),
+                                       "iteration")));
+  if (fit.one_step) {
+    quality.add("one-step",
+                fmt::format("the regression of x(k+1) on x(k) and u(k), R² {} with T = {}; noise "
+                            "and repeated rows bias it: shown for comparison, not used",
+                            number(fit.one_step->r_squared, 4), seconds(fit.one_step->period)),
+                Tone::quiet);
+  }
+  section.blocks.emplace_back(std::move(quality));
+  return section;
+}
+
+}  // namespace flyball::report
