@@ -1,0 +1,274 @@
+#include <fmt/format.h>
+
+#include <flyball/core/version.hpp>
+
+#include "report/format.hpp"
+#include "report/page_style.hpp"
+#include "report/render_html.hpp"
+#include "report/sections.hpp"
+
+namespace flyball::report {
+
+namespace {
+
+std::string_view class_of(Tone tone) {
+  switch (tone) {
+    case Tone::good:
+      return "good";
+    case Tone::caution:
+      return "caution";
+    case Tone::bad:
+      return "bad";
+    case Tone::quiet:
+      return "quiet";
+    case Tone::plain:
+      break;
+  }
+  return {};
+}
+
+std::string class_attribute(std::string_view first, Tone tone) {
+  const std::string_view second = class_of(tone);
+  if (first.empty() && second.empty()) {
+    return "";
+  }
+  return fmt::format(" class=\"{}{}{}\"", first, first.empty() || second.empty() ? "" : " ",
+                     second);
+}
+
+/// A mark that does not need colour to be told apart.
+std::string_view mark_of(Tone tone) {
+  switch (tone) {
+    case Tone::good:
+      return "✔ ";
+    case Tone::caution:
+      return "▲ ";
+    case Tone::bad:
+      return "✖ ";
+    case Tone::quiet:
+    case Tone::plain:
+      break;
+  }
+  return {};
+}
+
+std::string render(const Facts& facts) {
+  std::string out = "<table class=\"facts\"><tbody>\n";
+  for (const Facts::Fact& fact : facts.facts) {
+    out += fmt::format("<tr><th scope=\"row\" class=\"w\">{}</th><td{}>{}</td></tr>\n",
+                       escape_html(fact.name), class_attribute("w", fact.tone),
+                       escape_html(fact.value));
+  }
+  return out + "</tbody></table>\n";
+}
+
+std::string render(const Table& table) {
+  const auto words = [&](std::size_t column) { return table.is_words(column) ? "w" : ""; };
+  std::string out = "<div class=\"scroll\"><table>\n";
+  if (!table.caption.empty()) {
+    out += "<caption>" + escape_html(table.caption) + "</caption>\n";
+  }
+  out += "<thead><tr>";
+  for (std::size_t c = 0; c < table.header.size(); ++c) {
+    out += fmt::format("<th scope=\"col\"{}>{}</th>", class_attribute(words(c), Tone::plain),
+                       escape_html(table.header[c]));
+  }
+  out += "</tr></thead>\n<tbody>\n";
+  for (const auto& row : table.rows) {
+    out += "<tr>";
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      const std::string_view tag = c == 0 ? "th" : "td";
+      out += fmt::format("<{}{}{}>{}</{}>", tag, c == 0 ? " scope=\"row\"" : "",
+                         class_attribute(words(c), row[c].tone), escape_html(row[c].text), tag);
+    }
+    out += "</tr>\n";
+  }
+  return out + "</tbody></table></div>\n";
+}
+
+std::string render(const Paragraph& paragraph) {
+  return fmt::format("<p{}>{}{}</p>\n", class_attribute("", paragraph.tone),
+                     mark_of(paragraph.tone), escape_html(paragraph.text));
+}
+
+std::string render(const Findings& findings) {
+  std::string out = "<ul class=\"findings\">\n";
+  for (const Diagnostic& diagnostic : findings.diagnostics) {
+    const Tone tone = diagnostic.severity == Severity::info      ? Tone::quiet
+                      : diagnostic.severity == Severity::warning ? Tone::caution
+                                                                 : Tone::bad;
+    out += fmt::format("<li><span{}>{}</span> {} <code class=\"quiet\">{}</code></li>\n",
+                       class_attribute("badge", tone), to_string(diagnostic.severity),
+                       escape_html(diagnostic.message), escape_html(diagnostic.code));
+  }
+  return out + "</ul>\n";
+}
+
+std::string render(const Code& code) {
+  return fmt::format("<details><summary>{}</summary><pre><code>{}</code></pre></details>\n",
+                     escape_html(code.title), escape_html(code.text));
+}
+
+/// The <svg> element without what may stand before it in a file.
+std::string_view svg_element(std::string_view svg) {
+  const std::size_t at = svg.find("<svg");
+  return at == std::string_view::npos ? std::string_view() : svg.substr(at);
+}
+
+/// Identifiers inside a picture are made its own: a page must not hold one twice.
+std::string with_own_ids(std::string_view svg, std::size_t number) {
+  const std::string prefix = fmt::format("p{}-", number);
+  std::string out;
+  out.reserve(svg.size() + svg.size() / 16);
+  std::size_t at = 0;
+  while (at < svg.size()) {
+    std::size_t end = std::string_view::npos;
+    std::size_t length = 0;
+    for (const std::string_view key : {" id=\"", " id='", "href=\"#", "href='#", "url(#"}) {
+      const std::size_t found = svg.find(key, at);
+      if (found < end) {
+        end = found;
+        length = key.size();
+      }
+    }
+    if (end == std::string_view::npos) {
+      break;
+    }
+    out += svg.substr(at, end + length - at);
+    out += prefix;
+    at = end + length;
+  }
+  out += svg.substr(at);
+  return out;
+}
+
+std::string render(const RenderedFigure& rendered, std::size_t number) {
+  const Figure& figure = rendered.figure;
+  const std::string label = escape_html(figure.title + ". " + figure.description);
+  std::string out = "<figure>\n";
+  const std::string_view svg = svg_element(rendered.svg);
+  if (svg.empty()) {
+    out += fmt::format("<p class=\"caution\">▲ The picture “{}” could not be drawn: {}</p>\n",
+                       escape_html(figure.title), escape_html(rendered.problem));
+  } else {
+    out += fmt::format("<div class=\"picture\" role=\"img\" aria-label=\"{}\">\n{}</div>\n", label,
+                       with_own_ids(svg, number));
+  }
+  return out +
+         fmt::format("<figcaption>{}</figcaption>\n</figure>\n", escape_html(figure.description));
+}
+
+std::string heading(const Section& section) {
+  return fmt::format("<section id=\"{}\" aria-labelledby=\"h-{}\">\n<h2 id=\"h-{}\">{}</h2>\n",
+                     section.id, section.id, section.id, escape_html(section.title));
+}
+
+std::string origin_section(const Origins& origins, const Provenance& provenance) {
+  std::string out = heading({"origin", "How it was made", {}});
+  Facts facts;
+  facts.add("Flyball", std::string(version));
+  if (!provenance.command.empty()) {
+    facts.add("command", provenance.command);
+  }
+  for (const auto& [name, value] : origins) {
+    facts.add(name, value);
+  }
+  out += render(facts);
+  if (!provenance.files.empty()) {
+    out += "<p>Beside this page:</p>\n<ul>\n";
+    for (const std::string& file : provenance.files) {
+      out += fmt::format("<li><a href=\"{0}\">{0}</a></li>\n", escape_html(file));
+    }
+    out += "</ul>\n";
+  }
+  return out + "</section>\n";
+}
+
+Origins origins_of(const study::IdentifyResult& result) {
+  return {{"log", result.source.path}};
+}
+
+Origins origins_of(const study::DesignResult& result) {
+  return {{"seed", fmt::to_string(result.job.seed)}};
+}
+
+Origins origins_of(const study::TuneResult& result) {
+  Origins origins = origins_of(result.identification);
+  if (result.design && *result.design) {
+    const Origins more = origins_of(**result.design);
+    origins.insert(origins.end(), more.begin(), more.end());
+  }
+  return origins;
+}
+
+}  // namespace
+
+std::string render_html(const Document& document, const std::vector<RenderedFigure>& figures,
+                        const Origins& origins, const Provenance& provenance) {
+  std::string out = fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<meta name=\"generator\" content=\"Flyball {}\">\n<title>{} – Flyball</title>\n"
+      "<style>{}</style>\n</head>\n<body>\n",
+      version, escape_html(document.title), page_style);
+  out += fmt::format("<header>\n<h1>{}</h1>\n", escape_html(document.title));
+  out += fmt::format("<div{}><strong>{}{}</strong>\n",
+                     class_attribute("verdict", document.verdict.tone),
+                     mark_of(document.verdict.tone), escape_html(document.verdict.line));
+  if (!document.verdict.reasons.empty()) {
+    out += "<ul>\n";
+    for (const std::string& reason : document.verdict.reasons) {
+      out += "<li>" + escape_html(reason) + "</li>\n";
+    }
+    out += "</ul>\n";
+  }
+  out += "</div>\n<nav aria-label=\"Sections\"><ul>\n";
+  for (const Section& section : document.sections) {
+    out += fmt::format("<li><a href=\"#{}\">{}</a></li>\n", section.id, escape_html(section.title));
+  }
+  out += "<li><a href=\"#origin\">How it was made</a></li>\n</ul></nav>\n</header>\n<main>\n";
+  std::size_t number = 0;
+  for (const Section& section : document.sections) {
+    out += heading(section);
+    for (const Block& block : section.blocks) {
+      out += std::visit([](const auto& b) { return render(b); }, block);
+    }
+    for (const RenderedFigure& figure : figures) {
+      if (figure.figure.section == section.id) {
+        out += render(figure, ++number);
+      }
+    }
+    out += "</section>\n";
+  }
+  out += origin_section(origins, provenance);
+  return out + "</main>\n</body>\n</html>\n";
+}
+
+std::string page_of(const study::IdentifyResult& result, const std::vector<RenderedFigure>& figures,
+                    const Provenance& provenance) {
+  return render_html(document_of(result), figures, origins_of(result), provenance);
+}
+
+std::string page_of(const study::DesignResult& result, const std::vector<RenderedFigure>& figures,
+                    const Provenance& provenance) {
+  return render_html(document_of(result), figures, origins_of(result), provenance);
+}
+
+std::string page_of(const study::TuneResult& result, const std::vector<RenderedFigure>& figures,
+                    const Provenance& provenance) {
+  return render_html(document_of(result), figures, origins_of(result), provenance);
+}
+
+std::string to_html(const study::IdentifyResult& result, const Provenance& provenance) {
+  return page_of(result, render(figures_of(result), false), provenance);
+}
+
+std::string to_html(const study::DesignResult& result, const Provenance& provenance) {
+  return page_of(result, render(figures_of(result), false), provenance);
+}
+
+std::string to_html(const study::TuneResult& result, const Provenance& provenance) {
+  return page_of(result, render(figures_of(result), false), provenance);
+}
+
+}  // namespace flyball::report
