@@ -1,0 +1,217 @@
+#include <flyball/report/terminal.hpp>
+
+#include <cmath>
+#include <regex>
+#include <sstream>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <flyball/study/schema.hpp>
+
+#include "fixtures.hpp"
+#include "report/format.hpp"
+
+namespace flyball::report {
+namespace {
+
+using Json = nlohmann::json;
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) {
+    lines.push_back(line);
+  }
+  return lines;
+}
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// Every number that stands in a text.
+std::vector<double> numbers_in(const std::string& text) {
+  std::vector<double> numbers;
+  const char* at = text.c_str();
+  while (*at != '\0') {
+    const bool begins = (*at >= '0' && *at <= '9') || (*at == '-' && at[1] >= '0' && at[1] <= '9');
+    if (!begins) {
+      ++at;
+      continue;
+    }
+    char* end = nullptr;
+    numbers.push_back(std::strtod(at, &end));
+    at = end;
+  }
+  return numbers;
+}
+
+/// Whether a value is shown to two digits, as it is or in ms, percent, degrees or decibels.
+bool shown(double value, const std::vector<double>& numbers) {
+  for (const double scale : {1.0, 1e3, 1e2, 180.0 / 3.141592653589793}) {
+    for (const double number : numbers) {
+      if (std::abs(number - scale * value) <= 6e-3 * std::abs(scale * value) + 1e-300) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+void expect_all_shown(const Json& json, const std::string& path,
+                      const std::vector<double>& numbers) {
+  if (json.is_number()) {
+    EXPECT_TRUE(shown(json.get<double>(), numbers)) << path << " = " << json;
+  } else if (json.is_structured()) {
+    for (const auto& [key, value] : json.items()) {
+      if (key != "standard_error") {  // shown as the interval
+        expect_all_shown(value, path + "/" + key, numbers);
+      }
+    }
+  }
+}
+
+TEST(Terminal, ShowsEveryNumberThatTheJsonHas) {
+  for (const MechanismKind kind :
+       {MechanismKind::flywheel, MechanismKind::elevator, MechanismKind::arm}) {
+    const study::TuneResult result = tune_result(kind);
+    const std::vector<double> numbers = numbers_in(to_terminal(result));
+    const Json json = Json::parse(study::to_json(result));
+    for (const char* pointer :
+         {"/identification/gains", "/identification/fit", "/identification/one_step_regression",
+          "/design/period", "/design/K", "/design/kalman_gain", "/design/feedforward",
+          "/design/margins", "/design/motion", "/design/plant", "/design/paste",
+          "/design/robustness/worst_overshoot", "/design/simulation/tracking_error_rms",
+          "/design/simulation/tracking_error_max", "/design/weights"}) {
+      ASSERT_TRUE(json.contains(Json::json_pointer(pointer))) << pointer;
+      expect_all_shown(json[Json::json_pointer(pointer)], pointer, numbers);
+    }
+    for (const Json& pole : json["/design/poles"_json_pointer]) {
+      EXPECT_TRUE(shown(pole[0].get<double>(), numbers)) << pole;
+      EXPECT_TRUE(shown(std::abs(pole[1].get<double>()), numbers)) << pole;
+    }
+  }
+}
+
+TEST(Terminal, IsWithinItsWidthAndAligned) {
+  for (const MechanismKind kind :
+       {MechanismKind::flywheel, MechanismKind::elevator, MechanismKind::arm}) {
+    for (const std::string& line : lines_of(to_terminal(tune_result(kind)))) {
+      // Code to paste keeps its lines.
+      EXPECT_TRUE(display_width(line) <= 100 || has(line, "//")) << line;
+    }
+  }
+}
+
+TEST(Terminal, WithoutColourThereIsNoEscape) {
+  const study::TuneResult result = tune_result(MechanismKind::elevator);
+  const std::string plain = to_terminal(result);
+  EXPECT_EQ(plain.find('\x1b'), std::string::npos);
+  const std::string colored = to_terminal(result, {.color = true});
+  EXPECT_NE(colored.find('\x1b'), std::string::npos);
+  std::string stripped;
+  for (std::size_t i = 0; i < colored.size(); ++i) {
+    if (colored[i] == '\x1b') {
+      i = colored.find('m', i);
+    } else {
+      stripped += colored[i];
+    }
+  }
+  EXPECT_EQ(stripped, plain);
+}
+
+TEST(Terminal, NoNaNIsPrintedAsANumber) {
+  study::TuneResult result = tune_result(MechanismKind::elevator);
+  study::DesignResult& design = **result.design;
+  design.margins.gain_margin = std::numeric_limits<double>::infinity();
+  design.margins.phase_margin = std::nan("");
+  design.robustness.front().stable = false;
+  design.robustness.front().overshoot = std::numeric_limits<double>::infinity();
+  design.robust = false;
+  result.identification.report.fit->one_step->kA = std::nan("");
+  const std::string text = to_terminal(result);
+  EXPECT_EQ(text.find("nan"), std::string::npos);
+  EXPECT_EQ(text.find("NaN"), std::string::npos);
+  EXPECT_FALSE(std::regex_search(text, std::regex("\\binf\\b")));
+  EXPECT_TRUE(has(text, "none"));
+  EXPECT_TRUE(has(text, "∞"));
+  EXPECT_TRUE(has(text, "unstable"));
+  EXPECT_TRUE(has(text, "Do not run this controller as it is."));
+}
+
+TEST(Terminal, SaysWhatALogDoesNotDetermine) {
+  const std::string text = to_terminal(tune_result(MechanismKind::elevator, false));
+  EXPECT_TRUE(has(text, "not determined"));
+  EXPECT_TRUE(has(text, "below 0.0371"));
+  EXPECT_TRUE(has(text, "the speed-up is over within two rows"));
+  EXPECT_TRUE(has(text, "14.3.2"));
+}
+
+TEST(Terminal, ARefusedLogIsToldWithItsReason) {
+  const study::IdentifyResult refused = refused_result();
+  ASSERT_FALSE(refused.report.fit);
+  const std::string text = to_terminal(refused);
+  EXPECT_TRUE(has(text, "No gains can be taken from this log."));
+  const std::string reason(refused.report.fit.error().info().summary);
+  EXPECT_TRUE(has(text, reason.substr(0, reason.find(' ')))) << text;
+  EXPECT_TRUE(has(to_terminal(study::TuneResult{refused, std::nullopt}),
+                  "No gains can be taken from this log."));
+}
+
+TEST(Terminal, DiagnosticsStandMostSevereFirstAndOnce) {
+  study::IdentifyResult result = identify_result(MechanismKind::flywheel);
+  result.source.diagnostics = {{"assumed", Severity::info, "first told"},
+                               {"truncated_log", Severity::warning, "then this"},
+                               {"assumed", Severity::info, "first told"},
+                               {"worst", Severity::error, "above all"}};
+  const std::string text = to_terminal(result);
+  EXPECT_LT(text.find("above all"), text.find("then this"));
+  EXPECT_LT(text.find("then this"), text.find("first told"));
+  EXPECT_EQ(text.find("first told"), text.rfind("first told"));
+  EXPECT_TRUE(has(text, "[truncated_log]"));
+}
+
+TEST(Terminal, TextOfALogCannotSteerTheTerminal) {
+  study::IdentifyResult result = identify_result(MechanismKind::flywheel);
+  result.source.subject = "\x1b]0;owned\x07 wheel";
+  const std::string text = to_terminal(result, {.color = false});
+  EXPECT_EQ(text.find('\x1b'), std::string::npos);
+  EXPECT_EQ(text.find('\x07'), std::string::npos);
+}
+
+TEST(Terminal, NamesTheReport) {
+  const study::DesignResult design = design_result(MechanismKind::arm);
+  EXPECT_TRUE(has(to_terminal(design, {}, "out/arm"), "out/arm/index.html"));
+  EXPECT_FALSE(has(to_terminal(design), "index.html"));
+}
+
+TEST(Motors, TableHasEveryMotorWithItsNumbers) {
+  std::vector<mechanisms::DcMotor> motors;
+  for (const mechanisms::MotorTableEntry& entry : mechanisms::motor_table()) {
+    motors.push_back(mechanisms::motor(entry.name).value());
+  }
+  const std::string text = motors_to_terminal(motors);
+  for (const mechanisms::MotorTableEntry& entry : mechanisms::motor_table()) {
+    bool found = false;
+    for (const std::string& line : lines_of(text)) {
+      if (line.rfind("  " + std::string(entry.name) + "  ", 0) == 0) {
+        found = true;
+        const std::vector<double> numbers = numbers_in(line.substr(2 + entry.name.size()));
+        EXPECT_TRUE(shown(entry.free_speed_rpm, numbers)) << line;
+        EXPECT_TRUE(shown(entry.stall_torque, numbers)) << line;
+        EXPECT_TRUE(shown(entry.nominal_voltage / entry.stall_current, numbers)) << line;
+        EXPECT_TRUE(shown(entry.stall_torque / entry.stall_current, numbers)) << line;
+      }
+    }
+    EXPECT_TRUE(found) << entry.name << "\n" << text;
+  }
+  EXPECT_TRUE(has(text, "Vex775Pro"));  // another name, not another way of writing it
+  EXPECT_FALSE(has(text, "NeoVortex"));
+  for (const std::string& line : lines_of(text)) {
+    EXPECT_LE(display_width(line), 100u) << line;
+  }
+}
+
+}  // namespace
+}  // namespace flyball::report
