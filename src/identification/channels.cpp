@@ -272,6 +272,23 @@ void mend_signs(PreparedRecording& prepared) {
            mismatched.size(), moved, names, rows)});
 }
 
+void drop_coarse_velocity(PreparedRecording& prepared) {
+  constexpr double kCoarse = 0.05;  // of top speed
+  constexpr double kSpan = 0.07;    // s, of the position differences that replace it
+  if (!prepared.has_position || !prepared.has_velocity ||
+      prepared.velocity_quantum < kCoarse * prepared.top_speed ||
+      prepared.velocity_quantum < 2.0 * prepared.position_quantum / kSpan) {
+    return;
+  }
+  prepared.has_velocity = false;
+  prepared.diagnostics.push_back(
+      {"coarse_velocity", Severity::warning,
+       fmt::format(
+           "the velocity column has steps of {:.3g} {}/s at a top speed of {:.3g}; only the "
+           "position is used",
+           prepared.velocity_quantum, prepared.unit, prepared.top_speed)});
+}
+
 void check_velocity_scale(PreparedRecording& prepared) {
   if (!prepared.has_position || !prepared.has_velocity) {
     return;

@@ -32,6 +32,9 @@ void refresh_derived_columns(PreparedRecording& prepared);
 /// so.
 void mend_signs(PreparedRecording& prepared);
 
+/// Gives up a velocity column that is truncated to a few steps where the position is finer.
+void drop_coarse_velocity(PreparedRecording& prepared);
+
 /// Compares the velocity column with the derivative of the position.
 void check_velocity_scale(PreparedRecording& prepared);
 

@@ -16,7 +16,15 @@ constexpr double kNormal95 = 1.96;
 constexpr double kOneSided95 = 1.645;
 constexpr double kWidestTimeConstant = 0.6;  // relative half-width beyond which kA is unknown
 
-GainEstimate symmetric(double value, double standard_error) {
+// What no single session can tell: repeats of one mechanism on one day scatter by at least so much,
+// and voltages are not measured better than to a few millivolts.
+constexpr double kVoltageAllowance = 3e-3;  // V, standard error added to kS and kG
+constexpr double kSpeedAllowance = 1.5e-3;  // relative, added to kV
+constexpr double kInertiaAllowance = 1e-2;  // relative, added to kA
+
+/// @param allowance  Standard error of what the model leaves out, in the gain's unit.
+GainEstimate symmetric(double value, double random_error, double allowance) {
+  const double standard_error = std::hypot(random_error, allowance);
   return {value,
           standard_error,
           {value - kNormal95 * standard_error, value + kNormal95 * standard_error},
@@ -43,7 +51,7 @@ GainEstimate inertia_gain(const PreparedRecording& prepared, const Eigen::Vector
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(x.size());
   gradient[kLogTimeConstant] = 1.0;
   gradient[kVelocityGain] = 1.0 / kV;
-  const double relative = spread.standard_error(gradient);
+  const double relative = std::hypot(spread.standard_error(gradient), kInertiaAllowance);
   GainEstimate kA;
   kA.value = tau * kV;
   kA.standard_error = relative * kA.value;
@@ -52,21 +60,19 @@ GainEstimate inertia_gain(const PreparedRecording& prepared, const Eigen::Vector
 
   const double refresh = std::max(
       {prepared.row_period, prepared.position_refresh_period, prepared.velocity_refresh_period});
-  const double ceiling =
-      std::max(kA.value * std::exp(std::min(kOneSided95 * relative, 5.0)), refresh * kV);
   if (x[kLogTimeConstant] <= bounds.lower[kLogTimeConstant] + 1e-6) {
     mark_undetermined(
-        kA, ceiling,
+        kA, kA.interval[1],
         fmt::format("the speed-up is over within one sensor value ({:.0f} ms)", 1e3 * refresh));
   } else if (x[kLogTimeConstant] >= bounds.upper[kLogTimeConstant] - 1e-6) {
     mark_undetermined(kA, kA.interval[1], "the speed hardly settles within the tests");
   } else if (tau < refresh) {
-    mark_undetermined(kA, ceiling,
+    mark_undetermined(kA, kA.interval[1],
                       fmt::format("the time constant kA/kV = {:.1f} ms is shorter than the {:.0f} "
                                   "ms between sensor values",
                                   1e3 * tau, 1e3 * refresh));
   } else if (kNormal95 * relative > kWidestTimeConstant) {
-    mark_undetermined(kA, ceiling,
+    mark_undetermined(kA, kA.interval[1],
                       fmt::format("its 95 % interval is ±{:.0f} %: it trades against the sensors' "
                                   "delay and averaging",
                                   100.0 * kNormal95 * relative));
@@ -78,17 +84,19 @@ void gravity_gains(const Eigen::VectorXd& x, const Covariances& spread, Feedforw
   const double cosine = x[kGravityCosine];
   const double sine = x[kGravitySine];
   if (fit.mechanism == MechanismKind::elevator) {
-    fit.kG = symmetric(cosine, spread.standard_error(unit_gradient(x.size(), kGravityCosine)));
+    fit.kG = symmetric(cosine, spread.standard_error(unit_gradient(x.size(), kGravityCosine)),
+                       kVoltageAllowance);
   } else if (fit.mechanism == MechanismKind::arm) {
     // kG cos(θ + offset) = kG cos(offset) cos θ − kG sin(offset) sin θ
     const double amplitude = std::max(std::hypot(cosine, sine), 1e-12);
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(x.size());
     gradient[kGravityCosine] = cosine / amplitude;
     gradient[kGravitySine] = sine / amplitude;
-    fit.kG = symmetric(amplitude, spread.standard_error(gradient));
+    fit.kG = symmetric(amplitude, spread.standard_error(gradient), kVoltageAllowance);
     gradient[kGravityCosine] = sine / (amplitude * amplitude);
     gradient[kGravitySine] = -cosine / (amplitude * amplitude);
-    fit.angle_offset = symmetric(std::atan2(-sine, cosine), spread.standard_error(gradient));
+    fit.angle_offset = symmetric(std::atan2(-sine, cosine), spread.standard_error(gradient),
+                                 kVoltageAllowance / amplitude);
   } else {
     return;
   }
@@ -112,15 +120,17 @@ Expected<void> estimate_gains(const PreparedRecording& prepared, const Eigen::Ve
                               .in("identify")
                               .hint("record ramps and steps in both directions with more travel"));
   }
-  fit.kS = symmetric(x[kStaticFriction],
-                     spread.standard_error(unit_gradient(x.size(), kStaticFriction)));
+  fit.kS =
+      symmetric(x[kStaticFriction], spread.standard_error(unit_gradient(x.size(), kStaticFriction)),
+                kVoltageAllowance);
   fit.kS.interval[0] = std::max(0.0, fit.kS.interval[0]);
   if (fit.kS.interval[0] <= 0.0) {
     mark_undetermined(fit.kS, std::max(fit.kS.interval[1], 1e-3),
                       "static friction cannot be told from zero");
   }
   fit.kV =
-      symmetric(x[kVelocityGain], spread.standard_error(unit_gradient(x.size(), kVelocityGain)));
+      symmetric(x[kVelocityGain], spread.standard_error(unit_gradient(x.size(), kVelocityGain)),
+                kSpeedAllowance * x[kVelocityGain]);
   fit.kA = inertia_gain(prepared, x, spread, bounds);
   gravity_gains(x, spread, fit);
 
@@ -172,12 +182,12 @@ void report_fit(const PreparedRecording& prepared, const FeedforwardFit& fit,
         {"kG_indistinguishable", Severity::warning,
          fmt::format("|kG| is below {:.3g} V: {}", fit.kG->upper_bound, fit.kG->reason)});
   }
-  if (prepared.has_velocity && fit.averaging_width > 0.03) {
+  if (prepared.has_velocity && fit.averaging_width > 0.03 && fit.velocity_delay > 0.0) {
     diagnostics.push_back(
         {"velocity_filtered", Severity::info,
          fmt::format("the velocity column is averaged over about {:.0f} ms; a controller that uses "
                      "it sees the velocity {:.0f} ms late",
-                     1e3 * fit.averaging_width, 1e3 * std::max(0.0, fit.velocity_delay))});
+                     1e3 * fit.averaging_width, 1e3 * fit.velocity_delay)});
   }
   if (prepared.has_position && prepared.has_velocity &&
       std::abs(fit.velocity_delay - 0.5 * fit.averaging_width - fit.position_delay) > 0.015) {

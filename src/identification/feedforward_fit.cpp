@@ -9,6 +9,7 @@
 
 #include <flyball/core/argument.hpp>
 
+#include "identification/cross_checks.hpp"
 #include "identification/estimates.hpp"
 #include "identification/output_error.hpp"
 #include "identification/robust_fit.hpp"
@@ -104,9 +105,9 @@ Bounds make_bounds(const OutputErrorProblem& problem, const StartGains& start,
   bounds.lower[kPositionDelay] = -0.04;
   bounds.upper[kPositionDelay] = options.max_delay;
   bounds.lower[kAveragingWidth] = 0.0;
-  bounds.upper[kAveragingWidth] = 0.15;
+  bounds.upper[kAveragingWidth] = 0.3;
   bounds.lower[kVelocityDelay] = -0.04;
-  bounds.upper[kVelocityDelay] = options.max_delay + 0.06;
+  bounds.upper[kVelocityDelay] = options.max_delay + 0.15;
   bounds.lower[kVelocityScale] = 0.3;
   bounds.upper[kVelocityScale] = 3.0;
   return bounds;
@@ -129,37 +130,39 @@ Eigen::VectorXd make_start(const OutputErrorProblem& problem, const StartGains& 
                           ? recording.velocity_scale
                           : 1.0;
   for (std::size_t i = 0; i < problem.runs().size(); ++i) {
-    const ResidualRun& run = problem.runs()[i];
-    const PreparedRun& prepared = recording.runs[run.prepared];
-    x[kSharedParameters + static_cast<Eigen::Index>(i)] =
-        run.starts_at_rest ? 0.0 : prepared.smoothed_velocity[prepared.first];
+    x[kSharedParameters + static_cast<Eigen::Index>(i)] = problem.runs()[i].likely_initial_velocity;
   }
   return x;
 }
 
-/// From several time constants a few iterations each, then the best one to convergence with scales
-/// and angles refreshed.
+/// A thinned problem decides between several time constants; the whole one is then solved with
+/// scales and angles refreshed.
 RobustFit fit_gains(OutputErrorProblem& problem, const StartGains& gains, const Bounds& bounds,
                     const FitOptions& options, ChannelScales& scales) {
   const std::vector<bool> free = problem.free_parameters();
   const double top = problem.recording().top_speed;
   scales = {problem.recording().has_position ? 0.02 * top * options.difference_span : 0.0,
             problem.recording().has_velocity ? 0.02 * top : 0.0};
+  const std::size_t thinning = std::clamp<std::size_t>(problem.residuals() / 600, 1, 8);
+  OutputErrorProblem thinned(problem.recording(), options, thinning);
+  OutputErrorProblem& scout = thinned.runs().size() == problem.runs().size() ? thinned : problem;
   RobustFit best;
   int iterations = 0;
   for (const double time_constant : {0.03, 0.15, 0.7}) {
-    RobustFit fit = minimize(problem, make_start(problem, gains, time_constant), free, bounds,
-                             scales, std::min(12, options.max_iterations / 8));
+    RobustFit fit = minimize(scout, make_start(problem, gains, time_constant), free, bounds, scales,
+                             std::min(15, options.max_iterations / 8), 1e-2);
     iterations += fit.iterations;
     if (best.x.size() == 0 || fit.cost < best.cost) {
       best = std::move(fit);
     }
   }
   for (int refresh = 0; refresh < kScaleRefreshes; ++refresh) {
+    const bool last = refresh + 1 == kScaleRefreshes;
     problem.set_angle_delay(best.x[kPositionDelay]);
     scales = residual_scales(problem, best.x);
     best = minimize(problem, best.x, free, bounds, scales,
-                    std::max(1, std::min(60, options.max_iterations - iterations)));
+                    std::max(1, std::min(last ? 60 : 20, options.max_iterations - iterations)),
+                    last ? 1e-3 : 0.1);
     iterations += best.iterations;
   }
   best.iterations = iterations;
@@ -272,6 +275,18 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
   if (auto one_step = fit_one_step(prepared)) {
     fit.one_step = *std::move(one_step);
   }
+  if (!fit.kA.determined) {
+    // A speed-up within one sensor value leaves no trace of its own that could bound it further.
+    const double refresh =
+        std::max(prepared.position_refresh_period, prepared.velocity_refresh_period);
+    fit.kA.upper_bound = std::max({fit.kA.value, refresh * fit.kV.value,
+                                   inertia_ceiling(problem, best, bounds, scales, spread)});
+    fit.kA.interval = {0.0, fit.kA.upper_bound};
+  } else {
+    compare_channels(problem, best, bounds, scales, diagnostics);
+  }
+  compare_repeats(fit, diagnostics);
+  detect_elasticity(prepared, fit, diagnostics);
   report_fit(prepared, fit, diagnostics);
   return fit;
 }

@@ -12,12 +12,23 @@ using mechanisms::MechanismKind;
 constexpr double kTail = 0.06;           // s, simulated beyond the window for negative delays
 constexpr double kLead = 0.1;            // s, compared before a step that starts from rest
 constexpr double kLongestSpan = 0.2;     // s, of a position difference
+constexpr double kCrowded = 0.018;       // s, differences closer than this add nothing on a ramp
 constexpr double kShortestWidth = 1e-3;  // s, below this an average is a sample
 
 SimulationVector simulation_parameters(const Eigen::VectorXd& x, std::size_t run) {
   return {x[kStaticFriction],  x[kVelocityGain],
           x[kLogTimeConstant], x[kGravityCosine],
           x[kGravitySine],     x[kSharedParameters + static_cast<Eigen::Index>(run)]};
+}
+
+/// Keeps one value of `thinning`.
+template <class Value>
+void thin(std::vector<Value>& values, std::size_t thinning) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < values.size(); i += thinning) {
+    values[kept++] = values[i];
+  }
+  values.resize(kept);
 }
 
 ResidualRun make_run(const PreparedRun& prepared, std::size_t index, const FitOptions& options,
@@ -27,6 +38,8 @@ ResidualRun make_run(const PreparedRun& prepared, std::size_t index, const FitOp
   run.prepared = index;
   run.ramp = is_quasistatic(source.kind);
   run.starts_at_rest = prepared.starts_at_rest;
+  run.likely_initial_velocity =
+      prepared.starts_at_rest ? 0.0 : prepared.smoothed_velocity[prepared.first];
   const double begin = source.time[prepared.first];
   run.window_end = source.time[prepared.last - 1];
   const std::size_t end = lower_index(source.time, run.window_end + kTail);
@@ -56,7 +69,10 @@ ResidualRun make_run(const PreparedRun& prepared, std::size_t index, const FitOp
         ++from;
       }
       const double span = source.time[to] - source.time[fresh[from]];
-      if (usable(fresh[from]) && source.time[fresh[from]] <= latest && span <= kLongestSpan) {
+      const bool crowded = run.ramp && !run.differences.empty() &&
+                           source.time[to] - source.time[run.differences.back().second] < kCrowded;
+      if (usable(fresh[from]) && source.time[fresh[from]] <= latest && span <= kLongestSpan &&
+          !crowded) {
         run.differences.emplace_back(fresh[from], to);
       }
     }
@@ -77,19 +93,25 @@ struct Averaged {
   double value;
   double by_delay;
   double by_width;
-  SimulationVector gradient{};
+  SimulationGradient gradient;
 };
 
-Averaged moving_average(const Response& response, double time, double width, bool gradient) {
+struct Hints {
+  std::size_t early = 0;
+  std::size_t late = 0;
+};
+
+Averaged moving_average(const Response& response, double time, double width, bool gradient,
+                        Hints& hints) {
   const double half = 0.5 * std::max(width, kShortestWidth);
-  const Response::Sample late = response.at(time + half, gradient);
-  const Response::Sample early = response.at(time - half, gradient);
-  Averaged average{};
+  const Response::Sample late = response.at(time + half, gradient, hints.late);
+  const Response::Sample early = response.at(time - half, gradient, hints.early);
+  Averaged average;
   average.value = (late.position - early.position) / (2.0 * half);
   average.by_delay = -(late.velocity - early.velocity) / (2.0 * half);
   average.by_width = (0.5 * (late.velocity + early.velocity) - average.value) / (2.0 * half);
-  for (std::size_t j = 0; gradient && j < average.gradient.size(); ++j) {
-    average.gradient[j] = (late.position_gradient[j] - early.position_gradient[j]) / (2.0 * half);
+  if (gradient) {
+    average.gradient = (late.position_gradient - early.position_gradient) / (2.0 * half);
   }
   return average;
 }
@@ -98,17 +120,15 @@ constexpr int kLocalInitialVelocity = kLocalParameters - 1;
 
 /// Simulation columns 0–4 are shared; the initial velocity is the last local column.
 template <class Row>
-void store_gradient(Row&& row, const SimulationVector& gradient, double factor) {
-  for (int j = 0; j < kInitialVelocity; ++j) {
-    row[j] = factor * gradient[static_cast<std::size_t>(j)];
-  }
+void store_gradient(Row&& row, const SimulationGradient& gradient, double factor) {
+  row.template head<kInitialVelocity>() = factor * gradient.template head<kInitialVelocity>();
   row[kLocalInitialVelocity] = factor * gradient[kInitialVelocity];
 }
 
 }  // namespace
 
 OutputErrorProblem::OutputErrorProblem(const PreparedRecording& recording,
-                                       const FitOptions& options)
+                                       const FitOptions& options, std::size_t thinning)
     : recording_(recording), mechanism_(*recording.mechanism) {
   for (std::size_t i = 0; i < recording.runs.size(); ++i) {
     const PreparedRun& prepared = recording.runs[i];
@@ -117,6 +137,8 @@ OutputErrorProblem::OutputErrorProblem(const PreparedRecording& recording,
     }
     ResidualRun run =
         make_run(prepared, i, options, recording.has_position, recording.has_velocity);
+    thin(run.differences, thinning);
+    thin(run.velocities, thinning);
     if (run.differences.size() + run.velocities.size() >= 5) {
       runs_.push_back(std::move(run));
     }
@@ -166,25 +188,25 @@ void OutputErrorProblem::evaluate(std::size_t index, const Eigen::VectorXd& x, b
     block.difference_jacobian.setZero(differences, kLocalParameters);
     block.velocity_jacobian.setZero(velocities, kLocalParameters);
   }
+  Hints hints;
   for (Eigen::Index row = 0; row < differences; ++row) {
     const auto [from, to] = run.differences[static_cast<std::size_t>(row)];
-    const Response::Sample early = response.at(source.time[from] - x[kPositionDelay], jacobian);
-    const Response::Sample late = response.at(source.time[to] - x[kPositionDelay], jacobian);
+    const Response::Sample early =
+        response.at(source.time[from] - x[kPositionDelay], jacobian, hints.early);
+    const Response::Sample late =
+        response.at(source.time[to] - x[kPositionDelay], jacobian, hints.late);
     block.difference[row] =
         (source.position[to] - source.position[from]) - (late.position - early.position);
     if (jacobian) {
-      SimulationVector gradient{};
-      for (std::size_t j = 0; j < gradient.size(); ++j) {
-        gradient[j] = late.position_gradient[j] - early.position_gradient[j];
-      }
-      store_gradient(block.difference_jacobian.row(row), gradient, -1.0);
+      store_gradient(block.difference_jacobian.row(row),
+                     late.position_gradient - early.position_gradient, -1.0);
       block.difference_jacobian(row, kPositionDelay) = late.velocity - early.velocity;
     }
   }
   for (Eigen::Index row = 0; row < velocities; ++row) {
     const std::size_t at = run.velocities[static_cast<std::size_t>(row)];
-    const Averaged average =
-        moving_average(response, source.time[at] - x[kVelocityDelay], x[kAveragingWidth], jacobian);
+    const Averaged average = moving_average(response, source.time[at] - x[kVelocityDelay],
+                                            x[kAveragingWidth], jacobian, hints);
     const double scale = x[kVelocityScale];
     block.velocity[row] = source.velocity[at] - scale * average.value;
     if (jacobian) {
@@ -198,13 +220,27 @@ void OutputErrorProblem::evaluate(std::size_t index, const Eigen::VectorXd& x, b
 
 double OutputErrorProblem::velocity_shown(std::size_t run, const Eigen::VectorXd& x,
                                           double time) const {
+  Hints hints;
   return x[kVelocityScale] *
-         moving_average(responses_[run], time - x[kVelocityDelay], x[kAveragingWidth], false).value;
+         moving_average(responses_[run], time - x[kVelocityDelay], x[kAveragingWidth], false, hints)
+             .value;
 }
 
 double OutputErrorProblem::position_shown(std::size_t run, const Eigen::VectorXd& x,
                                           double time) const {
-  return responses_[run].position_at(time - x[kPositionDelay]);
+  std::size_t hint = 0;
+  return responses_[run].at(time - x[kPositionDelay], false, hint).position;
+}
+
+double OutputErrorProblem::initial_velocity_information() const {
+  const double deviation = 0.1 * recording_.top_speed;
+  return 1.0 / (deviation * deviation);
+}
+
+double OutputErrorProblem::initial_velocity_deviation(const Eigen::VectorXd& x,
+                                                      Eigen::Index parameter) const {
+  const ResidualRun& run = runs_[static_cast<std::size_t>(parameter) - kSharedParameters];
+  return (x[parameter] - run.likely_initial_velocity) * std::sqrt(initial_velocity_information());
 }
 
 std::vector<bool> OutputErrorProblem::free_parameters() const {

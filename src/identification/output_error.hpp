@@ -32,6 +32,7 @@ struct ResidualRun {
   std::size_t prepared = 0;  ///< Index in PreparedRecording::runs.
   bool ramp = false;
   bool starts_at_rest = false;
+  double likely_initial_velocity = 0.0;
   double window_end = 0.0;
   RunInput input;
   /// Rows of the prepared run (from, to) whose position difference is compared.
@@ -52,7 +53,9 @@ struct ResidualBlock {
 
 class OutputErrorProblem {
  public:
-  OutputErrorProblem(const PreparedRecording& recording, const FitOptions& options);
+  /// @param thinning  Only one residual of so many is compared (to find a start quickly).
+  OutputErrorProblem(const PreparedRecording& recording, const FitOptions& options,
+                     std::size_t thinning = 1);
 
   [[nodiscard]] const std::vector<ResidualRun>& runs() const { return runs_; }
   [[nodiscard]] const PreparedRecording& recording() const { return recording_; }
@@ -71,6 +74,14 @@ class OutputErrorProblem {
   /// The velocity (as the column shows it) and the position at the given times of a run.
   [[nodiscard]] double velocity_shown(std::size_t run, const Eigen::VectorXd& x, double time) const;
   [[nodiscard]] double position_shown(std::size_t run, const Eigen::VectorXd& x, double time) const;
+
+  /// A weak prior: a run that starts in motion starts about as fast as its smoothed velocity says,
+  /// within a tenth of top speed (with a short time constant its data do not tell the start).
+  /// @param parameter  Index of the initial velocity in x. @return  In standard deviations.
+  [[nodiscard]] double initial_velocity_deviation(const Eigen::VectorXd& x,
+                                                  Eigen::Index parameter) const;
+  /// 1/(standard deviation of that prior)².
+  [[nodiscard]] double initial_velocity_information() const;
 
   /// Which parameters the data can move at all.
   [[nodiscard]] std::vector<bool> free_parameters() const;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <string>
 
@@ -57,6 +58,7 @@ struct RowDefects {
   std::size_t unsorted = 0;
   std::size_t same_time = 0;
   std::size_t outliers = 0;
+  std::size_t jumps = 0;
   std::size_t total = 0;
 };
 
@@ -132,6 +134,69 @@ void drop_outliers(TestRun& run, RowDefects& defects) {
   }
 }
 
+struct Segment {
+  std::size_t begin;
+  std::size_t end;
+};
+
+/// Stretches of the position without a jump that no mechanism makes: six times the usual fast step
+/// and a tenth of the range at once. Stale first values, wrapping encoders and glitches make them.
+std::vector<Segment> smooth_segments(const std::vector<double>& position, double& largest_step) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < position.size(); ++i) {
+    if (position[i] != position[i - 1]) {
+      steps.push_back(std::abs(position[i] - position[i - 1]));
+    }
+  }
+  const auto [low, high] = std::minmax_element(position.begin(), position.end());
+  largest_step = std::max(6.0 * quantile(steps, 0.95), 0.1 * (*high - *low));
+  std::vector<Segment> segments{{0, position.size()}};
+  for (std::size_t i = 1; i < position.size(); ++i) {
+    if (std::abs(position[i] - position[i - 1]) > largest_step) {
+      segments.back().end = i;
+      segments.push_back({i, position.size()});
+    }
+  }
+  return segments;
+}
+
+/// Keeps the longest stretch without jumps and what continues it on both sides.
+void drop_jumps(TestRun& run, RowDefects& defects) {
+  if (run.position.size() < 20) {
+    return;
+  }
+  double largest_step = 0.0;
+  const std::vector<Segment> segments = smooth_segments(run.position, largest_step);
+  if (segments.size() == 1) {
+    return;
+  }
+  const auto longest = std::max_element(
+      segments.begin(), segments.end(),
+      [](const Segment& a, const Segment& b) { return a.end - a.begin < b.end - b.begin; });
+  std::vector<Segment> kept{*longest};
+  for (auto segment = longest + 1; segment != segments.end(); ++segment) {
+    const double step = run.position[segment->begin] - run.position[kept.back().end - 1];
+    if (std::abs(step) <= largest_step) {
+      kept.push_back(*segment);
+    }
+  }
+  for (auto segment = longest; segment != segments.begin();) {
+    --segment;
+    const double step = run.position[kept.front().begin] - run.position[segment->end - 1];
+    if (std::abs(step) <= largest_step) {
+      kept.insert(kept.begin(), *segment);
+    }
+  }
+  std::vector<std::size_t> rows;
+  for (const Segment& segment : kept) {
+    for (std::size_t i = segment.begin; i < segment.end; ++i) {
+      rows.push_back(i);
+    }
+  }
+  defects.jumps += run.time.size() - rows.size();
+  keep_rows(run, rows);
+}
+
 void report_rows(const RowDefects& defects, std::vector<Diagnostic>& diagnostics) {
   const auto tell = [&](std::size_t count, std::string code, std::string_view what,
                         std::string_view done) {
@@ -146,6 +211,10 @@ void report_rows(const RowDefects& defects, std::vector<Diagnostic>& diagnostics
   tell(defects.same_time, "duplicate_times", "repeat the time of the row before",
        "the later one was kept");
   tell(defects.outliers, "outliers", "hold a value far outside the test's range",
+       "they were dropped");
+  tell(defects.jumps, "position_jumps",
+       "lie beyond a jump of the position that no mechanism makes (a stale first value, a wrapping "
+       "encoder or a glitch)",
        "they were dropped");
 }
 
@@ -208,6 +277,28 @@ void report_missing_tests(PreparedRecording& prepared) {
   }
 }
 
+/// An arm does not turn round and round: then the position is that of something else.
+void report_travel(PreparedRecording& prepared) {
+  if (prepared.mechanism != mechanisms::MechanismKind::arm || !prepared.has_position) {
+    return;
+  }
+  double travel = 0.0;
+  for (const PreparedRun& run : prepared.runs) {
+    const auto [low, high] = std::minmax_element(run.run.position.begin(), run.run.position.end());
+    travel = std::max(travel, *high - *low);
+  }
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  if (travel > kTurn) {
+    prepared.diagnostics.push_back(
+        {"travel_exceeds_turn", Severity::warning,
+         fmt::format(
+             "the arm's position spans {:.1f} rad ({:.1f} turns) in one test: it looks like "
+             "the motor's angle, not the arm's; gravity cannot be found and all gains are per "
+             "radian of that angle. Give the gearing to the encoder",
+             travel, travel / kTurn)});
+  }
+}
+
 }  // namespace
 
 Expected<PreparedRecording> prepare(const Recording& recording, const PreparationOptions& options) {
@@ -227,6 +318,7 @@ Expected<PreparedRecording> prepare(const Recording& recording, const Preparatio
     drop_not_finite(run.run, defects);
     sort_rows(run.run, defects);
     drop_outliers(run.run, defects);
+    drop_jumps(run.run, defects);
     if (run.run.time.size() >= 2) {
       prepared.runs.push_back(std::move(run));
     }
@@ -238,7 +330,9 @@ Expected<PreparedRecording> prepare(const Recording& recording, const Preparatio
   refresh_derived_columns(prepared);
   detect_motion(prepared);
   mend_signs(prepared);
+  drop_coarse_velocity(prepared);
   trim_runs(prepared, options);
+  report_travel(prepared);
   check_velocity_scale(prepared);
   report_repeats(prepared);
   return prepared;

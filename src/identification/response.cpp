@@ -2,19 +2,15 @@
 #include <cmath>
 
 #include "identification/response.hpp"
-#include "identification/statistics.hpp"
-
 namespace flyball::identification {
 namespace {
-
-using Gradient = Eigen::Matrix<double, 1, kSimulationParameters>;
 
 /// The state with its derivatives by the parameters.
 struct State {
   double velocity;
   double position;
-  Gradient velocity_gradient;
-  Gradient position_gradient;
+  SimulationGradient velocity_gradient;
+  SimulationGradient position_gradient;
 };
 
 struct Drive {
@@ -38,7 +34,7 @@ void slide(State& state, const Drive& drive, double sign, double duration,
     // ∂a/∂ln τ = a T/τ, ∂c/∂ln τ = c − a T.
     const double a_log = a * duration / tau;
     const double c_log = c - a * duration;
-    Gradient force = Gradient::Zero();
+    SimulationGradient force = SimulationGradient::Zero();
     force[kStaticFriction] = -sign;
     force[kGravityCosine] = -drive.cosine;
     force[kGravitySine] = -drive.sine;
@@ -100,7 +96,8 @@ void Response::simulate(const RunInput& input, const SimulationVector& parameter
     velocity_gradient_.resize(rows, kSimulationParameters);
     position_gradient_.resize(rows, kSimulationParameters);
   }
-  State state{parameters[kInitialVelocity], 0.0, Gradient::Zero(), Gradient::Zero()};
+  State state{parameters[kInitialVelocity], 0.0, SimulationGradient::Zero(),
+              SimulationGradient::Zero()};
   state.velocity_gradient[kInitialVelocity] = 1.0;
   for (Eigen::Index row = 0; row < rows; ++row) {
     velocity_[row] = state.velocity;
@@ -119,7 +116,7 @@ void Response::simulate(const RunInput& input, const SimulationVector& parameter
   }
 }
 
-Response::Sample Response::at(double time, bool gradient) const {
+Response::Sample Response::at(double time, bool gradient, std::size_t& hint) const {
   const std::vector<double>& knots = input_->time;
   Sample sample;
   if (time <= knots.front() || time >= knots.back()) {
@@ -127,16 +124,22 @@ Response::Sample Response::at(double time, bool gradient) const {
     const double beyond = time - knots[static_cast<std::size_t>(row)];
     sample.velocity = velocity_[row];
     sample.position = position_[row] + beyond * velocity_[row];
-    for (int j = 0; gradient && j < kSimulationParameters; ++j) {
-      sample.position_gradient[static_cast<std::size_t>(j)] =
-          position_gradient_(row, j) + beyond * velocity_gradient_(row, j);
+    if (gradient) {
+      sample.position_gradient = position_gradient_.row(row) + beyond * velocity_gradient_.row(row);
     }
     return sample;
   }
-  const std::size_t next = std::max<std::size_t>(1, lower_index(knots, time));
-  const auto k = static_cast<Eigen::Index>(next) - 1;
-  const double width = knots[next] - knots[next - 1];
-  const double s = (time - knots[next - 1]) / width;
+  // knots[hint] <= time < knots[hint + 1]; times are asked for nearly in order.
+  hint = std::min(hint, knots.size() - 2);
+  while (knots[hint] > time) {
+    --hint;
+  }
+  while (knots[hint + 1] <= time) {
+    ++hint;
+  }
+  const auto k = static_cast<Eigen::Index>(hint);
+  const double width = knots[hint + 1] - knots[hint];
+  const double s = (time - knots[hint]) / width;
   // Cubic Hermite basis of values (h00, h01) and slopes (h10, h11).
   const double h01 = s * s * (3.0 - 2.0 * s);
   const double h00 = 1.0 - h01;
@@ -145,10 +148,10 @@ Response::Sample Response::at(double time, bool gradient) const {
   sample.position =
       h00 * position_[k] + h10 * velocity_[k] + h01 * position_[k + 1] + h11 * velocity_[k + 1];
   sample.velocity = (1.0 - s) * velocity_[k] + s * velocity_[k + 1];
-  for (int j = 0; gradient && j < kSimulationParameters; ++j) {
-    sample.position_gradient[static_cast<std::size_t>(j)] =
-        h00 * position_gradient_(k, j) + h10 * velocity_gradient_(k, j) +
-        h01 * position_gradient_(k + 1, j) + h11 * velocity_gradient_(k + 1, j);
+  if (gradient) {
+    sample.position_gradient = h00 * position_gradient_.row(k) + h10 * velocity_gradient_.row(k) +
+                               h01 * position_gradient_.row(k + 1) +
+                               h11 * velocity_gradient_.row(k + 1);
   }
   return sample;
 }

@@ -20,6 +20,7 @@ enum SimulationParameter : int {
 };
 inline constexpr int kSimulationParameters = 6;
 using SimulationVector = std::array<double, kSimulationParameters>;
+using SimulationGradient = Eigen::Matrix<double, 1, kSimulationParameters>;
 
 /// What drives a run: everything is held from a row to the next.
 struct RunInput {
@@ -35,7 +36,7 @@ class Response {
   struct Sample {
     double position = 0.0;
     double velocity = 0.0;
-    SimulationVector position_gradient{};
+    SimulationGradient position_gradient;  ///< Only set if asked for.
   };
 
   /// Integrates kA v̇ = V − kS sgn(v) − kV v − gravity exactly from row to row: exponential pieces,
@@ -43,8 +44,8 @@ class Response {
   void simulate(const RunInput& input, const SimulationVector& parameters, bool sensitivities);
 
   /// Before the first row the velocity is the initial one, after the last row it stays.
-  [[nodiscard]] Sample at(double time, bool gradient) const;
-  [[nodiscard]] double position_at(double time) const { return at(time, false).position; }
+  /// @param hint  A row near `time`, to start the search from; it is moved to the row found.
+  [[nodiscard]] Sample at(double time, bool gradient, std::size_t& hint) const;
 
  private:
   using Gradients = Eigen::Matrix<double, Eigen::Dynamic, kSimulationParameters, Eigen::RowMajor>;

@@ -22,6 +22,10 @@ double weight(double z) {
   return 1.0 / std::sqrt(1.0 + ratio * ratio);
 }
 
+double square(double value) {
+  return value * value;
+}
+
 double inverse(double scale) {
   return scale > 0.0 ? 1.0 / scale : 0.0;
 }
@@ -38,6 +42,9 @@ double total_cost(OutputErrorProblem& problem, const Eigen::VectorXd& x,
     for (const double residual : block.velocity) {
       cost += loss(residual * inverse(scales.velocity));
     }
+  }
+  for (Eigen::Index i = kSharedParameters; i < x.size(); ++i) {
+    cost += square(problem.initial_velocity_deviation(x, i));
   }
   return cost;
 }
@@ -87,6 +94,13 @@ NormalEquations normal_equations(OutputErrorProblem& problem, const Eigen::Vecto
       }
     }
   }
+  const double information = problem.initial_velocity_information();
+  for (Eigen::Index i = kSharedParameters; i < n; ++i) {
+    const double deviation = problem.initial_velocity_deviation(x, i);
+    equations.cost += square(deviation);
+    equations.gradient[i] += deviation * std::sqrt(information);
+    equations.hessian(i, i) += information;
+  }
   return equations;
 }
 
@@ -118,7 +132,7 @@ std::vector<Eigen::Index> active_parameters(const Eigen::VectorXd& x,
 
 RobustFit minimize(OutputErrorProblem& problem, const Eigen::VectorXd& start,
                    const std::vector<bool>& free, const Bounds& bounds, const ChannelScales& scales,
-                   int max_iterations) {
+                   int max_iterations, double tolerance) {
   RobustFit fit;
   fit.x = start.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
   double damping = 1e-3;
@@ -148,7 +162,7 @@ RobustFit minimize(OutputErrorProblem& problem, const Eigen::VectorXd& start,
       fit.x = trial;
       fit.cost = trial_cost;
       damping = std::max(1e-9, damping / 5.0);
-      if (gain < 1e-8 * (1.0 + fit.cost)) {
+      if (gain < tolerance) {
         fit.converged = true;
         break;
       }
@@ -401,6 +415,13 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
     scatter(bread, hessian, i);
   }
 
+  // The same holds, more weakly, for what only nuisance parameters and kA may lack: data.
+  bread(kLogTimeConstant, kLogTimeConstant) += 0.1;
+  for (const int delay : {kPositionDelay, kVelocityDelay, kAveragingWidth}) {
+    bread(delay, delay) += 1.0 / square(0.1);
+  }
+  bread.diagonal().tail(n - kSharedParameters).array() += problem.initial_velocity_information();
+
   const Covariogram ramp_gamma = covariogram(runs, true);
   const Covariogram step_gamma = covariogram(runs, false);
   std::array<Eigen::MatrixXd, 3> middles;
@@ -420,6 +441,7 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
   }
   Covariances result;
   result.estimates.fill(Eigen::MatrixXd::Zero(n, n));
+  result.independent = Eigen::MatrixXd::Zero(n, n);
   const auto size = static_cast<Eigen::Index>(active.size());
   // Equilibrated, so that the pivots tell how well the parameters are told apart.
   const Eigen::VectorXd equilibrium = bread.diagonal()(active).cwiseSqrt().cwiseInverse();
@@ -433,6 +455,7 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
   const Eigen::MatrixXd inverse_bread = equilibrium.asDiagonal() *
                                         factor.solve(Eigen::MatrixXd::Identity(size, size)) *
                                         equilibrium.asDiagonal();
+  result.independent(active, active) = inverse_bread;
   const double blocks_left = std::max(1.0, static_cast<double>(blocks) - static_cast<double>(size));
   for (std::size_t k = 0; k < middles.size(); ++k) {
     const Eigen::MatrixXd covariance = inverse_bread * middles[k](active, active) * inverse_bread *

@@ -29,10 +29,11 @@ struct RobustFit {
 };
 
 /// Minimises Σ ρ(r/σ), ρ(z) = 2δ²(√(1 + (z/δ)²) − 1), δ = 1.5, over the free parameters in their
-/// bounds. Source: Moré, "The Levenberg–Marquardt algorithm" (1978); bounds by projection.
+/// bounds, until a step gains less than `tolerance` (in units of the loss, that is of χ²). Source:
+/// Moré, "The Levenberg–Marquardt algorithm" (1978); bounds by projection.
 [[nodiscard]] RobustFit minimize(OutputErrorProblem& problem, const Eigen::VectorXd& start,
                                  const std::vector<bool>& free, const Bounds& bounds,
-                                 const ChannelScales& scales, int max_iterations);
+                                 const ChannelScales& scales, int max_iterations, double tolerance);
 
 /// Robust scales of the residuals at x, floored by what the columns' resolution allows.
 [[nodiscard]] ChannelScales residual_scales(OutputErrorProblem& problem, const Eigen::VectorXd& x);
@@ -41,6 +42,7 @@ struct RobustFit {
 /// Rows and columns of fixed parameters and of those at a bound are zero.
 struct Covariances {
   std::array<Eigen::MatrixXd, 3> estimates;
+  Eigen::MatrixXd independent;  ///< What it would be if residuals were independent.
   bool singular = false;
   /// Largest of the three standard errors of gradient · x.
   [[nodiscard]] double standard_error(const Eigen::VectorXd& gradient) const;

@@ -1,0 +1,191 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "identification/cross_checks.hpp"
+#include "identification/statistics.hpp"
+
+namespace flyball::identification {
+namespace {
+
+constexpr double kOneSided95 = 1.645;
+constexpr int kProfilePoints = 8;
+constexpr int kRefitIterations = 12;
+
+/// How much larger the variance is than independent residuals would make it.
+double correlation_inflation(const Covariances& spread, Eigen::Index parameter) {
+  const double independent = spread.independent(parameter, parameter);
+  if (!(independent > 0.0)) {
+    return 1.0;
+  }
+  double largest = independent;
+  for (const Eigen::MatrixXd& estimate : spread.estimates) {
+    largest = std::max(largest, estimate(parameter, parameter));
+  }
+  return largest / independent;
+}
+
+struct Inertia {
+  double log_kA;
+  double standard_error;
+};
+
+/// kA from one channel alone, starting from the fit of both; nothing if it is not determined.
+std::optional<Inertia> fit_channel(OutputErrorProblem& problem, const RobustFit& best,
+                                   const Bounds& bounds, const ChannelScales& scales,
+                                   Channel channel) {
+  const bool position = channel == Channel::position;
+  const ChannelScales chosen{position ? scales.difference : 0.0, position ? 0.0 : scales.velocity};
+  if (chosen.difference + chosen.velocity <= 0.0) {
+    return std::nullopt;
+  }
+  std::vector<bool> free = problem.free_parameters();
+  free[kPositionDelay] = free[kPositionDelay] && position;
+  free[kVelocityDelay] = free[kVelocityDelay] && !position;
+  free[kAveragingWidth] = free[kAveragingWidth] && !position;
+  free[kVelocityScale] = false;
+  const RobustFit fit = minimize(problem, best.x, free, bounds, chosen, kRefitIterations, 0.1);
+  const Covariances spread = covariances(problem, fit.x, free, bounds, chosen);
+  const double slack = 1e-6;
+  if (spread.singular || fit.x[kLogTimeConstant] <= bounds.lower[kLogTimeConstant] + slack ||
+      fit.x[kLogTimeConstant] >= bounds.upper[kLogTimeConstant] - slack) {
+    return std::nullopt;
+  }
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(fit.x.size());
+  gradient[kLogTimeConstant] = 1.0;
+  gradient[kVelocityGain] = 1.0 / fit.x[kVelocityGain];
+  return Inertia{fit.x[kLogTimeConstant] + std::log(fit.x[kVelocityGain]),
+                 spread.standard_error(gradient)};
+}
+
+/// Top speed in the first 0.3 s over the speed in the 0.3 s that follow; 0 if they were not
+/// recorded.
+double overshoot(const std::vector<double>& time, const std::vector<double>& velocity,
+                 double direction) {
+  constexpr double kSettling = 0.3;  // s
+  const std::size_t middle = lower_index(time, time.front() + kSettling);
+  const std::size_t end = lower_index(time, time.front() + 2.0 * kSettling);
+  if (end >= time.size()) {
+    return 0.0;
+  }
+  double peak = 0.0;
+  for (std::size_t i = 0; i < middle; ++i) {
+    peak = std::max(peak, direction * velocity[i]);
+  }
+  std::vector<double> after;
+  for (std::size_t i = middle; i < end; ++i) {
+    after.push_back(direction * velocity[i]);
+  }
+  const double settled = quantile(std::move(after), 0.25);
+  return settled > 0.0 ? peak / settled : 0.0;
+}
+
+}  // namespace
+
+double inertia_ceiling(OutputErrorProblem& problem, const RobustFit& best, const Bounds& bounds,
+                       const ChannelScales& scales, const Covariances& spread) {
+  const double inflation = std::max(correlation_inflation(spread, kVelocityGain),
+                                    correlation_inflation(spread, kLogTimeConstant));
+  const double allowed = kOneSided95 * kOneSided95 * inflation;
+  std::vector<bool> free = problem.free_parameters();
+  free[kLogTimeConstant] = false;
+  Eigen::VectorXd x = best.x;
+  double below = x[kLogTimeConstant];
+  double rise_below = 0.0;
+  for (int point = 0; point < kProfilePoints; ++point) {
+    x[kLogTimeConstant] = std::min(below + std::log(1.8), bounds.upper[kLogTimeConstant]);
+    const RobustFit fit =
+        minimize(problem, x, free, bounds, scales, kRefitIterations, 0.02 * allowed);
+    const double rise = std::max(0.0, fit.cost - best.cost);
+    x = fit.x;
+    if (rise > allowed) {
+      // Near the minimum √rise is linear in the parameter.
+      const double fraction =
+          (std::sqrt(allowed) - std::sqrt(rise_below)) / (std::sqrt(rise) - std::sqrt(rise_below));
+      const double log_tau = below + fraction * (x[kLogTimeConstant] - below);
+      return std::exp(log_tau) * x[kVelocityGain];
+    }
+    below = x[kLogTimeConstant];
+    rise_below = rise;
+  }
+  return std::exp(below) * x[kVelocityGain];
+}
+
+void compare_channels(OutputErrorProblem& problem, const RobustFit& best, const Bounds& bounds,
+                      const ChannelScales& scales, std::vector<Diagnostic>& diagnostics) {
+  const auto by_position = fit_channel(problem, best, bounds, scales, Channel::position);
+  const auto by_velocity = fit_channel(problem, best, bounds, scales, Channel::velocity);
+  if (!by_position || !by_velocity) {
+    return;
+  }
+  const double difference = by_velocity->log_kA - by_position->log_kA;
+  const double spread = std::hypot(by_position->standard_error, by_velocity->standard_error);
+  if (std::abs(difference) > 0.15 && std::abs(difference) > 3.0 * spread) {
+    diagnostics.push_back(
+        {"channels_disagree", Severity::warning,
+         fmt::format("kA is {:.3g} from the position alone but {:.3g} from the velocity alone; the "
+                     "velocity's filter is not the moving average that the fit supposes",
+                     std::exp(by_position->log_kA), std::exp(by_velocity->log_kA))});
+  }
+}
+
+void compare_repeats(const FeedforwardFit& fit, std::vector<Diagnostic>& diagnostics) {
+  // Measured over simulated speed of each run; per kind the least and the greatest.
+  std::map<TestKind, std::pair<double, double>> extremes;
+  for (const FittedRun& run : fit.runs) {
+    double product = 0.0;
+    double square = 0.0;
+    for (std::size_t i = 0; i < run.velocity.size(); ++i) {
+      product += run.velocity[i] * run.velocity_hat[i];
+      square += run.velocity_hat[i] * run.velocity_hat[i];
+    }
+    if (run.used && square > 0.0) {
+      const double ratio = product / square;
+      const auto [entry, first] = extremes.try_emplace(run.kind, ratio, ratio);
+      if (!first) {
+        entry->second = {std::min(entry->second.first, ratio),
+                         std::max(entry->second.second, ratio)};
+      }
+    }
+  }
+  for (const auto& [kind, range] : extremes) {
+    if (range.first > 0.0 && range.second / range.first > 1.1) {
+      diagnostics.push_back(
+          {"repeats_disagree", Severity::warning,
+           fmt::format(
+               "two {} tests differ in speed by a factor {:.2f} under the same voltage; was "
+               "the mechanism changed between them? Identify them apart",
+               to_string(kind), range.second / range.first)});
+    }
+  }
+}
+
+void detect_elasticity(const PreparedRecording& prepared, const FeedforwardFit& fit,
+                       std::vector<Diagnostic>& diagnostics) {
+  for (std::size_t i = 0; i < prepared.runs.size(); ++i) {
+    const PreparedRun& run = prepared.runs[i];
+    if (!fit.runs[i].used || is_quasistatic(run.run.kind) || !run.starts_at_rest) {
+      continue;
+    }
+    const auto first = run.smoothed_velocity.begin() + static_cast<std::ptrdiff_t>(run.first);
+    const auto last = run.smoothed_velocity.begin() + static_cast<std::ptrdiff_t>(run.last);
+    const double measured = overshoot(fit.runs[i].time, {first, last}, run.direction);
+    const double simulated = overshoot(fit.runs[i].time, fit.runs[i].velocity_hat, run.direction);
+    if (measured > 1.15 * std::max(1.0, simulated)) {
+      diagnostics.push_back(
+          {"elastic", Severity::warning,
+           fmt::format("{}: the speed overshoots by {:.0f} % after the step and falls again, the "
+                       "simulated one by {:.0f} %; backlash or elasticity, which the model lacks, "
+                       "limits how fast a controller may be",
+                       to_string(run.run.kind), 100.0 * (measured - 1.0),
+                       100.0 * (std::max(1.0, simulated) - 1.0))});
+    }
+  }
+}
+
+}  // namespace flyball::identification
