@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cmath>
+
+#include <Eigen/Core>
+
+#include "identification/output_error.hpp"
+
+/// The soft-L1 loss and how a run's parameters lie among all of them; shared by the minimisation
+/// and the variance of its answer.
+namespace flyball::identification {
+
+using LocalMatrix = Eigen::Matrix<double, kLocalParameters, kLocalParameters>;
+using LocalVector = Eigen::Matrix<double, kLocalParameters, 1>;
+
+inline constexpr double kSoft = 1.5;  // δ: residuals beyond 1.5 σ count linearly
+
+inline double square(double value) {
+  return value * value;
+}
+
+inline double loss(double z) {
+  return 2.0 * square(kSoft) * (std::sqrt(1.0 + square(z / kSoft)) - 1.0);
+}
+
+/// ρ'(z)/(2z): the weight of iterated least squares. ρ''(z)/2 is its cube.
+inline double weight(double z) {
+  return 1.0 / std::sqrt(1.0 + square(z / kSoft));
+}
+
+/// 1/scale, and 0 for a channel that is switched off.
+inline double inverse(double scale) {
+  return scale > 0.0 ? 1.0 / scale : 0.0;
+}
+
+inline Eigen::Index global_index(int local, std::size_t run) {
+  return local < kSharedParameters ? local : kSharedParameters + static_cast<Eigen::Index>(run);
+}
+
+/// Adds a run's matrix to that of all parameters.
+inline void scatter(Eigen::MatrixXd& global, const LocalMatrix& local, std::size_t run) {
+  for (int a = 0; a < kLocalParameters; ++a) {
+    for (int b = 0; b < kLocalParameters; ++b) {
+      global(global_index(a, run), global_index(b, run)) += local(a, b);
+    }
+  }
+}
+
+}  // namespace flyball::identification

@@ -1,0 +1,72 @@
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <flyball/identification/feedforward_fit.hpp>
+
+#include "scenarios.hpp"
+
+namespace {
+
+using flyball::identification::fit_feedforward;
+using flyball::identification::GainEstimate;
+
+constexpr std::uint64_t kSeeds = 12;
+
+struct Tally {
+  std::vector<double> errors;
+  std::vector<double> widths;
+  std::size_t covered = 0;
+
+  void add(const GainEstimate& gain, double truth) {
+    errors.push_back(std::abs(gain.value / truth - 1.0));
+    widths.push_back(0.5 * (gain.interval[1] - gain.interval[0]) / truth);
+    covered += gain.interval[0] <= truth && truth <= gain.interval[1] ? 1U : 0U;
+    EXPECT_TRUE(gain.determined) << gain.reason;
+  }
+};
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+void expect_within(const Tally& tally, double error, double width, const char* gain) {
+  EXPECT_LE(median(tally.errors), error) << gain;
+  EXPECT_LE(median(tally.widths), width) << gain;
+  // At 88 % true coverage fewer than 8 of 12 happen once in 500 sessions.
+  EXPECT_GE(tally.covered, 8U) << gain;
+}
+
+class MonteCarlo : public testing::TestWithParam<std::size_t> {};
+
+TEST_P(MonteCarlo, RecoversTheGainsWithHonestIntervals) {
+  const scenarios::Truth& truth = scenarios::kMechanisms.at(GetParam());
+  Tally kS;
+  Tally kV;
+  Tally kA;
+  Tally kG;
+  for (std::uint64_t seed = 5001; seed <= 5000 + kSeeds; ++seed) {
+    const auto recording =
+        flyball::simulation::record_test_session(scenarios::session(truth, seed));
+    ASSERT_TRUE(recording);
+    const auto fit = fit_feedforward(*recording);
+    ASSERT_TRUE(fit) << "seed " << seed << ": " << to_string(fit.error());
+    kS.add(fit->kS, truth.kS);
+    kV.add(fit->kV, truth.kV);
+    kA.add(fit->kA, truth.kA);
+    if (fit->kG) {
+      kG.add(*fit->kG, truth.kG);
+    }
+  }
+  expect_within(kS, 0.03, 0.15, "kS");
+  expect_within(kV, 0.03, 0.02, "kV");
+  expect_within(kA, 0.05, 0.10, "kA");
+  if (!kG.errors.empty()) {
+    expect_within(kG, 0.03, 0.04, "kG");
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Mechanisms, MonteCarlo, testing::Range<std::size_t>(0, 6));
+
+}  // namespace

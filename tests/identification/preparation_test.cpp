@@ -1,0 +1,271 @@
+#include <flyball/identification/preparation.hpp>
+
+#include <cmath>
+#include <limits>
+
+#include "recordings.hpp"
+
+namespace {
+
+using namespace flyball::identification;
+using flyball::ArgumentError;
+using recordings::find;
+using recordings::kArm;
+using recordings::kElevator;
+using recordings::kFlywheel;
+using recordings::record;
+
+TEST(Prepare, FindsRefreshAndResolution) {
+  const auto prepared = prepare(record(kElevator));
+  ASSERT_TRUE(prepared);
+  EXPECT_NEAR(prepared->row_period, 5e-3, 1e-9);
+  EXPECT_NEAR(prepared->position_refresh_period, 20e-3, 1e-9);
+  // Steps of one or two counts: the mechanism may never move by just one.
+  EXPECT_NEAR(prepared->position_quantum, 1.5e-4, 5.1e-5);
+  EXPECT_NEAR(prepared->velocity_scale, 1.0, 0.01);
+  ASSERT_EQ(prepared->runs.size(), 4U);
+  for (const PreparedRun& run : prepared->runs) {
+    EXPECT_TRUE(run.moved);
+    EXPECT_EQ(run.direction, is_forward(run.run.kind) ? 1.0 : -1.0);
+    EXPECT_LT(run.first, run.last);
+    EXPECT_EQ(run.starts_at_rest, !is_quasistatic(run.run.kind));
+  }
+}
+
+TEST(Prepare, TellsRepeatedRows) {
+  Recording recording = record(kArm, 2);
+  for (TestRun& run : recording.runs) {
+    for (std::size_t i = 0; i < run.velocity.size(); ++i) {
+      run.velocity[i] = run.velocity[i - i % 4];
+      run.position[i] = run.position[i - i % 4];
+    }
+  }
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  ASSERT_NE(find(prepared->diagnostics, "repeated_rows"), nullptr);
+  EXPECT_NE(find(prepared->diagnostics, "repeated_rows")->message.find("20.0 ms"),
+            std::string::npos);
+}
+
+TEST(Prepare, SortsRowsThatGoBackInTime) {
+  const Recording sorted = record(kArm);
+  Recording shuffled = sorted;
+  for (std::vector<double> TestRun::* column :
+       {&TestRun::time, &TestRun::voltage, &TestRun::position, &TestRun::velocity}) {
+    std::swap((shuffled.runs[0].*column)[100], (shuffled.runs[0].*column)[200]);
+  }
+  const auto prepared = prepare(shuffled);
+  ASSERT_TRUE(prepared);
+  ASSERT_NE(find(prepared->diagnostics, "unsorted_time"), nullptr);
+  EXPECT_EQ(prepared->runs[0].run.time, sorted.runs[0].time);
+  EXPECT_EQ(prepared->runs[0].run.position, sorted.runs[0].position);
+}
+
+TEST(Prepare, KeepsTheLaterOfTwoRowsOfOneInstant) {
+  Recording recording = record(kArm);
+  recording.runs[0].time[101] = recording.runs[0].time[100];
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  EXPECT_NE(find(prepared->diagnostics, "duplicate_times"), nullptr);
+  EXPECT_EQ(prepared->runs[0].run.time.size(), recording.runs[0].time.size() - 1);
+}
+
+TEST(Prepare, DropsRowsThatAreNotFinite) {
+  Recording recording = record(kArm);
+  recording.runs[1].velocity[50] = std::numeric_limits<double>::quiet_NaN();
+  recording.runs[1].voltage[60] = std::numeric_limits<double>::infinity();
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  ASSERT_NE(find(prepared->diagnostics, "non_finite_rows"), nullptr);
+  EXPECT_EQ(find(prepared->diagnostics, "non_finite_rows")->message.substr(0, 4), "2 of");
+  EXPECT_EQ(prepared->runs[1].run.time.size(), recording.runs[1].time.size() - 2);
+}
+
+TEST(Prepare, DropsSpikes) {
+  Recording recording = record(kArm);
+  recording.runs[2].velocity[40] = -977.0;
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  EXPECT_NE(find(prepared->diagnostics, "outliers"), nullptr);
+  EXPECT_EQ(prepared->runs[2].run.time.size(), recording.runs[2].time.size() - 1);
+}
+
+TEST(Prepare, DropsStaleFirstPositionsAndGlitches) {
+  Recording recording = record(kElevator);
+  for (std::size_t i = 0; i < 5; ++i) {
+    recording.runs[1].position[i] = 0.0;
+  }
+  const std::size_t rows = recording.runs[0].time.size();
+  recording.runs[0].position[rows - 100] -= 0.4;
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  EXPECT_NE(find(prepared->diagnostics, "position_jumps"), nullptr);
+  EXPECT_EQ(prepared->runs[1].run.time.size(), recording.runs[1].time.size() - 5);
+  EXPECT_EQ(prepared->runs[0].run.time.size(), rows - 1);
+}
+
+TEST(Prepare, NamesAnInvertedEncoder) {
+  Recording recording = record(kElevator);
+  const Recording upright = recording;
+  for (TestRun& run : recording.runs) {
+    recordings::negate(run.position);
+    recordings::negate(run.velocity);
+  }
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  ASSERT_NE(find(prepared->diagnostics, "sign_mismatch"), nullptr);
+  EXPECT_NE(find(prepared->diagnostics, "sign_mismatch")->message.find("inverted encoder"),
+            std::string::npos);
+  EXPECT_EQ(prepared->runs[3].run.velocity, upright.runs[3].velocity);
+}
+
+TEST(Prepare, GivesAnUnsignedVoltageTheSignOfTheMotion) {
+  Recording recording = record(kFlywheel);
+  for (TestRun& run : recording.runs) {
+    for (double& voltage : run.voltage) {
+      voltage = std::abs(voltage);
+    }
+  }
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  ASSERT_NE(find(prepared->diagnostics, "sign_mismatch"), nullptr);
+  EXPECT_NE(find(prepared->diagnostics, "sign_mismatch")->message.find("carries no sign"),
+            std::string::npos);
+  EXPECT_LT(prepared->runs[3].run.voltage.back(), 0.1);
+}
+
+TEST(Prepare, TellsAPositionAgainstItsVelocity) {
+  Recording recording = record(kFlywheel);
+  for (TestRun& run : recording.runs) {
+    recordings::negate(run.position);
+  }
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  ASSERT_NE(find(prepared->diagnostics, "sign_mismatch"), nullptr);
+  EXPECT_NE(find(prepared->diagnostics, "sign_mismatch")->message.find("position disagrees"),
+            std::string::npos);
+}
+
+TEST(Prepare, TellsOneTestRecordedTheOtherWayRound) {
+  Recording recording = record(kFlywheel);
+  recordings::negate(recording.runs[3].voltage);
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  ASSERT_NE(find(prepared->diagnostics, "sign_mismatch"), nullptr);
+  EXPECT_NE(find(prepared->diagnostics, "sign_mismatch")->message.find("dynamic-reverse"),
+            std::string::npos);
+}
+
+TEST(Prepare, TellsTheScaleOfTheVelocity) {
+  Recording recording = record(kFlywheel);
+  for (TestRun& run : recording.runs) {
+    for (double& velocity : run.velocity) {
+      velocity *= 0.87;
+    }
+  }
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  EXPECT_NE(find(prepared->diagnostics, "velocity_disagrees_with_position"), nullptr);
+  EXPECT_NEAR(prepared->velocity_scale, 0.87, 0.01);
+}
+
+TEST(Prepare, GivesUpACoarseVelocity) {
+  Recording recording = record(kArm);
+  for (TestRun& run : recording.runs) {
+    for (double& velocity : run.velocity) {
+      velocity = std::trunc(velocity / 0.6) * 0.6;
+    }
+  }
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  EXPECT_NE(find(prepared->diagnostics, "coarse_velocity"), nullptr);
+  EXPECT_FALSE(prepared->has_velocity);
+}
+
+TEST(Prepare, CutsAStall) {
+  Recording recording = record(kElevator);
+  TestRun& run = recording.runs[2];
+  while (std::abs(run.voltage.back()) < 3.0) {
+    for (std::vector<double> TestRun::* column :
+         {&TestRun::time, &TestRun::voltage, &TestRun::position, &TestRun::velocity}) {
+      (run.*column).pop_back();
+    }
+  }
+  const double stop = run.time.back();
+  for (int i = 0; i < 60; ++i) {
+    run.time.push_back(run.time.back() + 5e-3);
+    run.voltage.push_back(6.0);
+    run.position.push_back(run.position.back());
+    run.velocity.push_back(0.0);
+  }
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  ASSERT_NE(find(prepared->diagnostics, "hit_stop"), nullptr);
+  EXPECT_LT(prepared->runs[2].run.time[prepared->runs[2].last - 1], stop);
+}
+
+TEST(Prepare, TellsMissingAndMotionlessTests) {
+  Recording recording = record(kElevator);
+  for (double& position : recording.runs[1].position) {
+    position = 0.5;
+  }
+  recording.runs.pop_back();
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  ASSERT_NE(find(prepared->diagnostics, "missing_test"), nullptr);
+  EXPECT_NE(find(prepared->diagnostics, "missing_test")->message.find("dynamic-reverse"),
+            std::string::npos);
+  EXPECT_NE(find(prepared->diagnostics, "no_motion"), nullptr);
+  EXPECT_FALSE(prepared->runs[1].moved);
+}
+
+TEST(Prepare, TellsAnArmThatTurnsRoundAndRound) {
+  Recording recording = record(kArm);
+  for (TestRun& run : recording.runs) {
+    for (double& position : run.position) {
+      position *= 20.0;
+    }
+  }
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  EXPECT_NE(find(prepared->diagnostics, "travel_exceeds_turn"), nullptr);
+}
+
+TEST(Prepare, KeepsTheLongestStretchWithoutGaps) {
+  Recording recording = record(kFlywheel);
+  TestRun& run = recording.runs[0];
+  for (std::size_t i = run.time.size() - 200; i < run.time.size(); ++i) {
+    run.time[i] += 1.0;
+  }
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  EXPECT_NE(find(prepared->diagnostics, "gaps"), nullptr);
+  EXPECT_LE(prepared->runs[0].last, run.time.size() - 200);
+}
+
+TEST(Prepare, RefusesColumnsOfDifferentLength) {
+  Recording recording = record(kArm);
+  recording.runs[1].velocity.pop_back();
+  const auto prepared = prepare(recording);
+  ASSERT_FALSE(prepared);
+  EXPECT_TRUE(prepared.error().is(ArgumentError::wrong_shape));
+  EXPECT_EQ(prepared.error().subject(), "run 1 (quasistatic-reverse)");
+}
+
+TEST(Prepare, RefusesARunWithoutPositionAndVelocity) {
+  Recording recording = record(kArm);
+  recording.runs[0].position.clear();
+  recording.runs[0].velocity.clear();
+  EXPECT_FALSE(prepare(recording));
+}
+
+TEST(Prepare, SurvivesEmptyRecordings) {
+  const auto nothing = prepare(Recording{});
+  ASSERT_TRUE(nothing);
+  EXPECT_TRUE(nothing->runs.empty());
+  Recording empty_run;
+  empty_run.runs.resize(4);
+  EXPECT_TRUE(prepare(empty_run));
+}
+
+}  // namespace

@@ -1,0 +1,104 @@
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include <flyball/identification/feedforward_fit.hpp>
+
+#include "recordings.hpp"
+
+// Other people's SysId recordings: the truth is not known, but physics and repeats are.
+namespace {
+
+using namespace flyball::identification;
+using flyball::mechanisms::MechanismKind;
+
+const std::filesystem::path kData = FLYBALL_TEST_DATA;
+
+/// Rows [t, V, position, velocity] in rotations; of nine columns the left side.
+Recording read(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  const nlohmann::json json = nlohmann::json::parse(file);
+  const std::string test = json.value("test", "");
+  const std::string units = json.value("units", "Radians");
+  double scale = json.value("unitsPerRotation", 1.0);
+  scale *= units == "Degrees" ? std::numbers::pi / 180.0 : 1.0;
+  Recording recording;
+  recording.mechanism = test == "Elevator" ? MechanismKind::elevator
+                        : test == "Arm"    ? MechanismKind::arm
+                                           : MechanismKind::flywheel;
+  recording.unit = units == "Meters" ? "m" : "rad";
+  for (const char* key : {"slow-forward", "slow-backward", "fast-forward", "fast-backward"}) {
+    TestRun run;
+    run.kind = parse_test_kind(key).value();
+    for (const auto& row : json.at(key)) {
+      const bool drive = row.size() == 9;
+      run.time.push_back(row[0]);
+      run.voltage.push_back(row[1]);
+      run.position.push_back(scale * row[drive ? 3 : 2].get<double>());
+      run.velocity.push_back(scale * row[drive ? 5 : 3].get<double>());
+    }
+    recording.runs.push_back(std::move(run));
+  }
+  return recording;
+}
+
+FeedforwardFit fit(const std::string& name) {
+  const auto result = fit_feedforward(read(kData / "sysid-json" / name));
+  EXPECT_TRUE(result) << name << ": " << (result ? "" : to_string(result.error()));
+  return result.value_or(FeedforwardFit{});
+}
+
+TEST(RealLogs, EachMechanismGivesPhysicalGains) {
+  for (const char* name :
+       {"calcmogul_flywheel_simple.json", "frc2423_simple_meters_20220307-193058.json",
+        "frc4392_arm_20230218-170836.json", "mrt3216_arm_20230302-130355.json",
+        "sciborgs_elbow_20230222-162953.json", "sciborgs_elevator_20230227-154527.json"}) {
+    const FeedforwardFit gains = fit(name);
+    EXPECT_GT(gains.kV.value, 0.0) << name;
+    EXPECT_GE(gains.kS.value, 0.0) << name;
+    EXPECT_GT(gains.r_squared, 0.95) << name;
+    if (gains.kA.determined) {
+      EXPECT_GT(gains.kA.interval[0], 0.0) << name;
+    } else {
+      EXPECT_GT(gains.kA.upper_bound, 0.0) << name;
+      EXPECT_FALSE(gains.kA.reason.empty()) << name;
+    }
+  }
+}
+
+// The same elbow twice within ten minutes.
+TEST(RealLogs, RepeatsAgreeWithinTheirIntervals) {
+  const FeedforwardFit first = fit("sciborgs_elbow_20230222-162953.json");
+  const FeedforwardFit second = fit("sciborgs_elbow_20230222-163221.json");
+  EXPECT_NEAR(second.kV.value / first.kV.value, 1.0, 0.02);
+  EXPECT_NEAR(second.kA.value / first.kA.value, 1.0, 0.15);
+  EXPECT_NEAR(second.kG->value / first.kG->value, 1.0, 0.03);
+  EXPECT_NEAR(second.kS.value, first.kS.value, 0.04);
+}
+
+TEST(RealLogs, AnArmThatDoesNotMoveIsRefused) {
+  const auto refused =
+      fit_feedforward(read(kData / "sysid-json-bad" / "mrt3216_arm_nomotion_20230301-172022.json"));
+  ASSERT_FALSE(refused);
+  EXPECT_TRUE(refused.error().is(IdentificationError::no_motion));
+}
+
+TEST(RealLogs, AnIdleLogIsRefused) {
+  const auto refused = fit_feedforward(
+      read(kData / "sysid-json-bad" / "frc_characterization_2019_nine_column_idle.json"));
+  ASSERT_FALSE(refused);
+  EXPECT_TRUE(refused.error().is(IdentificationError::no_motion));
+}
+
+TEST(RealLogs, AnInvertedEncoderIsNamed) {
+  const auto report = identify_feedforward(
+      read(kData / "sysid-json-bad" / "frc1672_drive_inverted_encoder_20230427-151436.json"));
+  const auto* diagnostic = recordings::find(report.diagnostics, "sign_mismatch");
+  ASSERT_NE(diagnostic, nullptr);
+  EXPECT_NE(diagnostic->message.find("inverted encoder"), std::string::npos);
+}
+
+}  // namespace
