@@ -116,7 +116,9 @@ TEST(Lqr, BooksFlywheelAndArmModels) {
   const double m = 2.2675;
   const auto arm = mechanisms::arm({.motor = mechanisms::cim(),
                                     .gearing = 0.5,
-                                    .moment_of_inertia = MomentOfInertia(m * l * l / 3.0)})
+                                    .moment_of_inertia = MomentOfInertia(m * l * l / 3.0),
+                                    .mass = Mass(m),
+                                    .center_of_mass = Length(0.5 * l)})
                        .value();
   const auto swinging = discretize(arm, 5_ms).value();
   EXPECT_NEAR(swinging.A(0, 1), 0.004999988140718234, 1e-15);

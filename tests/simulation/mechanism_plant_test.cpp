@@ -113,15 +113,24 @@ TEST(MechanismPlant, ArmAgreesWithRungeKutta) {
   EXPECT_NEAR(end.velocity, s.velocity, 3e-8);
 }
 
-// Without friction and voltage an arm swings; with friction it comes to rest where gravity's torque
-// is within friction, and stays there.
+// A lightly damped arm swings, and comes to rest where gravity's torque is within friction; there
+// it stays.
 TEST(MechanismPlant, ArmComesToRest) {
-  const auto arm = plant(MechanismKind::arm);
+  FeedforwardGains swinging = gains;
+  swinging.kV = 0.2;
+  const auto arm = plant(MechanismKind::arm, swinging);
   const auto rest = arm.step({0.5, 0.0}, 0.0, 60.0);
   EXPECT_EQ(rest.velocity, 0.0);
   EXPECT_LE(std::abs(0.6 * std::cos(rest.position + 0.2)), 0.2);
   EXPECT_EQ(arm.step(rest, 0.0, 5.0).position, rest.position);
   EXPECT_LT(rest.position, 0.0);
+}
+
+// A heavily damped one creeps towards the place where friction holds it, ever more slowly.
+TEST(MechanismPlant, DampedArmCreeps) {
+  const auto rest = plant(MechanismKind::arm).step({0.5, 0.0}, 0.0, 60.0);
+  EXPECT_LT(std::abs(rest.velocity), 1e-9);
+  EXPECT_NEAR(0.6 * std::cos(rest.position + 0.2), 0.2, 1e-8);
 }
 
 // A kA of zero: the velocity is (V - gravity - kS)/kV at once, and zero within friction.

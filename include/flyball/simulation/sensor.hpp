@@ -12,9 +12,9 @@ namespace flyball {
 struct SensorModel {
   double resolution = 0.0;  ///< Readings are whole multiples of it, in the quantity's unit.
   double noise = 0.0;       ///< Standard deviation of a fresh reading, in the quantity's unit.
-  Time delay;               ///< Age of what is read, s.
-  Time refresh;             ///< A fresh reading comes at multiples of it and is held between, s.
-  Time moving_average;      ///< The reading is the mean over this window, s.
+  Time delay{};             ///< Age of what is read, s.
+  Time refresh{};           ///< A fresh reading comes at multiples of it and is held between, s.
+  Time moving_average{};    ///< The reading is the mean over this window, s.
 };
 
 /// A sensor in a simulation that records its truth at a fixed step.
