@@ -35,11 +35,11 @@ Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const
   if (!dual) {
     Error error = std::move(dual.error()).in(std::string(where));
     if (error.is(RiccatiError::not_stabilizable)) {
-      error = std::move(error)
-                  .about("the dual (Aᵀ, Cᵀ)")
-                  .hint(
-                      "no output shows this mode, so nothing corrects it; measure a state that "
-                      "it moves");
+      return tl::unexpected(Error(
+          std::move(error)
+              .about("the dual (Aᵀ, Cᵀ)")
+              .hint("no output shows this mode, so nothing corrects it; measure a state that it "
+                    "moves")));
     }
     return tl::unexpected(std::move(error));
   }
