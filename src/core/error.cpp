@@ -42,6 +42,10 @@ Error&& Error::with(std::string name, std::vector<double> values) && {
   return std::move(*this);
 }
 
+Error&& Error::with(std::string name, std::initializer_list<double> values) && {
+  return std::move(*this).with(std::move(name), std::vector<double>(values));
+}
+
 Error&& Error::with(std::string name, std::string text) && {
   evidence_.push_back({std::move(name), {}, std::move(text)});
   return std::move(*this);

@@ -193,8 +193,10 @@ void detect_motion(PreparedRecording& prepared) {
   prepared.top_speed = 0.0;
   for (PreparedRun& run : prepared.runs) {
     double signed_square = 0.0;
+    double square = 0.0;
     for (const double velocity : run.smoothed_velocity) {
       signed_square += velocity * std::abs(velocity);
+      square += velocity * velocity;
     }
     run.direction = signed_square >= 0.0 ? 1.0 : -1.0;
     const double speed = top_of(run.smoothed_velocity, 0.98);
@@ -203,7 +205,9 @@ void detect_motion(PreparedRecording& prepared) {
           std::minmax_element(run.run.position.begin(), run.run.position.end());
       run.moved = *high - *low > 10.0 * prepared.position_quantum && speed > 0.0;
     } else {
-      run.moved = prepared.has_velocity && speed > 15.0 * prepared.velocity_quantum;
+      // Without a position to show it, motion is a velocity that keeps its sign; noise does not.
+      run.moved = prepared.has_velocity && speed > 15.0 * prepared.velocity_quantum &&
+                  std::abs(signed_square) > 0.3 * square;
     }
     if (run.moved) {
       prepared.top_speed = std::max(prepared.top_speed, speed);

@@ -69,6 +69,7 @@ Expected<void> check_job(const ClosedLoopJob& job) {
           ? Expected<void>{}
           : check_positive(job.truth.motor_resistance, where, "motor_resistance", "Ohm"),
       check_not_negative(job.truth.actuation_delay.si(), where, "actuation_delay", "s"),
+      check_not_negative(regulator.measurement_delay.si(), where, "measurement_delay", "s"),
       check_not_negative(job.truth.voltage_noise, where, "voltage_noise", "V"));
 }
 
@@ -192,7 +193,9 @@ Expected<ClosedLoopResult> simulate(const ClosedLoopJob& job) {
     const MotionState& r_next = job.reference[std::min(k + 1, job.reference.size() - 1)];
     const double time = static_cast<double>(k) * T;
 
-    const double y = sensor->read();
+    const double reading = sensor->read();
+    const double rate = flywheel ? (r_next.velocity - r.velocity) / T : r.velocity;
+    const double y = reading + design.measurement_delay.si() * rate;
     const double rail = drive.rail(state.velocity);
     const double direction = r.velocity != 0.0 ? r.velocity : r_next.velocity;
     const double extra = (design.feed_forward_gravity ? feedforward->gravity(r.position) : 0.0) +
@@ -217,7 +220,7 @@ Expected<ClosedLoopResult> simulate(const ClosedLoopJob& job) {
     columns.reference_velocity.push_back(r.velocity);
     columns.position.push_back(state.position);
     columns.velocity.push_back(state.velocity);
-    columns.measurement.push_back(y);
+    columns.measurement.push_back(reading);
     columns.estimated_position.push_back(regulator->x_hat()(0));
     columns.estimated_velocity.push_back(regulator->x_hat()(n - 1));
     columns.voltage.push_back(u);

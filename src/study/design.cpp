@@ -101,14 +101,18 @@ void fill_defaults(DesignJob& job, std::vector<Diagnostic>& diagnostics) {
   }
 }
 
-// Loosens the tolerances from the defaults until the margins are comfortable.
+// Of tolerances from tight to loose, takes those that leave comfortable margins and the stiffest
+// loop. The tightest comfortable ones need not be it: the compensation of a long delay (B.12) turns
+// an aggressive gain into nearly none.
 Expected<LoopDesign> search_tolerances(const LinearModel& model, DesignJob& job,
                                        std::vector<Diagnostic>& diagnostics) {
   const std::vector<double> start =
       default_tolerances(job.plant, static_cast<std::size_t>(model.A.rows()));
-  std::optional<Error> last;
   constexpr int steps = 40;
   constexpr double step = 1.25;
+  std::optional<LoopDesign> best;
+  std::vector<double> best_tolerances;
+  std::optional<Error> last;
   double factor = 1.0;
   for (int i = 0; i < steps; ++i, factor *= step) {
     std::vector<double> tolerances = start;
@@ -120,31 +124,36 @@ Expected<LoopDesign> search_tolerances(const LinearModel& model, DesignJob& job,
       last = std::move(loop).error();
       continue;
     }
-    if (!is_comfortable(*loop)) {
-      continue;
+    if (is_comfortable(*loop) && (!best || loop->K_delayed(0, 0) > best->K_delayed(0, 0))) {
+      best = *std::move(loop);
+      best_tolerances = std::move(tolerances);
     }
-    job.controller.state_tolerance = tolerances;
-    std::vector<std::string> words;
-    for (std::size_t k = 0; k < tolerances.size(); ++k) {
-      words.push_back(fmt::format("{} {}", format_number(tolerances[k], 3), model.states[k]));
-    }
-    diagnostics.push_back(
-        {"assumed", Severity::info,
-         fmt::format("no tolerances were given: {} are as tight as leave a gain margin of 2, a "
-                     "phase margin of 45° and ±20 % of inertia and gain",
-                     fmt::join(words, ", "))});
-    return loop;
   }
-  if (last) {
-    return tl::unexpected(*last);
+  if (!best && last) {
+    return tl::unexpected(*std::move(last));
   }
-  return tl::unexpected(
-      Error(DesignError::margins_lost)
-          .in(std::string(where))
-          .about("the loop")
-          .got(fmt::format("without margins at any tolerance with a delay of {} ms",
-                           format_number(1e3 * job.controller.delay.value_or(0.0), 3)))
-          .hint("shorten the delay or the period"));
+  if (!best) {
+    return tl::unexpected(
+        Error(DesignError::margins_lost)
+            .in(std::string(where))
+            .about("the loop")
+            .got(fmt::format("without margins at any tolerance with a delay of {} ms",
+                             format_number(1e3 * job.controller.delay.value_or(0.0), 3)))
+            .hint("shorten the delay or the period"));
+  }
+  std::vector<std::string> words;
+  for (std::size_t k = 0; k < best_tolerances.size(); ++k) {
+    words.push_back(
+        fmt::format("{} for {}", format_number(best_tolerances[k], 3), model.states[k]));
+  }
+  diagnostics.push_back(
+      {"assumed", Severity::info,
+       fmt::format(
+           "no tolerances were given: {} make the stiffest loop that keeps a gain margin of "
+           "2, a phase margin of 45° and ±20 % of inertia and gain",
+           fmt::join(words, ", "))});
+  job.controller.state_tolerance = std::move(best_tolerances);
+  return *std::move(best);
 }
 
 void add_margin_warnings(const LoopDesign& loop, const DesignJob& job,

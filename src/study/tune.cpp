@@ -9,13 +9,17 @@ PlantDescription plant_from_fit(const identification::FeedforwardFit& fit) {
   PlantDescription plant;
   plant.kind = fit.mechanism;
   plant.unit = fit.unit;
-  plant.gains.kS = fit.kS.value;
+  // A gain that cannot be told from zero is designed with as zero.
+  const auto known = [](const identification::GainEstimate& gain) {
+    return gain.determined ? gain.value : 0.0;
+  };
+  plant.gains.kS = known(fit.kS);
   plant.gains.kV = fit.kV.value;
-  plant.gains.kA = fit.kA.determined ? fit.kA.value : 0.0;
+  plant.gains.kA = known(fit.kA);
   plant.kA_determined = fit.kA.determined;
   plant.kA_upper_bound = fit.kA.determined ? 0.0 : fit.kA.upper_bound;
-  plant.gains.kG = fit.kG ? fit.kG->value : 0.0;
-  plant.gains.angle_offset = fit.angle_offset ? fit.angle_offset->value : 0.0;
+  plant.gains.kG = fit.kG ? known(*fit.kG) : 0.0;
+  plant.gains.angle_offset = fit.angle_offset ? known(*fit.angle_offset) : 0.0;
   return plant;
 }
 

@@ -158,8 +158,8 @@ TEST(Design, RefusesWhatCannotBe) {
   EXPECT_TRUE(result.error().is(ArgumentError::wrong_shape)) << to_string(result.error());
 
   job = elevator_job();
-  job.controller.state_tolerance = {1e-5, 1e-5};
-  job.controller.delay = 0.1;
+  job.controller.state_tolerance = {0.001, 10.0};
+  job.controller.delay = 0.020;
   result = design(job);
   ASSERT_FALSE(result);
   EXPECT_TRUE(result.error().is(DesignError::margins_lost)) << to_string(result.error());

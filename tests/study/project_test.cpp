@@ -54,7 +54,7 @@ TEST(Project, SaysWhereAnUnknownKeyStandsAndWhatWasMeant) {
             "elevator.toml:5:1: mechanism.gearng is not a key of [mechanism]; did you mean "
             "\"gearing\"?");
   EXPECT_EQ(message(replaced(elevator_text, "[controller]", "[controler]")),
-            "elevator.toml:9:1: controler is not a section that is known; did you mean "
+            "elevator.toml:9:2: controler is not a section that is known; did you mean "
             "\"controller\"?");
 }
 

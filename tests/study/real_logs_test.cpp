@@ -68,15 +68,15 @@ TEST_P(RealLogs, GiveGainsThatMakeSenseOrAReason) {
   EXPECT_TRUE((*result->design)->robust);
 }
 
-INSTANTIATE_TEST_SUITE_P(Study, RealLogs, ::testing::ValuesIn(mechanism_logs()),
-                         [](const ::testing::TestParamInfo<RealLog>& info) {
-                           std::string name =
-                               std::filesystem::path(info.param.file).stem().string();
-                           for (char& c : name) {
-                             c = std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
-                           }
-                           return name;
-                         });
+std::string test_name(const ::testing::TestParamInfo<RealLog>& log) {
+  std::string name = std::filesystem::path(log.param.file).stem().string();
+  for (char& c : name) {
+    c = std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
+  }
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Study, RealLogs, ::testing::ValuesIn(mechanism_logs()), test_name);
 
 // The same elbow on the same day must give the same gains.
 TEST(RealLogRepeats, SciborgsElbowAgreesWithItself) {

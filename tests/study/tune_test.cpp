@@ -98,7 +98,8 @@ TEST(Tune, ARefusedLogHasNoDesignAndSaysWhy) {
   session.kS = 20.0;  // friction that no test overcomes
   session.kV = 4.0;
   session.kA = 0.3;
-  session.kG = 0.0;
+  session.velocity_noise = 1e-3;
+  session.resolution = 1e-4;
   const SessionFile file(session, "Elevator", "flyball_tune_test_stuck.json");
   TuneJob job;
   job.identification.log = file.path();
@@ -106,7 +107,8 @@ TEST(Tune, ARefusedLogHasNoDesignAndSaysWhy) {
   ASSERT_TRUE(result) << to_string(result.error());
   ASSERT_FALSE(result->identification.report.fit);
   EXPECT_TRUE(
-      result->identification.report.fit.error().is(identification::IdentificationError::no_motion));
+      result->identification.report.fit.error().is(identification::IdentificationError::no_motion))
+      << to_string(result->identification.report.fit.error());
   EXPECT_FALSE(result->design);
   const auto json = nlohmann::json::parse(to_json(*result));
   EXPECT_EQ(json["error"]["code"], "no_motion");

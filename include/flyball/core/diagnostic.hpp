@@ -12,9 +12,9 @@ enum class Severity { info, warning, error };
 
 /// Something worth telling about data that was still usable (or the reason why it was not).
 struct Diagnostic {
-  std::string code;  ///< A stable snake_case identifier, such as "repeated_rows".
+  std::string code{};  ///< A stable snake_case identifier, such as "repeated_rows".
   Severity severity = Severity::info;
-  std::string message;  ///< One sentence: what was seen, how much of it, what was done about it.
+  std::string message{};  ///< One sentence: what was seen, how much of it, what was done about it.
 };
 
 }  // namespace flyball

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <concepts>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -60,6 +61,7 @@ class Error {
   /// Evidence, listed in the order given.
   Error&& with(std::string name, double value) &&;
   Error&& with(std::string name, std::vector<double> values) &&;
+  Error&& with(std::string name, std::initializer_list<double> values) &&;
   Error&& with(std::string name, std::string text) &&;
 
   /// Whether this is the given enumerator of the given family.

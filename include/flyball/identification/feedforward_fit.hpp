@@ -23,33 +23,34 @@ struct GainEstimate {
   /// Whether the data tell the value. If not, `value` is the best guess, not to be designed with.
   bool determined = true;
   double upper_bound = 0.0;  ///< If not determined: the value is below this (95 %).
-  std::string reason;        ///< If not determined: why.
+  std::string reason{};      ///< If not determined: why.
 };
 
 /// A run as measured and as simulated in free run from its recorded voltage.
 struct FittedRun {
   TestKind kind = TestKind::quasistatic_forward;
-  std::size_t source = 0;            ///< Index of the run in the recording.
-  bool used = false;                 ///< Whether the fit used it; if not, nothing is simulated.
-  std::vector<double> time;          ///< s, the window that was fitted.
-  std::vector<double> voltage;       ///< V.
-  std::vector<double> position;      ///< Measured; empty if the log has none.
-  std::vector<double> velocity;      ///< Measured (derived from position if the log has none).
-  std::vector<double> position_hat;  ///< Simulated, as the sensor would have shown it.
-  std::vector<double> velocity_hat;  ///< Simulated, delayed and averaged as the sensor does.
-  std::vector<double> velocity_residual;  ///< velocity − velocity_hat.
+  std::size_t source = 0;              ///< Index of the run in the recording.
+  bool used = false;                   ///< Whether the fit used it; if not, nothing is simulated.
+  std::vector<double> time{};          ///< s, the window that was fitted.
+  std::vector<double> voltage{};       ///< V.
+  std::vector<double> position{};      ///< Measured; empty if the log has none.
+  std::vector<double> velocity{};      ///< Measured (derived from position if the log has none).
+  std::vector<double> position_hat{};  ///< Simulated, as the sensor would have shown it.
+  std::vector<double> velocity_hat{};  ///< Simulated, delayed and averaged as the sensor does.
+  std::vector<double> velocity_residual{};  ///< velocity − velocity_hat.
 };
 
 /// The feedforward model V = kS sgn(v) + kV v + kA a + gravity, with gravity nothing (flywheel),
 /// kG (elevator) or kG cos(θ + angle_offset) (arm), θ as the log counts it.
 struct FeedforwardFit {
   mechanisms::MechanismKind mechanism{};
-  std::string unit;                          ///< "m" or "rad".
-  GainEstimate kS;                           ///< V.
-  GainEstimate kV;                           ///< V/(unit/s).
-  GainEstimate kA;                           ///< V/(unit/s²).
-  std::optional<GainEstimate> kG;            ///< V; elevators and arms.
-  std::optional<GainEstimate> angle_offset;  ///< rad; arms: true angle from horizontal − measured.
+  std::string unit{};                ///< "m" or "rad".
+  GainEstimate kS;                   ///< V.
+  GainEstimate kV;                   ///< V/(unit/s).
+  GainEstimate kA;                   ///< V/(unit/s²).
+  std::optional<GainEstimate> kG{};  ///< V; elevators and arms.
+  std::optional<GainEstimate>
+      angle_offset{};  ///< rad; arms: true angle from horizontal − measured.
 
   double r_squared = 0.0;        ///< Of the free-run simulated velocity, all used runs.
   double velocity_nrmse = 0.0;   ///< RMS error over standard deviation of the velocity.
@@ -59,15 +60,15 @@ struct FeedforwardFit {
   double velocity_scale = 1.0;   ///< Velocity column over derivative of position.
   double velocity_noise = 0.0;   ///< unit/s, robust standard deviation of the velocity residual.
   double position_noise = 0.0;   ///< unit, of the position-difference residual over √2.
-  std::optional<OneStepFit> one_step;  ///< The book's regression, for comparison.
-  std::vector<FittedRun> runs;         ///< One per prepared run.
+  std::optional<OneStepFit> one_step{};  ///< The book's regression, for comparison.
+  std::vector<FittedRun> runs{};         ///< One per prepared run.
   std::size_t residuals = 0;
   int iterations = 0;
 };
 
 /// How to fit.
 struct FitOptions {
-  std::optional<mechanisms::MechanismKind> mechanism;  ///< Overrides the recording's.
+  std::optional<mechanisms::MechanismKind> mechanism{};  ///< Overrides the recording's.
   PreparationOptions preparation;
   double difference_span = 0.07;  ///< s, span of the position differences.
   double max_delay = 0.1;         ///< s, largest delay of position or velocity looked for.
@@ -77,7 +78,7 @@ struct FitOptions {
 /// The answer with everything that led to it: also a refused recording can be plotted.
 struct FitReport {
   PreparedRecording prepared;
-  std::vector<Diagnostic> diagnostics;  ///< Of preparation and fit.
+  std::vector<Diagnostic> diagnostics{};  ///< Of preparation and fit.
   Expected<FeedforwardFit> fit;
 };
 

@@ -40,17 +40,17 @@ enum class TestKind {
 /// `position` or `velocity` may be empty if the log has no such channel (not both).
 struct TestRun {
   TestKind kind = TestKind::quasistatic_forward;
-  std::vector<double> time;      ///< s, ascending.
-  std::vector<double> voltage;   ///< V, applied to the motors.
-  std::vector<double> position;  ///< m or rad, at the output.
-  std::vector<double> velocity;  ///< m/s or rad/s, at the output.
+  std::vector<double> time{};      ///< s, ascending.
+  std::vector<double> voltage{};   ///< V, applied to the motors.
+  std::vector<double> position{};  ///< m or rad, at the output.
+  std::vector<double> velocity{};  ///< m/s or rad/s, at the output.
 };
 
 /// The characterisation tests of one mechanism, any number of each kind.
 struct Recording {
-  std::optional<mechanisms::MechanismKind> mechanism;  ///< What the log says it is, if it does.
-  std::string unit = "rad";                            ///< Unit of position: "m" or "rad".
-  std::vector<TestRun> runs;
+  std::optional<mechanisms::MechanismKind> mechanism{};  ///< What the log says it is, if it does.
+  std::string unit = "rad";                              ///< Unit of position: "m" or "rad".
+  std::vector<TestRun> runs{};
 };
 
 }  // namespace flyball::identification

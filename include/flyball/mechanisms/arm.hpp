@@ -7,11 +7,11 @@ namespace flyball::mechanisms {
 
 /// What a single-jointed arm is made of.
 struct ArmParameters {
-  DcMotor motor;
-  double gearing = 1.0;               ///< Motor turns per arm turn (> 1 is a reduction).
-  MomentOfInertia moment_of_inertia;  ///< J about the joint.
-  Mass mass;                          ///< For gravity; zero for an arm that is counterbalanced.
-  Length center_of_mass;              ///< Its distance from the joint.
+  DcMotor motor{};
+  double gearing = 1.0;                 ///< Motor turns per arm turn (> 1 is a reduction).
+  MomentOfInertia moment_of_inertia{};  ///< J about the joint.
+  Mass mass{};                          ///< For gravity; zero for an arm that is counterbalanced.
+  Length center_of_mass{};              ///< Its distance from the joint.
 };
 
 /// x = [angle (rad), angular velocity (rad/s)], y = angle, u = voltage (V); zero is horizontal.

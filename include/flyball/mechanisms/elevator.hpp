@@ -7,10 +7,10 @@ namespace flyball::mechanisms {
 
 /// What an elevator is made of.
 struct ElevatorParameters {
-  DcMotor motor;
+  DcMotor motor{};
   double gearing = 1.0;  ///< Motor turns per drum turn (> 1 is a reduction).
-  Mass mass;             ///< The carriage and what it carries.
-  Length drum_radius;
+  Mass mass{};           ///< The carriage and what it carries.
+  Length drum_radius{};
 };
 
 /// x = [position (m), velocity (m/s)], y = position, u = voltage (V).

@@ -7,9 +7,9 @@ namespace flyball::mechanisms {
 
 /// What a flywheel is made of.
 struct FlywheelParameters {
-  DcMotor motor;
-  double gearing = 1.0;               ///< Motor turns per flywheel turn (> 1 is a reduction).
-  MomentOfInertia moment_of_inertia;  ///< J at the flywheel.
+  DcMotor motor{};
+  double gearing = 1.0;                 ///< Motor turns per flywheel turn (> 1 is a reduction).
+  MomentOfInertia moment_of_inertia{};  ///< J at the flywheel.
 };
 
 /// x = y = angular velocity (rad/s), u = voltage (V).

@@ -11,11 +11,11 @@ namespace flyball::mechanisms {
 
 /// The five numbers of a motor's datasheet, for one motor.
 struct MotorDatasheet {
-  Voltage nominal_voltage;
-  Torque stall_torque;
-  Current stall_current;
-  Current free_current;
-  AngularVelocity free_speed;
+  Voltage nominal_voltage{};
+  Torque stall_torque{};
+  Current stall_current{};
+  Current free_current{};
+  AngularVelocity free_speed{};
 };
 
 /// A DC brushed motor (or a brushless one behind its controller), or n of them in one gearbox.
@@ -24,7 +24,7 @@ struct MotorDatasheet {
 /// add torque and current, so R is divided by n while K_t and K_v stay.
 /// Source: book, section 12.1.
 struct DcMotor {
-  std::string name;
+  std::string name{};
   int count = 1;
   double nominal_voltage = 0.0;  ///< V
   double stall_torque = 0.0;     ///< N m, all motors together.

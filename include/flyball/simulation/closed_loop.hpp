@@ -18,10 +18,10 @@ namespace flyball {
 struct RegulatorDesign {
   mechanisms::MechanismKind kind = mechanisms::MechanismKind::flywheel;
   /// Believed gains; kS and gravity are fed forward.
-  mechanisms::FeedforwardGains gains;
+  mechanisms::FeedforwardGains gains{};
   /// Discrete model in volts: states [velocity] (flywheel), [position, velocity], or [position] for
   /// a mechanism that is faster than the period.
-  DiscreteSystem<> plant;
+  DiscreteSystem<> plant{};
   Eigen::MatrixXd K;    ///< 1 x n
   Eigen::MatrixXd K_e;  ///< n x 1, filter form.
   double max_voltage = 12.0;
@@ -29,25 +29,28 @@ struct RegulatorDesign {
   bool feed_forward_gravity = true;
   bool feed_forward_friction = true;
   bool compensate_voltage = true;  ///< (6.23) with the rail voltage measured at each sample.
+  /// Age of a measurement, s. It is moved along the reference to now, y + delay dr/dt, so that a
+  /// late sensor causes no error while the reference moves; the loop itself is not changed.
+  Time measurement_delay{};
 };
 
 /// What the regulator meets.
 struct PlantTruth {
-  mechanisms::FeedforwardGains gains;  ///< True gains.
-  double breakaway = 1.0;              ///< Static over sliding friction.
+  mechanisms::FeedforwardGains gains{};  ///< True gains.
+  double breakaway = 1.0;                ///< Static over sliding friction.
   double motor_resistance = std::numeric_limits<double>::infinity();  ///< Ω, for the battery.
-  Battery battery;
-  SensorModel sensor;          ///< Of the velocity (flywheel), else of the position.
-  Time actuation_delay;        ///< From the sample to the change of the voltage, s.
+  Battery battery{};
+  SensorModel sensor{};        ///< Of the velocity (flywheel), else of the position.
+  Time actuation_delay{};      ///< From the sample to the change of the voltage, s.
   double voltage_noise = 0.0;  ///< V, standard deviation of the applied voltage of each period.
 };
 
 /// A closed loop to simulate.
 struct ClosedLoopJob {
-  RegulatorDesign regulator;
-  PlantTruth truth;
-  std::vector<MotionState> reference;  ///< One a period; a flywheel's is its velocity.
-  MechanismState initial;
+  RegulatorDesign regulator{};
+  PlantTruth truth{};
+  std::vector<MotionState> reference{};  ///< One a period; a flywheel's is its velocity.
+  MechanismState initial{};
   std::uint64_t seed = 1;
 };
 
@@ -58,7 +61,7 @@ struct ClosedLoopResult {
   /// "estimated_velocity" (those that the model has), "voltage" (asked for), "command" (sent),
   /// "motor_voltage" (seen by the motor, mean of the period), "rail_voltage", "current" (A of the
   /// battery, 0 without a motor resistance).
-  TimeSeries series;
+  TimeSeries series{};
   double rms_error = 0.0;           ///< Of the controlled quantity, over all rows.
   double max_error = 0.0;           ///< Its largest magnitude.
   double final_error = 0.0;         ///< Reference less truth at the last row.
@@ -73,22 +76,22 @@ struct ClosedLoopResult {
 
 /// A linear loop without noise, as the book's figures close it.
 struct LinearLoop {
-  DiscreteSystem<> plant;              ///< Truth and model.
-  Eigen::MatrixXd K;                   ///< m x n
-  std::optional<Eigen::MatrixXd> K_e;  ///< n x p, filter form; none feeds the true state back.
+  DiscreteSystem<> plant{};              ///< Truth and model.
+  Eigen::MatrixXd K;                     ///< m x n
+  std::optional<Eigen::MatrixXd> K_e{};  ///< n x p, filter form; none feeds the true state back.
   bool plant_inversion = true;
-  Eigen::VectorXd u_min;
-  Eigen::VectorXd u_max;
-  Eigen::VectorXd x0;  ///< n; empty is zero.
+  Eigen::VectorXd u_min{};
+  Eigen::VectorXd u_max{};
+  Eigen::VectorXd x0{};  ///< n; empty is zero.
 };
 
 /// Trajectories, one column a row of the reference.
 struct LinearTrajectory {
-  Eigen::VectorXd time;   ///< s
-  Eigen::MatrixXd x;      ///< n x samples
-  Eigen::MatrixXd x_hat;  ///< n x samples; x without an observer.
-  Eigen::MatrixXd y;      ///< p x samples
-  Eigen::MatrixXd u;      ///< m x samples
+  Eigen::VectorXd time{};   ///< s
+  Eigen::MatrixXd x;        ///< n x samples
+  Eigen::MatrixXd x_hat{};  ///< n x samples; x without an observer.
+  Eigen::MatrixXd y;        ///< p x samples
+  Eigen::MatrixXd u;        ///< m x samples
 };
 
 /// Each sample: x = A x + B u_previous; the observer predicts with u_previous and corrects with

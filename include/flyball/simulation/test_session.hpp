@@ -39,7 +39,7 @@ struct TestSessionOptions {
   double resolution = 0.0;         ///< unit, encoder step; 0: none.
   double velocity_window = 40e-3;  ///< s, moving average in the velocity; 0: none.
   /// unit/s, standard deviation of the velocity noise; not given: 0.5 % of (step_voltage − kS)/kV.
-  std::optional<double> velocity_noise;
+  std::optional<double> velocity_noise{};
   bool noise_per_row = false;   ///< Noise drawn anew in each row, also where the value repeats.
   double voltage_noise = 0.02;  ///< V, standard deviation of the recorded voltage.
   std::uint64_t seed = 1;

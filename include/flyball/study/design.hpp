@@ -18,29 +18,29 @@ namespace flyball::study {
 struct PlantDescription {
   mechanisms::MechanismKind kind{};
   std::string unit = "rad";  ///< "m" or "rad".
-  mechanisms::FeedforwardGains gains;
-  bool kA_determined = true;                 ///< If not, Theorem 14.3.2 is the plant.
-  double kA_upper_bound = 0.0;               ///< V·s²/unit, if not determined.
-  std::optional<mechanisms::DcMotor> motor;  ///< If known: current and battery sag are simulated.
-  double gearing = 1.0;                      ///< Motor turns per output turn.
-  double drum_radius = 0.0;                  ///< m, elevators with a known drum, else 0.
-  double nominal_voltage = 12.0;             ///< V
+  mechanisms::FeedforwardGains gains{};
+  bool kA_determined = true;                   ///< If not, Theorem 14.3.2 is the plant.
+  double kA_upper_bound = 0.0;                 ///< V·s²/unit, if not determined.
+  std::optional<mechanisms::DcMotor> motor{};  ///< If known: current and battery sag are simulated.
+  double gearing = 1.0;                        ///< Motor turns per output turn.
+  double drum_radius = 0.0;                    ///< m, elevators with a known drum, else 0.
+  double nominal_voltage = 12.0;               ///< V
 };
 
 /// What the controller has to do and what it works with. Empty optionals get a default that the
 /// result's diagnostics tell.
 struct ControllerOptions {
-  double period = 0.020;                ///< s
-  std::vector<double> state_tolerance;  ///< Bryson's largest acceptable errors; empty: chosen.
-  double input_tolerance = 12.0;        ///< V
-  double max_voltage = 12.0;            ///< V, the input's limit.
-  std::optional<double> delay;          ///< s, from sensing to acting; identified or 0 if absent.
+  double period = 0.020;                  ///< s
+  std::vector<double> state_tolerance{};  ///< Bryson's largest acceptable errors; empty: chosen.
+  double input_tolerance = 12.0;          ///< V
+  double max_voltage = 12.0;              ///< V, the input's limit.
+  std::optional<double> delay{};          ///< s, from sensing to acting; identified or 0 if absent.
 };
 
 /// What is measured, per sample, and how far the model is trusted.
 struct EstimatorOptions {
-  std::optional<double> measurement_std;  ///< unit (position) or unit/s (flywheel).
-  std::vector<double> model_std;          ///< Per sample and state; empty: chosen.
+  std::optional<double> measurement_std{};  ///< unit (position) or unit/s (flywheel).
+  std::vector<double> model_std{};          ///< Per sample and state; empty: chosen.
 };
 
 /// The sensor that the simulated loop reads.
@@ -56,9 +56,9 @@ struct BatteryOptions {
 
 /// The reference that the simulated loop follows: a trapezoid from 0 to the goal.
 struct ProfileOptions {
-  std::optional<double> goal;              ///< unit (or unit/s for a flywheel).
-  std::optional<double> max_velocity;      ///< unit/s; the fastest the motor can follow if absent.
-  std::optional<double> max_acceleration;  ///< unit/s²
+  std::optional<double> goal{};          ///< unit (or unit/s for a flywheel).
+  std::optional<double> max_velocity{};  ///< unit/s; the fastest the motor can follow if absent.
+  std::optional<double> max_acceleration{};  ///< unit/s²
 };
 
 /// Design a controller for a mechanism.
@@ -102,13 +102,13 @@ struct MotionLimits {
 
 /// Gains in the unit that other tools want, per output unit named by `per`.
 struct PasteGains {
-  std::string per;  ///< "rad", "m", "rotation", "RPM", …
-  double kP = 0.0;  ///< V/unit (position) or V/(unit/s) (flywheel).
-  double kD = 0.0;  ///< V/(unit/s)
-  double kS = 0.0;  ///< V
-  double kV = 0.0;  ///< V/(unit/s)
-  double kA = 0.0;  ///< V/(unit/s²)
-  double kG = 0.0;  ///< V
+  std::string per{};  ///< "rad", "m", "rotation", "RPM", …
+  double kP = 0.0;    ///< V/unit (position) or V/(unit/s) (flywheel).
+  double kD = 0.0;    ///< V/(unit/s)
+  double kS = 0.0;    ///< V
+  double kV = 0.0;    ///< V/(unit/s)
+  double kA = 0.0;    ///< V/(unit/s²)
+  double kG = 0.0;    ///< V
 };
 
 /// A designed loop: what to implement, how well it holds, how it behaves.
@@ -122,33 +122,33 @@ struct PasteGains {
 /// old, is moved along the reference to now, y + delay dr/dt, so that a moving reference causes no
 /// error; the observer predicts and corrects; u = K_delayed (r - x_hat) + B⁺ (r' - A r) + kS + kG.
 struct DesignResult {
-  DesignJob job;                    ///< As run, with every default filled in.
-  std::vector<std::string> states;  ///< Names with units: "position (m)", …
-  bool velocity_servo = false;      ///< kA is not determined: Theorem 14.3.2 is the plant.
+  DesignJob job;                      ///< As run, with every default filled in.
+  std::vector<std::string> states{};  ///< Names with units: "position (m)", …
+  bool velocity_servo = false;        ///< kA is not determined: Theorem 14.3.2 is the plant.
 
   Eigen::MatrixXd A_continuous, B_continuous;
-  Eigen::MatrixXd A, B, C;      ///< Discrete plant (Theorem 7.3.1) and its output.
-  Eigen::MatrixXd Q, R;         ///< LQR weights (Bryson).
-  Eigen::MatrixXd K;            ///< LQR gain, u = K (r - x).
-  Eigen::MatrixXd K_delayed;    ///< The gain with the delay compensated (B.12); what is used.
-  Eigen::VectorXcd poles;       ///< Closed-loop poles of A - B K.
-  Eigen::MatrixXd kalman_gain;  ///< Filter form (9.22).
-  Eigen::VectorXcd estimator_poles;
-  Eigen::MatrixXd inversion;  ///< B⁺ of the plant inversion u = B⁺ (r' - A r).
+  Eigen::MatrixXd A, B, C;        ///< Discrete plant (Theorem 7.3.1) and its output.
+  Eigen::MatrixXd Q, R;           ///< LQR weights (Bryson).
+  Eigen::MatrixXd K;              ///< LQR gain, u = K (r - x).
+  Eigen::MatrixXd K_delayed;      ///< The gain with the delay compensated (B.12); what is used.
+  Eigen::VectorXcd poles{};       ///< Closed-loop poles of A - B K.
+  Eigen::MatrixXd kalman_gain{};  ///< Filter form (9.22).
+  Eigen::VectorXcd estimator_poles{};
+  Eigen::MatrixXd inversion{};  ///< B⁺ of the plant inversion u = B⁺ (r' - A r).
 
   LoopMargins margins;
-  std::vector<RobustnessPoint> robustness;
+  std::vector<RobustnessPoint> robustness{};
   bool robust = false;  ///< Whether every point of the grid is stable.
   double worst_overshoot = 0.0;
 
   MotionLimits motion;
-  TimeSeries response;  ///< The simulated closed loop: columns in the order of `simulate_loop`.
+  TimeSeries response{};  ///< The simulated closed loop: columns in the order of `simulate_loop`.
   double tracking_error_rms =
       0.0;  ///< unit, of the true position (velocity) against the reference.
   double tracking_error_max = 0.0;
 
-  std::vector<PasteGains> paste;
-  std::vector<Diagnostic> diagnostics;
+  std::vector<PasteGains> paste{};
+  std::vector<Diagnostic> diagnostics{};
 };
 
 /// Runs the job: discretise, LQR by Bryson's rule, delay compensation, steady-state Kalman gain,

@@ -9,7 +9,7 @@ namespace flyball::study {
 
 /// Identify a mechanism from a log.
 struct IdentifyJob {
-  std::string log;  ///< Path.
+  std::string log{};  ///< Path.
   LogSelection selection;
 };
 
@@ -19,7 +19,7 @@ struct IdentifyResult {
   identification::FitReport
       report;  ///< `report.fit` is the gains or the reason why there are none.
   mechanisms::MechanismKind mechanism{};
-  std::string unit;  ///< "m" or "rad".
+  std::string unit{};  ///< "m" or "rad".
 
   /// Everything found while reading, preparing and fitting, in that order.
   [[nodiscard]] std::vector<Diagnostic> diagnostics() const;

@@ -22,9 +22,10 @@ enum class ProjectError {
 /// A TOML project file: the design job it describes. A file that only sets controller options can
 /// accompany a log; then `plant_error` tells what it would need to stand alone.
 struct Project {
-  std::string path;
-  std::optional<Error> plant_error;  ///< Why the file does not define a mechanism, if it does not.
-  std::optional<mechanisms::MechanismKind> mechanism;
+  std::string path{};
+  std::optional<Error>
+      plant_error{};  ///< Why the file does not define a mechanism, if it does not.
+  std::optional<mechanisms::MechanismKind> mechanism{};
   DesignJob job;
 };
 

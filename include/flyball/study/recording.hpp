@@ -16,12 +16,12 @@ namespace flyball::study {
 
 /// What a person may say about a log beyond what it says itself. Empty fields are detected.
 struct LogSelection {
-  std::optional<mechanisms::MechanismKind> mechanism;
-  std::string state_channel;    ///< The channel with the name of the running test.
-  std::string voltage_channel;  ///< Channel names as the log has them.
-  std::string position_channel;
-  std::string velocity_channel;
-  std::string unit;    ///< Unit of the position channel: "rotations", "m", "deg", …
+  std::optional<mechanisms::MechanismKind> mechanism{};
+  std::string state_channel{};    ///< The channel with the name of the running test.
+  std::string voltage_channel{};  ///< Channel names as the log has them.
+  std::string position_channel{};
+  std::string velocity_channel{};
+  std::string unit{};  ///< Unit of the position channel: "rotations", "m", "deg", …
   double scale = 1.0;  ///< Multiplies position and velocity: output units a recorded unit.
 };
 
@@ -39,13 +39,13 @@ enum class RecordingError {
 
 /// A log, read as the characterisation tests of one mechanism.
 struct LoadedRecording {
-  std::string path;
-  std::string format;   ///< "SysId JSON", "WPILOG", "CSV".
-  std::string subject;  ///< The mechanism's name in the log, or empty.
+  std::string path{};
+  std::string format{};   ///< "SysId JSON", "WPILOG", "CSV".
+  std::string subject{};  ///< The mechanism's name in the log, or empty.
   identification::Recording recording;
-  std::vector<Diagnostic> diagnostics;  ///< What was found; assumptions have the code "assumed".
+  std::vector<Diagnostic> diagnostics{};  ///< What was found; assumptions have the code "assumed".
   /// Why the recording can be shown but not identified: a drivetrain's.
-  std::optional<Error> refusal;
+  std::optional<Error> refusal{};
 };
 
 /// Reads a log and finds the tests in it: channels by name, type and unit; runs by the test state;

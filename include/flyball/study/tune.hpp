@@ -14,7 +14,7 @@ struct TuneJob {
 /// Both results. When the fit was refused there is no design; its error is in the identification.
 struct TuneResult {
   IdentifyResult identification;
-  std::optional<Expected<DesignResult>> design;
+  std::optional<Expected<DesignResult>> design{};
 };
 
 /// @errors as `identify`.

@@ -1,0 +1,164 @@
+#include <algorithm>
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "book/figures.hpp"
+#include "commands.hpp"
+#include "console.hpp"
+
+namespace flyball::app {
+
+namespace {
+
+constexpr const char* schema = "flyball.book/1";
+using Json = nlohmann::ordered_json;
+
+struct Options {
+  CommonOptions common;
+  std::vector<std::string> figures;
+  bool list = false;
+  bool check = false;
+};
+
+int list(const Options& options) {
+  if (options.common.json) {
+    Json figures = Json::array();
+    for (const book::FigureEntry& entry : book::figures()) {
+      figures.push_back({{"id", std::string(entry.id)},
+                         {"section", std::string(entry.section)},
+                         {"title", std::string(entry.title)}});
+    }
+    print(Json{{"schema", schema}, {"figures", std::move(figures)}}.dump());
+    return success;
+  }
+  std::string text = fmt::format("{:<8} {:<8} {}\n", "figure", "section", "title");
+  for (const book::FigureEntry& entry : book::figures()) {
+    text += fmt::format("{:<8} {:<8} {}\n", entry.id, entry.section, entry.title);
+  }
+  print(text);
+  return success;
+}
+
+// The checks of the figures that were asked for, or of all.
+Expected<std::vector<book::FigureCheck>> checks_of(const Options& options) {
+  if (options.figures.empty()) {
+    return book::check_figures();
+  }
+  std::vector<book::FigureCheck> checks;
+  for (const std::string& id : options.figures) {
+    auto entry = book::find_figure(id);
+    if (!entry) {
+      return tl::unexpected(std::move(entry).error());
+    }
+    const std::vector<book::FigureCheck> of_figure = book::check_figure((*entry)->id);
+    checks.insert(checks.end(), of_figure.begin(), of_figure.end());
+  }
+  return checks;
+}
+
+int check(const Options& options) {
+  const auto checks = checks_of(options);
+  if (!checks) {
+    return fail(checks.error(), options.common, schema);
+  }
+  const bool passed = std::all_of(checks->begin(), checks->end(),
+                                  [](const book::FigureCheck& c) { return c.passed; });
+  if (options.common.json) {
+    Json list = Json::array();
+    for (const book::FigureCheck& c : *checks) {
+      list.push_back({{"figure", c.figure},
+                      {"name", c.name},
+                      {"values", c.values},
+                      {"worst_error", c.worst_error},
+                      {"tolerance", c.tolerance},
+                      {"passed", c.passed},
+                      {"source", c.source},
+                      {"problem", c.problem}});
+    }
+    print(Json{{"schema", schema}, {"passed", passed}, {"checks", std::move(list)}}.dump());
+  } else {
+    std::string text = fmt::format("{:<7} {:<34} {:>7} {:>12} {:>10}\n", "figure",
+                                   "number or series", "values", "worst error", "tolerance");
+    for (const book::FigureCheck& c : *checks) {
+      text += c.problem.empty()
+                  ? fmt::format("{:<7} {:<34} {:>7} {:>12.2e} {:>10.0e}  {}\n", c.figure, c.name,
+                                c.values, c.worst_error, c.tolerance, c.passed ? "ok" : "WRONG")
+                  : fmt::format("{:<7} {:<34} {}\n", c.figure, c.name, c.problem);
+    }
+    print(text);
+  }
+  return passed ? success : no_answer;
+}
+
+int draw(const Options& options) {
+  const std::string folder = options.common.out.empty() ? "." : options.common.out;
+  Json answers = Json::array();
+  for (const std::string& id : options.figures) {
+    const auto entry = book::find_figure(id);
+    if (!entry) {
+      return fail(entry.error(), options.common, schema);
+    }
+    const auto figure = (*entry)->compute();
+    if (!figure) {
+      return fail(figure.error(), options.common, schema);
+    }
+    const auto files = book::write_figure(*figure, folder);
+    if (!files) {
+      return fail(files.error(), options.common, schema);
+    }
+    Json numbers = Json::object();
+    std::string text = fmt::format("Figure {}: {}\n", figure->id, figure->title);
+    for (const book::FigureNumber& number : figure->numbers) {
+      numbers[number.name] = {{"value", number.value}, {"unit", number.unit}};
+      text += fmt::format("  {} = {:.6g} {}\n", number.name, number.value, number.unit);
+    }
+    for (const std::string& file : *files) {
+      text += fmt::format("  {}\n", file);
+    }
+    if (options.common.json) {
+      answers.push_back({{"id", figure->id},
+                         {"title", figure->title},
+                         {"numbers", std::move(numbers)},
+                         {"files", *files}});
+    } else {
+      print(text);
+    }
+  }
+  if (options.common.json) {
+    print(Json{{"schema", schema}, {"figures", std::move(answers)}}.dump());
+  }
+  return success;
+}
+
+}  // namespace
+
+void add_book_command(CLI::App& program, int& status) {
+  CLI::App* command = program.add_subcommand(
+      "book", "Draw figures of Controls Engineering in FRC, and check them against references");
+  auto options = std::make_shared<Options>();
+  command->add_option("FIGURE", options->figures, "Figures by number, such as 6.3");
+  command->add_flag("--list", options->list, "List the figures that are there");
+  command->add_flag("--check", options->check,
+                    "Compare with reference numbers; exit status 1 if any is off");
+  add_common_options(*command, options->common,
+                     "Write picture (PNG, SVG) and CSV here (this folder if absent)");
+  command->callback([options, &status] {
+    if (options->list) {
+      status = list(*options);
+    } else if (options->check) {
+      status = check(*options);
+    } else if (options->figures.empty()) {
+      status = fail(Error(ArgumentError::empty)
+                        .about("book")
+                        .got("called without a figure")
+                        .expected("a figure's number, --list or --check"),
+                    options->common, schema);
+    } else {
+      status = draw(*options);
+    }
+  });
+}
+
+}  // namespace flyball::app
