@@ -7,6 +7,19 @@
 
 namespace flyball {
 
+Error& Error::operator=(Error&& other) noexcept {
+  if (this != &other) {
+    info_ = other.info_;
+    where_ = std::move(other.where_);
+    subject_ = std::move(other.subject_);
+    expected_ = std::move(other.expected_);
+    got_ = std::move(other.got_);
+    hint_ = std::move(other.hint_);
+    evidence_ = std::move(other.evidence_);
+  }
+  return *this;
+}
+
 Error&& Error::in(std::string where) && {
   where_ = std::move(where);
   return std::move(*this);

@@ -124,5 +124,14 @@ TEST(Diagnostic, SeveritiesHaveTheNamesOfTheSchema) {
   EXPECT_EQ(to_string(Severity::error), "error");
 }
 
+TEST(Error, KeepsItsPartsWhenAssignedToItself) {
+  Error error = Error(ArgumentError::empty).about("R").with("pivot", 0.0);
+  error = std::move(error).in("lqr");
+  EXPECT_EQ(error.where(), "lqr");
+  EXPECT_EQ(error.subject(), "R");
+  ASSERT_EQ(error.evidence().size(), 1u);
+  EXPECT_EQ(error.evidence()[0].name, "pivot");
+}
+
 }  // namespace
 }  // namespace flyball

@@ -53,6 +53,13 @@ class Error {
   template <ErrorEnum E>
   explicit Error(E code) : info_(error_info(code)) {}
 
+  Error(const Error&) = default;
+  Error(Error&&) noexcept = default;
+  Error& operator=(const Error&) = default;
+  /// Safe when both are one: `error = std::move(error).in("lqr")` keeps its text.
+  Error& operator=(Error&& other) noexcept;
+  ~Error() = default;
+
   Error&& in(std::string where) &&;          ///< The function, or "file:line:column".
   Error&& about(std::string subject) &&;     ///< The thing that is wrong.
   Error&& expected(std::string what) &&;     ///< What it must be.
