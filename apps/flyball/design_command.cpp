@@ -21,14 +21,11 @@ struct Options {
   std::string project;
 };
 
-Expected<double> option_quantity(const std::string& text, Dimension dimension, const char* option,
-                                 bool zero_allowed) {
+Expected<double> option_quantity(const std::string& text, Dimension dimension, const char* option) {
   auto value = parse_quantity(text, dimension, option);
-  if (value && !(*value > 0.0 || (zero_allowed && *value == 0.0))) {
-    return tl::unexpected(Error(ArgumentError::not_positive)
-                              .about(option)
-                              .got(text)
-                              .expected(zero_allowed ? "zero or greater" : "greater than zero"));
+  if (value && !(*value >= 0.0)) {
+    return tl::unexpected(
+        Error(ArgumentError::out_of_range).about(option).got(text).expected("zero or greater"));
   }
   return value;
 }
@@ -79,20 +76,19 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
 
 Expected<void> apply(const DesignOptions& options, study::DesignJob& job) {
   const auto set = [](const std::string& text, Dimension dimension, const char* option,
-                      auto&& assign, bool zero_allowed = false) -> Expected<void> {
+                      auto&& assign) -> Expected<void> {
     if (text.empty()) {
       return {};
     }
-    return option_quantity(text, dimension, option, zero_allowed).map(assign);
+    return option_quantity(text, dimension, option).map(assign);
   };
   if (auto period = set(options.period, Dimension::time, "--period",
                         [&](double value) { job.controller.period = value; });
       !period) {
     return period;
   }
-  if (auto delay = set(
-          options.delay, Dimension::time, "--delay",
-          [&](double value) { job.controller.delay = value; }, true);
+  if (auto delay = set(options.delay, Dimension::time, "--delay",
+                       [&](double value) { job.controller.delay = value; });
       !delay) {
     return delay;
   }

@@ -1,11 +1,10 @@
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <vector>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-#include <Eigen/SVD>
-
+#include "math/dense.hpp"
 #include "math/riccati_robust.hpp"
 
 namespace flyball::detail {
@@ -13,7 +12,6 @@ namespace flyball::detail {
 namespace {
 
 using Eigen::Index;
-using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
@@ -33,15 +31,21 @@ Error diagnose_riccati(const RiccatiProblem& p) {
   const double size_A = p.A.norm();
   const double size_B = p.B.norm();
   const double unit = size_B > 0.0 && size_A > 0.0 ? size_A / size_B : 1.0;
-  const Eigen::VectorXcd eigenvalues = p.A.eigenvalues();
+  const Eigen::VectorXcd eigenvalues = eigenvalues_of(p.A);
   for (Index k = 0; k < n; ++k) {
     if (std::abs(eigenvalues(k)) < 1.0 - 1e-7) {
       continue;
     }
-    MatrixXcd pencil(n, n + m);
-    pencil << p.A.cast<std::complex<double>>() - eigenvalues(k) * MatrixXcd::Identity(n, n),
-        (unit * p.B).cast<std::complex<double>>();
-    const double smallest = pencil.jacobiSvd().singularValues()(n - 1);
+    // [Re -Im; Im Re] of the pencil has its singular values, each twice; the last diagonal entry of
+    // the pivoted triangle is the smallest of them but for a factor of order n.
+    MatrixXd pencil = MatrixXd::Zero(2 * (n + m), 2 * n);
+    pencil.block(0, 0, n, n) = p.A.transpose();
+    pencil.block(0, 0, n, n).diagonal().array() -= eigenvalues(k).real();
+    pencil.block(n, 0, m, n) = unit * p.B.transpose();
+    pencil.bottomRightCorner(n + m, n) = pencil.topLeftCorner(n + m, n);
+    pencil.block(n + m, 0, n, n).diagonal().setConstant(-eigenvalues(k).imag());
+    pencil.block(0, n, n, n).diagonal().setConstant(eigenvalues(k).imag());
+    const double smallest = std::abs(pivoted_qr(pencil).R(2 * n - 1, 2 * n - 1));
     if (smallest <= 1e-12 * static_cast<double>(n) * std::max(1.0, size_A)) {
       return Error(RiccatiError::not_stabilizable)
           .in("dare")
@@ -53,7 +57,6 @@ Error diagnose_riccati(const RiccatiProblem& p) {
   }
 
   // det(λM - L) of the pencil without R: the shift keeps its eigenvalues and makes R regular.
-  MatrixXd shift = MatrixXd::Zero(n, n);
   double best = 0.0;
   RiccatiProblem regular;
   for (const double factor : {0.0, 1.0, 0.37, -0.61}) {
@@ -82,28 +85,33 @@ Error diagnose_riccati(const RiccatiProblem& p) {
   MatrixXd rhs(m, 2 * n);
   rhs << regular.B.transpose(), regular.N.transpose();
   const MatrixXd solved = solve_equilibrated(regular.R, rhs, rcond);
+  const MatrixXd BN = product(regular.B, solved);
   MatrixXd L = MatrixXd::Zero(2 * n, 2 * n);
   MatrixXd M = MatrixXd::Zero(2 * n, 2 * n);
-  L.topLeftCorner(n, n) = regular.A - regular.B * solved.rightCols(n);
-  L.bottomLeftCorner(n, n) = -(regular.Q - regular.N * solved.rightCols(n));
+  L.topLeftCorner(n, n) = regular.A - BN.rightCols(n);
+  L.bottomLeftCorner(n, n) = product(regular.N, solved.rightCols(n)) - regular.Q;
   L.bottomRightCorner(n, n).setIdentity();
   M.topLeftCorner(n, n).setIdentity();
-  M.topRightCorner(n, n) = regular.B * solved.leftCols(n);
+  M.topRightCorner(n, n) = BN.leftCols(n);
   M.bottomRightCorner(n, n) = L.topLeftCorner(n, n).transpose();
-  // The Cayley transform w = (λ - 1)/(λ + 1) sends the unit circle to the imaginary axis and
-  // leaves no eigenvalue at infinity but λ = -1.
-  const Eigen::GeneralizedEigenSolver<MatrixXd> pencil(L, M, false);
+  // (L - cM)⁻¹M has the eigenvalues 1/(λ - c), those at infinity included; c is near the unit
+  // circle, whose eigenvalues matter, and not on it.
   double closest = std::numeric_limits<double>::infinity();
   std::complex<double> on_circle;
-  if (pencil.info() == Eigen::Success) {
-    for (Index k = 0; k < 2 * n; ++k) {
-      const std::complex<double> lambda = pencil.alphas()(k) / pencil.betas()(k);
+  for (const double c : {-1.3, 1.7}) {
+    const MatrixXd inverted = solve_linear(L - c * M, M, &rcond);
+    if (!(rcond > epsilon) || !inverted.allFinite()) {
+      continue;
+    }
+    for (const std::complex<double>& mu : eigenvalues_of(inverted)) {
+      const std::complex<double> lambda = c + 1.0 / mu;
       const double distance = std::abs(std::abs(lambda) - 1.0);
       if (distance < closest) {
         closest = distance;
         on_circle = lambda;
       }
     }
+    break;
   }
   if (closest < 1e-5) {
     return Error(RiccatiError::no_stabilizing_solution)

@@ -4,10 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-#include <Eigen/QR>
-
+#include "math/dense.hpp"
 #include "math/double_double.hpp"
 #include "math/riccati_robust.hpp"
 #include "math/stein.hpp"
@@ -43,8 +40,9 @@ std::optional<Reduced> reduce(const RiccatiProblem& p) {
   if (!(rcond > 4.0 * epsilon)) {
     return std::nullopt;
   }
-  Reduced reduced{p.A - p.B * solved.rightCols(n), symmetrized(p.B * solved.leftCols(n)),
-                  symmetrized(p.Q - p.N * solved.rightCols(n))};
+  const MatrixXd BN = product(p.B, solved);
+  Reduced reduced{p.A - BN.rightCols(n), symmetrized(BN.leftCols(n)),
+                  symmetrized(p.Q - product(p.N, solved.rightCols(n)))};
   if (!reduced.A.allFinite() || !reduced.G.allFinite() || !reduced.H.allFinite()) {
     return std::nullopt;
   }
@@ -115,12 +113,15 @@ std::optional<MatrixXd> doubling(Reduced r, int& iterations) {
   const Index n = r.A.rows();
   for (int k = 0; k < 64; ++k) {
     ++iterations;
-    const Eigen::PartialPivLU<MatrixXd> W(MatrixXd::Identity(n, n) + r.G * r.H);
-    const MatrixXd WA = W.solve(r.A);
-    const MatrixXd WG = W.solve(r.G);
-    const MatrixXd dH = symmetrized(r.A.transpose() * (r.H * WA).eval());
-    r.G += symmetrized(r.A * WG * r.A.transpose());
-    r.A = (r.A * WA).eval();
+    MatrixXd W = product(r.G, r.H);
+    W.diagonal().array() += 1.0;
+    MatrixXd AG(n, 2 * n);
+    AG << r.A, r.G;
+    const MatrixXd solved = solve_linear(W, AG);
+    const MatrixXd WA = solved.leftCols(n);
+    const MatrixXd dH = symmetrized(transposed_product(r.A, product(r.H, WA)));
+    r.G += symmetrized(product(product(r.A, solved.rightCols(n)), r.A.transpose()));
+    r.A = product(r.A, WA);
     r.H += dH;
     if (!r.H.allFinite()) {
       return std::nullopt;
@@ -160,25 +161,24 @@ std::optional<MatrixXd> inverse_free(const RiccatiProblem& p, int& iterations) {
     ++iterations;
     MatrixXd stacked(2 * size, size);
     stacked << M, -L;
-    const Eigen::HouseholderQR<MatrixXd> qr(stacked);
-    const MatrixXd U = qr.householderQ();
-    L = (U.topRightCorner(size, size).transpose() * L).eval();
-    M = (U.bottomRightCorner(size, size).transpose() * M).eval();
-    MatrixXd triangle = qr.matrixQR().topRows(size).triangularView<Eigen::Upper>();
+    const OrthogonalTriangular qr = full_qr(stacked);
+    L = transposed_product(qr.Q.topRightCorner(size, size), L);
+    M = transposed_product(qr.Q.bottomRightCorner(size, size), M);
+    MatrixXd triangle = qr.R.topRows(size);
     triangle = triangle.array().colwise() * triangle.diagonal().array().sign();
     if (k > 0 && (triangle - previous).norm() <= 1e-14 * triangle.norm()) {
       break;
     }
     previous = std::move(triangle);
   }
-  const Eigen::FullPivLU<MatrixXd> sum(L + M);
-  if (!sum.isInvertible()) {
+  double rcond = 0.0;
+  const MatrixXd projector = solve_linear(L + M, M, &rcond);
+  if (!(rcond > 4.0 * epsilon)) {
     return std::nullopt;
   }
-  const Eigen::ColPivHouseholderQR<MatrixXd> projector(sum.solve(M));
-  const MatrixXd basis = MatrixXd(projector.householderQ()).leftCols(n);
-  const Eigen::PartialPivLU<MatrixXd> U1(basis.topRows(n).transpose());
-  const MatrixXd X = U1.solve(basis.middleRows(n, n).transpose()).transpose();
+  const MatrixXd basis = pivoted_qr(projector).Q.leftCols(n);
+  const MatrixXd X =
+      solve_linear(basis.topRows(n).transpose(), basis.middleRows(n, n).transpose()).transpose();
   return X.allFinite() ? std::optional<MatrixXd>(symmetrized(X)) : std::nullopt;
 }
 
@@ -193,14 +193,15 @@ struct Evaluation {
 
 Evaluation evaluate(const RiccatiProblem& p, const MatrixXd& X) {
   Evaluation e;
-  const MatrixXd XA = X * p.A;
-  const MatrixXd AXA = p.A.transpose() * XA;
-  const MatrixXd cross = p.B.transpose() * XA + p.N.transpose();
-  e.K = solve_equilibrated(symmetrized(p.R + p.B.transpose() * X * p.B), cross, e.rcond);
-  const MatrixXd feedback = cross.transpose() * e.K;
+  const MatrixXd XA = product(X, p.A);
+  const MatrixXd AXA = transposed_product(p.A, XA);
+  const MatrixXd cross = transposed_product(p.B, XA) + p.N.transpose();
+  e.K = solve_equilibrated(symmetrized(p.R + transposed_product(p.B, product(X, p.B))), cross,
+                           e.rcond);
+  const MatrixXd feedback = transposed_product(cross, e.K);
   e.F = symmetrized(AXA - X - feedback + p.Q);
   e.scale = AXA.norm() + X.norm() + feedback.norm() + p.Q.norm();
-  e.closed_loop = p.A - p.B * e.K;
+  e.closed_loop = p.A - product(p.B, e.K);
   return e;
 }
 
@@ -248,7 +249,7 @@ Evaluation evaluate_in_double_double(const RiccatiProblem& p, const MatrixXd& X)
     SZ.lo = ZS.lo.transpose();
   }
   e.F = symmetrized(add_product(DoubleDoubleMatrix(-X), 1.0, Z, SZ).rounded());
-  e.closed_loop = p.A - p.B * e.K;
+  e.closed_loop = p.A - product(p.B, e.K);
   return e;
 }
 
@@ -309,10 +310,10 @@ std::optional<Refined> refine(const RiccatiProblem& p, const VectorXd& d, Matrix
 }  // namespace
 
 RiccatiProblem shifted(const RiccatiProblem& p, const MatrixXd& X0) {
-  const MatrixXd XA = X0 * p.A;
-  const MatrixXd XB = X0 * p.B;
-  return {p.A, p.B, symmetrized(p.Q + p.A.transpose() * XA - X0),
-          symmetrized(p.R + p.B.transpose() * XB), p.N + p.A.transpose() * XB};
+  const MatrixXd XA = product(X0, p.A);
+  const MatrixXd XB = product(X0, p.B);
+  return {p.A, p.B, symmetrized(p.Q + transposed_product(p.A, XA) - X0),
+          symmetrized(p.R + transposed_product(p.B, XB)), p.N + transposed_product(p.A, XB)};
 }
 
 MatrixXd solve_equilibrated(const MatrixXd& M, const MatrixXd& rhs, double& rcond) {
@@ -326,10 +327,7 @@ MatrixXd solve_equilibrated(const MatrixXd& M, const MatrixXd& rhs, double& rcon
     }
   }
   const MatrixXd scaled = s.asDiagonal() * M * s.asDiagonal();
-  const Eigen::PartialPivLU<MatrixXd> lu(scaled);
-  const double smallest = lu.matrixLU().diagonal().cwiseAbs().minCoeff();
-  rcond = smallest > 0.0 ? lu.rcond() : 0.0;
-  return s.asDiagonal() * lu.solve(s.asDiagonal() * rhs);
+  return s.asDiagonal() * solve_linear(scaled, s.asDiagonal() * rhs, &rcond);
 }
 
 Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem) {
@@ -363,7 +361,7 @@ Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem) 
     }
     const Evaluation& e = refined->evaluation;
     RiccatiSolution solution;
-    solution.poles = e.closed_loop.eigenvalues();
+    solution.poles = eigenvalues_of(e.closed_loop);
     solution.X = inverse.asDiagonal() * refined->X * inverse.asDiagonal();
     solution.K = e.K * inverse.asDiagonal();
     const auto gain = solve_stein(e.closed_loop, MatrixXd::Identity(n, n));
@@ -376,14 +374,17 @@ Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem) 
     // at 1/2 (last_step), or X hangs on the rounding of the data (rounding).
     double rcond = 0.0;
     const MatrixXd G =
-        p.B * solve_equilibrated(p.R + p.B.transpose() * refined->X * p.B, p.B.transpose(), rcond);
+        product(p.B, solve_equilibrated(p.R + transposed_product(p.B, product(refined->X, p.B)),
+                                        p.B.transpose(), rcond));
+    const MatrixXd size_A = p.A.cwiseAbs();
     const MatrixXd size_K = e.K.cwiseAbs();
     const MatrixXd size_X = refined->X.cwiseAbs();
     const auto rounding = solve_stein(
-        e.closed_loop, epsilon * (p.A.cwiseAbs().transpose() * size_X * p.A.cwiseAbs() + size_X +
-                                  p.Q.cwiseAbs() + size_K.transpose() * p.R.cwiseAbs() * size_K));
-    if (!rounding || !(gain->norm() * (G * refined->last_step).norm() < 0.05) ||
-        !(gain->norm() * (G * *rounding).norm() < 0.05)) {
+        e.closed_loop,
+        epsilon * (transposed_product(size_A, product(size_X, size_A)) + size_X + p.Q.cwiseAbs() +
+                   transposed_product(size_K, product(p.R.cwiseAbs(), size_K))));
+    if (!rounding || !(gain->norm() * product(G, refined->last_step).norm() < 0.05) ||
+        !(gain->norm() * product(G, *rounding).norm() < 0.05)) {
       return std::nullopt;
     }
     solution.residual = e.scale > 0.0 ? e.F.norm() / e.scale : 0.0;

@@ -5,6 +5,8 @@
 
 #include <Eigen/Core>
 
+#include "math/dense.hpp"
+
 namespace flyball::detail {
 
 /// X = AᵀXA + C for A inside the unit circle, by the squared Smith iteration
@@ -15,7 +17,7 @@ namespace flyball::detail {
   constexpr double epsilon = std::numeric_limits<double>::epsilon();
   Eigen::MatrixXd X = std::move(C);
   for (int k = 0; k < 52; ++k) {
-    const Eigen::MatrixXd update = A.transpose() * (X * A).eval();
+    const Eigen::MatrixXd update = transposed_product(A, product(X, A));
     X += update;
     if (!X.allFinite()) {
       return std::nullopt;
@@ -24,7 +26,7 @@ namespace flyball::detail {
     if (power * power < 0.25 * epsilon) {
       return X;
     }
-    A = (A * A).eval();
+    A = product(A, A);
   }
   return std::nullopt;
 }

@@ -5,7 +5,6 @@
 
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
-#include <rapidcheck.h>
 
 #include <flyball/core/random.hpp>
 
@@ -138,6 +137,194 @@ TEST(Riccati, RefusesMisuse) {
   EXPECT_TRUE(dare(A, B, nan * Q, R).error().is(ArgumentError::not_finite));
   EXPECT_TRUE(dare(A, B, Q, nan * R).error().is(ArgumentError::not_finite));
   EXPECT_TRUE(dare(A, B, Q, R, nan * B).error().is(ArgumentError::not_finite));
+}
+
+struct Equation {
+  MatrixXd A, B, Q, R, N;
+};
+
+MatrixXd normal(Random& random, Index rows, Index columns) {
+  MatrixXd M(rows, columns);
+  for (double& entry : M.reshaped()) {
+    entry = random.normal();
+  }
+  return M;
+}
+
+/// Stable and unstable systems of up to nine states with a joint weight [Q N; N' R] >= 0.
+Equation random_equation(Random& random) {
+  const auto n = static_cast<Index>(1 + random.bits() % 9);
+  const auto m = static_cast<Index>(1 + random.bits() % static_cast<std::uint64_t>(n));
+  Equation e{normal(random, n, n), normal(random, n, m), {}, {}, {}};
+  e.A *= random.uniform(0.3, 1.6) / e.A.eigenvalues().cwiseAbs().maxCoeff();
+  const MatrixXd C = normal(random, n + m, n + m);
+  const MatrixXd W = C.transpose() * C;
+  e.Q = W.topLeftCorner(n, n);
+  e.R = W.bottomRightCorner(m, m);
+  e.N = random.bits() % 2 == 0 ? MatrixXd(W.topRightCorner(n, m)) : MatrixXd::Zero(n, m);
+  return e;
+}
+
+/// F(X) relative to its terms, by another route than the solver's: Z = [I; -K],
+/// Z'([A B]'X[A B] + [Q N; N' R])Z = X at the solution.
+double relative_residual(const Equation& e, const RiccatiSolution& s) {
+  const MatrixXd closed = e.A - e.B * s.K;
+  const MatrixXd stage = e.Q - e.N * s.K - (e.N * s.K).transpose() + s.K.transpose() * e.R * s.K;
+  const MatrixXd next = closed.transpose() * s.X * closed;
+  return (next + stage - s.X).norm() / (next.norm() + stage.norm() + s.X.norm());
+}
+
+void expect_solved(const Equation& e, const RiccatiSolution& s, double tolerance) {
+  EXPECT_LT(relative_residual(e, s), tolerance);
+  EXPECT_EQ(s.X, s.X.transpose());
+  EXPECT_LT((e.A - e.B * s.K).eigenvalues().cwiseAbs().maxCoeff(), 1.0);
+  EXPECT_LT(s.poles.cwiseAbs().maxCoeff(), 1.0);
+  const MatrixXd Rt = e.R + e.B.transpose() * s.X * e.B;
+  const MatrixXd cross = e.B.transpose() * s.X * e.A + e.N.transpose();
+  EXPECT_LT((Rt * s.K - cross).norm(), tolerance * (Rt.norm() * s.K.norm() + cross.norm()));
+}
+
+TEST(Riccati, RandomSystemsAreSolved) {
+  Random random(1);
+  for (int k = 0; k < 2000; ++k) {
+    SCOPED_TRACE(k);
+    const Equation e = random_equation(random);
+    const auto s = dare(e.A, e.B, e.Q, e.R, e.N);
+    ASSERT_TRUE(s.has_value()) << to_string(s.error());
+    expect_solved(e, *s, 1e-12);
+  }
+}
+
+// x = D z, u = E v: X_z = D X D and K_z = E⁻¹ K D, whatever the units.
+TEST(Riccati, UnitsDoNotMatter) {
+  Random random(2);
+  for (int k = 0; k < 300; ++k) {
+    SCOPED_TRACE(k);
+    const Equation e = random_equation(random);
+    const auto units = [&random](Index count) {
+      Eigen::VectorXd d(count);
+      for (double& entry : d) {
+        entry = std::ldexp(1.0, static_cast<int>(random.bits() % 53) - 26);
+      }
+      return d;
+    };
+    const Eigen::VectorXd d = units(e.A.rows());
+    const Eigen::VectorXd v = units(e.B.cols());
+    const auto plain = dare(e.A, e.B, e.Q, e.R, e.N);
+    const auto scaled = dare(
+        d.cwiseInverse().asDiagonal() * e.A * d.asDiagonal(),
+        d.cwiseInverse().asDiagonal() * e.B * v.asDiagonal(), d.asDiagonal() * e.Q * d.asDiagonal(),
+        v.asDiagonal() * e.R * v.asDiagonal(), d.asDiagonal() * e.N * v.asDiagonal());
+    ASSERT_TRUE(plain.has_value());
+    ASSERT_TRUE(scaled.has_value()) << to_string(scaled.error());
+    const MatrixXd X = d.cwiseInverse().asDiagonal() * scaled->X * d.cwiseInverse().asDiagonal();
+    EXPECT_LT((X - plain->X).norm(), 1e-10 * plain->X.norm());
+  }
+}
+
+// Units as users have them: everything times 1e8 or 1e-8. X scales with the cost.
+TEST(Riccati, CostScalesX) {
+  Random random(3);
+  for (int k = 0; k < 200; ++k) {
+    const Equation e = random_equation(random);
+    const double c = k % 2 == 0 ? 1e8 : 1e-8;
+    const auto plain = dare(e.A, e.B, e.Q, e.R, e.N);
+    const auto scaled = dare(e.A, e.B, c * e.Q, c * e.R, c * e.N);
+    ASSERT_TRUE(plain.has_value() && scaled.has_value());
+    EXPECT_LT((scaled->X - c * plain->X).norm(), 1e-10 * scaled->X.norm());
+    EXPECT_LT((scaled->K - plain->K).norm(), 1e-9 * (1.0 + plain->K.norm()));
+  }
+}
+
+// A rank-deficient R is no obstacle where R + B'XB has an inverse.
+TEST(Riccati, SingularR) {
+  Random random(4);
+  for (int k = 0; k < 300; ++k) {
+    SCOPED_TRACE(k);
+    Equation e = random_equation(random);
+    e.Q += MatrixXd::Identity(e.Q.rows(), e.Q.rows());
+    e.R(0, 0) = 0.0;
+    e.R.row(0).setZero();
+    e.R.col(0).setZero();
+    e.N.setZero();
+    const auto s = dare(e.A, e.B, e.Q, e.R);
+    ASSERT_TRUE(s.has_value()) << to_string(s.error());
+    expect_solved(e, *s, 1e-11);
+  }
+}
+
+// Nearly unreachable modes and indefinite weights: an answer is right or it is not given.
+TEST(Riccati, NeverWrong) {
+  Random random(5);
+  int solved = 0;
+  for (int k = 0; k < 400; ++k) {
+    SCOPED_TRACE(k);
+    Equation e = random_equation(random);
+    if (k % 2 == 0) {
+      e.B.row(0) *= std::pow(10.0, random.uniform(-14.0, 0.0));
+      e.A.row(0).tail(e.A.cols() - 1).setZero();
+      e.N.setZero();
+    } else {
+      e.Q -= random.uniform(0.0, 2.0) * e.Q.trace() / static_cast<double>(e.Q.rows()) *
+             MatrixXd::Identity(e.Q.rows(), e.Q.rows());
+    }
+    const auto s = dare(e.A, e.B, e.Q, e.R, e.N);
+    if (s) {
+      ++solved;
+      expect_solved(e, *s, 1e-9);
+    } else {
+      EXPECT_EQ(s.error().kind(), ErrorKind::no_answer);
+      EXPECT_FALSE(s.error().evidence().empty());
+    }
+  }
+  EXPECT_GT(solved, 200);
+}
+
+template <int States, int Inputs>
+void expect_fixed_is_dynamic() {
+  Random random(6);
+  for (int k = 0; k < 20; ++k) {
+    const Eigen::Matrix<double, States, States> A = normal(random, States, States);
+    const Eigen::Matrix<double, States, Inputs> B = normal(random, States, Inputs);
+    const Eigen::Matrix<double, States, States> Q = A.transpose() * A;
+    const Eigen::Matrix<double, Inputs, Inputs> R =
+        Eigen::Matrix<double, Inputs, Inputs>::Identity();
+    const Eigen::Matrix<double, States, Inputs> N = 0.1 * B;
+    const auto fixed = dare(A, B, Q, R, N);
+    const auto dynamic = dare(MatrixXd(A), MatrixXd(B), MatrixXd(Q), MatrixXd(R), MatrixXd(N));
+    ASSERT_EQ(fixed.has_value(), dynamic.has_value());
+    if (fixed) {
+      EXPECT_EQ(MatrixXd(fixed->X), dynamic->X);
+      EXPECT_EQ(MatrixXd(fixed->K), dynamic->K);
+      EXPECT_EQ(fixed->residual, dynamic->residual);
+      EXPECT_EQ(fixed->iterations, dynamic->iterations);
+    }
+  }
+}
+
+TEST(Riccati, FixedIsDynamic) {
+  expect_fixed_is_dynamic<1, 1>();
+  expect_fixed_is_dynamic<2, 1>();
+  expect_fixed_is_dynamic<2, 2>();
+  expect_fixed_is_dynamic<3, 1>();
+  expect_fixed_is_dynamic<4, 2>();
+  expect_fixed_is_dynamic<5, 2>();
+  expect_fixed_is_dynamic<7, 3>();
+  expect_fixed_is_dynamic<10, 3>();
+}
+
+// Blocks of larger matrices have gaps between their columns; more inputs than states are usual
+// for an overactuated vehicle.
+TEST(Riccati, BlocksAndManyInputs) {
+  Random random(8);
+  const MatrixXd big = normal(random, 12, 12);
+  const MatrixXd Q = MatrixXd::Identity(3, 3);
+  const MatrixXd R = MatrixXd::Identity(5, 5);
+  const auto blocks = dare(big.topLeftCorner(3, 3), big.block(4, 4, 3, 5), Q, R);
+  const auto copies =
+      dare(MatrixXd(big.topLeftCorner(3, 3)), MatrixXd(big.block(4, 4, 3, 5)), Q, R);
+  ASSERT_TRUE(blocks.has_value() && copies.has_value());
+  EXPECT_EQ(blocks->X, copies->X);
 }
 
 }  // namespace

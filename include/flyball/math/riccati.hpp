@@ -1,5 +1,7 @@
 #pragma once
 
+#include <complex>
+
 #include <Eigen/Core>
 
 #include <flyball/core/argument.hpp>
@@ -59,5 +61,71 @@ struct RiccatiSolution {
                                              const MatrixRef& N);
 [[nodiscard]] Expected<RiccatiSolution> dare(const MatrixRef& A, const MatrixRef& B,
                                              const MatrixRef& Q, const MatrixRef& R);
+
+/// RiccatiSolution with its sizes known when compiling; nothing of it is on the heap.
+template <int States, int Inputs>
+struct FixedRiccatiSolution {
+  Eigen::Matrix<double, States, States> X;
+  Eigen::Matrix<double, Inputs, States> K;
+  Eigen::Vector<std::complex<double>, States> poles;
+  double residual = 0.0;
+  double condition = 0.0;
+  int iterations = 0;
+};
+
+namespace detail {
+
+/// An equation and the places for its answer, all column-major without gaps; N may be null.
+struct RiccatiData {
+  int states = 0;
+  int inputs = 0;
+  const double* A = nullptr;
+  const double* B = nullptr;
+  const double* Q = nullptr;
+  const double* R = nullptr;
+  const double* N = nullptr;
+};
+struct RiccatiAnswer {
+  double* X = nullptr;
+  double* K = nullptr;
+  std::complex<double>* poles = nullptr;
+  double residual = 0.0;
+  double condition = 0.0;
+  int iterations = 0;
+};
+[[nodiscard]] Expected<void> solve_riccati(const RiccatiData& data, RiccatiAnswer& answer);
+
+}  // namespace detail
+
+/// The same as the dynamic `dare` through the same compiled kernels, without its allocations: for
+/// a regulator that is designed anew in each step of a loop. Ordinary data of up to ten states
+/// does not allocate; data that needs the careful way does.
+template <int States, int Inputs>
+  requires(States > 0 && Inputs > 0)
+[[nodiscard]] Expected<FixedRiccatiSolution<States, Inputs>> dare(
+    const Eigen::Matrix<double, States, States>& A, const Eigen::Matrix<double, States, Inputs>& B,
+    const Eigen::Matrix<double, States, States>& Q, const Eigen::Matrix<double, Inputs, Inputs>& R,
+    const Eigen::Matrix<double, States, Inputs>& N) {
+  Expected<FixedRiccatiSolution<States, Inputs>> solution;
+  detail::RiccatiAnswer answer{solution->X.data(), solution->K.data(), solution->poles.data()};
+  auto solved = detail::solve_riccati(
+      {States, Inputs, A.data(), B.data(), Q.data(), R.data(), N.data()}, answer);
+  if (!solved) {
+    return tl::unexpected(std::move(solved).error());
+  }
+  solution->residual = answer.residual;
+  solution->condition = answer.condition;
+  solution->iterations = answer.iterations;
+  return solution;
+}
+template <int States, int Inputs>
+  requires(States > 0 && Inputs > 0)
+[[nodiscard]] Expected<FixedRiccatiSolution<States, Inputs>> dare(
+    const Eigen::Matrix<double, States, States>& A, const Eigen::Matrix<double, States, Inputs>& B,
+    const Eigen::Matrix<double, States, States>& Q,
+    const Eigen::Matrix<double, Inputs, Inputs>& R) {
+  const Eigen::Matrix<double, States, Inputs> none = Eigen::Matrix<double, States, Inputs>::Zero();
+  return dare<States, Inputs>(A, B, Q, R, none);
+}
 
 }  // namespace flyball

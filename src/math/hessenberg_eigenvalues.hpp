@@ -1,0 +1,230 @@
+// Compiled once for each instruction set; see small_matrix.hpp.
+
+namespace flyball::detail::FLYBALL_VARIANT {
+
+/// The roots of λ² - trace λ + determinant of a 2x2 block, real ones without cancellation.
+inline void eigenvalues_2x2(double a, double b, double c, double d, std::complex<double>* lambda) {
+  const double p = 0.5 * (a - d);
+  const double discriminant = p * p + b * c;
+  if (discriminant >= 0.0) {
+    const double root = std::sqrt(discriminant);
+    const double z = p >= 0.0 ? p + root : p - root;
+    lambda[0] = d + z;
+    lambda[1] = z != 0.0 ? d - b * c / z : d;
+  } else {
+    const double root = std::sqrt(-discriminant);
+    lambda[0] = {d + p, root};
+    lambda[1] = {d + p, -root};
+  }
+}
+
+/// All eigenvalues of H (n x n, destroyed): reduction to Hessenberg form by stabilised elimination,
+/// then the double-shift QR iteration on the active block only (Martin, Peters and Wilkinson,
+/// Numerische Mathematik 14 (1970): elmhes and hqr). False where 30 iterations an eigenvalue do not
+/// suffice.
+template <int N>
+inline bool eigenvalues(Size<N> size, double* H, std::complex<double>* lambda) {
+  const int n = size();
+  const int ld = size.padded();
+  const auto h = [H, ld](int i, int j) -> double& { return H[i + j * ld]; };
+  if (n == 1) {
+    lambda[0] = H[0];
+    return true;
+  }
+  if (n == 2) {
+    eigenvalues_2x2(h(0, 0), h(0, 1), h(1, 0), h(1, 1), lambda);
+    return true;
+  }
+
+  for (int m = 1; m < n - 1; ++m) {
+    int pivot = m;
+    double largest = 0.0;
+    for (int i = m; i < n; ++i) {
+      if (std::abs(h(i, m - 1)) > largest) {
+        largest = std::abs(h(i, m - 1));
+        pivot = i;
+      }
+    }
+    if (largest == 0.0) {
+      continue;
+    }
+    if (pivot != m) {
+      for (int j = m - 1; j < n; ++j) {
+        std::swap(h(pivot, j), h(m, j));
+      }
+      for (int i = 0; i < n; ++i) {
+        std::swap(h(i, pivot), h(i, m));
+      }
+    }
+    const double inverse = 1.0 / h(m, m - 1);
+    for (int i = m + 1; i < n; ++i) {
+      h(i, m - 1) *= inverse;  // the multipliers, kept where the zeros belong
+    }
+    const double* y = &h(0, m - 1);
+    for (int j = m; j < n; ++j) {
+      const double head = h(m, j);
+      double* column = &h(0, j);
+      for (int i = m + 1; i < n; ++i) {
+        column[i] -= y[i] * head;
+      }
+    }
+    double* target = &h(0, m);
+    for (int k = m + 1; k < n; ++k) {
+      const double factor = y[k];
+      const double* column = &h(0, k);
+      for (int i = 0; i < n; ++i) {
+        target[i] += factor * column[i];
+      }
+    }
+    for (int i = m + 1; i < n; ++i) {
+      h(i, m - 1) = 0.0;
+    }
+  }
+
+  constexpr double epsilon = std::numeric_limits<double>::epsilon();
+  double norm = 0.0;
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i <= std::min(j + 1, n - 1); ++i) {
+      norm += std::abs(h(i, j));
+    }
+  }
+  int end = n - 1;
+  double shift = 0.0;
+  int iteration = 0;
+  while (end >= 0) {
+    int low = end;
+    for (; low > 0; --low) {
+      double size_here = std::abs(h(low - 1, low - 1)) + std::abs(h(low, low));
+      if (size_here == 0.0) {
+        size_here = norm;
+      }
+      if (std::abs(h(low, low - 1)) <= epsilon * size_here) {
+        h(low, low - 1) = 0.0;
+        break;
+      }
+    }
+    double x = h(end, end);
+    if (low == end) {
+      lambda[end--] = x + shift;
+      iteration = 0;
+      continue;
+    }
+    double y = h(end - 1, end - 1);
+    double w = h(end, end - 1) * h(end - 1, end);
+    if (low == end - 1) {
+      eigenvalues_2x2(y + shift, h(end - 1, end), h(end, end - 1), x + shift, lambda + end - 1);
+      end -= 2;
+      iteration = 0;
+      continue;
+    }
+    if (iteration == 30) {
+      return false;
+    }
+    if (iteration == 10 || iteration == 20) {
+      shift += x;
+      for (int i = 0; i <= end; ++i) {
+        h(i, i) -= x;
+      }
+      const double s = std::abs(h(end, end - 1)) + std::abs(h(end - 1, end - 2));
+      x = y = 0.75 * s;
+      w = -0.4375 * s * s;
+    }
+    ++iteration;
+    // Two consecutive small subdiagonals let the sweep start below `low`.
+    int m = end - 2;
+    double p = 0.0;
+    double q = 0.0;
+    double r = 0.0;
+    for (;; --m) {
+      const double z = h(m, m);
+      const double rr = x - z;
+      const double ss = y - z;
+      p = (rr * ss - w) / h(m + 1, m) + h(m, m + 1);
+      q = h(m + 1, m + 1) - z - rr - ss;
+      r = h(m + 2, m + 1);
+      const double s = std::abs(p) + std::abs(q) + std::abs(r);
+      p /= s;
+      q /= s;
+      r /= s;
+      if (m == low) {
+        break;
+      }
+      const double u = std::abs(h(m, m - 1)) * (std::abs(q) + std::abs(r));
+      const double v =
+          std::abs(p) * (std::abs(h(m - 1, m - 1)) + std::abs(z) + std::abs(h(m + 1, m + 1)));
+      if (u <= epsilon * v) {
+        break;
+      }
+    }
+    for (int i = m + 2; i <= end; ++i) {
+      h(i, i - 2) = 0.0;
+      if (i > m + 2) {
+        h(i, i - 3) = 0.0;
+      }
+    }
+    for (int k = m; k < end; ++k) {
+      const bool last = k == end - 1;
+      if (k != m) {
+        p = h(k, k - 1);
+        q = h(k + 1, k - 1);
+        r = last ? 0.0 : h(k + 2, k - 1);
+        x = std::abs(p) + std::abs(q) + std::abs(r);
+        if (x == 0.0) {
+          continue;
+        }
+        p /= x;
+        q /= x;
+        r /= x;
+      }
+      const double s = std::copysign(std::sqrt(p * p + q * q + r * r), p);
+      if (k == m) {
+        if (low != m) {
+          h(k, k - 1) = -h(k, k - 1);
+        }
+      } else {
+        h(k, k - 1) = -s * x;
+      }
+      p += s;
+      x = p / s;
+      y = q / s;
+      const double z = r / s;
+      q /= p;
+      r /= p;
+      if (last) {
+        for (int j = k; j <= end; ++j) {
+          const double t = h(k, j) + q * h(k + 1, j);
+          h(k, j) -= t * x;
+          h(k + 1, j) -= t * y;
+        }
+        double* c0 = &h(0, k);
+        double* c1 = &h(0, k + 1);
+        for (int i = low; i <= end; ++i) {
+          const double t = x * c0[i] + y * c1[i];
+          c0[i] -= t;
+          c1[i] -= t * q;
+        }
+      } else {
+        for (int j = k; j <= end; ++j) {
+          double* column = &h(k, j);
+          const double t = column[0] + q * column[1] + r * column[2];
+          column[0] -= t * x;
+          column[1] -= t * y;
+          column[2] -= t * z;
+        }
+        const int stop = std::min(end, k + 3);
+        double* c0 = &h(0, k);
+        double* c1 = &h(0, k + 1);
+        double* c2 = &h(0, k + 2);
+        for (int i = low; i <= stop; ++i) {
+          const double t = x * c0[i] + y * c1[i] + z * c2[i];
+          c0[i] -= t;
+          c1[i] -= t * q;
+          c2[i] -= t * r;
+        }
+      }
+    }
+  }
+  return true;
+}
+
+}  // namespace flyball::detail::FLYBALL_VARIANT

@@ -1,0 +1,205 @@
+// Compiled once for each instruction set, in its own namespace (see riccati_kernel_body.hpp), so
+// without `#pragma once`: dense kernels on raw column-major arrays whose rows are padded with zeros
+// to a whole number of vectors. Free of Eigen, whose types change their layout with the vectors.
+
+namespace flyball::detail::FLYBALL_VARIANT {
+
+/// A size that is known when compiling (N > 0) or not (N = 0).
+template <int N>
+struct Size {
+  int runtime;
+  constexpr int operator()() const { return N > 0 ? N : runtime; }
+  /// Rows of storage: even below three, else a multiple of four.
+  constexpr int padded() const { return (*this)() <= 2 ? 2 : (((*this)() + 3) / 4) * 4; }
+};
+
+using Vector2 = double __attribute__((vector_size(16), aligned(8), may_alias));
+using Vector4 = double __attribute__((vector_size(32), aligned(8), may_alias));
+
+enum class Product { assign, add, subtract };
+
+/// One tile of C: Blocks vectors high, Columns wide.
+template <class Vector, int Blocks, int Columns, Product Kind>
+inline __attribute__((always_inline)) void product_tile(double* C, std::ptrdiff_t ldc,
+                                                        const double* A, std::ptrdiff_t lda,
+                                                        const double* B, std::ptrdiff_t ldb,
+                                                        std::ptrdiff_t depth) {
+  constexpr int width = sizeof(Vector) / sizeof(double);
+  Vector sum[Blocks][Columns];
+#pragma GCC unroll 8
+  for (int b = 0; b < Blocks; ++b) {
+#pragma GCC unroll 8
+    for (int j = 0; j < Columns; ++j) {
+      sum[b][j] = Vector{};
+    }
+  }
+  for (std::ptrdiff_t k = 0; k < depth; ++k) {
+#pragma GCC unroll 8
+    for (int b = 0; b < Blocks; ++b) {
+      const Vector a = *reinterpret_cast<const Vector*>(A + k * lda + b * width);
+#pragma GCC unroll 8
+      for (int j = 0; j < Columns; ++j) {
+        sum[b][j] += a * B[k + j * ldb];
+      }
+    }
+  }
+#pragma GCC unroll 8
+  for (int j = 0; j < Columns; ++j) {
+#pragma GCC unroll 8
+    for (int b = 0; b < Blocks; ++b) {
+      Vector* c = reinterpret_cast<Vector*>(C + j * ldc + b * width);
+      if constexpr (Kind == Product::assign) {
+        *c = sum[b][j];
+      } else if constexpr (Kind == Product::add) {
+        *c += sum[b][j];
+      } else {
+        *c -= sum[b][j];
+      }
+    }
+  }
+}
+
+template <class Vector, int Blocks, Product Kind>
+inline void product_strip(double* C, std::ptrdiff_t ldc, const double* A, std::ptrdiff_t lda,
+                          const double* B, std::ptrdiff_t ldb, std::ptrdiff_t depth,
+                          std::ptrdiff_t columns) {
+  for (std::ptrdiff_t left = columns / 4; left > 0; --left) {
+    product_tile<Vector, Blocks, 4, Kind>(C, ldc, A, lda, B, ldb, depth);
+    C += 4 * ldc;
+    B += 4 * ldb;
+  }
+  for (std::ptrdiff_t left = columns % 4; left > 0; --left) {
+    product_tile<Vector, Blocks, 1, Kind>(C, ldc, A, lda, B, ldb, depth);
+    C += ldc;
+    B += ldb;
+  }
+}
+
+/// C (padded rows x columns) = or += or -= A (padded rows x depth) B (depth x columns).
+/// With `Lower`, tiles that lie wholly above the diagonal are left alone.
+template <int N, Product Kind = Product::assign, bool Lower = false>
+inline void multiply(Size<N> n, double* C, std::ptrdiff_t ldc, const double* A, std::ptrdiff_t lda,
+                     const double* B, std::ptrdiff_t ldb, std::ptrdiff_t depth,
+                     std::ptrdiff_t columns) {
+  const std::ptrdiff_t rows = n.padded();
+  if (rows == 2) {
+    product_strip<Vector2, 1, Kind>(C, ldc, A, lda, B, ldb, depth, columns);
+    return;
+  }
+  std::ptrdiff_t i = 0;
+  for (; i + 8 <= rows; i += 8) {
+    const std::ptrdiff_t end = Lower && i + 8 < columns ? i + 8 : columns;
+    product_strip<Vector4, 2, Kind>(C + i, ldc, A + i, lda, B, ldb, depth, end);
+  }
+  if (i < rows) {
+    const std::ptrdiff_t end = Lower && i + 4 < columns ? i + 4 : columns;
+    product_strip<Vector4, 1, Kind>(C + i, ldc, A + i, lda, B, ldb, depth, end);
+  }
+}
+
+template <int N>
+inline void transpose(Size<N> n, double* T, const double* A) {
+  const int ld = n.padded();
+  for (int j = 0; j < n(); ++j) {
+    for (int i = 0; i < n(); ++i) {
+      T[i + j * ld] = A[j + i * ld];
+    }
+  }
+}
+
+/// Copies the lower triangle over the upper one.
+template <int N>
+inline void mirror(Size<N> n, double* S) {
+  const int ld = n.padded();
+  for (int j = 1; j < n(); ++j) {
+    for (int i = 0; i < j; ++i) {
+      S[i + j * ld] = S[j + i * ld];
+    }
+  }
+}
+
+template <int N>
+inline double squared_norm(Size<N> n, const double* M, int columns) {
+  const int count = n.padded() * columns;
+  double sum = 0.0;
+  for (int k = 0; k < count; ++k) {
+    sum += M[k] * M[k];
+  }
+  return sum;
+}
+
+/// M ← M⁻¹ by Gauss-Jordan elimination with row pivoting; false where a pivot vanishes.
+template <int N>
+inline bool invert(Size<N> size, double* M, int* pivots) {
+  const int n = size();
+  const int ld = size.padded();
+  if (n == 1) {
+    M[0] = 1.0 / M[0];
+    return std::isfinite(M[0]);
+  }
+  if (n == 2) {
+    const double determinant = M[0] * M[3] - M[1] * M[2];
+    const double inverse = 1.0 / determinant;
+    const double first = M[0];
+    M[0] = M[3] * inverse;
+    M[3] = first * inverse;
+    M[1] *= -inverse;
+    M[2] *= -inverse;
+    return std::isfinite(inverse);
+  }
+  for (int k = 0; k < n; ++k) {
+    int pivot = k;
+    double largest = std::abs(M[k + k * ld]);
+    for (int i = k + 1; i < n; ++i) {
+      const double candidate = std::abs(M[i + k * ld]);
+      if (candidate > largest) {
+        largest = candidate;
+        pivot = i;
+      }
+    }
+    pivots[k] = pivot;
+    if (pivot != k) {
+      for (int j = 0; j < n; ++j) {
+        const double held = M[k + j * ld];
+        M[k + j * ld] = M[pivot + j * ld];
+        M[pivot + j * ld] = held;
+      }
+    }
+    double* column = M + k * ld;
+    const double inverse = 1.0 / column[k];
+    if (!std::isfinite(inverse)) {
+      return false;
+    }
+    // The other rows lose column k's multiples of row k; row k itself is divided by the pivot.
+    for (int i = 0; i < ld; ++i) {
+      column[i] *= -inverse;
+    }
+    column[k] = 0.0;
+    for (int j = 0; j < n; ++j) {
+      if (j == k) {
+        continue;
+      }
+      double* other = M + j * ld;
+      const double factor = other[k];
+      for (int i = 0; i < ld; ++i) {
+        other[i] += column[i] * factor;
+      }
+      other[k] = factor * inverse;
+    }
+    column[k] = inverse;
+  }
+  for (int k = n - 1; k >= 0; --k) {
+    if (pivots[k] != k) {
+      double* a = M + k * ld;
+      double* b = M + pivots[k] * ld;
+      for (int i = 0; i < ld; ++i) {
+        const double held = a[i];
+        a[i] = b[i];
+        b[i] = held;
+      }
+    }
+  }
+  return true;
+}
+
+}  // namespace flyball::detail::FLYBALL_VARIANT
