@@ -21,6 +21,7 @@ enum class PlotError {
 };
 [[nodiscard]] ErrorInfo error_info(PlotError code);
 
+/// How a curve is drawn.
 enum class LineStyle { solid, dashed, points, steps, crosses, circles };
 
 /// One curve of a panel.
@@ -57,6 +58,7 @@ struct PlotPanel {
   bool log_y = false;
 };
 
+/// A picture of one or more panels above each other.
 struct Plot {
   std::string title = {};
   std::string x_label = {};  ///< With its unit: "Time (s)".
@@ -89,6 +91,9 @@ struct PolePlotGroup {
   std::vector<std::complex<double>> poles = {};
   std::vector<std::complex<double>> zeros = {};
 };
+/// A pole map.
+/// @param groups  Each with a colour and a legend of its own. @param discrete  Draws the unit
+/// circle.
 [[nodiscard]] Plot pole_plot(std::string title, const std::vector<PolePlotGroup>& groups,
                              bool discrete);
 
