@@ -1,3 +1,5 @@
+#pragma once
+
 // Compiled once for each instruction set; see small_matrix.hpp.
 
 namespace flyball::detail::FLYBALL_VARIANT {

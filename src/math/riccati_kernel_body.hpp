@@ -1,3 +1,5 @@
+#pragma once
+
 // The kernel of riccati_kernel.hpp for one instruction set: the including source has chosen
 // FLYBALL_VARIANT and included what stands in the standard library.
 
