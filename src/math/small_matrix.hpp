@@ -1,8 +1,8 @@
 #pragma once
 
-// Compiled once for each instruction set, in its own namespace (see riccati_kernel_body.hpp), so
-// without `#pragma once`: dense kernels on raw column-major arrays whose rows are padded with zeros
-// to a whole number of vectors. Free of Eigen, whose types change their layout with the vectors.
+// Compiled once for each instruction set, in its own namespace (see riccati_kernel_body.hpp): dense
+// kernels on raw column-major arrays whose rows are padded with zeros to a whole number of vectors.
+// Free of Eigen, whose types change their layout with the vectors.
 
 namespace flyball::detail::FLYBALL_VARIANT {
 
