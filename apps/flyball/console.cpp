@@ -72,9 +72,13 @@ int fail(const Error& error, const CommonOptions& options, const std::string& sc
   if (options.json) {
     print(study::to_json(error, schema));
   }
+  tell(error);
+  return exit_status(error);
+}
+
+void tell(const Error& error) {
   std::fflush(stdout);
   std::fprintf(stderr, "flyball: %s\n", to_string(error).c_str());
-  return exit_status(error);
 }
 
 std::optional<std::string> report_folder(const CommonOptions& options, bool by_default) {

@@ -50,6 +50,9 @@ int fail(const Error& error, const CommonOptions& options, const std::string& sc
 [[nodiscard]] std::optional<std::string> report_folder(const CommonOptions& options,
                                                        bool by_default);
 
+/// An error's words on standard error.
+void tell(const Error& error);
+
 /// Words for a report that could not be written where nobody asked for it.
 void warn(const std::string& text);
 

@@ -21,11 +21,14 @@ struct Options {
   std::string project;
 };
 
-Expected<double> option_quantity(const std::string& text, Dimension dimension, const char* option) {
+Expected<double> option_quantity(const std::string& text, Dimension dimension, const char* option,
+                                 bool zero_allowed) {
   auto value = parse_quantity(text, dimension, option);
-  if (value && !(*value >= 0.0)) {
-    return tl::unexpected(
-        Error(ArgumentError::out_of_range).about(option).got(text).expected("zero or greater"));
+  if (value && !(*value > 0.0 || (zero_allowed && *value == 0.0))) {
+    return tl::unexpected(Error(ArgumentError::not_positive)
+                              .about(option)
+                              .got(text)
+                              .expected(zero_allowed ? "zero or greater" : "greater than zero"));
   }
   return value;
 }
@@ -76,19 +79,20 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
 
 Expected<void> apply(const DesignOptions& options, study::DesignJob& job) {
   const auto set = [](const std::string& text, Dimension dimension, const char* option,
-                      auto&& assign) -> Expected<void> {
+                      auto&& assign, bool zero_allowed = false) -> Expected<void> {
     if (text.empty()) {
       return {};
     }
-    return option_quantity(text, dimension, option).map(assign);
+    return option_quantity(text, dimension, option, zero_allowed).map(assign);
   };
   if (auto period = set(options.period, Dimension::time, "--period",
                         [&](double value) { job.controller.period = value; });
       !period) {
     return period;
   }
-  if (auto delay = set(options.delay, Dimension::time, "--delay",
-                       [&](double value) { job.controller.delay = value; });
+  if (auto delay = set(
+          options.delay, Dimension::time, "--delay",
+          [&](double value) { job.controller.delay = value; }, true);
       !delay) {
     return delay;
   }

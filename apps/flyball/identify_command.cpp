@@ -38,7 +38,7 @@ int run(const Options& options) {
                             : report::to_terminal(*result, terminal_style(), written));
   if (!result->report.fit) {
     const Error& refusal = result->report.fit.error();
-    warn(to_string(refusal));
+    tell(refusal);
     return exit_status(refusal);
   }
   return success;

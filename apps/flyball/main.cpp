@@ -1,12 +1,42 @@
+#include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <flyball/core/text.hpp>
 #include <flyball/core/version.hpp>
 
 #include "commands.hpp"
 #include "console.hpp"
+
+namespace {
+
+// CLI11 answers a mistyped command with "a subcommand is required"; this names the nearest one.
+std::string unknown_command(const CLI::App& program, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') {
+    return {};
+  }
+  std::vector<std::string_view> names;
+  for (const CLI::App* command : program.get_subcommands({})) {
+    names.push_back(command->get_name());
+  }
+  const std::string_view wanted = argv[1];
+  if (std::find(names.begin(), names.end(), wanted) != names.end()) {
+    return {};
+  }
+  const std::string nearest = flyball::nearest_name(wanted, names);
+  return fmt::format("\"{}\" is not a command; {}", wanted,
+                     nearest.empty() ? fmt::format("commands are {}", fmt::join(names, ", "))
+                                     : fmt::format("did you mean \"{}\"?", nearest));
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   CLI::App program{
@@ -35,6 +65,10 @@ int main(int argc, char** argv) {
   flyball::app::add_motors_command(program, status);
   flyball::app::add_book_command(program, status);
 
+  if (const std::string unknown = unknown_command(program, argc, argv); !unknown.empty()) {
+    std::fprintf(stderr, "flyball: %s\n", unknown.c_str());
+    return flyball::app::bad_input;
+  }
   try {
     program.parse(argc, argv);
   } catch (const CLI::Success& answer) {

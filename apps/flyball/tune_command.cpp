@@ -69,7 +69,7 @@ int run(const Options& options) {
   print(options.common.json ? study::to_json(*result)
                             : report::to_terminal(*result, terminal_style(), written));
   if (const Error* refusal = refusal_of(*result)) {
-    warn(to_string(*refusal));
+    tell(*refusal);
     return exit_status(*refusal);
   }
   return success;

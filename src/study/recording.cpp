@@ -289,11 +289,18 @@ Expected<LoadedRecording> recording_from_log(const Log& log, const LogSelection&
   auto result = log.sysid ? from_sysid_json(log, selection, std::move(loaded))
                           : from_channels(log, selection, std::move(loaded));
   if (result && !result->refusal && !result->recording.mechanism) {
-    return tl::unexpected(Error(RecordingError::mechanism_unknown)
-                              .in(log.source)
-                              .about("mechanism")
-                              .got("not told by the log")
-                              .hint("say it with --mechanism flywheel, elevator or arm"));
+    Error error = Error(RecordingError::mechanism_unknown)
+                      .in(log.source)
+                      .about("mechanism")
+                      .got("not told by the log")
+                      .hint("say it with --mechanism flywheel, elevator or arm");
+    // A log that was cut short often lost the key that says it.
+    for (const Diagnostic& diagnostic : log.diagnostics) {
+      if (diagnostic.severity != Severity::info) {
+        error = std::move(error).with(diagnostic.code, diagnostic.message);
+      }
+    }
+    return tl::unexpected(std::move(error));
   }
   return result;
 }

@@ -105,4 +105,7 @@ Expected<Eigen::MatrixXd> discretize(const MeasurementDensity& density, Time per
   return density.R / period.si();
 }
 
+template Expected<DiscreteSystem<1, 1, 1>> discretize(const ContinuousSystem<1, 1, 1>&, Time);
+template Expected<DiscreteSystem<2, 1, 1>> discretize(const ContinuousSystem<2, 1, 1>&, Time);
+
 }  // namespace flyball

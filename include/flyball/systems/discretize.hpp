@@ -33,6 +33,12 @@ template <int States, int Inputs, int Outputs>
   });
 }
 
+// The common sizes are compiled once, in the library.
+extern template Expected<DiscreteSystem<1, 1, 1>> discretize(const ContinuousSystem<1, 1, 1>&,
+                                                             Time);
+extern template Expected<DiscreteSystem<2, 1, 1>> discretize(const ContinuousSystem<2, 1, 1>&,
+                                                             Time);
+
 /// A process noise's spectral density, (state unit)²·s: continuous white noise dx/dt = A x + w with
 /// E[w(t) w(τ)ᵀ] = Q δ(t - τ). A type of its own, because a per-sample covariance must not be
 /// discretised again.
