@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-#include <Eigen/QR>
-
 #include <flyball/control/feedforward.tpp>
+
+#include "math/dense.hpp"
 
 namespace flyball {
 
@@ -20,8 +20,7 @@ Expected<Eigen::MatrixXd> pseudo_inverse(const MatrixRef& B) {
   if (auto finite = check_finite(B, where, "B"); !finite) {
     return tl::unexpected(finite.error());
   }
-  return Eigen::MatrixXd(
-      Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>(B).pseudoInverse());
+  return detail::solve_least_squares(B, Eigen::MatrixXd::Identity(B.rows(), B.rows()));
 }
 
 SimpleFeedforward::SimpleFeedforward(mechanisms::MechanismKind kind,

@@ -5,9 +5,8 @@
 #include <numbers>
 #include <optional>
 
-#include <Eigen/Eigenvalues>
-
 #include "control/sampled_loop.hpp"
+#include "math/dense.hpp"
 
 namespace flyball {
 
@@ -94,7 +93,7 @@ std::vector<double> first_grid(const SampledLoop& loop) {
     if (M.rows() == 0) {
       return;
     }
-    for (const Complex& pole : M.eigenvalues()) {
+    for (const Complex& pole : detail::eigenvalues_of(M)) {
       const double angle = std::abs(std::arg(pole));
       const double width = std::abs(std::log(std::max(std::abs(pole), 1e-3)));
       for (int k = -4; k <= 3; ++k) {

@@ -2,12 +2,12 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/LU>
 #include <fmt/format.h>
 
 #include <flyball/control/margins.hpp>
 
 #include "control/sampled_loop.hpp"
+#include "math/dense.hpp"
 
 namespace flyball {
 
@@ -32,7 +32,7 @@ StepResponse step_response(const detail::SampledLoop& loop, const Eigen::MatrixX
 
   const Eigen::Index n = loop.plant_states();
   const Eigen::MatrixXd I_M = Eigen::MatrixXd::Identity(M.rows(), M.cols()) - M;
-  const Eigen::VectorXd settled = I_M.partialPivLu().solve(drive);
+  const Eigen::VectorXd settled = detail::solve_linear(I_M, drive);
   const double final_value = output.dot(settled.head(n));
 
   // Until what is left of the transient is below 1e-9, within reason.

@@ -1,19 +1,17 @@
 #include <cmath>
 #include <numbers>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-
 #include <flyball/systems/input_delay.hpp>
 
 #include "control/sampled_loop.hpp"
+#include "math/dense.hpp"
 
 namespace flyball {
 
 namespace detail {
 
 double spectral_radius(const Eigen::MatrixXd& M) {
-  return M.size() == 0 ? 0.0 : M.eigenvalues().cwiseAbs().maxCoeff();
+  return M.size() == 0 ? 0.0 : eigenvalues_of(M).cwiseAbs().maxCoeff();
 }
 
 Expected<void> check_loop(const PlantInputLoop& loop, std::string_view where) {
@@ -74,16 +72,19 @@ std::complex<double> SampledLoop::response(double theta) const {
   const Complex z = nyquist ? Complex(-1.0) : std::polar(1.0, theta);
   const Complex delay = nyquist ? Complex(std::fmod(whole_delays_, 2.0) == 0.0 ? 1.0 : -1.0)
                                 : std::polar(1.0, -theta * whole_delays_);
-  const auto resolvent = [&](const Eigen::MatrixXd& M, const Eigen::MatrixXcd& right) {
+  const auto resolvent = [&](const Eigen::MatrixXd& M, const Eigen::VectorXcd& right) {
     Eigen::MatrixXcd zI_M = -M.cast<Complex>();
     zI_M.diagonal().array() += z;
-    return Eigen::MatrixXcd(zI_M.partialPivLu().solve(right));
+    return Eigen::VectorXcd(solve_complex(zI_M, right));
   };
-  const Eigen::MatrixXcd u = B_0_.cast<Complex>() + B_1_.cast<Complex>() / z;
-  const Eigen::MatrixXcd y = C_.cast<Complex>() * resolvent(A_, u);
-  Complex v = (D_c_.cast<Complex>() * y)(0, 0);
+  const auto times = [](const Eigen::MatrixXd& M, const Eigen::VectorXcd& right) {
+    return Eigen::VectorXcd(M.cast<Complex>().lazyProduct(right));
+  };
+  const Eigen::VectorXcd u = B_0_.cast<Complex>() + B_1_.cast<Complex>() / z;
+  const Eigen::VectorXcd y = times(C_, resolvent(A_, u));
+  Complex v = times(D_c_, y)(0);
   if (A_c_.rows() > 0) {
-    v += (C_c_.cast<Complex>() * resolvent(A_c_, B_c_.cast<Complex>() * y))(0, 0);
+    v += times(C_c_, resolvent(A_c_, times(B_c_, y)))(0);
   }
   return v * delay;
 }

@@ -2,9 +2,9 @@
 
 #include <string>
 
-#include <Eigen/Cholesky>
-
 #include <flyball/math/riccati.hpp>
+
+#include "math/dense.hpp"
 
 namespace flyball {
 
@@ -47,7 +47,7 @@ Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const
   const Eigen::MatrixXd& P = dual->X;
   const Eigen::MatrixXd S = C * P * C.transpose() + noise_R;
   // L = A K is the dual's gain; K itself does not need an inverse of A.
-  const Eigen::MatrixXd K = S.ldlt().solve(C * P).transpose();
+  const Eigen::MatrixXd K = detail::solve_symmetric(S, C * P).transpose();
   const Eigen::MatrixXd I_KC = Eigen::MatrixXd::Identity(n, n) - K * C;
   KalmanGain<> gain;
   gain.K = K;

@@ -1,11 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
 #include "identification/robust_fit.hpp"
 #include "identification/soft_loss.hpp"
 #include "identification/statistics.hpp"
+#include "math/dense.hpp"
 
 namespace flyball::identification {
 namespace {
@@ -116,7 +115,7 @@ RobustFit minimize(OutputErrorProblem& problem, const Eigen::VectorXd& start,
     const Eigen::VectorXd gradient = equations.gradient(active);
     const Eigen::VectorXd diagonal = hessian.diagonal();
     hessian.diagonal() += damping * diagonal;
-    const Eigen::VectorXd step = hessian.ldlt().solve(-gradient);
+    const Eigen::VectorXd step = detail::solve_symmetric(hessian, -gradient);
     Eigen::VectorXd trial = fit.x;
     for (Eigen::Index i = 0; i < n; ++i) {
       trial[active[static_cast<std::size_t>(i)]] += std::isfinite(step[i]) ? step[i] : 0.0;

@@ -2,13 +2,13 @@
 #include <cmath>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include <flyball/identification/identification_error.hpp>
 
 #include "identification/start.hpp"
 #include "identification/statistics.hpp"
+#include "math/dense.hpp"
 
 namespace flyball::identification {
 namespace {
@@ -73,8 +73,8 @@ Expected<StartGains> regress_gains(const PreparedRecording& recording) {
     // A ridge far below the data keeps absent regressors (no gravity, no acceleration) at zero.
     const double ridge = 1e-9 * normal.trace();
     normal.diagonal().array() += ridge;
-    gains =
-        normal.ldlt().solve(rows.regressors.transpose() * (weights.asDiagonal() * rows.voltage));
+    gains = detail::solve_symmetric(
+        normal, rows.regressors.transpose() * (weights.asDiagonal() * rows.voltage));
     const Eigen::VectorXd residuals = rows.voltage - rows.regressors * gains;
     const double scale =
         std::max(1e-6, mad_scale({residuals.data(), static_cast<std::size_t>(residuals.size())}));

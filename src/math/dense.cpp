@@ -1,6 +1,6 @@
-#include <algorithm>
+#include <cmath>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/QR>
 
@@ -8,6 +8,7 @@
 
 namespace flyball::detail {
 
+using Eigen::Index;
 using Eigen::MatrixXd;
 
 MatrixXd product(const MatrixRef& A, const MatrixRef& B) {
@@ -22,6 +23,16 @@ MatrixXd transposed_product(const MatrixRef& A, const MatrixRef& B) {
   return C;
 }
 
+MatrixXd product_transposed(const MatrixRef& A, const MatrixRef& B) {
+  MatrixXd C(A.rows(), B.rows());
+  C.noalias() = A * B.transpose();
+  return C;
+}
+
+MatrixXd symmetrized(const MatrixRef& M) {
+  return 0.5 * (M + M.transpose());
+}
+
 MatrixXd solve_linear(const MatrixRef& A, const MatrixRef& B, double* rcond) {
   const Eigen::PartialPivLU<MatrixXd> lu(A);
   if (rcond != nullptr) {
@@ -31,8 +42,20 @@ MatrixXd solve_linear(const MatrixRef& A, const MatrixRef& B, double* rcond) {
   return lu.solve(B);
 }
 
-Eigen::VectorXcd eigenvalues_of(const MatrixRef& A) {
-  return Eigen::EigenSolver<MatrixXd>(A, false).eigenvalues();
+MatrixXd solve_symmetric(const MatrixRef& A, const MatrixRef& B) {
+  return A.ldlt().solve(B);
+}
+
+MatrixXd solve_least_squares(const MatrixRef& A, const MatrixRef& B) {
+  return A.completeOrthogonalDecomposition().solve(B);
+}
+
+std::optional<MatrixXd> cholesky_of(const MatrixRef& S) {
+  const Eigen::LLT<MatrixXd> llt(S);
+  if (llt.info() != Eigen::Success) {
+    return std::nullopt;
+  }
+  return MatrixXd(llt.matrixL());
 }
 
 OrthogonalTriangular full_qr(const MatrixRef& A) {
@@ -43,6 +66,39 @@ OrthogonalTriangular full_qr(const MatrixRef& A) {
 OrthogonalTriangular pivoted_qr(const MatrixRef& A) {
   const Eigen::ColPivHouseholderQR<MatrixXd> qr(A);
   return {qr.householderQ(), qr.matrixQR().triangularView<Eigen::Upper>()};
+}
+
+Eigen::VectorXd balance_of(const MatrixRef& A) {
+  const Index n = A.rows();
+  Eigen::VectorXd d = Eigen::VectorXd::Ones(n);
+  MatrixXd M = A.cwiseAbs();
+  for (int sweep = 0; sweep < 20; ++sweep) {
+    bool changed = false;
+    for (Index i = 0; i < n; ++i) {
+      const double column = M.col(i).sum() - M(i, i);
+      const double row = M.row(i).sum() - M(i, i);
+      if (column <= 0.0 || row <= 0.0 || !std::isfinite(column + row)) {
+        continue;
+      }
+      const int exponent = static_cast<int>(std::lround(0.5 * std::log2(row / column)));
+      const double f = std::ldexp(1.0, exponent);
+      if (exponent == 0 || column * f + row / f > 0.95 * (column + row)) {
+        continue;
+      }
+      d(i) *= f;
+      M.col(i) *= f;
+      M.row(i) /= f;
+      changed = true;
+    }
+    if (!changed) {
+      break;
+    }
+  }
+  return norm1(M) < norm1(A) ? d : Eigen::VectorXd::Ones(n);
+}
+
+double norm1(const MatrixRef& A) {
+  return A.size() == 0 ? 0.0 : A.cwiseAbs().colwise().sum().maxCoeff();
 }
 
 }  // namespace flyball::detail

@@ -38,6 +38,8 @@ inline bool eigenvalues(Size<N> size, double* H, std::complex<double>* lambda) {
     return true;
   }
 
+  // The multipliers of one elimination, in memory that is written last: 2n doubles, at least `ld`.
+  double* const multipliers = reinterpret_cast<double*>(lambda);
   for (int m = 1; m < n - 1; ++m) {
     int pivot = m;
     double largest = 0.0;
@@ -59,27 +61,23 @@ inline bool eigenvalues(Size<N> size, double* H, std::complex<double>* lambda) {
       }
     }
     const double inverse = 1.0 / h(m, m - 1);
-    for (int i = m + 1; i < n; ++i) {
-      h(i, m - 1) *= inverse;  // the multipliers, kept where the zeros belong
-    }
-    const double* y = &h(0, m - 1);
-    for (int j = m; j < n; ++j) {
-      const double head = h(m, j);
-      double* column = &h(0, j);
-      for (int i = m + 1; i < n; ++i) {
-        column[i] -= y[i] * head;
-      }
-    }
-    double* target = &h(0, m);
-    for (int k = m + 1; k < n; ++k) {
-      const double factor = y[k];
-      const double* column = &h(0, k);
-      for (int i = 0; i < n; ++i) {
-        target[i] += factor * column[i];
-      }
+    for (int i = 0; i < ld; ++i) {
+      multipliers[i] = i > m && i < n ? h(i, m - 1) * inverse : 0.0;
     }
     for (int i = m + 1; i < n; ++i) {
       h(i, m - 1) = 0.0;
+    }
+    for (int j = m; j < n; ++j) {
+      const double head = h(m, j);
+      for (int i = m / 4 * 4; i < ld; i += 4) {
+        *reinterpret_cast<Vector4*>(&h(i, j)) -= load4(multipliers + i) * head;
+      }
+    }
+    for (int k = m + 1; k < n; ++k) {
+      const double factor = multipliers[k];
+      for (int i = 0; i < ld; i += 4) {
+        *reinterpret_cast<Vector4*>(&h(i, m)) += load4(&h(i, k)) * factor;
+      }
     }
   }
 
@@ -164,46 +162,54 @@ inline bool eigenvalues(Size<N> size, double* H, std::complex<double>* lambda) {
         h(i, i - 3) = 0.0;
       }
     }
+    // Whole vectors of rows: those above `low` and below `end` belong to other blocks, whose
+    // eigenvalues do not depend on these columns; the others below the bulge are zero.
+    const int first = low / 4 * 4;
     for (int k = m; k < end; ++k) {
       const bool last = k == end - 1;
+      double scale = 1.0;
       if (k != m) {
         p = h(k, k - 1);
         q = h(k + 1, k - 1);
         r = last ? 0.0 : h(k + 2, k - 1);
-        x = std::abs(p) + std::abs(q) + std::abs(r);
-        if (x == 0.0) {
+      }
+      double square = p * p + q * q + r * r;
+      if (!(square > 1e-280 && square < 1e280)) {
+        scale = std::abs(p) + std::abs(q) + std::abs(r);
+        if (!(scale > 0.0)) {
           continue;
         }
-        p /= x;
-        q /= x;
-        r /= x;
+        p /= scale;
+        q /= scale;
+        r /= scale;
+        square = p * p + q * q + r * r;
       }
-      const double s = std::copysign(std::sqrt(p * p + q * q + r * r), p);
-      if (k == m) {
-        if (low != m) {
-          h(k, k - 1) = -h(k, k - 1);
-        }
-      } else {
-        h(k, k - 1) = -s * x;
+      const double s = std::copysign(std::sqrt(square), p);
+      if (k != m) {
+        h(k, k - 1) = -s * scale;
+      } else if (low != m) {
+        h(k, k - 1) = -h(k, k - 1);
       }
       p += s;
-      x = p / s;
-      y = q / s;
-      const double z = r / s;
-      q /= p;
-      r /= p;
+      const double inverse_s = 1.0 / s;
+      const double inverse_p = 1.0 / p;
+      x = p * inverse_s;
+      y = q * inverse_s;
+      const double z = r * inverse_s;
+      q *= inverse_p;
+      r *= inverse_p;
       if (last) {
         for (int j = k; j <= end; ++j) {
           const double t = h(k, j) + q * h(k + 1, j);
           h(k, j) -= t * x;
           h(k + 1, j) -= t * y;
         }
-        double* c0 = &h(0, k);
-        double* c1 = &h(0, k + 1);
-        for (int i = low; i <= end; ++i) {
-          const double t = x * c0[i] + y * c1[i];
-          c0[i] -= t;
-          c1[i] -= t * q;
+        for (int i = first; i <= end; i += 4) {
+          Vector4& c0 = *reinterpret_cast<Vector4*>(&h(i, k));
+          Vector4& c1 = *reinterpret_cast<Vector4*>(&h(i, k + 1));
+          const Vector4 t = x * c0 + y * c1;
+          c0 -= t;
+          c1 -= t * q;
         }
       } else {
         for (int j = k; j <= end; ++j) {
@@ -214,14 +220,14 @@ inline bool eigenvalues(Size<N> size, double* H, std::complex<double>* lambda) {
           column[2] -= t * z;
         }
         const int stop = std::min(end, k + 3);
-        double* c0 = &h(0, k);
-        double* c1 = &h(0, k + 1);
-        double* c2 = &h(0, k + 2);
-        for (int i = low; i <= stop; ++i) {
-          const double t = x * c0[i] + y * c1[i] + z * c2[i];
-          c0[i] -= t;
-          c1[i] -= t * q;
-          c2[i] -= t * r;
+        for (int i = first; i <= stop; i += 4) {
+          Vector4& c0 = *reinterpret_cast<Vector4*>(&h(i, k));
+          Vector4& c1 = *reinterpret_cast<Vector4*>(&h(i, k + 1));
+          Vector4& c2 = *reinterpret_cast<Vector4*>(&h(i, k + 2));
+          const Vector4 t = x * c0 + y * c1 + z * c2;
+          c0 -= t;
+          c1 -= t * q;
+          c2 -= t * r;
         }
       }
     }

@@ -5,8 +5,7 @@
 #include <limits>
 #include <span>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
+#include "math/dense.hpp"
 
 namespace flyball {
 
@@ -16,9 +15,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-double norm1(const MatrixXd& M) {
-  return M.cwiseAbs().colwise().sum().maxCoeff();
-}
+using detail::norm1;
+using detail::product;
 
 /// (e^x - e^y) / (x - y), for any distance of x and y.
 double divided_difference(double x, double y) {
@@ -70,37 +68,6 @@ MatrixXd expm_2x2(const MatrixXd& A) {
   return E;
 }
 
-/// Powers of two d such that row and column sums of diag(d)⁻¹ A diag(d) are close (Osborne;
-/// LAPACK's xGEBAL without its permutations). All ones where that does not lower the norm.
-VectorXd balance(const MatrixXd& A) {
-  const Index n = A.rows();
-  VectorXd d = VectorXd::Ones(n);
-  MatrixXd M = A.cwiseAbs();
-  for (int sweep = 0; sweep < 20; ++sweep) {
-    bool changed = false;
-    for (Index i = 0; i < n; ++i) {
-      const double column = M.col(i).sum() - M(i, i);
-      const double row = M.row(i).sum() - M(i, i);
-      if (column <= 0.0 || row <= 0.0 || !std::isfinite(column + row)) {
-        continue;
-      }
-      const int exponent = static_cast<int>(std::lround(0.5 * std::log2(row / column)));
-      const double f = std::ldexp(1.0, exponent);
-      if (exponent == 0 || column * f + row / f > 0.95 * (column + row)) {
-        continue;
-      }
-      d(i) *= f;
-      M.col(i) *= f;
-      M.row(i) /= f;
-      changed = true;
-    }
-    if (!changed) {
-      break;
-    }
-  }
-  return norm1(M) < norm1(A.cwiseAbs()) ? d : VectorXd::Ones(n);
-}
-
 /// Extra squarings that the rounding of the order-m approximant asks for (Al-Mohy and Higham,
 /// equation 3.11 and 5.1): ‖ |A|^(2m+1) ‖₁ is exact by products of |A| with a vector.
 int extra_squarings(const MatrixXd& A, int m) {
@@ -130,7 +97,7 @@ int extra_squarings(const MatrixXd& A, int m) {
 
 /// (V - U)⁻¹ (V + U) with the odd part U and the even part V of the Padé numerator.
 MatrixXd pade_quotient(const MatrixXd& U, const MatrixXd& V) {
-  return (V - U).partialPivLu().solve(V + U);
+  return detail::solve_linear(V - U, V + U);
 }
 
 /// Order 3, 5, 7, 9: coefficients b₀ … b_m, powers[k] = A^(2k).
@@ -142,7 +109,7 @@ MatrixXd pade_low(const MatrixXd& A, std::span<const double> b, std::span<const 
     even += b[2 * k] * powers[k];
     odd += b[2 * k + 1] * powers[k];
   }
-  return pade_quotient(A * odd, even);
+  return pade_quotient(product(A, odd), even);
 }
 
 MatrixXd pade_13(const MatrixXd& A, const MatrixXd& A2, const MatrixXd& A4, const MatrixXd& A6) {
@@ -161,10 +128,10 @@ MatrixXd pade_13(const MatrixXd& A, const MatrixXd& A2, const MatrixXd& A4, cons
                                      182.0,
                                      1.0};
   const MatrixXd I = MatrixXd::Identity(A.rows(), A.cols());
-  const MatrixXd U = A * (A6 * (b[13] * A6 + b[11] * A4 + b[9] * A2) + b[7] * A6 + b[5] * A4 +
-                          b[3] * A2 + b[1] * I);
-  const MatrixXd V =
-      A6 * (b[12] * A6 + b[10] * A4 + b[8] * A2) + b[6] * A6 + b[4] * A4 + b[2] * A2 + b[0] * I;
+  const MatrixXd U = product(A, product(A6, b[13] * A6 + b[11] * A4 + b[9] * A2) + b[7] * A6 +
+                                    b[5] * A4 + b[3] * A2 + b[1] * I);
+  const MatrixXd V = product(A6, b[12] * A6 + b[10] * A4 + b[8] * A2) + b[6] * A6 + b[4] * A4 +
+                     b[2] * A2 + b[0] * I;
   return pade_quotient(U, V);
 }
 
@@ -201,9 +168,9 @@ MatrixXd scaling_and_squaring(MatrixXd A, bool triangular) {
   A *= std::ldexp(1.0, -prescale);
 
   std::array<MatrixXd, 5> powers;
-  powers[1] = A * A;
-  powers[2] = powers[1] * powers[1];
-  powers[3] = powers[1] * powers[2];
+  powers[1] = product(A, A);
+  powers[2] = product(powers[1], powers[1]);
+  powers[3] = product(powers[1], powers[2]);
   const double d4 = std::pow(norm1(powers[2]), 1.0 / 4.0);
   const double d6 = std::pow(norm1(powers[3]), 1.0 / 6.0);
   int squarings = prescale;
@@ -217,7 +184,7 @@ MatrixXd scaling_and_squaring(MatrixXd A, bool triangular) {
     }
   }
   if (E.size() == 0) {
-    powers[4] = powers[2] * powers[2];
+    powers[4] = product(powers[2], powers[2]);
     const double d8 = std::pow(norm1(powers[4]), 1.0 / 8.0);
     const double eta3 = std::max(d6, d8);
     if (prescale == 0 && eta3 <= theta7 && extra_squarings(A, 7) == 0) {
@@ -225,7 +192,7 @@ MatrixXd scaling_and_squaring(MatrixXd A, bool triangular) {
     } else if (prescale == 0 && eta3 <= theta9 && extra_squarings(A, 9) == 0) {
       E = pade_low(A, b9, powers);
     } else {
-      const double d10 = std::pow(norm1(powers[2] * powers[3]), 1.0 / 10.0);
+      const double d10 = std::pow(norm1(product(powers[2], powers[3])), 1.0 / 10.0);
       const double eta5 = std::min(eta3, std::max(d8, d10));
       int s = eta5 > 0.0 ? std::max(0, static_cast<int>(std::ceil(std::log2(eta5 / theta13)))) : 0;
       s += extra_squarings(std::ldexp(1.0, -s) * A, 13);
@@ -239,7 +206,7 @@ MatrixXd scaling_and_squaring(MatrixXd A, bool triangular) {
     restore_diagonals(original, squarings, E);
   }
   for (int k = squarings - 1; k >= 0; --k) {
-    E = E * E;
+    E = product(E, E);
     if (triangular) {
       restore_diagonals(original, k, E);
     }
@@ -286,14 +253,14 @@ Expected<MatrixXd> expm(const MatrixRef& A) {
   } else if (is_upper_triangular(A.transpose())) {
     E = scaling_and_squaring(A.transpose(), true).transpose();
   } else {
-    const VectorXd d = balance(A);
+    const VectorXd d = detail::balance_of(A);
     E = d.asDiagonal() *
         scaling_and_squaring(d.cwiseInverse().asDiagonal() * A * d.asDiagonal(), false) *
         d.cwiseInverse().asDiagonal();
   }
   if (!E.allFinite()) {
     const double scale = std::max(1.0, A.cwiseAbs().maxCoeff());
-    const double abscissa = (A / scale).eval().eigenvalues().real().maxCoeff() * scale;
+    const double abscissa = detail::eigenvalues_of(A / scale).real().maxCoeff() * scale;
     return tl::unexpected(Error(MatrixExponentialError::overflow)
                               .in("expm")
                               .about("exp(A)")

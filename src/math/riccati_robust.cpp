@@ -19,10 +19,6 @@ using Eigen::VectorXd;
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
-MatrixXd symmetrized(const MatrixXd& M) {
-  return 0.5 * (M + M.transpose());
-}
-
 /// A₀ = A - B R⁻¹Nᵀ, G₀ = B R⁻¹Bᵀ, H₀ = Q - N R⁻¹Nᵀ: the equation without N and R,
 /// H = Q₀ + A₀ᵀH(I + G₀H)⁻¹A₀.
 struct Reduced {

@@ -120,11 +120,30 @@ inline void mirror(Size<N> n, double* S) {
   }
 }
 
+inline const Vector4& load4(const double* from) {
+  return *reinterpret_cast<const Vector4*>(from);
+}
+
+/// Sum of squares over whole columns, padding (zeros) included.
 template <int N>
 inline double squared_norm(Size<N> n, const double* M, int columns) {
   const int count = n.padded() * columns;
   double sum = 0.0;
-  for (int k = 0; k < count; ++k) {
+  int k = 0;
+  if (n.padded() > 2) {
+    // Four independent sums: a single one would wait for every addition.
+    Vector4 even{};
+    Vector4 odd{};
+    for (; k + 8 <= count; k += 8) {
+      const Vector4 a = load4(M + k);
+      const Vector4 b = load4(M + k + 4);
+      even += a * a;
+      odd += b * b;
+    }
+    even += odd;
+    sum = (even[0] + even[2]) + (even[1] + even[3]);
+  }
+  for (; k < count; ++k) {
     sum += M[k] * M[k];
   }
   return sum;
@@ -150,13 +169,17 @@ inline bool invert(Size<N> size, double* M, int* pivots) {
     return std::isfinite(inverse);
   }
   for (int k = 0; k < n; ++k) {
+    double* column = M + k * ld;
+    double largest = 0.0;
+    for (int i = k; i < n; ++i) {
+      largest = std::max(largest, std::abs(column[i]));
+    }
+    // The diagonal serves while it is not much smaller: few rows move, and the residual of the
+    // result is checked in the end.
     int pivot = k;
-    double largest = std::abs(M[k + k * ld]);
-    for (int i = k + 1; i < n; ++i) {
-      const double candidate = std::abs(M[i + k * ld]);
-      if (candidate > largest) {
-        largest = candidate;
-        pivot = i;
+    if (!(std::abs(column[k]) >= 0.25 * largest)) {
+      while (pivot + 1 < n && std::abs(column[pivot]) != largest) {
+        ++pivot;
       }
     }
     pivots[k] = pivot;
@@ -167,7 +190,6 @@ inline bool invert(Size<N> size, double* M, int* pivots) {
         M[pivot + j * ld] = held;
       }
     }
-    double* column = M + k * ld;
     const double inverse = 1.0 / column[k];
     if (!std::isfinite(inverse)) {
       return false;
@@ -177,16 +199,19 @@ inline bool invert(Size<N> size, double* M, int* pivots) {
       column[i] *= -inverse;
     }
     column[k] = 0.0;
-    for (int j = 0; j < n; ++j) {
-      if (j == k) {
-        continue;
-      }
+    const auto eliminate = [=](int j) {
       double* other = M + j * ld;
       const double factor = other[k];
-      for (int i = 0; i < ld; ++i) {
-        other[i] += column[i] * factor;
+      for (int i = 0; i < ld; i += 4) {
+        *reinterpret_cast<Vector4*>(other + i) += load4(column + i) * factor;
       }
       other[k] = factor * inverse;
+    };
+    for (int j = 0; j < k; ++j) {
+      eliminate(j);
+    }
+    for (int j = k + 1; j < n; ++j) {
+      eliminate(j);
     }
     column[k] = inverse;
   }

@@ -12,6 +12,7 @@
 #include <flyball/control/latency.hpp>
 #include <flyball/control/lqr.hpp>
 #include <flyball/estimation/kalman_gain.hpp>
+#include <flyball/math/matrix_function.hpp>
 #include <flyball/mechanisms/arm.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/mechanisms/flywheel.hpp>
@@ -293,7 +294,7 @@ Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
   loop.poles = regulator->poles;
 
   auto delayed = compensate_latency(loop.K, plant.A, plant.B, plant.period, delay);
-  if (!delayed && delayed.error().is(LatencyError::no_real_power)) {
+  if (!delayed && delayed.error().is(MatrixFunctionError::no_real_power)) {
     // A closed-loop pole on the negative real axis has no real fractional power.
     loop.whole_periods = true;
     const Time whole(std::round(delay.si() / plant.period.si()) * plant.period.si());

@@ -3,7 +3,7 @@
 #include <complex>
 #include <string>
 
-#include <Eigen/Eigenvalues>
+#include "math/dense.hpp"
 
 namespace flyball {
 
@@ -47,15 +47,15 @@ Expected<Eigen::VectorXcd> poles(const MatrixRef& A) {
   if (auto finite = check_finite(A, "poles", "A"); !finite) {
     return tl::unexpected(finite.error());
   }
-  const Eigen::EigenSolver<Eigen::MatrixXd> solver(A, false);
-  if (solver.info() != Eigen::Success) {
+  Eigen::VectorXcd eigenvalues = detail::eigenvalues_of(A);
+  if (!eigenvalues.allFinite()) {
     return tl::unexpected(Error(ArgumentError::malformed)
                               .in("poles")
                               .about("A")
                               .got("a matrix on which the QR iteration did not converge")
                               .hint("scale its rows and columns to like magnitudes"));
   }
-  return solver.eigenvalues();
+  return eigenvalues;
 }
 
 bool is_stable_continuous(const Eigen::VectorXcd& poles) noexcept {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <flyball/control/lqr.hpp>
-#include <flyball/core/random.hpp>
+#include <flyball/math/matrix_function.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/systems/discretize.hpp>
 
@@ -14,80 +14,6 @@ namespace flyball {
 namespace {
 
 using namespace flyball::literals;
-
-// [[a, b], [0, d]]^p has (a^p - d^p)/(a - d) b above its diagonal.
-TEST(MatrixPower, TriangularInClosedForm) {
-  Eigen::Matrix2d M;
-  M << 0.9, 0.3, 0.0, 0.2;
-  for (const double p : {0.5, 0.25, 2.5, 7.3}) {
-    Eigen::Matrix2d expected;
-    expected << std::pow(0.9, p), 0.3 * (std::pow(0.9, p) - std::pow(0.2, p)) / 0.7, 0.0,
-        std::pow(0.2, p);
-    EXPECT_LT((matrix_power(M, p).value() - expected).norm(), 1e-14) << p;
-  }
-}
-
-// A Jordan block: [[a, 1], [0, a]]^p = [[a^p, p a^{p-1}], [0, a^p]]; it has no eigenvector basis,
-// where the book's diagonalisation gives up.
-TEST(MatrixPower, DefectiveMatrix) {
-  Eigen::Matrix2d M;
-  M << 0.64, 1.0, 0.0, 0.64;
-  const Eigen::MatrixXd root = matrix_power(M, 0.5).value();
-  EXPECT_NEAR(root(0, 0), 0.8, 1e-14);
-  EXPECT_NEAR(root(0, 1), 0.5 / 0.8, 1e-13);
-  EXPECT_NEAR(root(1, 0), 0.0, 1e-15);
-}
-
-// A rotation by θ to the power p is the rotation by pθ (complex poles).
-TEST(MatrixPower, Rotation) {
-  const double angle = 2.0;
-  Eigen::Matrix2d M;
-  M << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
-  const Eigen::MatrixXd third = matrix_power(M, 1.0 / 3.0).value();
-  EXPECT_NEAR(third(0, 0), std::cos(angle / 3.0), 1e-14);
-  EXPECT_NEAR(third(1, 0), std::sin(angle / 3.0), 1e-14);
-}
-
-// M^p M^q = M^{p+q}, and whole powers are products.
-TEST(MatrixPower, AddsExponents) {
-  Random random(6);
-  for (int trial = 0; trial < 30; ++trial) {
-    const Eigen::Index n = 1 + trial % 5;
-    const Eigen::MatrixXd G = Eigen::MatrixXd::NullaryExpr(n, n, [&] { return random.normal(); });
-    // Eigenvalues to the right of the imaginary axis have every principal power.
-    const Eigen::MatrixXd M = G * 0.2 + Eigen::MatrixXd::Identity(n, n);
-    const double p = random.uniform(0.0, 2.0);
-    const double q = random.uniform(0.0, 2.0);
-    const Eigen::MatrixXd sum = matrix_power(M, p + q).value();
-    EXPECT_LT((matrix_power(M, p).value() * matrix_power(M, q).value() - sum).norm(),
-              1e-12 * (1.0 + sum.norm()));
-    EXPECT_LT((matrix_power(M, 3.0).value() - M * M * M).norm(), 1e-13 * (M * M * M).norm());
-    EXPECT_EQ(matrix_power(M, 0.0).value(), Eigen::MatrixXd::Identity(n, n));
-  }
-}
-
-// A simple eigenvalue zero (a deadbeat pole) is no obstacle; a defective one is.
-TEST(MatrixPower, ZeroEigenvalues) {
-  const Eigen::Matrix2d simple = Eigen::Vector2d(0.25, 0.0).asDiagonal();
-  const Eigen::MatrixXd root = matrix_power(simple, 0.5).value();
-  EXPECT_NEAR(root(0, 0), 0.5, 1e-15);
-  EXPECT_EQ(root(1, 1), 0.0);
-  Eigen::Matrix2d nilpotent;
-  nilpotent << 0.0, 1.0, 0.0, 0.0;
-  EXPECT_TRUE(matrix_power(nilpotent, 0.5).error().is(LatencyError::no_real_power));
-  EXPECT_TRUE(matrix_power(nilpotent, 2.0).value().isZero(0.0));
-  EXPECT_TRUE(matrix_power(Eigen::Matrix2d::Zero(), 0.5).value().isZero(0.0));
-}
-
-TEST(MatrixPower, NamesTheNegativeEigenvalue) {
-  const Eigen::Matrix2d M = Eigen::Vector2d(0.5, -0.3).asDiagonal();
-  const auto power = matrix_power(M, 1.5);
-  ASSERT_FALSE(power.has_value());
-  EXPECT_TRUE(power.error().is(LatencyError::no_real_power));
-  EXPECT_EQ(power.error().kind(), ErrorKind::no_answer);
-  EXPECT_NEAR(power.error().evidence().front().values.front(), -0.3, 1e-15);
-  EXPECT_NEAR(matrix_power(M, 3.0).value()(1, 1), -0.027, 1e-17);
-}
 
 // The book's elevator with 50 ms at 5 ms: K (A - B K)^10. SciPy 1.10.1:
 //   A=np.array([[1,0.003410460424794879],[0,0.43997153428542146]])
@@ -133,7 +59,7 @@ TEST(CompensateLatency, Errors) {
   const Eigen::Vector2d B(0.0, 0.0);
   const Eigen::RowVector2d K(1.0, 1.0);
   const auto fraction = compensate_latency(K, A, B, 10_ms, 15_ms);
-  EXPECT_TRUE(fraction.error().is(LatencyError::no_real_power));
+  EXPECT_TRUE(fraction.error().is(MatrixFunctionError::no_real_power));
   EXPECT_EQ(fraction.error().where(), "compensate_latency");
   EXPECT_TRUE(
       compensate_latency(K, A, B, 10_ms, Time(-0.01)).error().is(ArgumentError::out_of_range));
@@ -144,9 +70,6 @@ TEST(CompensateLatency, Errors) {
   Eigen::Matrix2d bad = A;
   bad(0, 1) = std::numeric_limits<double>::infinity();
   EXPECT_TRUE(compensate_latency(K, bad, B, 10_ms, 10_ms).error().is(ArgumentError::not_finite));
-  EXPECT_TRUE(matrix_power(A, -1.0).error().is(ArgumentError::out_of_range));
-  EXPECT_TRUE(matrix_power(A, 1e10).error().is(ArgumentError::out_of_range));
-  EXPECT_TRUE(matrix_power(Eigen::MatrixXd(0, 0), 1.0).error().is(ArgumentError::empty));
 }
 
 }  // namespace

@@ -4,28 +4,13 @@
 
 namespace flyball {
 
-/// Why a gain cannot be compensated for latency.
-enum class LatencyError {
-  no_real_power,  ///< (A - B K)^(L/T) is not real: a closed-loop pole is real and negative.
-};
-[[nodiscard]] ErrorInfo error_info(LatencyError code);
-
-/// The principal real power M^p, p >= 0, by the Schur-Padé algorithm (exact products if p is
-/// whole).
-/// @param M  n x n.
-/// @errors ArgumentError for shape and entries, out_of_range for p < 0; LatencyError::no_real_power
-///         if p is not whole and M has a negative real eigenvalue (the evidence), or a defective
-///         eigenvalue zero.
-/// Source: Higham and Lin, "An improved Schur-Padé algorithm for fractional powers of a matrix and
-/// their Fréchet derivatives", SIAM J. Matrix Anal. Appl. 34 (2013).
-[[nodiscard]] Expected<Eigen::MatrixXd> matrix_power(const MatrixRef& M, double p);
-
 /// The gain for a state that is `latency` old: K (A - B K)^(L/T), the second case of (B.12). L need
 /// not be a multiple of T.
 ///
 /// @param K  m x n, designed for no latency. @param A  n x n, discrete. @param B  n x m, discrete.
 /// @param period  T, s. @param latency  L, s, not negative.
-/// @errors ArgumentError; LatencyError::no_real_power for a fraction of a period.
+/// @errors ArgumentError; MatrixFunctionError::no_real_power for a fraction of a period where a
+/// closed-loop pole is real and negative.
 /// Source: book, appendix B.4.2, equation B.12.
 [[nodiscard]] Expected<Eigen::MatrixXd> compensate_latency(const MatrixRef& K, const MatrixRef& A,
                                                            const MatrixRef& B, Time period,

@@ -1,0 +1,17 @@
+#pragma once
+
+// What nearly every source includes; nothing of the project, so that it seldom changes.
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+#include <fmt/format.h>
+#include <tl/expected.hpp>
