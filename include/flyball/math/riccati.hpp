@@ -18,7 +18,7 @@ enum class RiccatiError {
 };
 [[nodiscard]] ErrorInfo error_info(RiccatiError code);
 
-/// The stabilising solution of a discrete-time algebraic Riccati equation.
+/// The stabilising solution of an algebraic Riccati equation.
 struct RiccatiSolution {
   Eigen::MatrixXd X;       ///< n x n, symmetric.
   Eigen::MatrixXd K;       ///< m x n, (R + BᵀXB)⁻¹(BᵀXA + Nᵀ): u = -K x.
@@ -60,6 +60,24 @@ struct RiccatiSolution {
                                              const MatrixRef& Q, const MatrixRef& R,
                                              const MatrixRef& N);
 [[nodiscard]] Expected<RiccatiSolution> dare(const MatrixRef& A, const MatrixRef& B,
+                                             const MatrixRef& Q, const MatrixRef& R);
+
+/// The stabilising solution X = Xᵀ of the continuous-time algebraic Riccati equation
+///
+///   F(X) = AᵀX + XA - (XB + N)R⁻¹(BᵀX + Nᵀ) + Q = 0
+///
+/// for which A - BK, K = R⁻¹(BᵀX + Nᵀ), has all eigenvalues left of the imaginary axis. As `dare`:
+/// its existence decides, Q and R may be indefinite; R must have an inverse.
+///
+/// @errors   As `dare`; RiccatiError::singular where R has no inverse.
+/// Source: book, Theorem 7.7.1's continuous counterpart in section 5.11.1, equation 5.1 (whose
+/// first term is AᵀX). Doubling after a Cayley transform: Chu, Fan and Lin, "A structure-preserving
+/// doubling algorithm for continuous-time algebraic Riccati equations", Linear Algebra Appl. 396
+/// (2005). Newton: Kleinman, IEEE Trans. Automatic Control 13 (1968).
+[[nodiscard]] Expected<RiccatiSolution> care(const MatrixRef& A, const MatrixRef& B,
+                                             const MatrixRef& Q, const MatrixRef& R,
+                                             const MatrixRef& N);
+[[nodiscard]] Expected<RiccatiSolution> care(const MatrixRef& A, const MatrixRef& B,
                                              const MatrixRef& Q, const MatrixRef& R);
 
 /// RiccatiSolution with its sizes known when compiling; nothing of it is on the heap.

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/core/expected.hpp>
+
+namespace flyball {
+
+/// Why a linear matrix equation has no answer.
+enum class MatrixEquationError {
+  no_unique_solution,  ///< Two eigenvalues add up to zero (continuous) or multiply to one
+                       ///< (discrete).
+  no_convergence,      ///< The eigenvalues could not be computed.
+  overflow,            ///< An entry of the solution exceeds the largest double.
+};
+[[nodiscard]] ErrorInfo error_info(MatrixEquationError code);
+
+/// The solution of a linear matrix equation, and how good it is.
+struct LinearMatrixSolution {
+  Eigen::MatrixXd X;
+  double residual = 0.0;   ///< Norm of what is left of the equation / sum of its terms' norms.
+  double condition = 0.0;  ///< Estimate: how much relative errors of the data grow in X.
+};
+
+/// The continuous Lyapunov equation A X + X Aᵀ + Q = 0.
+///
+/// By the Schur form of the balanced A (Bartels and Stewart), with the residual formed in twice the
+/// working precision and corrected until it is rounding.
+///
+/// @param A  n x n, no two of whose eigenvalues add up to zero. It need not be stable.
+/// @param Q  n x n; X is symmetric where Q is.
+/// @errors   ArgumentError::wrong_shape, empty, not_finite; MatrixEquationError::no_unique_solution
+///           with the pair of eigenvalues as evidence.
+/// Cost: O(n³), allocates.
+///
+/// Source: book, section 5.11.3, equation 5.3; Bartels and Stewart, Comm. ACM 15 (1972).
+[[nodiscard]] Expected<LinearMatrixSolution> lyapunov(const MatrixRef& A, const MatrixRef& Q);
+
+/// The discrete Lyapunov equation A X Aᵀ - X + Q = 0; no product of two eigenvalues of A may be
+/// one. As `lyapunov`. Source: book, section 5.11.4, equation 5.4.
+[[nodiscard]] Expected<LinearMatrixSolution> discrete_lyapunov(const MatrixRef& A,
+                                                               const MatrixRef& Q);
+
+/// The Sylvester equation A X + X B = C, X of n x m.
+/// @param A  n x n. @param B  m x m. @param C  n x m.
+/// @errors   As `lyapunov`; the pair is an eigenvalue of A and one of B.
+/// Source: Bartels and Stewart, Comm. ACM 15 (1972).
+[[nodiscard]] Expected<LinearMatrixSolution> sylvester(const MatrixRef& A, const MatrixRef& B,
+                                                       const MatrixRef& C);
+
+/// The discrete Sylvester equation A X B - X + C = 0. As `sylvester`; the pair has the product one.
+[[nodiscard]] Expected<LinearMatrixSolution> discrete_sylvester(const MatrixRef& A,
+                                                                const MatrixRef& B,
+                                                                const MatrixRef& C);
+
+}  // namespace flyball

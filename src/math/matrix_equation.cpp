@@ -1,0 +1,292 @@
+#include <flyball/math/matrix_equation.hpp>
+
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <vector>
+
+#include "math/dense.hpp"
+#include "math/double_double.hpp"
+
+namespace flyball {
+
+namespace {
+
+using Complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+enum class Domain { continuous, discrete };
+
+bool is_triangular(const MatrixXd& M) {
+  for (Index j = 0; j + 1 < M.cols(); ++j) {
+    if (!M.col(j).tail(M.rows() - j - 1).isZero(0.0)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// M = D U T Uᴴ D⁻¹ with D powers of two.
+struct Factor {
+  Eigen::VectorXd d;
+  MatrixXcd T;
+  MatrixXcd U;
+  bool converged = false;
+  double uncertainty = 0.0;  ///< Of the eigenvalues, by rounding.
+};
+
+Factor factorize(const MatrixXd& M) {
+  Factor f;
+  f.d = detail::balance_of(M);
+  const MatrixXd balanced = f.d.cwiseInverse().asDiagonal() * M * f.d.asDiagonal();
+  if (is_triangular(balanced)) {
+    f.T = balanced.cast<Complex>();
+    f.U = MatrixXcd::Identity(M.rows(), M.cols());
+    f.converged = true;
+    return f;
+  }
+  detail::ComplexSchur schur = detail::complex_schur_of(balanced);
+  f.T = std::move(schur.T);
+  f.U = std::move(schur.U);
+  f.converged = schur.converged;
+  f.uncertainty = epsilon * balanced.norm();
+  return f;
+}
+
+/// The factor of Mᵀ = D⁻¹ conj(U) Tᵀ Uᵀ D, with the order reversed so that it is upper triangular.
+Factor transposed(const Factor& f) {
+  return {f.d.cwiseInverse(), f.T.transpose().reverse(), f.U.conjugate().rowwise().reverse(),
+          f.converged, f.uncertainty};
+}
+
+/// A X ± … as an operator on X, with its inverse by the triangular factors.
+class Equation {
+ public:
+  Equation(Domain domain, const MatrixRef& A, const MatrixRef& B)
+      : domain_(domain), A_(A), B_(B), a_(factorize(A)), b_(factorize(B)) {}
+
+  /// The Lyapunov equation: B = Aᵀ shares the factors.
+  Equation(Domain domain, const MatrixRef& A)
+      : domain_(domain), A_(A), B_(A.transpose()), a_(factorize(A)), b_(transposed(a_)) {}
+
+  [[nodiscard]] Expected<void> check(std::string_view where) const {
+    if (!a_.converged || !b_.converged) {
+      return tl::unexpected(
+          Error(MatrixEquationError::no_convergence).in(std::string(where)).about("eigenvalues"));
+    }
+    double smallest = std::numeric_limits<double>::infinity();
+    Complex worst_a;
+    Complex worst_b;
+    for (const Complex& a : a_.T.diagonal()) {
+      for (const Complex& b : b_.T.diagonal()) {
+        const bool continuous = domain_ == Domain::continuous;
+        const double gap = continuous ? std::abs(a + b) : std::abs(a * b - 1.0);
+        const double size = continuous ? std::abs(a) + std::abs(b) : std::abs(a * b) + 1.0;
+        const double blur = continuous
+                                ? a_.uncertainty + b_.uncertainty
+                                : a_.uncertainty * std::abs(b) + b_.uncertainty * std::abs(a);
+        const double ratio = gap == 0.0 ? 0.0 : gap / (epsilon * size + blur);
+        if (ratio < smallest) {
+          smallest = ratio;
+          worst_a = a;
+          worst_b = b;
+        }
+      }
+    }
+    if (smallest > 4.0) {
+      return {};
+    }
+    return tl::unexpected(
+        Error(MatrixEquationError::no_unique_solution)
+            .in(std::string(where))
+            .got(domain_ == Domain::continuous ? "two eigenvalues with the sum zero"
+                                               : "two eigenvalues with the product one")
+            .with("eigenvalue", std::vector<double>{worst_a.real(), worst_a.imag()})
+            .with("eigenvalue of the other side",
+                  std::vector<double>{worst_b.real(), worst_b.imag()}));
+  }
+
+  /// The X of A X + X B = F, or of A X B - X = F.
+  [[nodiscard]] MatrixXd solve(const MatrixXd& F) const {
+    MatrixXcd Y = transform(F);
+    const MatrixXcd& S = a_.T;
+    const MatrixXcd& T = b_.T;
+    for (Index j = 0; j < Y.cols(); ++j) {
+      MatrixXcd shifted = S;
+      if (domain_ == Domain::continuous) {
+        if (j > 0) {
+          Y.col(j) -= Y.leftCols(j).lazyProduct(T.col(j).head(j));
+        }
+        shifted.diagonal().array() += T(j, j);
+      } else {
+        if (j > 0) {
+          const Eigen::VectorXcd known = Y.leftCols(j).lazyProduct(T.col(j).head(j));
+          Y.col(j) -= S.lazyProduct(known);
+        }
+        shifted *= T(j, j);
+        shifted.diagonal().array() -= 1.0;
+      }
+      for (Index k = Y.rows() - 1; k >= 0; --k) {
+        Y(k, j) /= shifted(k, k);
+        Y.col(j).head(k) -= Y(k, j) * shifted.col(k).head(k);
+      }
+    }
+    const MatrixXcd left = detail::complex_product(a_.U, Y);
+    const MatrixXd X = detail::complex_product(left, b_.U.adjoint()).real();
+    return a_.d.asDiagonal() * X * b_.d.cwiseInverse().asDiagonal();
+  }
+
+  /// F minus the operator applied to X, in twice the working precision.
+  [[nodiscard]] MatrixXd residual(const MatrixXd& X, const MatrixXd& F) const {
+    using detail::add_product;
+    using detail::DoubleDoubleMatrix;
+    DoubleDoubleMatrix sum(F);
+    if (domain_ == Domain::continuous) {
+      sum = add_product(std::move(sum), -1.0, A_.transpose(), DoubleDoubleMatrix(X));
+      return add_product(std::move(sum), -1.0, X.transpose(), DoubleDoubleMatrix(B_)).rounded();
+    }
+    const DoubleDoubleMatrix XB =
+        add_product(DoubleDoubleMatrix(MatrixXd::Zero(X.rows(), X.cols())), 1.0, X.transpose(),
+                    DoubleDoubleMatrix(B_));
+    sum = add_product(std::move(sum), -1.0, A_.transpose(), XB);
+    return add_product(std::move(sum), 1.0, MatrixXd::Identity(X.rows(), X.rows()),
+                       DoubleDoubleMatrix(X))
+        .rounded();
+  }
+
+  /// The sum of the norms of the equation's terms.
+  [[nodiscard]] double scale(const MatrixXd& X, const MatrixXd& F) const {
+    if (domain_ == Domain::continuous) {
+      return detail::product(A_, X).norm() + detail::product(X, B_).norm() + F.norm();
+    }
+    return detail::product(A_, detail::product(X, B_)).norm() + X.norm() + F.norm();
+  }
+
+ private:
+  [[nodiscard]] MatrixXcd transform(const MatrixXd& F) const {
+    const MatrixXd scaled = a_.d.cwiseInverse().asDiagonal() * F * b_.d.asDiagonal();
+    const MatrixXcd left = detail::complex_product(a_.U.adjoint(), scaled.cast<Complex>());
+    return detail::complex_product(left, b_.U);
+  }
+
+  Domain domain_;
+  MatrixXd A_;
+  MatrixXd B_;
+  Factor a_;
+  Factor b_;
+};
+
+Expected<LinearMatrixSolution> solve(const Equation& equation, const MatrixXd& F, bool symmetric,
+                                     std::string_view where) {
+  if (auto check = equation.check(where); !check) {
+    return tl::unexpected(std::move(check).error());
+  }
+  LinearMatrixSolution solution;
+  MatrixXd& X = solution.X;
+  X = equation.solve(F);
+  double previous = std::numeric_limits<double>::infinity();
+  for (int pass = 0; pass < 10 && X.allFinite(); ++pass) {
+    const MatrixXd correction = equation.solve(equation.residual(X, F));
+    const double step = correction.norm();
+    if (!std::isfinite(step) || !(step < 0.5 * previous)) {
+      break;
+    }
+    X += correction;
+    if (symmetric) {
+      X = detail::symmetrized(X);
+    }
+    if (step <= epsilon * X.norm()) {
+      break;
+    }
+    previous = step;
+  }
+  if (!X.allFinite()) {
+    return tl::unexpected(Error(MatrixEquationError::overflow).in(std::string(where)));
+  }
+  const double scale = equation.scale(X, F);
+  solution.residual = scale > 0.0 ? equation.residual(X, F).norm() / scale : 0.0;
+  // ‖L⁻¹‖ from two matrices of signs, which no direction is orthogonal to.
+  double gain = 0.0;
+  for (const Index stride : {1, 3}) {
+    MatrixXd signs(X.rows(), X.cols());
+    for (Index k = 0; k < signs.size(); ++k) {
+      signs(k) = (k * stride + k / 5) % 2 == 0 ? 1.0 : -1.0;
+    }
+    gain = std::max(gain, equation.solve(signs).norm() / signs.norm());
+  }
+  solution.condition = X.norm() > 0.0 ? std::max(1.0, gain * scale / X.norm()) : gain;
+  return solution;
+}
+
+Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A, const MatrixRef& Q,
+                                              std::string_view where) {
+  if (auto check = check_square(A, where, "A"); !check) {
+    return tl::unexpected(std::move(check).error());
+  }
+  if (auto check = check_all(check_shape(Q, A.rows(), A.rows(), where, "Q", "states x states"),
+                             check_finite(A, where, "A"), check_finite(Q, where, "Q"));
+      !check) {
+    return tl::unexpected(std::move(check).error());
+  }
+  return solve(Equation(domain, A), -Q, Q == Q.transpose(), where);
+}
+
+Expected<LinearMatrixSolution> solve_sylvester(Domain domain, const MatrixRef& A,
+                                               const MatrixRef& B, const MatrixRef& C,
+                                               std::string_view where) {
+  if (auto check = check_square(A, where, "A"); !check) {
+    return tl::unexpected(std::move(check).error());
+  }
+  if (auto check = check_square(B, where, "B"); !check) {
+    return tl::unexpected(std::move(check).error());
+  }
+  if (auto check = check_all(
+          check_shape(C, A.rows(), B.rows(), where, "C", "rows of A x columns of B"),
+          check_finite(A, where, "A"), check_finite(B, where, "B"), check_finite(C, where, "C"));
+      !check) {
+    return tl::unexpected(std::move(check).error());
+  }
+  const double sign = domain == Domain::continuous ? 1.0 : -1.0;
+  return solve(Equation(domain, A, B), sign * C, false, where);
+}
+
+}  // namespace
+
+ErrorInfo error_info(MatrixEquationError code) {
+  constexpr std::string_view family = "matrix_equation";
+  switch (code) {
+    case MatrixEquationError::no_unique_solution:
+      return {family, "no_unique_solution", "the equation has no unique solution",
+              ErrorKind::no_answer};
+    case MatrixEquationError::no_convergence:
+      return {family, "no_convergence", "the eigenvalues could not be computed",
+              ErrorKind::no_answer};
+    case MatrixEquationError::overflow:
+      return {family, "overflow", "the solution exceeds the largest double", ErrorKind::no_answer};
+  }
+  return {family, "unknown", "unknown error", ErrorKind::defect};
+}
+
+Expected<LinearMatrixSolution> lyapunov(const MatrixRef& A, const MatrixRef& Q) {
+  return solve_lyapunov(Domain::continuous, A, Q, "lyapunov");
+}
+
+Expected<LinearMatrixSolution> discrete_lyapunov(const MatrixRef& A, const MatrixRef& Q) {
+  return solve_lyapunov(Domain::discrete, A, Q, "discrete_lyapunov");
+}
+
+Expected<LinearMatrixSolution> sylvester(const MatrixRef& A, const MatrixRef& B,
+                                         const MatrixRef& C) {
+  return solve_sylvester(Domain::continuous, A, B, C, "sylvester");
+}
+
+Expected<LinearMatrixSolution> discrete_sylvester(const MatrixRef& A, const MatrixRef& B,
+                                                  const MatrixRef& C) {
+  return solve_sylvester(Domain::discrete, A, B, C, "discrete_sylvester");
+}
+
+}  // namespace flyball
