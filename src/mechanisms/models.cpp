@@ -25,20 +25,23 @@ Expected<void> check_drive(const DcMotor& motor, double gearing, std::string_vie
     return checked;
   }
   if (!(gearing > 0.0) || !std::isfinite(gearing)) {
-    return tl::unexpected(Error(ArgumentError::not_positive)
-                              .in(std::string(where))
-                              .about("gearing")
-                              .got(format_number(gearing))
-                              .expected("greater than zero" + std::string(gearing_hint)));
+    return tl::unexpected(
+        Error(std::isfinite(gearing) ? ArgumentError::not_positive : ArgumentError::not_finite)
+            .in(std::string(where))
+            .about("gearing")
+            .got(format_number(gearing))
+            .expected("greater than zero" + std::string(gearing_hint)));
   }
   return {};
 }
 
+// Parameters that are numbers can have a model that is none (J = 1e-320): A and B are checked too.
 Expected<void> check_gains(const FeedforwardGains& gains, std::string_view where) {
-  return check_all(check_positive(gains.kV, where, "kV"), check_positive(gains.kA, where, "kA"),
-                   check_not_negative(gains.kS, where, "kS", "V"),
-                   check_finite(gains.kG, where, "kG"),
-                   check_finite(gains.angle_offset, where, "angle_offset"));
+  return check_all(
+      check_positive(gains.kV, where, "kV"), check_positive(gains.kA, where, "kA"),
+      check_finite(gains.kV / gains.kA, where, "kV/kA"),
+      check_finite(1.0 / gains.kA, where, "1/kA"), check_not_negative(gains.kS, where, "kS", "V"),
+      check_finite(gains.kG, where, "kG"), check_finite(gains.angle_offset, where, "angle_offset"));
 }
 
 Flywheel velocity_model(const FeedforwardGains& gains, double nominal_voltage) {
@@ -82,7 +85,10 @@ Expected<Flywheel> flywheel(const FlywheelParameters& parameters) {
       !checked) {
     return tl::unexpected(checked.error());
   }
-  return velocity_model(rotational_gains(motor, G, J.si()), motor.nominal_voltage);
+  const FeedforwardGains gains = rotational_gains(motor, G, J.si());
+  return check_gains(gains, where).map([&] {
+    return velocity_model(gains, motor.nominal_voltage);
+  });
 }
 
 Expected<Elevator> elevator(const ElevatorParameters& parameters) {
@@ -99,7 +105,9 @@ Expected<Elevator> elevator(const ElevatorParameters& parameters) {
                                .kV = G / (motor.Kv * r),
                                .kA = motor.R * r * m / (G * motor.Kt),
                                .kG = motor.R * r * m * standard_gravity / (G * motor.Kt)};
-  return position_model(MechanismKind::elevator, gains, motor.nominal_voltage);
+  return check_gains(gains, where).map([&] {
+    return position_model(MechanismKind::elevator, gains, motor.nominal_voltage);
+  });
 }
 
 Expected<Arm> arm(const ArmParameters& parameters) {
@@ -116,7 +124,9 @@ Expected<Arm> arm(const ArmParameters& parameters) {
   }
   FeedforwardGains gains = rotational_gains(motor, G, J.si());
   gains.kG = motor.R * m * standard_gravity * l / (G * motor.Kt);
-  return position_model(MechanismKind::arm, gains, motor.nominal_voltage);
+  return check_gains(gains, where).map([&] {
+    return position_model(MechanismKind::arm, gains, motor.nominal_voltage);
+  });
 }
 
 Expected<Flywheel> flywheel(const FeedforwardGains& gains) {

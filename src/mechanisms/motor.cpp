@@ -51,8 +51,10 @@ std::string fold(std::string_view text) {
 
 std::vector<std::string> folded_names(const MotorTableEntry& entry) {
   std::vector<std::string> names{fold(entry.name)};
-  if (!entry.aliases.empty()) {
-    names.push_back(fold(entry.aliases));
+  for (std::string_view rest = entry.aliases; !rest.empty();) {
+    const std::size_t end = std::min(rest.find(','), rest.size());
+    names.push_back(fold(rest.substr(0, end)));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
   }
   return names;
 }
@@ -124,7 +126,12 @@ Expected<DcMotor> motor(std::string_view name, const MotorDatasheet& one, int co
             .got(to_text(one.free_current))
             .expected(fmt::format("below the stall current ({})", to_text(one.stall_current))));
   }
-  return from_datasheet(name, one, count);
+  DcMotor result = from_datasheet(name, one, count);
+  // Numbers can have quotients that are none: 1e300 V / 1e-300 A.
+  return check_all(check_positive(result.R, where, "R", "Ohm"),
+                   check_positive(result.Kt, where, "Kt", "N m/A"),
+                   check_positive(result.Kv, where, "Kv", "rad/s/V"))
+      .map([&] { return std::move(result); });
 }
 
 Expected<DcMotor> motor(std::string_view name, int count) {

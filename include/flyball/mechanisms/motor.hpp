@@ -47,8 +47,8 @@ struct DcMotor {
 };
 
 /// A motor from its datasheet. @param name  For messages. @param count  Motors in the gearbox.
-/// @errors ArgumentError::not_positive, not_finite, out_of_range (count < 1, a free current not
-///         below the stall current).
+/// @errors ArgumentError::not_positive, not_finite (a number, or R, K_t or K_v from them),
+///         out_of_range (count < 1, a free current not below the stall current).
 /// Source: book, equations 12.4 to 12.6.
 [[nodiscard]] Expected<DcMotor> motor(std::string_view name, const MotorDatasheet& datasheet,
                                       int count = 1);
