@@ -1,0 +1,76 @@
+#pragma once
+
+#include <flyball/math/differentiation.hpp>
+#include <flyball/systems/system.hpp>
+
+namespace flyball {
+
+namespace detail {
+
+/// The state as output, where a model has no h.
+inline constexpr auto state_as_output = [](const auto& x, const auto&) { return x; };
+
+}  // namespace detail
+
+/// The linear system of small deviations from a point of dx/dt = f(x, u), y = h(x, u):
+///
+///   A = ∂f/∂x, B = ∂f/∂u, C = ∂h/∂x, D = ∂h/∂u at (x, u),
+///   d(δx)/dt = A δx + B δu,  δy = C δx + D δu,
+///
+/// with exact derivatives (dual numbers). It describes x - x* where (x*, u*) is an equilibrium;
+/// elsewhere f(x, u) remains as a constant, which is the caller's.
+///
+/// @param f  f(x, u) over a generic scalar: Eigen vectors in, the n derivatives out.
+/// @param h  h(x, u) likewise, p outputs. @param x  n x 1. @param u  m x 1; fixed or dynamic.
+/// @return   A continuous system, of the sizes of x, u and h. @errors ArgumentError::not_finite for
+///           the point, or for a derivative there, naming the matrix; wrong_shape if f(x, u) is not
+///           of the size of x.
+/// Cost: one call of f and of h with duals of n + m derivatives. Source: book, section 8.2.
+template <class F, class H, class State, class Input>
+[[nodiscard]] auto linearize(F&& f, H&& h, const Eigen::MatrixBase<State>& x,
+                             const Eigen::MatrixBase<Input>& u) {
+  constexpr int N = State::RowsAtCompileTime;
+  constexpr int M = Input::RowsAtCompileTime;
+  constexpr int P = decltype(jacobians(h, x, u).by_x)::RowsAtCompileTime;
+  using System = ContinuousSystem<N, M, P>;
+
+  if (auto check = check_all(check_finite(x, "linearize", "x"), check_finite(u, "linearize", "u"));
+      !check) {
+    return Expected<System>(tl::unexpected(std::move(check).error()));
+  }
+  const auto of_f = jacobians(f, x, u);
+  const auto of_h = jacobians(h, x, u);
+  if (auto check = check_shape(of_f.by_x, x.size(), x.size(), "linearize", "the Jacobian of f",
+                               "states x states");
+      !check) {
+    return Expected<System>(tl::unexpected(std::move(check).error()));
+  }
+  System system{of_f.by_x, of_f.by_u, of_h.by_x, of_h.by_u};
+  if (auto check = check_system(system, "linearize"); !check) {
+    return Expected<System>(tl::unexpected(std::move(check).error()));
+  }
+  return Expected<System>(std::move(system));
+}
+
+/// The same with the state as output: C = I, D = 0.
+template <class F, class State, class Input>
+[[nodiscard]] auto linearize(F&& f, const Eigen::MatrixBase<State>& x,
+                             const Eigen::MatrixBase<Input>& u) {
+  return linearize(std::forward<F>(f), detail::state_as_output, x, u);
+}
+
+/// A model that compiled code calls: f(x, u), or h(x, u), into the last argument.
+using ModelFunction =
+    FunctionRef<void(const Eigen::Ref<const Eigen::VectorXd>&,
+                     const Eigen::Ref<const Eigen::VectorXd>&, Eigen::Ref<Eigen::VectorXd>)>;
+
+/// The same for a black box, by differences (Richardson's unless the options say otherwise).
+/// @param x  n x 1. @param u  m x 1. @return C = I, D = 0.
+/// @errors DifferentiationError::not_finite; ArgumentError for the point and the step.
+/// Cost: up to 20 (n + m) calls of f; allocates.
+[[nodiscard]] Expected<ContinuousSystem<>> numerical_linearize(
+    ModelFunction f, const Eigen::Ref<const Eigen::VectorXd>& x,
+    const Eigen::Ref<const Eigen::VectorXd>& u,
+    const DifferenceOptions& options = {.scheme = DifferenceScheme::richardson});
+
+}  // namespace flyball
