@@ -187,6 +187,21 @@ void mark_window(PreparedRun& prepared, PreparedRecording& recording,
   }
 }
 
+/// Standard deviation of a column's white noise from the second differences of its fresh values:
+/// √6 σ where nothing moves, and next to nothing of a motion that lasts many values.
+double white_noise(const std::vector<double>& values, const std::vector<std::size_t>& fresh) {
+  std::vector<double> bends;
+  for (std::size_t i = 2; i < fresh.size(); ++i) {
+    bends.push_back(values[fresh[i]] - 2.0 * values[fresh[i - 1]] + values[fresh[i - 2]]);
+  }
+  return bends.size() < 8 ? 0.0 : mad_scale(bends) / std::sqrt(6.0);
+}
+
+// A hundred thousand values of normal noise span nine standard deviations.
+constexpr double kNoiseSpan = 12.0;
+// Noise averaged over the smoothing window, of three values at least, stays below.
+constexpr double kNoiseSpeed = 2.0;
+
 }  // namespace
 
 void detect_motion(PreparedRecording& prepared) {
@@ -203,10 +218,15 @@ void detect_motion(PreparedRecording& prepared) {
     if (prepared.has_position) {
       const auto [low, high] =
           std::minmax_element(run.run.position.begin(), run.run.position.end());
-      run.moved = *high - *low > 10.0 * prepared.position_quantum && speed > 0.0;
+      const double noise = white_noise(run.run.position, run.fresh_position);
+      run.moved = *high - *low > std::max(10.0 * prepared.position_quantum, kNoiseSpan * noise) &&
+                  speed > 0.0;
     } else {
       // Without a position to show it, motion is a velocity that keeps its sign; noise does not.
-      run.moved = prepared.has_velocity && speed > 15.0 * prepared.velocity_quantum &&
+      const double noise =
+          prepared.has_velocity ? white_noise(run.run.velocity, run.fresh_velocity) : 0.0;
+      run.moved = prepared.has_velocity &&
+                  speed > std::max(15.0 * prepared.velocity_quantum, kNoiseSpeed * noise) &&
                   std::abs(signed_square) > 0.3 * square;
     }
     if (run.moved) {

@@ -9,58 +9,14 @@
 #include <flyball/core/quantity.hpp>
 #include <flyball/core/text.hpp>
 
+#include "study/channel_names.hpp"
 #include "study/channels.hpp"
 
 namespace flyball::study {
 
 namespace {
 
-using identification::TestKind;
 using identification::TestRun;
-using mechanisms::MechanismKind;
-
-std::string lower(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) {
-    c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  }
-  return out;
-}
-
-bool contains_any(std::string_view text, std::span<const std::string_view> words) {
-  return std::any_of(words.begin(), words.end(), [&](std::string_view word) {
-    return text.find(word) != std::string_view::npos;
-  });
-}
-
-std::vector<TestWindow> windows_of(const TextSignal& state) {
-  std::vector<TestWindow> windows;
-  std::optional<TestKind> running;
-  for (std::size_t i = 0; i < state.time.size(); ++i) {
-    const auto parsed = identification::parse_test_kind(state.value[i]);
-    const std::optional<TestKind> kind = parsed ? std::optional<TestKind>(*parsed) : std::nullopt;
-    if (running && (kind != running)) {
-      windows.back().end = state.time[i];
-    }
-    if (kind && kind != running) {
-      windows.push_back({*kind, state.time[i], state.time[i]});
-    }
-    running = kind;
-  }
-  // A state that is logged only when it changes leaves its last test open: it runs to the end.
-  if (running) {
-    windows.back().end = std::numeric_limits<double>::infinity();
-  }
-  return windows;
-}
-
-// "ElevatorSubsystem" of "sysid-test-state-ElevatorSubsystem", "" of other names.
-std::string subject_of(std::string_view state_name) {
-  constexpr std::string_view prefix = "sysid-test-state-";
-  const std::size_t at = lower(state_name).find(prefix);
-  return at == std::string::npos ? std::string()
-                                 : std::string(state_name.substr(at + prefix.size()));
-}
 
 constexpr std::array<std::string_view, 2> voltage_words{"volt", "appliedv"};
 constexpr std::array<std::string_view, 4> position_words{"position", "angle", "distance", "pos"};
@@ -90,23 +46,6 @@ bool fits(const Signal& signal, Quantity quantity) {
                                                     dimension == Dimension::angular_velocity);
   }
   return false;
-}
-
-std::size_t samples_in(const Signal& signal, const std::vector<TestWindow>& windows) {
-  if (windows.empty()) {
-    return signal.time.size();
-  }
-  return static_cast<std::size_t>(
-      std::count_if(signal.time.begin(), signal.time.end(), [&](double t) {
-        return std::any_of(windows.begin(), windows.end(), [&](const TestWindow& window) {
-          return t >= window.begin && t < window.end;
-        });
-      }));
-}
-
-// "left" or "right" as a word of its own or at a capital: "voltage-drive-left", "LeftVolts".
-bool names_side(std::string_view name, std::string_view side) {
-  return lower(name).find(side) != std::string::npos;
 }
 
 struct Candidates {
@@ -158,18 +97,11 @@ Expected<const Signal*> named_channel(const Log& log, const std::string& name, Q
 }
 
 Expected<const Signal*> choose(const Log& log, const FoundTests& tests, Quantity quantity,
-                               const std::string& said, const Signal* voltage, bool& drivetrain) {
+                               const std::string& said, const Signal* voltage) {
   if (!said.empty()) {
     return named_channel(log, said, quantity);
   }
   Candidates candidates = candidates_for(log, tests, quantity);
-  if (candidates.signals.size() > 1) {
-    const bool left = std::any_of(candidates.signals.begin(), candidates.signals.end(),
-                                  [](const Signal* s) { return names_side(s->name, "left"); });
-    const bool right = std::any_of(candidates.signals.begin(), candidates.signals.end(),
-                                   [](const Signal* s) { return names_side(s->name, "right"); });
-    drivetrain = drivetrain || (left && right);
-  }
   if (candidates.signals.size() > 1 && voltage != nullptr) {
     // The voltage's namesake: "position-wrist-Coral" beside "voltage-wrist-Coral".
     std::string wanted = lower(voltage->name);
@@ -182,8 +114,12 @@ Expected<const Signal*> choose(const Log& log, const FoundTests& tests, Quantity
         }
       }
     }
+    const Side side = side_of(voltage->name);
+    if (side != Side::none) {
+      std::erase_if(candidates.signals, [&](const Signal* s) { return side_of(s->name) != side; });
+    }
   }
-  if (candidates.signals.size() == 1 || (drivetrain && !candidates.signals.empty())) {
+  if (candidates.signals.size() == 1) {
     return candidates.signals.front();
   }
   if (candidates.signals.empty()) {
@@ -225,79 +161,65 @@ double hold(const Signal& signal, double t, std::size_t& cursor) {
   return signal.value[cursor];
 }
 
+constexpr std::array every_quantity{Quantity::voltage, Quantity::position, Quantity::velocity};
+
 }  // namespace
 
-Expected<FoundTests> find_tests(const Log& log, const std::string& state_channel) {
-  FoundTests found;
-  if (!state_channel.empty()) {
-    const TextSignal* state = log.find_text(state_channel);
-    if (state == nullptr) {
-      std::vector<std::string_view> names;
-      for (const TextSignal& text : log.texts) {
-        names.push_back(text.name);
-      }
-      const std::string nearest = nearest_name(state_channel, names);
-      return tl::unexpected(
-          Error(RecordingError::no_test_state)
-              .about("state channel")
-              .got(fmt::format("\"{}\", which the log does not have as a text", state_channel))
-              .hint(nearest.empty() ? "" : fmt::format("did you mean \"{}\"?", nearest)));
-    }
-    found = {state->name, subject_of(state->name), windows_of(*state)};
-    if (found.windows.empty()) {
-      return tl::unexpected(Error(RecordingError::no_tests)
-                                .about(state_channel)
-                                .got("without the name of a test")
-                                .expected("quasistatic-forward, quasistatic-reverse, "
-                                          "dynamic-forward or dynamic-reverse at times"));
-    }
-    return found;
+std::string drivetrain_reason(const Log& log, const FoundTests& tests,
+                              const LogSelection& selection) {
+  const bool said = selection.mechanism || !selection.voltage_channel.empty() ||
+                    !selection.position_channel.empty() || !selection.velocity_channel.empty();
+  // An elevator lifted by a left and a right motor is an elevator.
+  if (said || kind_from_name(tests.state_name)) {
+    return {};
   }
-  std::vector<FoundTests> all;
-  std::string silent;
-  for (const TextSignal& text : log.texts) {
-    std::vector<TestWindow> windows = windows_of(text);
-    if (!windows.empty()) {
-      all.push_back({text.name, subject_of(text.name), std::move(windows)});
-    } else if (!subject_of(text.name).empty()) {
-      silent = text.name;
+  if (names_drivetrain(tests.state_name)) {
+    return fmt::format("\"{}\" names it one", tests.state_name);
+  }
+  for (const Quantity quantity : every_quantity) {
+    const Signal* left = nullptr;
+    const Signal* right = nullptr;
+    for (const Signal* signal : candidates_for(log, tests, quantity).signals) {
+      const Side side = side_of(signal->name);
+      left = side == Side::left && left == nullptr ? signal : left;
+      right = side == Side::right && right == nullptr ? signal : right;
+    }
+    if (left != nullptr && right != nullptr) {
+      return fmt::format("\"{}\" and \"{}\" are a left and a right side", left->name, right->name);
     }
   }
-  if (all.size() > 1) {
-    std::vector<std::string> names;
-    for (const FoundTests& tests : all) {
-      names.push_back("\"" + tests.state_name + "\"");
+  return {};
+}
+
+std::optional<FoundChannels> one_side(const Log& log, const FoundTests& tests) {
+  std::array<const Signal*, 3> chosen{};
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    const Candidates candidates = candidates_for(log, tests, every_quantity[i]);
+    for (const Signal* signal : candidates.signals) {
+      const bool better = chosen[i] != nullptr && side_of(chosen[i]->name) != Side::left &&
+                          side_of(signal->name) == Side::left;
+      chosen[i] = chosen[i] == nullptr || better ? signal : chosen[i];
     }
-    return tl::unexpected(Error(RecordingError::ambiguous_channel)
-                              .about("mechanism")
-                              .got(fmt::format("one of {}: {}", all.size(), fmt::join(names, ", ")))
-                              .hint("choose one with --state"));
   }
-  if (all.size() == 1) {
-    return all.front();
+  const auto [voltage, position, velocity] = chosen;
+  if (voltage == nullptr || (position == nullptr && velocity == nullptr)) {
+    return std::nullopt;
   }
-  if (!silent.empty()) {
-    return tl::unexpected(Error(RecordingError::no_tests)
-                              .about(silent)
-                              .got("\"none\" throughout")
-                              .hint("no characterisation test ran while this was recorded"));
-  }
-  return found;
+  return FoundChannels{voltage, position, velocity};
 }
 
 Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
                                       const LogSelection& selection) {
   FoundChannels channels;
-  auto voltage = choose(log, tests, Quantity::voltage, selection.voltage_channel, nullptr,
-                        channels.drivetrain);
+  auto voltage = choose(log, tests, Quantity::voltage, selection.voltage_channel, nullptr);
   if (!voltage) {
     return tl::unexpected(std::move(voltage).error());
   }
   channels.voltage = *voltage;
-  auto position = choose(log, tests, Quantity::position, selection.position_channel,
-                         channels.voltage, channels.drivetrain);
-  auto velocity = choose(log, tests, Quantity::velocity, selection.velocity_channel,
-                         channels.voltage, channels.drivetrain);
+  auto position =
+      choose(log, tests, Quantity::position, selection.position_channel, channels.voltage);
+  auto velocity =
+      choose(log, tests, Quantity::velocity, selection.velocity_channel, channels.voltage);
   if (!position) {
     return tl::unexpected(std::move(position).error());
   }
@@ -317,44 +239,6 @@ Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
                       : "name them with --position and --velocity"));
   }
   return channels;
-}
-
-std::vector<TestWindow> split_by_voltage(const Signal& voltage) {
-  constexpr double idle = 0.05;      // V: below this nothing is driven
-  constexpr double shortest = 0.3;   // s
-  constexpr double step_rise = 0.1;  // s: a step is at most of its level by then
-  std::vector<TestWindow> windows;
-  const std::size_t n = voltage.time.size();
-  std::size_t i = 0;
-  while (i < n) {
-    if (std::abs(voltage.value[i]) <= idle) {
-      ++i;
-      continue;
-    }
-    const bool forward = voltage.value[i] > 0.0;
-    std::size_t end = i;
-    double peak = 0.0;
-    while (end < n && std::abs(voltage.value[end]) > idle &&
-           (voltage.value[end] > 0.0) == forward) {
-      peak = std::max(peak, std::abs(voltage.value[end]));
-      ++end;
-    }
-    const double begin_time = voltage.time[i];
-    const double end_time = end < n ? voltage.time[end] : voltage.time[n - 1];
-    if (end_time - begin_time >= shortest) {
-      double early = 0.0;
-      for (std::size_t k = i; k < end && voltage.time[k] <= begin_time + step_rise; ++k) {
-        early = std::max(early, std::abs(voltage.value[k]));
-      }
-      const bool dynamic = early >= 0.7 * peak;
-      const TestKind kind =
-          dynamic ? (forward ? TestKind::dynamic_forward : TestKind::dynamic_reverse)
-                  : (forward ? TestKind::quasistatic_forward : TestKind::quasistatic_reverse);
-      windows.push_back({kind, begin_time, end_time});
-    }
-    i = end;
-  }
-  return windows;
 }
 
 std::vector<TestRun> join_channels(const FoundChannels& channels,
@@ -390,79 +274,6 @@ std::vector<TestRun> join_channels(const FoundChannels& channels,
     }
   }
   return runs;
-}
-
-std::string position_unit_of_velocity(std::string_view unit) {
-  const auto parsed = unit.empty() ? Expected<Unit>(Unit{}) : parse_unit(unit);
-  if (!parsed) {
-    return {};
-  }
-  if (parsed->dimension == Dimension::velocity) {
-    return "m";
-  }
-  return parsed->dimension == Dimension::angular_velocity ? "rad" : std::string();
-}
-
-std::optional<MechanismKind> kind_from_name(std::string_view name) {
-  const std::string text = lower(name);
-  constexpr std::array<std::string_view, 2> elevator{"elevator", "lift"};
-  constexpr std::array<std::string_view, 2> flywheel{"flywheel", "shooter"};
-  if (contains_any(text, elevator)) {
-    return MechanismKind::elevator;
-  }
-  if (contains_any(text, flywheel)) {
-    return MechanismKind::flywheel;
-  }
-  return std::nullopt;
-}
-
-std::vector<Diagnostic> diagnose_drive(const SysIdJson& log) {
-  std::vector<Diagnostic> found;
-  const auto side = [&](std::string_view name, auto voltage_of, auto velocity_of) {
-    double product = 0.0;
-    double voltage_power = 0.0;
-    double velocity_power = 0.0;
-    std::size_t rows = 0;
-    double top_voltage = 0.0;
-    double travel_speed = 0.0;
-    for (const SysIdJson::Run& run : log.runs) {
-      const std::vector<double>& voltage = voltage_of(run);
-      const std::vector<double>& velocity = velocity_of(run);
-      for (std::size_t i = 0; i < std::min(voltage.size(), velocity.size()); ++i) {
-        product += voltage[i] * velocity[i];
-        voltage_power += voltage[i] * voltage[i];
-        velocity_power += velocity[i] * velocity[i];
-        top_voltage = std::max(top_voltage, std::abs(voltage[i]));
-        travel_speed = std::max(travel_speed, std::abs(velocity[i]));
-        ++rows;
-      }
-    }
-    constexpr double standstill = 0.02;  // rotations a second
-    if (rows > 0 && travel_speed < standstill) {
-      found.push_back({"no_motion", Severity::error,
-                       fmt::format("the {} side never moved: at most {:.3g} rotations/s at up to "
-                                   "{:.3g} V",
-                                   name, travel_speed, top_voltage)});
-      return;
-    }
-    const double correlation = voltage_power > 0.0 && velocity_power > 0.0
-                                   ? product / std::sqrt(voltage_power * velocity_power)
-                                   : 0.0;
-    if (correlation < -0.3) {
-      found.push_back({"inverted_encoder", Severity::error,
-                       fmt::format("the {} side's encoder counts against its voltage (correlation "
-                                   "{:.2f}): it is inverted",
-                                   name, correlation)});
-    }
-  };
-  using Run = SysIdJson::Run;
-  side(
-      "left", [](const Run& r) -> const std::vector<double>& { return r.voltage; },
-      [](const Run& r) -> const std::vector<double>& { return r.velocity; });
-  side(
-      "right", [](const Run& r) -> const std::vector<double>& { return r.right_voltage; },
-      [](const Run& r) -> const std::vector<double>& { return r.right_velocity; });
-  return found;
 }
 
 }  // namespace flyball::study

@@ -11,7 +11,10 @@
 #include <flyball/core/text.hpp>
 #include <flyball/io/log.hpp>
 
+#include "study/channel_names.hpp"
 #include "study/channels.hpp"
+#include "study/drivetrain.hpp"
+#include "study/test_windows.hpp"
 
 namespace flyball::study {
 
@@ -149,6 +152,22 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
     return tl::unexpected(std::move(tests).error().in(log.source));
   }
   loaded.subject = tests->subject;
+  if (const std::string reason = drivetrain_reason(log, *tests, selection); !reason.empty()) {
+    loaded.refusal = Error(RecordingError::drivetrain)
+                         .in(log.source)
+                         .about("mechanism")
+                         .got("a drivetrain: " + reason)
+                         .expected("a flywheel, an elevator or an arm")
+                         .hint(
+                             "drivetrains are not supported yet; if it is another mechanism, say "
+                             "which with --mechanism");
+    if (const auto channels = one_side(log, *tests)) {
+      loaded.recording.runs =
+          join_channels(*channels, tests->windows.empty() ? split_by_voltage(*channels->voltage)
+                                                          : tests->windows);
+    }
+    return loaded;
+  }
 
   auto channels = find_channels(log, *tests, selection);
   if (!channels) {
@@ -180,14 +199,6 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
                               .about(tests->state_name)
                               .got("without a test in which the mechanism was recorded"));
   }
-  if (channels->drivetrain) {
-    loaded.refusal =
-        Error(RecordingError::drivetrain)
-            .in(log.source)
-            .hint("it records a left and a right side; drivetrains are not supported yet");
-    return loaded;
-  }
-
   // Unit: said by the person, else by the position's or the velocity's channel, else rotations.
   std::string unit = selection.unit;
   if (unit.empty() && channels->position && parse_unit(channels->position->unit) &&

@@ -209,6 +209,38 @@ TEST(FeedforwardFit, RefusesALogWithoutMotion) {
   EXPECT_NE(find(report.diagnostics, "no_motion"), nullptr);
 }
 
+// Analogue sensors and differentiated encoders never stand still: their noise is no motion.
+TEST(FeedforwardFit, RefusesAMechanismThatOnlyShowsNoise) {
+  enum Shown { both, position_only, velocity_only };
+  flyball::Random random(7);
+  for (const std::size_t mechanism : {kFlywheel, kElevator, kArm}) {
+    for (const Shown shown : {both, position_only, velocity_only}) {
+      for (const std::size_t repeat : {1U, 4U}) {  // rows that a value is shown in
+        for (int trial = 0; trial < 5; ++trial) {
+          Recording recording = record(mechanism);
+          for (TestRun& run : recording.runs) {
+            for (std::size_t i = 0; i < run.time.size(); ++i) {
+              const bool held = i % repeat != 0;
+              run.position[i] = held ? run.position[i - 1] : 0.7 + random.normal(0.0, 1e-3);
+              run.velocity[i] = held ? run.velocity[i - 1] : random.normal(0.0, 0.05);
+            }
+            if (shown == position_only) {
+              run.velocity.clear();
+            } else if (shown == velocity_only) {
+              run.position.clear();
+            }
+          }
+          const auto fit = fit_feedforward(recording);
+          ASSERT_FALSE(fit);
+          EXPECT_EQ(fit.error().code(), "no_motion")
+              << to_string(fit.error()) << "\nmechanism " << mechanism << " shown " << shown
+              << " repeat " << repeat;
+        }
+      }
+    }
+  }
+}
+
 TEST(FeedforwardFit, RefusesAnUnknownMechanismAndTakesTheOption) {
   Recording recording = record(kFlywheel);
   recording.mechanism.reset();

@@ -122,5 +122,21 @@ TEST(RealLogDefects, AreNamed) {
   }
 }
 
+// One drive, as its vendor's raw frames and as an exporter's channels.
+TEST(RealLogDrivetrains, AreRecognised) {
+  const std::filesystem::path folder = std::filesystem::path(FLYBALL_TEST_DATA) / "wpilog";
+  if (!std::filesystem::exists(folder)) {
+    GTEST_SKIP() << "no recordings";
+  }
+  for (const char* file : {"miami_drive_FRC_20240119_152551.wpilog",
+                           "miami_drive_FRC_20240119_152551_advantagescope_export.wpilog"}) {
+    const auto result = identify({.log = (folder / file).string(), .selection = {}});
+    ASSERT_TRUE(result) << file << ": " << to_string(result.error());
+    ASSERT_FALSE(result->report.fit) << file;
+    EXPECT_EQ(result->report.fit.error().code(), "drivetrain") << file;
+    EXPECT_EQ(result->report.fit.error().kind(), ErrorKind::no_answer);
+  }
+}
+
 }  // namespace
 }  // namespace flyball::study

@@ -128,6 +128,99 @@ TEST(Recording, LeftAndRightAreADrivetrain) {
   ASSERT_TRUE(loaded->refusal);
   EXPECT_TRUE(loaded->refusal->is(RecordingError::drivetrain));
   EXPECT_EQ(loaded->refusal->kind(), ErrorKind::no_answer);
+  EXPECT_NE(to_string(*loaded->refusal).find("a left and a right side"), std::string::npos);
+  // What one side did can still be looked at.
+  EXPECT_EQ(loaded->recording.runs.size(), 2u);
+}
+
+// The channels of a robot that logs each motor controller: none says its side, only the distances
+// do.
+Log four_controllers(std::string state_name) {
+  Log log = wpilog("Meter");
+  log.texts[0].name = std::move(state_name);
+  log.signals.clear();
+  for (const char* id : {"11", "12"}) {
+    const std::string spark = std::string("NT:/URCL/SparkMax-") + id;
+    log.signals.push_back(signal(spark + "/AppliedOutputVoltage", "", volts));
+    log.signals.push_back(signal(spark + "/MotorPositionRotations", "", linear));
+    log.signals.push_back(signal(spark + "/MotorVelocityRPM", "", one));
+  }
+  return log;
+}
+
+std::string refusal_of(const Log& log, const LogSelection& selection) {
+  const auto recording = recording_from_log(log, selection);
+  return !recording           ? std::string(recording.error().code())
+         : recording->refusal ? std::string(recording->refusal->code())
+                              : "accepted";
+}
+
+TEST(Recording, ADrivetrainIsToldByItsName) {
+  for (const char* name : {"sysid-test-state-DriveSubsystem", "sysid-test-state-drivetrain",
+                           "/RealOutputs/Swerve/SysIdState", "sysid-test-state-swerve_drive",
+                           "sysid-test-state-CommandSwerveDrivetrain"}) {
+    EXPECT_EQ(refusal_of(four_controllers(name), {}), "drivetrain") << name;
+  }
+  EXPECT_EQ(refusal_of(four_controllers("sysid-test-state-Wrist"), {}), "ambiguous_channel");
+  // Not every word that begins so is one.
+  EXPECT_EQ(refusal_of(four_controllers("sysid-test-state-Screwdriver"), {}), "ambiguous_channel");
+  // What the person says has the last word.
+  const Log drive = four_controllers("sysid-test-state-DriveSubsystem");
+  EXPECT_EQ(refusal_of(drive, {.mechanism = MechanismKind::flywheel}), "ambiguous_channel");
+  LogSelection one_motor;
+  one_motor.mechanism = MechanismKind::flywheel;
+  one_motor.voltage_channel = drive.signals[0].name;
+  one_motor.position_channel = drive.signals[1].name;
+  one_motor.velocity_channel = drive.signals[2].name;
+  EXPECT_EQ(refusal_of(drive, one_motor), "accepted");
+}
+
+TEST(Recording, ADrivetrainIsToldWithoutVoltages) {
+  Log log = four_controllers("sysid-test-state-DriveSubsystem");
+  std::erase_if(log.signals, [](const Signal& s) { return s.name.ends_with("Voltage"); });
+  const auto loaded = recording_from_log(log, {});
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  ASSERT_TRUE(loaded->refusal);
+  EXPECT_TRUE(loaded->refusal->is(RecordingError::drivetrain));
+  EXPECT_TRUE(loaded->recording.runs.empty());
+}
+
+TEST(Recording, SidesMayBeOneLetterOrOneWord) {
+  const std::vector<std::pair<const char*, const char*>> pairs{
+      {"Distance L", "Distance R"},
+      {"LeftPosition", "RightPosition"},
+      {"frontleft/position", "frontright/position"}};
+  for (const auto& [left, right] : pairs) {
+    Log log = four_controllers("sysid-test-state-Base");
+    log.signals.push_back(signal(left, "", linear));
+    log.signals.push_back(signal(right, "", linear));
+    EXPECT_EQ(refusal_of(log, {}), "drivetrain") << left;
+  }
+  Log log = four_controllers("sysid-test-state-Base");
+  log.signals.push_back(signal("Level position", "", linear));
+  log.signals.push_back(signal("Roller position", "", linear));
+  EXPECT_EQ(refusal_of(log, {}), "ambiguous_channel");
+}
+
+// Two motors lift it: which one was recorded is asked, and a side once said is kept.
+TEST(Recording, AnElevatorMayHaveALeftAndARightMotor) {
+  Log log = wpilog("Meter");
+  log.texts[0].name = "sysid-test-state-Elevator";
+  log.signals.clear();
+  for (const char* side : {"left", "right"}) {
+    log.signals.push_back(signal(std::string(side) + " applied volts", "Volt", volts));
+    log.signals.push_back(signal(std::string(side) + " carriage position", "Meter", linear));
+    log.signals.push_back(
+        signal(std::string(side) + " carriage velocity", "Meter per Second", one));
+  }
+  EXPECT_EQ(refusal_of(log, {}), "ambiguous_channel");
+  LogSelection selection;
+  selection.voltage_channel = "right applied volts";
+  const auto loaded = recording_from_log(log, selection);
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_FALSE(loaded->refusal);
+  ASSERT_FALSE(loaded->diagnostics.empty());
+  EXPECT_NE(loaded->diagnostics.front().message.find("right carriage position"), std::string::npos);
 }
 
 TEST(Recording, AsksWhichChannelWhenSeveralFit) {
