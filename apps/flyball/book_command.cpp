@@ -134,7 +134,7 @@ int draw(const Options& options) {
 
 }  // namespace
 
-void add_book_command(CLI::App& program, int& status) {
+void add_book_command(CLI::App& program, Invocation& invocation) {
   CLI::App* command = program.add_subcommand(
       "book", "Draw figures of Controls Engineering in FRC, and check them against references");
   auto options = std::make_shared<Options>();
@@ -144,7 +144,8 @@ void add_book_command(CLI::App& program, int& status) {
                     "Compare with reference numbers; exit status 1 if any is off");
   add_common_options(*command, options->common,
                      "Write picture (PNG, SVG) and CSV here (this folder if absent)");
-  command->callback([options, &status] {
+  command->callback([options, &invocation] {
+    int& status = invocation.status;
     if (options->list) {
       status = list(*options);
     } else if (options->check) {

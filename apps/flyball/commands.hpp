@@ -1,14 +1,22 @@
 #pragma once
 
+#include <string>
+
 #include <CLI/CLI.hpp>
 
 namespace flyball::app {
 
+/// One call of the program.
+struct Invocation {
+  std::string typed;  ///< The command line, see typed_command.
+  int status = 0;     ///< The exit status that the command left.
+};
+
 /// Adds a command to the program. When it was called it leaves its exit status.
-void add_identify_command(CLI::App& program, int& status);
-void add_design_command(CLI::App& program, int& status);
-void add_tune_command(CLI::App& program, int& status);
-void add_motors_command(CLI::App& program, int& status);
-void add_book_command(CLI::App& program, int& status);
+void add_identify_command(CLI::App& program, Invocation& invocation);
+void add_design_command(CLI::App& program, Invocation& invocation);
+void add_tune_command(CLI::App& program, Invocation& invocation);
+void add_motors_command(CLI::App& program, Invocation& invocation);
+void add_book_command(CLI::App& program, Invocation& invocation);
 
 }  // namespace flyball::app

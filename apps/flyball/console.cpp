@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 
@@ -11,6 +13,53 @@ namespace flyball::app {
 
 int exit_status(const Error& error) {
   return error.kind() == ErrorKind::no_answer ? no_answer : bad_input;
+}
+
+namespace {
+
+std::string quoted_for_shell(std::string_view word) {
+  constexpr std::string_view plain =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-./=:,+@%";
+  if (!word.empty() && word.find_first_not_of(plain) == std::string_view::npos) {
+    return std::string(word);
+  }
+  std::string quoted = "'";
+  for (const char c : word) {
+    quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  }
+  return quoted + "'";
+}
+
+// Channels have names such as "/Arm/AppliedVolts", which are no paths.
+bool takes_channel(std::string_view option) {
+  constexpr std::array<std::string_view, 4> options{"--state", "--voltage", "--position",
+                                                    "--velocity"};
+  return std::find(options.begin(), options.end(), option) != options.end();
+}
+
+}  // namespace
+
+std::string typed_command(std::span<const char* const> arguments) {
+  std::string typed = "flyball";
+  for (std::size_t i = 1; i < arguments.size(); ++i) {
+    std::string_view value = arguments[i];
+    std::string_view option = arguments[i - 1];
+    std::string word;
+    if (const std::size_t equals = value.find('=');
+        value.starts_with("--") && equals != std::string_view::npos) {
+      option = value.substr(0, equals);
+      word = value.substr(0, equals + 1);
+      value.remove_prefix(equals + 1);
+    }
+    if (value.starts_with('/') && !takes_channel(option)) {
+      while (value.size() > 1 && value.back() == '/') {
+        value.remove_suffix(1);
+      }
+      value.remove_prefix(value.rfind('/') + 1);
+    }
+    typed += ' ' + quoted_for_shell(word.append(value));
+  }
+  return typed;
 }
 
 void add_common_options(CLI::App& command, CommonOptions& options, const std::string& report) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -21,8 +22,14 @@ enum ExitStatus : int { success = 0, no_answer = 1, bad_input = 2 };
 struct CommonOptions {
   bool json = false;
   std::string out;
+  std::string typed;  ///< The command line, for the report.
   unsigned long long seed = 1;
 };
+
+/// The command line for a report: "flyball" and what was typed, quoted for a shell where it must
+/// be. A path from the root is cut to its last name: a report is handed on, and whose machine it
+/// was made on concerns nobody.
+[[nodiscard]] std::string typed_command(std::span<const char* const> arguments);
 
 /// Adds --json and --out. @param report  What --out writes, for the help.
 void add_common_options(CLI::App& command, CommonOptions& options, const std::string& report);

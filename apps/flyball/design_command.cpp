@@ -1,10 +1,9 @@
 #include <memory>
 
 #include <flyball/core/quantity.hpp>
-#include <flyball/report/write_report.hpp>
 #include <flyball/study/project.hpp>
-#include <flyball/study/schema.hpp>
 
+#include "answer.hpp"
 #include "commands.hpp"
 #include "console.hpp"
 #include "design_options.hpp"
@@ -48,19 +47,7 @@ int run(const Options& options) {
   if (!result) {
     return fail(result.error(), options.common, schema);
   }
-  std::string written;
-  if (const auto folder = report_folder(options.common, true)) {
-    if (auto report = report::write_design_report(*result, *folder)) {
-      written = *folder;
-    } else if (!options.common.out.empty()) {
-      return fail(report.error(), options.common, schema);
-    } else {
-      warn("no report: " + to_string(report.error()));
-    }
-  }
-  print(options.common.json ? study::to_json(*result)
-                            : report::to_terminal(*result, terminal_style(), written));
-  return success;
+  return answer(*result, &report::write_design_report, options.common, true, schema);
 }
 
 }  // namespace
@@ -103,7 +90,7 @@ Expected<void> apply(const DesignOptions& options, study::DesignJob& job) {
              [&](double value) { job.controller.max_voltage = value; });
 }
 
-void add_design_command(CLI::App& program, int& status) {
+void add_design_command(CLI::App& program, Invocation& invocation) {
   CLI::App* command = program.add_subcommand(
       "design", "Design a controller from a project file: mass, gearing and motors, or gains");
   command->footer(
@@ -120,11 +107,12 @@ void add_design_command(CLI::App& program, int& status) {
       "  period = \"20 ms\"\n"
       "  state_tolerance = [\"2 cm\", \"0.4 m/s\"]   # leave out to have them chosen");
   auto options = std::make_shared<Options>();
+  options->common.typed = invocation.typed;
   command->add_option("PROJECT", options->project, "The project file")->required();
   add_design_options(*command, options->design);
   add_common_options(*command, options->common,
                      "Write the report into this folder (flyball-report if absent)");
-  command->callback([options, &status] { status = run(*options); });
+  command->callback([options, &invocation] { invocation.status = run(*options); });
 }
 
 }  // namespace flyball::app

@@ -1,8 +1,6 @@
 #include <memory>
 
-#include <flyball/report/write_report.hpp>
-#include <flyball/study/schema.hpp>
-
+#include "answer.hpp"
 #include "commands.hpp"
 #include "console.hpp"
 
@@ -27,36 +25,24 @@ int run(const Options& options) {
   if (!result) {
     return fail(result.error(), options.common, schema);
   }
-  std::string written;
-  if (const auto folder = report_folder(options.common, false)) {
-    if (auto report = report::write_identify_report(*result, *folder); !report) {
-      return fail(report.error(), options.common, schema);
-    }
-    written = *folder;
-  }
-  print(options.common.json ? study::to_json(*result)
-                            : report::to_terminal(*result, terminal_style(), written));
-  if (!result->report.fit) {
-    const Error& refusal = result->report.fit.error();
-    tell(refusal);
-    return exit_status(refusal);
-  }
-  return success;
+  const Error* refusal = result->report.fit ? nullptr : &result->report.fit.error();
+  return answer(*result, &report::write_identify_report, options.common, false, schema, refusal);
 }
 
 }  // namespace
 
-void add_identify_command(CLI::App& program, int& status) {
+void add_identify_command(CLI::App& program, Invocation& invocation) {
   CLI::App* command = program.add_subcommand(
       "identify", "Identify kS, kV, kA and kG of a mechanism from a log of it moving");
   command->footer(
       "LOG is a SysId JSON, a WPILOG or a CSV with the four characterisation tests (quasistatic\n"
       "and dynamic, forward and reverse). What the log does not say is detected and told.");
   auto options = std::make_shared<Options>();
+  options->common.typed = invocation.typed;
   command->add_option("LOG", options->path, "The log")->required();
   add_log_options(*command, options->log);
   add_common_options(*command, options->common, "Write the report into this folder");
-  command->callback([options, &status] { status = run(*options); });
+  command->callback([options, &invocation] { invocation.status = run(*options); });
 }
 
 }  // namespace flyball::app

@@ -58,12 +58,13 @@ int main(int argc, char** argv) {
   program.set_version_flag("--version", "flyball " + std::string(flyball::version));
   program.require_subcommand(1);
 
-  int status = flyball::app::success;
-  flyball::app::add_identify_command(program, status);
-  flyball::app::add_design_command(program, status);
-  flyball::app::add_tune_command(program, status);
-  flyball::app::add_motors_command(program, status);
-  flyball::app::add_book_command(program, status);
+  flyball::app::Invocation invocation{
+      .typed = flyball::app::typed_command({argv, static_cast<std::size_t>(argc)})};
+  flyball::app::add_identify_command(program, invocation);
+  flyball::app::add_design_command(program, invocation);
+  flyball::app::add_tune_command(program, invocation);
+  flyball::app::add_motors_command(program, invocation);
+  flyball::app::add_book_command(program, invocation);
 
   if (const std::string unknown = unknown_command(program, argc, argv); !unknown.empty()) {
     std::fprintf(stderr, "flyball: %s\n", unknown.c_str());
@@ -81,5 +82,5 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "flyball: a defect of Flyball: %s\n", defect.what());
     return flyball::app::bad_input;
   }
-  return status;
+  return invocation.status;
 }

@@ -58,14 +58,14 @@ int run(const Options& options) {
 
 }  // namespace
 
-void add_motors_command(CLI::App& program, int& status) {
+void add_motors_command(CLI::App& program, Invocation& invocation) {
   CLI::App* command =
       program.add_subcommand("motors", "List the motors by their datasheet numbers");
   auto options = std::make_shared<Options>();
   command->add_option("NAME", options->name,
                       "One motor; case, spaces and punctuation do not matter (krakenX60foc)");
   command->add_flag("--json", options->common.json, "Answer one JSON object on one line");
-  command->callback([options, &status] { status = run(*options); });
+  command->callback([options, &invocation] { invocation.status = run(*options); });
 }
 
 }  // namespace flyball::app

@@ -1,10 +1,9 @@
 #include <memory>
 
-#include <flyball/report/write_report.hpp>
 #include <flyball/study/project.hpp>
-#include <flyball/study/schema.hpp>
 #include <flyball/study/tune.hpp>
 
+#include "answer.hpp"
 #include "commands.hpp"
 #include "console.hpp"
 #include "design_options.hpp"
@@ -56,28 +55,13 @@ int run(const Options& options) {
   if (!result) {
     return fail(result.error(), options.common, schema);
   }
-  std::string written;
-  if (const auto folder = report_folder(options.common, true)) {
-    if (auto report = report::write_tune_report(*result, *folder)) {
-      written = *folder;
-    } else if (!options.common.out.empty()) {
-      return fail(report.error(), options.common, schema);
-    } else {
-      warn("no report: " + to_string(report.error()));
-    }
-  }
-  print(options.common.json ? study::to_json(*result)
-                            : report::to_terminal(*result, terminal_style(), written));
-  if (const Error* refusal = refusal_of(*result)) {
-    tell(*refusal);
-    return exit_status(*refusal);
-  }
-  return success;
+  return answer(*result, &report::write_tune_report, options.common, true, schema,
+                refusal_of(*result));
 }
 
 }  // namespace
 
-void add_tune_command(CLI::App& program, int& status) {
+void add_tune_command(CLI::App& program, Invocation& invocation) {
   CLI::App* command = program.add_subcommand(
       "tune", "From a log to a proven controller: identify, design, simulate, report, C++");
   command->footer(
@@ -85,13 +69,14 @@ void add_tune_command(CLI::App& program, int& status) {
       "PROJECT.toml may set [controller], [estimator], [sensor], [battery], [profile], and the\n"
       "motor in [mechanism] so that current and battery sag are simulated.");
   auto options = std::make_shared<Options>();
+  options->common.typed = invocation.typed;
   command->add_option("LOG", options->path, "The log")->required();
   command->add_option("PROJECT", options->project, "A project file (TOML)");
   add_log_options(*command, options->log);
   add_design_options(*command, options->design);
   add_common_options(*command, options->common,
                      "Write the report into this folder (flyball-report if absent)");
-  command->callback([options, &status] { status = run(*options); });
+  command->callback([options, &invocation] { invocation.status = run(*options); });
 }
 
 }  // namespace flyball::app

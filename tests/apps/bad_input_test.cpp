@@ -1,0 +1,230 @@
+// What nobody should type, and what comes of it: a clear error, the right exit status, nothing
+// half-written.
+#include <cstdint>
+
+#include <nlohmann/json.hpp>
+
+#include "run.hpp"
+
+namespace flyball::test {
+namespace {
+
+using Json = nlohmann::json;
+
+class BadInput : public Command {
+ protected:
+  /// The command must end so, say that, print nothing as a result and leave nothing behind.
+  void expect(const std::string& arguments, int status, std::string_view words) const {
+    const std::size_t before = files();
+    const Answer answer = run(arguments);
+    EXPECT_EQ(answer.status, status) << arguments << "\n" << answer.err;
+    EXPECT_TRUE(answer.err.starts_with("flyball: ")) << arguments << "\n" << answer.err;
+    EXPECT_TRUE(holds(answer.err, words)) << arguments << "\n" << answer.err;
+    EXPECT_EQ(files(), before) << arguments;
+  }
+
+  /// The same from every command that reads logs, and with --json as one object with the code.
+  void expect_log(const std::string& log, int status, std::string_view code,
+                  std::string_view words) const {
+    expect("identify " + log, status, words);
+    expect("tune " + log + " --json", status, words);
+    const Answer answer = run("identify " + log + " --json");
+    EXPECT_EQ(answer.status, status);
+    const Json json = Json::parse(answer.out, nullptr, false);
+    ASSERT_FALSE(json.is_discarded()) << answer.out;
+    EXPECT_EQ(json.at("schema"), "flyball.identify/1");
+    EXPECT_EQ(json.at("error").at("code"), code);
+    EXPECT_FALSE(json.at("error").at("message").get<std::string>().empty());
+  }
+
+  static Json elevator() { return Json::parse(contents(FLYBALL_EXAMPLES "/logs/elevator.json")); }
+
+  void project(const std::string& mechanism, const std::string& rest = "") const {
+    write("project.toml", "[mechanism]\n" + mechanism + rest);
+  }
+};
+
+constexpr const char* good_elevator =
+    "type = \"elevator\"\nmotor = \"NEO\"\nmotor_count = 2\ngearing = 10.0\nmass = \"8 kg\"\n"
+    "drum_radius = \"1 in\"\n";
+
+std::string with(std::string text, const std::string& from, const std::string& to) {
+  return text.replace(text.find(from), from.size(), to);
+}
+
+std::string wpilog_header(std::uint16_t version) {
+  std::string text = "WPILOG";
+  text += static_cast<char>(version & 0xff);
+  text += static_cast<char>(version >> 8);
+  return text + std::string(4, '\0');
+}
+
+TEST_F(BadInput, LogsThatAreNone) {
+  expect_log("nowhere.json", 2, "not_found", "nowhere.json");
+  expect_log(".", 2, "is_a_folder", "folder");
+  write("empty.json", "");
+  expect_log("empty.json", 2, "empty", "empty");
+  write("noise.wpilog", std::string("\x01\xff\x00\x80zz\x07", 7) + std::string(300, '\xee'));
+  const Answer noise = run("identify noise.wpilog");
+  EXPECT_EQ(noise.status, 2);
+  EXPECT_TRUE(holds(noise.err, "noise.wpilog")) << noise.err;
+  write("magic.wpilog", "WPILOX" + wpilog_header(0x100).substr(6) + std::string(40, '\x01'));
+  EXPECT_EQ(run("identify magic.wpilog").status, 2);
+  write("version.wpilog", wpilog_header(0x0700) + std::string(40, '\x01'));
+  const Answer version = run("identify version.wpilog");
+  EXPECT_EQ(version.status, 2);
+  EXPECT_TRUE(holds(version.err, "version")) << version.err;
+  write("other.json", "{\"hello\": [1, 2, 3]}");
+  EXPECT_EQ(run("identify other.json").status, 2);
+  write("text.csv", "this is a letter\nto my aunt\n");
+  EXPECT_EQ(run("identify text.csv").status, 2);
+}
+
+// A record that claims four gigabytes, and one whose lengths run over the end.
+TEST_F(BadInput, AbsurdRecordLengths) {
+  std::string huge = "\x7f\x01";
+  huge += std::string(3, '\0') + std::string(4, '\xff') + std::string(8, '\0') + "abc";
+  write("huge.wpilog", wpilog_header(0x100) + huge);
+  const Answer answer = run("identify huge.wpilog");
+  EXPECT_NE(answer.status, 0);
+  EXPECT_LE(answer.status, 2) << "ended by a signal";
+  EXPECT_TRUE(holds(answer.err, "huge.wpilog")) << answer.err;
+  std::string extra = wpilog_header(0x100);
+  extra[8] = extra[9] = extra[10] = extra[11] = '\xff';
+  write("extra.wpilog", extra);
+  EXPECT_EQ(run("identify extra.wpilog").status, 2);
+}
+
+// What precedes the cut is used, with a warning.
+TEST_F(BadInput, ATruncatedLog) {
+  const std::string whole = contents(FLYBALL_EXAMPLES "/logs/elevator.json");
+  write("cut.json", whole.substr(0, whole.size() * 19 / 20));
+  const Answer answer = run("identify cut.json --mechanism elevator --unit m --json");
+  EXPECT_LE(answer.status, 1) << answer.err;
+  EXPECT_TRUE(holds(answer.out, "\"truncated_log\"")) << answer.out;
+  write("stump.json", whole.substr(0, whole.size() / 3));
+  expect_log("stump.json --mechanism elevator --unit m", 1, "missing_tests", "missing");
+}
+
+TEST_F(BadInput, NotANumber) {
+  Json log = elevator();
+  std::string text = log.dump();
+  log["slow-forward"][100][3] = "NaN";
+  text = log.dump();
+  text = with(text, "\"NaN\"", "NaN");
+  write("nan.json", text);
+  const Answer answer = run("identify nan.json --json");
+  EXPECT_EQ(answer.status, 0) << answer.err;
+  EXPECT_TRUE(holds(answer.out, "non_finite")) << answer.out;
+}
+
+TEST_F(BadInput, NoMotion) {
+  Json log = elevator();
+  for (const char* test : {"slow-forward", "slow-backward", "fast-forward", "fast-backward"}) {
+    for (Json& row : log[test]) {
+      row[2] = 0.25;
+      row[3] = 0.0;
+    }
+  }
+  write("still.json", log.dump());
+  expect_log("still.json", 1, "no_motion", "move");
+}
+
+TEST_F(BadInput, OneTestOfFour) {
+  Json log = elevator();
+  for (const char* test : {"slow-backward", "fast-forward", "fast-backward"}) {
+    log[test] = Json::array();
+  }
+  write("one.json", log.dump());
+  expect_log("one.json", 1, "missing_tests", "dynamic");
+}
+
+TEST_F(BadInput, TimeThatGoesBackIsSorted) {
+  Json log = elevator();
+  std::swap(log["slow-forward"][50], log["slow-forward"][90]);
+  write("unsorted.json", log.dump());
+  const Answer answer = run("identify unsorted.json --json");
+  EXPECT_EQ(answer.status, 0) << answer.err;
+  EXPECT_TRUE(holds(answer.out, "unsorted_time")) << answer.out;
+}
+
+TEST_F(BadInput, MotorsThatAreNone) {
+  expect("motors warpdrive", 2, "known motors are");
+  expect("motors kraken", 2, "one of Kraken X60, Kraken X60 FOC");
+  project(with(good_elevator, "\"NEO\"", "\"NEP\""));
+  expect("design project.toml", 2, "project.toml:3:1: motor is \"NEP\"");
+  expect("design project.toml", 2, "did you mean \"NEO\"?");
+}
+
+TEST_F(BadInput, ProjectFiles) {
+  const auto refused = [&](const std::string& mechanism, const std::string& rest,
+                           std::string_view words) {
+    project(mechanism, rest);
+    expect("design project.toml", 2, words);
+    expect("design project.toml --out report", 2, words);
+  };
+  refused(with(good_elevator, "8 kg", "8 m"), "", "project.toml:6:1: mechanism.mass is \"8 m\", a length");
+  refused(with(good_elevator, "\"8 kg\"", "8"), "", "project.toml:6:1: mechanism.mass is 8, without a unit");
+  refused(with(good_elevator, "8 kg", "-8 kg"), "", "mass");
+  refused(with(good_elevator, "8 kg", "nan kg"), "", "mass");
+  refused(with(good_elevator, "10.0", "0"), "", "gearing");
+  refused(with(good_elevator, "10.0", "-10"), "", "gearing");
+  refused(with(good_elevator, "10.0", "inf"), "", "gearing");
+  refused(with(good_elevator, "motor_count = 2", "motor_count = 0"), "", "motor_count");
+  refused(with(good_elevator, "gearing", "gearng"), "", "did you mean \"gearing\"?");
+  refused(with(good_elevator, "elevator", "escalator"), "", "elevator");
+  refused(good_elevator, "[controler]\nperiod = \"20 ms\"\n", "did you mean \"controller\"?");
+  refused(good_elevator, "[controller]\nperiod = \"0 ms\"\n", "period");
+  refused(good_elevator, "[controller]\nperiod = \"-5 ms\"\n", "period");
+  refused(good_elevator, "[controller]\nperiod = \"20 kg\"\n", "a mass");
+  refused(good_elevator, "[controller]\nperiod = ", "project.toml:9");
+  write("project.toml", "");
+  expect("design project.toml", 2, "mechanism");
+  expect("design nowhere.toml", 2, "nowhere.toml");
+  write("project.toml", std::string("\xff\xfe\x00\x01", 4));
+  expect("design project.toml", 2, "project.toml");
+}
+
+TEST_F(BadInput, OptionsOfTheCommandLine) {
+  project(good_elevator);
+  expect("design project.toml --period 0ms", 2, "--period");
+  expect("design project.toml --period 20", 2, "--period");
+  expect("design project.toml --period 20kg", 2, "--period");
+  expect("design project.toml --max-voltage -3V", 2, "--max-voltage");
+  expect("design project.toml --delay -3ms", 2, "--delay");
+  expect("design project.toml --seed banana", 2, "--seed");
+  expect("identify " + example("logs/elevator.json") + " --mechanism turret", 2, "turret");
+  expect("identify " + example("logs/elevator.json") + " --unit parsnips", 2, "parsnips");
+  expect("identify " + example("logs/elevator.json") + " --scale 0", 2, "scale");
+}
+
+// Mathematics says no: the motor cannot lift it.
+TEST_F(BadInput, AMechanismThatTheMotorCannotMove) {
+  project(with(good_elevator, "8 kg", "80000 kg"));
+  expect("design project.toml --json", 1, "motor");
+}
+
+TEST_F(BadInput, FoldersThatAreNotOurs) {
+  project(good_elevator);
+  write("in-the-way", "a file\n");
+  expect("design project.toml --out in-the-way", 2, "it must be a folder");
+  expect("design project.toml --out in-the-way/report", 2, "in-the-way");
+  EXPECT_EQ(contents(work() / "in-the-way"), "a file\n");
+
+  std::filesystem::create_directory(work() / "thesis");
+  write("thesis/chapter.txt", "three years\n");
+  expect("design project.toml --out thesis", 2, "not empty");
+  expect("identify " + example("logs/elevator.json") + " --out thesis", 2, "not empty");
+  EXPECT_EQ(contents(work() / "thesis/chapter.txt"), "three years\n");
+
+  // Where nobody asked for a report, one that cannot be written is a warning beside the result.
+  std::filesystem::create_directory(work() / "flyball-report");
+  write("flyball-report/mine.txt", "mine\n");
+  const Answer answer = run("design project.toml");
+  EXPECT_EQ(answer.status, 0) << answer.err;
+  EXPECT_TRUE(holds(answer.err, "warning: no report")) << answer.err;
+  EXPECT_FALSE(answer.out.empty());
+}
+
+}  // namespace
+}  // namespace flyball::test
