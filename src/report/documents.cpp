@@ -49,8 +49,7 @@ void add_design_sections(Document& document, const study::DesignResult& result,
   document.sections.push_back(constants_section(result, reason));
 }
 
-std::string title_of(mechanisms::MechanismKind kind, const std::string& subject,
-                     const std::string& path) {
+std::string title_of(const std::string& kind, const std::string& subject, const std::string& path) {
   std::string title = capitalized(kind);
   if (!subject.empty()) {
     title += fmt::format(" “{}”", subject);
@@ -179,7 +178,7 @@ Verdict verdict_of(const study::TuneResult& result) {
 
 Document document_of(const study::IdentifyResult& result) {
   Document document;
-  document.title = title_of(result.mechanism, result.source.subject, result.source.path);
+  document.title = title_of(kind_of(result), result.source.subject, result.source.path);
   document.verdict = verdict_of(result);
   document.sections = {data_section(result), gains_section(result),
                        diagnostics_section(result.diagnostics())};

@@ -153,12 +153,20 @@ std::vector<PreparedRun> shown_runs(const study::IdentifyResult& result) {
   return runs;
 }
 
-std::string capitalized(mechanisms::MechanismKind kind) {
-  std::string name(to_string(kind));
+std::string kind_of(const study::IdentifyResult& result) {
+  // A drivetrain's log is refused before it is taken for a mechanism's.
+  return result.source.refusal ? "drivetrain" : std::string(to_string(result.mechanism));
+}
+
+std::string capitalized(std::string name) {
   if (!name.empty() && name.front() >= 'a' && name.front() <= 'z') {
     name.front() = static_cast<char>(name.front() - 'a' + 'A');
   }
   return name;
+}
+
+std::string capitalized(mechanisms::MechanismKind kind) {
+  return capitalized(std::string(to_string(kind)));
 }
 
 Section data_section(const study::IdentifyResult& result) {
@@ -171,7 +179,7 @@ Section data_section(const study::IdentifyResult& result) {
                 (result.source.format.empty() ? "" : fmt::format(" ({})", result.source.format)));
   facts.add(
       "mechanism",
-      fmt::format("{}{}, position in {}", to_string(result.mechanism),
+      fmt::format("{}{}, position in {}", kind_of(result),
                   result.source.subject.empty() ? "" : fmt::format(" “{}”", result.source.subject),
                   result.unit));
   std::size_t rows = 0;

@@ -42,5 +42,8 @@ namespace flyball::report {
 [[nodiscard]] std::string controlled_unit(const study::PlantDescription& plant);
 /// "Elevator", "Arm", "Flywheel".
 [[nodiscard]] std::string capitalized(mechanisms::MechanismKind kind);
+/// "elevator", …, or "drivetrain" for a log that was refused as one.
+[[nodiscard]] std::string kind_of(const study::IdentifyResult& result);
+[[nodiscard]] std::string capitalized(std::string name);
 
 }  // namespace flyball::report

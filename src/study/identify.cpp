@@ -18,8 +18,10 @@ Expected<IdentifyResult> identify(const IdentifyJob& job) {
   if (source->refusal) {
     identification::FitReport refused{
         .prepared = {}, .diagnostics = {}, .fit = tl::unexpected(*source->refusal)};
-    return IdentifyResult{
-        .source = *std::move(source), .report = std::move(refused), .mechanism = {}, .unit = {}};
+    return IdentifyResult{.source = *std::move(source),
+                          .report = std::move(refused),
+                          .mechanism = {},
+                          .unit = "unit"};
   }
   const mechanisms::MechanismKind mechanism = *source->recording.mechanism;
   const std::string unit = source->recording.unit;

@@ -19,7 +19,7 @@ struct IdentifyResult {
   identification::FitReport
       report;  ///< `report.fit` is the gains or the reason why there are none.
   mechanisms::MechanismKind mechanism{};
-  std::string unit{};  ///< "m" or "rad".
+  std::string unit{};  ///< "m" or "rad"; "unit" of a log that was refused before it was known.
 
   /// Everything found while reading, preparing and fitting, in that order.
   [[nodiscard]] std::vector<Diagnostic> diagnostics() const;
