@@ -6,6 +6,8 @@
 
 #include <flyball/math/matrix_exponential.hpp>
 
+#include "systems/quadratic_integral.hpp"
+
 namespace flyball {
 
 Expected<DiscretizedMatrices> discretize_zoh(const MatrixRef& A, const MatrixRef& B, Time period) {
@@ -59,29 +61,11 @@ Expected<Eigen::MatrixXd> discretize(const MatrixRef& A, const ProcessDensity& d
   }
 
   const double T = period.si();
-  const double norm = A.cwiseAbs().colwise().sum().maxCoeff() * T;
-  const int doublings = norm > 0.5 ? static_cast<int>(std::ceil(std::log2(norm / 0.5))) : 0;
-  const double h = std::ldexp(T, -doublings);
-
-  // Q(h) = Σ_j h^{j+1}/(j+1)! L^j(Q) with L(X) = A X + X Aᵀ. ‖L‖h <= 2‖A‖h <= 1, so 20 terms leave
-  // 1/21! of the first.
-  Eigen::MatrixXd term = 0.5 * (Q + Q.transpose()) * h;
-  Eigen::MatrixXd Q_d = term;
-  for (int j = 2; j <= 20; ++j) {
-    const Eigen::MatrixXd product = A * term;
-    term = (h / j) * (product + product.transpose());
-    Q_d += term;
+  auto Q_d = detail::quadratic_integral(A, Q, T);
+  if (!Q_d) {
+    return tl::unexpected(std::move(Q_d).error());
   }
-  auto Phi = expm(A * h);
-  if (!Phi) {
-    return tl::unexpected(Phi.error());
-  }
-  for (int k = 0; k < doublings; ++k) {
-    Q_d += (*Phi * Q_d * Phi->transpose()).eval();
-    Q_d = 0.5 * (Q_d + Q_d.transpose()).eval();
-    *Phi = (*Phi * *Phi).eval();
-  }
-  if (!Q_d.allFinite()) {
+  if (!Q_d->allFinite()) {
     return tl::unexpected(
         Error(ArgumentError::not_finite)
             .in(std::string(where))

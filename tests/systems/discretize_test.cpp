@@ -70,7 +70,7 @@ TEST(Discretize, PeriodsAddUp) {
 // A Q_d + Q_d Aᵀ = A_d Q A_dᵀ - Q, what (7.8) gives by parts; also for ‖A‖T of 1e4, where one Van
 // Loan exponential has nothing left.
 TEST(Discretize, NoiseOfAStiffPlant) {
-  for (const double rate : {1.0, 200.0, 1e5}) {
+  for (const double rate : {1.0, 200.0, 1e5, 1e6}) {
     Eigen::Matrix2d A;
     A << -1.0, 1.0, 0.0, -rate;
     Eigen::Matrix2d Q;

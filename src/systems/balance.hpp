@@ -1,0 +1,25 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include <flyball/core/argument.hpp>
+
+namespace flyball::detail {
+
+/// Powers of two, so that scaling does not round: states x = diag(states) x', inputs and outputs
+/// such that the scaled B diag(inputs) and diag(outputs) C are of the size of the scaled A.
+struct SystemScaling {
+  Eigen::VectorXd states;
+  double inputs = 1.0;
+  double outputs = 1.0;
+};
+
+/// The scaling of states under which rows and columns of [A B; C 0] are of like size (SLICOT's
+/// TB01ID). B or C may have no columns or rows: then they do not count. A state that acts on
+/// nothing, or on which nothing acts, has a free scale: it takes the one of the others.
+[[nodiscard]] SystemScaling scaling_of(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C);
+
+/// diag(states)⁻¹ A diag(states).
+[[nodiscard]] Eigen::MatrixXd scaled_state_matrix(const MatrixRef& A, const SystemScaling& scaling);
+
+}  // namespace flyball::detail

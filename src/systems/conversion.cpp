@@ -1,0 +1,413 @@
+#include <flyball/systems/conversion.hpp>
+
+#include <array>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include <flyball/core/text.hpp>
+#include <flyball/math/matrix_exponential.hpp>
+#include <flyball/math/matrix_function.hpp>
+#include <flyball/systems/discretize.hpp>
+
+#include "math/dense.hpp"
+#include "systems/zero_pole_gain.hpp"
+
+namespace flyball {
+
+namespace {
+
+using Complex = std::complex<double>;
+using detail::product;
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+constexpr std::array<std::string_view, 6> names{
+    "zoh", "foh", "tustin", "forward-euler", "backward-euler", "matched"};
+
+/// I + factor A or its right hand sides are solved for: A balanced, so that the states' units do
+/// not decide what is singular.
+class Shifted {
+ public:
+  /// constant I + factor A.
+  Shifted(const MatrixXd& A, double constant, double factor)
+      : A_(A), d_(detail::balance_of(A)), factor_(factor), constant_(constant) {
+    balanced_ = d_.cwiseInverse().asDiagonal() * A * d_.asDiagonal();
+    matrix_ = factor * balanced_;
+    matrix_.diagonal().array() += constant;
+  }
+
+  /// @param forbidden  The eigenvalue of A that makes it singular.
+  [[nodiscard]] Expected<void> check(double forbidden, std::string_view where,
+                                     std::string_view method) const {
+    const Eigen::VectorXcd eigenvalues = detail::eigenvalues_of(A_);
+    const double blur = epsilon * balanced_.norm() * std::abs(factor_);
+    for (const Complex& lambda : eigenvalues) {
+      const double gap = std::abs(constant_ + factor_ * lambda);
+      if (gap > 4.0 * (blur + epsilon * (std::abs(constant_) + std::abs(factor_ * lambda)))) {
+        continue;
+      }
+      return tl::unexpected(
+          Error(SystemError::no_image)
+              .in(std::string(where))
+              .about("A")
+              .got("with an eigenvalue that " + std::string(method) + " maps to infinity")
+              .expected("without the eigenvalue " + format_number(forbidden))
+              .hint("choose another period or zoh")
+              .with("eigenvalue", std::vector<double>{lambda.real(), lambda.imag()}));
+    }
+    return {};
+  }
+
+  [[nodiscard]] MatrixXd solve(const MatrixXd& rhs) const {
+    return d_.asDiagonal() * detail::solve_linear(matrix_, d_.cwiseInverse().asDiagonal() * rhs);
+  }
+
+  /// rhs (constant I + factor A)⁻¹.
+  [[nodiscard]] MatrixXd solve_right(const MatrixXd& rhs) const {
+    const MatrixXd transposed =
+        detail::solve_linear(matrix_.transpose(), (rhs * d_.asDiagonal()).transpose());
+    return transposed.transpose() * d_.cwiseInverse().asDiagonal();
+  }
+
+ private:
+  MatrixXd A_;
+  Eigen::VectorXd d_;
+  double factor_;
+  double constant_;
+  MatrixXd balanced_;
+  MatrixXd matrix_;
+};
+
+/// T, or 2 tan(ωT/2)/ω, at which the bilinear transform is exact at ω.
+double warped(double T, double omega) {
+  return omega > 0.0 ? 2.0 * std::tan(0.5 * omega * T) / omega : T;
+}
+
+Expected<void> check_arguments(Time period, ConversionMethod method, AngularVelocity prewarp,
+                               std::string_view where) {
+  if (auto checked = check_all(check_positive(period.si(), where, "period", "s"),
+                               check_not_negative(prewarp.si(), where, "prewarp", "rad/s"));
+      !checked) {
+    return checked;
+  }
+  if (prewarp.si() == 0.0) {
+    return {};
+  }
+  const double nyquist = std::numbers::pi / period.si();
+  if (method != ConversionMethod::tustin) {
+    return tl::unexpected(Error(ArgumentError::out_of_range)
+                              .in(std::string(where))
+                              .about("prewarp")
+                              .got("given for " + std::string(to_string(method)))
+                              .expected("zero: only tustin can be prewarped"));
+  }
+  if (prewarp.si() >= nyquist) {
+    return tl::unexpected(
+        Error(ArgumentError::out_of_range)
+            .in(std::string(where))
+            .about("prewarp")
+            .got(format_number(prewarp.si()) + " rad/s")
+            .expected("below the Nyquist frequency, pi/T = " + format_number(nyquist) + " rad/s"));
+  }
+  return {};
+}
+
+Expected<void> check_single(const MatrixXd& D, std::string_view where) {
+  if (D.rows() == 1 && D.cols() == 1) {
+    return {};
+  }
+  return tl::unexpected(
+      Error(ArgumentError::wrong_shape)
+          .in(std::string(where))
+          .about("the system")
+          .got(std::to_string(D.rows()) + " outputs by " + std::to_string(D.cols()) + " inputs")
+          .expected("one output by one input: only then are there zeros to match")
+          .hint("convert each channel, or choose zoh"));
+}
+
+/// φ₁(AT) T and φ₂(AT) T, φ₁ = (eˣ - 1)/x, φ₂ = (eˣ - 1 - x)/x², and e^{AT}, from one exponential.
+struct Holds {
+  MatrixXd A;
+  MatrixXd one;
+  MatrixXd two;
+};
+
+/// @param B  What the last two are multiplied with.
+Expected<Holds> holds(const MatrixXd& A, const MatrixXd& B, double T) {
+  const Index n = A.rows();
+  const Index m = B.cols();
+  const double size = std::max(detail::norm1(A) * T, 1.0);
+  const double size_B = detail::norm1(B) * T;
+  const double scale = size_B > 0.0 ? std::exp2(std::round(std::log2(size / size_B))) : 1.0;
+  MatrixXd block = MatrixXd::Zero(n + 2 * m, n + 2 * m);
+  block.topLeftCorner(n, n) = A * T;
+  block.block(0, n, n, m) = (B * scale) * T;
+  block.block(n, n + m, m, m).setIdentity();
+  auto exponential = expm(block);
+  if (!exponential) {
+    return tl::unexpected(std::move(exponential).error());
+  }
+  return Holds{exponential->topLeftCorner(n, n), exponential->block(0, n, n, m) / scale,
+               exponential->block(0, n + m, n, m) / scale};
+}
+
+/// (eˣ - 1)/x.
+Complex phi(Complex x) {
+  if (std::abs(x) < 0.5) {
+    Complex sum = 1.0;
+    Complex term = 1.0;
+    for (int k = 2; k < 20; ++k) {
+      term *= x / static_cast<double>(k);
+      sum += term;
+    }
+    return sum;
+  }
+  return (std::exp(x) - 1.0) / x;
+}
+
+Expected<DiscreteSystem<>> match_to_discrete(const ContinuousSystem<>& system, Time period) {
+  constexpr std::string_view where = "discretize";
+  if (auto single = check_single(system.D, where); !single) {
+    return tl::unexpected(std::move(single).error());
+  }
+  const auto zpk = detail::zero_pole_gain(system);
+  if (!zpk) {
+    return tl::unexpected(Error(SystemError::zero_transfer)
+                              .in(std::string(where))
+                              .about("the system")
+                              .hint("there is no gain to match; choose zoh"));
+  }
+  const double T = period.si();
+  detail::ZeroPoleGain image;
+  // G_d(1) = G(0): (1 - e^{pT})/(-p) = T φ₁(pT), which at the origin is T.
+  Complex gain = zpk->gain;
+  for (const Complex& p : zpk->poles) {
+    image.poles.push_back(std::exp(p * T));
+    gain *= T * phi(p * T);
+  }
+  for (const Complex& z : zpk->zeros) {
+    image.zeros.push_back(std::exp(z * T));
+    gain /= T * phi(z * T);
+  }
+  for (std::size_t k = zpk->zeros.size() + 1; k < zpk->poles.size(); ++k) {
+    image.zeros.emplace_back(-1.0);
+    gain /= 2.0;
+  }
+  image.gain = gain.real();
+  const ContinuousSystem<> sections = detail::series_of_sections(image);
+  DiscreteSystem<> discrete{sections.A, sections.B, sections.C, sections.D, period};
+  return check_system(discrete, where).map([&] { return discrete; });
+}
+
+Expected<ContinuousSystem<>> match_to_continuous(const DiscreteSystem<>& system) {
+  constexpr std::string_view where = "undiscretize";
+  if (auto single = check_single(system.D, where); !single) {
+    return tl::unexpected(std::move(single).error());
+  }
+  auto zpk = detail::zero_pole_gain({system.A, system.B, system.C, system.D});
+  if (!zpk) {
+    return tl::unexpected(
+        Error(SystemError::zero_transfer).in(std::string(where)).about("the system"));
+  }
+  // k equal zeros scatter by the k-th root of rounding.
+  std::vector<Complex>& zeros = zpk->zeros;
+  std::sort(zeros.begin(), zeros.end(),
+            [](Complex a, Complex b) { return std::abs(a + 1.0) < std::abs(b + 1.0); });
+  std::size_t at_infinity = 0;
+  for (std::size_t k = zeros.size(); k > 0 && at_infinity == 0; --k) {
+    const double scatter = 4.0 * std::pow(1e3 * epsilon, 1.0 / static_cast<double>(k));
+    at_infinity = std::abs(zeros[k - 1] + 1.0) <= std::min(scatter, 0.3) ? k : 0;
+  }
+  zeros.erase(zeros.begin(), zeros.begin() + static_cast<std::ptrdiff_t>(at_infinity));
+  const double T = system.period.si();
+  detail::ZeroPoleGain image;
+  Complex gain = zpk->gain * std::ldexp(1.0, static_cast<int>(at_infinity));
+  const auto map = [&](const std::vector<Complex>& from, std::vector<Complex>& to,
+                       std::string_view what, bool pole) -> Expected<void> {
+    for (const Complex& z : from) {
+      if (std::abs(z) < 1e-300 || (z.imag() == 0.0 && z.real() <= 0.0)) {
+        return tl::unexpected(
+            Error(SystemError::no_image)
+                .in(std::string(where))
+                .about("the " + std::string(what))
+                .got("zero or negative")
+                .expected("off the closed negative real axis: e^{sT} of a real system is")
+                .hint("choose tustin")
+                .with(std::string(what), std::vector<double>{z.real(), z.imag()}));
+      }
+      const Complex s = std::log(z) / T;
+      to.push_back(s);
+      gain = pole ? gain / (T * phi(s * T)) : gain * (T * phi(s * T));
+    }
+    return {};
+  };
+  if (auto mapped = map(zpk->poles, image.poles, "pole", true); !mapped) {
+    return tl::unexpected(std::move(mapped).error());
+  }
+  if (auto mapped = map(zeros, image.zeros, "zero", false); !mapped) {
+    return tl::unexpected(std::move(mapped).error());
+  }
+  image.gain = gain.real();
+  ContinuousSystem<> continuous = detail::series_of_sections(image);
+  return check_system(continuous, where).map([&] { return continuous; });
+}
+
+/// A of the continuous system under zero- or first-order hold.
+Expected<MatrixXd> logarithm(const MatrixXd& A, double T) {
+  return logm(A).map([&](const MatrixXd& X) { return MatrixXd(X / T); });
+}
+
+}  // namespace
+
+std::string_view to_string(ConversionMethod method) {
+  const auto index = static_cast<std::size_t>(method);
+  return index < names.size() ? names[index] : "unknown";
+}
+
+Expected<ConversionMethod> parse_conversion_method(std::string_view name) {
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    if (names[k] == name) {
+      return static_cast<ConversionMethod>(k);
+    }
+  }
+  const std::string nearest = nearest_name(name, names);
+  return tl::unexpected(Error(ArgumentError::unknown_name)
+                            .about("method")
+                            .got('"' + std::string(name) + '"')
+                            .expected("zoh, foh, tustin, forward-euler, backward-euler or matched")
+                            .hint(nearest.empty() ? "" : "did you mean \"" + nearest + "\"?"));
+}
+
+Expected<DiscreteSystem<>> convert_to_discrete(const ContinuousSystem<>& system, Time period,
+                                               ConversionMethod method, AngularVelocity prewarp) {
+  constexpr std::string_view where = "discretize";
+  if (auto checked = check_system(system, where); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  if (auto checked = check_arguments(period, method, prewarp, where); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  const auto& [A, B, C, D] = system;
+  const Index n = A.rows();
+  const double T =
+      method == ConversionMethod::tustin ? warped(period.si(), prewarp.si()) : period.si();
+  DiscreteSystem<> discrete{A, B, C, D, period};
+  switch (method) {
+    case ConversionMethod::zoh: {
+      auto held = discretize_zoh(A, B, period);
+      if (!held) {
+        return tl::unexpected(std::move(held).error());
+      }
+      discrete.A = std::move(held->A);
+      discrete.B = std::move(held->B);
+      break;
+    }
+    case ConversionMethod::foh: {
+      const auto parts = holds(A, B, T);
+      if (!parts) {
+        return tl::unexpected(parts.error());
+      }
+      discrete.A = parts->A;
+      discrete.B = parts->one - parts->two + product(parts->A, parts->two);
+      discrete.D = D + product(C, parts->two);
+      break;
+    }
+    case ConversionMethod::tustin:
+    case ConversionMethod::backward_euler: {
+      // θ = 1/2 or 1: A_d = (I - θTA)⁻¹(I + (1 - θ)TA).
+      const double theta = method == ConversionMethod::tustin ? 0.5 : 1.0;
+      const Shifted shifted(A, 1.0, -theta * T);
+      if (auto checked = shifted.check(1.0 / (theta * T), where, to_string(method)); !checked) {
+        return tl::unexpected(std::move(checked).error());
+      }
+      discrete.A = shifted.solve(MatrixXd::Identity(n, n) + (1.0 - theta) * T * A);
+      discrete.B = shifted.solve(T * B);
+      discrete.C = shifted.solve_right(C);
+      discrete.D = D + theta * product(C, discrete.B);
+      break;
+    }
+    case ConversionMethod::forward_euler:
+      discrete.A = MatrixXd::Identity(n, n) + T * A;
+      discrete.B = T * B;
+      break;
+    case ConversionMethod::matched:
+      return match_to_discrete(system, period);
+  }
+  return check_system(discrete, where).map([&] { return discrete; });
+}
+
+Expected<ContinuousSystem<>> convert_to_continuous(const DiscreteSystem<>& system,
+                                                   ConversionMethod method,
+                                                   AngularVelocity prewarp) {
+  constexpr std::string_view where = "undiscretize";
+  if (auto checked = check_system(system, where); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  if (auto checked = check_arguments(system.period, method, prewarp, where); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  const auto& [A, B, C, D, period] = system;
+  const Index n = A.rows();
+  const MatrixXd I = MatrixXd::Identity(n, n);
+  const double T =
+      method == ConversionMethod::tustin ? warped(period.si(), prewarp.si()) : period.si();
+  ContinuousSystem<> continuous{A, B, C, D};
+  switch (method) {
+    case ConversionMethod::zoh:
+    case ConversionMethod::foh: {
+      auto found = logarithm(A, T);
+      if (!found) {
+        return tl::unexpected(std::move(found).error());
+      }
+      continuous.A = *found;
+      // B_d = T φ₁(AT) B, or T φ₁(AT)² B: φ₁ - φ₂ + eˣφ₂ = φ₁². The principal logarithm keeps φ₁
+      // regular.
+      const auto parts = holds(continuous.A, I, T);
+      if (!parts) {
+        return tl::unexpected(parts.error());
+      }
+      continuous.B = detail::solve_linear(parts->one, B);
+      if (method == ConversionMethod::foh) {
+        continuous.B = T * detail::solve_linear(parts->one, continuous.B);
+        continuous.D = D - product(C, product(parts->two, continuous.B));
+      }
+      break;
+    }
+    case ConversionMethod::tustin: {
+      const Shifted shifted(A, 1.0, 1.0);
+      if (auto checked = shifted.check(-1.0, where, "tustin"); !checked) {
+        return tl::unexpected(std::move(checked).error());
+      }
+      continuous.A = (2.0 / T) * shifted.solve(A - I);
+      continuous.B = (2.0 / T) * shifted.solve(B);
+      continuous.C = 2.0 * shifted.solve_right(C);
+      continuous.D = D - 0.5 * product(continuous.C, B);
+      break;
+    }
+    case ConversionMethod::forward_euler:
+      continuous.A = (A - I) / T;
+      continuous.B = B / T;
+      break;
+    case ConversionMethod::backward_euler: {
+      const Shifted shifted(A, 0.0, 1.0);
+      if (auto checked = shifted.check(0.0, where, "backward-euler"); !checked) {
+        return tl::unexpected(std::move(checked).error());
+      }
+      continuous.A = shifted.solve(A - I) / T;
+      continuous.B = shifted.solve(B) / T;
+      continuous.C = shifted.solve_right(C);
+      continuous.D = D - product(continuous.C, B);
+      break;
+    }
+    case ConversionMethod::matched:
+      return match_to_continuous(system);
+  }
+  return check_system(continuous, where).map([&] { return continuous; });
+}
+
+}  // namespace flyball

@@ -1,0 +1,190 @@
+#include <flyball/systems/gramian.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <flyball/math/matrix_equation.hpp>
+
+#include "math/dense.hpp"
+#include "systems/balance.hpp"
+#include "systems/gramian_factor.hpp"
+#include "systems/modes.hpp"
+
+namespace flyball {
+
+namespace detail {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+Expected<void> check_stable(const MatrixRef& A, TimeDomain domain, std::string_view where) {
+  const JudgedEigenvalues judged = judged_eigenvalues(A, domain);
+  if (!judged.converged) {
+    return tl::unexpected(Error(SystemError::no_convergence)
+                              .in(std::string(where))
+                              .about("the eigenvalues of A"));
+  }
+  for (Index k = 0; k < judged.values.size(); ++k) {
+    if (judged.verdicts[static_cast<std::size_t>(k)] != Stability::stable) {
+      return tl::unexpected(
+          Error(SystemError::not_stable)
+              .in(std::string(where))
+              .about("A")
+              .got(judged.verdicts[static_cast<std::size_t>(k)] == Stability::marginal
+                       ? "marginally stable"
+                       : "unstable")
+              .expected(domain == TimeDomain::continuous
+                            ? "stable: every pole left of the imaginary axis"
+                            : "stable: every pole within the unit circle")
+              .hint("stabilise the system first, or remove a pole that is not reached or seen "
+                    "with minimal_realization")
+              .with("pole", std::vector<double>{judged.values(k).real(), judged.values(k).imag()}));
+    }
+  }
+  return {};
+}
+
+Expected<MatrixXd> gramian_factor(const MatrixRef& A, const MatrixRef& B, TimeDomain domain,
+                                  std::string_view where) {
+  if (auto stable = check_stable(A, domain, where); !stable) {
+    return tl::unexpected(std::move(stable).error());
+  }
+  const Index n = A.rows();
+  MatrixXd power = A;
+  MatrixXd L = B;
+  if (domain == TimeDomain::continuous) {
+    // F = (pI - A)⁻¹(pI + A), G = √(2p) (pI - A)⁻¹B have the same Gramian; p in the middle of the
+    // poles' sizes brings them all inside the circle.
+    const Eigen::VectorXd sizes = eigenvalues_of(A).cwiseAbs();
+    const double p = std::sqrt(sizes.minCoeff() * sizes.maxCoeff());
+    MatrixXd shifted = -A;
+    shifted.diagonal().array() += p;
+    MatrixXd right(n, n + B.cols());
+    right << A, std::sqrt(2.0 * p) * B;
+    right.leftCols(n).diagonal().array() += p;
+    const MatrixXd solved = solve_linear(shifted, right);
+    power = solved.leftCols(n);
+    L = solved.rightCols(B.cols());
+  }
+  constexpr int most_doublings = 60;
+  for (int k = 0; k < most_doublings; ++k) {
+    const MatrixXd next = product(power, L);
+    if (!next.allFinite()) {
+      break;
+    }
+    const bool last = next.norm() <= 1e-2 * std::numeric_limits<double>::epsilon() * L.norm();
+    MatrixXd both(n, L.cols() + next.cols());
+    both << L, next;
+    if (both.cols() > n) {
+      // L Lᵀ of fewer columns: Rᵀ R with R the triangle of bothᵀ.
+      L = full_qr(both.transpose()).R.topRows(n).transpose();
+    } else {
+      L = both;
+    }
+    if (last) {
+      MatrixXd square = MatrixXd::Zero(n, n);
+      square.leftCols(L.cols()) = L;
+      return square;
+    }
+    power = product(power, power);
+  }
+  return tl::unexpected(Error(SystemError::no_convergence)
+                            .in(std::string(where))
+                            .about("the Gramian")
+                            .hint("a pole is too close to the boundary of stability"));
+}
+
+Expected<GramianFactors> gramian_factors(const ContinuousSystem<>& system, TimeDomain domain,
+                                         std::string_view where) {
+  const SystemScaling scaling = scaling_of(system.A, system.B, system.C);
+  const MatrixXd A = scaled_state_matrix(system.A, scaling);
+  const MatrixXd B = scaling.states.cwiseInverse().asDiagonal() * system.B;
+  const MatrixXd C = system.C * scaling.states.asDiagonal();
+  auto reach = gramian_factor(A, B, domain, where);
+  if (!reach) {
+    return tl::unexpected(std::move(reach).error());
+  }
+  auto sight = gramian_factor(A.transpose(), C.transpose(), domain, where);
+  if (!sight) {
+    return tl::unexpected(std::move(sight).error());
+  }
+  return GramianFactors{scaling.states, std::move(*reach), std::move(*sight)};
+}
+
+}  // namespace detail
+
+namespace {
+
+using Eigen::MatrixXd;
+
+Expected<Gramian> gramian(const MatrixRef& A, const MatrixRef& B, TimeDomain domain) {
+  const MatrixXd BB = detail::product_transposed(B, B);
+  auto solution = domain == TimeDomain::continuous ? lyapunov(A, BB) : discrete_lyapunov(A, BB);
+  if (!solution) {
+    return tl::unexpected(std::move(solution).error());
+  }
+  Gramian found;
+  found.W = detail::symmetrized(solution->X);
+  found.eigenvalues = detail::symmetric_eigensystem_of(found.W).values;
+  found.is_energy = detail::judged_eigenvalues(A, domain).stability == Stability::stable;
+  found.residual = solution->residual;
+  found.condition = solution->condition;
+  return found;
+}
+
+Expected<void> check_gramian(const MatrixRef& A, const MatrixRef& B, Eigen::Index rows,
+                             Eigen::Index columns, std::string_view name, std::string_view meaning,
+                             std::string_view where) {
+  if (auto square = check_square(A, where, "A"); !square) {
+    return square;
+  }
+  return check_all(check_shape(B, rows, columns, where, name, meaning),
+                   check_finite(A, where, "A"), check_finite(B, where, name));
+}
+
+Expected<Eigen::VectorXd> hankel(const ContinuousSystem<>& system, TimeDomain domain) {
+  return detail::gramian_factors(system, domain, "hankel_singular_values")
+      .map([](const detail::GramianFactors& factors) {
+        return detail::singular_values_of(
+            detail::transposed_product(factors.observability, factors.controllability));
+      });
+}
+
+}  // namespace
+
+Expected<Gramian> controllability_gramian(const MatrixRef& A, const MatrixRef& B,
+                                          TimeDomain domain) {
+  if (auto checked = check_gramian(A, B, A.rows(), B.cols(), "B", "states x inputs",
+                                   "controllability_gramian");
+      !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  return gramian(A, B, domain);
+}
+
+Expected<Gramian> observability_gramian(const MatrixRef& A, const MatrixRef& C, TimeDomain domain) {
+  if (auto checked = check_gramian(A, C, C.rows(), A.rows(), "C", "outputs x states",
+                                   "observability_gramian");
+      !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  return gramian(A.transpose(), C.transpose(), domain);
+}
+
+Expected<Eigen::VectorXd> hankel_singular_values(const ContinuousSystem<>& system) {
+  if (auto checked = check_system(system, "hankel_singular_values"); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  return hankel(system, TimeDomain::continuous);
+}
+
+Expected<Eigen::VectorXd> hankel_singular_values(const DiscreteSystem<>& system) {
+  if (auto checked = check_system(system, "hankel_singular_values"); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  return hankel({system.A, system.B, system.C, system.D}, TimeDomain::discrete);
+}
+
+}  // namespace flyball

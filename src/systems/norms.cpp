@@ -1,0 +1,245 @@
+#include <flyball/systems/norms.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <vector>
+
+#include <flyball/systems/conversion.hpp>
+
+#include "math/dense.hpp"
+#include "systems/balance.hpp"
+#include "systems/gramian_factor.hpp"
+
+namespace flyball {
+
+namespace {
+
+using Complex = std::complex<double>;
+using detail::product;
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double relative_accuracy = 1e-10;
+
+ContinuousSystem<> scaled(const ContinuousSystem<>& system) {
+  const detail::SystemScaling scaling = detail::scaling_of(system.A, system.B, system.C);
+  return {detail::scaled_state_matrix(system.A, scaling),
+          scaling.states.cwiseInverse().asDiagonal() * system.B,
+          system.C * scaling.states.asDiagonal(), system.D};
+}
+
+double largest_singular_value(const MatrixXd& M) {
+  return M.size() == 0 ? 0.0 : detail::singular_values_of(M)(0);
+}
+
+/// The largest singular value of G(jω).
+double gain_at(const ContinuousSystem<>& system, double omega) {
+  if (std::isinf(omega)) {
+    return largest_singular_value(system.D);
+  }
+  Eigen::MatrixXcd shifted = -system.A.cast<Complex>();
+  shifted.diagonal().array() += Complex(0.0, omega);
+  const Eigen::MatrixXcd x = detail::solve_complex(shifted, system.B.cast<Complex>());
+  const Eigen::MatrixXcd G =
+      detail::complex_product(system.C.cast<Complex>(), x) + system.D.cast<Complex>();
+  return G.rows() == 1 || G.cols() == 1 ? G.norm() : detail::singular_values_of_complex(G)(0);
+}
+
+/// The frequencies at which a singular value of G may be γ: eigenvalues of the Hamiltonian near the
+/// imaginary axis. Too many only cost time; `gain_at` decides.
+std::vector<double> crossings(const ContinuousSystem<>& s, double gamma) {
+  const Index n = s.A.rows();
+  const Index m = s.B.cols();
+  const Index p = s.C.rows();
+  // R = γ²I - DᵀD; [A + BR⁻¹DᵀC, γBR⁻¹Bᵀ; -γCᵀS⁻¹C, -(A + BR⁻¹DᵀC)ᵀ], S = γ²I - DDᵀ.
+  const MatrixXd R =
+      gamma * gamma * MatrixXd::Identity(m, m) - detail::transposed_product(s.D, s.D);
+  const MatrixXd S =
+      gamma * gamma * MatrixXd::Identity(p, p) - detail::product_transposed(s.D, s.D);
+  const MatrixXd R_B = detail::solve_linear(R, s.B.transpose());
+  const MatrixXd R_DC = detail::solve_linear(R, detail::transposed_product(s.D, s.C));
+  const MatrixXd S_C = detail::solve_linear(S, s.C);
+  MatrixXd H(2 * n, 2 * n);
+  H.topLeftCorner(n, n) = s.A + product(s.B, R_DC);
+  H.topRightCorner(n, n) = gamma * product(s.B, R_B);
+  H.bottomLeftCorner(n, n) = -gamma * detail::transposed_product(s.C, S_C);
+  H.bottomRightCorner(n, n) = -H.topLeftCorner(n, n).transpose();
+  const Eigen::VectorXcd eigenvalues = detail::eigenvalues_of(H);
+  const double size = H.norm();
+  std::vector<double> found;
+  for (const Complex& lambda : eigenvalues) {
+    const double tolerance = std::sqrt(epsilon) * std::abs(lambda) + 100.0 * epsilon * size;
+    if (lambda.imag() >= 0.0 && std::abs(lambda.real()) <= tolerance) {
+      found.push_back(lambda.imag());
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+/// A maximum of the gain near `omega`, by golden section over [low, high].
+double climb(const ContinuousSystem<>& system, double low, double high, double& gain) {
+  constexpr double golden = 0.6180339887498949;
+  double a = high - golden * (high - low);
+  double b = low + golden * (high - low);
+  double at_a = gain_at(system, a);
+  double at_b = gain_at(system, b);
+  for (int k = 0; k < 90 && high - low > 1e-15 * high; ++k) {
+    if (at_a >= at_b) {
+      high = b;
+      b = a;
+      at_b = at_a;
+      a = high - golden * (high - low);
+      at_a = gain_at(system, a);
+    } else {
+      low = a;
+      a = b;
+      at_a = at_b;
+      b = low + golden * (high - low);
+      at_b = gain_at(system, b);
+    }
+  }
+  gain = std::max(at_a, at_b);
+  return at_a >= at_b ? a : b;
+}
+
+/// @param system  Stable, scaled.
+Expected<HInfinityNorm> largest_gain(const ContinuousSystem<>& system, std::string_view where) {
+  HInfinityNorm best{gain_at(system, infinity), infinity, 0.0, 0};
+  const auto consider = [&](double omega) {
+    const double gain = gain_at(system, omega);
+    if (gain > best.norm || (gain == best.norm && omega < best.frequency)) {
+      best.norm = gain;
+      best.frequency = omega;
+    }
+  };
+  consider(0.0);
+  for (const Complex& pole : detail::eigenvalues_of(system.A)) {
+    consider(std::abs(pole));
+    consider(std::abs(pole.imag()));
+    // Where a second-order peak is: ω² = |p|² - 2 Re(p)².
+    const double peak = std::norm(pole) - 2.0 * pole.real() * pole.real();
+    consider(std::sqrt(std::max(0.0, peak)));
+  }
+  if (best.norm == 0.0) {
+    return HInfinityNorm{0.0, 0.0, 0.0, 0};
+  }
+  constexpr int most_iterations = 60;
+  for (best.iterations = 1; best.iterations <= most_iterations; ++best.iterations) {
+    const double gamma = best.norm * (1.0 + 0.5 * relative_accuracy);
+    const std::vector<double> found = crossings(system, gamma);
+    const double before = best.norm;
+    // Between neighbouring crossings the gain is above γ, or below it throughout.
+    double low = 0.0;
+    for (std::size_t k = 0; k <= found.size(); ++k) {
+      if (k == found.size()) {
+        if (!found.empty()) {
+          consider(2.0 * found.back());
+        }
+        break;
+      }
+      consider(found[k]);
+      consider(0.5 * (low + found[k]));
+      low = found[k];
+    }
+    if (best.norm > gamma) {
+      continue;
+    }
+    if (found.empty() || best.norm <= before * (1.0 + relative_accuracy)) {
+      // Eigenvalues that the search cannot tell from crossings: the peak itself.
+      if (std::isfinite(best.frequency) && best.frequency > 0.0) {
+        double gain = 0.0;
+        const double omega =
+            climb(system, best.frequency * (1.0 - 1e-3), best.frequency * (1.0 + 1e-3), gain);
+        if (gain > best.norm) {
+          const bool grew = gain > best.norm * (1.0 + 0.5 * relative_accuracy);
+          best.norm = gain;
+          best.frequency = omega;
+          if (grew) {
+            continue;
+          }
+        }
+      }
+      best.upper_bound = best.norm * (1.0 + relative_accuracy);
+      return best;
+    }
+  }
+  return tl::unexpected(Error(SystemError::no_convergence)
+                            .in(std::string(where))
+                            .about("the largest gain")
+                            .with("gain reached", best.norm)
+                            .with("frequency", best.frequency));
+}
+
+Expected<double> root_of_power(const ContinuousSystem<>& system, TimeDomain domain) {
+  const ContinuousSystem<> s = scaled(system);
+  auto L = detail::gramian_factor(s.A, s.B, domain, "h2_norm");
+  if (!L) {
+    return tl::unexpected(std::move(L).error());
+  }
+  const double energy = product(s.C, *L).norm();
+  return domain == TimeDomain::continuous ? energy : std::hypot(energy, system.D.norm());
+}
+
+}  // namespace
+
+Expected<double> h2_norm(const ContinuousSystem<>& system) {
+  constexpr std::string_view where = "h2_norm";
+  if (auto checked = check_system(system, where); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  if (!system.D.isZero(0.0)) {
+    return tl::unexpected(Error(SystemError::infinite_norm)
+                              .in(std::string(where))
+                              .about("D")
+                              .got("not zero")
+                              .expected("zero: white noise through D has infinite power")
+                              .with("norm of D", system.D.norm()));
+  }
+  return root_of_power(system, TimeDomain::continuous);
+}
+
+Expected<double> h2_norm(const DiscreteSystem<>& system) {
+  if (auto checked = check_system(system, "h2_norm"); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  return root_of_power({system.A, system.B, system.C, system.D}, TimeDomain::discrete);
+}
+
+Expected<HInfinityNorm> h_infinity_norm(const ContinuousSystem<>& system) {
+  constexpr std::string_view where = "h_infinity_norm";
+  if (auto checked = check_system(system, where); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  if (auto stable = detail::check_stable(system.A, TimeDomain::continuous, where); !stable) {
+    return tl::unexpected(std::move(stable).error());
+  }
+  return largest_gain(scaled(system), where);
+}
+
+Expected<HInfinityNorm> h_infinity_norm(const DiscreteSystem<>& system) {
+  constexpr std::string_view where = "h_infinity_norm";
+  if (auto checked = check_system(system, where); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  if (auto stable = detail::check_stable(system.A, TimeDomain::discrete, where); !stable) {
+    return tl::unexpected(std::move(stable).error());
+  }
+  // With T = 2, s = (z - 1)/(z + 1) = j tan(ωT/2).
+  auto mapped = convert_to_continuous({system.A, system.B, system.C, system.D, Time(2.0)},
+                                      ConversionMethod::tustin);
+  if (!mapped) {
+    return tl::unexpected(std::move(mapped).error());
+  }
+  auto norm = largest_gain(scaled(*mapped), where);
+  if (norm) {
+    norm->frequency = 2.0 * std::atan(norm->frequency) / system.period.si();
+  }
+  return norm;
+}
+
+}  // namespace flyball

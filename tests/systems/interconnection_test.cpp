@@ -1,0 +1,149 @@
+#include <flyball/systems/interconnection.hpp>
+
+#include <complex>
+
+#include <gtest/gtest.h>
+
+#include "math/matrices_json.hpp"
+#include "systems/random_systems.hpp"
+
+namespace flyball {
+namespace {
+
+using Complex = std::complex<double>;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+
+/// num/den in descending powers, in controllable canonical form.
+ContinuousSystem<> from_polynomials(std::vector<double> num, std::vector<double> den) {
+  const auto n = static_cast<Eigen::Index>(den.size()) - 1;
+  num.insert(num.begin(), den.size() - num.size(), 0.0);
+  ContinuousSystem<> s{MatrixXd::Zero(n, n), MatrixXd::Zero(n, 1), MatrixXd(1, n),
+                       MatrixXd::Constant(1, 1, num[0] / den[0])};
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto i = static_cast<std::size_t>(k) + 1;
+    s.A(0, k) = -den[i] / den[0];
+    s.C(0, k) = (num[i] - num[0] / den[0] * den[i]) / den[0];
+    if (k > 0) {
+      s.A(k, k - 1) = 1.0;
+    }
+  }
+  s.B(0, 0) = 1.0;
+  return s;
+}
+
+// G = 1/(s + 1), H = 1/(s + 2): 1/((s+1)(s+2)), (2s + 3)/((s+1)(s+2)), (s + 2)/(s² + 3s + 3).
+TEST(Interconnection, FirstOrderInClosedForm) {
+  const auto G = from_polynomials({1.0}, {1.0, 1.0});
+  const auto H = from_polynomials({1.0}, {1.0, 2.0});
+  const Complex s(0.0, 1.0);
+  const auto at = [&](const Expected<ContinuousSystem<>>& system) {
+    return transfer_at(system.value(), s).value()(0, 0);
+  };
+  EXPECT_LT(std::abs(at(series(G, H)) - 1.0 / ((s + 1.0) * (s + 2.0))), 1e-15);
+  EXPECT_LT(std::abs(at(parallel(G, H)) - (2.0 * s + 3.0) / ((s + 1.0) * (s + 2.0))), 1e-15);
+  EXPECT_LT(std::abs(at(feedback(G, H)) - (s + 2.0) / (s * s + 3.0 * s + 3.0)), 1e-15);
+  EXPECT_LT(
+      std::abs(at(feedback(G, H, FeedbackSign::positive)) - (s + 2.0) / (s * s + 3.0 * s + 1.0)),
+      1e-15);
+  EXPECT_LT(std::abs(at(feedback(G)) - 1.0 / (s + 2.0)), 1e-15);
+  const auto side = append(G, H).value();
+  EXPECT_EQ(side.D.rows(), 2);
+  EXPECT_EQ(side.B(0, 1), 0.0);
+}
+
+TEST(Interconnection, Gold) {
+  int seen = 0;
+  for (const auto& c : test::cases_of("interconnection.json")) {
+    ++seen;
+    const auto G = from_polynomials(c["G"]["num"], c["G"]["den"]);
+    const auto H = from_polynomials(c["H"]["num"], c["H"]["den"]);
+    const auto w = c["w"].get<std::vector<double>>();
+    for (const auto& [key, system] :
+         {std::pair{"jw_series", series(G, H)},
+          {"jw_parallel", parallel(G, H)},
+          {"jw_feedback_neg", feedback(G, H)},
+          {"jw_feedback_pos", feedback(G, H, FeedbackSign::positive)}}) {
+      for (std::size_t k = 0; k < w.size(); ++k) {
+        const Complex expected(c[key][k][0].get<double>(), c[key][k][1].get<double>());
+        const Complex found = transfer_at(system.value(), {0.0, w[k]}).value()(0, 0);
+        EXPECT_LE(std::abs(found - expected), 1e-12 * std::abs(expected))
+            << c["name"] << ' ' << key << ' ' << w[k];
+      }
+    }
+  }
+  EXPECT_EQ(seen, 3);
+}
+
+TEST(Interconnection, TransferMatricesMultiplyAndAdd) {
+  Random random(81);
+  for (int trial = 0; trial < 1000; ++trial) {
+    const Eigen::Index m = 1 + trial % 3;
+    const Eigen::Index p = 1 + trial % 2;
+    const auto G = test::random_system(random, 1 + trial % 5, m, p);
+    const auto H = test::random_system(random, 1 + trial % 4, p, m);
+    const auto G2 = test::random_system(random, 1 + trial % 4, m, p);
+    const Complex s(random.normal(), 2.0 + random.uniform());
+    const MatrixXcd g = test::response(G, s);
+    const MatrixXcd h = test::response(H, s);
+    const auto close = [&](const Expected<ContinuousSystem<>>& system, const MatrixXcd& expected) {
+      return (transfer_at(system.value(), s).value() - expected).norm() <=
+             1e-9 * (1.0 + expected.norm()) * (1.0 + g.norm()) * (1.0 + h.norm());
+    };
+    EXPECT_TRUE(close(series(G, H), h * g));
+    EXPECT_TRUE(close(parallel(G, G2), g + test::response(G2, s)));
+    const MatrixXcd I = MatrixXcd::Identity(p, p);
+    EXPECT_TRUE(close(feedback(G, H), (I + g * h).inverse() * g)) << trial;
+    EXPECT_TRUE(close(feedback(G, H, FeedbackSign::positive), (I - g * h).inverse() * g));
+    const auto side = transfer_at(append(G, H).value(), s).value();
+    EXPECT_LT((side.topLeftCorner(p, m) - g).norm() + side.topRightCorner(p, p).norm(),
+              1e-9 * (1.0 + g.norm()));
+  }
+}
+
+// Discrete systems connect alike, and keep their period.
+TEST(Interconnection, DiscreteSystems) {
+  Random random(82);
+  const auto c = test::random_system(random, 2, 1, 1);
+  const auto e = test::random_system(random, 3, 1, 1);
+  const DiscreteSystem<> G{c.A, c.B, c.C, c.D, Time(0.02)};
+  DiscreteSystem<> H{e.A, e.B, e.C, e.D, Time(0.02)};
+  for (const auto& [discrete, continuous] : {std::pair{series(G, H), series(c, e)},
+                                             {parallel(G, H), parallel(c, e)},
+                                             {append(G, H), append(c, e)},
+                                             {feedback(G, H), feedback(c, e)},
+                                             {feedback(G), feedback(c)}}) {
+    EXPECT_EQ(discrete->A, continuous->A);
+    EXPECT_EQ(discrete->D, continuous->D);
+    EXPECT_EQ(discrete->period.si(), 0.02);
+  }
+  H.period = Time(0.01);
+  EXPECT_TRUE(series(G, H).error().is(SystemError::period_mismatch));
+  EXPECT_TRUE(feedback(G, H).error().is(SystemError::period_mismatch));
+}
+
+TEST(Interconnection, Errors) {
+  Random random(83);
+  const auto G = test::random_system(random, 2, 1, 2);
+  EXPECT_TRUE(series(G, G).error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(feedback(G).error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(
+      parallel(G, test::random_system(random, 2, 2, 2)).error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(series(G, ContinuousSystem<>{}).error().is(ArgumentError::empty));
+  // y = -(y - u): D₁D₂ = -1.
+  auto H = test::random_system(random, 1, 1, 1);
+  H.D(0, 0) = -1.0;
+  const auto loop = feedback(H);
+  ASSERT_FALSE(loop.has_value());
+  EXPECT_TRUE(loop.error().is(SystemError::algebraic_loop));
+  EXPECT_EQ(loop.error().evidence().front().values.front(), 0.0);
+  H.D(0, 0) = 1.0;
+  EXPECT_TRUE(feedback(H).has_value());
+  EXPECT_TRUE(feedback(H, FeedbackSign::positive).error().is(SystemError::algebraic_loop));
+  const auto integrator = from_polynomials({1.0}, {1.0, 0.0});
+  EXPECT_TRUE(transfer_at(integrator, 0.0).error().is(SystemError::no_image));
+  EXPECT_TRUE(transfer_at(integrator, NAN).error().is(ArgumentError::not_finite));
+}
+
+}  // namespace
+}  // namespace flyball
