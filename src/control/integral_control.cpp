@@ -1,0 +1,160 @@
+#include <flyball/control/integral_control.hpp>
+
+#include <string>
+
+#include <flyball/control/quadratic_cost.hpp>
+
+#include "math/dense.hpp"
+
+namespace flyball {
+
+namespace {
+
+/// [x; x_I]₊ = [A 0; -h C  e I][x; x_I] + [B; -h D] u: h = T and e = 1 sampled, h = 1 and e = 0
+/// not.
+struct Augmented {
+  Eigen::MatrixXd A, B;
+};
+
+Augmented augmented(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C, const MatrixRef& D,
+                    double h, double e) {
+  const Eigen::Index n = A.rows();
+  const Eigen::Index p = C.rows();
+  Augmented plant{Eigen::MatrixXd::Zero(n + p, n + p), Eigen::MatrixXd::Zero(n + p, B.cols())};
+  plant.A.topLeftCorner(n, n) = A;
+  plant.A.bottomLeftCorner(p, n) = -h * C;
+  plant.A.bottomRightCorner(p, p).diagonal().setConstant(e);
+  plant.B.topRows(n) = B;
+  plant.B.bottomRows(p) = -h * D;
+  return plant;
+}
+
+/// Whether a constant input holds the outputs anywhere: [A - e I  B; C  D] has independent rows.
+Expected<void> check_trackable(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
+                               const MatrixRef& D, double e, std::string_view where) {
+  const Eigen::Index n = A.rows();
+  const Eigen::Index p = C.rows();
+  Eigen::MatrixXd balance(n + p, n + B.cols());
+  balance << A, B, C, D;
+  balance.topLeftCorner(n, n).diagonal().array() -= e;
+  // Rows and columns of one size, so that units do not decide.
+  for (int pass = 0; pass < 3; ++pass) {
+    for (Eigen::Index i = 0; i < balance.rows(); ++i) {
+      const double size = balance.row(i).norm();
+      balance.row(i) /= size > 0.0 ? size : 1.0;
+    }
+    for (Eigen::Index j = 0; j < balance.cols(); ++j) {
+      const double size = balance.col(j).norm();
+      balance.col(j) /= size > 0.0 ? size : 1.0;
+    }
+  }
+  const Eigen::VectorXd singular = detail::singular_values_of(balance);
+  const double smallest = p > B.cols() ? 0.0 : singular(n + p - 1);
+  if (smallest > 1e-12 * singular(0)) {
+    return {};
+  }
+  return tl::unexpected(Error(IntegralControlError::not_trackable)
+                            .in(std::string(where))
+                            .about("the plant")
+                            .hint("track fewer outputs, or others: each needs an input of its own "
+                                  "that moves it in steady state")
+                            .with("outputs", static_cast<double>(p))
+                            .with("inputs", static_cast<double>(B.cols()))
+                            .with("smallest singular value of [A - I, B; C, D], rows and columns "
+                                  "scaled",
+                                  smallest));
+}
+
+IntegralLqr split(LqrDesign<>&& design, Eigen::Index n) {
+  return {design.K.leftCols(n), design.K.rightCols(design.K.cols() - n),
+          std::move(design.S),  std::move(design.poles),
+          design.residual,      design.condition};
+}
+
+template <class Solve>
+Expected<IntegralLqr> design(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
+                             const MatrixRef& D, double h, double e, const Weight& Q,
+                             std::string_view where, const Solve& solve) {
+  const Eigen::Index size = A.rows() + C.rows();
+  if (Q.get()) {
+    if (auto shape = check_shape(*Q.get(), size, size, where, "Q",
+                                 "(states + outputs) x (states + outputs)");
+        !shape) {
+      return tl::unexpected(shape.error());
+    }
+  }
+  if (auto trackable = check_trackable(A, B, C, D, e, where); !trackable) {
+    return tl::unexpected(trackable.error());
+  }
+  const Augmented plant = augmented(A, B, C, D, h, e);
+  auto solved = solve(plant);
+  if (!solved) {
+    const bool weight = solved.error().where() == "bryson";
+    return tl::unexpected(weight ? solved.error()
+                                 : Error(std::move(solved.error()).in(std::string(where))));
+  }
+  return split(std::move(*solved), A.rows());
+}
+
+}  // namespace
+
+ErrorInfo error_info(IntegralControlError code) {
+  constexpr std::string_view family = "integral_control";
+  switch (code) {
+    case IntegralControlError::not_trackable:
+      return {family, "not_trackable", "no constant input holds the outputs at every value",
+              ErrorKind::no_answer};
+    case IntegralControlError::not_matched:
+      return {family, "not_matched", "no combination of inputs acts like the disturbance",
+              ErrorKind::no_answer};
+  }
+  return {family, "unknown", "unknown error", ErrorKind::defect};
+}
+
+Expected<IntegralLqr> lqi(const DiscreteSystem<>& plant, const Weight& Q, const Weight& R) {
+  if (auto checked = check_system(plant, "lqi"); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  return design(plant.A, plant.B, plant.C, plant.D, plant.period.si(), 1.0, Q, "lqi",
+                [&](const Augmented& augmented) { return lqr(augmented.A, augmented.B, Q, R); });
+}
+
+Expected<IntegralLqr> continuous_lqi(const ContinuousSystem<>& plant, const Weight& Q,
+                                     const Weight& R) {
+  if (auto checked = check_system(plant, "continuous_lqi"); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  return design(
+      plant.A, plant.B, plant.C, plant.D, 1.0, 0.0, Q, "continuous_lqi",
+      [&](const Augmented& augmented) { return continuous_lqr(augmented.A, augmented.B, Q, R); });
+}
+
+Expected<Eigen::MatrixXd> input_error_gain(const MatrixRef& B, const MatrixRef& B_error) {
+  constexpr std::string_view where = "input_error_gain";
+  constexpr double negligible = 1e-9;
+  if (B.size() == 0) {
+    return tl::unexpected(Error(ArgumentError::empty)
+                              .in(std::string(where))
+                              .about("B")
+                              .got("empty")
+                              .expected("states x inputs"));
+  }
+  if (auto checked = check_all(
+          check_shape(B_error, B.rows(), B_error.cols(), where, "B_error", "states x disturbances"),
+          check_finite(B, where, "B"), check_finite(B_error, where, "B_error"));
+      !checked) {
+    return tl::unexpected(checked.error());
+  }
+  Eigen::MatrixXd gain = detail::solve_least_squares(B, B_error);
+  const double left = (detail::product(B, gain) - B_error).norm();
+  if (left > negligible * B_error.norm()) {
+    return tl::unexpected(Error(IntegralControlError::not_matched)
+                              .in(std::string(where))
+                              .about("B_error")
+                              .hint("estimate a disturbance that enters where an input does")
+                              .with("share that no input cancels", left / B_error.norm()));
+  }
+  return gain;
+}
+
+}  // namespace flyball

@@ -1,0 +1,165 @@
+#include <flyball/control/pid.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <flyball/core/argument.hpp>
+
+namespace flyball {
+
+namespace {
+
+/// Beyond this a term is cut, so that a sum of terms cannot be infinity less infinity.
+constexpr double huge = 1e300;
+
+double cut(double term) noexcept {
+  return std::clamp(term, -huge, huge);
+}
+
+Expected<void> check_limits(double low, double high, std::string_view name) {
+  if (std::isnan(low) || std::isnan(high) || !(low < high)) {
+    return tl::unexpected(
+        Error(ArgumentError::out_of_range)
+            .in("Pid")
+            .about(std::string(name) + "_min")
+            .got(format_number(low))
+            .expected("below " + std::string(name) + "_max, which is " + format_number(high)));
+  }
+  return {};
+}
+
+Expected<void> check_zone(double zone) {
+  return zone > 0.0 ? Expected<void>{}
+                    : tl::unexpected(Error(ArgumentError::not_positive)
+                                         .in("Pid")
+                                         .about("integral_zone")
+                                         .got(format_number(zone))
+                                         .expected("positive, or infinity for none"));
+}
+
+}  // namespace
+
+Expected<Pid> Pid::create(const PidSettings& settings) {
+  constexpr std::string_view where = "Pid";
+  return check_all(check_positive(settings.period, where, "period", "s"),
+                   check_finite(settings.gains.kp, where, "kp"),
+                   check_finite(settings.gains.ki, where, "ki"),
+                   check_finite(settings.gains.kd, where, "kd"),
+                   check_not_negative(settings.derivative_time_constant, where,
+                                      "derivative_time_constant", "s"),
+                   check_not_negative(settings.tracking_time, where, "tracking_time", "s"),
+                   check_not_negative(settings.turn, where, "turn"),
+                   check_limits(settings.output_min, settings.output_max, "output"),
+                   check_limits(settings.integral_min, settings.integral_max, "integral"),
+                   check_zone(settings.integral_zone))
+      .map([&] { return Pid(settings); });
+}
+
+Pid::Pid(const PidSettings& settings) noexcept : settings_(settings) {
+  update_tracking();
+  output_ = std::clamp(0.0, settings_.output_min, settings_.output_max);
+  integral_ = limited_integral(0.0);
+}
+
+void Pid::update_tracking() noexcept {
+  const PidGains& gains = settings_.gains;
+  double time = settings_.tracking_time;
+  if (time == 0.0 && gains.ki != 0.0) {
+    const double integral_time = std::abs(gains.kp / gains.ki);
+    const double derivative_time = gains.kp != 0.0 ? std::abs(gains.kd / gains.kp) : 0.0;
+    time = derivative_time > 0.0 ? std::sqrt(integral_time * derivative_time) : integral_time;
+  }
+  // Faster than one period would overshoot its own aim.
+  tracking_gain_ = time > settings_.period ? settings_.period / time : 1.0;
+}
+
+double Pid::wrapped(double difference) const noexcept {
+  return settings_.turn > 0.0 ? std::remainder(difference, settings_.turn) : difference;
+}
+
+double Pid::limited_integral(double value) const noexcept {
+  return cut(std::clamp(value, settings_.integral_min, settings_.integral_max));
+}
+
+double Pid::calculate(double measurement, double reference, double feedforward) noexcept {
+  const PidGains& gains = settings_.gains;
+  const double T = settings_.period;
+  const double added = std::isfinite(feedforward) ? feedforward : 0.0;
+  const bool known = std::isfinite(measurement) && std::isfinite(reference);
+  double step = 0.0;
+  double before_limits = integral_;
+  if (known) {
+    error_ = cut(wrapped(reference - measurement));
+    const double differentiated = settings_.derivative_on_measurement ? -measurement : error_;
+    const double change = has_before_ ? cut(wrapped(differentiated - before_)) : 0.0;
+    const double tau = settings_.derivative_time_constant;
+    rate_ = has_before_ ? cut((tau * rate_ + change) / (tau + T)) : 0.0;
+    before_ = differentiated;
+    has_before_ = true;
+    derivative_ = cut(gains.kd * rate_);
+    if (std::abs(error_) > settings_.integral_zone) {
+      integral_ = limited_integral(0.0);
+    } else {
+      step = cut(gains.ki * T * error_);
+    }
+    before_limits = cut(gains.kp * error_) + derivative_ + integral_;
+  } else {
+    error_ = 0.0;
+    derivative_ = 0.0;
+    rate_ = 0.0;
+    has_before_ = false;
+  }
+  before_limits += added;
+  double wanted = before_limits + step;
+  if (settings_.anti_windup == AntiWindup::clamping &&
+      ((wanted > settings_.output_max && step > 0.0) ||
+       (wanted < settings_.output_min && step < 0.0))) {
+    // What is left of the way to the limit still counts.
+    const double room = (step > 0.0 ? settings_.output_max : settings_.output_min) - before_limits;
+    step = room * step > 0.0 ? room : 0.0;
+    wanted = before_limits + step;
+  }
+  const double held = limited_integral(integral_ + step);
+  wanted += held - (integral_ + step);
+  integral_ = held;
+  output_ = cut(std::clamp(wanted, settings_.output_min, settings_.output_max));
+  saturated_ = output_ != wanted;
+  if (settings_.anti_windup == AntiWindup::back_calculation && gains.ki != 0.0 && known) {
+    integral_ = limited_integral(integral_ + tracking_gain_ * (output_ - wanted));
+  }
+  return output_;
+}
+
+bool Pid::set_gains(const PidGains& gains) noexcept {
+  if (!std::isfinite(gains.kp) || !std::isfinite(gains.ki) || !std::isfinite(gains.kd)) {
+    return false;
+  }
+  if (gains.ki == 0.0) {
+    integral_ = limited_integral(0.0);
+  } else {
+    const double change = cut((settings_.gains.kp - gains.kp) * error_) +
+                          cut((settings_.gains.kd - gains.kd) * rate_);
+    integral_ = limited_integral(integral_ + change);
+  }
+  settings_.gains = gains;
+  derivative_ = cut(gains.kd * rate_);
+  update_tracking();
+  return true;
+}
+
+void Pid::reset() noexcept {
+  reset(0.0);
+}
+
+void Pid::reset(double integral) noexcept {
+  integral_ = limited_integral(std::isfinite(integral) ? integral : 0.0);
+  error_ = 0.0;
+  before_ = 0.0;
+  rate_ = 0.0;
+  derivative_ = 0.0;
+  has_before_ = false;
+  saturated_ = false;
+  output_ = std::clamp(0.0, settings_.output_min, settings_.output_max);
+}
+
+}  // namespace flyball

@@ -1,0 +1,142 @@
+#include <flyball/control/steady_state_feedforward.hpp>
+
+#include <algorithm>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "math/dense.hpp"
+
+namespace flyball {
+
+namespace {
+
+constexpr std::string_view where = "steady_state_feedforward";
+
+/// N_x and N_u for one set of inputs and outputs.
+Expected<SteadyStateFeedforward<>> solve(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
+                                         const MatrixRef& D, Eigen::Index first_output) {
+  constexpr double left_over = 1e-9;
+  const Eigen::Index n = A.rows();
+  const Eigen::Index m = B.cols();
+  const Eigen::Index p = C.rows();
+  Eigen::MatrixXd balance(n + p, n + m);
+  balance << A, B, C, D;
+  Eigen::MatrixXd target = Eigen::MatrixXd::Zero(n + p, p);
+  target.bottomRows(p).setIdentity();
+  const Eigen::MatrixXd N = detail::solve_least_squares(balance, target);
+  const Eigen::MatrixXd rest = detail::product(balance, N) - target;
+  const Eigen::MatrixXd terms = balance.cwiseAbs() * N.cwiseAbs();
+  for (Eigen::Index j = 0; j < p; ++j) {
+    // Row by row, because the rows have different units.
+    for (Eigen::Index i = 0; i < n + p; ++i) {
+      const double size = std::max(terms(i, j), target(i, j));
+      if (!(std::abs(rest(i, j)) <= left_over * size) && size > 0.0) {
+        return tl::unexpected(Error(FeedforwardError::no_steady_state)
+                                  .in(std::string(where))
+                                  .about(fmt::format("output {}", first_output + j))
+                                  .hint("hold another output, or give the plant an input that can")
+                                  .with("what is left of its equation", rest.col(j).norm()));
+      }
+    }
+  }
+  SteadyStateFeedforward<> feedforward{N.topRows(n), N.bottomRows(m), {}};
+  feedforward.K_ff = detail::product(
+      feedforward.N_u,
+      detail::solve_least_squares(feedforward.N_x, Eigen::MatrixXd::Identity(n, n)));
+  return feedforward;
+}
+
+}  // namespace
+
+ErrorInfo error_info(FeedforwardError code) {
+  constexpr std::string_view family = "feedforward";
+  switch (code) {
+    case FeedforwardError::no_steady_state:
+      return {family, "no_steady_state", "no constant input holds the output at every value",
+              ErrorKind::no_answer};
+    case FeedforwardError::singular:
+      return {family, "singular", "B'QB + R is not positive definite", ErrorKind::no_answer};
+  }
+  return {family, "unknown", "unknown error", ErrorKind::defect};
+}
+
+Expected<SteadyStateFeedforward<>> steady_state_feedforward(const MatrixRef& A, const MatrixRef& B,
+                                                            const MatrixRef& C,
+                                                            const MatrixRef& D) {
+  return check_system(A, B, C, D, where).and_then([&] { return solve(A, B, C, D, 0); });
+}
+
+Expected<SteadyStateFeedforward<>> steady_state_feedforward_of_pairs(const MatrixRef& A,
+                                                                     const MatrixRef& B,
+                                                                     const MatrixRef& C,
+                                                                     const MatrixRef& D,
+                                                                     std::span<const int> inputs) {
+  if (auto checked = check_system(A, B, C, D, where); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  const Eigen::Index n = A.rows();
+  const Eigen::Index m = B.cols();
+  const Eigen::Index p = C.rows();
+  if (static_cast<Eigen::Index>(inputs.size()) != p) {
+    return tl::unexpected(Error(ArgumentError::wrong_shape)
+                              .in(std::string(where))
+                              .about("inputs")
+                              .got(fmt::format("{} entries", inputs.size()))
+                              .expected(fmt::format("one an output ({})", p)));
+  }
+  SteadyStateFeedforward<> sum{Eigen::MatrixXd::Zero(n, p), Eigen::MatrixXd::Zero(m, p),
+                               Eigen::MatrixXd::Zero(m, n)};
+  for (Eigen::Index j = 0; j < p; ++j) {
+    const int input = inputs[static_cast<std::size_t>(j)];
+    if (input < 0 || input >= m) {
+      return tl::unexpected(Error(ArgumentError::out_of_range)
+                                .in(std::string(where))
+                                .about(fmt::format("the input of output {}", j))
+                                .got(fmt::format("{}", input))
+                                .expected(fmt::format("from 0 to {}", m - 1)));
+    }
+    auto pair = solve(A, B.col(input), C.row(j), D.block(j, input, 1, 1), j);
+    if (!pair) {
+      return pair;
+    }
+    sum.N_x.col(j) = pair->N_x;
+    sum.N_u(input, j) += pair->N_u(0, 0);
+    sum.K_ff.row(input) += pair->K_ff;
+  }
+  return sum;
+}
+
+Expected<Eigen::MatrixXd> qr_weighted_gain(const MatrixRef& B, const Weight& Q, const Weight& R) {
+  constexpr std::string_view name = "qr_weighted_gain";
+  if (!Q.get() || !R.get()) {
+    return tl::unexpected(Q.get() ? R.get().error() : Q.get().error());
+  }
+  const Eigen::MatrixXd& weight_Q = *Q.get();
+  const Eigen::MatrixXd& weight_R = *R.get();
+  const Eigen::Index n = B.rows();
+  const Eigen::Index m = B.cols();
+  if (auto shapes = check_all(check_shape(weight_Q, n, n, name, "Q", "states x states"),
+                              check_shape(weight_R, m, m, name, "R", "inputs x inputs"));
+      !shapes) {
+    return tl::unexpected(shapes.error());
+  }
+  if (auto values =
+          check_all(check_finite(B, name, "B"), check_finite(weight_Q, name, "Q"),
+                    check_finite(weight_R, name, "R"), check_symmetric(weight_Q, name, "Q"),
+                    check_symmetric(weight_R, name, "R"));
+      !values) {
+    return tl::unexpected(values.error());
+  }
+  const Eigen::MatrixXd Q_B = detail::product(weight_Q, B);
+  const Eigen::MatrixXd inner = detail::symmetrized(detail::transposed_product(B, Q_B) + weight_R);
+  if (m == 0 || !detail::cholesky_of(inner)) {
+    return tl::unexpected(Error(FeedforwardError::singular)
+                              .in(std::string(name))
+                              .about("B'QB + R")
+                              .hint("give every input a weight in R"));
+  }
+  return detail::solve_symmetric(inner, Q_B.transpose());
+}
+
+}  // namespace flyball
