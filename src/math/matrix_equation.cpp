@@ -143,19 +143,13 @@ class Equation {
   /// F minus the operator applied to X, in twice the working precision.
   [[nodiscard]] MatrixXd residual(const MatrixXd& X, const MatrixXd& F) const {
     using detail::add_product;
-    using detail::DoubleDoubleMatrix;
-    DoubleDoubleMatrix sum(F);
+    using Matrix = detail::DoubleDoubleMatrix;
     if (domain_ == Domain::continuous) {
-      sum = add_product(std::move(sum), -1.0, A_.transpose(), DoubleDoubleMatrix(X));
-      return add_product(std::move(sum), -1.0, X.transpose(), DoubleDoubleMatrix(B_)).rounded();
+      const Matrix rest = add_product(Matrix(F), -1.0, Matrix(A_), Matrix(X));
+      return add_product(rest, -1.0, Matrix(X), Matrix(B_)).rounded();
     }
-    const DoubleDoubleMatrix XB =
-        add_product(DoubleDoubleMatrix(MatrixXd::Zero(X.rows(), X.cols())), 1.0, X.transpose(),
-                    DoubleDoubleMatrix(B_));
-    sum = add_product(std::move(sum), -1.0, A_.transpose(), XB);
-    return add_product(std::move(sum), 1.0, MatrixXd::Identity(X.rows(), X.rows()),
-                       DoubleDoubleMatrix(X))
-        .rounded();
+    const Matrix rest = sum(Matrix(F), 1.0, Matrix(X));
+    return add_product(rest, -1.0, Matrix(A_), detail::product(Matrix(X), Matrix(B_))).rounded();
   }
 
   /// The sum of the norms of the equation's terms.

@@ -151,6 +151,11 @@ Expected<MatrixXd> logm(const MatrixRef& A) {
   if (auto check = check_finite(A, where, "A"); !check) {
     return tl::unexpected(std::move(check).error());
   }
+  // Near the identity A - I has digits that the Schur form of A would round away.
+  const MatrixXd X = A - MatrixXd::Identity(A.rows(), A.cols());
+  if (detail::norm1(X) <= detail::near_identity) {
+    return detail::logarithm_near_identity(X);
+  }
   const Triangularized form = triangularize(A);
   if (!form.schur.converged) {
     return tl::unexpected(no_answer(MatrixFunctionError::no_real_logarithm, where,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "math/dense.hpp"
 #include "math/riccati_kernel.hpp"
 #include "math/riccati_robust.hpp"
 
@@ -11,10 +12,8 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "dare";
-
 Expected<void> check_shapes(const MatrixRef& A, const MatrixRef& B, const MatrixRef& Q,
-                            const MatrixRef& R, const MatrixRef* N) {
+                            const MatrixRef& R, const MatrixRef* N, std::string_view where) {
   const Eigen::Index n = A.rows();
   const Eigen::Index m = B.cols();
   const bool right = n > 0 && m > 0 && A.cols() == n && B.rows() == n && Q.rows() == n &&
@@ -40,7 +39,7 @@ Expected<void> check_shapes(const MatrixRef& A, const MatrixRef& B, const Matrix
 }
 
 Expected<void> check_values(const MatrixRef& A, const MatrixRef& B, const MatrixRef& Q,
-                            const MatrixRef& R, const MatrixRef& N) {
+                            const MatrixRef& R, const MatrixRef& N, std::string_view where) {
   if (auto finite = check_all(check_finite(A, where, "A"), check_finite(B, where, "B"),
                               check_finite(Q, where, "Q"), check_finite(R, where, "R"),
                               check_finite(N, where, "N"));
@@ -77,8 +76,8 @@ ErrorInfo error_info(RiccatiError code) {
   constexpr std::string_view family = "riccati";
   switch (code) {
     case RiccatiError::not_stabilizable:
-      return {family, "not_stabilizable",
-              "a mode on or outside the unit circle is reached by no input", ErrorKind::no_answer};
+      return {family, "not_stabilizable", "a mode that is not stable is reached by no input",
+              ErrorKind::no_answer};
     case RiccatiError::no_stabilizing_solution:
       return {family, "no_stabilizing_solution", "no stabilising solution exists",
               ErrorKind::no_answer};
@@ -108,11 +107,11 @@ Expected<void> solve_riccati(const RiccatiData& data, RiccatiAnswer& answer) {
   const ConstMap R(data.R, m, m);
   const Eigen::MatrixXd N = data.N == nullptr ? Eigen::MatrixXd(Eigen::MatrixXd::Zero(n, m))
                                               : Eigen::MatrixXd(ConstMap(data.N, n, m));
-  if (auto check = check_values(A, B, Q, R, N); !check) {
+  if (auto check = check_values(A, B, Q, R, N, data.continuous ? "care" : "dare"); !check) {
     return check;
   }
   auto solution =
-      solve_riccati_robustly({A, B, 0.5 * (Q + Q.transpose()), 0.5 * (R + R.transpose()), N});
+      solve_riccati_robustly({A, B, symmetrized(Q), symmetrized(R), N, data.continuous});
   if (!solution) {
     return tl::unexpected(std::move(solution).error());
   }
@@ -129,28 +128,32 @@ Expected<void> solve_riccati(const RiccatiData& data, RiccatiAnswer& answer) {
 
 namespace {
 
-Expected<RiccatiSolution> solve(const MatrixRef& A, const MatrixRef& B, const MatrixRef& Q,
-                                const MatrixRef& R, const MatrixRef* N) {
+Expected<RiccatiSolution> solve(bool continuous, const MatrixRef& A, const MatrixRef& B,
+                                const MatrixRef& Q, const MatrixRef& R, const MatrixRef* N) {
   const Eigen::Index n = A.rows();
   const Eigen::Index m = B.cols();
-  if (auto check = check_shapes(A, B, Q, R, N); !check) {
+  if (auto check = check_shapes(A, B, Q, R, N, continuous ? "care" : "dare"); !check) {
     return tl::unexpected(std::move(check).error());
   }
   if (A.outerStride() != n || B.outerStride() != n || Q.outerStride() != n ||
       R.outerStride() != m || (N != nullptr && N->outerStride() != n)) {
     // Blocks of larger matrices: copied, because the kernels take columns without gaps.
     const Eigen::MatrixXd cross = N == nullptr ? Eigen::MatrixXd::Zero(n, m) : Eigen::MatrixXd(*N);
-    return dare(Eigen::MatrixXd(A), Eigen::MatrixXd(B), Eigen::MatrixXd(Q), Eigen::MatrixXd(R),
-                cross);
+    using Solver = Expected<RiccatiSolution>(const MatrixRef&, const MatrixRef&, const MatrixRef&,
+                                             const MatrixRef&, const MatrixRef&);
+    Solver& solver = continuous ? static_cast<Solver&>(care) : static_cast<Solver&>(dare);
+    return solver(Eigen::MatrixXd(A), Eigen::MatrixXd(B), Eigen::MatrixXd(Q), Eigen::MatrixXd(R),
+                  cross);
   }
   Expected<RiccatiSolution> solution;
   solution->X.resize(n, n);
   solution->K.resize(m, n);
   solution->poles.resize(n);
   detail::RiccatiAnswer answer{solution->X.data(), solution->K.data(), solution->poles.data()};
-  auto solved = detail::solve_riccati({static_cast<int>(n), static_cast<int>(m), A.data(), B.data(),
-                                       Q.data(), R.data(), N == nullptr ? nullptr : N->data()},
-                                      answer);
+  auto solved =
+      detail::solve_riccati({static_cast<int>(n), static_cast<int>(m), A.data(), B.data(), Q.data(),
+                             R.data(), N == nullptr ? nullptr : N->data(), continuous},
+                            answer);
   if (!solved) {
     return tl::unexpected(std::move(solved).error());
   }
@@ -164,12 +167,22 @@ Expected<RiccatiSolution> solve(const MatrixRef& A, const MatrixRef& B, const Ma
 
 Expected<RiccatiSolution> dare(const MatrixRef& A, const MatrixRef& B, const MatrixRef& Q,
                                const MatrixRef& R, const MatrixRef& N) {
-  return solve(A, B, Q, R, &N);
+  return solve(false, A, B, Q, R, &N);
 }
 
 Expected<RiccatiSolution> dare(const MatrixRef& A, const MatrixRef& B, const MatrixRef& Q,
                                const MatrixRef& R) {
-  return solve(A, B, Q, R, nullptr);
+  return solve(false, A, B, Q, R, nullptr);
+}
+
+Expected<RiccatiSolution> care(const MatrixRef& A, const MatrixRef& B, const MatrixRef& Q,
+                               const MatrixRef& R, const MatrixRef& N) {
+  return solve(true, A, B, Q, R, &N);
+}
+
+Expected<RiccatiSolution> care(const MatrixRef& A, const MatrixRef& B, const MatrixRef& Q,
+                               const MatrixRef& R) {
+  return solve(true, A, B, Q, R, nullptr);
 }
 
 }  // namespace flyball

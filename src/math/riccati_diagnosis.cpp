@@ -20,11 +20,60 @@ std::vector<double> parts(std::complex<double> value) {
   return {value.real(), value.imag()};
 }
 
+/// What the Hamiltonian matrix [A -G; -H -Aᵀ] says: its eigenvalues on the imaginary axis would be
+/// the closed loop's.
+Error diagnose_continuous(const RiccatiProblem& p) {
+  const Index n = p.A.rows();
+  const auto reduced = reduce(p);
+  if (!reduced) {
+    double rcond = 0.0;
+    (void)solve_equilibrated(p.R, MatrixXd::Identity(p.R.rows(), p.R.rows()), rcond);
+    return Error(RiccatiError::singular)
+        .in("care")
+        .about("R")
+        .got("singular")
+        .expected("invertible")
+        .hint("weigh every input in R")
+        .with("reciprocal condition", rcond);
+  }
+  // X's unit is free: with it G and H are of one size.
+  const double size_G = reduced->G.norm();
+  const double size_H = reduced->H.norm();
+  const double unit = size_G > 0.0 && size_H > 0.0 ? std::sqrt(size_H / size_G) : 1.0;
+  MatrixXd hamiltonian(2 * n, 2 * n);
+  hamiltonian << reduced->A, -unit * reduced->G, -reduced->H / unit, -reduced->A.transpose();
+  const double size = hamiltonian.norm();
+  double closest = std::numeric_limits<double>::infinity();
+  std::complex<double> on_axis;
+  for (const std::complex<double>& lambda : eigenvalues_of(hamiltonian)) {
+    if (std::abs(lambda.real()) < closest) {
+      closest = std::abs(lambda.real());
+      on_axis = lambda;
+    }
+  }
+  if (closest <= 1e-6 * size) {
+    return Error(RiccatiError::no_stabilizing_solution)
+        .in("care")
+        .about("the closed loop")
+        .got("left with a mode on the imaginary axis")
+        .expected("left of it")
+        .hint("weigh that mode in Q, so that the controller has to move it")
+        .with("eigenvalue", parts(on_axis))
+        .with("distance from the imaginary axis", closest);
+  }
+  return Error(RiccatiError::no_convergence)
+      .in("care")
+      .about("X")
+      .hint("check the scaling of A, B, Q and R, and whether Q and R are the weights of a minimum")
+      .with("distance of the Hamiltonian's eigenvalues from the imaginary axis", closest);
+}
+
 }  // namespace
 
 Error diagnose_riccati(const RiccatiProblem& p) {
   const Index n = p.A.rows();
   const Index m = p.B.cols();
+  const char* const where = p.continuous ? "care" : "dare";
 
   // Popov-Belevitch-Hautus: λ is reached by the inputs exactly if [A - λI, B] has rank n. B's size
   // is the user's unit, so its columns are compared in A's.
@@ -33,7 +82,9 @@ Error diagnose_riccati(const RiccatiProblem& p) {
   const double unit = size_B > 0.0 && size_A > 0.0 ? size_A / size_B : 1.0;
   const Eigen::VectorXcd eigenvalues = eigenvalues_of(p.A);
   for (Index k = 0; k < n; ++k) {
-    if (std::abs(eigenvalues(k)) < 1.0 - 1e-7) {
+    const double inside = p.continuous ? -eigenvalues(k).real() / std::max(size_A, 1e-300)
+                                       : 1.0 - std::abs(eigenvalues(k));
+    if (inside > 1e-7) {
       continue;
     }
     // [Re -Im; Im Re] of the pencil has its singular values, each twice; the last diagonal entry of
@@ -46,14 +97,19 @@ Error diagnose_riccati(const RiccatiProblem& p) {
     pencil.block(n + m, 0, n, n).diagonal().setConstant(-eigenvalues(k).imag());
     pencil.block(0, n, n, n).diagonal().setConstant(eigenvalues(k).imag());
     const double smallest = std::abs(pivoted_qr(pencil).R(2 * n - 1, 2 * n - 1));
-    if (smallest <= 1e-12 * static_cast<double>(n) * std::max(1.0, size_A)) {
+    if (smallest <=
+        1e-12 * static_cast<double>(n) * (p.continuous ? size_A : std::max(1.0, size_A))) {
       return Error(RiccatiError::not_stabilizable)
-          .in("dare")
+          .in(where)
           .about("(A, B)")
           .hint("give this mode an input, or take it out of the model")
           .with("eigenvalue", parts(eigenvalues(k)))
           .with("magnitude", std::abs(eigenvalues(k)));
     }
+  }
+
+  if (p.continuous) {
+    return diagnose_continuous(p);
   }
 
   // det(λM - L) of the pencil without R: the shift keeps its eigenvalues and makes R regular.
@@ -74,7 +130,7 @@ Error diagnose_riccati(const RiccatiProblem& p) {
   }
   if (!(best > 10.0 * epsilon)) {
     return Error(RiccatiError::singular)
-        .in("dare")
+        .in(where)
         .about("R + B'XB")
         .got("singular for every X")
         .expected("invertible")
@@ -115,7 +171,7 @@ Error diagnose_riccati(const RiccatiProblem& p) {
   }
   if (closest < 1e-5) {
     return Error(RiccatiError::no_stabilizing_solution)
-        .in("dare")
+        .in(where)
         .about("the closed loop")
         .got("left with a mode on the unit circle")
         .expected("inside it")
@@ -124,7 +180,7 @@ Error diagnose_riccati(const RiccatiProblem& p) {
         .with("distance from the unit circle", closest);
   }
   return Error(RiccatiError::no_convergence)
-      .in("dare")
+      .in(where)
       .about("X")
       .hint("check the scaling of A, B, Q and R, and whether Q and R are the weights of a minimum")
       .with("distance of the pencil's eigenvalues from the unit circle", closest);

@@ -17,8 +17,16 @@ inline constexpr int kernel_stack_states = 10;
 inline constexpr int kernel_workspace(int n, int m) {
   const int ld = n <= 2 ? 2 : ((n + 3) / 4) * 4;
   const int ldm = m <= 2 ? 2 : ((m + 3) / 4) * 4;
-  return 10 * ld * n + 4 * ld * m + 4 * ldm * (n + m) + 12 * ld;
+  return 11 * ld * n + 4 * ld * m + ldm * (2 * n + m) + 8 * ld;
 }
+
+/// F(X) of the equation in twice the working precision, rounded: n x n, without gaps. K need only
+/// be close to the X's gain, because with Z = [I; -K]
+///   F = Zᵀ([A B]ᵀX[A B] + [Q N; Nᵀ R])Z - X  or  Zᵀ[AᵀX + XA + Q, XB + N; BᵀX + Nᵀ, R]Z
+/// depends on its error to second order. False where there is no memory for it on the stack and
+/// none to be had.
+[[nodiscard]] bool riccati_residual(const RiccatiData& data, const double* X, const double* K,
+                                    double* F);
 
 /// The kernel compiled for the instruction sets of every processor and of those with 256-bit
 /// vectors; `memory` and `pivots` are null where the stack serves.

@@ -1,34 +1,60 @@
 #pragma once
 
-#include <Eigen/Core>
-
 #include <flyball/math/riccati.hpp>
+
+#include "math/double_double.hpp"
 
 namespace flyball::detail {
 
-/// The data of an equation whose shapes, symmetry and finiteness have been checked.
+/// A Riccati equation with symmetric Q and R, checked.
 struct RiccatiProblem {
   Eigen::MatrixXd A;
   Eigen::MatrixXd B;
   Eigen::MatrixXd Q;
   Eigen::MatrixXd R;
   Eigen::MatrixXd N;
+  bool continuous = false;
 };
 
-/// The way for every equation that the short one does not vouch for: balance, double from several
-/// shifts, refine by Newton's method with residuals in twice the working precision, verify, and
-/// where nothing passes say why.
-[[nodiscard]] Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem);
-
-/// Which of the reasons of RiccatiError holds for a (balanced) problem without an answer.
-[[nodiscard]] Error diagnose_riccati(const RiccatiProblem& problem);
-
-/// Q + AᵀX₀A - X₀, R + BᵀX₀B, N + AᵀX₀B: the equation for X - X₀, with the same closed loop.
-[[nodiscard]] RiccatiProblem shifted(const RiccatiProblem& problem, const Eigen::MatrixXd& X0);
-
-/// Solves M Z = rhs for a symmetric, possibly indefinite M after scaling it by powers of two;
-/// `rcond` receives the reciprocal condition of the scaled M, zero where it is singular.
+/// M⁻¹ rhs for a symmetric M, equilibrated by powers of two first; `rcond` is that of the scaled M.
 [[nodiscard]] Eigen::MatrixXd solve_equilibrated(const Eigen::MatrixXd& M,
                                                  const Eigen::MatrixXd& rhs, double& rcond);
+
+/// A₀ = A - B R⁻¹Nᵀ, G = B R⁻¹Bᵀ, H = Q - N R⁻¹Nᵀ: the equation without N and R; nothing where R
+/// has no inverse.
+struct ReducedRiccati {
+  Eigen::MatrixXd A;
+  Eigen::MatrixXd G;
+  Eigen::MatrixXd H;
+};
+[[nodiscard]] std::optional<ReducedRiccati> reduce(const RiccatiProblem& p);
+
+/// The discrete equation for Y = X - X₀, which has the same closed loop.
+[[nodiscard]] RiccatiProblem shifted(const RiccatiProblem& p, const Eigen::MatrixXd& X0);
+
+/// Powers of two d such that the states z of x = diag(d) z have comparable A, G and H.
+[[nodiscard]] Eigen::VectorXd balance_riccati(const RiccatiProblem& p);
+
+/// The solution in twice the working precision, rounded.
+struct ExtendedRiccati {
+  Eigen::MatrixXd X;
+  Eigen::MatrixXd K;
+  Eigen::MatrixXd closed_loop;
+  double gain = 0.0;      ///< ‖L⁻¹(I)‖ of the closed loop's Lyapunov operator.
+  double scale = 0.0;     ///< Sum of the norms of F's terms.
+  double residual = 0.0;  ///< ‖F(X)‖ of the rounded X.
+  int iterations = 0;
+};
+
+/// Doubling and Newton's method in twice the working precision, from several shifts (discrete) and
+/// Cayley parameters (continuous); nothing where none converges to a stabilising solution.
+[[nodiscard]] std::optional<ExtendedRiccati> solve_riccati_extended(const RiccatiProblem& p);
+
+/// Balances, solves in twice the working precision, verifies; the careful way for data that the
+/// kernels do not vouch for.
+[[nodiscard]] Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem);
+
+/// Why there is no answer.
+[[nodiscard]] Error diagnose_riccati(const RiccatiProblem& p);
 
 }  // namespace flyball::detail

@@ -84,6 +84,24 @@ inline void multiply(Size<N> n, double* C, std::ptrdiff_t ldc, const double* A, 
                      const double* B, std::ptrdiff_t ldb, std::ptrdiff_t depth,
                      std::ptrdiff_t columns) {
   const std::ptrdiff_t rows = n.padded();
+  if constexpr (N == 2) {
+    if (depth == 2) {
+      const Vector2 first = *reinterpret_cast<const Vector2*>(A);
+      const Vector2 second = *reinterpret_cast<const Vector2*>(A + lda);
+      for (std::ptrdiff_t j = 0; j < columns; ++j) {
+        const Vector2 sum = first * B[j * ldb] + second * B[1 + j * ldb];
+        Vector2* c = reinterpret_cast<Vector2*>(C + j * ldc);
+        if constexpr (Kind == Product::assign) {
+          *c = sum;
+        } else if constexpr (Kind == Product::add) {
+          *c += sum;
+        } else {
+          *c -= sum;
+        }
+      }
+      return;
+    }
+  }
   if (rows == 2) {
     product_strip<Vector2, 1, Kind>(C, ldc, A, lda, B, ldb, depth, columns);
     return;

@@ -184,6 +184,17 @@ MatrixXcd solve_triangular(const MatrixXcd& T, MatrixXcd B) {
   return B;
 }
 
+Eigen::MatrixXd logarithm_near_identity(const Eigen::MatrixXd& X) {
+  const Quadrature rule = gauss_legendre(7);
+  Eigen::MatrixXd L = Eigen::MatrixXd::Zero(X.rows(), X.cols());
+  for (std::size_t k = 0; k < rule.nodes.size(); ++k) {
+    Eigen::MatrixXd denominator = rule.nodes[k] * X;
+    denominator.diagonal().array() += 1.0;
+    L += rule.weights[k] * solve_linear(denominator, X);
+  }
+  return L;
+}
+
 MatrixXcd triangular_logarithm(const MatrixXcd& T) {
   const NearIdentity near = take_roots(T);
   const Quadrature rule = gauss_legendre(near.degree);

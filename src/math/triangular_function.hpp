@@ -10,6 +10,10 @@ namespace flyball::detail {
 
 [[nodiscard]] Eigen::MatrixXcd triangular_logarithm(const Eigen::MatrixXcd& T);
 
+/// log(I + X), ‖X‖₁ at most `near_identity`, with a relative error of rounding in X's size.
+inline constexpr double near_identity = 0.25;
+[[nodiscard]] Eigen::MatrixXd logarithm_near_identity(const Eigen::MatrixXd& X);
+
 /// T^p, -1 < p < 1.
 [[nodiscard]] Eigen::MatrixXcd triangular_power(const Eigen::MatrixXcd& T, double p);
 

@@ -9,6 +9,8 @@
 #include <flyball/core/random.hpp>
 #include <flyball/math/matrix_exponential.hpp>
 
+#include "math/matrices_json.hpp"
+
 namespace flyball {
 namespace {
 
@@ -107,6 +109,25 @@ TEST(MatrixPower, Errors) {
   EXPECT_TRUE(powm(A, std::nan("")).error().is(ArgumentError::not_finite));
   EXPECT_TRUE(powm(Eigen::MatrixXd(0, 0), 1.0).error().is(ArgumentError::empty));
   EXPECT_TRUE(powm(1e200 * A, 2.0).error().is(MatrixFunctionError::overflow));
+}
+
+// Golden numbers; see "about" in the file.
+TEST(MatrixFunctions, GoldenCases) {
+  for (const auto& c : test::cases_of("matrix_functions.json")) {
+    SCOPED_TRACE(c.at("name").get<std::string>());
+    const Eigen::MatrixXd A = test::matrix_from(c.at("A"));
+    if (c.contains("log")) {
+      const Eigen::MatrixXd X = test::matrix_from(c.at("log"));
+      EXPECT_LE((logm(A).value() - X).norm(), 1e-14 * X.norm());
+    } else {
+      EXPECT_FALSE(logm(A));
+      EXPECT_FALSE(powm(A, 0.5));
+    }
+    for (const auto& power : c.value("powers", nlohmann::json::array())) {
+      const Eigen::MatrixXd X = test::matrix_from(power.at("X"));
+      EXPECT_LE((powm(A, power.at("power")).value() - X).norm(), 1e-14 * X.norm());
+    }
+  }
 }
 
 // exp(log A) = A for 3000 matrices without negative eigenvalues, badly scaled ones among them.

@@ -102,6 +102,7 @@ struct RiccatiData {
   const double* Q = nullptr;
   const double* R = nullptr;
   const double* N = nullptr;
+  bool continuous = false;
 };
 struct RiccatiAnswer {
   double* X = nullptr;
