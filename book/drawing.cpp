@@ -39,6 +39,28 @@ Plot response_plot(const FigureResult& figure, const std::vector<ResponsePanel>&
   return plot;
 }
 
+Plot line_plot(const FigureResult& figure, const std::string& y_label,
+               const std::vector<PlotColumn>& columns) {
+  PlotPanel panel{.y_label = y_label};
+  for (const PlotColumn& column : columns) {
+    if (const auto* values = find_column(figure, column.column)) {
+      panel.lines.push_back(
+          {.label = column.label, .x = figure.columns.front().values, .y = *values});
+    }
+  }
+  return {.title = figure.title, .x_label = "Time (s)", .panels = {std::move(panel)}};
+}
+
+Eigen::VectorXd step_response(const DiscreteSystem<>& system, Eigen::Index samples) {
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(system.A.rows());
+  Eigen::VectorXd y(samples);
+  for (Eigen::Index k = 0; k < samples; ++k) {
+    y(k) = system.C.row(0).dot(x) + system.D(0, 0);
+    x = system.A * x + system.B.col(0);
+  }
+  return y;
+}
+
 Eigen::MatrixXd pulse_reference(double height, Eigen::Index states, Time period) {
   const auto samples = static_cast<Eigen::Index>(10.2 / period.si() + 0.5);
   Eigen::MatrixXd r = Eigen::MatrixXd::Zero(states, samples);

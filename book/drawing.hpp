@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include <flyball/core/quantity.hpp>
+#include <flyball/systems/system.hpp>
 
 #include "book/figures.hpp"
 
@@ -36,6 +37,19 @@ struct ResponsePanel {
 /// Panels above each other over the first column, time.
 [[nodiscard]] Plot response_plot(const FigureResult& figure,
                                  const std::vector<ResponsePanel>& panels);
+
+/// A column, and what it is called in the legend.
+struct PlotColumn {
+  std::string column;
+  std::string label;
+};
+
+/// Columns over the first one, time, in one panel.
+[[nodiscard]] Plot line_plot(const FigureResult& figure, const std::string& y_label,
+                             const std::vector<PlotColumn>& columns);
+
+/// The output of a system at rest whose first input is 1 from the first sample on.
+[[nodiscard]] Eigen::VectorXd step_response(const DiscreteSystem<>& system, Eigen::Index samples);
 
 /// The reference of the book's step responses: `height` for 0.1 s <= t < 5.1 s, otherwise 0, until
 /// 10.2 s. One column a sample; the first state gets it, the others stay 0.

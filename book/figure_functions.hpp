@@ -2,14 +2,42 @@
 
 #include "book/figures.hpp"
 
-/// One function a figure, each in the file of its name. They unpack every `Expected` with value():
-/// the constants are the book's, so a refusal is thrown to the one who asked for the figure.
+/// One function a figure or table, in the folder of its chapter. They unpack every `Expected` with
+/// value(): the constants are the book's, so a refusal is thrown to the one who asked for the
+/// figure.
 namespace flyball::book {
 
 [[nodiscard]] FigureResult figure_2_3();
+[[nodiscard]] FigureResult figure_2_5();
+[[nodiscard]] FigureResult figure_2_6();
+[[nodiscard]] FigureResult figure_2_7();
+[[nodiscard]] FigureResult figure_2_9();
+[[nodiscard]] FigureResult figure_6_1();
 [[nodiscard]] FigureResult figure_6_3();
 [[nodiscard]] FigureResult figure_6_5();
+[[nodiscard]] FigureResult figure_6_6();
+[[nodiscard]] FigureResult figure_6_7();
 [[nodiscard]] FigureResult figure_6_9();
+[[nodiscard]] FigureResult figure_7_1();
+[[nodiscard]] FigureResult figure_7_2();
+[[nodiscard]] FigureResult figure_7_3();
+[[nodiscard]] FigureResult figure_7_4();
+[[nodiscard]] FigureResult figure_7_5();
+[[nodiscard]] FigureResult figure_7_6();
 [[nodiscard]] FigureResult figure_7_7();
+[[nodiscard]] FigureResult figure_7_8();
+[[nodiscard]] FigureResult figure_7_10();
+[[nodiscard]] FigureResult figure_B_1();
+[[nodiscard]] FigureResult figure_B_2();
+[[nodiscard]] FigureResult figure_B_3();
+[[nodiscard]] FigureResult figure_B_4();
+[[nodiscard]] FigureResult figure_B_5();
+[[nodiscard]] FigureResult figure_B_6();
+[[nodiscard]] FigureResult figure_C_1();
+[[nodiscard]] FigureResult figure_C_2();
+[[nodiscard]] FigureResult figure_C_3();
+[[nodiscard]] FigureResult table_7_1();
+[[nodiscard]] FigureResult table_7_2();
+[[nodiscard]] FigureResult table_7_3();
 
 }  // namespace flyball::book

@@ -28,13 +28,52 @@ Expected<FigureResult> compute() {
 
 constexpr std::array table{
     FigureEntry{"2.3", "PD controller on an elevator", "2.2", compute<figure_2_3>},
+    FigureEntry{"2.5", "P controller on a flywheel with steady-state error", "2.3",
+                compute<figure_2_5>},
+    FigureEntry{"2.6", "PI controller on a flywheel without overshoot", "2.3", compute<figure_2_6>},
+    FigureEntry{"2.7", "PI controller on a flywheel with overshoot", "2.3", compute<figure_2_7>},
+    FigureEntry{"2.9", "Underdamped, overdamped, critically damped responses", "2.5",
+                compute<figure_2_9>},
+    FigureEntry{"6.1", "Impulse response against the place of the pole", "6.4",
+                compute<figure_6_1>},
     FigureEntry{"6.3", "Elevator response", "6.9.4", compute<figure_6_3>},
     FigureEntry{"6.5", "Flywheel response", "6.10.3", compute<figure_6_5>},
+    FigureEntry{"6.6", "Position step of a motor with inductance", "6.10.7", compute<figure_6_6>},
+    FigureEntry{"6.7", "Position step of a motor without inductance", "6.10.7",
+                compute<figure_6_7>},
     FigureEntry{"6.9", "Single-jointed arm response", "6.11.4", compute<figure_6_9>},
+    FigureEntry{"7.1", "The s-plane, coloured by the angle of s", "7.1", compute<figure_7_1>},
+    FigureEntry{"7.2", "Single poles on the real axis", "7.1.2", compute<figure_7_2>},
+    FigureEntry{"7.3", "Complex conjugate poles", "7.1.2", compute<figure_7_3>},
+    FigureEntry{"7.4", "Aliasing", "7.1.3", compute<figure_7_4>},
+    FigureEntry{"7.5", "Taylor series expansions of the exponential", "7.3.1", compute<figure_7_5>},
+    FigureEntry{"7.6", "The z-plane, coloured by the angle of s", "7.6", compute<figure_7_6>},
     FigureEntry{"7.7", "Cost-to-go for elevator model", "7.7.2", compute<figure_7_7>},
+    FigureEntry{"7.8", "Second-order CIM motor response with pole placement and LQR", "7.7.4",
+                compute<figure_7_8>},
+    FigureEntry{"7.10", "Second-order CIM motor response with plant inversion", "7.8.1",
+                compute<figure_7_10>},
+    FigureEntry{"B.1", "Elevator with a delay of 50 ms", "B.4", compute<figure_B_1>},
+    FigureEntry{"B.2", "Elevator with a delay of 50 ms, compensated", "B.4", compute<figure_B_2>},
+    FigureEntry{"B.3", "Drivetrain velocity with a delay of 40 ms", "B.4.2", compute<figure_B_3>},
+    FigureEntry{"B.4", "Drivetrain velocity with a delay of 40 ms, compensated", "B.4.2",
+                compute<figure_B_4>},
+    FigureEntry{"B.5", "Flywheel with a delay of 80 ms", "B.4.2", compute<figure_B_5>},
+    FigureEntry{"B.6", "Flywheel with a delay of 80 ms, compensated", "B.4.2", compute<figure_B_6>},
+    FigureEntry{"C.1", "Second-order CIM motor response with plant inversion, weighted and not",
+                "C.1", compute<figure_C_1>},
+    FigureEntry{"C.2", "Second-order CIM motor response with various feedforwards", "C.2",
+                compute<figure_C_2>},
+    FigureEntry{"C.3", "Second-order CIM motor response with plant inversions", "C.2",
+                compute<figure_C_3>},
+    FigureEntry{"table 7.1", "Mapping from the s-plane to the z-plane", "7.1", compute<table_7_1>},
+    FigureEntry{"table 7.2", "Discretisation methods", "7.3.1", compute<table_7_2>},
+    FigureEntry{"table 7.3", "Taylor series of the discretisation methods", "7.3.1",
+                compute<table_7_3>},
 };
 
-/// "6.3" of "Figure 6.3", "fig. 6.3" or " 6.3 "; figures of the appendices begin with a capital.
+/// "6.3" of "Figure 6.3", "fig. 6.3" or " 6.3 ", "TABLE7.1" of "table 7.1"; figures of the
+/// appendices begin with a capital.
 std::string bare_id(std::string_view text) {
   std::string id;
   for (const char c : text) {
@@ -73,7 +112,8 @@ std::span<const FigureEntry> figures() {
 
 Expected<const FigureEntry*> find_figure(std::string_view id) {
   const std::string wanted = bare_id(id);
-  const auto* found = std::ranges::find(table, wanted, &FigureEntry::id);
+  const auto* found =
+      std::ranges::find(table, wanted, [](const FigureEntry& entry) { return bare_id(entry.id); });
   if (found != table.end()) {
     return found;
   }
@@ -104,8 +144,9 @@ std::string to_csv(const FigureResult& figure) {
 }
 
 std::string file_stem(const FigureResult& figure) {
-  std::string stem = "figure_" + figure.id;
+  std::string stem = figure.id.starts_with("table") ? figure.id : "figure_" + figure.id;
   std::ranges::replace(stem, '.', '_');
+  std::ranges::replace(stem, ' ', '_');
   return stem;
 }
 

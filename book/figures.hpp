@@ -12,8 +12,8 @@
 #include <flyball/io/plot.hpp>
 
 /// The figures of *Controls Engineering in the FIRST Robotics Competition*, computed by this
-/// library and compared with what the book's own scripts computed. Each figure is one function in a
-/// file of its own (book/figure_6_3.cpp), written to be read as an example of the library.
+/// library and compared with what the book's own scripts computed. Each figure is one function in
+/// the folder of its chapter (book/chapter_6), written to be read as an example of the library.
 namespace flyball::book {
 
 /// A number that belongs to a figure, such as a gain.
@@ -25,7 +25,7 @@ struct FigureNumber {
 
 /// What a figure shows.
 struct FigureResult {
-  std::string id;     ///< "6.3"
+  std::string id;     ///< "6.3", or "table 7.2"
   std::string title;  ///< "Elevator response"
   /// The plotted data, columns of equal length; the abscissa (time, or the two axes of a surface)
   /// comes first.
@@ -45,7 +45,7 @@ struct FigureEntry {
 /// Every figure that is there, in the book's order.
 [[nodiscard]] std::span<const FigureEntry> figures();
 
-/// A figure by its number, as people write it: "6.3", "Figure 6.3", "fig. 6.3".
+/// A figure by its number, as people write it: "6.3", "Figure 6.3", "fig. 6.3"; "Table 7.2".
 /// @errors ArgumentError::unknown_name with the nearest figures that are there.
 [[nodiscard]] Expected<const FigureEntry*> find_figure(std::string_view id);
 
@@ -53,7 +53,7 @@ struct FigureEntry {
 /// that reads back to the same double.
 [[nodiscard]] std::string to_csv(const FigureResult& figure);
 
-/// "figure_6_3", which every file of the figure is called.
+/// "figure_6_3" or "table_7_2", which every file of the figure is called.
 [[nodiscard]] std::string file_stem(const FigureResult& figure);
 
 /// Writes figure_6_3.png, .svg and .csv into a folder, which is made if it is not there. Everything

@@ -116,6 +116,9 @@ ErrorInfo error_info(IntegrationError code) {
     case IntegrationError::too_many_steps:
       return {family, "too_many_steps", "the time is not reached in the steps allowed",
               ErrorKind::no_answer};
+    case IntegrationError::no_convergence:
+      return {family, "no_convergence", "the stages of an implicit step were not found",
+              ErrorKind::no_answer};
   }
   return {family, "unknown", "unknown error", ErrorKind::defect};
 }

@@ -17,7 +17,7 @@ struct OdeProblem {
   double t_end = 0.0;
   double direction = 1.0;
   double relative_tolerance = 0.0;
-  Eigen::VectorXd absolute_tolerance;
+  Eigen::VectorXd absolute_tolerance{};
   double max_step = 0.0;
   int max_steps = 0;
   IntegrationStatistics statistics{};

@@ -20,6 +20,7 @@ enum class IntegrationError {
   not_finite,      ///< f, or an event's function, gave NaN or infinity where no step avoids it.
   step_underflow,  ///< The step that the tolerance asks for is lost in rounding: a singularity.
   too_many_steps,  ///< The cap of the options.
+  no_convergence,  ///< The stages of an implicit step were not found.
 };
 [[nodiscard]] ErrorInfo error_info(IntegrationError code);
 
