@@ -19,10 +19,12 @@ double node(double low, double high, int i) {
   return i == grid - 1 ? high : low + i * ((high - low) / (grid - 1));
 }
 
-/// The angle of a stable s, from 0 (π/2) through 1/2 (the negative real axis) to 1 (-π/2).
+/// The angle of a stable s as a colour, from 0 (π/2) through 1/2 (the negative real axis) to 1
+/// (-π/2). The upper half is one of 256 colours further on, as in the book's script, since the
+/// first one is left for what is not in the map.
 double hue(Complex s) {
   const double angle = std::arg(s);
-  return angle > 0.0 ? (angle - pi / 2.0) / pi : 0.5 + (angle + pi) / pi;
+  return angle > 0.0 ? 1.0 / 255.0 + (angle - pi / 2.0) / pi : 0.5 + (angle + pi) / pi;
 }
 
 /// A square of a plane, coloured: rows run along the real axis first. The picture takes every

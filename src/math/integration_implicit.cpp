@@ -76,14 +76,18 @@ Expected<VectorXd> implicit_step(const ButcherTableauView& tableau, OdeFunction 
       return tl::unexpected(no_step(IntegrationError::not_finite, "take a shorter step", t, x));
     }
     z += step.reshaped(n, stages);
-    const double size = step.norm();
-    const double rounding = 4.0 * std::numeric_limits<double>::epsilon() * (x.norm() + z.norm());
+    const double size = step.cwiseAbs().maxCoeff();
+    const double rounding = 4.0 * std::numeric_limits<double>::epsilon() *
+                            (x.cwiseAbs().maxCoeff() + z.cwiseAbs().maxCoeff());
     // Where rounding stops it, a correction is as small as one and no longer shrinks.
     if (size <= rounding || (size <= 1e4 * rounding && size >= 0.5 * previous)) {
       VectorXd next = x;
       for (Index i = 0; i < stages; ++i) {
         const auto place = static_cast<std::size_t>(i);
         next += dt * tableau.b[place] * problem.derivative(t + tableau.c[place] * dt, x + z.col(i));
+      }
+      if (!next.allFinite()) {
+        return tl::unexpected(no_step(IntegrationError::not_finite, "take a shorter step", t, x));
       }
       return next;
     }

@@ -246,7 +246,7 @@ Expected<void> RadauStepper::step(OdeProblem& problem, OdeState& state) {
       error = problem.norm(difference, state.x, next);
     }
     const VectorXd f_next = problem.derivative(t_next, next);
-    was_not_finite = !std::isfinite(error) || !f_next.allFinite();
+    was_not_finite = !std::isfinite(error) || !next.allFinite() || !f_next.allFinite();
     const double safety = 0.9 * (2.0 * max_newton + 1.0) / (2.0 * max_newton + newton.iterations);
     if (was_not_finite || error > 1.0) {
       ++problem.statistics.rejected;

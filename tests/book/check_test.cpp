@@ -115,6 +115,11 @@ TEST(FigureChecks, EveryAlteredSeriesIsFound) {
         for (const double value : series.at("values")) {
           scale = std::max(scale, std::abs(value));
         }
+        for (const char* extreme : {"min", "max"}) {
+          if (series.contains(extreme)) {
+            scale = std::max(scale, std::abs(series.at(extreme).get<double>()));
+          }
+        }
         return scale == 0.0 ? 1.0 : scale;
       };
       for (const char* part : {"values", "min", "max", "mean"}) {
