@@ -235,7 +235,7 @@ std::string rev_constants(const DesignResult& design, Language language,
   if (!flywheel) {
     text += fmt::format("//   {}(kD * 60.0 / 0.001 / {});{}\n",
                         cpp ? "config.closedLoop.D" : "config.closedLoop.d", nominal,
-                        "  // a SPARK differentiates rotations over its 1 ms loop");
+                        "  // per change of rotations in a SPARK's 1 ms loop");
   }
   const std::string gravity = plant.kind == MechanismKind::arm        ? ".kCos(kG)"
                               : plant.kind == MechanismKind::elevator ? ".kG(kG)"

@@ -91,6 +91,18 @@ TEST(Constants, NameTheClassesThatTakeThem) {
   has(rev_constants(flywheel, Language::java), "velocityFF(kV / 12.0)");
 }
 
+// kD e' with e' = (e_k - e_(k-1))/1 ms: WPILib's SysId divides a position loop's kD by 12 V and by
+// the 1 ms of a controller that is not time-normalised; 60 makes V/RPM a V s/rotation.
+TEST(Constants, ASparkDifferentiatesOverItsMillisecond) {
+  const study::DesignResult design = design_result(MechanismKind::arm);
+  EXPECT_NE(rev_constants(design, Language::cpp).find("closedLoop.D(kD * 60.0 / 0.001 / 12.0);"),
+            std::string::npos);
+  EXPECT_NE(rev_constants(design, Language::java).find("closedLoop.d(kD * 60.0 / 0.001 / 12.0);"),
+            std::string::npos);
+  const study::PasteGains& rotation = gains_per(design, "rotation");
+  EXPECT_NEAR(60.0 * gains_per(design, "RPM").kD, rotation.kD, 1e-9 * rotation.kD);
+}
+
 TEST(Constants, AnUndeterminedKAIsZeroWithItsReason) {
   const study::DesignResult design = design_result(MechanismKind::elevator, false);
   const std::string reason = "the speed-up\nis over \\";

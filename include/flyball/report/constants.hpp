@@ -30,7 +30,10 @@ struct PasteText {
                                             std::string_view kA_reason = {});
 
 /// For REVLib, per rotation and RPM of the mechanism; says what is in volts and what SPARKs want as
-/// a share of the full voltage. @return Empty if the design has no gains per RPM.
+/// a share of the full voltage. A SPARK adds kD (e_k - e_(k-1)) every millisecond without dividing
+/// by the time between, so its kD is the one in V/RPM times 60 s/min, over 1 ms, over the voltage.
+/// Source: the preset of WPILib's SysId for REV controllers (period 1 ms, not time-normalised).
+/// @return Empty if the design has no gains per RPM.
 [[nodiscard]] std::string rev_constants(const study::DesignResult& design, Language language,
                                         std::string_view kA_reason = {});
 
