@@ -19,7 +19,7 @@ constexpr std::array<std::string_view, 7> palette = {"#0072B2", "#D55E00", "#009
                                                      "#E69F00", "#56B4E9", "#333333"};
 
 // The layout in pixels.
-constexpr int left_margin = 96;
+constexpr int left_margin = 108;
 constexpr int right_margin = 28;
 constexpr int title_height = 40;
 constexpr int bottom_margin = 66;
@@ -311,7 +311,7 @@ class Script {
                    1.0 - static_cast<double>(right_margin) / plot_.width,
                    1.0 - static_cast<double>(box.top) / height_,
                    1.0 - static_cast<double>(box.bottom) / height_, box.y.low(), box.y.high(),
-                   literal(panel.y_label), 20.0 / plot_.width,
+                   literal(panel.y_label), 16.0 / plot_.width,
                    1.0 - 0.5 * (box.top + box.bottom) / height_);
     script_ += panel.log_y ? "set logscale y\n" : "unset logscale y\n";
     if (last) {

@@ -181,7 +181,10 @@ Section controller_section(const DesignResult& result) {
   }
   table.header.emplace_back("B⁺");
   table.header.emplace_back("Kalman gain");
-  table.header.emplace_back("model std");
+  const bool model_given = !result.job.estimator.model_std.empty();
+  if (model_given) {
+    table.header.emplace_back("model std");
+  }
   for (Eigen::Index i = 0; i < result.A.rows(); ++i) {
     std::vector<Table::Cell> row{state_name(result, i), entry(controller.state_tolerance, i),
                                  matrix_entry(result.K, 0, i)};
@@ -190,7 +193,9 @@ Section controller_section(const DesignResult& result) {
     }
     row.emplace_back(matrix_entry(result.inversion, 0, i));
     row.emplace_back(matrix_entry(result.kalman_gain, i, 0));
-    row.emplace_back(entry(result.job.estimator.model_std, i));
+    if (model_given) {
+      row.emplace_back(entry(result.job.estimator.model_std, i));
+    }
     table.rows.push_back(std::move(row));
   }
   section.blocks.emplace_back(std::move(table));

@@ -67,7 +67,9 @@ std::string with_half_width(double value, double half_width) {
 }
 
 std::string percent(double ratio, int digits) {
-  return std::isnan(ratio) ? "none" : number(100.0 * ratio, digits) + " %";
+  // Below a thousandth of a per cent is nothing that anybody could see.
+  const double shown = std::abs(ratio) < 1e-5 ? 0.0 : 100.0 * ratio;
+  return std::isnan(ratio) ? "none" : number(shown, digits) + " %";
 }
 
 std::string seconds(double value) {

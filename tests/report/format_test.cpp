@@ -63,6 +63,8 @@ TEST(Format, TimesAndComplexNumbersAndMatrices) {
   EXPECT_EQ(matrix((Eigen::MatrixXd(2, 2) << 0, 1, 0, -13.333333).finished()),
             "[0  1; 0  -13.333]");
   EXPECT_EQ(percent(0.125), "12.5 %");
+  EXPECT_EQ(percent(4.1e-4, 2), "0.041 %");
+  EXPECT_EQ(percent(2.8e-11, 2), "0 %");
   EXPECT_EQ(enumerate({"a", "b", "c"}), "a, b and c");
   EXPECT_EQ(count(1, "run"), "1 run");
   EXPECT_EQ(count(0, "run"), "0 runs");
