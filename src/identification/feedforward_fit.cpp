@@ -67,8 +67,8 @@ Expected<void> check_tests(const PreparedRecording& prepared) {
             .hint(voltage < 0.1
                       ? "no voltage was applied either: the log was started but no test ran"
                       : "check that the encoder counts and that the mechanism is free")
-            .with("largest voltage, V", voltage)
-            .with("largest travel, " + prepared.unit, travel));
+            .with("largest voltage (V)", voltage)
+            .with("largest travel (" + prepared.unit + ")", travel));
   }
   if (!ramps || !steps) {
     return tl::unexpected(

@@ -161,6 +161,27 @@ double hold(const Signal& signal, double t, std::size_t& cursor) {
   return signal.value[cursor];
 }
 
+// The channels with the most samples in the tests, for a person to choose from.
+std::string fullest_channels(const Log& log, const FoundTests& tests) {
+  constexpr std::size_t shown = 12;
+  std::vector<std::pair<std::size_t, const Signal*>> all;
+  for (const Signal& signal : log.signals) {
+    if (const std::size_t samples = samples_in(signal, tests.windows); samples >= 2) {
+      all.emplace_back(samples, &signal);
+    }
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < std::min(shown, all.size()); ++i) {
+    names.push_back("\"" + all[i].second->name + "\"");
+  }
+  if (names.empty()) {
+    return ", none of which has two samples in the tests";
+  }
+  return fmt::format(", such as {}{}", fmt::join(names, ", "), all.size() > shown ? ", …" : "");
+}
+
 constexpr std::array every_quantity{Quantity::voltage, Quantity::position, Quantity::velocity};
 
 }  // namespace
@@ -233,7 +254,8 @@ Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
     return tl::unexpected(
         Error(RecordingError::no_channel)
             .about(channels.voltage == nullptr ? "voltage channel" : "position or velocity channel")
-            .got(fmt::format("not found among {} numeric channels", log.signals.size()))
+            .got(fmt::format("not found by name among {} numeric channels{}", log.signals.size(),
+                             fullest_channels(log, tests)))
             .hint(channels.voltage == nullptr
                       ? "name the channel of the applied volts with --voltage"
                       : "name them with --position and --velocity"));

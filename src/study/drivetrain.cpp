@@ -33,7 +33,7 @@ std::vector<Diagnostic> diagnose_drive(const SysIdJson& log) {
       found.push_back({"no_motion", Severity::error,
                        fmt::format("the {} side never moved: at most {:.3g} rotations/s at up to "
                                    "{:.3g} V",
-                                   name, travel_speed, top_voltage)});
+                                   name, travel_speed < 1e-9 ? 0.0 : travel_speed, top_voltage)});
       return;
     }
     const double correlation = voltage_power > 0.0 && velocity_power > 0.0

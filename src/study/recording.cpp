@@ -231,7 +231,8 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
         Error(RecordingError::mechanism_unknown)
             .in(log.source)
             .about("mechanism")
-            .got(fmt::format("not told by the log ({} fit an arm and a flywheel)", unit))
+            .got(fmt::format("not told by the log (positions in \"{}\" fit an arm and a flywheel)",
+                             unit))
             .hint("say it with --mechanism arm or --mechanism flywheel"));
   }
   auto output = output_scale(unit, selection.scale, kind);

@@ -245,6 +245,11 @@ TEST(Recording, SaysWhichChannelIsMissing) {
   Log log = wpilog("Rotation");
   log.signals.erase(log.signals.begin());
   EXPECT_EQ(code_of(log, {.mechanism = MechanismKind::arm}), "no_channel");
+  const auto listed = recording_from_log(log, {.mechanism = MechanismKind::arm});
+  for (const char* channel :
+       {"such as \"", "\"position-motor-Wrist\"", "\"NT:/intake/Position\""}) {
+    EXPECT_NE(to_string(listed.error()).find(channel), std::string::npos) << channel;
+  }
   log = wpilog("Rotation");
   log.texts[0].value.assign(5, "none");
   EXPECT_EQ(code_of(log, {.mechanism = MechanismKind::arm}), "no_tests");
