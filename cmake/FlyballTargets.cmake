@@ -9,6 +9,10 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_L
   # False positives on std::string in g++ 12: https://gcc.gnu.org/bugzilla/show_bug.cgi?id=105651
   target_compile_options(flyball_options INTERFACE -Wno-restrict)
 endif()
+if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+  # The standard library of g++ 12 deprecates what its own std::stable_sort is made of.
+  target_compile_options(flyball_options INTERFACE -Wno-deprecated-declarations)
+endif()
 if(FLYBALL_WARNINGS_AS_ERRORS)
   target_compile_options(flyball_options INTERFACE -Werror)
 endif()
