@@ -160,12 +160,14 @@ Expected<std::vector<std::string>> write_figure(const FigureResult& figure,
     }
   }
   std::error_code failure;
-  std::filesystem::create_directories(folder, failure);
+  const bool made = std::filesystem::create_directories(folder, failure);
   if (failure) {
     return tl::unexpected(Error(FileError::not_writable)
-                              .about(folder)
-                              .got(failure.message())
-                              .hint("choose another folder"));
+                              .in(folder)
+                              .about("the output folder")
+                              .got("not writable")
+                              .hint("give a folder that you may write to")
+                              .with("system", failure.message()));
   }
   const auto path = (std::filesystem::path(folder) / file_stem(figure)).string();
   const std::array<std::pair<std::string, std::string>, 3> files{
@@ -173,6 +175,13 @@ Expected<std::vector<std::string>> write_figure(const FigureResult& figure,
   std::vector<std::string> written;
   for (const auto& [name, contents] : files) {
     if (auto done = write_file_atomically(name, contents); !done) {
+      // A figure is there with all its files, or not at all.
+      for (const std::string& earlier : written) {
+        std::filesystem::remove(earlier, failure);
+      }
+      if (made) {
+        std::filesystem::remove(folder, failure);  // only if it is empty
+      }
       return tl::unexpected(done.error());
     }
     written.push_back(name);

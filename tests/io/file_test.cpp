@@ -150,6 +150,17 @@ TEST(OutputFolder, ADestinationThatFillsUpMeanwhileIsLeftAlone) {
   EXPECT_EQ(folder.get("report/thesis.tex"), "years of work");
 }
 
+// The folder that is being built has a passing name, which a message must not tell.
+TEST(OutputFolder, ErrorsNameTheFolderThatWasAskedFor) {
+  const TemporaryFolder folder;
+  const Expected<OutputFolder> report = OutputFolder::create(folder.file("report"));
+  ASSERT_TRUE(report);
+  ASSERT_TRUE(report->write("data/run", "x"));
+  const Expected<void> written = report->write("data", "a folder is there");
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().where(), folder.file("report/data"));
+}
+
 TEST(OutputFolder, NamesStayInside) {
   const TemporaryFolder folder;
   const Expected<OutputFolder> report = OutputFolder::create(folder.file("report"));
