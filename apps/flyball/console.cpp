@@ -64,7 +64,11 @@ std::string typed_command(std::span<const char* const> arguments) {
 
 void add_common_options(CLI::App& command, CommonOptions& options, const std::string& report) {
   command.add_flag("--json", options.json, "Answer one JSON object on one line (docs/schemas.md)");
-  command.add_option("--out", options.out, report)->type_name("DIR");
+  command.add_option("--out", options.out, report)
+      ->type_name("DIR")
+      ->check([](const std::string& folder) {
+        return folder.empty() ? std::string("a folder's name is needed") : std::string();
+      });
 }
 
 void add_log_options(CLI::App& command, LogOptions& options) {

@@ -163,8 +163,10 @@ TEST_F(BadInput, ProjectFiles) {
     expect("design project.toml", 2, words);
     expect("design project.toml --out report", 2, words);
   };
-  refused(with(good_elevator, "8 kg", "8 m"), "", "project.toml:6:1: mechanism.mass is \"8 m\", a length");
-  refused(with(good_elevator, "\"8 kg\"", "8"), "", "project.toml:6:1: mechanism.mass is 8, without a unit");
+  refused(with(good_elevator, "8 kg", "8 m"), "",
+          "project.toml:6:1: mechanism.mass is \"8 m\", a length");
+  refused(with(good_elevator, "\"8 kg\"", "8"), "",
+          "project.toml:6:1: mechanism.mass is 8, without a unit");
   refused(with(good_elevator, "8 kg", "-8 kg"), "", "mass");
   refused(with(good_elevator, "8 kg", "nan kg"), "", "mass");
   refused(with(good_elevator, "10.0", "0"), "", "gearing");
@@ -210,6 +212,10 @@ TEST_F(BadInput, FoldersThatAreNotOurs) {
   expect("design project.toml --out in-the-way", 2, "it must be a folder");
   expect("design project.toml --out in-the-way/report", 2, "in-the-way");
   EXPECT_EQ(contents(work() / "in-the-way"), "a file\n");
+
+  expect("design project.toml --out ''", 2, "--out: a folder's name is needed");
+  expect("book 6.3 --out in-the-way", 2, "in-the-way: the output folder is not writable");
+  expect("book 6.3 --out in-the-way/figures", 2, "the output folder is not writable");
 
   std::filesystem::create_directory(work() / "thesis");
   write("thesis/chapter.txt", "three years\n");
