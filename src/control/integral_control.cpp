@@ -2,32 +2,12 @@
 
 #include <string>
 
-#include <flyball/control/quadratic_cost.hpp>
-
+#include "control/weights.hpp"
 #include "math/dense.hpp"
 
 namespace flyball {
 
 namespace {
-
-/// [x; x_I]₊ = [A 0; -h C  e I][x; x_I] + [B; -h D] u: h = T and e = 1 sampled, h = 1 and e = 0
-/// not.
-struct Augmented {
-  Eigen::MatrixXd A, B;
-};
-
-Augmented augmented(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C, const MatrixRef& D,
-                    double h, double e) {
-  const Eigen::Index n = A.rows();
-  const Eigen::Index p = C.rows();
-  Augmented plant{Eigen::MatrixXd::Zero(n + p, n + p), Eigen::MatrixXd::Zero(n + p, B.cols())};
-  plant.A.topLeftCorner(n, n) = A;
-  plant.A.bottomLeftCorner(p, n) = -h * C;
-  plant.A.bottomRightCorner(p, p).diagonal().setConstant(e);
-  plant.B.topRows(n) = B;
-  plant.B.bottomRows(p) = -h * D;
-  return plant;
-}
 
 /// Whether a constant input holds the outputs anywhere: [A - e I  B; C  D] has independent rows.
 Expected<void> check_trackable(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
@@ -65,19 +45,17 @@ Expected<void> check_trackable(const MatrixRef& A, const MatrixRef& B, const Mat
                                   smallest));
 }
 
-IntegralLqr split(LqrDesign<>&& design, Eigen::Index n) {
-  return {design.K.leftCols(n), design.K.rightCols(design.K.cols() - n),
-          std::move(design.S),  std::move(design.poles),
-          design.residual,      design.condition};
-}
+}  // namespace
 
-template <class Solve>
-Expected<IntegralLqr> design(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
-                             const MatrixRef& D, double h, double e, const Weight& Q,
-                             std::string_view where, const Solve& solve) {
-  const Eigen::Index size = A.rows() + C.rows();
+namespace detail {
+
+Expected<IntegralPlant> integral_plant(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
+                                       const MatrixRef& D, double h, double e, const Weight& Q,
+                                       std::string_view where) {
+  const Eigen::Index n = A.rows();
+  const Eigen::Index p = C.rows();
   if (Q.get()) {
-    if (auto shape = check_shape(*Q.get(), size, size, where, "Q",
+    if (auto shape = check_shape(*Q.get(), n + p, n + p, where, "Q",
                                  "(states + outputs) x (states + outputs)");
         !shape) {
       return tl::unexpected(shape.error());
@@ -86,17 +64,28 @@ Expected<IntegralLqr> design(const MatrixRef& A, const MatrixRef& B, const Matri
   if (auto trackable = check_trackable(A, B, C, D, e, where); !trackable) {
     return tl::unexpected(trackable.error());
   }
-  const Augmented plant = augmented(A, B, C, D, h, e);
-  auto solved = solve(plant);
-  if (!solved) {
-    const bool weight = solved.error().where() == "bryson";
-    return tl::unexpected(weight ? solved.error()
-                                 : Error(std::move(solved.error()).in(std::string(where))));
-  }
-  return split(std::move(*solved), A.rows());
+  IntegralPlant plant{Eigen::MatrixXd::Zero(n + p, n + p), Eigen::MatrixXd::Zero(n + p, B.cols())};
+  plant.A.topLeftCorner(n, n) = A;
+  plant.A.bottomLeftCorner(p, n) = -h * C;
+  plant.A.bottomRightCorner(p, p).diagonal().setConstant(e);
+  plant.B.topRows(n) = B;
+  plant.B.bottomRows(p) = -h * D;
+  return plant;
 }
 
-}  // namespace
+Expected<IntegralLqr> split_integral(Expected<LqrDesign<>>&& design, Eigen::Index n,
+                                     std::string_view where) {
+  if (!design) {
+    const bool weight = design.error().where() == "bryson";
+    return tl::unexpected(weight ? design.error()
+                                 : Error(std::move(design.error()).in(std::string(where))));
+  }
+  return IntegralLqr{design->K.leftCols(n), design->K.rightCols(design->K.cols() - n),
+                     std::move(design->S),  std::move(design->poles),
+                     design->residual,      design->condition};
+}
+
+}  // namespace detail
 
 ErrorInfo error_info(IntegralControlError code) {
   constexpr std::string_view family = "integral_control";
@@ -115,18 +104,11 @@ Expected<IntegralLqr> lqi(const DiscreteSystem<>& plant, const Weight& Q, const 
   if (auto checked = check_system(plant, "lqi"); !checked) {
     return tl::unexpected(checked.error());
   }
-  return design(plant.A, plant.B, plant.C, plant.D, plant.period.si(), 1.0, Q, "lqi",
-                [&](const Augmented& augmented) { return lqr(augmented.A, augmented.B, Q, R); });
-}
-
-Expected<IntegralLqr> continuous_lqi(const ContinuousSystem<>& plant, const Weight& Q,
-                                     const Weight& R) {
-  if (auto checked = check_system(plant, "continuous_lqi"); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  return design(
-      plant.A, plant.B, plant.C, plant.D, 1.0, 0.0, Q, "continuous_lqi",
-      [&](const Augmented& augmented) { return continuous_lqr(augmented.A, augmented.B, Q, R); });
+  return detail::integral_plant(plant.A, plant.B, plant.C, plant.D, plant.period.si(), 1.0, Q,
+                                "lqi")
+      .and_then([&](const detail::IntegralPlant& augmented) {
+        return detail::split_integral(lqr(augmented.A, augmented.B, Q, R), plant.A.rows(), "lqi");
+      });
 }
 
 Expected<Eigen::MatrixXd> input_error_gain(const MatrixRef& B, const MatrixRef& B_error) {

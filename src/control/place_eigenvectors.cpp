@@ -233,8 +233,9 @@ std::optional<PlacedLoop> place_eigenvectors(const PlacementProblem& problem) {
     if (!best->M.allFinite()) {
       return std::nullopt;
     }
-    const Eigen::VectorXd singular = singular_values_of_complex(best_X);
-    best->condition = singular(0) / singular(singular.size() - 1);
+    const Eigen::MatrixXcd inverse =
+        solve_complex(best_X, Eigen::MatrixXcd::Identity(best_X.rows(), best_X.cols()));
+    best->condition = norm2(best_X) * norm2(inverse);
   }
   return best;
 }

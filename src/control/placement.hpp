@@ -54,4 +54,7 @@ struct PlacedLoop {
 /// columns.
 [[nodiscard]] Eigen::MatrixXcd leading_directions(const ComplexMatrixRef& M, Eigen::Index count);
 
+/// The largest singular value of M; infinite where M is not finite.
+[[nodiscard]] double norm2(const ComplexMatrixRef& M);
+
 }  // namespace flyball::detail

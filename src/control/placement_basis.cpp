@@ -1,4 +1,5 @@
 #include <cmath>
+#include <limits>
 
 #include "control/placement.hpp"
 
@@ -57,6 +58,19 @@ Eigen::MatrixXcd leading_directions(const ComplexMatrixRef& M, Eigen::Index coun
     gram -= (system.values(2 * r - 1) + 1.0 + gram.norm()) * v * v.adjoint();
   }
   return directions;
+}
+
+double norm2(const ComplexMatrixRef& M) {
+  // Entries of any size: the Gram matrix squares them.
+  const double size = M.cwiseAbs().maxCoeff();
+  if (!std::isfinite(size)) {
+    return std::numeric_limits<double>::infinity();
+  }
+  if (size == 0.0) {
+    return 0.0;
+  }
+  const Eigen::MatrixXcd scaled = M / size;
+  return size * (scaled * leading_directions(scaled, 1).col(0)).norm();
 }
 
 }  // namespace flyball::detail

@@ -108,10 +108,10 @@ Reached reached_by(const Eigen::MatrixXd& closed, const Eigen::VectorXcd& wanted
     return reached;
   }
   double rcond = 0.0;
-  Eigen::MatrixXcd left =
+  const Eigen::MatrixXcd left =
       detail::solve_complex(system.vectors, Eigen::MatrixXcd::Identity(n, n), &rcond);
-  const Eigen::VectorXd singular = detail::singular_values_of_complex(system.vectors);
-  reached.condition = singular(n - 1) > 0.0 ? singular(0) / singular(n - 1) : infinity;
+  reached.condition = detail::norm2(system.vectors) * detail::norm2(left);
+  reached.condition = std::isfinite(reached.condition) ? reached.condition : infinity;
   reached.poles.resize(n);
   reached.sensitivity.resize(n);
   reached.pole_error = 0.0;
@@ -241,6 +241,95 @@ Error uncontrollable_mode(const detail::ControllableStaircase& form, const Eigen
       .with("states it lives in (counted from 0)", states);
 }
 
+/// The poles that are left for the controllable part once each mode that stays has taken its own;
+/// the error if one finds none.
+Expected<Eigen::VectorXcd> poles_to_move(const detail::ControllableStaircase& form,
+                                         const Eigen::VectorXd& units,
+                                         const Eigen::VectorXcd& wanted,
+                                         std::vector<Complex>& staying) {
+  const Eigen::Index n = form.A.rows();
+  const Eigen::Index rest = n - form.controllable;
+  const Eigen::MatrixXd A_u = form.A.bottomRightCorner(rest, rest);
+  const detail::Eigensystem right = detail::eigensystem_of(A_u);
+  const detail::Eigensystem left = detail::eigensystem_of(A_u.transpose());
+  const std::vector<std::size_t> order = matched(right.values, wanted);
+  std::vector<bool> stays(static_cast<std::size_t>(n), false);
+  for (Eigen::Index i = 0; i < rest; ++i) {
+    const Complex mode = right.values(i);
+    const std::size_t match = order[static_cast<std::size_t>(i)];
+    // The mode itself is known to rounding times its sensitivity.
+    Eigen::Index same = 0;
+    (left.values.array() - mode).abs().minCoeff(&same);
+    const double along =
+        std::abs((left.vectors.col(same).transpose() * right.vectors.col(i)).value());
+    const double tolerance = std::min(1e-4, 1e-8 / std::max(along, 1e-16)) * scale_of(mode);
+    if (!(std::abs(wanted(static_cast<Eigen::Index>(match)) - mode) <= tolerance)) {
+      return tl::unexpected(uncontrollable_mode(form, units, mode));
+    }
+    stays[match] = true;
+    staying.push_back(mode);
+  }
+  Eigen::VectorXcd moved(form.controllable);
+  Eigen::Index count = 0;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (!stays[static_cast<std::size_t>(i)]) {
+      moved(count++) = wanted(i);
+    }
+  }
+  return moved;
+}
+
+/// The gain found with each state measured in its unit, for the plant in the units it came in.
+Expected<PolePlacement<>> place_in_units(const MatrixRef& A, const MatrixRef& B,
+                                         const Eigen::VectorXcd& wanted,
+                                         const Eigen::VectorXcd& poles,
+                                         const Eigen::VectorXd& units) {
+  const Eigen::Index n = A.rows();
+  const Eigen::MatrixXd A_used = units.cwiseInverse().asDiagonal() * A * units.asDiagonal();
+  const Eigen::MatrixXd B_used = units.cwiseInverse().asDiagonal() * B;
+  const detail::ControllableStaircase form = detail::controllable_staircase(A_used, B_used);
+  const Eigen::Index n_c = form.controllable;
+  PolePlacement<> placed;
+  if (n_c == n) {
+    if (auto found = place_controllable(A_used, B_used, wanted)) {
+      placed.K = std::move(found->K);
+      // Repeated poles leave it open which of their eigenvectors an eigenvalue routine finds.
+      placed.condition = (units.array() == 1.0).all() ? found->condition : 0.0;
+    }
+  } else {
+    auto moved = poles_to_move(form, units, wanted, placed.uncontrollable);
+    if (!moved) {
+      return tl::unexpected(std::move(moved).error());
+    }
+    placed.K = Eigen::MatrixXd::Zero(B.cols(), n);
+    if (n_c > 0) {
+      const auto found =
+          place_controllable(form.A.topLeftCorner(n_c, n_c), form.B.topRows(n_c), *moved);
+      placed.K =
+          found ? detail::product_transposed(found->K, form.Q.leftCols(n_c)) : Eigen::MatrixXd();
+    }
+  }
+  Reached reached;
+  if (placed.K.size() > 0) {
+    placed.K = (placed.K * units.cwiseInverse().asDiagonal()).eval();
+    reached = reached_by(A - detail::product(B, placed.K), poles);
+  }
+  if (!reached.accepted || !placed.K.allFinite()) {
+    return tl::unexpected(
+        Error(PolePlacementError::not_reached)
+            .in(std::string(where))
+            .about("(A, B)")
+            .hint("it is nearly uncontrollable: ask for poles nearer to those of A")
+            .with("largest distance of a pole from its place", reached.pole_error)
+            .with("condition of the eigenvectors", reached.condition));
+  }
+  placed.poles = reached.poles;
+  placed.condition =
+      placed.condition > 0.0 ? std::min(placed.condition, reached.condition) : reached.condition;
+  placed.pole_error = reached.pole_error;
+  return placed;
+}
+
 Expected<void> check_arguments(const MatrixRef& A, const MatrixRef& B,
                                const Eigen::VectorXcd& poles) {
   if (auto square = check_square(A, where, "A"); !square) {
@@ -296,89 +385,17 @@ Expected<PolePlacement<>> place(const MatrixRef& A, const MatrixRef& B,
   if (!wanted) {
     return tl::unexpected(wanted.error());
   }
-  const Eigen::Index n = A.rows();
-  detail::ControllableStaircase form = detail::controllable_staircase(A, B);
-  Eigen::VectorXd units = Eigen::VectorXd::Ones(n);
-  if (form.controllable < n) {
-    // Coarse units can hide a coupling: look again where all states are of one size.
-    const Eigen::VectorXd d = detail::balance_of(A);
-    detail::ControllableStaircase balanced = detail::controllable_staircase(
-        d.cwiseInverse().asDiagonal() * A * d.asDiagonal(), d.cwiseInverse().asDiagonal() * B);
-    if (balanced.controllable > form.controllable) {
-      form = std::move(balanced);
-      units = d;
+  auto placed = place_in_units(A, B, *wanted, poles, Eigen::VectorXd::Ones(A.rows()));
+  if (placed) {
+    return placed;
+  }
+  // Coarse units can hide a coupling, or cost digits: again where all states are of one size.
+  const Eigen::VectorXd units = detail::balance_of(A);
+  if ((units.array() != 1.0).any()) {
+    if (auto again = place_in_units(A, B, *wanted, poles, units)) {
+      return again;
     }
   }
-  const bool rescaled = (units.array() != 1.0).any();
-  const Eigen::MatrixXd A_used =
-      rescaled ? Eigen::MatrixXd(units.cwiseInverse().asDiagonal() * A * units.asDiagonal())
-               : Eigen::MatrixXd(A);
-  const Eigen::MatrixXd B_used =
-      rescaled ? Eigen::MatrixXd(units.cwiseInverse().asDiagonal() * B) : Eigen::MatrixXd(B);
-
-  PolePlacement<> placed;
-  const Eigen::Index n_c = form.controllable;
-  Eigen::MatrixXd K;
-  if (n_c == n) {
-    if (auto found = place_controllable(A_used, B_used, *wanted)) {
-      K = std::move(found->K);
-      // Repeated poles leave it open which of their eigenvectors an eigenvalue routine finds.
-      placed.condition = rescaled ? 0.0 : found->condition;
-    }
-  } else {
-    const Eigen::Index rest = n - n_c;
-    const detail::Eigensystem fixed = detail::eigensystem_of(form.A.bottomRightCorner(rest, rest));
-    Eigen::VectorXcd modes = fixed.values;
-    const std::vector<std::size_t> order = matched(modes, *wanted);
-    std::vector<bool> stays(static_cast<std::size_t>(n), false);
-    const detail::Eigensystem left =
-        detail::eigensystem_of(form.A.bottomRightCorner(rest, rest).transpose());
-    for (Eigen::Index i = 0; i < rest; ++i) {
-      const Complex asked =
-          (*wanted)(static_cast<Eigen::Index>(order[static_cast<std::size_t>(i)]));
-      Eigen::Index same = 0;
-      (left.values.array() - modes(i)).abs().minCoeff(&same);
-      const double along =
-          std::abs((left.vectors.col(same).transpose() * fixed.vectors.col(i)).value());
-      const double tolerance = std::min(1e-4, 1e-8 / std::max(along, 1e-16)) * scale_of(modes(i));
-      if (std::abs(asked - modes(i)) > tolerance) {
-        return tl::unexpected(uncontrollable_mode(form, units, modes(i)));
-      }
-      stays[order[static_cast<std::size_t>(i)]] = true;
-      placed.uncontrollable.push_back(modes(i));
-    }
-    std::vector<Complex> moved;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      if (!stays[static_cast<std::size_t>(i)]) {
-        moved.push_back((*wanted)(i));
-      }
-    }
-    K = Eigen::MatrixXd::Zero(B.cols(), n);
-    if (n_c > 0) {
-      const Eigen::VectorXcd moved_poles = Eigen::Map<const Eigen::VectorXcd>(moved.data(), n_c);
-      const auto found =
-          place_controllable(form.A.topLeftCorner(n_c, n_c), form.B.topRows(n_c), moved_poles);
-      K = found ? detail::product_transposed(found->K, form.Q.leftCols(n_c)) : Eigen::MatrixXd();
-    }
-  }
-  if (K.size() > 0 && rescaled) {
-    K = (K * units.cwiseInverse().asDiagonal()).eval();
-  }
-  const Reached reached = K.size() > 0 ? reached_by(A - detail::product(B, K), poles) : Reached{};
-  if (K.size() == 0 || !K.allFinite() || !reached.accepted) {
-    return tl::unexpected(
-        Error(PolePlacementError::not_reached)
-            .in(std::string(where))
-            .about("(A, B)")
-            .hint("it is nearly uncontrollable: ask for poles nearer to those of A")
-            .with("largest distance of a pole from its place", reached.pole_error)
-            .with("condition of the eigenvectors", reached.condition));
-  }
-  placed.K = std::move(K);
-  placed.poles = reached.poles;
-  placed.condition =
-      placed.condition > 0.0 ? std::min(placed.condition, reached.condition) : reached.condition;
-  placed.pole_error = reached.pole_error;
   return placed;
 }
 

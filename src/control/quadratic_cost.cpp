@@ -4,13 +4,14 @@
 
 #include <flyball/math/riccati.hpp>
 
+#include "control/placement.hpp"
+#include "control/weights.hpp"
 #include "math/dense.hpp"
 
 namespace flyball {
 
-namespace {
+namespace detail {
 
-/// The matrix of a weight, or its maker's error; symmetric, of the given size.
 Expected<Eigen::MatrixXd> weight_of(const Weight& weight, Eigen::Index size, std::string_view where,
                                     std::string_view name, std::string_view meaning) {
   if (!weight.get()) {
@@ -24,38 +25,7 @@ Expected<Eigen::MatrixXd> weight_of(const Weight& weight, Eigen::Index size, std
       .map([&] { return matrix; });
 }
 
-Expected<LqrDesign<>> solve_continuous(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
-                                       const Weight& R, const Eigen::MatrixXd* N) {
-  constexpr std::string_view where = "continuous_lqr";
-  if (auto square = check_square(A, where, "A"); !square) {
-    return tl::unexpected(square.error());
-  }
-  if (auto shape = check_shape(B, A.rows(), B.cols(), where, "B", "states x inputs"); !shape) {
-    return tl::unexpected(shape.error());
-  }
-  const auto weight_Q = weight_of(Q, A.rows(), where, "Q", "states x states");
-  if (!weight_Q) {
-    return tl::unexpected(weight_Q.error());
-  }
-  const auto weight_R = weight_of(R, B.cols(), where, "R", "inputs x inputs");
-  if (!weight_R) {
-    return tl::unexpected(weight_R.error());
-  }
-  if (N != nullptr) {
-    if (auto shape = check_shape(*N, A.rows(), B.cols(), where, "N", "states x inputs"); !shape) {
-      return tl::unexpected(shape.error());
-    }
-  }
-  auto solution =
-      N == nullptr ? care(A, B, *weight_Q, *weight_R) : care(A, B, *weight_Q, *weight_R, *N);
-  if (!solution) {
-    return tl::unexpected(Error(std::move(solution.error()).in(std::string(where))));
-  }
-  return LqrDesign<>{std::move(solution->K), std::move(solution->X), std::move(solution->poles),
-                     solution->residual, solution->condition};
-}
-
-}  // namespace
+}  // namespace detail
 
 Expected<QuadraticCost> output_cost(const MatrixRef& C, const MatrixRef& D, const Weight& Q,
                                     const Weight& R) {
@@ -65,11 +35,11 @@ Expected<QuadraticCost> output_cost(const MatrixRef& C, const MatrixRef& D, cons
       !checked) {
     return tl::unexpected(checked.error());
   }
-  const auto weight_Q = weight_of(Q, C.rows(), where, "Q", "outputs x outputs");
+  const auto weight_Q = detail::weight_of(Q, C.rows(), where, "Q", "outputs x outputs");
   if (!weight_Q) {
     return tl::unexpected(weight_Q.error());
   }
-  const auto weight_R = weight_of(R, D.cols(), where, "R", "inputs x inputs");
+  const auto weight_R = detail::weight_of(R, D.cols(), where, "R", "inputs x inputs");
   if (!weight_R) {
     return tl::unexpected(weight_R.error());
   }
@@ -106,6 +76,64 @@ Expected<QuadraticCost> implicit_model_cost(const MatrixRef& A, const MatrixRef&
   return cost;
 }
 
+namespace {
+
+/// The gain of least cost. The reference model's modes that are on the unit circle or outside it,
+/// such as a position, cost nothing where the plant already follows them: they are left alone,
+/// where a stabilising regulator would have no answer.
+Expected<Eigen::MatrixXd> following_gain(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
+                                         const MatrixRef& A_ref, const Eigen::MatrixXd& Q,
+                                         const Eigen::MatrixXd& R, const QuadraticCost& cost) {
+  if (!detail::cholesky_of(cost.R)) {
+    return tl::unexpected(Error(RiccatiError::singular)
+                              .about("R + (CB)'Q(CB)")
+                              .got("not positive definite")
+                              .hint("give every input a weight in R"));
+  }
+  // Completing the square: u = -R⁻¹Nᵀx + u' leaves A - BR⁻¹Nᵀ and the cost Q - NR⁻¹Nᵀ.
+  const Eigen::MatrixXd shift = detail::solve_symmetric(cost.R, cost.N.transpose());
+  const Eigen::MatrixXd A_shifted = A - detail::product(B, shift);
+  Eigen::MatrixXd Q_shifted = detail::symmetrized(cost.Q - detail::product(cost.N, shift));
+  const detail::SymmetricEigensystem weights = detail::symmetric_eigensystem_of(Q);
+  if (detail::cholesky_of(R) && weights.values.minCoeff() >= -1e-12 * weights.values.maxCoeff()) {
+    // Eᵀ(I + F R⁻¹ Fᵀ)⁻¹E with Q = WᵀW, E = W(CA - A_ref C) and F = WCB: without the difference of
+    // what is nearly equal when the plant can follow.
+    const Eigen::MatrixXd W =
+        weights.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * weights.vectors.transpose();
+    const Eigen::MatrixXd E = detail::product(W, detail::product(C, A) - detail::product(A_ref, C));
+    const Eigen::MatrixXd F = detail::product(W, detail::product(C, B));
+    const Eigen::MatrixXd inner = Eigen::MatrixXd::Identity(W.rows(), W.rows()) +
+                                  detail::product(F, detail::solve_symmetric(R, F.transpose()));
+    Q_shifted = detail::symmetrized(
+        detail::transposed_product(E, detail::solve_symmetric(detail::symmetrized(inner), E)));
+  }
+  auto solution = dare(A_shifted, B, Q_shifted, cost.R);
+  if (solution) {
+    return Eigen::MatrixXd(solution->K + shift);
+  }
+  // Only what the cost sees: by duality the controllable part of the transposed pair.
+  const detail::ControllableStaircase seen =
+      detail::controllable_staircase(A_shifted.transpose(), Q_shifted);
+  const Eigen::Index n = seen.controllable;
+  if (n == A.rows()) {
+    return tl::unexpected(std::move(solution).error());
+  }
+  if (n == 0) {
+    return shift;
+  }
+  const Eigen::MatrixXd basis = seen.Q.leftCols(n);
+  const Eigen::MatrixXd Q_seen =
+      detail::symmetrized(detail::transposed_product(basis, detail::product(Q_shifted, basis)));
+  const auto part = dare(seen.A.topLeftCorner(n, n).transpose(),
+                         detail::transposed_product(basis, B), Q_seen, cost.R);
+  if (!part) {
+    return tl::unexpected(part.error());
+  }
+  return Eigen::MatrixXd(detail::product_transposed(part->K, basis) + shift);
+}
+
+}  // namespace
+
 Expected<ImplicitModel> implicit_model_following(const MatrixRef& A, const MatrixRef& B,
                                                  const MatrixRef& C, const MatrixRef& A_ref,
                                                  const MatrixRef& B_ref, const Weight& Q,
@@ -121,27 +149,16 @@ Expected<ImplicitModel> implicit_model_following(const MatrixRef& A, const Matri
       !checked) {
     return tl::unexpected(checked.error());
   }
-  auto design = lqr(A, B, cost->Q, cost->R, cost->N);
-  if (!design) {
-    return tl::unexpected(Error(std::move(design.error()).in(std::string(where))));
+  const auto K = following_gain(A, B, C, A_ref, *Q.get(), *R.get(), *cost);
+  if (!K) {
+    return tl::unexpected(Error(Error(K.error()).in(std::string(where))));
   }
   const Eigen::MatrixXd reach = detail::product(C, B);
-  ImplicitModel model{design->K, detail::solve_least_squares(reach, B_ref), std::move(*cost),
-                      design->poles, 0.0};
+  ImplicitModel model{*K, detail::solve_least_squares(reach, B_ref), std::move(*cost),
+                      detail::eigenvalues_of(A - detail::product(B, *K)), 0.0};
   model.mismatch =
       (detail::product(C, A) - detail::product(A_ref, C) - detail::product(reach, model.K)).norm();
   return model;
-}
-
-Expected<LqrDesign<>> continuous_lqr(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
-                                     const Weight& R) {
-  return solve_continuous(A, B, Q, R, nullptr);
-}
-
-Expected<LqrDesign<>> continuous_lqr(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
-                                     const Weight& R, const MatrixRef& N) {
-  const Eigen::MatrixXd cross = N;
-  return solve_continuous(A, B, Q, R, &cross);
 }
 
 }  // namespace flyball

@@ -56,8 +56,11 @@ struct ImplicitModel {
                                                           const Weight& R);
 
 /// Implicit model following: the closed loop moves like z₊ = A_ref z + B_ref u.
+/// Modes that cost nothing because the plant follows them by itself are left as they are, also on
+/// the unit circle: a position in both models stays an integrator.
 /// @param B_ref  p x q, discrete. B_ref's inputs act through K_u = (C B)⁺ B_ref.
-/// @errors As `implicit_model_cost`; RiccatiError as `lqr`.
+/// @errors As `implicit_model_cost`; RiccatiError as `dare`, singular where (CB)ᵀQ(CB) + R is not
+/// positive definite.
 /// Source: book, Theorem B.3.1 and section B.3.2.
 [[nodiscard]] Expected<ImplicitModel> implicit_model_following(
     const MatrixRef& A, const MatrixRef& B, const MatrixRef& C, const MatrixRef& A_ref,

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string_view>
+
+#include <flyball/control/integral_control.hpp>
+
+/// What the designs with quadratic costs have in common.
+namespace flyball::detail {
+
+/// The matrix of a weight, or its maker's error; symmetric, of the given size.
+[[nodiscard]] Expected<Eigen::MatrixXd> weight_of(const Weight& weight, Eigen::Index size,
+                                                  std::string_view where, std::string_view name,
+                                                  std::string_view meaning);
+
+/// [x; x_I]₊ = [A 0; -h C  e I][x; x_I] + [B; -h D] u: h = T and e = 1 sampled, h = 1 and e = 0
+/// not.
+struct IntegralPlant {
+  Eigen::MatrixXd A, B;
+};
+
+/// The plant with the integral of its outputs' error, where these can be tracked and Q fits it.
+[[nodiscard]] Expected<IntegralPlant> integral_plant(const MatrixRef& A, const MatrixRef& B,
+                                                     const MatrixRef& C, const MatrixRef& D,
+                                                     double h, double e, const Weight& Q,
+                                                     std::string_view where);
+
+/// Its regulator, taken apart after n states.
+[[nodiscard]] Expected<IntegralLqr> split_integral(Expected<LqrDesign<>>&& design, Eigen::Index n,
+                                                   std::string_view where);
+
+}  // namespace flyball::detail

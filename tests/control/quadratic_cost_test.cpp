@@ -1,0 +1,148 @@
+#include <flyball/control/quadratic_cost.hpp>
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include <flyball/core/random.hpp>
+#include <flyball/math/riccati.hpp>
+#include <flyball/mechanisms/elevator.hpp>
+
+namespace flyball {
+namespace {
+
+using namespace flyball::literals;
+
+Eigen::MatrixXd random_matrix(Random& random, Eigen::Index rows, Eigen::Index columns) {
+  return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return random.normal(); });
+}
+
+/// The book's example plant of appendix B.
+DiscreteSystem<2, 1, 1> plant() {
+  DiscreteSystem<2, 1, 1> system;
+  system.A << 1.0, 0.1, 0.0, 0.95;
+  system.B << 0.005, 0.1;
+  system.C << 1.0, 0.3;
+  system.D << 0.2;
+  system.period = 0.1_s;
+  return system;
+}
+
+Eigen::MatrixXd scalar(double value) {
+  return Eigen::MatrixXd::Constant(1, 1, value);
+}
+
+// SciPy 1.10.1, solve_discrete_are with s = N: facts of the reference data for Theorem B.2.1.
+TEST(OutputCost, IsTheBooksExample) {
+  const auto cost = output_cost(plant().C, plant().D, scalar(3.0), scalar(0.5)).value();
+  EXPECT_NEAR(cost.Q(0, 0), 3.0, 1e-15);
+  EXPECT_NEAR(cost.Q(0, 1), 0.9, 1e-15);
+  EXPECT_NEAR(cost.Q(1, 1), 0.27, 1e-15);
+  EXPECT_NEAR(cost.R(0, 0), 0.62, 1e-15);
+  EXPECT_NEAR(cost.N(0, 0), 0.6, 1e-15);
+  EXPECT_NEAR(cost.N(1, 0), 0.18, 1e-15);
+  const auto design = output_lqr(plant(), scalar(3.0), scalar(0.5)).value();
+  static_assert(decltype(design.K)::ColsAtCompileTime == 2);
+  EXPECT_NEAR(design.K(0, 0), 2.0792724950117867, 1e-12);
+  EXPECT_NEAR(design.K(0, 1), 1.334944324646523, 1e-12);
+}
+
+// yᵀQy + uᵀRu is the quadratic form of the weights, at any x and u.
+TEST(OutputCost, IsTheOutputsCost) {
+  Random random(1);
+  for (int trial = 0; trial < 1000; ++trial) {
+    const Eigen::Index n = 1 + trial % 4;
+    const Eigen::Index m = 1 + trial % 3;
+    const Eigen::Index p = 1 + trial % 5;
+    const Eigen::MatrixXd C = random_matrix(random, p, n);
+    const Eigen::MatrixXd D = random_matrix(random, p, m);
+    const Eigen::MatrixXd G = random_matrix(random, p, p);
+    const Eigen::MatrixXd Q = G * G.transpose();
+    const Eigen::MatrixXd R = Eigen::MatrixXd::Identity(m, m);
+    const auto cost = output_cost(C, D, Q, R).value();
+    const Eigen::VectorXd x = random_matrix(random, n, 1);
+    const Eigen::VectorXd u = random_matrix(random, m, 1);
+    const Eigen::VectorXd y = C * x + D * u;
+    const double direct = y.dot(Q * y) + u.dot(R * u);
+    const double folded = x.dot(cost.Q * x) + 2.0 * x.dot(cost.N * u) + u.dot(cost.R * u);
+    ASSERT_NEAR(folded, direct, 1e-11 * (1.0 + direct));
+  }
+}
+
+// The output being the state: the plain regulator.
+TEST(OutputCost, OfTheStateIsThePlainOne) {
+  const Eigen::MatrixXd I = Eigen::MatrixXd::Identity(2, 2);
+  const auto cost = output_cost(I, Eigen::MatrixXd::Zero(2, 1), I, scalar(2.0)).value();
+  EXPECT_EQ(cost.Q, I);
+  EXPECT_EQ(cost.R, scalar(2.0));
+  EXPECT_EQ(cost.N, Eigen::MatrixXd::Zero(2, 1));
+}
+
+// Reference data for Theorem B.3.1 (SciPy 1.10.1).
+TEST(ImplicitModel, IsTheBooksExample) {
+  Eigen::Matrix2d A_ref;
+  A_ref << 1.0, 0.1, 0.0, 0.8;
+  const Eigen::Matrix2d Q = Eigen::Vector2d(1.0, 2.0).asDiagonal();
+  const auto model = implicit_model_following(plant().A, plant().B, Eigen::Matrix2d::Identity(),
+                                              A_ref, plant().B, Q, scalar(0.5))
+                         .value();
+  EXPECT_NEAR(model.cost.Q(1, 1), 0.045, 1e-15);
+  EXPECT_NEAR(model.cost.R(0, 0), 0.520025, 1e-15);
+  EXPECT_NEAR(model.cost.N(1, 0), 0.03, 1e-15);
+  EXPECT_NEAR(model.K(0, 0), 0.0, 1e-12);
+  EXPECT_NEAR(model.K(0, 1), 0.1256101785074124, 1e-10);
+  EXPECT_NEAR(model.K_u(0, 0), 1.0, 1e-14);
+}
+
+// With an input a state and nothing to pay for it, A - BK is A_ref and B K_u is B_ref.
+TEST(ImplicitModel, IsExactWhereItCanBe) {
+  Random random(2);
+  for (int trial = 0; trial < 200; ++trial) {
+    const Eigen::Index n = 1 + trial % 4;
+    const Eigen::MatrixXd A = random_matrix(random, n, n);
+    const Eigen::MatrixXd B = random_matrix(random, n, n) + 4.0 * Eigen::MatrixXd::Identity(n, n);
+    Eigen::MatrixXd A_ref = random_matrix(random, n, n);
+    A_ref *= 0.8 / A_ref.norm();
+    const Eigen::MatrixXd B_ref = random_matrix(random, n, 2);
+    const Eigen::MatrixXd I = Eigen::MatrixXd::Identity(n, n);
+    const auto model = implicit_model_following(A, B, I, A_ref, B_ref, I, 1e-12 * I);
+    ASSERT_TRUE(model.has_value()) << to_string(model.error());
+    ASSERT_LT((A - B * model->K - A_ref).norm(), 1e-8);
+    ASSERT_LT(model->mismatch, 1e-8);
+    ASSERT_LT((B * model->K_u - B_ref).norm(), 1e-11 * B_ref.norm() * B.norm());
+  }
+}
+
+TEST(ImplicitModel, Errors) {
+  const Eigen::MatrixXd I = Eigen::MatrixXd::Identity(2, 2);
+  const Eigen::MatrixXd B = Eigen::Vector2d(0.0, 1.0);
+  EXPECT_TRUE(implicit_model_cost(I, B, I, Eigen::MatrixXd::Ones(1, 1), I, scalar(1.0))
+                  .error()
+                  .is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(
+      implicit_model_following(I, B, I, 0.5 * I, Eigen::MatrixXd::Ones(3, 1), I, scalar(1.0))
+          .error()
+          .is(ArgumentError::wrong_shape));
+  const auto Q = implicit_model_cost(I, B, I, I, scalar(1.0), scalar(1.0));
+  EXPECT_EQ(to_string(Q.error()),
+            "implicit_model_cost: Q is 1x1; it must be outputs x outputs (2x2)");
+  auto slower = plant();
+  slower.period = 0.2_s;
+  EXPECT_TRUE(implicit_model_following(plant(), slower, I, scalar(1.0))
+                  .error()
+                  .is(ArgumentError::out_of_range));
+  EXPECT_TRUE(implicit_model_following(plant(), plant(), I, scalar(1.0)).has_value());
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(output_cost(I * nan, B, I, scalar(1.0)).error().is(ArgumentError::not_finite));
+  EXPECT_TRUE(output_cost(I, B, I, bryson({-1.0})).error().is(ArgumentError::not_positive));
+  EXPECT_TRUE(output_cost(I, Eigen::MatrixXd::Ones(1, 1), I, scalar(1.0))
+                  .error()
+                  .is(ArgumentError::wrong_shape));
+  Eigen::Matrix2d skew = I;
+  skew(0, 1) = 1.0;
+  EXPECT_TRUE(output_cost(I, B, skew, scalar(1.0)).error().is(ArgumentError::not_symmetric));
+}
+
+}  // namespace
+}  // namespace flyball
