@@ -1,7 +1,8 @@
+#include <flyball/control/continuous_lqr.hpp>
+
 #include <string>
 
 #include <flyball/control/integral_control.hpp>
-#include <flyball/control/quadratic_cost.hpp>
 #include <flyball/math/riccati.hpp>
 
 #include "control/weights.hpp"

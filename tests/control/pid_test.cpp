@@ -4,9 +4,11 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include <flyball/control/lqr.hpp>
 #include <flyball/core/argument.hpp>
 #include <flyball/core/random.hpp>
 #include <flyball/mechanisms/flywheel.hpp>
@@ -235,32 +237,48 @@ TEST(Pid, AllocatesNothing) {
   }
 }
 
-// Figure 2.7: PI on the flywheel of Figure 2.5, Ki = 0.2, the integral within 12 V. Values of the
-// book's own script at samples 70 and 510.
+// Figure 2.7: PI on the flywheel of Figure 2.5, Q = 200 rad/s, R = 12 V, Ki = 0.2, the integral
+// within 12 V; samples of the book's own script.
 TEST(Pid, IsTheBooksFlywheel) {
   const auto flywheel = mechanisms::flywheel({.motor = mechanisms::vex_775pro(),
                                               .gearing = 2.0 / 3.0,
                                               .moment_of_inertia = MomentOfInertia(0.00032)})
                             .value();
   const auto plant = discretize(flywheel, 5_ms).value();
-  // Without an integral the loop rests where 0 = (A - 1 - B K) ω + B K r.
-  const double a = plant.A(0, 0);
-  const double b = plant.B(0, 0);
-  const double r = 942.4777960769379;
-  const double kp = 0.05;
   PidSettings settings{
-      .gains = {.kp = kp}, .period = 0.005, .output_min = -12.0, .output_max = 12.0};
-  Pid proportional = make(settings);
-  settings.gains.ki = 0.2;
-  Pid integrating = make(settings);
-  double without = 0.0;
-  double with = 0.0;
-  for (int k = 0; k < 4000; ++k) {
-    without = a * without + b * proportional.calculate(without, r);
-    with = a * with + b * integrating.calculate(with, r);
+      .gains = {.kp = lqr(plant, bryson({200}), bryson({12})).value().K(0), .ki = 0.2},
+      .period = 0.005};
+  settings.output_min = settings.integral_min = -12.0;
+  settings.output_max = settings.integral_max = 12.0;
+  settings.anti_windup = AntiWindup::none;
+  Pid controller = make(settings);
+  std::vector<double> speeds;
+  double x = 0.0;
+  for (int k = 0; k < 2040; ++k) {
+    speeds.push_back(x);
+    const double r = k >= 20 && k < 1020 ? 942.4777960769379 : 0.0;
+    x = plant.A(0, 0) * x + plant.B(0, 0) * controller.calculate(x, r);
   }
-  EXPECT_NEAR(without, b * kp * r / (1.0 - a + b * kp), 1e-9 * r);
-  EXPECT_NEAR(with, r, 1e-9 * r);
+  EXPECT_NEAR(speeds[255], 1008.3343280163555, 1e-9 * 942.0);
+  EXPECT_NEAR(speeds[510], 942.1343065759827, 1e-9 * 942.0);
+  EXPECT_NEAR(speeds[765], 942.4750877905371, 1e-9 * 942.0);
+  EXPECT_NEAR(speeds[1020], 942.477842565534, 1e-9 * 942.0);
+  EXPECT_NEAR(speeds[1274], -20.829591302455935, 1e-9 * 942.0);
+  EXPECT_NEAR(speeds[2039], -8.685703787238312e-06, 1e-9 * 942.0);
+}
+
+// Figure 2.5: without an integral the loop rests where 0 = (A - 1 - B Kp) ω + B Kp r.
+TEST(Pid, ProportionalLeavesAnError) {
+  const double a = 0.9975024630976951;
+  const double b = 0.6155494833981923;
+  const double r = 942.4777960769379;
+  const double kp = 0.055;
+  Pid controller = make({.gains = {.kp = kp}});
+  double x = 0.0;
+  for (int k = 0; k < 4000; ++k) {
+    x = a * x + b * controller.calculate(x, r);
+  }
+  EXPECT_NEAR(x, b * kp * r / (1.0 - a + b * kp), 1e-9 * r);
 }
 
 TEST(Pid, Errors) {
