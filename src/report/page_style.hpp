@@ -29,7 +29,7 @@ border-bottom:1px solid var(--line)}
 thead th{color:var(--quiet);font-weight:600;border-bottom-width:2px}
 th.w,td.w{text-align:left}
 tbody th{font-weight:600}
-.scroll th,.scroll td:not(.w){white-space:nowrap}
+.scroll tbody th,.scroll td:not(.w){white-space:nowrap}
 .facts th{color:var(--quiet);font-weight:400;white-space:nowrap}
 .facts td{overflow-wrap:anywhere}
 figure{margin:1rem 0}
