@@ -22,9 +22,8 @@ using Eigen::MatrixXd;
 Expected<void> check_stable(const MatrixRef& A, TimeDomain domain, std::string_view where) {
   const JudgedEigenvalues judged = judged_eigenvalues(A, domain);
   if (!judged.converged) {
-    return tl::unexpected(Error(SystemError::no_convergence)
-                              .in(std::string(where))
-                              .about("the eigenvalues of A"));
+    return tl::unexpected(
+        Error(SystemError::no_convergence).in(std::string(where)).about("the eigenvalues of A"));
   }
   for (Index k = 0; k < judged.values.size(); ++k) {
     if (judged.verdicts[static_cast<std::size_t>(k)] != Stability::stable) {
@@ -140,8 +139,8 @@ Expected<void> check_gramian(const MatrixRef& A, const MatrixRef& B, Eigen::Inde
   if (auto square = check_square(A, where, "A"); !square) {
     return square;
   }
-  return check_all(check_shape(B, rows, columns, where, name, meaning),
-                   check_finite(A, where, "A"), check_finite(B, where, name));
+  return check_all(check_shape(B, rows, columns, where, name, meaning), check_finite(A, where, "A"),
+                   check_finite(B, where, name));
 }
 
 Expected<Eigen::VectorXd> hankel(const ContinuousSystem<>& system, TimeDomain domain) {
@@ -165,8 +164,8 @@ Expected<Gramian> controllability_gramian(const MatrixRef& A, const MatrixRef& B
 }
 
 Expected<Gramian> observability_gramian(const MatrixRef& A, const MatrixRef& C, TimeDomain domain) {
-  if (auto checked = check_gramian(A, C, C.rows(), A.rows(), "C", "outputs x states",
-                                   "observability_gramian");
+  if (auto checked =
+          check_gramian(A, C, C.rows(), A.rows(), "C", "outputs x states", "observability_gramian");
       !checked) {
     return tl::unexpected(std::move(checked).error());
   }

@@ -22,7 +22,9 @@ inline Eigen::MatrixXd matrix_from(const nlohmann::json& rows) {
 
 /// The cases of a file of tests/data.
 inline nlohmann::json cases_of(const std::string& file) {
-  std::ifstream stream(std::string(FLYBALL_PROJECT_DATA) + "/" + file);
+  std::string path = FLYBALL_PROJECT_DATA "/";
+  path += file;
+  std::ifstream stream(path);
   return nlohmann::json::parse(stream).at("cases");
 }
 

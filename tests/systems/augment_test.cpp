@@ -52,5 +52,66 @@ TEST(AugmentInputError, Errors) {
   EXPECT_TRUE(augment_input_error(ContinuousSystem<>{}).error().is(ArgumentError::empty));
 }
 
+ContinuousSystem<> dynamic_cart() {
+  const auto plant = cart();
+  return {plant.A, plant.B, plant.C, plant.D};
+}
+
+// 6.7.1's blocks, with D in what is integrated.
+TEST(Augment, Integral) {
+  const auto augmented = augment_integral(dynamic_cart()).value();
+  Eigen::Matrix3d A;
+  A << 0.0, 1.0, 0.0, 0.0, -3.0, 0.0, -1.0, 0.0, 0.0;
+  EXPECT_EQ(augmented.A, Eigen::MatrixXd(A));
+  EXPECT_EQ(augmented.B, Eigen::MatrixXd(Eigen::Vector3d(0.0, 2.0, -0.5)));
+  EXPECT_EQ(augmented.C, Eigen::MatrixXd(Eigen::RowVector3d(1.0, 0.0, 0.0)));
+  const auto reference = augment_integral_reference(dynamic_cart()).value();
+  EXPECT_EQ(reference.B.rightCols(1), Eigen::MatrixXd(Eigen::Vector3d(0.0, 0.0, 1.0)));
+  EXPECT_EQ(reference.D, Eigen::MatrixXd(Eigen::RowVector2d(0.5, 0.0)));
+  EXPECT_EQ(
+      augment_gain(Eigen::RowVector2d(1.0, 2.0), Eigen::MatrixXd::Constant(1, 1, 3.0)).value(),
+      Eigen::MatrixXd(Eigen::RowVector3d(1.0, 2.0, 3.0)));
+}
+
+// augment_input_error is the bias that acts as the input does.
+TEST(Augment, Bias) {
+  const auto plant = dynamic_cart();
+  const auto bias = augment_bias(plant, plant.B, Eigen::MatrixXd::Zero(1, 1)).value();
+  const auto error = augment_input_error(plant).value();
+  EXPECT_EQ(bias.A, error.A);
+  EXPECT_EQ(bias.B, error.B);
+  EXPECT_EQ(bias.C, error.C);
+  const DiscreteSystem<> sampled{plant.A, plant.B, plant.C, plant.D, Time(0.1)};
+  const auto offset =
+      augment_bias(sampled, Eigen::MatrixXd::Zero(2, 1), Eigen::MatrixXd::Ones(1, 1)).value();
+  EXPECT_EQ(offset.A(2, 2), 1.0);
+  EXPECT_EQ(offset.C(0, 2), 1.0);
+  EXPECT_EQ(offset.period.si(), 0.1);
+}
+
+TEST(Augment, Output) {
+  const auto plant = dynamic_cart();
+  const Eigen::MatrixXd K = Eigen::RowVector2d(4.0, 5.0);
+  const auto shown = augment_output(plant, -K, Eigen::MatrixXd::Zero(1, 1)).value();
+  EXPECT_EQ(shown.C.row(0), Eigen::MatrixXd(plant.C));
+  EXPECT_EQ(shown.C.row(1), Eigen::MatrixXd(-K));
+  EXPECT_EQ(shown.D, Eigen::MatrixXd(Eigen::Vector2d(0.5, 0.0)));
+  const DiscreteSystem<> sampled{plant.A, plant.B, plant.C, plant.D, Time(0.1)};
+  EXPECT_EQ(augment_output(sampled, -K, Eigen::MatrixXd::Zero(1, 1))->C, shown.C);
+}
+
+TEST(Augment, Errors) {
+  const auto plant = dynamic_cart();
+  const Eigen::MatrixXd one = Eigen::MatrixXd::Ones(1, 1);
+  EXPECT_TRUE(augment_bias(plant, one, one).error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(augment_bias(plant, plant.B, plant.B).error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(augment_bias(plant, NAN * plant.B, one).error().is(ArgumentError::not_finite));
+  EXPECT_TRUE(augment_output(plant, one, one).error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(augment_output(plant, plant.C, plant.C).error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(augment_gain(one, plant.B).error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(augment_integral({}).error().is(ArgumentError::empty));
+  EXPECT_TRUE(augment_integral_reference({}).error().is(ArgumentError::empty));
+}
+
 }  // namespace
 }  // namespace flyball

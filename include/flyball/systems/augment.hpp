@@ -52,4 +52,49 @@ augment_gain_input_error(const Eigen::Matrix<double, Inputs, States>& K) {
   return augmented;
 }
 
+/// Augments a plant with the integral of each output's error, dx_I/dt = r - y:
+/// A_aug = [A 0; -C 0], B_aug = [B; -D], C_aug = [C 0]; for integral action by state feedback.
+///
+/// The reference enters through [0; I], which `augment_integral_reference` has as further inputs.
+/// Augment before discretising.
+/// @return A system of states + outputs states.
+/// @errors ArgumentError for shapes and entries.
+/// Source: book, section 6.7.1 (plant augmentation, 6.6.1).
+[[nodiscard]] Expected<ContinuousSystem<>> augment_integral(const ContinuousSystem<>& plant);
+
+/// The same with the inputs [u; r], for simulating the loop: B_aug = [B 0; -D I].
+[[nodiscard]] Expected<ContinuousSystem<>> augment_integral_reference(
+    const ContinuousSystem<>& plant);
+
+/// The controller's side (6.6.2): u = [K K_I] ([r; 0] - [x; x_I]).
+/// @param K  m x n. @param K_I  m x p. @return m x (n + p).
+/// @errors ArgumentError for shapes and entries. Source: book, section 6.7.1.
+[[nodiscard]] Expected<Eigen::MatrixXd> augment_gain(const MatrixRef& K, const MatrixRef& K_I);
+
+/// Augments a plant with constants that no input moves, for an observer that estimates them:
+/// A_aug = [A B_bias; 0 0], B_aug = [B; 0], C_aug = [C C_bias].
+///
+/// An input's error is B_bias = a column of B; a sensor's offset is C_bias = a column of I.
+/// @param B_bias  n x k: how the constants act on the states. @param C_bias  p x k: on the outputs.
+/// @return A system of n + k states; a discrete one keeps them by I instead of 0.
+/// @errors ArgumentError for shapes and entries.
+/// Source: book, sections 6.6.3 (observer augmentation) and 6.7.2 with its B_error.
+[[nodiscard]] Expected<ContinuousSystem<>> augment_bias(const ContinuousSystem<>& plant,
+                                                        const MatrixRef& B_bias,
+                                                        const MatrixRef& C_bias);
+[[nodiscard]] Expected<DiscreteSystem<>> augment_bias(const DiscreteSystem<>& plant,
+                                                      const MatrixRef& B_bias,
+                                                      const MatrixRef& C_bias);
+
+/// Appends outputs: C_aug = [C; C_more], D_aug = [D; D_more]. With C_more = -K and D_more = 0 they
+/// are the inputs of the feedback u = -Kx; with rows of I, states.
+/// @param C_more  k x n. @param D_more  k x m.
+/// @errors ArgumentError for shapes and entries. Source: book, section 6.6.4.
+[[nodiscard]] Expected<ContinuousSystem<>> augment_output(const ContinuousSystem<>& plant,
+                                                          const MatrixRef& C_more,
+                                                          const MatrixRef& D_more);
+[[nodiscard]] Expected<DiscreteSystem<>> augment_output(const DiscreteSystem<>& plant,
+                                                        const MatrixRef& C_more,
+                                                        const MatrixRef& D_more);
+
 }  // namespace flyball

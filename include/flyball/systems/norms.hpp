@@ -18,7 +18,7 @@ namespace flyball {
 /// The largest gain of a system, over all frequencies and input directions.
 struct HInfinityNorm {
   double norm = 0.0;
-  double frequency = 0.0;  ///< Where it is reached, rad/s; ∞ if at s = ∞. Up to π/T if discrete.
+  double frequency = 0.0;    ///< Where it is reached, rad/s; ∞ if at s = ∞. Up to π/T if discrete.
   double upper_bound = 0.0;  ///< No gain exceeds it; norm is within 1e-10 of it, relative.
   int iterations = 0;
 };
@@ -32,8 +32,8 @@ struct HInfinityNorm {
 /// @errors ArgumentError for the system; SystemError::not_stable with the pole (its gain is
 ///         infinite, or no gain of a stable system); no_convergence.
 /// Cost: a few times O((2n)³), allocates.
-/// Source: Bruinsma and Steinbuch, Systems & Control Letters 14 (1990); Boyd and Balakrishnan, same,
-/// 15 (1990).
+/// Source: Bruinsma and Steinbuch, Systems & Control Letters 14 (1990); Boyd and Balakrishnan,
+/// same, 15 (1990).
 [[nodiscard]] Expected<HInfinityNorm> h_infinity_norm(const ContinuousSystem<>& system);
 [[nodiscard]] Expected<HInfinityNorm> h_infinity_norm(const DiscreteSystem<>& system);
 

@@ -1,0 +1,323 @@
+#include <flyball/systems/analysis.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include <flyball/math/matrix_equation.hpp>
+
+#include "math/dense.hpp"
+#include "systems/balance.hpp"
+#include "systems/modes.hpp"
+
+namespace flyball {
+
+namespace {
+
+using Complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// Re λ, or |λ| - 1: positive outside the stable region.
+double excess(Complex lambda, TimeDomain domain) {
+  return domain == TimeDomain::continuous ? lambda.real() : std::abs(lambda) - 1.0;
+}
+
+Expected<Equilibrium> rest(const MatrixXd& balance, const ContinuousSystem<>& system,
+                           const Eigen::VectorXd& u) {
+  constexpr std::string_view where = "equilibrium";
+  if (auto checked = check_all(check_shape(u, system.B.cols(), 1, where, "u", "inputs x 1"),
+                               check_finite(u, where, "u"));
+      !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  // balance x = B u, in units in which the states are of like size.
+  const detail::SystemScaling scaling = detail::scaling_of(balance, system.B, system.C);
+  const MatrixXd M = detail::scaled_state_matrix(balance, scaling);
+  const Eigen::VectorXd right =
+      scaling.states.cwiseInverse().asDiagonal() * detail::product(system.B, u);
+  double rcond = 0.0;
+  Eigen::VectorXd x = detail::solve_linear(M, right, &rcond);
+  const double small = 10.0 * epsilon * static_cast<double>(M.rows());
+  const bool unique = rcond > small && x.allFinite();
+  if (!unique) {
+    x = detail::solve_least_squares(M, right);
+  }
+  const double left = (detail::product(M, x) - right).norm();
+  const double size = M.norm() * x.norm() + right.norm();
+  if (!(left <= 1e3 * small * size)) {
+    return tl::unexpected(Error(SystemError::no_equilibrium)
+                              .in(std::string(where))
+                              .about("u")
+                              .got("driving an integrator")
+                              .hint("only inputs that leave every integrator at rest have one")
+                              .with("relative residual", left / size));
+  }
+  Equilibrium found;
+  found.x = scaling.states.asDiagonal() * x;
+  found.y = detail::product(system.C, found.x) + detail::product(system.D, u);
+  found.unique = unique;
+  return found;
+}
+
+}  // namespace
+
+namespace detail {
+
+JudgedEigenvalues judged_eigenvalues(const MatrixRef& A, TimeDomain domain, double blur) {
+  const Index n = A.rows();
+  JudgedEigenvalues judged;
+  if (n == 0) {
+    return judged;
+  }
+  const Eigen::VectorXd d = balance_of(A);
+  const MatrixXd balanced = d.cwiseInverse().asDiagonal() * A * d.asDiagonal();
+  const Eigensystem system = eigensystem_of(balanced);
+  judged.values = system.values;
+  if (!system.values.allFinite()) {
+    judged.converged = false;
+    return judged;
+  }
+  const auto triangular = [](const MatrixXd& M) {
+    for (Index j = 0; j + 1 < M.cols(); ++j) {
+      if (!M.col(j).tail(M.rows() - j - 1).isZero(0.0)) {
+        return false;
+      }
+    }
+    return true;
+  };
+  // Such a matrix shows its eigenvalues without any computing.
+  const bool exact = triangular(balanced) || triangular(balanced.transpose());
+  // The condition of an eigenvalue is ‖v‖‖w‖ with wᵀ the row of V⁻¹; a defective one has none, and
+  // moves by the root of rounding.
+  const double rounding = 10.0 * epsilon * std::sqrt(static_cast<double>(n)) * balanced.norm();
+  double rcond = 0.0;
+  const Eigen::MatrixXcd rows =
+      solve_complex(system.vectors, Eigen::MatrixXcd::Identity(n, n), &rcond);
+  judged.uncertainty.resize(n);
+  for (Index k = 0; k < n; ++k) {
+    const double condition = rows.row(k).norm();
+    const double most = std::sqrt(epsilon) * std::max(balanced.norm(), 1e-300);
+    judged.uncertainty(k) =
+        blur + (exact                      ? epsilon * std::abs(judged.values(k))
+                : std::isfinite(condition) ? std::min(rounding * condition, 10.0 * most)
+                                           : most);
+    const double by = excess(judged.values(k), domain);
+    const double margin = judged.uncertainty(k);
+    judged.verdicts.push_back(by < -margin  ? Stability::stable
+                              : by > margin ? Stability::unstable
+                                            : Stability::marginal);
+  }
+  for (Index k = 0; k < n; ++k) {
+    const Stability verdict = judged.verdicts[static_cast<std::size_t>(k)];
+    if (verdict == Stability::unstable) {
+      judged.stability = Stability::unstable;
+      return judged;
+    }
+    if (verdict != Stability::marginal) {
+      continue;
+    }
+    judged.stability = Stability::marginal;
+    // On the boundary a chain grows: fewer eigenvectors than eigenvalues.
+    Index same = 0;
+    const double near = 100.0 * std::sqrt(epsilon) * balanced.norm();
+    Complex mean = 0.0;
+    for (Index j = 0; j < n; ++j) {
+      if (std::abs(judged.values(j) - judged.values(k)) <= near) {
+        ++same;
+        mean += judged.values(j);
+      }
+    }
+    if (same == 1) {
+      continue;
+    }
+    mean /= static_cast<double>(same);
+    Eigen::MatrixXcd shifted = balanced.cast<Complex>();
+    shifted.diagonal().array() -= mean;
+    const Eigen::VectorXd sizes = singular_values_of_complex(shifted);
+    const auto vectors = (sizes.array() <= 1e-10 * balanced.norm()).count();
+    if (vectors < same) {
+      judged.stability = Stability::unstable;
+      return judged;
+    }
+  }
+  return judged;
+}
+
+std::string pole_text(Complex pole) {
+  return pole.imag() == 0.0 ? format_number(pole.real(), 4)
+                            : fmt::format("{} +/- {}i", format_number(pole.real(), 4),
+                                          format_number(std::abs(pole.imag()), 4));
+}
+
+}  // namespace detail
+
+std::string_view to_string(Stability stability) {
+  switch (stability) {
+    case Stability::stable:
+      return "stable";
+    case Stability::marginal:
+      return "marginally stable";
+    case Stability::unstable:
+      return "unstable";
+  }
+  return "unknown";
+}
+
+Expected<ModalAnalysis> analyze_modes(const MatrixRef& A, TimeDomain domain, Time period) {
+  constexpr std::string_view where = "analyze_modes";
+  if (auto square = check_square(A, where, "A"); !square) {
+    return tl::unexpected(std::move(square).error());
+  }
+  const bool discrete = domain == TimeDomain::discrete;
+  if (auto checked = check_all(
+          check_finite(A, where, "A"),
+          discrete ? check_positive(period.si(), where, "period", "s") : Expected<void>());
+      !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  const detail::JudgedEigenvalues judged = detail::judged_eigenvalues(A, domain);
+  if (!judged.converged) {
+    return tl::unexpected(Error(SystemError::no_convergence)
+                              .in(std::string(where))
+                              .about("the eigenvalues of A")
+                              .hint("scale its rows and columns to like magnitudes"));
+  }
+  ModalAnalysis analysis;
+  analysis.stability = judged.stability;
+  for (Index k = 0; k < judged.values.size(); ++k) {
+    Mode mode;
+    mode.pole = judged.values(k);
+    mode.uncertainty = judged.uncertainty(k);
+    mode.stability = judged.verdicts[static_cast<std::size_t>(k)];
+    mode.s = !discrete          ? mode.pole
+             : mode.pole == 0.0 ? Complex(-infinity, 0.0)
+                                : std::log(mode.pole) / period.si();
+    if (mode.s == Complex(-infinity, 0.0)) {
+      mode.natural_frequency = infinity;
+      mode.damping_ratio = 1.0;
+    } else {
+      mode.natural_frequency = std::abs(mode.s);
+      mode.damping_ratio =
+          mode.natural_frequency > 0.0 ? -mode.s.real() / mode.natural_frequency : 0.0;
+      mode.time_constant = mode.s.real() == 0.0 ? infinity : -1.0 / mode.s.real();
+    }
+    if (mode.stability == Stability::marginal) {
+      mode.time_constant = infinity;
+    }
+    analysis.modes.push_back(mode);
+    analysis.slowest_time_constant = std::max(analysis.slowest_time_constant, mode.time_constant);
+  }
+  if (analysis.stability != Stability::stable) {
+    analysis.slowest_time_constant = infinity;
+  }
+  std::sort(analysis.modes.begin(), analysis.modes.end(), [](const Mode& a, const Mode& b) {
+    return a.s.real() != b.s.real() ? a.s.real() > b.s.real() : a.s.imag() > b.s.imag();
+  });
+  return analysis;
+}
+
+std::string describe(const ModalAnalysis& analysis) {
+  std::string text = fmt::format("{}\n", to_string(analysis.stability));
+  for (const Mode& mode : analysis.modes) {
+    if (mode.pole.imag() < 0.0) {
+      continue;
+    }
+    text += detail::pole_text(mode.pole) + ": ";
+    const std::string frequency = fmt::format("{} rad/s", format_number(mode.natural_frequency, 3));
+    if (mode.stability == Stability::marginal) {
+      text += mode.s.imag() != 0.0 ? "oscillates at " + frequency + " for ever"
+                                   : std::string("integrates");
+    } else {
+      text += mode.stability == Stability::stable ? "decays" : "grows";
+      text += fmt::format(" with the time constant {} s",
+                          format_number(std::abs(mode.time_constant), 3));
+      if (mode.s.imag() != 0.0) {
+        text += fmt::format(", oscillating at {} with the damping ratio {}", frequency,
+                            format_number(mode.damping_ratio, 3));
+      }
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+Expected<Equilibrium> equilibrium(const ContinuousSystem<>& system, const Eigen::VectorXd& u) {
+  if (auto checked = check_system(system, "equilibrium"); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  return rest(-system.A, system, u);
+}
+
+Expected<Equilibrium> equilibrium(const DiscreteSystem<>& system, const Eigen::VectorXd& u) {
+  if (auto checked = check_system(system, "equilibrium"); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  const Index n = system.A.rows();
+  return rest(MatrixXd::Identity(n, n) - system.A, {system.A, system.B, system.C, system.D}, u);
+}
+
+Expected<LyapunovCertificate> lyapunov_certificate(const MatrixRef& A, const MatrixRef& Q,
+                                                   TimeDomain domain) {
+  constexpr std::string_view where = "lyapunov_certificate";
+  if (auto square = check_square(A, where, "A"); !square) {
+    return tl::unexpected(std::move(square).error());
+  }
+  if (auto checked = check_all(check_finite(A, where, "A"),
+                               check_shape(Q, A.rows(), A.rows(), where, "Q", "states x states"),
+                               check_finite(Q, where, "Q"));
+      !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  if (auto symmetric = check_symmetric(Q, where, "Q"); !symmetric) {
+    return tl::unexpected(std::move(symmetric).error());
+  }
+  const MatrixXd weight = detail::symmetrized(Q);
+  if (!detail::cholesky_of(weight)) {
+    return tl::unexpected(
+        Error(ArgumentError::not_positive)
+            .in(std::string(where))
+            .about("Q")
+            .got("not positive definite")
+            .expected("positive definite: V has to fall wherever x is not zero")
+            .with("smallest eigenvalue", detail::symmetric_eigensystem_of(weight).values(0)));
+  }
+  auto solution = domain == TimeDomain::continuous ? lyapunov(A.transpose(), weight)
+                                                   : discrete_lyapunov(A.transpose(), weight);
+  if (!solution) {
+    return tl::unexpected(std::move(solution).error());
+  }
+  LyapunovCertificate certificate;
+  certificate.P = detail::symmetrized(solution->X);
+  certificate.residual = solution->residual;
+  certificate.eigenvalues = detail::symmetric_eigensystem_of(certificate.P).values;
+  // Definiteness does not depend on the states' units; rounding does.
+  const Eigen::VectorXd scale = certificate.P.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt();
+  const MatrixXd unit =
+      scale.cwiseInverse().asDiagonal() * certificate.P * scale.cwiseInverse().asDiagonal();
+  const auto L =
+      (certificate.P.diagonal().array() > 0.0).all() ? detail::cholesky_of(unit) : std::nullopt;
+  certificate.positive_definite = L.has_value();
+  if (L) {
+    // P⁻¹Q has the eigenvalues of L⁻¹ Q L⁻ᵀ.
+    const MatrixXd Q_unit =
+        scale.cwiseInverse().asDiagonal() * weight * scale.cwiseInverse().asDiagonal();
+    const MatrixXd half = detail::solve_linear(*L, Q_unit);
+    const MatrixXd whole = detail::solve_linear(*L, half.transpose());
+    certificate.decay_rate =
+        std::max(0.0, detail::symmetric_eigensystem_of(detail::symmetrized(whole)).values(0));
+  }
+  return certificate;
+}
+
+Expected<LyapunovCertificate> lyapunov_certificate(const MatrixRef& A, TimeDomain domain) {
+  return lyapunov_certificate(A, MatrixXd::Identity(A.rows(), A.rows()), domain);
+}
+
+}  // namespace flyball

@@ -1,0 +1,341 @@
+#include <flyball/systems/realization.hpp>
+
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <string>
+
+#include "math/dense.hpp"
+#include "systems/balance.hpp"
+#include "systems/gramian_factor.hpp"
+#include "systems/staircase.hpp"
+
+namespace flyball {
+
+namespace {
+
+using Complex = std::complex<double>;
+using detail::product;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Continuous = ContinuousSystem<>;
+using Discrete = DiscreteSystem<>;
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+Continuous bare(const Discrete& s) {
+  return {s.A, s.B, s.C, s.D};
+}
+Discrete timed(const Continuous& s, Time period) {
+  return {s.A, s.B, s.C, s.D, period};
+}
+
+Expected<Continuous> transform(const Continuous& system, const MatrixRef& T) {
+  constexpr std::string_view where = "similarity_transform";
+  const Index n = system.A.rows();
+  if (auto checked = check_all(check_shape(T, n, n, where, "T", "states x states"),
+                               check_finite(T, where, "T"));
+      !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  // Rows and columns of T are units, old and new; they do not make it singular.
+  Eigen::VectorXd rows(n);
+  Eigen::VectorXd columns(n);
+  MatrixXd unit = T;
+  for (Index i = 0; i < n; ++i) {
+    const double size = unit.row(i).cwiseAbs().maxCoeff();
+    rows(i) = size > 0.0 ? std::exp2(std::round(std::log2(size))) : 1.0;
+    unit.row(i) /= rows(i);
+  }
+  for (Index j = 0; j < n; ++j) {
+    const double size = unit.col(j).cwiseAbs().maxCoeff();
+    columns(j) = size > 0.0 ? std::exp2(std::round(std::log2(size))) : 1.0;
+    unit.col(j) /= columns(j);
+  }
+  MatrixXd right(n, n + system.B.cols());
+  right << rows.cwiseInverse().asDiagonal() * product(system.A, T),
+      rows.cwiseInverse().asDiagonal() * system.B;
+  double rcond = 0.0;
+  const MatrixXd solved =
+      columns.cwiseInverse().asDiagonal() * detail::solve_linear(unit, right, &rcond);
+  if (!(rcond > 10.0 * epsilon) || !solved.allFinite()) {
+    return tl::unexpected(Error(SystemError::singular_transform)
+                              .in(std::string(where))
+                              .about("T")
+                              .got("singular")
+                              .expected("invertible")
+                              .with("reciprocal condition", rcond));
+  }
+  return Continuous{solved.leftCols(n), solved.rightCols(system.B.cols()), product(system.C, T),
+                    system.D};
+}
+
+/// For a single input. @param failure  What to say if the form does not exist.
+Expected<Continuous> companion(const Continuous& given, SystemError failure,
+                               std::string_view where) {
+  const Index n = given.A.rows();
+  if (given.B.cols() != 1) {
+    const bool dual = failure == SystemError::not_observable;
+    return tl::unexpected(
+        Error(ArgumentError::wrong_shape)
+            .in(std::string(where))
+            .about(dual ? "C" : "B")
+            .got("of " + std::to_string(given.B.cols()) + (dual ? " rows" : " columns"))
+            .expected(dual ? "one row: the form is of a single output"
+                           : "one column: the form is of a single input"));
+  }
+  const detail::SystemScaling scaling = detail::scaling_of(given.A, given.B, given.C);
+  // Time in the unit of the fastest mode keeps the powers of A within range.
+  const MatrixXd A_balanced = detail::scaled_state_matrix(given.A, scaling);
+  const double rate =
+      A_balanced.norm() > 0.0 ? std::exp2(std::round(std::log2(A_balanced.norm()))) : 1.0;
+  const MatrixXd A = A_balanced / rate;
+  const MatrixXd B = scaling.states.cwiseInverse().asDiagonal() * given.B;
+  const MatrixXd C = given.C * scaling.states.asDiagonal();
+  const double size_B = B.norm() > 0.0 ? B.norm() : 1.0;
+
+  // x'₁ = qᵀx with qᵀAᵏB = 0 for k < n - 1 and 1 for the last; the others are its derivatives.
+  MatrixXd K(n, n);
+  K.col(0) = B / size_B;
+  for (Index k = 1; k < n; ++k) {
+    K.col(k) = product(A, K.col(k - 1));
+  }
+  double rcond = 0.0;
+  const MatrixXd q =
+      detail::solve_linear(K.transpose(), MatrixXd::Identity(n, n).col(n - 1), &rcond);
+  if (!(rcond > 10.0 * epsilon) || !q.allFinite()) {
+    return tl::unexpected(Error(failure)
+                              .in(std::string(where))
+                              .about("the system")
+                              .hint("it has no companion form in double precision; see "
+                                    "minimal_realization")
+                              .with("reciprocal condition", rcond));
+  }
+  MatrixXd rows(n, n);
+  rows.row(0) = q.transpose();
+  for (Index k = 1; k < n; ++k) {
+    rows.row(k) = product(rows.row(k - 1), A);
+  }
+  const MatrixXd numerators = detail::solve_linear(rows.transpose(), C.transpose()).transpose();
+
+  // Π(s - λ), from the eigenvalues.
+  Eigen::VectorXcd polynomial = Eigen::VectorXcd::Zero(n + 1);
+  polynomial(0) = 1.0;
+  Index degree = 0;
+  for (const Complex& lambda : detail::eigenvalues_of(A)) {
+    ++degree;
+    for (Index k = degree; k > 0; --k) {
+      polynomial(k) = polynomial(k - 1) - lambda * polynomial(k);
+    }
+    polynomial(0) *= -lambda;
+  }
+  Continuous form{MatrixXd::Zero(n, n), MatrixXd::Zero(n, 1), numerators, given.D};
+  for (Index k = 0; k < n; ++k) {
+    if (k > 0) {
+      form.A(k - 1, k) = 1.0;
+    }
+    const double unit = std::pow(rate, static_cast<double>(n - k));
+    form.A(n - 1, k) = -polynomial(k).real() * unit;
+    // Σ c_k s^k in the fast unit of time; the gain of B with it.
+    form.C.col(k) *= size_B * unit / rate;
+  }
+  form.B(n - 1, 0) = 1.0;
+  if (auto checked = check_system(form, where); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  return form;
+}
+
+Continuous dual(const Continuous& s) {
+  return {s.A.transpose(), s.C.transpose(), s.B.transpose(), s.D.transpose()};
+}
+
+template <class System>
+Expected<BalancedRealization<Continuous>> truncate(const System& given, TimeDomain domain,
+                                                   Index order, bool all, std::string_view where) {
+  if (auto checked = check_system(given, where); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  const Continuous system{given.A, given.B, given.C, given.D};
+  const Index n = system.A.rows();
+  auto factors = detail::gramian_factors(system, domain, where);
+  if (!factors) {
+    return tl::unexpected(std::move(factors).error());
+  }
+  const detail::SingularValues svd =
+      detail::svd_of(detail::transposed_product(factors->observability, factors->controllability));
+  const double floor = static_cast<double>(n) * epsilon * svd.values(0);
+  const Index present = (svd.values.array() > floor).count();
+  if (all && present < n) {
+    return tl::unexpected(Error(SystemError::not_controllable)
+                              .in(std::string(where))
+                              .about("a state")
+                              .got("not reached or not seen")
+                              .expected("reached and seen: only such states can be balanced")
+                              .hint("leave it out with balanced_truncation or minimal_realization")
+                              .with("states that are both", static_cast<double>(present))
+                              .with("smallest Hankel singular value", svd.values(n - 1)));
+  }
+  if (!all && (order < 1 || order > present)) {
+    return tl::unexpected(Error(ArgumentError::out_of_range)
+                              .in(std::string(where))
+                              .about("order")
+                              .got(std::to_string(order))
+                              .expected("from 1 to " + std::to_string(present) +
+                                        ", the number of states that are reached and seen"));
+  }
+  const Index r = all ? n : order;
+  // x = L_c V σ^{-1/2} x', x' = σ^{-1/2} Uᵀ L_oᵀ x.
+  const Eigen::VectorXd root = svd.values.head(r).cwiseSqrt().cwiseInverse();
+  BalancedRealization<Continuous> found;
+  found.T = factors->states.asDiagonal() * product(factors->controllability, svd.V.leftCols(r)) *
+            root.asDiagonal();
+  found.T_inverse = root.asDiagonal() *
+                    product(svd.U.leftCols(r).transpose(), factors->observability.transpose()) *
+                    factors->states.cwiseInverse().asDiagonal();
+  found.hankel = svd.values;
+  found.error_bound = 2.0 * svd.values.tail(n - r).sum();
+  found.system = {product(found.T_inverse, product(system.A, found.T)),
+                  product(found.T_inverse, system.B), product(system.C, found.T), system.D};
+  return found;
+}
+
+Expected<BalancedRealization<Discrete>> timed(Expected<BalancedRealization<Continuous>> found,
+                                              Time period) {
+  return std::move(found).map([&](BalancedRealization<Continuous>&& s) {
+    return BalancedRealization<Discrete>{timed(s.system, period), std::move(s.hankel),
+                                         std::move(s.T), std::move(s.T_inverse), s.error_bound};
+  });
+}
+
+Expected<MinimalRealization<Continuous>> minimal(const Continuous& system, double tolerance) {
+  constexpr std::string_view where = "minimal_realization";
+  if (auto checked = check_not_negative(tolerance, where, "tolerance"); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  if (tolerance >= 1.0) {
+    return tl::unexpected(Error(ArgumentError::out_of_range)
+                              .in(std::string(where))
+                              .about("tolerance")
+                              .got(format_number(tolerance))
+                              .expected("below 1"));
+  }
+  const Index n = system.A.rows();
+  const double small = tolerance > 0.0 ? tolerance : 100.0 * epsilon * static_cast<double>(n);
+  const detail::SystemScaling scaling = detail::scaling_of(system.A, system.B, system.C);
+  const MatrixXd A = detail::scaled_state_matrix(system.A, scaling);
+  const MatrixXd B = scaling.states.cwiseInverse().asDiagonal() * system.B;
+  const MatrixXd C = system.C * scaling.states.asDiagonal();
+
+  const detail::Staircase reach = detail::staircase_of(A, B, small);
+  const Index r = reach.rank;
+  const MatrixXd C_r = product(C, reach.Q.leftCols(r));
+  const detail::Staircase sight =
+      detail::staircase_of(reach.A.topLeftCorner(r, r).transpose(), C_r.transpose(), small);
+  const Index k = sight.rank;
+
+  MinimalRealization<Continuous> found;
+  found.unreached = n - r;
+  found.unseen = r - k;
+  if (k == n) {
+    found.system = system;
+    found.T = MatrixXd::Identity(n, n);
+    return found;
+  }
+  const MatrixXd B_r = reach.B.topRows(r);
+  found.system.A = sight.A.topLeftCorner(k, k).transpose();
+  found.system.B = detail::transposed_product(sight.Q.leftCols(k), B_r);
+  found.system.C = sight.B.topRows(k).transpose();
+  found.system.D = system.D;
+  found.T = scaling.states.asDiagonal() * product(reach.Q.leftCols(r), sight.Q.leftCols(k));
+  return found;
+}
+
+}  // namespace
+
+Expected<Continuous> similarity_transform(const Continuous& system, const MatrixRef& T) {
+  if (auto checked = check_system(system, "similarity_transform"); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  return transform(system, T);
+}
+Expected<Discrete> similarity_transform(const Discrete& system, const MatrixRef& T) {
+  if (auto checked = check_system(system, "similarity_transform"); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  return transform(bare(system), T).map([&](const Continuous& s) {
+    return timed(s, system.period);
+  });
+}
+
+Expected<Continuous> controllable_canonical_form(const Continuous& system) {
+  constexpr std::string_view where = "controllable_canonical_form";
+  if (auto checked = check_system(system, where); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  return companion(system, SystemError::not_controllable, where);
+}
+Expected<Discrete> controllable_canonical_form(const Discrete& system) {
+  constexpr std::string_view where = "controllable_canonical_form";
+  if (auto checked = check_system(system, where); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  return companion(bare(system), SystemError::not_controllable, where)
+      .map([&](const Continuous& s) { return timed(s, system.period); });
+}
+
+Expected<Continuous> observable_canonical_form(const Continuous& system) {
+  constexpr std::string_view where = "observable_canonical_form";
+  if (auto checked = check_system(system, where); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  if (system.C.rows() == 0) {
+    return tl::unexpected(Error(SystemError::not_observable).in(std::string(where)));
+  }
+  return companion(dual(system), SystemError::not_observable, where).map(dual);
+}
+Expected<Discrete> observable_canonical_form(const Discrete& system) {
+  if (auto checked = check_system(system, "observable_canonical_form"); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  return observable_canonical_form(bare(system)).map([&](const Continuous& s) {
+    return timed(s, system.period);
+  });
+}
+
+Expected<BalancedRealization<Continuous>> balanced_realization(const Continuous& system) {
+  return truncate(system, TimeDomain::continuous, 0, true, "balanced_realization");
+}
+Expected<BalancedRealization<Discrete>> balanced_realization(const Discrete& system) {
+  return timed(truncate(system, TimeDomain::discrete, 0, true, "balanced_realization"),
+               system.period);
+}
+
+Expected<BalancedRealization<Continuous>> balanced_truncation(const Continuous& system,
+                                                              Index order) {
+  return truncate(system, TimeDomain::continuous, order, false, "balanced_truncation");
+}
+Expected<BalancedRealization<Discrete>> balanced_truncation(const Discrete& system, Index order) {
+  return timed(truncate(system, TimeDomain::discrete, order, false, "balanced_truncation"),
+               system.period);
+}
+
+Expected<MinimalRealization<Continuous>> minimal_realization(const Continuous& system,
+                                                             double tolerance) {
+  if (auto checked = check_system(system, "minimal_realization"); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  return minimal(system, tolerance);
+}
+Expected<MinimalRealization<Discrete>> minimal_realization(const Discrete& system,
+                                                           double tolerance) {
+  if (auto checked = check_system(system, "minimal_realization"); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  return minimal(bare(system), tolerance).map([&](MinimalRealization<Continuous>&& s) {
+    return MinimalRealization<Discrete>{timed(s.system, system.period), s.unreached, s.unseen,
+                                        std::move(s.T)};
+  });
+}
+
+}  // namespace flyball
