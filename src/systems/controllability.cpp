@@ -222,10 +222,12 @@ Expected<Verdict> analyze(const MatrixRef& A_given, const MatrixRef& B_given, Ti
   }
 
   const double unit = A.norm() > 0.0 ? A.norm() : 1.0;
-  const Eigen::VectorXd sizes = detail::singular_values_of(krylov(A / unit, B));
-  reach.matrix_rank = numerical_rank(sizes, static_cast<double>(n) * epsilon);
+  if (B.cols() > 0) {
+    const Eigen::VectorXd sizes = detail::singular_values_of(krylov(A / unit, B));
+    reach.matrix_rank = numerical_rank(sizes, static_cast<double>(n) * epsilon);
+  }
   const MatrixXd raw = krylov(A_given, B_given);
-  if (raw.allFinite()) {
+  if (raw.cols() > 0 && raw.allFinite()) {
     const Eigen::VectorXd raw_sizes = detail::singular_values_of(raw);
     const double smallest = raw_sizes(raw_sizes.size() - 1);
     reach.matrix_condition = smallest > 0.0 ? raw_sizes(0) / smallest : infinity;

@@ -107,6 +107,16 @@ double climb(const ContinuousSystem<>& system, double low, double high, double& 
   return at_a >= at_b ? a : b;
 }
 
+/// G(1/s): what lies at infinity comes to the origin. A is stable, so it has an inverse.
+ContinuousSystem<> inverted(const ContinuousSystem<>& s) {
+  const Index n = s.A.rows();
+  MatrixXd right(n, n + s.B.cols());
+  right << MatrixXd::Identity(n, n), s.B;
+  const MatrixXd solved = detail::solve_linear(s.A, right);
+  const MatrixXd A_B = solved.rightCols(s.B.cols());
+  return {solved.leftCols(n), -A_B, product(s.C, solved.leftCols(n)), s.D - product(s.C, A_B)};
+}
+
 /// @param system  Stable, scaled.
 Expected<HInfinityNorm> largest_gain(const ContinuousSystem<>& system, std::string_view where) {
   HInfinityNorm best{gain_at(system, infinity), infinity, 0.0, 0};
@@ -125,13 +135,30 @@ Expected<HInfinityNorm> largest_gain(const ContinuousSystem<>& system, std::stri
     const double peak = std::norm(pole) - 2.0 * pole.real() * pole.real();
     consider(std::sqrt(std::max(0.0, peak)));
   }
+  const Eigen::VectorXd sizes = detail::eigenvalues_of(system.A).cwiseAbs();
+  const double slowest = sizes.minCoeff();
+  const double fastest = sizes.maxCoeff();
+  constexpr int grid = 48;
+  for (int k = 0; k <= grid; ++k) {
+    consider(1e-3 * slowest * std::pow(1e6 * fastest / slowest, static_cast<double>(k) / grid));
+  }
   if (best.norm == 0.0) {
     return HInfinityNorm{0.0, 0.0, 0.0, 0};
   }
+  // γ²I - DᵀD is regular only well above the gain at infinity, or else at the origin.
+  const bool turned = gain_at(system, infinity) > gain_at(system, 0.0);
+  const ContinuousSystem<> representative = turned ? inverted(system) : system;
   constexpr int most_iterations = 60;
   for (best.iterations = 1; best.iterations <= most_iterations; ++best.iterations) {
     const double gamma = best.norm * (1.0 + 0.5 * relative_accuracy);
-    const std::vector<double> found = crossings(system, gamma);
+    std::vector<double> found = crossings(representative, gamma);
+    if (turned) {
+      std::reverse(found.begin(), found.end());
+      for (double& omega : found) {
+        omega = 1.0 / omega;
+      }
+      std::erase_if(found, [](double omega) { return !std::isfinite(omega); });
+    }
     const double before = best.norm;
     // Between neighbouring crossings the gain is above γ, or below it throughout.
     double low = 0.0;
