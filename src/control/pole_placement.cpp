@@ -385,14 +385,14 @@ Expected<PolePlacement<>> place(const MatrixRef& A, const MatrixRef& B,
   if (!wanted) {
     return tl::unexpected(wanted.error());
   }
-  auto placed = place_in_units(A, B, *wanted, poles, Eigen::VectorXd::Ones(A.rows()));
-  if (placed) {
-    return placed;
-  }
-  // Coarse units can hide a coupling, or cost digits: again where all states are of one size.
-  const Eigen::VectorXd units = detail::balance_of(A);
-  if ((units.array() != 1.0).any()) {
-    if (auto again = place_in_units(A, B, *wanted, poles, units)) {
+  // Coarse units can hide a coupling, or cost digits: then all states are made of one size.
+  constexpr double coarse = 1e4;
+  const Eigen::VectorXd as_given = Eigen::VectorXd::Ones(A.rows());
+  const Eigen::VectorXd balanced = detail::balance_of(A);
+  const bool first = balanced.maxCoeff() > coarse * balanced.minCoeff();
+  auto placed = place_in_units(A, B, *wanted, poles, first ? balanced : as_given);
+  if (!placed && balanced != as_given) {
+    if (auto again = place_in_units(A, B, *wanted, poles, first ? as_given : balanced)) {
       return again;
     }
   }
