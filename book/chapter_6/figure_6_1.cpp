@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -38,12 +37,12 @@ FigureResult figure_6_1() {
       response.push_back(x(0));
       x = mode.A * x;
     }
-    // Drawn beside its pole, over 10 s and faster so that it oscillates visibly.
+    // Drawn beside its pole, the oscillations faster, up to twice the impulse.
     for (int k = 0; k < 200; ++k) {
       const double t = k * 0.01;
       const double value = std::exp(sigma * t) * std::cos(omega * 80.0 / 3.0 * t / 2.0);
       drawn.x.push_back(sigma + 0.2 * t);
-      drawn.y.push_back(omega + 0.15 * std::clamp(value, -2.0, 2.0));
+      drawn.y.push_back(std::abs(value) > 2.0 ? std::nan("") : omega + 0.15 * value);
     }
     figure.columns.push_back({fmt::format("pole {}{:+}j", sigma, omega), "", response});
     panel.lines.push_back(std::move(drawn));

@@ -53,7 +53,8 @@ FigureResult plane(std::string id, std::string title, double re_low, double re_h
     picture.x.push_back(node(re_low, re_high, k));
     picture.y.push_back(node(im_low, im_high, k));
     for (int i = 0; i < grid; i += coarse) {
-      picture.z.push_back(colors[static_cast<std::size_t>(i * grid + k)]);
+      const double value = colors[static_cast<std::size_t>(i * grid + k)];
+      picture.z.push_back(value == 0.0 ? std::nan("") : value);  // a gap
     }
   }
   figure.columns = {

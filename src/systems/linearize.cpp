@@ -11,7 +11,9 @@ Expected<ContinuousSystem<>> numerical_linearize(ModelFunction f,
   Eigen::VectorXd point(n + m);
   point << x, u;
   const auto of_both = [&](const Eigen::Ref<const Eigen::VectorXd>& at,
-                           Eigen::Ref<Eigen::VectorXd> dxdt) { f(at.head(n), at.tail(m), dxdt); };
+                           const Eigen::Ref<Eigen::VectorXd>& dxdt) {
+    f(at.head(n), at.tail(m), dxdt);
+  };
   return numerical_jacobian(of_both, point, n, options).map([&](const Eigen::MatrixXd& J) {
     return ContinuousSystem<>{J.leftCols(n), J.rightCols(m), Eigen::MatrixXd::Identity(n, n),
                               Eigen::MatrixXd::Zero(n, m)};

@@ -5,6 +5,7 @@
 
 #include <flyball/core/argument.hpp>
 #include <flyball/math/differentiation.hpp>
+#include <flyball/math/integration.hpp>
 
 namespace flyball {
 namespace {
@@ -44,6 +45,26 @@ TEST(AdaptiveIntegration, TheStepIsAddedToTheTimeThatItWasTaken) {
   const auto solution = integrate(oscillator, 0.0, Vector2d(1.0, 0.0), 0.5, options).value();
   EXPECT_NEAR(solution.final_state()(0), std::cos(0.5), 1e-12);
   EXPECT_GT(solution.statistics().rejected, 0);
+}
+
+TEST(AdaptiveIntegration, LinearSystemsAgreeWithTheirExponential) {
+  rc::check("dx/dt = A x + B u, slow and stiff", [] {
+    const auto entry = [] { return *rc::gen::inRange(-1000, 1000) / 500.0; };
+    Eigen::Matrix3d A;
+    for (Eigen::Index i = 0; i < A.size(); ++i) {
+      A(i) = entry();
+    }
+    A.row(2) *= *rc::gen::element(1.0, 30.0, 1000.0);
+    A.diagonal().array() -= A.cwiseAbs().rowwise().sum().array();  // stable, by Gershgorin's discs
+    const Vector3d B(entry(), entry(), entry());
+    const Vector3d x(entry(), entry(), entry());
+    const Vector3d exact = integrate_linear(A, B, x, Eigen::VectorXd::Ones(1), 2.0).value();
+    for (const auto method : {IntegrationMethod::automatic, IntegrationMethod::radau}) {
+      const auto f = [&](double, const Vector3d& at) { return Vector3d(A * at + B); };
+      const auto solution = integrate(f, 0.0, x, 2.0, accurate(1e-9, method)).value();
+      RC_ASSERT((solution.final_state() - exact).norm() < 1e-6);
+    }
+  });
 }
 
 // One revolution with eccentricity 0.9, whose speed varies nineteenfold: back at perihelion.

@@ -25,7 +25,8 @@ class FunctionRef<Result(Arguments...)> {
     requires(!std::is_same_v<std::remove_cvref_t<Callable>, FunctionRef> &&
              !std::is_function_v<std::remove_reference_t<Callable>> &&
              std::is_invocable_r_v<Result, Callable&, Arguments...>)
-  // NOLINTNEXTLINE(google-explicit-constructor, bugprone-forwarding-reference-overload)
+  // NOLINTBEGIN(google-explicit-constructor, bugprone-forwarding-reference-overload)
+  // NOLINTBEGIN(performance-unnecessary-value-param): an Eigen::Ref that is written to is a value.
   FunctionRef(Callable&& callable) noexcept
       : object_(const_cast<void*>(static_cast<const void*>(std::addressof(callable)))),
         call_([](void* object, Arguments... arguments) -> Result {
@@ -37,6 +38,8 @@ class FunctionRef<Result(Arguments...)> {
   Result operator()(Arguments... arguments) const {
     return call_(object_, std::forward<Arguments>(arguments)...);
   }
+  // NOLINTEND(performance-unnecessary-value-param)
+  // NOLINTEND(google-explicit-constructor, bugprone-forwarding-reference-overload)
 
  private:
   void* object_;

@@ -34,10 +34,11 @@ enum class IntegrationMethod {
 /// How accurately, and how far to go for it.
 struct IntegrationOptions {
   IntegrationMethod method = IntegrationMethod::automatic;
-  double relative_tolerance = 1e-6;       ///< Of the error of a step, at least 100 ε = 2.3e-14.
-  double absolute_tolerance = 1e-9;       ///< In the states' units, positive.
-  Eigen::VectorXd absolute_tolerances{};  ///< One a state instead of the one above; or empty.
-  double initial_step = 0.0;              ///< s; 0: from f.
+  double relative_tolerance = 1e-6;  ///< Of the error of a step, at least 100 ε = 2.3e-14.
+  double absolute_tolerance = 1e-9;  ///< In the states' units, positive.
+  /// One a state instead of the one above; or empty.
+  Eigen::VectorXd absolute_tolerances{};
+  double initial_step = 0.0;                                  ///< s; 0: from f.
   double max_step = std::numeric_limits<double>::infinity();  ///< s.
   int max_steps = 100'000;                                    ///< Accepted and rejected ones.
 };
