@@ -157,7 +157,7 @@ TEST(Place, RandomPlants) {
   EXPECT_EQ(refused, 0);
 }
 
-// Badly scaled states and inputs (1e±4 here, so that the test's own eigenvalues can be trusted).
+// Badly scaled states and inputs (1e±8), judged in units that are not.
 TEST(Place, BadlyScaledPlants) {
   Random random(4);
   int refused = 0;
@@ -167,7 +167,7 @@ TEST(Place, BadlyScaledPlants) {
     const Eigen::Index m = 1 + trial % 2;
     Eigen::VectorXd d(n);
     for (double& entry : d) {
-      entry = std::pow(10.0, random.uniform(-4.0, 4.0));
+      entry = std::pow(10.0, random.uniform(-8.0, 8.0));
     }
     const Eigen::MatrixXd A =
         d.asDiagonal() * random_matrix(random, n, n) * d.cwiseInverse().asDiagonal();
@@ -181,9 +181,9 @@ TEST(Place, BadlyScaledPlants) {
     }
     const Eigen::MatrixXd scaled =
         d.cwiseInverse().asDiagonal() * (A - B * placed->K) * d.asDiagonal();
-    ASSERT_LT(worst(scaled, poles), 1e-4) << "trial " << trial;
+    ASSERT_LT(worst(scaled, poles), 1e-8) << "trial " << trial;
   }
-  EXPECT_LE(refused, 0.005 * trials);
+  EXPECT_EQ(refused, 0);
 }
 
 // As often as B has independent columns, the closed loop stays diagonalisable.
