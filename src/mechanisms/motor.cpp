@@ -161,6 +161,7 @@ Expected<DcMotor> motor(std::string_view name, int count) {
                               .expected(fmt::format("one of {}", fmt::join(candidates, ", "))));
   }
   std::vector<std::string_view> names;
+  names.reserve(table.size());
   for (const MotorTableEntry& entry : table) {
     names.push_back(entry.name);
   }
