@@ -18,5 +18,6 @@ void add_design_command(CLI::App& program, Invocation& invocation);
 void add_tune_command(CLI::App& program, Invocation& invocation);
 void add_motors_command(CLI::App& program, Invocation& invocation);
 void add_book_command(CLI::App& program, Invocation& invocation);
+void add_solve_command(CLI::App& program, Invocation& invocation);
 
 }  // namespace flyball::app
