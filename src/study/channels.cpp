@@ -84,6 +84,7 @@ Expected<const Signal*> named_channel(const Log& log, const std::string& name, Q
     return signal;
   }
   std::vector<std::string_view> names;
+  names.reserve(log.signals.size());
   for (const Signal& signal : log.signals) {
     names.push_back(signal.name);
   }

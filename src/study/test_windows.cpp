@@ -55,6 +55,7 @@ Expected<FoundTests> find_tests(const Log& log, const std::string& state_channel
     const TextSignal* state = log.find_text(state_channel);
     if (state == nullptr) {
       std::vector<std::string_view> names;
+      names.reserve(log.texts.size());
       for (const TextSignal& text : log.texts) {
         names.push_back(text.name);
       }
@@ -87,6 +88,7 @@ Expected<FoundTests> find_tests(const Log& log, const std::string& state_channel
   }
   if (all.size() > 1) {
     std::vector<std::string> names;
+    names.reserve(all.size());
     for (const FoundTests& tests : all) {
       names.push_back("\"" + tests.state_name + "\"");
     }
