@@ -55,6 +55,7 @@ int run(const std::string& kind) {
   const auto solver = study::Solver::create(kind);
   if (!solver) {
     tell(solver.error());
+    print(study::Solver::error_json(solver.error()));
     return bad_input;
   }
   std::ios::sync_with_stdio(false);

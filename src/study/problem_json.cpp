@@ -12,7 +12,11 @@ namespace {
 
 using Json = nlohmann::json;
 
+/// What stands there, in a few words; lists and objects may be of any size.
 std::string kind_of(const Json& value) {
+  if (value.is_structured()) {
+    return value.is_array() ? fmt::format("a list of {}", value.size()) : "an object";
+  }
   std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
   if (text.size() > 40) {
     text = text.substr(0, 37) + "...";

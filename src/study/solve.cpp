@@ -1,8 +1,9 @@
 #include <flyball/study/solve.hpp>
 
+#include <algorithm>
 #include <array>
 #include <optional>
-#include <sstream>
+#include <string>
 #include <vector>
 
 #include <flyball/control/lqr.hpp>
@@ -578,6 +579,30 @@ Outcome check_fields(const Json& object, const SolveKind& kind) {
   return {};
 }
 
+/// Brackets of a text that are open at once, strings left out. Writing a value (an id) recurses.
+int depth_of(std::string_view text) {
+  int depth = 0;
+  int deepest = 0;
+  bool quoted = false;
+  for (std::size_t k = 0; k < text.size(); ++k) {
+    const char c = text[k];
+    if (quoted) {
+      if (c == '\\') {
+        ++k;
+      } else if (c == '"') {
+        quoted = false;
+      }
+    } else if (c == '"') {
+      quoted = true;
+    } else if (c == '[' || c == '{') {
+      deepest = std::max(deepest, ++depth);
+    } else if (c == ']' || c == '}') {
+      --depth;
+    }
+  }
+  return deepest;
+}
+
 SolveAnswer refused(AnswerWriter& answer, const Json* id, const Error& error) {
   answer.begin(id);
   answer.add(error);
@@ -607,12 +632,28 @@ Expected<Solver> Solver::create(std::string_view kind) {
                             .hint(nearest.empty() ? "" : "did you mean \"" + nearest + "\"?"));
 }
 
+std::string Solver::error_json(const Error& error) {
+  AnswerWriter answer;
+  answer.begin(nullptr);
+  answer.add(error);
+  return answer.end();
+}
+
 bool Solver::is_complete(std::string_view text) {
   return Json::accept(text);
 }
 
 SolveAnswer Solver::solve(std::string_view problem) const {
   AnswerWriter answer;
+  constexpr int deepest = 64;
+  if (const int depth = depth_of(problem); depth > deepest) {
+    return refused(answer, nullptr,
+                   Error(ArgumentError::malformed)
+                       .in(std::string(kinds[index_].name))
+                       .about("problem")
+                       .got(std::to_string(depth) + " brackets within each other")
+                       .expected("at most " + std::to_string(deepest)));
+  }
   const Json object = Json::parse(problem, nullptr, false);
   if (object.is_discarded() || !object.is_object()) {
     return refused(answer, nullptr,

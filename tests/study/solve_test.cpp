@@ -162,6 +162,10 @@ TEST(Solve, SurvivesLongAndDeepText) {
   EXPECT_EQ(
       refusal("expm", R"({"A":)" + std::string(1000000, '[') + std::string(1000000, ']') + "}"),
       "malformed");
+  EXPECT_EQ(refusal("expm", R"({"id":)" + std::string(1000000, '[') + std::string(1000000, ']') +
+                                R"(,"A":[[0]]})"),
+            "malformed");
+  EXPECT_EQ(refusal("expm", R"({"id":"[[\"]]","A":[[0]]})"), "");
   EXPECT_EQ(refusal("expm", R"({")" + std::string(10000000, 'a') + R"(":1})"), "unknown_name");
 }
 

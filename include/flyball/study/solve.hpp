@@ -38,6 +38,9 @@ class Solver {
   /// Cost: that of the kernel, and of reading and writing the text.
   [[nodiscard]] SolveAnswer solve(std::string_view problem) const;
 
+  /// {"error": {…}}: how an unknown kind is answered.
+  [[nodiscard]] static std::string error_json(const Error& error);
+
   /// Whether a text is one whole JSON value, so that it need not be continued by the next line.
   [[nodiscard]] static bool is_complete(std::string_view text);
 
