@@ -54,6 +54,7 @@ struct TuningStep {
   std::string decided{};  ///< "keep Kp = 40: it oscillates, which Kd is to damp"
 };
 
+/// What the manual procedure found, step by step.
 struct ManualTuning {
   PidGains gains;
   std::vector<TuningStep> steps;

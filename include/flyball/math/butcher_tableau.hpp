@@ -45,6 +45,7 @@ struct ButcherTableauView {
   std::span<const double> b;
   std::span<const double> c;
 
+  /// Of a tableau, which has to outlive it.
   template <std::size_t Stages>
   // NOLINTNEXTLINE(google-explicit-constructor): a view is made where a tableau is passed.
   ButcherTableauView(const ButcherTableau<Stages>& tableau) noexcept

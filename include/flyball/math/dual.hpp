@@ -113,6 +113,8 @@ class Dual {
     return y;
   }
 
+  /// Arithmetic with duals and numbers; comparisons are those of the values.
+  ///@{
   Dual& operator+=(const Dual& other) { return *this = *this + other; }
   Dual& operator-=(const Dual& other) { return *this = *this - other; }
   Dual& operator*=(const Dual& other) { return *this = *this * other; }
@@ -155,8 +157,11 @@ class Dual {
   }
   friend std::partial_ordering operator<=>(const Dual& a, double b) { return a.value <=> b; }
 
-  // The functions of <cmath>, found by argument-dependent lookup: write `using std::sin; sin(x)`,
-  // or `sin(x)` in a function over a generic scalar.
+  ///@}
+
+  /// The functions of the cmath header, found by argument-dependent lookup: write `using std::sin;
+  /// sin(x)`, or `sin(x)` in a function over a generic scalar.
+  ///@{
   friend Dual sqrt(const Dual& x) {
     const double root = std::sqrt(x.value);
     return chain(x, root, 0.5 / root, -0.25 / (root * x.value));
@@ -319,6 +324,7 @@ class Dual {
   friend bool isnan(const Dual& x) { return std::isnan(x.value); }
   friend bool isinf(const Dual& x) { return std::isinf(x.value); }
   friend bool signbit(const Dual& x) { return std::signbit(x.value); }
+  ///@}
 
  private:
   static constexpr double ln2 = 0.69314718055994530942;
@@ -341,6 +347,7 @@ class Dual {
 
 }  // namespace flyball
 
+/// @cond What Eigen asks of a scalar.
 namespace Eigen {
 
 /// So that vectors and matrices of duals are like any others.
@@ -377,3 +384,4 @@ struct ScalarBinaryOpTraits<double, flyball::Dual<N, Order>, Operation> {
 };
 
 }  // namespace Eigen
+/// @endcond

@@ -54,6 +54,7 @@ struct Event {
   EventDirection direction = EventDirection::any;
   bool terminal = false;  ///< Whether the integration ends there.
 };
+/// @private Lets the function decide the type.
 template <class Function>
 Event(Function, EventDirection = EventDirection::any, bool = false) -> Event<Function>;
 
@@ -88,6 +89,7 @@ class OdeSolution {
     [[nodiscard]] Eigen::VectorXd at(double s) const;
   };
 
+  /// Where an integration starts, before its first step.
   OdeSolution(double t, const Eigen::VectorXd& x);
 
   /// x at a time, of order 4 (Dormand-Prince) or 3 (Radau IIA) in the step; outside the interval

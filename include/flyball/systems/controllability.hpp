@@ -40,11 +40,13 @@ struct ReachAnalysis {
   double tolerance = 0.0;  ///< Below it a distance counts as zero.
 };
 
+/// What the inputs reach.
 struct ControllabilityAnalysis : ReachAnalysis {
   bool controllable = false;
   bool stabilizable = false;  ///< Every mode that no input moves decays by itself (6.12.4).
 };
 
+/// What the outputs show.
 struct ObservabilityAnalysis : ReachAnalysis {
   bool observable = false;
   bool detectable = false;  ///< Every mode that no output shows decays by itself (6.12.8).
