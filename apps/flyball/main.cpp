@@ -49,6 +49,7 @@ int main(int argc, char** argv) {
       "  flyball identify shooter.json --json       only the gains, for other programs\n"
       "  flyball design elevator.toml               no robot yet: mass, gearing and motors\n"
       "  flyball motors kraken                      what the motor table knows\n"
+      "  flyball analyze model.json                 poles, what can be moved and seen, gains\n"
       "  flyball solve dare < problems.jsonl        any kernel, from any language\n"
       "  flyball book 6.3                           a figure of the book, from this library\n"
       "\n"
@@ -66,6 +67,7 @@ int main(int argc, char** argv) {
   flyball::app::add_tune_command(program, invocation);
   flyball::app::add_motors_command(program, invocation);
   flyball::app::add_book_command(program, invocation);
+  flyball::app::add_analyze_command(program, invocation);
   flyball::app::add_solve_command(program, invocation);
 
   if (const std::string unknown = unknown_command(program, argc, argv); !unknown.empty()) {

@@ -1,0 +1,66 @@
+#include <flyball/study/analyze.hpp>
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace flyball::study {
+namespace {
+
+// dx/dt = -2x + 3u: y = 1.5 (1 - e^{-2t}), gain 1.5 at every frequency's start, H2 norm 3/√4.
+TEST(Analyze, FirstOrderLag) {
+  const auto analysis = analyze(parse_model(R"({"A":[[-2]],"B":[[3]]})", "m").value()).value();
+  EXPECT_EQ(analysis.modes.stability, Stability::stable);
+  EXPECT_TRUE(analysis.controllability.controllable);
+  EXPECT_TRUE(analysis.observability.observable);
+  EXPECT_NEAR((*analysis.dc_gain)(0, 0), 1.5, 1e-15);
+  EXPECT_NEAR(*analysis.h2_norm, 1.5, 1e-14);
+  EXPECT_NEAR(analysis.h_infinity_norm->norm, 1.5, 1e-9);
+  const StepResponse& step = analysis.steps.at(0);
+  EXPECT_GT(step.time(step.time.size() - 1), 2.5);
+  for (Eigen::Index k = 0; k < step.time.size(); ++k) {
+    EXPECT_NEAR(step.y(k, 0), 1.5 * (1.0 - std::exp(-2.0 * step.time(k))), 1e-12);
+  }
+}
+
+// x₊ = 0.5x + u: y_k = 2 (1 - 0.5ᵏ).
+TEST(Analyze, DiscreteLag) {
+  const auto analysis =
+      analyze(parse_model(R"({"A":[[0.5]],"B":[[1]],"domain":"discrete","T":0.02})", "m").value())
+          .value();
+  EXPECT_NEAR((*analysis.dc_gain)(0, 0), 2.0, 1e-15);
+  const StepResponse& step = analysis.steps.at(0);
+  EXPECT_NEAR(step.time(3), 0.06, 1e-15);
+  EXPECT_NEAR(step.y(3, 0), 1.75, 1e-15);
+}
+
+TEST(Analyze, UnstableAndIntegratingModels) {
+  const auto unstable =
+      analyze(parse_model(R"({"A":[[1,0],[0,-1]],"B":[[0],[1]],"states":["a","b"]})", "m").value())
+          .value();
+  EXPECT_EQ(unstable.modes.stability, Stability::unstable);
+  EXPECT_FALSE(unstable.controllability.stabilizable);
+  EXPECT_FALSE(unstable.h2_norm.has_value());
+  EXPECT_NE(describe(unstable.controllability, unstable.model.states).find("a"), std::string::npos);
+  const auto integrator = analyze(parse_model(R"({"A":[[0]],"B":[[1]]})", "m").value()).value();
+  EXPECT_FALSE(integrator.dc_gain.has_value());
+  EXPECT_NEAR(integrator.steps.at(0).y(10, 0), integrator.steps.at(0).time(10), 1e-14);
+}
+
+TEST(Analyze, RefusesBadModels) {
+  const auto refused = [](const char* text) { return parse_model(text, "m.json").error().code(); };
+  EXPECT_EQ(refused("{"), "malformed");
+  EXPECT_EQ(refused("[1]"), "malformed");
+  EXPECT_EQ(refused(R"({"A":[[1]]})"), "malformed");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"E":[[1]]})"), "malformed");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"domain":"z"})"), "malformed");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"domain":"discrete"})"), "malformed");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"domain":"discrete","T":0})"), "not_positive");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"states":["a","b"]})"), "malformed");
+  EXPECT_EQ(refused(R"({"A":[[1,2],[3]],"B":[[1]]})"), "malformed");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1],[2]]})"), "wrong_shape");
+  EXPECT_EQ(refused(R"({"A":[["nan"]],"B":[[1]]})"), "not_finite");
+}
+
+}  // namespace
+}  // namespace flyball::study
