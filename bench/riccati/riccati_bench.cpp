@@ -1,6 +1,7 @@
-// How long a whole dare() takes, checks and eigenvalues included, beside SLICOT's SB02OD on the
-// same data in the same process, one thread: `bench_riccati [repetitions]`. Minima over repetitions
-// that alternate between the two, because another process may hold the machine in any of them.
+// How long a whole dare() or care() takes, checks and eigenvalues included, beside SLICOT's SB02OD
+// on the same data in the same process, one thread: `bench_riccati [repetitions]`. Minima over
+// repetitions that alternate between the two, because another process may hold the machine in any
+// of them.
 
 #include <algorithm>
 #include <chrono>
@@ -72,7 +73,7 @@ class Slicot {
         flags_(static_cast<std::size_t>(2 * n)),
         work_(std::max({7 * (2 * n + 1) + 16, 16 * n, 2 * n + m, 3 * m, 64 * size_})) {}
 
-  int solve(const Equation& e) {
+  int solve(const Equation& e, const char* domain = "D") {
     const int p = 0;
     const int one = 1;
     const int twice = 2 * n_;
@@ -81,7 +82,7 @@ class Slicot {
     const double none = 0.0;
     double rcond = 0.0;
     int info = 0;
-    sb02od_("D", "B", "N", "U", "Z", "S", &n_, &m_, &p, e.A.data(), &n_, e.B.data(), &n_,
+    sb02od_(domain, "B", "N", "U", "Z", "S", &n_, &m_, &p, e.A.data(), &n_, e.B.data(), &n_,
             e.Q.data(), &n_, e.R.data(), &m_, &none, &one, &rcond, X_.data(), &n_,
             alpha_real_.data(), alpha_imaginary_.data(), beta_.data(), S_.data(), &size_, T_.data(),
             &size_, U_.data(), &twice, &tolerance, integers_.data(), work_.data(), &ldwork,
@@ -109,7 +110,12 @@ double microseconds(int calls, Work&& work) {
   return elapsed.count() / calls;
 }
 
-void compare(int n, int repetitions) {
+/// One of the two equations, on the same data.
+void compare(bool continuous, int n, int repetitions) {
+  const char* const domain = continuous ? "C" : "D";
+  const auto solve_ours = [continuous](const Equation& e) {
+    return continuous ? flyball::care(e.A, e.B, e.Q, e.R) : flyball::dare(e.A, e.B, e.Q, e.R);
+  };
   const int m = std::max(1, n / 2);
   constexpr int count = 8;
   flyball::Random random(static_cast<std::uint64_t>(n));
@@ -120,8 +126,8 @@ void compare(int n, int repetitions) {
   Slicot slicot(n, m);
   double largest_difference = 0.0;
   for (const Equation& e : equations) {
-    const auto ours = flyball::dare(e.A, e.B, e.Q, e.R);
-    if (!ours || slicot.solve(e) != 0) {
+    const auto ours = solve_ours(e);
+    if (!ours || slicot.solve(e, domain) != 0) {
       std::printf("n = %d: not solved\n", n);
       return;
     }
@@ -134,11 +140,10 @@ void compare(int n, int repetitions) {
   double sink = 0.0;
   for (int r = 0; r < repetitions; ++r) {
     for (const Equation& e : equations) {
-      best_ours = std::min(best_ours, microseconds(calls, [&](int) {
-                             sink += flyball::dare(e.A, e.B, e.Q, e.R)->X(0, 0);
-                           }));
+      best_ours =
+          std::min(best_ours, microseconds(calls, [&](int) { sink += solve_ours(e)->X(0, 0); }));
       best_slicot =
-          std::min(best_slicot, microseconds(calls, [&](int) { sink += slicot.solve(e); }));
+          std::min(best_slicot, microseconds(calls, [&](int) { sink += slicot.solve(e, domain); }));
     }
   }
   std::printf("%5d %5d %12.2f %12.2f %9.2f %14.1e%s\n", n, m, best_ours, best_slicot,
@@ -208,9 +213,12 @@ int main(int argc, char** argv) {
   openblas_set_num_threads(1);
   const int repetitions = argc > 1 ? std::max(1, std::atoi(argv[1])) : 25;
   std::printf("whole solves, minima in microseconds, one thread\n");
-  std::printf("%5s %5s %12s %12s %9s %14s\n", "n", "m", "flyball", "SB02OD", "ratio", "difference");
-  for (const int n : {2, 5, 10, 20, 50, 100}) {
-    compare(n, repetitions);
+  for (const bool continuous : {false, true}) {
+    std::printf("%s\n%5s %5s %12s %12s %9s %14s\n", continuous ? "care" : "dare", "n", "m",
+                "flyball", "SB02OD", "ratio", "difference");
+    for (const int n : {2, 5, 10, 20, 50, 100}) {
+      compare(continuous, n, repetitions);
+    }
   }
   std::printf("\n%-28s %8s %8s   %s\n", "", "fixed", "dynamic", "wpimath, measured elsewhere");
   absolute<2, 1>("elevator 2x1, 5 ms", elevator(0.005), "4.1-4.4", repetitions);
