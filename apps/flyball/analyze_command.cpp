@@ -1,6 +1,7 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -36,13 +37,17 @@ std::string matrix_text(const Eigen::MatrixXd& M) {
   return text;
 }
 
+std::string counted(Eigen::Index count, std::string_view what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
 std::string to_text(const study::ModelAnalysis& analysis) {
   const study::ModelFile& model = analysis.model;
   const bool continuous = model.domain == TimeDomain::continuous;
   std::string text = fmt::format(
-      "A {} system with {} states, {} inputs and {} outputs{}: {}\n\nPoles\n{}\n",
-      continuous ? "continuous" : "discrete", model.system.A.rows(), model.system.B.cols(),
-      model.system.C.rows(),
+      "A {} system with {}, {} and {}{}: {}\n\nPoles\n{}\n", continuous ? "continuous" : "discrete",
+      counted(model.system.A.rows(), "state"), counted(model.system.B.cols(), "input"),
+      counted(model.system.C.rows(), "output"),
       continuous ? std::string() : fmt::format(", sampled each {:g} s", model.period.si()),
       to_string(analysis.modes.stability), describe(analysis.modes));
   text += fmt::format("\nControllability\n{}\n", describe(analysis.controllability, model.states));
@@ -63,7 +68,7 @@ std::string to_text(const study::ModelAnalysis& analysis) {
 }
 
 Plot pole_map(const study::ModelAnalysis& analysis) {
-  PolePlotGroup group{.label = "poles"};
+  PolePlotGroup group{.label = "open-loop"};
   for (const Mode& mode : analysis.modes.modes) {
     group.poles.push_back(mode.pole);
   }
