@@ -52,4 +52,5 @@ clean:  ## Remove what was built
 	@rm -rf build docs/html
 
 configure:
-	@cmake --preset release --log-level=WARNING $(LAUNCHER)
+	@cmake --preset release --log-level=WARNING $(LAUNCHER) \
+	  -DFLYBALL_BUILD_APPS=ON -DFLYBALL_BUILD_EXAMPLES=ON -DFLYBALL_BUILD_TESTS=ON
