@@ -140,4 +140,34 @@ void Range::widen_to(double span) {
   high_ = centre + 0.5 * span;
 }
 
+double tick_step(double span, int at_most) {
+  const double least = span / std::max(at_most, 1);
+  if (!std::isfinite(least) || least < 1e-290) {
+    return 0.0;
+  }
+  const double power = std::pow(10.0, std::floor(std::log10(least)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * power >= least * (1.0 - 1e-9)) {
+      return factor * power;
+    }
+  }
+  return 10.0 * power;
+}
+
+void round_out(Range& range, double step) {
+  constexpr double nearly = 0.02;  // of the span
+  if (step <= 0.0) {
+    return;
+  }
+  const double margin = nearly * range.span();
+  const double low = std::floor(range.low() / step) * step;
+  const double high = std::ceil(range.high() / step) * step;
+  if (range.low() - low < margin) {
+    range.include(low);
+  }
+  if (high - range.high() < margin) {
+    range.include(high);
+  }
+}
+
 }  // namespace flyball::io

@@ -45,4 +45,11 @@ class Range {
   double high_ = -1.0;
 };
 
+/// The least of 1, 2 and 5 times a power of ten that divides `span` into at most `at_most` (at
+/// least one) steps; 0 where there is no such number.
+[[nodiscard]] double tick_step(double span, int at_most);
+
+/// Moves an end of the range out to the next multiple of `step`, if it is nearly there.
+void round_out(Range& range, double step);
+
 }  // namespace flyball::io

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
@@ -8,65 +7,24 @@
 #include <fmt/format.h>
 
 #include "io/plot_data.hpp"
+#include "io/plot_legend.hpp"
 #include "io/plot_script.hpp"
 #include "io/text.hpp"
 
 namespace flyball::io {
 namespace {
 
-/// Okabe and Ito, "Color universal design" (2008), the yellow left out: it is too light on white.
-constexpr std::array<std::string_view, 7> palette = {"#0072B2", "#D55E00", "#009E73", "#CC79A7",
-                                                     "#E69F00", "#56B4E9", "#333333"};
-
 // The layout in pixels.
 constexpr int left_margin = 108;
 constexpr int right_margin = 28;
 constexpr int title_height = 40;
 constexpr int bottom_margin = 66;
-constexpr int legend_row = 20;
 constexpr int panel_gap = 14;
 
+constexpr int x_tick_pixels = 80;  ///< At least, from one tick to the next.
+constexpr int y_tick_pixels = 34;
+
 constexpr std::size_t max_scatter = 4000;
-
-int color_index(int wanted, std::size_t& next) {
-  const std::size_t index = wanted >= 0 ? static_cast<std::size_t>(wanted) : next++;
-  return static_cast<int>(index % palette.size());
-}
-
-/// Characters, not bytes, of UTF-8.
-std::size_t length(std::string_view text) {
-  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) {
-    return (static_cast<unsigned char>(c) & 0xC0) != 0x80;
-  }));
-}
-
-/// How a panel's legend is laid out: so many columns and rows.
-struct Legend {
-  int columns = 1;
-  int rows = 0;
-};
-
-Legend legend_of(const PlotPanel& panel, int width) {
-  std::size_t entries = 0;
-  std::size_t longest = 0;
-  const auto add = [&](const std::string& label) {
-    entries += label.empty() ? 0 : 1;
-    longest = std::max(longest, length(label));
-  };
-  for (const PlotBand& band : panel.bands) {
-    add(band.label);
-  }
-  for (const PlotLine& line : panel.lines) {
-    add(line.label);
-  }
-  Legend legend;
-  if (entries > 0) {
-    const int each = 60 + 8 * static_cast<int>(std::min<std::size_t>(longest, 100));
-    legend.columns = std::clamp(width / each, 1, static_cast<int>(entries));
-    legend.rows = (static_cast<int>(entries) + legend.columns - 1) / legend.columns;
-  }
-  return legend;
-}
 
 Expected<void> check_lengths(const std::string& label, std::size_t x, std::size_t y) {
   if (x != y) {
@@ -109,10 +67,6 @@ Expected<void> check(const Plot& plot) {
   return {};
 }
 
-bool scattered(LineStyle style) {
-  return style == LineStyle::points || style == LineStyle::crosses || style == LineStyle::circles;
-}
-
 class Script {
  public:
   explicit Script(const Plot& plot)
@@ -137,14 +91,17 @@ class Script {
                    "set multiplot\nset border 3 lc rgb '#555555' lw 1\n"
                    "set tics out nomirror textcolor rgb '#333333' scale 0.6\n"
                    "set grid xtics ytics lc rgb '#DDDDDD' lw 1 lt 1\nset style fill noborder\n"
-                   "set xrange [{}:{}]\n",
-                   x_.low(), x_.high());
+                   "unset key\nset xrange [{}:{}]\n{}",
+                   x_.low(), x_.high(),
+                   plot_.x_step > 0.0 ? fmt::format("set xtics {}\n", plot_.x_step)
+                                      : ticks('x', x_, box_width_ / x_tick_pixels, plot_.log_x));
     if (plot_.log_x) {
       script_ += "set logscale x\n";
     }
     if (!plot_.title.empty()) {
-      fmt::format_to(out(), "set label 1 {} at screen 0.5, screen {} center font ',15'\n",
-                     literal(plot_.title), 1.0 - 22.0 / height_);
+      fmt::format_to(out(), "set label 1 {} at screen 0.5, screen {} center font ',{}'\n",
+                     literal(plot_.title), 1.0 - 22.0 / height_,
+                     title_size(plot_.title, plot_.width));
     }
     for (std::size_t i = 0; i < plot_.panels.size(); ++i) {
       draw_panel(i);
@@ -168,8 +125,8 @@ class Script {
     int overhead = above + bottom_margin;
     std::vector<Legend> legends;
     for (const PlotPanel& panel : plot_.panels) {
-      legends.push_back(legend_of(panel, box_width_));
-      overhead += legends.back().rows * legend_row + panel_gap;
+      legends.emplace_back(panel, box_width_);
+      overhead += legends.back().rows() * Legend::row_height + panel_gap;
     }
     const int usual = plot_.equal_axes ? box_width_ * 2 / 3
                       : count == 1     ? 380
@@ -179,7 +136,7 @@ class Script {
     const int box_height = plot_.height > 0 ? std::max(given, 40) : usual;
     height_ = overhead + box_height * static_cast<int>(count);
     for (std::size_t i = 0; i < count; ++i) {
-      above += legends[i].rows * legend_row + panel_gap;
+      above += legends[i].rows() * Legend::row_height + panel_gap;
       boxes_.push_back({above, above + box_height, legends[i], y_range(plot_.panels[i])});
       above += box_height;
     }
@@ -203,6 +160,9 @@ class Script {
       x_.include(1.0);
     }
     x_.pad(scatter || plot_.equal_axes ? 0.05 : 0.0);
+    if (!scatter && !plot_.equal_axes && !plot_.log_x) {
+      round_out(x_, tick_step(x_.span(), box_width_ / x_tick_pixels));
+    }
     if (plot_.equal_axes) {
       for (Box& box : boxes_) {
         const double per_pixel =
@@ -215,6 +175,11 @@ class Script {
 
   Range y_range(const PlotPanel& panel) const {
     Range range(panel.log_y);
+    if (panel.y_limits) {
+      range.include(panel.y_limits->low);
+      range.include(panel.y_limits->high);
+      return range;
+    }
     for (const PlotLine& line : panel.lines) {
       range.include(line.y);
     }
@@ -305,12 +270,13 @@ class Script {
     const bool last = index + 1 == plot_.panels.size();
     fmt::format_to(out(),
                    "set lmargin at screen {}\nset rmargin at screen {}\nset tmargin at screen {}\n"
-                   "set bmargin at screen {}\nset yrange [{}:{}]\nset label {} at screen {}, "
+                   "set bmargin at screen {}\nset yrange [{}:{}]\n{}set label {} at screen {}, "
                    "screen {} center rotate by 90 textcolor rgb '#333333'\n",
                    static_cast<double>(left_margin) / plot_.width,
                    1.0 - static_cast<double>(right_margin) / plot_.width,
                    1.0 - static_cast<double>(box.top) / height_,
                    1.0 - static_cast<double>(box.bottom) / height_, box.y.low(), box.y.high(),
+                   ticks('y', box.y, (box.bottom - box.top) / y_tick_pixels, panel.log_y),
                    literal(panel.y_label), 16.0 / plot_.width,
                    1.0 - 0.5 * (box.top + box.bottom) / height_);
     script_ += panel.log_y ? "set logscale y\n" : "unset logscale y\n";
@@ -322,14 +288,11 @@ class Script {
     } else {
       script_ += "set format x ''\n";
     }
-    fmt::format_to(
-        out(),
-        "set key at graph 0, screen {} left bottom horizontal Left reverse maxcols {} samplen 2\n",
-        1.0 - static_cast<double>(box.top - 4) / height_, box.legend.columns);
+    script_ += box.legend.commands(left_margin + 10, box.top, plot_.width, height_);
     draw_marks(panel);
     draw_curves(panel);
     // The title belongs to the first panel only: a label drawn again and again grows bold.
-    script_ += "unset label\nunset arrow\n";
+    script_ += "unset label\nunset arrow\nunset object\n";
   }
 
   void draw_marks(const PlotPanel& panel) {
@@ -356,7 +319,15 @@ class Script {
                        "set label {} at graph 0.995, first {} right offset 0, character -0.6",
                        label, mark.at);
       }
-      script_ += " font ',10' textcolor rgb '#555555' front\n";
+      script_ += " font ',12' textcolor rgb '#555555' front\n";
+    }
+    for (const PlotNote& note : panel.notes) {
+      if (std::isfinite(note.x) && std::isfinite(note.y)) {
+        fmt::format_to(out(),
+                       "set label {} at first {}, first {} left offset character 0.8, character "
+                       "0.6 font ',12' front\n",
+                       literal(note.text), note.x, note.y);
+      }
     }
   }
 
@@ -365,62 +336,36 @@ class Script {
     const auto add = [&](std::string text) {
       curves += (curves.empty() ? "" : ", ") + std::move(text);
     };
-    const auto title = [](const std::string& label) {
-      return label.empty() ? std::string("notitle") : "title " + literal(label);
-    };
-    std::size_t next = 0;
+    const std::vector<std::string_view> colors = panel_colors(panel);
     if (plot_.unit_circle) {
-      add("$circle with lines lc rgb '#999999' lw 1.2 notitle");
+      add("$circle with lines lc rgb '#999999' lw 1.2");
     }
-    for (const PlotBand& band : panel.bands) {
-      const int color = color_index(band.color, next);
+    for (std::size_t i = 0; i < panel.bands.size(); ++i, ++drawn_) {
       if (drawable_[drawn_]) {
         add(fmt::format(
-            "$d{} with filledcurves closed fc rgb '{}' fs transparent solid 0.2 noborder {}",
-            drawn_, palette[static_cast<std::size_t>(color)], title(band.label)));
+            "$d{} with filledcurves closed fc rgb '{}' fs transparent solid 0.2 noborder", drawn_,
+            colors[i]));
       }
-      ++drawn_;
     }
-    for (const PlotLine& line : panel.lines) {
-      const int color = color_index(line.color, next);
+    for (std::size_t i = 0; i < panel.lines.size(); ++i, ++drawn_) {
+      const PlotLine& line = panel.lines[i];
       if (drawable_[drawn_]) {
-        const std::string_view rgb = palette[static_cast<std::size_t>(color)];
-        // Dots too small to tell their colour get a larger one in the legend.
-        const bool dots = line.style == LineStyle::points && !line.label.empty();
-        add(fmt::format("$d{} {} lc rgb '{}' {}", drawn_, style(line), rgb,
-                        dots ? "notitle" : title(line.label)));
-        if (dots) {
-          add(fmt::format("keyentry with points pt 7 ps 0.7 lc rgb '{}' {}", rgb,
-                          title(line.label)));
-        }
+        add(fmt::format("$d{} with {} {} lc rgb '{}'", drawn_, kind(line.style),
+                        stroke(line.style, line.x.size()), colors[panel.bands.size() + i]));
       }
-      ++drawn_;
     }
     if (curves.empty()) {
       script_ += "set label 'no data' at graph 0.5, graph 0.5 center textcolor rgb '#999999'\n";
-      curves = "NaN notitle";
+      curves = "NaN";
     }
     script_ += "plot " + curves + "\n";
   }
 
-  static std::string style(const PlotLine& line) {
-    switch (line.style) {
-      case LineStyle::solid:
-        return "with lines lw 1.8";
-      case LineStyle::dashed:
-        return "with lines lw 1.8 dt (18,8)";
-      case LineStyle::steps:
-        return "with steps lw 1.8";
-      case LineStyle::crosses:
-        return "with points pt 2 ps 1.2 lw 2";
-      case LineStyle::circles:
-        return "with points pt 6 ps 1.2 lw 2";
-      case LineStyle::points:
-        break;
-    }
-    return fmt::format("with points pt 7 ps {}", line.x.size() > 300  ? 0.22
-                                                 : line.x.size() > 60 ? 0.4
-                                                                      : 0.7);
+  static std::string_view kind(LineStyle style) {
+    return scattered(style)              ? "points"
+           : style == LineStyle::steps   ? "steps"
+           : style == LineStyle::samples ? "linespoints"
+                                         : "lines";
   }
 
   const Plot& plot_;
@@ -445,19 +390,30 @@ std::string literal(std::string_view text) {
 }
 
 std::string script_head(PictureFormat format, int width, int height) {
-  const std::string_view fonts = "DejaVu Sans,12";
   if (format == PictureFormat::svg) {
     return fmt::format(
-        "set encoding utf8\nset terminal svg size {},{} dynamic noenhanced font '{}' background "
-        "'#FFFFFF'\n",
-        width, height, fonts);
+        "set encoding utf8\nset terminal svg size {},{} dynamic standalone noenhanced font "
+        "'DejaVu Sans,{}' background '#FFFFFF'\n",
+        width, height, font_size);
   }
   constexpr double scale = 1.5;
+  constexpr double points_per_pixel = 72.0 / 96.0;  // cairo's fonts are sized in points
   return fmt::format(
-      "set encoding utf8\nset terminal pngcairo size {},{} noenhanced font '{}' fontscale {} "
-      "linewidth {} "
-      "pointscale {} background '#FFFFFF'\n",
-      std::lround(width * scale), std::lround(height * scale), fonts, scale, scale, scale);
+      "set encoding utf8\nset terminal pngcairo size {},{} noenhanced font 'DejaVu Sans,{}' "
+      "fontscale {} linewidth {} pointscale {} background '#FFFFFF'\n",
+      std::lround(width * scale), std::lround(height * scale), font_size, scale * points_per_pixel,
+      scale, scale);
+}
+
+double title_size(std::string_view title, int width) {
+  constexpr double usual = 17.0;
+  return std::clamp((width - 20.0) / std::max(text_width(title, 1.0), 1.0), 9.0, usual);
+}
+
+std::string ticks(char axis, const Range& range, int at_most, bool logarithmic) {
+  const double step = logarithmic ? 0.0 : tick_step(range.span(), at_most);
+  return step > 0.0 ? fmt::format("set {}tics {}\n", axis, step)
+                    : fmt::format("set {}tics autofreq\n", axis);
 }
 
 Expected<std::string> gnuplot_script(const Plot& plot, PictureFormat format) {

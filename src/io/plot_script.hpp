@@ -1,9 +1,12 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include <flyball/core/expected.hpp>
 #include <flyball/io/plot.hpp>
+
+#include "io/plot_data.hpp"
 
 /// Plots as gnuplot programs; private to io.
 namespace flyball::io {
@@ -15,6 +18,12 @@ enum class PictureFormat { svg, png };
 
 /// The commands that every picture begins with: terminal, fonts, encoding.
 [[nodiscard]] std::string script_head(PictureFormat format, int width, int height);
+
+/// The size of a title's font, smaller if it would not fit.
+[[nodiscard]] double title_size(std::string_view title, int width);
+
+/// The command for an axis' ticks, not more than so many. @param axis  'x', 'y'.
+[[nodiscard]] std::string ticks(char axis, const Range& range, int at_most, bool logarithmic);
 
 /// A text as a gnuplot literal in single quotes, in which neither backslash nor backtick means
 /// anything. An apostrophe becomes the typographic one: gnuplot 5.4 takes a doubled quote at the

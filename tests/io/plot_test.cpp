@@ -12,6 +12,7 @@
 #include <flyball/io/file.hpp>
 
 #include "io/examples.hpp"
+#include "io/plot_data.hpp"
 #include "io/temporary_folder.hpp"
 
 namespace flyball {
@@ -31,7 +32,8 @@ Plot example(std::size_t points) {
   PlotBand band{"interval", line.x, line.y, line.y};
   PlotPanel panel{"Velocity (m/s)", {line}, {band}, {{0.5, "step", true}, {1.2, "limit"}}};
   for (const LineStyle style : {LineStyle::dashed, LineStyle::points, LineStyle::steps,
-                                LineStyle::crosses, LineStyle::circles}) {
+                                LineStyle::crosses, LineStyle::circles, LineStyle::squares,
+                                LineStyle::dash_dot, LineStyle::dotted, LineStyle::samples}) {
     panel.lines.push_back({"", {0.1, 0.2}, {0.1, 0.2}, style});
   }
   plot.panels = {panel, {"Voltage (V)", {line}}};
@@ -109,6 +111,38 @@ TEST(Plot, LongSeriesStaySmallAndKeepTheirExtremes) {
   EXPECT_NE(with, render_svg({.panels = {flat}}).value());
 }
 
+TEST(Plot, TicksAreOneTwoOrFiveTimesAPowerOfTen) {
+  EXPECT_DOUBLE_EQ(io::tick_step(1.0, 10), 0.1);
+  EXPECT_DOUBLE_EQ(io::tick_step(1.0, 9), 0.2);
+  EXPECT_DOUBLE_EQ(io::tick_step(8.9, 5), 2.0);
+  EXPECT_DOUBLE_EQ(io::tick_step(2400.0, 5), 500.0);
+  EXPECT_DOUBLE_EQ(io::tick_step(60.0, 1), 100.0);
+  EXPECT_DOUBLE_EQ(io::tick_step(60.0, 0), 100.0);
+  EXPECT_EQ(io::tick_step(1e-300, 5), 0.0);
+  EXPECT_EQ(io::tick_step(std::numeric_limits<double>::infinity(), 5), 0.0);
+
+  io::Range range;
+  range.include(0.004);
+  range.include(5.999);
+  io::round_out(range, 1.0);
+  EXPECT_EQ(range.low(), 0.0);
+  EXPECT_EQ(range.high(), 6.0);
+  range.include(6.5);
+  io::round_out(range, 1.0);
+  EXPECT_EQ(range.high(), 6.5);
+}
+
+TEST(Plot, NotesAndLimits) {
+  Plot plot = example(50);
+  plot.panels[0].notes = {{0.5, 0.5, "here"}, {nan, 0.0, "nowhere"}};
+  plot.panels[0].y_limits = PlotLimits{-0.5, 0.5};
+  const std::string svg = render_svg(plot).value();
+  EXPECT_TRUE(contains(svg, "here"));
+  EXPECT_FALSE(contains(svg, "nowhere"));
+  plot.panels[0].y_limits.reset();
+  EXPECT_NE(svg, render_svg(plot).value());
+}
+
 TEST(Plot, GapsConstantsAndNothing) {
   Plot plot = example(3);
   plot.panels = {
@@ -150,6 +184,24 @@ TEST(Plot, Surfaces) {
   EXPECT_TRUE(contains(render_svg(surface).value(), "Cost-to-go"));
   surface.from_above = true;
   EXPECT_TRUE(render_png(surface).value().starts_with("\x89PNG"));
+
+  // A map beside it: one picture, whatever may be in it, that carries its pixels itself.
+  SurfacePlot right = example_surface();
+  right.unit_circle = true;
+  surface.equal_axes = true;
+  surface.beside.push_back(right);
+  const std::string pair = render_svg(surface).value();
+  EXPECT_TRUE(contains(pair, "data:image/png;base64,"));
+  EXPECT_GT(pair.size(), render_svg(example_surface()).value().size() / 2);
+  surface.beside[0].z.pop_back();
+  EXPECT_TRUE(render_svg(surface).error().is(ArgumentError::wrong_shape));
+  surface.beside.clear();
+  surface.x = {0, 1, 3};
+  EXPECT_TRUE(render_svg(surface).error().is(ArgumentError::out_of_range));
+  surface.from_above = false;  // polygons may be of any width
+  EXPECT_TRUE(render_svg(surface));
+
+  surface = example_surface();
   surface.z.pop_back();
   EXPECT_TRUE(render_svg(surface).error().is(ArgumentError::wrong_shape));
   surface.z.assign(6, nan);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <complex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,8 +22,19 @@ enum class PlotError {
 };
 [[nodiscard]] ErrorInfo error_info(PlotError code);
 
-/// How a curve is drawn.
-enum class LineStyle { solid, dashed, points, steps, crosses, circles };
+/// How a curve is drawn. Several curves of one panel are told apart in grey by their dashes.
+enum class LineStyle {
+  solid,
+  dashed,
+  points,
+  steps,
+  crosses,
+  circles,
+  squares,
+  dash_dot,
+  dotted,
+  samples,  ///< Points joined by a thin line: few values at whole steps.
+};
 
 /// One curve of a panel.
 struct PlotLine {
@@ -49,6 +61,19 @@ struct PlotMark {
   bool vertical = false;
 };
 
+/// Words beside a point of a panel.
+struct PlotNote {
+  double x = 0.0;
+  double y = 0.0;
+  std::string text = {};
+};
+
+/// What an axis shows of data that go further.
+struct PlotLimits {
+  double low = 0.0;
+  double high = 1.0;
+};
+
 /// One pair of axes. Panels of a plot stand above each other and share the x axis.
 struct PlotPanel {
   std::string y_label = {};  ///< With its unit: "Velocity (m/s)".
@@ -56,6 +81,8 @@ struct PlotPanel {
   std::vector<PlotBand> bands = {};
   std::vector<PlotMark> marks = {};
   bool log_y = false;
+  std::vector<PlotNote> notes = {};
+  std::optional<PlotLimits> y_limits = {};  ///< Curves are cut there; absent: all is shown.
 };
 
 /// A picture of one or more panels above each other.
@@ -66,22 +93,31 @@ struct Plot {
   bool log_x = false;
   bool equal_axes = false;  ///< One unit is as long on x as on y.
   bool unit_circle = false;
-  int width = 900;  ///< Pixels.
-  int height = 0;   ///< Pixels; 0: what the panels need.
+  int width = 900;      ///< Pixels.
+  int height = 0;       ///< Pixels; 0: what the panels need.
+  double x_step = 0.0;  ///< Between two ticks of the x axis; 0: chosen.
 };
 
-/// A function of two variables: a surface in perspective, or coloured from above.
+/// A function of two variables: a surface in perspective, or coloured from above. Viridis, which
+/// keeps its order in grey and for the colour-blind (van der Walt and Smith, 2015); NaN stays
+/// blank.
 struct SurfacePlot {
   std::string title = {};
-  std::string x_label = {};
+  std::string x_label = {};  ///< With its unit, as those below.
   std::string y_label = {};
   std::string z_label = {};
   std::vector<double> x = {};
   std::vector<double> y = {};
   std::vector<double> z = {};  ///< z[i * x.size() + j] belongs to (x[j], y[i]).
-  bool from_above = false;
+  bool from_above = false;     ///< Then x and y ascend evenly.
   int width = 900;
   int height = 620;
+  bool equal_axes = false;   ///< From above: one unit is as long on x as on y.
+  bool unit_circle = false;  ///< From above: drawn over the colours.
+  double z_step = 0.0;       ///< From above: between two ticks of the colours; 0: chosen.
+  /// From above: maps to the right of this one, in the same colours. Of theirs only the axes, the
+  /// data and what is drawn over them count.
+  std::vector<SurfacePlot> beside = {};
 };
 
 /// Closed-loop or open-loop poles (and zeros) in the complex plane, poles as crosses, zeros as
@@ -98,7 +134,8 @@ struct PolePlotGroup {
                              bool discrete);
 
 /// The `<svg>` element as text, fit for an HTML page or a file.
-/// @errors PlotError, ArgumentError::wrong_shape (columns of unequal length), out_of_range (size).
+/// @errors PlotError, ArgumentError::wrong_shape (columns of unequal length), out_of_range (size,
+/// axes of a map that do not ascend evenly), empty (no panel, no finite value).
 /// Cost: starts gnuplot, about 0.1 s.
 [[nodiscard]] Expected<std::string> render_svg(const Plot& plot);
 [[nodiscard]] Expected<std::string> render_svg(const SurfacePlot& plot);
