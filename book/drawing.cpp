@@ -14,8 +14,6 @@ const std::vector<double>* find_column(const FigureResult& figure, const std::st
 }  // namespace
 
 Plot response_plot(const FigureResult& figure, const std::vector<ResponsePanel>& panels) {
-  constexpr int reference_color = 1;
-  constexpr int state_color = 0;
   Plot plot;
   plot.title = figure.title;
   plot.x_label = "Time (s)";
@@ -44,8 +42,11 @@ Plot line_plot(const FigureResult& figure, const std::string& y_label,
   PlotPanel panel{.y_label = y_label};
   for (const PlotColumn& column : columns) {
     if (const auto* values = find_column(figure, column.column)) {
-      panel.lines.push_back(
-          {.label = column.label, .x = figure.columns.front().values, .y = *values});
+      panel.lines.push_back({.label = column.label,
+                             .x = figure.columns.front().values,
+                             .y = *values,
+                             .style = column.style,
+                             .color = column.color});
     }
   }
   return {.title = figure.title, .x_label = "Time (s)", .panels = {std::move(panel)}};

@@ -38,11 +38,17 @@ struct ResponsePanel {
 [[nodiscard]] Plot response_plot(const FigureResult& figure,
                                  const std::vector<ResponsePanel>& panels);
 
-/// A column, and what it is called in the legend.
+/// A column, what it is called in the legend, and how it is drawn.
 struct PlotColumn {
   std::string column;
   std::string label;
+  LineStyle style = LineStyle::solid;
+  int color = -1;  ///< As of a PlotLine.
 };
+
+/// What a controller should reach: dashed and of this colour in every figure.
+constexpr int reference_color = 1;
+constexpr int state_color = 0;
 
 /// Columns over the first one, time, in one panel.
 [[nodiscard]] Plot line_plot(const FigureResult& figure, const std::string& y_label,

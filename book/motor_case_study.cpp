@@ -34,8 +34,9 @@ FigureResult case_study(std::string id, std::string title, const DiscreteSystem<
                     {"reference_velocity", "rad/s", constant(r(0))},
                     {"reference_current", "A", constant(r(1))}};
   Plot plot{.title = figure.title, .x_label = "Time (s)"};
-  plot.panels = {
-      {.y_label = "Velocity (rad/s)"}, {.y_label = "Current (A)"}, {.y_label = "Input (V)"}};
+  plot.panels = {{.y_label = "Angular velocity (rad/s)"},
+                 {.y_label = "Current (A)"},
+                 {.y_label = "Voltage (V)"}};
   for (std::size_t i = 0; i < 2; ++i) {
     plot.panels[i].lines.push_back({.label = i == 0 ? "Reference" : "",
                                     .x = time,
@@ -43,7 +44,10 @@ FigureResult case_study(std::string id, std::string title, const DiscreteSystem<
                                     .style = LineStyle::dashed,
                                     .color = 1});
   }
-  int color = 1;
+  // Blue, green, black, told apart in grey by their dashes.
+  constexpr int colors[] = {0, 2, 6};
+  constexpr LineStyle styles[] = {LineStyle::solid, LineStyle::dash_dot, LineStyle::dotted};
+  std::size_t drawn = 0;
   for (const CaseStudy& controller : controllers) {
     Eigen::Vector2d x = Eigen::Vector2d::Zero();
     std::vector<double> columns[3];
@@ -54,11 +58,14 @@ FigureResult case_study(std::string id, std::string title, const DiscreteSystem<
       columns[1].push_back(x(1));
       columns[2].push_back(u);
     }
-    color = color == 1 ? 0 : color == 0 ? 2 : color + 1;
     for (std::size_t i = 0; i < 3; ++i) {
-      plot.panels[i].lines.push_back(
-          {.label = i == 0 ? controller.label : "", .x = time, .y = columns[i], .color = color});
+      plot.panels[i].lines.push_back({.label = i == 0 ? controller.label : "",
+                                      .x = time,
+                                      .y = columns[i],
+                                      .style = styles[drawn % 3],
+                                      .color = colors[drawn % 3]});
     }
+    ++drawn;
     figure.columns.push_back({"velocity_" + controller.name, "rad/s", columns[0]});
     figure.columns.push_back({"current_" + controller.name, "A", columns[1]});
     figure.columns.push_back({"voltage_" + controller.name, "V", columns[2]});

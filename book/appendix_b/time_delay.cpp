@@ -68,15 +68,16 @@ FigureResult delayed_loop(const DelayStudy& study) {
     const auto row = static_cast<Eigen::Index>(i);
     figure.columns.push_back({"reference_" + study.names[i], study.units[i], values(r.row(row))});
     figure.columns.push_back({study.names[i], study.units[i], values(states.row(row))});
-    figure.numbers.push_back({study.names.size() == 1 ? "K"
-                              : i == 0                ? "K_p"
-                                                      : "K_d",
-                              "V/(" + study.units[i] + ")", K(row)});
+    const std::string gain = study.names.size() == 1 ? "K" : i == 0 ? "K_p" : "K_d";
+    // "V/m", "V/(m/s)"
+    const bool quotient = study.units[i].find('/') != std::string::npos;
+    const std::string unit = quotient ? "V/(" + study.units[i] + ")" : "V/" + study.units[i];
+    figure.numbers.push_back({gain, unit, K(row)});
     panels.push_back({study.labels[i] + " (" + study.units[i] + ")", study.names[i],
-                      "State (K = " + format_number(K(row), 4) + ")"});
+                      "State (" + gain + " = " + format_number(K(row), 5) + " " + unit + ")"});
   }
   figure.columns.push_back({"voltage", "V", voltage});
-  panels.push_back({"Voltage (V)", "voltage", "Input"});
+  panels.push_back({"Voltage (V)", "voltage", "Input, as it arrives"});
   figure.picture = response_plot(figure, panels);
   return figure;
 }

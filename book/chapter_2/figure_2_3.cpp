@@ -50,8 +50,9 @@ FigureResult figure_2_3() {
   figure.numbers = {{"K_p", "V/m", K_p}, {"K_d", "V/(m/s)", K_d}};
   figure.picture = response_plot(
       figure,
-      {{"Position (m)", "position", "Output (Kp = " + format_number(K_p, 5) + ")", "Setpoint"},
-       {"Velocity (m/s)", "velocity", "Output (Kd = " + format_number(K_d, 2) + ")", "Setpoint"},
+      {{"Position (m)", "position", "Output (Kp = " + format_number(K_p, 5) + " V/m)", "Setpoint"},
+       {"Velocity (m/s)", "velocity", "Output (Kd = " + format_number(K_d, 4) + " V/(m/s))",
+        "Setpoint"},
        {"Voltage (V)", "voltage", "Input"}});
   return figure;
 }

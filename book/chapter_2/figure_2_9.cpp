@@ -36,10 +36,10 @@ FigureResult figure_2_9() {
                     {"damping_overdamped", "", 2.5 / std::sqrt(3.0)},
                     {"damping_critically_damped", "", 2.5 / std::sqrt(6.268)}};
   figure.picture = line_plot(figure, "Position (m)",
-                             {{"setpoint", "Setpoint"},
-                              {"underdamped", "Underdamped"},
-                              {"overdamped", "Overdamped"},
-                              {"critically_damped", "Critically damped"}});
+                             {{"underdamped", "Underdamped", LineStyle::solid, 0},
+                              {"overdamped", "Overdamped", LineStyle::dash_dot, 2},
+                              {"critically_damped", "Critically damped", LineStyle::dotted, 6},
+                              {"setpoint", "Setpoint", LineStyle::dashed, reference_color}});
   return figure;
 }
 

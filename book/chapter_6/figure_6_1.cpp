@@ -25,7 +25,12 @@ FigureResult figure_6_1() {
     time.push_back(k * period.si());
   }
   figure.columns.push_back({"time", "s", time});
-  PlotPanel panel{.y_label = "Im (rad/s)", .marks = {{.at = 0.0, .vertical = true}, {.at = 0.0}}};
+  PlotPanel panel{
+      .y_label = "Imaginary part of the pole (rad/s)",
+      .marks = {{.at = 0.0, .vertical = true}, {.at = 0.0}},
+      .notes = {{-2.1, 2.25, "Stable: left half-plane"}, {0.6, 2.25, "Unstable: right half-plane"}},
+      .y_limits = PlotLimits{-0.4, 2.5}};
+  PlotLine crosses{.label = "Pole", .style = LineStyle::crosses, .color = 6};
   for (const auto& [sigma, omega] : poles) {
     // dx/dt = [σ -ω; ω σ] x turns and grows like the mode; the impulse is its initial state.
     const Eigen::Matrix2d A{{sigma, -omega}, {omega, sigma}};
@@ -33,6 +38,8 @@ FigureResult figure_6_1() {
     Eigen::Vector2d x(1.0, 0.0);
     std::vector<double> response;
     PlotLine drawn{.color = sigma < 0.0 ? 2 : sigma > 0.0 ? 1 : 0};
+    PlotLine axis{.x = {sigma, sigma + 0.4}, .y = {omega, omega}, .style = LineStyle::dotted};
+    axis.color = 6;
     for (int k = 0; k < samples; ++k) {
       response.push_back(x(0));
       x = mode.A * x;
@@ -41,14 +48,25 @@ FigureResult figure_6_1() {
     for (int k = 0; k < 200; ++k) {
       const double t = k * 0.01;
       const double value = std::exp(sigma * t) * std::cos(omega * 80.0 / 3.0 * t / 2.0);
+      if (std::abs(value) > 2.0) {
+        break;
+      }
       drawn.x.push_back(sigma + 0.2 * t);
-      drawn.y.push_back(std::abs(value) > 2.0 ? std::nan("") : omega + 0.15 * value);
+      drawn.y.push_back(omega + 0.15 * value);
     }
     figure.columns.push_back({fmt::format("pole {}{:+}j", sigma, omega), "", response});
+    if (omega > 0.0) {
+      panel.lines.push_back(std::move(axis));
+    }
     panel.lines.push_back(std::move(drawn));
-    panel.lines.push_back({.x = {sigma}, .y = {omega}, .style = LineStyle::crosses, .color = 4});
+    crosses.x.push_back(sigma);
+    crosses.y.push_back(omega);
   }
-  figure.picture = Plot{.title = figure.title, .x_label = "Re (1/s)", .panels = {panel}};
+  panel.lines.push_back(std::move(crosses));
+  figure.picture = Plot{.title = figure.title,
+                        .x_label = "Real part of the pole (1/s)",
+                        .panels = {panel},
+                        .equal_axes = true};
   return figure;
 }
 

@@ -40,7 +40,8 @@ FigureResult position_step(std::string id, std::string title, const Eigen::Matri
   const Eigen::VectorXcd open = poles(A).value();
   figure.numbers = {{"slowest_electrical_pole", "1/s", open.real().minCoeff()}};
   figure.picture = line_plot(figure, "Position (rad)",
-                             {{"reference", "Reference"}, {"position", "Step response"}});
+                             {{"position", "Step response", LineStyle::solid, state_color},
+                              {"reference", "Reference", LineStyle::dashed, reference_color}});
   return figure;
 }
 

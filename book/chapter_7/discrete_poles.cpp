@@ -12,7 +12,8 @@ namespace {
 constexpr int samples = 60;
 
 FigureResult pole_figure(std::string id, std::string title, const DiscreteSystem<>& right,
-                         const DiscreteSystem<>& left) {
+                         const DiscreteSystem<>& left, const std::string& right_label,
+                         const std::string& left_label) {
   std::vector<double> time;
   for (int k = 0; k < samples; ++k) {
     time.push_back(k * right.period.si());
@@ -26,9 +27,10 @@ FigureResult pole_figure(std::string id, std::string title, const DiscreteSystem
     return step_response(system, 2000)(1999);
   };
   figure.numbers = {{"final_right", "", settled(right)}, {"final_left", "", settled(left)}};
-  figure.picture = line_plot(figure, "Step response",
-                             {{"right_half_plane", "Poles in the right half plane"},
-                              {"left_half_plane", "Poles in the left half plane"}});
+  figure.picture =
+      line_plot(figure, "Step response",
+                {{"right_half_plane", right_label, LineStyle::samples, state_color},
+                 {"left_half_plane", left_label, LineStyle::samples, reference_color}});
   return figure;
 }
 
@@ -41,7 +43,8 @@ FigureResult figure_7_2() {
     return DiscreteSystem<>{Eigen::MatrixXd{{pole}}, Eigen::MatrixXd{{1.0}}, Eigen::MatrixXd{{1.0}},
                             Eigen::MatrixXd{{0.0}}, 100_ms};
   };
-  return pole_figure("7.2", "Single poles on the real axis", system(0.6), system(-0.6));
+  return pole_figure("7.2", "Single poles on the real axis", system(0.6), system(-0.6),
+                     "Pole at 0.6, right half-plane", "Pole at −0.6, left half-plane");
 }
 
 /// Figure 7.3: of 1/((z ∓ 0.6)² + 0.6²), whose poles are ±0.6 ± 0.6j.
@@ -52,7 +55,9 @@ FigureResult figure_7_3() {
                             Eigen::MatrixXd{{0.0}, {1.0}}, Eigen::MatrixXd{{1.0, 0.0}},
                             Eigen::MatrixXd{{0.0}}, 100_ms};
   };
-  return pole_figure("7.3", "Complex conjugate poles", system(0.6), system(-0.6));
+  return pole_figure("7.3", "Complex conjugate poles", system(0.6), system(-0.6),
+                     "Poles at 0.6 ± 0.6j, right half-plane",
+                     "Poles at −0.6 ± 0.6j, left half-plane");
 }
 
 }  // namespace flyball::book

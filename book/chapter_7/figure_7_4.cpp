@@ -24,7 +24,7 @@ FigureResult figure_7_4() {
     original.push_back(signal(t));
     aliased.push_back(std::sin(-2.0 * std::numbers::pi * alias * t));
   }
-  PlotLine samples{.label = "Samples at 2 Hz", .style = LineStyle::circles};
+  PlotLine samples{.label = "Samples at 2 Hz", .style = LineStyle::circles, .color = 6};
   for (int k = 0; k < 8; ++k) {
     samples.x.push_back(k / sample_rate);
     samples.y.push_back(signal(k / sample_rate));
@@ -33,9 +33,9 @@ FigureResult figure_7_4() {
   FigureResult figure{.id = "7.4", .title = "Aliasing"};
   figure.columns = {{"time", "s", time}, {"original", "", original}, {"aliased", "", aliased}};
   figure.numbers = {{"alias_frequency", "Hz", alias}};
-  Plot plot = line_plot(
-      figure, "f(t)",
-      {{"original", "Original signal at 1.5 Hz"}, {"aliased", "Aliased signal at 0.5 Hz"}});
+  Plot plot = line_plot(figure, "Signal",
+                        {{"original", "Original signal at 1.5 Hz"},
+                         {"aliased", "Aliased signal at 0.5 Hz", LineStyle::dashed}});
   plot.panels[0].lines.push_back(std::move(samples));
   figure.picture = std::move(plot);
   return figure;

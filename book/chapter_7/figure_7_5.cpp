@@ -17,7 +17,8 @@ FigureResult figure_7_5() {
     exact.push_back(std::exp(t.back()));
   }
   figure.columns = {{"t", "", t}, {"exponential", "", exact}};
-  std::vector<PlotColumn> drawn{{"exponential", "e^t"}};
+  std::vector<PlotColumn> drawn{{"exponential", "exp(t)", LineStyle::solid, 6}};
+  constexpr LineStyle styles[] = {LineStyle::dotted, LineStyle::dash_dot, LineStyle::dashed};
   for (int order = 5; order >= 0; --order) {
     std::vector<double> polynomial;
     for (const double at : t) {
@@ -31,16 +32,11 @@ FigureResult figure_7_5() {
     }
     const std::string name = "order_" + std::to_string(order);
     figure.columns.push_back({name, "", polynomial});
-    drawn.push_back({name, "n = " + std::to_string(order)});
+    drawn.push_back({name, "Order " + std::to_string(order), styles[order % 3], 5 - order});
   }
-  Plot plot = line_plot(figure, "f(t)", drawn);
+  Plot plot = line_plot(figure, "Sum of the series", drawn);
   plot.x_label = "t";
-  // As far as the book's axes go.
-  for (PlotLine& line : plot.panels[0].lines) {
-    for (double& y : line.y) {
-      y = y < -2.0 || y > 20.0 ? std::nan("") : y;
-    }
-  }
+  plot.panels[0].y_limits = PlotLimits{-2.0, 20.0};  // the book's axes
   figure.picture = std::move(plot);
   return figure;
 }

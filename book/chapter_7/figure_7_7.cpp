@@ -47,7 +47,7 @@ FigureResult figure_7_7() {
   figure.picture = SurfacePlot{.title = figure.title,
                                .x_label = "Position (m)",
                                .y_label = "Velocity (m/s)",
-                               .z_label = "Cost-to-go",
+                               .z_label = "Cost-to-go xᵀSx",
                                .x = values(axis),
                                .y = values(axis),
                                .z = costs};
