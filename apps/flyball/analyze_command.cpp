@@ -191,7 +191,8 @@ void add_analyze_command(CLI::App& program, Invocation& invocation) {
                    "A JSON file with A and B, and perhaps C, D, domain (\"continuous\" or "
                    "\"discrete\"), T (s) and states (names)")
       ->required();
-  add_common_options(*command, options->common, "a pole map and step responses, with their data");
+  add_common_options(*command, options->common,
+                     "Write a pole map and step responses, with their data, into this folder");
   command->callback([options, &invocation] { invocation.status = run(*options); });
 }
 

@@ -20,7 +20,13 @@ struct Options {
   std::vector<std::string> figures;
   bool list = false;
   bool check = false;
+  bool all = false;
 };
+
+/// "Figure 6.3", "Table 7.2".
+std::string name_of(const std::string& id) {
+  return id.starts_with("table") ? "T" + id.substr(1) : "Figure " + id;
+}
 
 int list(const Options& options) {
   if (options.common.json) {
@@ -33,9 +39,9 @@ int list(const Options& options) {
     print(Json{{"schema", schema}, {"figures", std::move(figures)}}.dump());
     return success;
   }
-  std::string text = fmt::format("{:<8} {:<8} {}\n", "figure", "section", "title");
+  std::string text = fmt::format("{:<10} {:<8} {}\n", "figure", "section", "title");
   for (const book::FigureEntry& entry : book::figures()) {
-    text += fmt::format("{:<8} {:<8} {}\n", entry.id, entry.section, entry.title);
+    text += fmt::format("{:<10} {:<8} {}\n", entry.id, entry.section, entry.title);
   }
   print(text);
   return success;
@@ -79,14 +85,18 @@ int check(const Options& options) {
     }
     print(Json{{"schema", schema}, {"passed", passed}, {"checks", std::move(list)}}.dump());
   } else {
-    std::string text = fmt::format("{:<7} {:<34} {:>7} {:>12} {:>10}\n", "figure",
+    std::string text = fmt::format("{:<10} {:<34} {:>7} {:>12} {:>10}\n", "figure",
                                    "number or series", "values", "worst error", "tolerance");
     for (const book::FigureCheck& c : *checks) {
       text += c.problem.empty()
-                  ? fmt::format("{:<7} {:<34} {:>7} {:>12.2e} {:>10.0e}  {}\n", c.figure, c.name,
+                  ? fmt::format("{:<10} {:<34} {:>7} {:>12.2e} {:>10.0e}  {}\n", c.figure, c.name,
                                 c.values, c.worst_error, c.tolerance, c.passed ? "ok" : "WRONG")
-                  : fmt::format("{:<7} {:<34} {}\n", c.figure, c.name, c.problem);
+                  : fmt::format("{:<10} {:<34} {}\n", c.figure, c.name, c.problem);
     }
+    const auto wrong = std::count_if(checks->begin(), checks->end(),
+                                     [](const book::FigureCheck& c) { return !c.passed; });
+    text += wrong == 0 ? fmt::format("all {} agree with their references\n", checks->size())
+                       : fmt::format("{} of {} are WRONG\n", wrong, checks->size());
     print(text);
   }
   return passed ? success : no_answer;
@@ -109,7 +119,7 @@ int draw(const Options& options) {
       return fail(files.error(), options.common, schema);
     }
     Json numbers = Json::object();
-    std::string text = fmt::format("Figure {}: {}\n", figure->id, figure->title);
+    std::string text = fmt::format("{}: {}\n", name_of(figure->id), figure->title);
     for (const book::FigureNumber& number : figure->numbers) {
       numbers[number.name] = {{"value", number.value}, {"unit", number.unit}};
       text += fmt::format("  {} = {:.6g} {}\n", number.name, number.value, number.unit);
@@ -139,6 +149,7 @@ void add_book_command(CLI::App& program, Invocation& invocation) {
       "book", "Draw figures of Controls Engineering in FRC, and check them against references");
   auto options = std::make_shared<Options>();
   command->add_option("FIGURE", options->figures, "Figures by number, such as 6.3");
+  command->add_flag("--all", options->all, "Draw every figure that is there");
   command->add_flag("--list", options->list, "List the figures that are there");
   command->add_flag("--check", options->check,
                     "Compare with reference numbers; exit status 1 if any is off");
@@ -146,6 +157,12 @@ void add_book_command(CLI::App& program, Invocation& invocation) {
                      "Write picture (PNG, SVG) and CSV here (this folder if absent)");
   command->callback([options, &invocation] {
     int& status = invocation.status;
+    if (options->all) {
+      options->figures.clear();
+      for (const book::FigureEntry& entry : book::figures()) {
+        options->figures.emplace_back(entry.id);
+      }
+    }
     if (options->list) {
       status = list(*options);
     } else if (options->check) {
@@ -154,7 +171,7 @@ void add_book_command(CLI::App& program, Invocation& invocation) {
       status = fail(Error(ArgumentError::empty)
                         .about("book")
                         .got("called without a figure")
-                        .expected("a figure's number, --list or --check"),
+                        .expected("a figure's number, --all, --list or --check"),
                     options->common, schema);
     } else {
       status = draw(*options);

@@ -1,4 +1,5 @@
 #include <memory>
+#include <string_view>
 
 #include <flyball/core/quantity.hpp>
 #include <flyball/study/project.hpp>
@@ -35,7 +36,15 @@ Expected<double> option_quantity(const std::string& text, Dimension dimension, c
 int run(const Options& options) {
   auto project = study::read_project(options.project);
   if (!project) {
-    return fail(project.error(), options.common, schema);
+    const std::string_view path = options.project;
+    const bool log = path.ends_with(".json") || path.ends_with(".wpilog") || path.ends_with(".csv");
+    Error error = std::move(project).error();
+    if (log && error.is(study::ProjectError::syntax)) {
+      constexpr const char* mend =
+          "a log goes to `flyball tune`, a linear model to `flyball analyze`";
+      return fail(std::move(error).hint(mend), options.common, schema);
+    }
+    return fail(error, options.common, schema);
   }
   if (project->plant_error) {
     return fail(*project->plant_error, options.common, schema);

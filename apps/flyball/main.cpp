@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,6 +30,11 @@ std::string unknown_command(const CLI::App& program, int argc, char** argv) {
   const std::string_view wanted = argv[1];
   if (std::find(names.begin(), names.end(), wanted) != names.end()) {
     return {};
+  }
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(wanted, ignored)) {
+    return fmt::format("\"{}\" is a file, not a command; try \"flyball {} {}\"", wanted,
+                       wanted.ends_with(".toml") ? "design" : "tune", wanted);
   }
   const std::string nearest = flyball::nearest_name(wanted, names);
   return fmt::format("\"{}\" is not a command; {}", wanted,

@@ -291,6 +291,13 @@ std::string owners(const Eigen::VectorXd& participation, std::span<const std::st
   return text.empty() ? "all states together" : text;
 }
 
+/// For words only: parts that are rounding beside the other eigenvalues are zero.
+std::complex<double> without_rounding(std::complex<double> eigenvalue, double scale) {
+  constexpr double rounding = 1e-12;
+  const auto part = [&](double value) { return std::abs(value) < rounding * scale ? 0.0 : value; };
+  return {part(eigenvalue.real()), part(eigenvalue.imag())};
+}
+
 struct Words {
   std::string_view verb;     ///< "no input moves"
   std::string_view reached;  ///< "reached by the inputs"
@@ -304,20 +311,24 @@ std::string describe(const ReachAnalysis& analysis, std::string_view headline, c
   for (Index k = 0; k < analysis.hidden.cols(); ++k) {
     text += fmt::format("{} {}\n", words.verb, combination(analysis.hidden.col(k), names));
   }
+  double scale = 0.0;
+  for (const ModeReach& mode : analysis.modes) {
+    scale = std::max(scale, std::abs(mode.eigenvalue));
+  }
   for (const ModeReach& mode : analysis.modes) {
     if (mode.eigenvalue.imag() < 0.0) {
       continue;
     }
+    const std::string pole = detail::pole_text(without_rounding(mode.eigenvalue, scale));
     if (!mode.reached) {
-      text +=
-          fmt::format("{} the mode {} ({}; {})\n", words.verb, detail::pole_text(mode.eigenvalue),
-                      to_string(mode.stability), owners(mode.participation, names));
+      text += fmt::format("{} the mode {} ({}; {})\n", words.verb, pole, to_string(mode.stability),
+                          owners(mode.participation, names));
     } else {
       constexpr double weak = 1e-6;
-      text += fmt::format("{} {} ({}; {}): distance {}\n",
-                          mode.distance < weak ? words.weak : std::string_view("mode"),
-                          detail::pole_text(mode.eigenvalue), to_string(mode.stability),
-                          owners(mode.participation, names), format_number(mode.distance, 2));
+      text += fmt::format("{} {} ({}; {}): distance {} from being cut off\n",
+                          mode.distance < weak ? words.weak : std::string_view("mode"), pole,
+                          to_string(mode.stability), owners(mode.participation, names),
+                          format_number(mode.distance, 2));
     }
   }
   return text;
