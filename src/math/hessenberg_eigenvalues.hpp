@@ -2,6 +2,8 @@
 
 // Compiled once for each instruction set; see small_matrix.hpp.
 
+#include "math/small_matrix.hpp"
+
 namespace flyball::detail::FLYBALL_VARIANT {
 
 /// The roots of λ² - trace λ + determinant of a 2x2 block, real ones without cancellation.

@@ -3,349 +3,42 @@
 // The kernel of riccati_kernel.hpp for one instruction set: the including source has chosen
 // FLYBALL_VARIANT and included what stands in the standard library.
 
-#include "math/small_matrix.hpp"
-//
 #include "math/hessenberg_eigenvalues.hpp"
+#include "math/riccati_closed_loop.hpp"
+#include "math/riccati_two_states.hpp"
+#include "math/small_matrix.hpp"
 
 namespace flyball::detail::FLYBALL_VARIANT {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-
-/// Cuts one block of memory into padded matrices.
-class Workspace {
- public:
-  explicit Workspace(double* memory) : next_(memory) {}
-  double* take(int count) {
-    double* const taken = next_;
-    next_ += count;
-    return taken;
-  }
-
- private:
-  double* next_;
-};
-
-/// Columns with gaps of zeros between them.
-inline void pad(double* to, int ld, const double* from, int rows, int columns) {
-  for (int j = 0; j < columns; ++j) {
-    for (int i = 0; i < rows; ++i) {
-      to[i + j * ld] = from[i + j * rows];
-    }
-    for (int i = rows; i < ld; ++i) {
-      to[i + j * ld] = 0.0;
-    }
-  }
-}
-
-/// The symmetric part of S, padded likewise.
-inline void pad_symmetric(double* to, int ld, const double* from, int n) {
-  for (int j = 0; j < n; ++j) {
-    for (int i = 0; i < n; ++i) {
-      to[i + j * ld] = 0.5 * (from[i + j * n] + from[j + i * n]);
-    }
-    for (int i = n; i < ld; ++i) {
-      to[i + j * ld] = 0.0;
-    }
-  }
-}
-
-/// R = LLᵀ in the lower triangle; false where R is not safely positive definite.
-inline bool cholesky(double* R, int ld, int m) {
-  double smallest = std::numeric_limits<double>::infinity();
-  double largest = 0.0;
-  for (int j = 0; j < m; ++j) {
-    double pivot = R[j + j * ld];
-    for (int k = 0; k < j; ++k) {
-      pivot -= R[j + k * ld] * R[j + k * ld];
-    }
-    smallest = pivot < smallest ? pivot : smallest;
-    largest = pivot > largest ? pivot : largest;
-    if (!(pivot > 0.0)) {
-      return false;
-    }
-    const double root = std::sqrt(pivot);
-    const double inverse = 1.0 / root;
-    R[j + j * ld] = root;
-    for (int i = j + 1; i < m; ++i) {
-      double entry = R[i + j * ld];
-      for (int k = 0; k < j; ++k) {
-        entry -= R[i + k * ld] * R[j + k * ld];
-      }
-      R[i + j * ld] = entry * inverse;
-    }
-  }
-  return smallest > 1e-10 * largest;
-}
-
-/// F ← F L⁻ᵀ, F with `ld` rows and m columns.
-inline void divide_by_transposed(double* F, int ld, const double* L, int ldl, int m) {
-  for (int j = 0; j < m; ++j) {
-    for (int k = 0; k < j; ++k) {
-      const double factor = L[j + k * ldl];
-      for (int i = 0; i < ld; ++i) {
-        F[i + j * ld] -= F[i + k * ld] * factor;
-      }
-    }
-    const double inverse = 1.0 / L[j + j * ldl];
-    for (int i = 0; i < ld; ++i) {
-      F[i + j * ld] *= inverse;
-    }
-  }
-}
-
-/// C (+ or -)= F Gᵀ for F, G with m columns.
-template <int N>
-inline void outer(Size<N> n, double* C, double sign, const double* F, const double* G, int m) {
-  const int ld = n.padded();
-  for (int j = 0; j < n(); ++j) {
-    for (int k = 0; k < m; ++k) {
-      const double factor = sign * G[j + k * ld];
-      for (int i = 0; i < ld; ++i) {
-        C[i + j * ld] += F[i + k * ld] * factor;
-      }
-    }
-  }
-}
-
-/// The symmetric solution of X = AᵀXA + C or of AᵀX + XA + C = 0 for two states, by its three
-/// equations; false where they are singular.
-inline bool lyapunov_2x2(bool continuous, const double* A, const double* C, double* X) {
-  const double a = A[0];
-  const double c = A[1];
-  const double b = A[2];
-  const double d = A[3];
-  double M[3][4] = {
-      {2.0 * a, 2.0 * c, 0.0, -C[0]}, {b, a + d, c, -C[1]}, {0.0, 2.0 * b, 2.0 * d, -C[3]}};
-  if (!continuous) {
-    const double discrete[3][4] = {{1.0 - a * a, -2.0 * a * c, -c * c, C[0]},
-                                   {-a * b, 1.0 - a * d - b * c, -c * d, C[1]},
-                                   {-b * b, -2.0 * b * d, 1.0 - d * d, C[3]}};
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 4; ++j) {
-        M[i][j] = discrete[i][j];
-      }
-    }
-  }
-  for (int k = 0; k < 3; ++k) {
-    int pivot = k;
-    for (int i = k + 1; i < 3; ++i) {
-      if (std::abs(M[i][k]) > std::abs(M[pivot][k])) {
-        pivot = i;
-      }
-    }
-    if (pivot != k) {
-      for (int j = k; j < 4; ++j) {
-        const double held = M[k][j];
-        M[k][j] = M[pivot][j];
-        M[pivot][j] = held;
-      }
-    }
-    if (M[k][k] == 0.0) {
-      return false;
-    }
-    for (int i = k + 1; i < 3; ++i) {
-      const double factor = M[i][k] / M[k][k];
-      for (int j = k + 1; j < 4; ++j) {
-        M[i][j] -= factor * M[k][j];
-      }
-    }
-  }
-  const double x22 = M[2][3] / M[2][2];
-  const double x12 = (M[1][3] - M[1][2] * x22) / M[1][1];
-  X[0] = (M[0][3] - M[0][1] * x12 - M[0][2] * x22) / M[0][0];
-  X[1] = X[2] = x12;
-  X[3] = x22;
-  return true;
-}
-
-/// The Lyapunov operator of a closed loop, L(X) = X - SᵀXS or -(SᵀX + XS), whose inverse takes
-/// defects to errors. The continuous one becomes a discrete one by the Cayley transform
-/// A = (S - γI)⁻¹(S + γI) = I + 2γM, M = (S - γI)⁻¹: L⁻¹(C) = Σ (Aᵏ)ᵀ(2γ MᵀCM)Aᵏ.
-template <int N>
-class ClosedLoop {
- public:
-  /// `work` holds six matrices; S is kept.
-  ClosedLoop(Size<N> n, bool continuous, const double* S, double* work, int* pivots)
-      : n_(n), continuous_(continuous), S_(S), work_(work), A_(S) {
-    if (n() == 2 || !continuous) {
-      return;
-    }
-    const int size = n.padded() * n();
-    double* const M = take(0);
-    double* const A = take(1);
-    gamma_ = std::sqrt(squared_norm(n, S, n()) / n());
-    for (int k = 0; k < size; ++k) {
-      M[k] = S[k];
-    }
-    add_diagonal(n, M, -gamma_);
-    valid_ = gamma_ > 0.0 && invert(n, M, pivots);
-    for (int k = 0; k < size; ++k) {
-      A[k] = 2.0 * gamma_ * M[k];
-    }
-    add_diagonal(n, A, 1.0);
-    M_ = M;
-    A_ = A;
-  }
-
-  /// An estimate of trace(L⁻¹(I)), a bound of ‖L⁻¹‖: exact for few states, from four vectors of
-  /// signs else (Hutchinson); infinite where the powers of A do not fade.
-  double gain() {
-    constexpr double infinity = std::numeric_limits<double>::infinity();
-    if (!valid_) {
-      return infinity;
-    }
-    if (n_() <= 4) {
-      double C[16] = {};
-      const int ld = n_.padded();
-      for (int i = 0; i < n_(); ++i) {
-        C[i + i * ld] = 1.0;
-      }
-      if (!solve(C)) {
-        return infinity;
-      }
-      double trace = 0.0;
-      for (int i = 0; i < n_(); ++i) {
-        if (!(C[i + i * ld] > 0.0)) {
-          return infinity;
-        }
-        trace += C[i + i * ld];
-      }
-      return trace;
-    }
-    return sampled_gain();
-  }
-
-  /// C ← L⁻¹(C), C symmetric; false where the powers of A do not fade.
-  bool solve(double* C) {
-    if (!valid_) {
-      return false;
-    }
-    if (n_() == 2) {
-      double X[4];
-      const bool solved = lyapunov_2x2(continuous_, S_, C, X);
-      for (int k = 0; k < 4; ++k) {
-        C[k] = X[k];
-      }
-      return solved;
-    }
-    const int ld = n_.padded();
-    const int size = ld * n_();
-    double* A = take(2);
-    double* T = take(3);
-    double* const At = take(4);
-    for (int k = 0; k < size; ++k) {
-      At[k] = 0.0;
-    }
-    if (continuous_) {
-      congruence(C, M_, At, T);
-      for (int k = 0; k < size; ++k) {
-        C[k] *= 2.0 * gamma_;
-      }
-    }
-    for (int k = 0; k < size; ++k) {
-      A[k] = A_[k];
-    }
-    double* const term = take(5);
-    for (int k = 0; k < 50; ++k) {
-      for (int i = 0; i < size; ++i) {
-        term[i] = C[i];
-      }
-      congruence(term, A, At, T);
-      for (int i = 0; i < size; ++i) {
-        C[i] += term[i];
-      }
-      const double power = squared_norm(n_, A, n_());
-      if (!(power < 1e300)) {
-        return false;
-      }
-      if (power < 1e-17) {
-        return true;
-      }
-      multiply(n_, T, ld, A, ld, A, ld, n_(), n_());
-      double* const swapped = A;
-      A = T;
-      T = swapped;
-    }
-    return false;
-  }
-
- private:
-  double* take(int index) const { return work_ + index * n_.padded() * n_(); }
-
-  static void add_diagonal(Size<N> n, double* M, double value) {
-    for (int i = 0; i < n(); ++i) {
-      M[i + i * n.padded()] += value;
-    }
-  }
-
-  /// C ← MᵀCM.
-  void congruence(double* C, const double* M, double* Mt, double* work) const {
-    const int ld = n_.padded();
-    transpose(n_, Mt, M);
-    multiply(n_, work, ld, C, ld, M, ld, n_(), n_());
-    multiply(n_, C, ld, Mt, ld, work, ld, n_(), n_());
-  }
-
-  double sampled_gain() {
-    const int ld = n_.padded();
-    double* y = take(2);
-    double* next = y + 4 * ld;
-    std::uint64_t bits = 0x9E3779B97F4A7C15U;
-    for (int j = 0; j < 4; ++j) {
-      for (int i = 0; i < ld; ++i) {
-        bits ^= bits << 13U;
-        bits ^= bits >> 7U;
-        bits ^= bits << 17U;
-        y[i + j * ld] = i < n_() ? ((bits & 1U) != 0U ? 1.0 : -1.0) : 0.0;
-      }
-    }
-    const auto advance = [&](const double* M) {
-      multiply(n_, next, ld, M, ld, y, ld, n_(), 4);
-      double* const swapped = y;
-      y = next;
-      next = swapped;
-      return squared_norm(n_, y, 4);
-    };
-    double sum = 4.0 * n_();
-    double unit = 1.0;
-    if (continuous_) {
-      unit = 2.0 * gamma_;
-      sum = advance(M_);
-    }
-    for (int k = 0; k < 2000; ++k) {
-      const double norm = advance(A_);
-      sum += norm;
-      if (norm < 1e-3 * sum) {
-        return 0.25 * sum * unit;
-      }
-    }
-    return std::numeric_limits<double>::infinity();
-  }
-
-  Size<N> n_;
-  bool continuous_;
-  bool valid_ = true;
-  double gamma_ = 0.0;
-  const double* S_;
-  double* work_;
-  const double* A_;
-  const double* M_ = nullptr;
-};
 
 /// The whole of one solution, in one block of memory.
 template <int N>
 class Kernel {
  public:
   Kernel(const RiccatiData& data, RiccatiAnswer& answer, double* memory, int* pivots)
-      : data_(data),
-        answer_(answer),
-        n_{data.states},
-        msize_{data.inputs},
-        pivots_(pivots),
-        work_(memory) {}
+      : data_(data), answer_(answer), n_{data.states}, msize_{data.inputs}, pivots_(pivots) {
+    allocate(Workspace(memory));
+  }
 
   bool run() {
-    if (!load() || (data_.continuous && !cayley()) || !doubling() || !close_loop()) {
+    if (!load()) {
+      return false;
+    }
+    if constexpr (N == 2) {
+      if (closed_form() && verify(50.0)) {
+        return true;
+      }
+      load();
+    }
+    return (!data_.continuous || cayley()) && doubling() && verify(250.0 * n_());
+  }
+
+ private:
+  /// The gain and the residual of X, corrected by Newton's method where they do not vouch for it to
+  /// `allowed` roundings.
+  bool verify(double allowed) {
+    if (!close_loop()) {
       return false;
     }
     for (int refinements = 0;; ++refinements) {
@@ -355,7 +48,7 @@ class Kernel {
       // The computed defect itself is rounded by about eps times the terms.
       const double error = gain * (defect_ + epsilon * scale_);
       answer_.condition = gain * scale_ / size_X_;
-      if (refinements == 0 && error <= 250.0 * n_() * bound) {
+      if (refinements == 0 && error <= allowed * bound) {
         break;
       }
       if (refinements == 4 || !(answer_.condition < 1e11)) {
@@ -373,23 +66,27 @@ class Kernel {
     return check_poles();
   }
 
- private:
   [[nodiscard]] int ld() const { return n_.padded(); }
   [[nodiscard]] int ldm() const { return msize_.padded(); }
   [[nodiscard]] int size() const { return ld() * n_(); }
 
-  bool load() {
+  void allocate(Workspace work) {
     const int n = n_();
     const int m = data_.inputs;
     for (double** matrix : {&A_, &G_, &H_, &W_, &T_, &At_, &V_, &next_, &A0_, &Q_, &X_}) {
-      *matrix = work_.take(size());
+      *matrix = work.take(size());
     }
     for (double** matrix : {&B_, &F_, &Y_, &AXB_}) {
-      *matrix = work_.take(ld() * m);
+      *matrix = work.take(ld() * m);
     }
-    R_ = work_.take(ldm() * m);
-    K_ = work_.take(ldm() * n);
-    Bt_ = work_.take(ldm() * n);
+    R_ = work.take(ldm() * m);
+    K_ = work.take(ldm() * n);
+    Bt_ = work.take(ldm() * n);
+  }
+
+  bool load() {
+    const int n = n_();
+    const int m = data_.inputs;
     pad(A0_, ld(), data_.A, n, n);
     pad(B_, ld(), data_.B, n, m);
     pad_symmetric(Q_, ld(), data_.Q, n);
@@ -425,6 +122,14 @@ class Kernel {
 
   void square(double* C, const double* A, const double* B) const {
     multiply(n_, C, ld(), A, ld(), B, ld(), n_(), n_());
+  }
+
+  bool closed_form() {
+    const TwoByTwo A = TwoByTwo::from(A_);
+    const TwoByTwo G = TwoByTwo::from(G_);
+    const TwoByTwo H = TwoByTwo::from(H_);
+    answer_.iterations = 0;
+    return data_.continuous ? care_two_states(A, G, H, X_) : dare_two_states(A, G, H, X_);
   }
 
   /// With A_γ = A - γI and W = A_γᵀ + H A_γ⁻¹G the discrete equation with
@@ -719,7 +424,6 @@ class Kernel {
   Size<N> n_;
   Size<0> msize_;
   int* pivots_;
-  Workspace work_;
   // A, G, H, W, T and At lie side by side: the closed loop's operator takes their place.
   double *A_, *G_, *H_, *W_, *T_, *At_, *V_, *next_, *A0_, *Q_, *X_;
   double *B_, *F_, *Y_, *AXB_, *R_, *K_, *Bt_;

@@ -247,4 +247,100 @@ inline bool invert(Size<N> size, double* M, int* pivots) {
   return true;
 }
 
+/// Cuts one block of memory into padded matrices.
+class Workspace {
+ public:
+  explicit Workspace(double* memory) : next_(memory) {}
+  double* take(int count) {
+    double* const taken = next_;
+    next_ += count;
+    return taken;
+  }
+
+ private:
+  double* next_;
+};
+
+/// Columns with gaps of zeros between them.
+inline void pad(double* to, int ld, const double* from, int rows, int columns) {
+  for (int j = 0; j < columns; ++j) {
+    for (int i = 0; i < rows; ++i) {
+      to[i + j * ld] = from[i + j * rows];
+    }
+    for (int i = rows; i < ld; ++i) {
+      to[i + j * ld] = 0.0;
+    }
+  }
+}
+
+/// The symmetric part of S, padded likewise.
+inline void pad_symmetric(double* to, int ld, const double* from, int n) {
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      to[i + j * ld] = 0.5 * (from[i + j * n] + from[j + i * n]);
+    }
+    for (int i = n; i < ld; ++i) {
+      to[i + j * ld] = 0.0;
+    }
+  }
+}
+
+/// R = LLᵀ in the lower triangle; false where R is not safely positive definite.
+inline bool cholesky(double* R, int ld, int m) {
+  double smallest = std::numeric_limits<double>::infinity();
+  double largest = 0.0;
+  for (int j = 0; j < m; ++j) {
+    double pivot = R[j + j * ld];
+    for (int k = 0; k < j; ++k) {
+      pivot -= R[j + k * ld] * R[j + k * ld];
+    }
+    smallest = pivot < smallest ? pivot : smallest;
+    largest = pivot > largest ? pivot : largest;
+    if (!(pivot > 0.0)) {
+      return false;
+    }
+    const double root = std::sqrt(pivot);
+    const double inverse = 1.0 / root;
+    R[j + j * ld] = root;
+    for (int i = j + 1; i < m; ++i) {
+      double entry = R[i + j * ld];
+      for (int k = 0; k < j; ++k) {
+        entry -= R[i + k * ld] * R[j + k * ld];
+      }
+      R[i + j * ld] = entry * inverse;
+    }
+  }
+  return smallest > 1e-10 * largest;
+}
+
+/// F ← F L⁻ᵀ, F with `ld` rows and m columns.
+inline void divide_by_transposed(double* F, int ld, const double* L, int ldl, int m) {
+  for (int j = 0; j < m; ++j) {
+    for (int k = 0; k < j; ++k) {
+      const double factor = L[j + k * ldl];
+      for (int i = 0; i < ld; ++i) {
+        F[i + j * ld] -= F[i + k * ld] * factor;
+      }
+    }
+    const double inverse = 1.0 / L[j + j * ldl];
+    for (int i = 0; i < ld; ++i) {
+      F[i + j * ld] *= inverse;
+    }
+  }
+}
+
+/// C (+ or -)= F Gᵀ for F, G with m columns.
+template <int N>
+inline void outer(Size<N> n, double* C, double sign, const double* F, const double* G, int m) {
+  const int ld = n.padded();
+  for (int j = 0; j < n(); ++j) {
+    for (int k = 0; k < m; ++k) {
+      const double factor = sign * G[j + k * ld];
+      for (int i = 0; i < ld; ++i) {
+        C[i + j * ld] += F[i + k * ld] * factor;
+      }
+    }
+  }
+}
+
 }  // namespace flyball::detail::FLYBALL_VARIANT

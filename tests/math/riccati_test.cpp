@@ -327,5 +327,58 @@ TEST(Riccati, BlocksAndManyInputs) {
   EXPECT_EQ(blocks->X, copies->X);
 }
 
+// Two states have a kernel of their own (the spectral factor in closed form). The same equation
+// beside an independent third state takes the general one; the two must agree. Every third plant
+// has a mode at the boundary, every fifth weighs nothing.
+TEST(Riccati, TwoStatesAgreeWithTheGeneralKernel) {
+  Random random(22);
+  const auto normal = [&random](Index rows, Index columns) {
+    return MatrixXd(MatrixXd::NullaryExpr(rows, columns, [&random] { return random.normal(); }));
+  };
+  int compared = 0;
+  for (int trial = 0; trial < 4000; ++trial) {
+    SCOPED_TRACE(trial);
+    const bool continuous = trial % 2 == 0;
+    const Index m = 1 + trial % 4 / 2;
+    MatrixXd A = normal(2, 2);
+    if (trial % 3 == 0) {
+      const Eigen::VectorXcd poles = A.eigenvalues();
+      continuous ? void(A.diagonal().array() -= poles.real().maxCoeff())
+                 : void(A /= poles.cwiseAbs().maxCoeff());
+    }
+    const MatrixXd B = normal(2, m);
+    const MatrixXd C =
+        trial % 5 == 0 && trial % 3 != 0 ? MatrixXd(MatrixXd::Zero(1, 2)) : normal(1, 2);
+    const MatrixXd Q = C.transpose() * C;
+    const MatrixXd N = 0.1 * C.transpose() * normal(1, m);
+    const MatrixXd R = MatrixXd::Identity(m, m);
+    MatrixXd wide_A = MatrixXd::Zero(3, 3);
+    wide_A << A, MatrixXd::Zero(2, 1), MatrixXd::Zero(1, 2), continuous ? -0.5 : 0.5;
+    MatrixXd wide_B = MatrixXd::Zero(3, m + 1);
+    wide_B.topLeftCorner(2, m) = B;
+    wide_B(2, m) = 1.0;
+    MatrixXd wide_Q = MatrixXd::Identity(3, 3);
+    wide_Q.topLeftCorner(2, 2) = Q;
+    MatrixXd wide_N = MatrixXd::Zero(3, m + 1);
+    wide_N.topLeftCorner(2, m) = N;
+    const MatrixXd wide_R = MatrixXd::Identity(m + 1, m + 1);
+    const auto two = continuous ? care(A, B, Q, R, N) : dare(A, B, Q, R, N);
+    const auto three = continuous ? care(wide_A, wide_B, wide_Q, wide_R, wide_N)
+                                  : dare(wide_A, wide_B, wide_Q, wide_R, wide_N);
+    ASSERT_EQ(two.has_value(), three.has_value());
+    if (!two) {
+      continue;
+    }
+    ++compared;
+    const MatrixXd expected = three->X.topLeftCorner(2, 2);
+    // What the kernels vouch for: 250 n roundings, or, corrected, some times the condition.
+    EXPECT_LE((two->X - expected).norm(),
+              epsilon * std::max(750.0, 20.0 * two->condition) * expected.norm());
+    EXPECT_LT(continuous ? two->poles.real().maxCoeff() : two->poles.cwiseAbs().maxCoeff() - 1.0,
+              0.0);
+  }
+  EXPECT_GE(compared, 3960);
+}
+
 }  // namespace
 }  // namespace flyball

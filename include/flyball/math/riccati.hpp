@@ -25,7 +25,7 @@ struct RiccatiSolution {
   Eigen::VectorXcd poles;  ///< n, eigenvalues of A - BK, all inside the unit circle.
   double residual = 0.0;   ///< ‖F(X)‖ / sum of the norms of F's terms (Frobenius).
   double condition = 0.0;  ///< Estimate: condition * residual estimates X's relative error.
-  int iterations = 0;      ///< Doubling steps plus Newton steps.
+  int iterations = 0;      ///< Doubling steps plus Newton steps; 0: a closed form.
 };
 
 /// The stabilising solution X = Xᵀ of the discrete-time algebraic Riccati equation

@@ -1,0 +1,185 @@
+#pragma once
+
+// Part of riccati_kernel_body.hpp, compiled with it once for each instruction set: the Lyapunov
+// operator of a closed loop, by which the kernel judges and corrects what it found.
+
+#include "math/riccati_two_states.hpp"
+#include "math/small_matrix.hpp"
+
+namespace flyball::detail::FLYBALL_VARIANT {
+
+/// The Lyapunov operator of a closed loop, L(X) = X - SᵀXS or -(SᵀX + XS), whose inverse takes
+/// defects to errors. The continuous one becomes a discrete one by the Cayley transform
+/// A = (S - γI)⁻¹(S + γI) = I + 2γM, M = (S - γI)⁻¹: L⁻¹(C) = Σ (Aᵏ)ᵀ(2γ MᵀCM)Aᵏ.
+template <int N>
+class ClosedLoop {
+ public:
+  /// `work` holds six matrices; S is kept.
+  ClosedLoop(Size<N> n, bool continuous, const double* S, double* work, int* pivots)
+      : n_(n), continuous_(continuous), S_(S), work_(work), A_(S) {
+    if (n() == 2 || !continuous) {
+      return;
+    }
+    const int size = n.padded() * n();
+    double* const M = take(0);
+    double* const A = take(1);
+    gamma_ = std::sqrt(squared_norm(n, S, n()) / n());
+    for (int k = 0; k < size; ++k) {
+      M[k] = S[k];
+    }
+    add_diagonal(n, M, -gamma_);
+    valid_ = gamma_ > 0.0 && invert(n, M, pivots);
+    for (int k = 0; k < size; ++k) {
+      A[k] = 2.0 * gamma_ * M[k];
+    }
+    add_diagonal(n, A, 1.0);
+    M_ = M;
+    A_ = A;
+  }
+
+  /// An estimate of trace(L⁻¹(I)), a bound of ‖L⁻¹‖: exact for few states, from four vectors of
+  /// signs else (Hutchinson); infinite where the powers of A do not fade.
+  double gain() {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    if (!valid_) {
+      return infinity;
+    }
+    if (n_() <= 4) {
+      double C[16] = {};
+      const int ld = n_.padded();
+      for (int i = 0; i < n_(); ++i) {
+        C[i + i * ld] = 1.0;
+      }
+      if (!solve(C)) {
+        return infinity;
+      }
+      double trace = 0.0;
+      for (int i = 0; i < n_(); ++i) {
+        if (!(C[i + i * ld] > 0.0)) {
+          return infinity;
+        }
+        trace += C[i + i * ld];
+      }
+      return trace;
+    }
+    return sampled_gain();
+  }
+
+  /// C ← L⁻¹(C), C symmetric; false where the powers of A do not fade.
+  bool solve(double* C) {
+    if (!valid_) {
+      return false;
+    }
+    if (n_() == 2) {
+      double X[4];
+      const bool solved = lyapunov_two_states(continuous_, S_, C, X);
+      for (int k = 0; k < 4; ++k) {
+        C[k] = X[k];
+      }
+      return solved;
+    }
+    const int ld = n_.padded();
+    const int size = ld * n_();
+    double* A = take(2);
+    double* T = take(3);
+    double* const At = take(4);
+    for (int k = 0; k < size; ++k) {
+      At[k] = 0.0;
+    }
+    if (continuous_) {
+      congruence(C, M_, At, T);
+      for (int k = 0; k < size; ++k) {
+        C[k] *= 2.0 * gamma_;
+      }
+    }
+    for (int k = 0; k < size; ++k) {
+      A[k] = A_[k];
+    }
+    double* const term = take(5);
+    for (int k = 0; k < 50; ++k) {
+      for (int i = 0; i < size; ++i) {
+        term[i] = C[i];
+      }
+      congruence(term, A, At, T);
+      for (int i = 0; i < size; ++i) {
+        C[i] += term[i];
+      }
+      const double power = squared_norm(n_, A, n_());
+      if (!(power < 1e300)) {
+        return false;
+      }
+      if (power < 1e-17) {
+        return true;
+      }
+      multiply(n_, T, ld, A, ld, A, ld, n_(), n_());
+      double* const swapped = A;
+      A = T;
+      T = swapped;
+    }
+    return false;
+  }
+
+ private:
+  double* take(int index) const { return work_ + index * n_.padded() * n_(); }
+
+  static void add_diagonal(Size<N> n, double* M, double value) {
+    for (int i = 0; i < n(); ++i) {
+      M[i + i * n.padded()] += value;
+    }
+  }
+
+  /// C ← MᵀCM.
+  void congruence(double* C, const double* M, double* Mt, double* work) const {
+    const int ld = n_.padded();
+    transpose(n_, Mt, M);
+    multiply(n_, work, ld, C, ld, M, ld, n_(), n_());
+    multiply(n_, C, ld, Mt, ld, work, ld, n_(), n_());
+  }
+
+  double sampled_gain() {
+    const int ld = n_.padded();
+    double* y = take(2);
+    double* next = y + 4 * ld;
+    std::uint64_t bits = 0x9E3779B97F4A7C15U;
+    for (int j = 0; j < 4; ++j) {
+      for (int i = 0; i < ld; ++i) {
+        bits ^= bits << 13U;
+        bits ^= bits >> 7U;
+        bits ^= bits << 17U;
+        y[i + j * ld] = i < n_() ? ((bits & 1U) != 0U ? 1.0 : -1.0) : 0.0;
+      }
+    }
+    const auto advance = [&](const double* M) {
+      multiply(n_, next, ld, M, ld, y, ld, n_(), 4);
+      double* const swapped = y;
+      y = next;
+      next = swapped;
+      return squared_norm(n_, y, 4);
+    };
+    double sum = 4.0 * n_();
+    double unit = 1.0;
+    if (continuous_) {
+      unit = 2.0 * gamma_;
+      sum = advance(M_);
+    }
+    for (int k = 0; k < 2000; ++k) {
+      const double norm = advance(A_);
+      sum += norm;
+      if (norm < 1e-3 * sum) {
+        return 0.25 * sum * unit;
+      }
+    }
+    return std::numeric_limits<double>::infinity();
+  }
+
+  Size<N> n_;
+  bool continuous_;
+  bool valid_ = true;
+  double gamma_ = 0.0;
+  const double* S_;
+  double* work_;
+  const double* A_;
+  const double* M_ = nullptr;
+};
+
+}  // namespace flyball::detail::FLYBALL_VARIANT
