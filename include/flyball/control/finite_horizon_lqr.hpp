@@ -34,7 +34,9 @@ struct FiniteHorizonLqr {
                                                             const Weight& S_N, int steps);
 
 /// The same for a plant that changes from step to step, such as one linearised along a trajectory:
-/// plants[k] takes x_k to x_{k+1}.
+/// plants[k] takes x_k to x_{k+1}, A n x n and B n x m for each.
+/// @errors As above; ArgumentError::empty without a plant, wrong_shape where one has other sizes.
+/// Cost: O(n³) a step; allocates. Source: as above.
 [[nodiscard]] Expected<FiniteHorizonLqr> finite_horizon_lqr(
     std::span<const DiscretizedMatrices> plants, const QuadraticCost& cost, const Weight& S_N);
 

@@ -37,11 +37,13 @@ struct IntegralLqr {
 /// Source: book, section 6.7.1.
 [[nodiscard]] Expected<IntegralLqr> lqi(const DiscreteSystem<>& plant, const Weight& Q,
                                         const Weight& R);
-/// The same for a continuous controller. @errors As above, and as `care`.
+/// The same for a continuous controller.
+/// @errors As above, but [A  B; C  D] is what must have full rank (no zero at 0), and as `care`.
+/// Cost: O((n + p)³), allocates.
 [[nodiscard]] Expected<IntegralLqr> continuous_lqi(const ContinuousSystem<>& plant, const Weight& Q,
                                                    const Weight& R);
 
-/// Fixed-size plants.
+/// `lqi` of a plant of fixed sizes. @errors As `lqi`.
 template <int States, int Inputs, int Outputs>
 [[nodiscard]] Expected<IntegralLqr> lqi(const DiscreteSystem<States, Inputs, Outputs>& plant,
                                         const Weight& Q, const Weight& R) {

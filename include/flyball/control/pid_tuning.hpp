@@ -39,8 +39,14 @@ struct TuningScenario {
   double noise = 0.0;  ///< Standard deviation of the measurement, per sample; seeded, repeatable.
 };
 
-/// @param plant  One input, one output, from rest. @param gains  Of the controller.
-/// @errors ArgumentError for a plant that is not of one input and output, and for the scenario.
+/// The loop's step response: u_k of the PID on what is measured, x_{k+1} = A x_k + B (u_k + d). A
+/// loop that runs away is kept at a million times the reference.
+/// @param plant  Discrete, one input, one output, from rest; its period is the controller's.
+/// @param gains  kp, ki, kd in the input's unit per the output's (and s). @param scenario  The
+/// step.
+/// @return Output and input at each sample, and the metrics of section 2.5.
+/// @errors ArgumentError for a plant that is not of one input and output, for the gains and for the
+///         scenario. Cost: O(n²) a sample; allocates. Source: book, sections 2.4 and 2.5.
 [[nodiscard]] Expected<PidResponse> simulate_pid(const DiscreteSystem<>& plant,
                                                  const PidGains& gains,
                                                  const TuningScenario& scenario);
@@ -93,12 +99,14 @@ struct UltimatePoint {
 
 /// Ziegler and Nichols' rules for an ultimate point: P 0.5 K_u; PI 0.45 K_u, T_u/1.2; PID 0.6 K_u,
 /// T_u/2, T_u/8; PD 0.8 K_u, T_u/8. Quarter-amplitude damping: lively.
-/// @errors ArgumentError. Source: Ziegler and Nichols, Trans. ASME 64 (1942).
+/// @param point  Gain and period, both positive. @param form  Which terms there are.
+/// @return kp, ki = kp/T_i, kd = kp T_d. @errors ArgumentError::not_positive, not_finite.
+/// Cost: none to speak of. Source: Ziegler and Nichols, Trans. ASME 64 (1942).
 [[nodiscard]] Expected<PidGains> ziegler_nichols(const UltimatePoint& point, PidForm form);
 
 /// Tyreus and Luyben's calmer rules: PI K_u/3.2, 2.2 T_u; PID K_u/2.2, 2.2 T_u, T_u/6.3. P and PD
-/// use the same gain and derivative time. Source: Tyreus and Luyben, Ind. Eng. Chem. Res. 31
-/// (1992).
+/// use the same gain and derivative time. Arguments, return and errors as `ziegler_nichols`.
+/// Source: Tyreus and Luyben, Ind. Eng. Chem. Res. 31 (1992).
 [[nodiscard]] Expected<PidGains> tyreus_luyben(const UltimatePoint& point, PidForm form);
 
 /// K e^{-θ s}/(τ s + 1): what a reaction curve shows of a plant.
@@ -117,14 +125,22 @@ struct ReactionCurve {
                                                      std::span<const double> values,
                                                      double input_step);
 /// The same of a plant's simulated step.
+/// @param plant  Discrete, one input, one output, from rest. @param input_step  As above.
+/// @param duration  s, until it has settled. @errors As above; ArgumentError for the plant.
 [[nodiscard]] Expected<ReactionCurve> reaction_curve(const DiscreteSystem<>& plant,
                                                      double input_step, double duration);
 
-/// P τ/(Kθ); PI 0.9, θ/0.3; PID 1.2, 2θ, θ/2; PD 1.2, θ/2.
+/// Gain in units of τ/(Kθ), T_i and T_d: P 1; PI 0.9, θ/0.3; PID 1.2, 2θ, θ/2; PD 1.2, θ/2.
+/// @param curve  K, τ > 0 s, θ > 0 s. @param form  Which terms there are.
+/// @return kp, ki = kp/T_i, kd = kp T_d.
 /// @errors ArgumentError::not_positive where the delay is zero: any gain would do.
 /// Source: Ziegler and Nichols, Trans. ASME 64 (1942).
 [[nodiscard]] Expected<PidGains> ziegler_nichols(const ReactionCurve& curve, PidForm form);
 
+/// Cohen and Coon's rules. With ρ = θ/τ, the gain in units of τ/(Kθ), T_i and T_d:
+///   P 1 + ρ/3;  PI 0.9 + ρ/12, θ(30 + 3ρ)/(9 + 20ρ);  PD 5/4 + ρ/6, θ(6 - 2ρ)/(22 + 3ρ);
+///   PID 4/3 + ρ/4, θ(32 + 6ρ)/(13 + 8ρ), 4θ/(11 + 2ρ).
+/// Arguments, return and errors as `ziegler_nichols` of a curve.
 /// Source: Cohen and Coon, Trans. ASME 75 (1953).
 [[nodiscard]] Expected<PidGains> cohen_coon(const ReactionCurve& curve, PidForm form);
 

@@ -37,7 +37,7 @@ struct SteadyStateFeedforward {
 /// @errors ArgumentError for shapes and entries; FeedforwardError::no_steady_state naming the
 /// output
 ///         that cannot be held, with what is left of its equation.
-/// Source: book, Theorem C.2.1.
+/// Cost: O((n + m)³), allocates. Source: book, Theorem C.2.1.
 [[nodiscard]] Expected<SteadyStateFeedforward<>> steady_state_feedforward(const MatrixRef& A,
                                                                           const MatrixRef& B,
                                                                           const MatrixRef& C,
@@ -46,6 +46,7 @@ struct SteadyStateFeedforward {
 /// The sum over pairs of one actuator and the one output that it drives, as the theorem's remark
 /// advises: output i by input inputs[i]. @param inputs  For each output its input, from 0.
 /// @errors As above; ArgumentError::wrong_shape, out_of_range for the pairs.
+/// Cost: O((n + m)³) an output; allocates. Source: book, the remark on Theorem C.2.1.
 [[nodiscard]] Expected<SteadyStateFeedforward<>> steady_state_feedforward_of_pairs(
     const MatrixRef& A, const MatrixRef& B, const MatrixRef& C, const MatrixRef& D,
     std::span<const int> inputs);
@@ -63,13 +64,14 @@ template <int States, int Inputs, int Outputs>
 
 }  // namespace detail
 
+/// The same for a continuous plant, with its sizes. @errors As above.
 template <int States, int Inputs, int Outputs>
 [[nodiscard]] Expected<SteadyStateFeedforward<States, Inputs, Outputs>> steady_state_feedforward(
     const ContinuousSystem<States, Inputs, Outputs>& plant) {
   return detail::sized<States, Inputs, Outputs>(
       steady_state_feedforward(plant.A, plant.B, plant.C, plant.D));
 }
-/// The discrete case has A - I in place of A (C.5).
+/// The discrete case has A - I in place of A (C.5). @errors As above; ArgumentError for the period.
 template <int States, int Inputs, int Outputs>
 [[nodiscard]] Expected<SteadyStateFeedforward<States, Inputs, Outputs>> steady_state_feedforward(
     const DiscreteSystem<States, Inputs, Outputs>& plant) {
@@ -92,7 +94,8 @@ template <int States, int Inputs, int Outputs>
 [[nodiscard]] Expected<Eigen::MatrixXd> qr_weighted_gain(const MatrixRef& B, const Weight& Q,
                                                          const Weight& R);
 
-/// The same as the run-time feedforward of a discrete plant.
+/// The same as the run-time feedforward of a discrete plant, u = K_ff (r_{k+1} - A r_k), which does
+/// not allocate where the sizes are known. @errors As above, and ArgumentError for the plant.
 template <int States, int Inputs, int Outputs>
 [[nodiscard]] Expected<LinearPlantInversion<States, Inputs>> qr_weighted_inversion(
     const DiscreteSystem<States, Inputs, Outputs>& plant, const Weight& Q, const Weight& R) {

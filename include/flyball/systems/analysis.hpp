@@ -99,7 +99,7 @@ struct LyapunovCertificate {
 [[nodiscard]] Expected<LyapunovCertificate> lyapunov_certificate(const MatrixRef& A,
                                                                  const MatrixRef& Q,
                                                                  TimeDomain domain);
-/// With Q = I.
+/// The same with Q = I, 1/state². @errors As above.
 [[nodiscard]] Expected<LyapunovCertificate> lyapunov_certificate(const MatrixRef& A,
                                                                  TimeDomain domain);
 

@@ -52,12 +52,14 @@ struct ObservabilityAnalysis : ReachAnalysis {
   bool detectable = false;  ///< Every mode that no output shows decays by itself (6.12.8).
 };
 
-/// [B AB … Aⁿ⁻¹B] (6.37), n x n m. @errors ArgumentError for shapes and entries.
-/// Source: book, Theorem 6.12.1.
+/// [B AB … Aⁿ⁻¹B] (6.37).
+/// @param A  n x n. @param B  n x m. @return n x n m. @errors ArgumentError for shapes and entries.
+/// Cost: O(n³m), allocates. Source: book, Theorem 6.12.1.
 [[nodiscard]] Expected<Eigen::MatrixXd> controllability_matrix(const MatrixRef& A,
                                                                const MatrixRef& B);
-/// [C; CA; …; CAⁿ⁻¹] (6.41), n p x n. @errors ArgumentError for shapes and entries.
-/// Source: book, Theorem 6.12.2.
+/// [C; CA; …; CAⁿ⁻¹] (6.41).
+/// @param A  n x n. @param C  p x n. @return n p x n. @errors ArgumentError for shapes and entries.
+/// Cost: O(n³p), allocates. Source: book, Theorem 6.12.2.
 [[nodiscard]] Expected<Eigen::MatrixXd> observability_matrix(const MatrixRef& A,
                                                              const MatrixRef& C);
 

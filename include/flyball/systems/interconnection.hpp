@@ -10,15 +10,18 @@ namespace flyball {
 /// The sign with which a feedback path returns to the input.
 enum class FeedbackSign { negative, positive };
 
-/// `first`, whose outputs are the inputs of `second`: G₂G₁. The states are [x₁; x₂].
+/// `first`, whose outputs are the inputs of `second`: G₂G₁. The states are [x₁; x₂], with
+/// A = [A₁ 0; B₂C₁ A₂], B = [B₁; B₂D₁], C = [D₂C₁ C₂], D = D₂D₁.
 /// @errors ArgumentError for shapes and entries, wrong_shape where `second` has not as many inputs
 ///         as `first` has outputs; discrete: SystemError::period_mismatch.
+/// Cost: some products of matrices; allocates. Source: book, section A.1, in state space.
 [[nodiscard]] Expected<ContinuousSystem<>> series(const ContinuousSystem<>& first,
                                                   const ContinuousSystem<>& second);
 [[nodiscard]] Expected<DiscreteSystem<>> series(const DiscreteSystem<>& first,
                                                 const DiscreteSystem<>& second);
 
-/// Both on the same input, their outputs added: G₁ + G₂. @errors As `series`.
+/// Both on the same input, their outputs added: G₁ + G₂, of as many inputs and outputs each.
+/// @errors As `series`. Source: book, section A.2, in state space.
 [[nodiscard]] Expected<ContinuousSystem<>> parallel(const ContinuousSystem<>& first,
                                                     const ContinuousSystem<>& second);
 [[nodiscard]] Expected<DiscreteSystem<>> parallel(const DiscreteSystem<>& first,

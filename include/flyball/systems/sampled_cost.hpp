@@ -34,7 +34,7 @@ struct SampledCost {
 [[nodiscard]] Expected<SampledCost> sampled_cost(const MatrixRef& A, const MatrixRef& B,
                                                  const MatrixRef& Q, const MatrixRef& R,
                                                  const MatrixRef& N, Time period);
-/// Without a cross weight.
+/// The same with N = 0. @errors As above.
 [[nodiscard]] Expected<SampledCost> sampled_cost(const MatrixRef& A, const MatrixRef& B,
                                                  const MatrixRef& Q, const MatrixRef& R,
                                                  Time period);
