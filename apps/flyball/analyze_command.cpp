@@ -78,10 +78,10 @@ Plot pole_map(const study::ModelAnalysis& analysis) {
 Plot step_plot(const study::ModelAnalysis& analysis) {
   Plot plot{.title = "Step responses", .x_label = "Time (s)"};
   for (Eigen::Index output = 0; output < analysis.model.system.C.rows(); ++output) {
-    PlotPanel panel{.y_label = fmt::format("y{}", output + 1)};
+    PlotPanel panel{.y_label = fmt::format("Output y{}", output + 1)};
     for (std::size_t input = 0; input < analysis.steps.size(); ++input) {
       const study::StepResponse& step = analysis.steps[input];
-      PlotLine line{.label = fmt::format("u{}", input + 1)};
+      PlotLine line{.label = fmt::format("after a unit step of u{}", input + 1)};
       line.x.assign(step.time.begin(), step.time.end());
       for (Eigen::Index k = 0; k < step.y.rows(); ++k) {
         line.y.push_back(step.y(k, output));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <flyball/systems/discretize.hpp>
 #include <flyball/systems/interconnection.hpp>
@@ -27,10 +28,12 @@ struct Horizon {
 Horizon horizon_of(const ModalAnalysis& analysis) {
   double slowest = 0.0;
   double fastest = 0.0;
+  double growth = std::numeric_limits<double>::infinity();  // s, of the mode that grows fastest
   for (const Mode& mode : analysis.modes) {
     const double tau = std::abs(mode.time_constant);
     if (std::isfinite(tau) && tau > 0.0) {
       slowest = std::max(slowest, tau);
+      growth = mode.stability == Stability::unstable ? std::min(growth, tau) : growth;
     }
     if (std::isfinite(mode.natural_frequency)) {
       fastest = std::max(fastest, mode.natural_frequency);
@@ -42,6 +45,7 @@ Horizon horizon_of(const ModalAnalysis& analysis) {
   } else if (fastest > 0.0) {
     horizon.end = 40.0 / fastest;  // about six turns of an undamped oscillation
   }
+  horizon.end = std::min(horizon.end, 5.0 * growth);
   horizon.step = horizon.end / 600.0;
   return horizon;
 }

@@ -150,7 +150,7 @@ Expected<LoopDesign> search_tolerances(const LinearModel& model, DesignJob& job,
   diagnostics.push_back(
       {"assumed", Severity::info,
        fmt::format(
-           "no tolerances were given: {} make the stiffest loop that keeps a gain margin of "
+           "no tolerances were given: with {} the loop is the stiffest that keeps a gain margin of "
            "2, a phase margin of 45° and ±20 % of inertia and gain",
            fmt::join(words, ", "))});
   job.controller.state_tolerance = std::move(best_tolerances);

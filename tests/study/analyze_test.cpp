@@ -47,6 +47,20 @@ TEST(Analyze, UnstableAndIntegratingModels) {
   EXPECT_NEAR(integrator.steps.at(0).y(10, 0), integrator.steps.at(0).time(10), 1e-14);
 }
 
+// A growing mode beside one a hundred times slower: y = e^t - 1 is shown for five of its time
+// constants, not until the slow one has settled at e^600.
+TEST(Analyze, AGrowingModeEndsTheStepResponse) {
+  const auto analysis = analyze(parse_model(R"({"A":[[1,0],[0,-0.01]],"B":[[1],[0.01]],
+                                               "C":[[1,0]]})",
+                                            "m")
+                                    .value())
+                            .value();
+  const StepResponse& step = analysis.steps.at(0);
+  const Eigen::Index last = step.time.size() - 1;
+  EXPECT_NEAR(step.time(last), 5.0, 0.02);
+  EXPECT_NEAR(step.y(last, 0), std::exp(step.time(last)) - 1.0, 1e-10);
+}
+
 TEST(Analyze, RefusesBadModels) {
   const auto refused = [](const char* text) { return parse_model(text, "m.json").error().code(); };
   EXPECT_EQ(refused("{"), "malformed");
