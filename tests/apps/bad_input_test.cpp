@@ -214,6 +214,10 @@ TEST_F(BadInput, FoldersThatAreNotOurs) {
   EXPECT_EQ(contents(work() / "in-the-way"), "a file\n");
 
   expect("design project.toml --out ''", 2, "--out: a folder's name is needed");
+  expect("book", 2, "a figure's number, --all, --list or --check");
+  write("log.json", "{}");
+  expect("log.json", 2, "\"log.json\" is a file, not a command; try \"flyball tune log.json\"");
+  expect("design log.json", 2, "a log goes to `flyball tune`");
   expect("book 6.3 --out in-the-way", 2, "in-the-way: the output folder is not writable");
   expect("book 6.3 --out in-the-way/figures", 2, "the output folder is not writable");
 
