@@ -29,6 +29,11 @@ double duration(const std::vector<double>& time) {
   return time.empty() ? 0.0 : time.back() - time.front();
 }
 
+/// How late a channel is; a negative delay in words.
+std::string delay_text(double delay) {
+  return delay < 0.0 ? seconds(-delay) + " ahead of the voltage in its row" : seconds(delay);
+}
+
 /// How often a channel has a new value, and in what steps.
 std::string channel_text(double refresh, double row_period, double quantum,
                          const std::string& unit) {
@@ -210,10 +215,10 @@ Section data_section(const study::IdentifyResult& result) {
   if (result.report.fit) {
     const FeedforwardFit& fit = *result.report.fit;
     if (data.has_position) {
-      facts.add("position delay", seconds(fit.position_delay));
+      facts.add("position delay", delay_text(fit.position_delay));
     }
     facts.add("velocity delay",
-              fmt::format("{}, with half of its averaging over {}", seconds(fit.velocity_delay),
+              fmt::format("{}, with half of its averaging over {}", delay_text(fit.velocity_delay),
                           seconds(fit.averaging_width)));
     if (data.has_position && data.has_velocity) {
       facts.add("velocity scale",

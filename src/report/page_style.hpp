@@ -49,7 +49,7 @@ footer{margin-top:2.5rem;color:var(--quiet);font-size:.9rem}
 @media (max-width:36rem){body{padding:.8rem}h1{font-size:1.35rem}
 .facts th,.facts td{display:block;border:0;padding:0;text-align:left}
 .facts td{padding-bottom:.5rem;border-bottom:1px solid var(--line)}
-.scroll table{font-size:.875rem}.scroll th,.scroll td{padding-right:.6rem}
+.scroll td.w:last-child{min-width:8rem}.scroll table{font-size:.875rem}.scroll th,.scroll td{padding-right:.6rem}
 .picture svg{min-width:38rem}.badge{min-width:0;margin-right:.5rem}}
 @media print{nav{display:none}body{max-width:none;padding:0}figure,pre,tr{break-inside:avoid}
 h2{break-after:avoid}.picture{border:0}}
