@@ -1,9 +1,9 @@
 #include <flyball/io/file.hpp>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -85,6 +85,36 @@ std::string temporary_beside(const std::string& path) {
       .string();
 }
 
+Error not_a_file(const std::string& path, std::string what, std::string mend) {
+  return Error(FileError::not_a_file)
+      .in(path)
+      .about("the path")
+      .got(std::move(what))
+      .expected("a file, or a pipe that something writes to")
+      .hint(std::move(mend));
+}
+
+/// Of what may be read; a device may wait for ever or never end.
+Expected<struct stat> status_of(int fd, const std::string& path) {
+  struct stat status{};
+  if (::fstat(fd, &status) != 0) {
+    return tl::unexpected(Error(FileError::not_readable).in(path).with("system", reason(errno)));
+  }
+  if (S_ISDIR(status.st_mode)) {
+    return tl::unexpected(Error(FileError::is_a_folder)
+                              .in(path)
+                              .about("the path")
+                              .got("a folder")
+                              .expected("a file")
+                              .hint("give one of the files in it"));
+  }
+  if (!S_ISREG(status.st_mode) && !S_ISFIFO(status.st_mode)) {
+    return tl::unexpected(not_a_file(path, ::isatty(fd) == 1 ? "a terminal" : "a device",
+                                     "give the name of the file"));
+  }
+  return status;
+}
+
 }  // namespace
 
 ErrorInfo error_info(FileError code) {
@@ -96,6 +126,8 @@ ErrorInfo error_info(FileError code) {
       return {family, "is_a_folder", "the path is a folder", ErrorKind::misuse};
     case FileError::not_a_folder:
       return {family, "not_a_folder", "the path is not a folder", ErrorKind::misuse};
+    case FileError::not_a_file:
+      return {family, "not_a_file", "the path is not a file", ErrorKind::misuse};
     case FileError::not_readable:
       return {family, "not_readable", "the file cannot be read", ErrorKind::environment};
     case FileError::not_writable:
@@ -109,7 +141,8 @@ ErrorInfo error_info(FileError code) {
 }
 
 Expected<std::string> read_file(const std::string& path, std::size_t max_bytes) {
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  // Not blocking: a named pipe that nobody writes to would be waited for, for ever.
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
   if (file.get() < 0) {
     const int error = errno;
     if (error == ENOENT || error == ENOTDIR) {
@@ -124,27 +157,21 @@ Expected<std::string> read_file(const std::string& path, std::size_t max_bytes) 
                               .hint("check its permissions")
                               .with("system", reason(error)));
   }
-  struct stat status{};
-  if (::fstat(file.get(), &status) == 0 && S_ISDIR(status.st_mode)) {
-    return tl::unexpected(Error(FileError::is_a_folder)
-                              .in(path)
-                              .about("the path")
-                              .got("a folder")
-                              .expected("a file")
-                              .hint("give one of the files in it"));
+  const auto status = status_of(file.get(), path);
+  if (!status) {
+    return tl::unexpected(status.error());
   }
+  const bool pipe = S_ISFIFO(status->st_mode);
   std::string contents;
   // A regular file says its size, which is a hint and not a promise; pipes say 0.
-  const auto announced = static_cast<std::size_t>(status.st_size > 0 ? status.st_size : 0);
+  const auto announced = static_cast<std::size_t>(std::max<off_t>(status->st_size, 0));
   std::size_t used = 0;
   for (;;) {
     if (used > max_bytes || announced > max_bytes) {
-      return tl::unexpected(
-          Error(FileError::too_large)
-              .in(path)
-              .about("the file")
-              .got(fmt::format("longer than {} bytes", max_bytes))
-              .hint("cut out the part with the tests, for example with AdvantageScope"));
+      return tl::unexpected(Error(FileError::too_large)
+                                .in(path)
+                                .about("the file")
+                                .got(fmt::format("longer than {} bytes", max_bytes)));
     }
     constexpr std::size_t chunk = std::size_t{1} << 16;
     contents.resize(used == 0 ? std::max(announced + 1, chunk)
@@ -152,6 +179,15 @@ Expected<std::string> read_file(const std::string& path, std::size_t max_bytes) 
     const ssize_t got = ::read(file.get(), contents.data() + used, contents.size() - used);
     if (got < 0 && errno == EINTR) {
       continue;
+    }
+    if (got < 0 && errno == EAGAIN && pipe) {
+      // Somebody holds the other end: what is not written yet may be waited for.
+      ::fcntl(file.get(), F_SETFL, ::fcntl(file.get(), F_GETFL) & ~O_NONBLOCK);
+      continue;
+    }
+    if (got == 0 && used == 0 && pipe) {
+      return tl::unexpected(not_a_file(path, "an empty pipe that nothing writes to",
+                                       "start the program that writes to it first"));
     }
     if (got < 0) {
       return tl::unexpected(Error(FileError::not_readable).in(path).with("system", reason(errno)));
@@ -173,7 +209,11 @@ Expected<void> write_file_atomically(const std::string& path, std::string_view c
     return tl::unexpected(cannot_write(path, EISDIR));
   }
   if (exists && !S_ISREG(status.st_mode)) {
-    const Descriptor device(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+    // Not blocking, or a pipe without a reader is waited for; with one, it may be full meanwhile.
+    const Descriptor device(::open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+    if (device.get() >= 0) {
+      ::fcntl(device.get(), F_SETFL, ::fcntl(device.get(), F_GETFL) & ~O_NONBLOCK);
+    }
     const int error = device.get() < 0 ? errno : write_all(device.get(), contents);
     return error == 0 ? Expected<void>{} : tl::unexpected(cannot_write(path, error));
   }

@@ -140,7 +140,12 @@ Expected<Log> parse_log(std::string_view bytes, const std::string& source) {
 }
 
 Expected<Log> read_log(const std::string& path) {
-  return read_file(path).and_then([&](const std::string& bytes) { return parse_log(bytes, path); });
+  auto bytes = read_file(path);
+  if (!bytes && bytes.error().is(FileError::too_large)) {
+    return tl::unexpected(std::move(bytes).error().hint(
+        "cut out the part with the tests, for example with AdvantageScope"));
+  }
+  return bytes.and_then([&](const std::string& read) { return parse_log(read, path); });
 }
 
 }  // namespace flyball

@@ -1,8 +1,11 @@
 #include <flyball/io/file.hpp>
 
+#include <chrono>
 #include <filesystem>
 #include <string>
+#include <thread>
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -29,8 +32,6 @@ TEST(ReadFile, RefusesWhatIsTooLarge) {
   const std::string path = folder.put("a", "12345");
   EXPECT_TRUE(read_file(path, 5));
   EXPECT_TRUE(read_file(path, 4).error().is(FileError::too_large));
-  // A device without a size and without an end.
-  EXPECT_TRUE(read_file("/dev/zero", 1 << 20).error().is(FileError::too_large));
 }
 
 TEST(ReadFile, Errors) {
@@ -44,6 +45,39 @@ TEST(ReadFile, Errors) {
     ::chmod(secret.c_str(), 0);
     EXPECT_TRUE(read_file(secret).error().is(FileError::not_readable));
   }
+}
+
+// Nothing that could be waited for, or that has no end, is opened as a file.
+TEST(ReadFile, RefusesDevicesAndForgottenPipes) {
+  EXPECT_TRUE(read_file("/dev/zero").error().is(FileError::not_a_file));
+  EXPECT_TRUE(read_file("/dev/null").error().is(FileError::not_a_file));
+  const TemporaryFolder folder;
+  const std::string pipe = folder.file("pipe");
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(to_string(read_file(pipe).error()),
+            pipe +
+                ": the path is an empty pipe that nothing writes to; it must be a file, or a pipe "
+                "that something writes to; start the program that writes to it first");
+  EXPECT_TRUE(write_file_atomically(pipe, "x").error().is(FileError::not_writable));
+}
+
+// A writer that takes its time is waited for, whether it is late or writes more than a pipe holds.
+TEST(ReadFile, ReadsPipesToTheirEnd) {
+  const TemporaryFolder folder;
+  const std::string pipe = folder.file("pipe");
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const std::string bytes(200'000, 'x');
+  const int ours = ::open(pipe.c_str(), O_RDWR | O_CLOEXEC);  // neither end waits for the other
+  ASSERT_GE(ours, 0);
+  std::thread writer([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    EXPECT_TRUE(write_file_atomically(pipe, bytes));
+    ::close(ours);
+  });
+  const auto read = read_file(pipe);
+  writer.join();
+  ASSERT_TRUE(read) << to_string(read.error());
+  EXPECT_EQ(*read, bytes);
 }
 
 TEST(WriteFileAtomically, ReplacesAndKeepsTheMode) {

@@ -14,6 +14,7 @@ enum class FileError {
   not_found,      ///< There is no such file (or no folder to put it in).
   is_a_folder,    ///< A folder where a file is needed.
   not_a_folder,   ///< A file where a folder is needed.
+  not_a_file,     ///< A device or terminal where a file is needed, or a pipe nothing writes to.
   not_readable,   ///< It exists and cannot be read.
   not_writable,   ///< It cannot be created, written or renamed into place.
   too_large,      ///< More bytes than the caller is willing to hold.
@@ -25,9 +26,10 @@ enum class FileError {
 inline constexpr std::size_t default_max_file_bytes = std::size_t{512} << 20;
 
 /// The bytes of a file.
-/// @param path       The file; pipes and other streams are read to their end.
+/// @param path       The file. A pipe (/dev/stdin, a shell's <(…)) is read to its end if something
+///                   writes to it or has done so; nothing else that could be waited for is opened.
 /// @param max_bytes  More is refused before it is held in memory.
-/// @errors FileError::not_found, is_a_folder, not_readable, too_large.
+/// @errors FileError::not_found, is_a_folder, not_a_file, not_readable, too_large.
 [[nodiscard]] Expected<std::string> read_file(const std::string& path,
                                               std::size_t max_bytes = default_max_file_bytes);
 
