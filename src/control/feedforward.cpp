@@ -4,24 +4,7 @@
 
 #include <flyball/control/feedforward.tpp>
 
-#include "math/dense.hpp"
-
 namespace flyball {
-
-Expected<Eigen::MatrixXd> pseudo_inverse(const MatrixRef& B) {
-  constexpr std::string_view where = "pseudo_inverse";
-  if (B.size() == 0) {
-    return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(where))
-                              .about("B")
-                              .got("empty")
-                              .expected("a matrix with at least one entry"));
-  }
-  if (auto finite = check_finite(B, where, "B"); !finite) {
-    return tl::unexpected(finite.error());
-  }
-  return detail::solve_least_squares(B, Eigen::MatrixXd::Identity(B.rows(), B.rows()));
-}
 
 SimpleFeedforward::SimpleFeedforward(mechanisms::MechanismKind kind,
                                      const mechanisms::FeedforwardGains& gains,

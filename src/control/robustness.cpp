@@ -80,12 +80,12 @@ Expected<RobustnessGrid> robustness_grid(const MatrixRef& A, const MatrixRef& B,
   if (auto checked = check_factors(options.gain, "gain"); !checked) {
     return tl::unexpected(checked.error());
   }
-  auto B_pinv = pseudo_inverse(model.B);
+  const auto B_pinv = pseudoinverse(model.B);
   if (!B_pinv) {
     return tl::unexpected(B_pinv.error());
   }
   const Eigen::Index n = model.A.rows();
-  const Eigen::MatrixXd F = K + *B_pinv * (Eigen::MatrixXd::Identity(n, n) - model.A);
+  const Eigen::MatrixXd F = K + B_pinv->X * (Eigen::MatrixXd::Identity(n, n) - model.A);
 
   RobustnessGrid grid;
   grid.all_stable = true;

@@ -313,11 +313,11 @@ Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
   loop.kalman_gain = observer->K;
   loop.estimator_poles = observer->poles;
 
-  auto inversion = pseudo_inverse(plant.B);
+  const auto inversion = pseudoinverse(plant.B);
   if (!inversion) {
-    return tl::unexpected(std::move(inversion).error());
+    return tl::unexpected(inversion.error());
   }
-  loop.inversion = *inversion;
+  loop.inversion = inversion->X;
 
   auto opened = observer_regulator_loop(model.A, model.B, model.C, plant, loop.K_delayed,
                                         loop.kalman_gain, delay);

@@ -21,36 +21,18 @@ using mechanisms::FeedforwardGains;
 using mechanisms::MechanismKind;
 
 // The book's models; B⁺ as in the reference data (NumPy 1.24.2, numpy.linalg.pinv).
-TEST(LinearPlantInversion, PseudoInversesOfTheBook) {
+TEST(LinearPlantInversion, PseudoinversesOfTheBook) {
   const Eigen::Vector2d elevator(0.00020770689038283711, 0.07317953761826645);
-  const Eigen::MatrixXd inverse = pseudo_inverse(elevator).value();
+  const Eigen::MatrixXd inverse = pseudoinverse(elevator).value().X;
   EXPECT_NEAR(inverse(0, 0), 0.038785382876832385, 1e-9 * 0.0388);
   EXPECT_NEAR(inverse(0, 1), 13.664912030806828, 1e-9 * 13.66);
-  EXPECT_NEAR(pseudo_inverse(Eigen::MatrixXd::Constant(1, 1, 0.6155494833981923)).value()(0, 0),
+  EXPECT_NEAR(pseudoinverse(Eigen::MatrixXd::Constant(1, 1, 0.6155494833981923)).value().X(0, 0),
               1.6245647620064867, 1e-9 * 1.62);
   Eigen::Matrix2d drive;
   drive << 0.00888344982357952, 0.0012213627658478623, 0.0012213627658478625, 0.008883449823579522;
-  const Eigen::MatrixXd inverse_drive = pseudo_inverse(drive).value();
+  const Eigen::MatrixXd inverse_drive = pseudoinverse(drive).value().X;
   EXPECT_NEAR(inverse_drive(0, 0), 114.7377444822541, 1e-9 * 114.7);
   EXPECT_NEAR(inverse_drive(0, 1), -15.774998647037332, 1e-9 * 114.7);
-}
-
-// The four conditions of Moore and Penrose, also without full rank.
-TEST(LinearPlantInversion, PseudoInverseIsMooreAndPenroses) {
-  Random random(12);
-  for (int trial = 0; trial < 30; ++trial) {
-    const Eigen::Index n = 2 + trial % 4;
-    const Eigen::Index m = 1 + trial % 3;
-    Eigen::MatrixXd B = Eigen::MatrixXd::NullaryExpr(n, m, [&] { return random.normal(); });
-    if (m > 1 && trial % 2 == 0) {
-      B.col(1) = 2.0 * B.col(0);
-    }
-    const Eigen::MatrixXd P = pseudo_inverse(B).value();
-    EXPECT_LT((B * P * B - B).norm(), 1e-12 * B.norm());
-    EXPECT_LT((P * B * P - P).norm(), 1e-12 * P.norm());
-    EXPECT_LT((B * P - (B * P).transpose()).norm(), 1e-12);
-    EXPECT_LT((P * B - (P * B).transpose()).norm(), 1e-12);
-  }
 }
 
 // A reference that the plant can follow is followed exactly: r_{k+1} = A r_k + B u gives u back.
@@ -85,10 +67,6 @@ TEST(LinearPlantInversion, FixedIsDynamicAndAllocatesNothing) {
 }
 
 TEST(LinearPlantInversion, Errors) {
-  EXPECT_TRUE(pseudo_inverse(Eigen::MatrixXd(0, 0)).error().is(ArgumentError::empty));
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(
-      pseudo_inverse(Eigen::MatrixXd::Constant(1, 1, nan)).error().is(ArgumentError::not_finite));
   DiscreteSystem<> plant;
   EXPECT_TRUE(linear_plant_inversion(plant).error().is(ArgumentError::not_positive));
 }

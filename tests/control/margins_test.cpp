@@ -345,7 +345,7 @@ TEST(RobustnessGrid, AgreesWithASimulation) {
                                     design.K, design.K_e, delay)
                         .value();
   ASSERT_EQ(grid.cases.size(), 25u);
-  const Eigen::MatrixXd B_pinv = pseudo_inverse(design.model.B).value();
+  const Eigen::MatrixXd B_pinv = pseudoinverse(design.model.B).value().X;
   double worst = 0.0;
   bool all_stable = true;
   for (const RobustnessCase& c : grid.cases) {

@@ -38,7 +38,7 @@ Design design() {
 TEST(Lqg, IsPredictCorrectControl) {
   const auto [plant, K, K_e] = design();
   auto regulator = lqg(plant, K, K_e, 12.0).value();
-  const Eigen::MatrixXd B_pinv = pseudo_inverse(plant.B).value();
+  const Eigen::MatrixXd B_pinv = pseudoinverse(plant.B).value().X;
   Random random(5);
   Eigen::Vector2d x_hat = Eigen::Vector2d::Zero();
   double u_model = 0.0;

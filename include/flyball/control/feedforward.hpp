@@ -1,5 +1,6 @@
 #pragma once
 
+#include <flyball/math/linear_algebra.hpp>
 #include <flyball/mechanisms/mechanism.hpp>
 #include <flyball/systems/system.hpp>
 
@@ -15,26 +16,22 @@ class LinearPlantInversion {
   using StateVector = Eigen::Matrix<double, States, 1>;
   using InputVector = Eigen::Matrix<double, Inputs, 1>;
   using StateMatrix = Eigen::Matrix<double, States, States>;
-  using PseudoInverse = Eigen::Matrix<double, Inputs, States>;
+  using InverseMatrix = Eigen::Matrix<double, Inputs, States>;
 
   /// @param A  n x n, discrete. @param B_pinv  m x n; `linear_plant_inversion` computes it.
-  LinearPlantInversion(const StateMatrix& A, const PseudoInverse& B_pinv)
+  LinearPlantInversion(const StateMatrix& A, const InverseMatrix& B_pinv)
       : A_(A), B_pinv_(B_pinv) {}
 
   /// @param r  The reference now. @param r_next  The reference one period later. @return u.
   [[nodiscard]] InputVector calculate(const StateVector& r,
                                       const StateVector& r_next) const noexcept;
 
-  [[nodiscard]] const PseudoInverse& B_pinv() const noexcept { return B_pinv_; }
+  [[nodiscard]] const InverseMatrix& B_pinv() const noexcept { return B_pinv_; }
 
  private:
   StateMatrix A_;
-  PseudoInverse B_pinv_;
+  InverseMatrix B_pinv_;
 };
-
-/// B⁺, the Moore-Penrose pseudoinverse, by a complete orthogonal decomposition.
-/// @param B  n x m. @return m x n. @errors ArgumentError::empty, not_finite.
-[[nodiscard]] Expected<Eigen::MatrixXd> pseudo_inverse(const MatrixRef& B);
 
 /// The plant inversion of a discrete plant. @errors ArgumentError for a malformed system.
 template <int States, int Inputs, int Outputs>
@@ -43,8 +40,8 @@ template <int States, int Inputs, int Outputs>
   if (auto checked = check_system(plant, "linear_plant_inversion"); !checked) {
     return tl::unexpected(checked.error());
   }
-  return pseudo_inverse(plant.B).map([&](const Eigen::MatrixXd& B_pinv) {
-    return LinearPlantInversion<States, Inputs>(plant.A, B_pinv);
+  return pseudoinverse(plant.B).map([&](const Pseudoinverse& B_pinv) {
+    return LinearPlantInversion<States, Inputs>(plant.A, B_pinv.X);
   });
 }
 

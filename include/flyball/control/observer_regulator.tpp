@@ -40,8 +40,9 @@ auto Lqg<States, Inputs, Outputs>::create(const Plant& plant, const FeedbackGain
       !checked) {
     return tl::unexpected(checked.error());
   }
-  return pseudo_inverse(plant.B).map([&](const Eigen::MatrixXd& B_pinv) {
-    return Lqg(plant, K, K_e, LinearPlantInversion<States, Inputs>(plant.A, B_pinv), u_min, u_max);
+  return pseudoinverse(plant.B).map([&](const Pseudoinverse& B_pinv) {
+    return Lqg(plant, K, K_e, LinearPlantInversion<States, Inputs>(plant.A, B_pinv.X), u_min,
+               u_max);
   });
 }
 
