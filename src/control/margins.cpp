@@ -5,6 +5,8 @@
 #include <numbers>
 #include <optional>
 
+#include "control/delay_margin.hpp"
+#include "control/line_search.hpp"
 #include "control/sampled_loop.hpp"
 #include "math/dense.hpp"
 
@@ -13,6 +15,10 @@ namespace flyball {
 namespace {
 
 using Complex = std::complex<double>;
+using detail::find_minimum;
+using detail::find_root;
+using detail::lag_to_minus_one;
+using detail::log_gain;
 using detail::SampledLoop;
 constexpr double pi = std::numbers::pi;
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -21,60 +27,6 @@ struct Point {
   double theta;
   Complex L;
 };
-
-// A root of f between a and b, where f changes sign, to the last bits: bisection with secant steps.
-template <class F>
-double find_root(const F& f, double a, double b, double f_a, double f_b) {
-  for (int i = 0; i < 200 && std::abs(b - a) > 4e-16 * std::max(std::abs(a), std::abs(b)); ++i) {
-    const double secant = b - f_b * (b - a) / (f_b - f_a);
-    const double middle = 0.5 * (a + b);
-    // Each third step halves, so that the bracket cannot stay long at one end.
-    const bool inside = secant > std::min(a, b) && secant < std::max(a, b);
-    const double x = inside && i % 3 != 2 ? secant : middle;
-    const double f_x = f(x);
-    if (f_x == 0.0) {
-      return x;
-    }
-    if ((f_x > 0.0) == (f_a > 0.0)) {
-      a = x;
-      f_a = f_x;
-    } else {
-      b = x;
-      f_b = f_x;
-    }
-  }
-  return std::abs(f_a) < std::abs(f_b) ? a : b;
-}
-
-// The place of the smallest f in [a, b], by golden sections.
-template <class F>
-double find_minimum(const F& f, double a, double b) {
-  const double ratio = 0.5 * (std::sqrt(5.0) - 1.0);
-  double c = b - ratio * (b - a);
-  double d = a + ratio * (b - a);
-  double f_c = f(c);
-  double f_d = f(d);
-  for (int i = 0; i < 60; ++i) {
-    if (f_c < f_d) {
-      b = d;
-      d = c;
-      f_d = f_c;
-      c = b - ratio * (b - a);
-      f_c = f(c);
-    } else {
-      a = c;
-      c = d;
-      f_c = f_d;
-      d = a + ratio * (b - a);
-      f_d = f(d);
-    }
-  }
-  return 0.5 * (a + b);
-}
-
-double log_gain(const Complex& L) {
-  return std::log(std::abs(L));
-}
 
 // Frequencies at which L is looked at first: all decades, every turn of the delay's phase, and the
 // neighbourhood of each pole.
@@ -183,150 +135,6 @@ Crossover crossover(double theta, const Complex& L, double period) {
   return {theta / period, std::abs(L), std::arg(L) * 180.0 / pi};
 }
 
-// The lag in (0, 2π] that turns L into -1 when |L| = 1.
-double lag_to_minus_one(const Complex& L) {
-  const double lag = std::remainder(std::arg(L) - pi, 2.0 * pi);
-  return lag > 0.0 ? lag : lag + 2.0 * pi;
-}
-
-// Where |L| = 1 near a frequency, for a loop that differs a little.
-std::optional<double> follow_crossover(const SampledLoop& loop, double theta) {
-  const auto at = [&](double t) { return log_gain(loop.response(t)); };
-  const double f_0 = at(theta);
-  for (double reach = 1e-3; reach < 0.5; reach *= 2.0) {
-    for (const double other : {theta * (1.0 + reach), theta * (1.0 - reach)}) {
-      const double end = std::min(other, pi);
-      const double f_1 = at(end);
-      if ((f_0 > 0.0) != (f_1 > 0.0)) {
-        return find_root(at, theta, end, f_0, f_1);
-      }
-    }
-  }
-  return std::nullopt;
-}
-
-class DelayMargin {
- public:
-  explicit DelayMargin(const PlantInputLoop& loop) : loop_(loop), period_(loop.period.si()) {}
-
-  // The smallest further delay at which the closed loop has a pole on the unit circle. A delay of
-  // whole periods does not move a crossover θ and costs θ of its lag a period, so the last whole
-  // period before the limit is known at once; within it the crossover is followed.
-  [[nodiscard]] double find(const std::vector<double>& crossovers,
-                            const SampledLoop& sampled) const {
-    double margin = infinity;
-    for (const double theta : crossovers) {
-      const double lag = lag_to_minus_one(sampled.response(theta));
-      const double whole = std::floor(lag / theta);
-      if (whole * period_ < margin) {
-        margin = std::min(margin, within_period(theta, lag, whole));
-      }
-    }
-    return agrees(margin) ? margin : scan(margin);
-  }
-
- private:
-  struct Followed {
-    double theta;
-    double lag;  // Left at `whole` periods and a part of the next; negative beyond the limit.
-  };
-
-  [[nodiscard]] std::optional<Followed> follow(const Followed& from, double part,
-                                               double whole) const {
-    const auto loop = SampledLoop::create(loop_, Time(part));
-    if (!loop) {
-      return std::nullopt;
-    }
-    const auto theta = follow_crossover(*loop, from.theta);
-    if (!theta) {
-      return std::nullopt;
-    }
-    // Unwrapped: the lag moves little between two parts.
-    const double lag = lag_to_minus_one(loop->response(*theta)) - whole * *theta;
-    return Followed{*theta, from.lag + std::remainder(lag - from.lag, 2.0 * pi)};
-  }
-
-  [[nodiscard]] double within_period(double theta, double lag, double whole) const {
-    constexpr int parts = 16;
-    Followed before{theta, lag - whole * theta};
-    double from = 0.0;
-    for (int i = 1; i <= parts; ++i) {
-      const double to = period_ * i / parts;
-      const auto after = follow(before, to, whole);
-      if (!after) {
-        return infinity;
-      }
-      if (after->lag <= 0.0) {
-        return whole * period_ + refine(before, from, to, whole);
-      }
-      before = *after;
-      from = to;
-    }
-    return (whole + 1.0) * period_;
-  }
-
-  [[nodiscard]] double refine(Followed before, double from, double to, double whole) const {
-    for (int i = 0; i < 60 && to - from > 1e-15 * period_; ++i) {
-      const double middle = 0.5 * (from + to);
-      const auto there = follow(before, middle, whole);
-      if (!there) {
-        break;
-      }
-      if (there->lag > 0.0) {
-        before = *there;
-        from = middle;
-      } else {
-        to = middle;
-      }
-    }
-    return 0.5 * (from + to);
-  }
-
-  [[nodiscard]] bool stable(double further) const {
-    const auto loop = SampledLoop::create(loop_, Time(further));
-    return loop && detail::spectral_radius(loop->closed(1.0)) < 1.0;
-  }
-
-  // The eigenvalues confirm the limit, and that nothing smaller was missed.
-  [[nodiscard]] bool agrees(double margin) const {
-    if (margin == infinity) {
-      return stable(0.5 * period_) && stable(3.7 * period_);
-    }
-    // Eigenvalues of a loop with hundreds of stored inputs would cost more than they confirm.
-    constexpr double most_stored = 150.0;
-    if (margin + loop_.delay.si() > most_stored * period_) {
-      return true;
-    }
-    constexpr double hair = 1e-6;
-    bool agreed = stable(margin * (1.0 - hair)) && !stable(margin * (1.0 + hair));
-    for (int i = 1; agreed && i < 6; ++i) {
-      agreed = stable(margin * i / 6.0);
-    }
-    return agreed;
-  }
-
-  // Where a crossover could not be followed: the first loss of stability on a grid, halved down.
-  [[nodiscard]] double scan(double guess) const {
-    const double most = std::isfinite(guess) ? 1.01 * guess : 64.0 * period_;
-    const double step = period_ / 16.0;
-    for (double from = 0.0; from < most; from += step) {
-      if (!stable(from + step)) {
-        double low = from;
-        double high = from + step;
-        while (high - low > 1e-14 * high) {
-          const double middle = 0.5 * (low + high);
-          (stable(middle) ? low : high) = middle;
-        }
-        return 0.5 * (low + high);
-      }
-    }
-    return guess;
-  }
-
-  const PlantInputLoop& loop_;
-  double period_;
-};
-
 void set_gain_margins(StabilityMargins& margins) {
   margins.gain_margin_up = infinity;
   margins.gain_margin_down = 0.0;
@@ -420,7 +228,7 @@ Expected<StabilityMargins> stability_margins(const PlantInputLoop& loop) {
     margins.phase_margin =
         std::min(margins.phase_margin, std::min(lag, 2.0 * pi - lag) * 180.0 / pi);
   }
-  margins.delay_margin = DelayMargin(loop).find(gain_crossovers, *sampled);
+  margins.delay_margin = detail::delay_margin(loop, gain_crossovers, *sampled);
   set_disk_margin(margins, *sampled, points, period);
   return margins;
 }

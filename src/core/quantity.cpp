@@ -1,151 +1,23 @@
 #include <flyball/core/quantity.hpp>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include <flyball/core/text.hpp>
 
+#include "core/unit_table.hpp"
+
 namespace flyball {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
-struct NamedUnit {
-  std::string_view text;  // as `canonical` leaves it
-  Dimension dimension;
-  double factor;
-};
-
+using detail::NamedUnit;
+using detail::units;
 using enum Dimension;
-
-// Written as `canonical` leaves them: no spaces, no "^", "·" or "*", "per" as "/", squares as a
-// trailing 2. Where only the case of a prefix tells units apart (mN, MN) the short form keeps it.
-constexpr std::array units{
-    NamedUnit{"", dimensionless, 1.0},
-    NamedUnit{"%", dimensionless, 0.01},
-    NamedUnit{"kg", mass, 1.0},
-    NamedUnit{"g", mass, 1e-3},
-    NamedUnit{"lb", mass, 0.45359237},
-    NamedUnit{"lbs", mass, 0.45359237},
-    NamedUnit{"lbm", mass, 0.45359237},
-    NamedUnit{"oz", mass, 0.028349523125},
-    NamedUnit{"kilogram", mass, 1.0},
-    NamedUnit{"gram", mass, 1e-3},
-    NamedUnit{"pound", mass, 0.45359237},
-    NamedUnit{"ounce", mass, 0.028349523125},
-    NamedUnit{"m", length, 1.0},
-    NamedUnit{"cm", length, 1e-2},
-    NamedUnit{"mm", length, 1e-3},
-    NamedUnit{"in", length, 0.0254},
-    NamedUnit{"\"", length, 0.0254},
-    NamedUnit{"ft", length, 0.3048},
-    NamedUnit{"meter", length, 1.0},
-    NamedUnit{"metre", length, 1.0},
-    NamedUnit{"centimeter", length, 1e-2},
-    NamedUnit{"millimeter", length, 1e-3},
-    NamedUnit{"inch", length, 0.0254},
-    NamedUnit{"inche", length, 0.0254},  // "inches" less its plural s
-    NamedUnit{"foot", length, 0.3048},
-    NamedUnit{"feet", length, 0.3048},
-    NamedUnit{"s", time, 1.0},
-    NamedUnit{"ms", time, 1e-3},
-    NamedUnit{"us", time, 1e-6},
-    NamedUnit{"min", time, 60.0},
-    NamedUnit{"sec", time, 1.0},
-    NamedUnit{"second", time, 1.0},
-    NamedUnit{"millisecond", time, 1e-3},
-    NamedUnit{"microsecond", time, 1e-6},
-    NamedUnit{"minute", time, 60.0},
-    NamedUnit{"rad", angle, 1.0},
-    NamedUnit{"deg", angle, pi / 180.0},
-    NamedUnit{"°", angle, pi / 180.0},
-    NamedUnit{"rot", angle, 2.0 * pi},
-    NamedUnit{"rev", angle, 2.0 * pi},
-    NamedUnit{"turn", angle, 2.0 * pi},
-    NamedUnit{"radian", angle, 1.0},
-    NamedUnit{"degree", angle, pi / 180.0},
-    NamedUnit{"rotation", angle, 2.0 * pi},
-    NamedUnit{"revolution", angle, 2.0 * pi},
-    NamedUnit{"m/s", velocity, 1.0},
-    NamedUnit{"mps", velocity, 1.0},
-    NamedUnit{"cm/s", velocity, 1e-2},
-    NamedUnit{"mm/s", velocity, 1e-3},
-    NamedUnit{"in/s", velocity, 0.0254},
-    NamedUnit{"ft/s", velocity, 0.3048},
-    NamedUnit{"fps", velocity, 0.3048},
-    NamedUnit{"meter/second", velocity, 1.0},
-    NamedUnit{"inch/second", velocity, 0.0254},
-    NamedUnit{"inche/second", velocity, 0.0254},
-    NamedUnit{"foot/second", velocity, 0.3048},
-    NamedUnit{"feet/second", velocity, 0.3048},
-    NamedUnit{"rad/s", angular_velocity, 1.0},
-    NamedUnit{"deg/s", angular_velocity, pi / 180.0},
-    NamedUnit{"°/s", angular_velocity, pi / 180.0},
-    NamedUnit{"rot/s", angular_velocity, 2.0 * pi},
-    NamedUnit{"rev/s", angular_velocity, 2.0 * pi},
-    NamedUnit{"rps", angular_velocity, 2.0 * pi},
-    NamedUnit{"rpm", angular_velocity, pi / 30.0},
-    NamedUnit{"rot/min", angular_velocity, pi / 30.0},
-    NamedUnit{"rev/min", angular_velocity, pi / 30.0},
-    NamedUnit{"radian/second", angular_velocity, 1.0},
-    NamedUnit{"degree/second", angular_velocity, pi / 180.0},
-    NamedUnit{"rotation/second", angular_velocity, 2.0 * pi},
-    NamedUnit{"revolution/second", angular_velocity, 2.0 * pi},
-    NamedUnit{"rotation/minute", angular_velocity, pi / 30.0},
-    NamedUnit{"revolution/minute", angular_velocity, pi / 30.0},
-    NamedUnit{"m/s2", acceleration, 1.0},
-    NamedUnit{"m/s/s", acceleration, 1.0},
-    NamedUnit{"in/s2", acceleration, 0.0254},
-    NamedUnit{"ft/s2", acceleration, 0.3048},
-    NamedUnit{"meter/second/second", acceleration, 1.0},
-    NamedUnit{"rad/s2", angular_acceleration, 1.0},
-    NamedUnit{"rad/s/s", angular_acceleration, 1.0},
-    NamedUnit{"deg/s2", angular_acceleration, pi / 180.0},
-    NamedUnit{"rot/s2", angular_acceleration, 2.0 * pi},
-    NamedUnit{"rotation/second/second", angular_acceleration, 2.0 * pi},
-    NamedUnit{"radian/second/second", angular_acceleration, 1.0},
-    NamedUnit{"N", force, 1.0},
-    NamedUnit{"kN", force, 1e3},
-    NamedUnit{"lbf", force, 4.4482216152605},
-    NamedUnit{"newton", force, 1.0},
-    NamedUnit{"Nm", torque, 1.0},
-    NamedUnit{"mNm", torque, 1e-3},
-    NamedUnit{"Ncm", torque, 1e-2},
-    NamedUnit{"lbfin", torque, 0.1129848290276167},
-    NamedUnit{"inlb", torque, 0.1129848290276167},
-    NamedUnit{"lbfft", torque, 1.3558179483314004},
-    NamedUnit{"ftlb", torque, 1.3558179483314004},
-    NamedUnit{"ozin", torque, 0.00706155181422604},
-    NamedUnit{"newtonmeter", torque, 1.0},
-    NamedUnit{"kgm2", moment_of_inertia, 1.0},
-    NamedUnit{"kgcm2", moment_of_inertia, 1e-4},
-    NamedUnit{"gcm2", moment_of_inertia, 1e-7},
-    NamedUnit{"lbin2", moment_of_inertia, 0.45359237 * 0.0254 * 0.0254},
-    NamedUnit{"lbft2", moment_of_inertia, 0.45359237 * 0.3048 * 0.3048},
-    NamedUnit{"V", voltage, 1.0},
-    NamedUnit{"mV", voltage, 1e-3},
-    NamedUnit{"volt", voltage, 1.0},
-    NamedUnit{"millivolt", voltage, 1e-3},
-    NamedUnit{"A", current, 1.0},
-    NamedUnit{"mA", current, 1e-3},
-    NamedUnit{"amp", current, 1.0},
-    NamedUnit{"ampere", current, 1.0},
-    NamedUnit{"Ohm", resistance, 1.0},
-    NamedUnit{"mOhm", resistance, 1e-3},
-    NamedUnit{"Ω", resistance, 1.0},
-    NamedUnit{"mΩ", resistance, 1e-3},
-    NamedUnit{"Hz", frequency, 1.0},
-    NamedUnit{"kHz", frequency, 1e3},
-    NamedUnit{"1/s", frequency, 1.0},
-    NamedUnit{"hertz", frequency, 1.0},
-};
 
 void replace_all(std::string& text, std::string_view from, std::string_view to) {
   for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at)) {

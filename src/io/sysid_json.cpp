@@ -15,172 +15,16 @@
 
 #include "io/signals.hpp"
 #include "io/sysid_columns.hpp"
+#include "io/sysid_rows.hpp"
 #include "io/text.hpp"
 
 namespace flyball {
 namespace {
 
 using io::run_names;
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t max_columns = io::columns_2020.size();
-
-using Row = std::array<double, max_columns>;
-
-/// A test's rows as they stand in the file.
-struct Table {
-  bool present = false;
-  std::vector<Row> rows;
-  std::vector<unsigned char> widths;
-};
-
-/// Collects complete rows while the parser walks through the text, so that whatever precedes a cut
-/// or an error is already there.
-class Handler : public nlohmann::json_sax<nlohmann::json> {
- public:
-  std::array<Table, run_names.size()> tables;
-  std::string test;
-  std::string units;
-  std::optional<double> units_per_rotation;
-  bool sysid = false;
-  std::optional<std::string> first_key;
-  std::vector<std::string> unknown_keys;
-  std::size_t odd_rows = 0;  ///< Neither 4, 9 nor 10 numbers.
-  bool top_is_object = false;
-  std::size_t error_at = 0;
-  std::string error_text;
-
-  bool null() override { return scalar(nan); }
-  bool boolean(bool value) override {
-    sysid = sysid || (depth_ == 1 && key_ == "sysid" && value);
-    return scalar(nan);
-  }
-  bool number_integer(number_integer_t value) override {
-    return scalar(static_cast<double>(value));
-  }
-  bool number_unsigned(number_unsigned_t value) override {
-    return scalar(static_cast<double>(value));
-  }
-  bool number_float(number_float_t value, const string_t& /*text*/) override {
-    return scalar(value);
-  }
-  bool string(string_t& value) override {
-    if (depth_ == 1 && key_ == "test") {
-      test = value;
-    } else if (depth_ == 1 && key_ == "units") {
-      units = value;
-    }
-    return scalar(nan);
-  }
-  bool binary(binary_t& /*value*/) override { return scalar(nan); }
-
-  bool start_object(std::size_t /*elements*/) override {
-    top_is_object = top_is_object || depth_ == 0;
-    row_is_odd_ = row_is_odd_ || in_row();
-    ++depth_;
-    return true;
-  }
-  bool key(string_t& value) override {
-    if (depth_ != 1) {
-      return true;
-    }
-    key_ = value;
-    if (!first_key) {
-      first_key = value;
-    }
-    const auto run = std::find(run_names.begin(), run_names.end(), value);
-    run_ = static_cast<std::size_t>(run - run_names.begin());
-    if (run != run_names.end()) {
-      tables[run_].present = true;
-    } else if (value != "sysid" && value != "test" && value != "units" &&
-               value != "unitsPerRotation") {
-      unknown_keys.push_back(value);
-    }
-    return true;
-  }
-  bool end_object() override {
-    --depth_;
-    return true;
-  }
-  bool start_array(std::size_t /*elements*/) override {
-    row_is_odd_ = in_row();
-    ++depth_;
-    if (in_row()) {
-      width_ = 0;
-    }
-    return true;
-  }
-  bool end_array() override {
-    if (in_row()) {
-      const bool known = width_ == 4 || width_ == 9 || width_ == 10;
-      if (known && !row_is_odd_) {
-        tables[run_].rows.push_back(row_);
-        tables[run_].widths.push_back(static_cast<unsigned char>(width_));
-      } else {
-        ++odd_rows;
-      }
-    }
-    --depth_;
-    return true;
-  }
-  bool parse_error(std::size_t position, const std::string& /*last_token*/,
-                   const nlohmann::detail::exception& error) override {
-    error_at = position;
-    error_text = error.what();
-    return false;
-  }
-
- private:
-  /// Directly in a row: {"slow-forward": [[ here ]]}.
-  bool in_row() const { return depth_ == 3 && top_is_object && run_ < run_names.size(); }
-
-  bool scalar(double value) {
-    if (in_row()) {
-      if (width_ < max_columns) {
-        row_[width_] = value;
-      }
-      ++width_;
-    } else if (depth_ == 1 && key_ == "unitsPerRotation" && std::isfinite(value)) {
-      units_per_rotation = value;
-    } else if (depth_ == 2 && run_ < run_names.size()) {
-      ++odd_rows;
-    }
-    return true;
-  }
-
-  std::size_t depth_ = 0;
-  std::string key_;
-  std::size_t run_ = run_names.size();
-  Row row_{};
-  std::size_t width_ = 0;
-  bool row_is_odd_ = false;
-};
-
-/// Python and JavaScript write NaN and Infinity, which JSON has no word for: each is replaced by an
-/// empty string of the same length, which the handler takes for "not a number".
-std::string without_nan_words(std::string_view text) {
-  std::string result(text);
-  bool quoted = false;
-  for (std::size_t i = 0; i < result.size(); ++i) {
-    if (result[i] == '"') {
-      quoted = !quoted;
-    } else if (quoted) {
-      i += result[i] == '\\' ? 1 : 0;
-    } else {
-      for (const std::string_view word :
-           {"NaN", "-Infinity", "Infinity", "-NaN", "nan", "inf", "-inf"}) {
-        if (result.compare(i, word.size(), word) == 0) {
-          result.replace(i, word.size(), word.size(), ' ');
-          result[i] = '"';
-          result[i + 1] = '"';
-          i += word.size() - 1;
-          break;
-        }
-      }
-    }
-  }
-  return result;
-}
+using io::SysIdRows;
+using io::SysIdTable;
+using Row = io::SysIdRow;
 
 Error not_sysid(const std::string& source, std::string got) {
   return Error(LogError::not_a_log)
@@ -196,7 +40,7 @@ void warn(SysIdJson& log, std::string code, std::string message) {
 }
 
 /// Which layout the rows have: by their width, and 9 columns by what else the file says.
-SysIdJson::Layout layout_of(const Handler& handler, std::size_t columns, bool truncated) {
+SysIdJson::Layout layout_of(const SysIdRows& handler, std::size_t columns, bool truncated) {
   if (columns == 4) {
     return SysIdJson::Layout::mechanism;
   }
@@ -211,9 +55,9 @@ SysIdJson::Layout layout_of(const Handler& handler, std::size_t columns, bool tr
 }
 
 /// How many numbers most rows have.
-std::size_t common_width(const Handler& handler) {
-  std::array<std::size_t, max_columns + 1> count{};
-  for (const Table& table : handler.tables) {
+std::size_t common_width(const SysIdRows& handler) {
+  std::array<std::size_t, io::max_columns + 1> count{};
+  for (const SysIdTable& table : handler.tables) {
     for (const unsigned char width : table.widths) {
       ++count[width];
     }
@@ -228,8 +72,8 @@ struct Dropped {
 };
 
 /// A table's good rows in time order, spread over the columns of a run.
-SysIdJson::Run to_run(std::string name, Table& table, SysIdJson::Layout layout, std::size_t columns,
-                      Dropped& dropped) {
+SysIdJson::Run to_run(std::string name, SysIdTable& table, SysIdJson::Layout layout,
+                      std::size_t columns, Dropped& dropped) {
   std::vector<Row> rows;
   rows.reserve(table.rows.size());
   for (std::size_t i = 0; i < table.rows.size(); ++i) {
@@ -263,7 +107,7 @@ SysIdJson::Run to_run(std::string name, Table& table, SysIdJson::Layout layout, 
   return run;
 }
 
-void tell_missing(SysIdJson& log, const Handler& handler) {
+void tell_missing(SysIdJson& log, const SysIdRows& handler) {
   for (std::size_t i = 0; i < run_names.size(); ++i) {
     if (log.find(run_names[i]) == nullptr) {
       const bool present = handler.tables[i].present;
@@ -316,12 +160,12 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
                               .expected("a SysId JSON")
                               .hint("record it again, or copy it again"));
   }
-  Handler handler;
+  SysIdRows handler;
   bool complete = nlohmann::json::sax_parse(text.begin(), text.end(), &handler);
   if (!complete) {
-    const std::string replaced = without_nan_words(text);
+    const std::string replaced = io::without_nan_words(text);
     if (replaced != text) {
-      handler = Handler();
+      handler = SysIdRows();
       complete = nlohmann::json::sax_parse(replaced.begin(), replaced.end(), &handler);
     }
   }
@@ -347,7 +191,7 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
     return tl::unexpected(not_sysid(source, "a list or a single value"));
   }
   const bool any_test = std::any_of(handler.tables.begin(), handler.tables.end(),
-                                    [](const Table& table) { return table.present; });
+                                    [](const SysIdTable& table) { return table.present; });
   if (!any_test && !handler.sysid && !truncated) {
     return tl::unexpected(not_sysid(source, handler.first_key
                                                 ? fmt::format("an object that begins with \"{}\"",
