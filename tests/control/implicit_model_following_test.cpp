@@ -4,24 +4,17 @@
 
 #include <flyball/core/random.hpp>
 
+#include "control/appendix_b_plant.hpp"
+
 namespace flyball {
 namespace {
 
 using namespace flyball::literals;
 
+using test::appendix_b_plant;
+
 Eigen::MatrixXd random_matrix(Random& random, Eigen::Index rows, Eigen::Index columns) {
   return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return random.normal(); });
-}
-
-/// The book's example plant of appendix B.
-DiscreteSystem<2, 1, 1> plant() {
-  DiscreteSystem<2, 1, 1> system;
-  system.A << 1.0, 0.1, 0.0, 0.95;
-  system.B << 0.005, 0.1;
-  system.C << 1.0, 0.3;
-  system.D << 0.2;
-  system.period = 0.1_s;
-  return system;
 }
 
 Eigen::MatrixXd scalar(double value) {
@@ -33,8 +26,9 @@ TEST(ImplicitModel, IsTheBooksExample) {
   Eigen::Matrix2d A_ref;
   A_ref << 1.0, 0.1, 0.0, 0.8;
   const Eigen::Matrix2d Q = Eigen::Vector2d(1.0, 2.0).asDiagonal();
-  const auto model = implicit_model_following(plant().A, plant().B, Eigen::Matrix2d::Identity(),
-                                              A_ref, plant().B, Q, scalar(0.5))
+  const auto model = implicit_model_following(appendix_b_plant().A, appendix_b_plant().B,
+                                              Eigen::Matrix2d::Identity(), A_ref,
+                                              appendix_b_plant().B, Q, scalar(0.5))
                          .value();
   EXPECT_NEAR(model.cost.Q(1, 1), 0.045, 1e-15);
   EXPECT_NEAR(model.cost.R(0, 0), 0.520025, 1e-15);
@@ -76,12 +70,13 @@ TEST(ImplicitModel, Errors) {
   const auto Q = implicit_model_cost(I, B, I, I, scalar(1.0), scalar(1.0));
   EXPECT_EQ(to_string(Q.error()),
             "implicit_model_cost: Q is 1x1; it must be outputs x outputs (2x2)");
-  auto slower = plant();
+  auto slower = appendix_b_plant();
   slower.period = 0.2_s;
-  EXPECT_TRUE(implicit_model_following(plant(), slower, I, scalar(1.0))
+  EXPECT_TRUE(implicit_model_following(appendix_b_plant(), slower, I, scalar(1.0))
                   .error()
                   .is(ArgumentError::out_of_range));
-  EXPECT_TRUE(implicit_model_following(plant(), plant(), I, scalar(1.0)).has_value());
+  EXPECT_TRUE(
+      implicit_model_following(appendix_b_plant(), appendix_b_plant(), I, scalar(1.0)).has_value());
 }
 
 }  // namespace

@@ -7,24 +7,15 @@
 
 #include <flyball/core/random.hpp>
 
+#include "control/appendix_b_plant.hpp"
+
 namespace flyball {
 namespace {
 
-using namespace flyball::literals;
+using test::appendix_b_plant;
 
 Eigen::MatrixXd random_matrix(Random& random, Eigen::Index rows, Eigen::Index columns) {
   return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return random.normal(); });
-}
-
-/// The book's example plant of appendix B.
-DiscreteSystem<2, 1, 1> plant() {
-  DiscreteSystem<2, 1, 1> system;
-  system.A << 1.0, 0.1, 0.0, 0.95;
-  system.B << 0.005, 0.1;
-  system.C << 1.0, 0.3;
-  system.D << 0.2;
-  system.period = 0.1_s;
-  return system;
 }
 
 Eigen::MatrixXd scalar(double value) {
@@ -33,14 +24,15 @@ Eigen::MatrixXd scalar(double value) {
 
 // SciPy 1.10.1, solve_discrete_are with s = N: facts of the reference data for Theorem B.2.1.
 TEST(OutputCost, IsTheBooksExample) {
-  const auto cost = output_cost(plant().C, plant().D, scalar(3.0), scalar(0.5)).value();
+  const auto cost =
+      output_cost(appendix_b_plant().C, appendix_b_plant().D, scalar(3.0), scalar(0.5)).value();
   EXPECT_NEAR(cost.Q(0, 0), 3.0, 1e-15);
   EXPECT_NEAR(cost.Q(0, 1), 0.9, 1e-15);
   EXPECT_NEAR(cost.Q(1, 1), 0.27, 1e-15);
   EXPECT_NEAR(cost.R(0, 0), 0.62, 1e-15);
   EXPECT_NEAR(cost.N(0, 0), 0.6, 1e-15);
   EXPECT_NEAR(cost.N(1, 0), 0.18, 1e-15);
-  const auto design = output_lqr(plant(), scalar(3.0), scalar(0.5)).value();
+  const auto design = output_lqr(appendix_b_plant(), scalar(3.0), scalar(0.5)).value();
   static_assert(decltype(design.K)::ColsAtCompileTime == 2);
   EXPECT_NEAR(design.K(0, 0), 2.0792724950117867, 1e-12);
   EXPECT_NEAR(design.K(0, 1), 1.334944324646523, 1e-12);

@@ -10,6 +10,8 @@
 #include <flyball/mechanisms/flywheel.hpp>
 #include <flyball/mechanisms/velocity_servo.hpp>
 
+#include "mechanisms/expect_model.hpp"
+
 namespace flyball::mechanisms {
 namespace {
 
@@ -21,10 +23,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 // Section 14.3: A = -K_v/K_a = -0.12/0.05 = -2.4, B = 1/K_a = 20.
 TEST(IdentifiedGains, Flywheel) {
   const Flywheel model = flywheel(FeedforwardGains{.kS = 0.5, .kV = 0.12, .kA = 0.05}).value();
-  EXPECT_DOUBLE_EQ(model.A(0, 0), -2.4);
-  EXPECT_DOUBLE_EQ(model.B(0, 0), 20.0);
-  EXPECT_EQ(model.C(0, 0), 1.0);
-  EXPECT_EQ(model.D(0, 0), 0.0);
+  test::expect_first_order(model, -2.4, 20.0);
   EXPECT_EQ(model.kind, MechanismKind::flywheel);
   EXPECT_EQ(model.nominal_voltage, 12.0);
   EXPECT_EQ(model.gains.kS, 0.5);
@@ -34,15 +33,7 @@ TEST(IdentifiedGains, Flywheel) {
 TEST(IdentifiedGains, ElevatorAndArm) {
   const FeedforwardGains gains{.kS = 0.2, .kV = 4.0, .kA = 0.25, .kG = 0.6, .angle_offset = 0.3};
   const auto check = [&](const Mechanism<2>& model, MechanismKind kind) {
-    EXPECT_EQ(model.A(0, 0), 0.0);
-    EXPECT_EQ(model.A(0, 1), 1.0);
-    EXPECT_EQ(model.A(1, 0), 0.0);
-    EXPECT_DOUBLE_EQ(model.A(1, 1), -16.0);
-    EXPECT_EQ(model.B(0, 0), 0.0);
-    EXPECT_DOUBLE_EQ(model.B(1, 0), 4.0);
-    EXPECT_EQ(model.C(0, 0), 1.0);
-    EXPECT_EQ(model.C(0, 1), 0.0);
-    EXPECT_EQ(model.D(0, 0), 0.0);
+    test::expect_second_order(model, -16.0, 4.0);
     EXPECT_EQ(model.kind, kind);
     EXPECT_EQ(model.gains.kG, 0.6);
   };

@@ -9,6 +9,8 @@
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/mechanisms/flywheel.hpp>
 
+#include "mechanisms/expect_model.hpp"
+
 namespace flyball::mechanisms {
 namespace {
 
@@ -35,10 +37,7 @@ void expect_near_relative(double found, double expected, double relative) {
 TEST(Flywheel, Theorem6101) {
   const Flywheel model =
       flywheel({.motor = round_motor(), .gearing = 10.0, .moment_of_inertia = 0.5_kg_m2}).value();
-  EXPECT_DOUBLE_EQ(model.A(0, 0), -2.5);
-  EXPECT_DOUBLE_EQ(model.B(0, 0), 5.0);
-  EXPECT_EQ(model.C(0, 0), 1.0);
-  EXPECT_EQ(model.D(0, 0), 0.0);
+  test::expect_first_order(model, -2.5, 5.0);
   EXPECT_EQ(model.kind, MechanismKind::flywheel);
   EXPECT_EQ(model.nominal_voltage, 24.0);
   // K_v' = G/K_v = 0.5 V s/rad, K_a' = R J/(G K_t) = 0.2 V s²/rad.
@@ -55,15 +54,7 @@ TEST(Elevator, Theorem691) {
   const Elevator model =
       elevator({.motor = round_motor(), .gearing = 10.0, .mass = 8_kg, .drum_radius = 5_cm})
           .value();
-  EXPECT_EQ(model.A(0, 0), 0.0);
-  EXPECT_EQ(model.A(0, 1), 1.0);
-  EXPECT_EQ(model.A(1, 0), 0.0);
-  EXPECT_DOUBLE_EQ(model.A(1, 1), -62.5);
-  EXPECT_EQ(model.B(0, 0), 0.0);
-  EXPECT_DOUBLE_EQ(model.B(1, 0), 6.25);
-  EXPECT_EQ(model.C(0, 0), 1.0);
-  EXPECT_EQ(model.C(0, 1), 0.0);
-  EXPECT_EQ(model.D(0, 0), 0.0);
+  test::expect_second_order(model, -62.5, 6.25);
   EXPECT_EQ(model.kind, MechanismKind::elevator);
   EXPECT_EQ(model.nominal_voltage, 24.0);
   EXPECT_DOUBLE_EQ(model.gains.kG, 0.16 * 9.80665);
@@ -83,15 +74,7 @@ TEST(Arm, Theorem6111) {
                          .mass = 3_kg,
                          .center_of_mass = 40_cm})
                         .value();
-  EXPECT_EQ(model.A(0, 0), 0.0);
-  EXPECT_EQ(model.A(0, 1), 1.0);
-  EXPECT_EQ(model.A(1, 0), 0.0);
-  EXPECT_DOUBLE_EQ(model.A(1, 1), -5.0);
-  EXPECT_EQ(model.B(0, 0), 0.0);
-  EXPECT_DOUBLE_EQ(model.B(1, 0), 10.0);
-  EXPECT_EQ(model.C(0, 0), 1.0);
-  EXPECT_EQ(model.C(0, 1), 0.0);
-  EXPECT_EQ(model.D(0, 0), 0.0);
+  test::expect_second_order(model, -5.0, 10.0);
   EXPECT_EQ(model.kind, MechanismKind::arm);
   EXPECT_DOUBLE_EQ(model.gains.kG, 0.48 * 9.80665);
   // -m g l cos θ/J (6.11.3): in full when level, half at 60 degrees, none when it stands up.
