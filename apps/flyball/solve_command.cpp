@@ -24,13 +24,17 @@ std::string list_of_kinds() {
   return text;
 }
 
+bool is_blank(const std::string& line) {
+  return line.find_first_not_of(" \t\r\n") == std::string::npos;
+}
+
 /// Answers problem after problem; the status is the worst that any of them asks for.
 class Stream {
  public:
   explicit Stream(const study::Solver& solver) : solver_(solver) {}
 
   void answer(const std::string& problem) {
-    if (problem.find_first_not_of(" \t\r") == std::string::npos) {
+    if (is_blank(problem)) {
       return;
     }
     study::SolveAnswer answer = solver_.solve(problem);
@@ -51,6 +55,33 @@ class Stream {
   long count_ = 0;
 };
 
+/// Calls back with each line of a text.
+template <class F>
+void for_each_line(const std::string& text, const F& f) {
+  for (std::size_t from = 0; from < text.size();) {
+    const std::size_t end = std::min(text.find('\n', from), text.size());
+    f(text.substr(from, end - from));
+    from = end + 1;
+  }
+}
+
+/// Whether a text whose first line is not whole is one object over several lines, be it broken: the
+/// other lines go on as such an object does, and none is a problem of its own.
+bool is_one_object(const std::string& text) {
+  if (study::Solver::is_complete(text)) {
+    return true;
+  }
+  bool one = text.starts_with('{');
+  bool first = true;
+  for_each_line(text, [&](const std::string& line) {
+    one =
+        one && (first || is_blank(line) ||
+                (std::string_view(" \t}]\"[,-0123456789").find(line[0]) != std::string_view::npos));
+    first = false;
+  });
+  return one;
+}
+
 int run(const std::string& kind) {
   const auto solver = study::Solver::create(kind);
   if (!solver) {
@@ -61,28 +92,20 @@ int run(const std::string& kind) {
   std::ios::sync_with_stdio(false);
   Stream stream(*solver);
   std::string line;
-  bool first = true;
-  while (std::getline(std::cin, line)) {
-    if (first && line.find_first_not_of(" \t\r") != std::string::npos) {
-      first = false;
-      if (!study::Solver::is_complete(line)) {
-        // One object over several lines, or lines of which the first is broken.
-        std::string rest{std::istreambuf_iterator<char>(std::cin), {}};
-        const std::string whole = line + '\n' + rest;
-        if (study::Solver::is_complete(whole)) {
-          stream.answer(whole);
-          break;
-        }
-        stream.answer(line);
-        for (std::size_t from = 0; from < rest.size();) {
-          const std::size_t end = std::min(rest.find('\n', from), rest.size());
-          stream.answer(rest.substr(from, end - from));
-          from = end + 1;
-        }
-        break;
-      }
+  while (std::getline(std::cin, line) && is_blank(line)) {
+  }
+  if (!is_blank(line) && !study::Solver::is_complete(line)) {
+    line += '\n';
+    line.append(std::istreambuf_iterator<char>(std::cin), {});
+    if (is_one_object(line)) {
+      stream.answer(line);
+    } else {
+      for_each_line(line, [&](const std::string& each) { stream.answer(each); });
     }
-    stream.answer(line);
+  } else {
+    do {
+      stream.answer(line);
+    } while (std::getline(std::cin, line));
   }
   if (stream.empty()) {
     tell(Error(ArgumentError::empty)

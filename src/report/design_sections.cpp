@@ -115,10 +115,8 @@ std::string controlled_unit(const study::PlantDescription& plant) {
   return plant.kind == MechanismKind::flywheel ? plant.unit + "/s" : plant.unit;
 }
 
-Section plant_section(const DesignResult& result) {
-  const study::PlantDescription& plant = result.job.plant;
+Facts plant_facts(const study::PlantDescription& plant) {
   const std::string& unit = plant.unit;
-  Section section{"plant", "Plant", {}};
   Facts facts;
   facts.add("mechanism", std::string(to_string(plant.kind)));
   if (plant.motor) {
@@ -133,9 +131,10 @@ Section plant_section(const DesignResult& result) {
   }
   std::string gains =
       fmt::format("kS {} V, kV {} V·s/{}", number(plant.gains.kS), number(plant.gains.kV), unit);
-  gains += plant.kA_determined
-               ? fmt::format(", kA {} V·s²/{}", number(plant.gains.kA), unit)
-               : fmt::format(", kA below {} V·s²/{}", number(plant.kA_upper_bound), unit);
+  gains += plant.kA_determined ? fmt::format(", kA {} V·s²/{}", number(plant.gains.kA), unit)
+           : plant.kA_upper_bound > 0.0
+               ? fmt::format(", kA below {} V·s²/{}", number(plant.kA_upper_bound), unit)
+               : std::string(", kA not known");
   if (plant.kind != MechanismKind::flywheel) {
     gains += fmt::format(", kG {} V", number(plant.gains.kG));
   }
@@ -143,12 +142,19 @@ Section plant_section(const DesignResult& result) {
     gains += fmt::format(", angle offset {} rad", number(plant.gains.angle_offset));
   }
   facts.add("gains", gains);
+  return facts;
+}
+
+Section plant_section(const DesignResult& result) {
+  const study::PlantDescription& plant = result.job.plant;
+  Section section{"plant", "Plant", {}};
+  Facts facts = plant_facts(plant);
   facts.add("states", enumerate(result.states));
   facts.add("input",
             result.velocity_servo
                 ? fmt::format("velocity ({0}/s); the volts are kS sgn(u) + kV u{1} "
                               "(Theorem 14.3.2)",
-                              unit, plant.kind == MechanismKind::flywheel ? "" : " + gravity")
+                              plant.unit, plant.kind == MechanismKind::flywheel ? "" : " + gravity")
                 : "voltage (V)");
   facts.add("continuous", fmt::format("A = {}, B = {}", matrix(result.A_continuous),
                                       matrix(result.B_continuous)));

@@ -49,6 +49,8 @@ void add_design_sections(Document& document, const study::DesignResult& result,
   document.sections.push_back(constants_section(result, reason));
 }
 
+}  // namespace
+
 std::string title_of(const std::string& kind, const std::string& subject, const std::string& path) {
   std::string title = capitalized(kind);
   if (!subject.empty()) {
@@ -58,8 +60,6 @@ std::string title_of(const std::string& kind, const std::string& subject, const 
   const std::string file = slash == std::string::npos ? path : path.substr(slash + 1);
   return file.empty() ? title : title + " from " + file;
 }
-
-}  // namespace
 
 Section constants_section(const study::DesignResult& result, const std::string& reason) {
   Section section{"constants", "Constants to paste", {}};

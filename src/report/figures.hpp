@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <flyball/io/plot.hpp>
+#include <flyball/study/analyze.hpp>
 #include <flyball/study/design.hpp>
 #include <flyball/study/identify.hpp>
 #include <flyball/study/tune.hpp>
@@ -24,6 +25,8 @@ struct Figure {
 /// Closed-loop response, estimate against truth, pole map.
 [[nodiscard]] std::vector<Figure> figures_of(const study::DesignResult& result);
 [[nodiscard]] std::vector<Figure> figures_of(const study::TuneResult& result);
+/// Pole map and step responses.
+[[nodiscard]] std::vector<Figure> figures_of(const study::ModelAnalysis& result);
 
 struct RenderedFigure {
   Figure figure;

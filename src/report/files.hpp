@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <flyball/core/expected.hpp>
+#include <flyball/study/analyze.hpp>
 #include <flyball/study/design.hpp>
 #include <flyball/study/identify.hpp>
 
@@ -19,6 +20,8 @@ struct ReportFile {
 [[nodiscard]] std::vector<ReportFile> data_files(const study::IdentifyResult& result);
 /// The closed-loop response and the robustness grid as CSV.
 [[nodiscard]] std::vector<ReportFile> data_files(const study::DesignResult& result);
+/// The step responses as CSV.
+[[nodiscard]] std::vector<ReportFile> data_files(const study::ModelAnalysis& result);
 
 /// The gains as a project file, intervals as comments; `flyball design` reads it. Without gains
 /// (a refused fit) empty.

@@ -201,6 +201,10 @@ Origins origins_of(const study::TuneResult& result) {
   return origins;
 }
 
+Origins origins_of(const study::ModelAnalysis& result) {
+  return {{"model", result.model.path}};
+}
+
 }  // namespace
 
 std::string render_html(const Document& document, const std::vector<RenderedFigure>& figures,
@@ -259,6 +263,11 @@ std::string page_of(const study::TuneResult& result, const std::vector<RenderedF
   return render_html(document_of(result), figures, origins_of(result), provenance);
 }
 
+std::string page_of(const study::ModelAnalysis& result, const std::vector<RenderedFigure>& figures,
+                    const Provenance& provenance) {
+  return render_html(document_of(result), figures, origins_of(result), provenance);
+}
+
 std::string to_html(const study::IdentifyResult& result, const Provenance& provenance) {
   return page_of(result, render(figures_of(result), false), provenance);
 }
@@ -268,6 +277,10 @@ std::string to_html(const study::DesignResult& result, const Provenance& provena
 }
 
 std::string to_html(const study::TuneResult& result, const Provenance& provenance) {
+  return page_of(result, render(figures_of(result), false), provenance);
+}
+
+std::string to_html(const study::ModelAnalysis& result, const Provenance& provenance) {
   return page_of(result, render(figures_of(result), false), provenance);
 }
 

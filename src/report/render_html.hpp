@@ -29,5 +29,8 @@ using Origins = std::vector<std::pair<std::string, std::string>>;
 [[nodiscard]] std::string page_of(const study::TuneResult& result,
                                   const std::vector<RenderedFigure>& figures,
                                   const Provenance& provenance);
+[[nodiscard]] std::string page_of(const study::ModelAnalysis& result,
+                                  const std::vector<RenderedFigure>& figures,
+                                  const Provenance& provenance);
 
 }  // namespace flyball::report

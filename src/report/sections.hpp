@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include <flyball/study/analyze.hpp>
 #include <flyball/study/design.hpp>
 #include <flyball/study/identify.hpp>
 #include <flyball/study/tune.hpp>
@@ -31,11 +32,18 @@ namespace flyball::report {
 [[nodiscard]] Document document_of(const study::IdentifyResult& result);
 [[nodiscard]] Document document_of(const study::DesignResult& result);
 [[nodiscard]] Document document_of(const study::TuneResult& result);
+[[nodiscard]] Document document_of(const study::ModelAnalysis& result);
 
 [[nodiscard]] Verdict verdict_of(const study::IdentifyResult& result);
 [[nodiscard]] Verdict verdict_of(const study::DesignResult& result);
 [[nodiscard]] Verdict verdict_of(const study::TuneResult& result);
+[[nodiscard]] Verdict verdict_of(const study::ModelAnalysis& result);
 
+/// Its kind, motors, gearing, drum and gains.
+[[nodiscard]] Facts plant_facts(const study::PlantDescription& plant);
+/// "Elevator “lift” from log.json". @param subject  May be empty, as `path`.
+[[nodiscard]] std::string title_of(const std::string& kind, const std::string& subject,
+                                   const std::string& path);
 /// What was measured: "velocity" for a flywheel, else "position".
 [[nodiscard]] std::string measured_name(mechanisms::MechanismKind kind);
 /// The unit of the controlled quantity: "rad/s" for a flywheel, else the unit itself.

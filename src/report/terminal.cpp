@@ -20,4 +20,9 @@ std::string to_terminal(const study::TuneResult& result, const TerminalStyle& st
   return render_terminal(document_of(result), style, report_folder);
 }
 
+std::string to_terminal(const study::ModelAnalysis& result, const TerminalStyle& style,
+                        std::string_view report_folder) {
+  return render_terminal(document_of(result), style, report_folder);
+}
+
 }  // namespace flyball::report

@@ -104,4 +104,11 @@ Expected<void> write_tune_report(const study::TuneResult& result, const std::str
   return write(result, std::move(files), folder, provenance);
 }
 
+Expected<void> write_analyze_report(const study::ModelAnalysis& result, const std::string& folder,
+                                    const Provenance& provenance) {
+  std::vector<ReportFile> files{{"result.json", study::to_json(result) + "\n"}};
+  append(files, data_files(result));
+  return write(result, std::move(files), folder, provenance);
+}
+
 }  // namespace flyball::report

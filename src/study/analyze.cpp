@@ -4,19 +4,19 @@
 #include <cmath>
 #include <limits>
 
-#include <flyball/systems/discretize.hpp>
+#include <fmt/format.h>
+
 #include <flyball/systems/interconnection.hpp>
 
-#include "study/problem_json.hpp"
+#include "study/linear_response.hpp"
 
 namespace flyball::study {
 
 namespace {
 
 using Eigen::MatrixXd;
-using Json = nlohmann::json;
 
-constexpr std::string_view fields[] = {"A", "B", "C", "D", "domain", "T", "states"};
+constexpr Eigen::Index most_steps = 16;  ///< Inputs whose step responses can still be looked at.
 
 /// Until the slowest mode has settled, and fine enough for the fastest; a growing mode is shown for
 /// a few of its time constants.
@@ -28,12 +28,12 @@ struct Horizon {
 Horizon horizon_of(const ModalAnalysis& analysis) {
   double slowest = 0.0;
   double fastest = 0.0;
-  double growth = std::numeric_limits<double>::infinity();  // s, of the mode that grows fastest
+  double growing = std::numeric_limits<double>::infinity();
   for (const Mode& mode : analysis.modes) {
     const double tau = std::abs(mode.time_constant);
-    if (std::isfinite(tau) && tau > 0.0) {
+    if (std::isfinite(tau) && tau > 0.0 && mode.stability != Stability::marginal) {
       slowest = std::max(slowest, tau);
-      growth = mode.stability == Stability::unstable ? std::min(growth, tau) : growth;
+      growing = mode.stability == Stability::unstable ? std::min(growing, tau) : growing;
     }
     if (std::isfinite(mode.natural_frequency)) {
       fastest = std::max(fastest, mode.natural_frequency);
@@ -41,151 +41,151 @@ Horizon horizon_of(const ModalAnalysis& analysis) {
   }
   Horizon horizon;
   if (slowest > 0.0) {
-    horizon.end = 6.0 * slowest;
+    horizon.end = std::min(6.0 * slowest, 5.0 * growing);
   } else if (fastest > 0.0) {
     horizon.end = 40.0 / fastest;  // about six turns of an undamped oscillation
   }
-  horizon.end = std::min(horizon.end, 5.0 * growth);
   horizon.step = horizon.end / 600.0;
   return horizon;
 }
 
 Expected<std::vector<StepResponse>> step_responses(const ModelFile& model,
                                                    const ModalAnalysis& modes) {
+  const ContinuousSystem<>& system = model.system;
   const Horizon horizon = horizon_of(modes);
-  DiscretizedMatrices sampled{model.system.A, model.system.B};
-  double step = model.period.si();
+  DiscretizedMatrices sampled{system.A, system.B};
+  double step = horizon.step;
   if (model.domain == TimeDomain::continuous) {
-    step = horizon.step;
-    auto discrete = discretize_zoh(model.system.A, model.system.B, Time(step));
+    auto discrete = discretize_zoh(system.A, system.B, Time(step));
     if (!discrete) {
       return tl::unexpected(discrete.error());
     }
     sampled = *std::move(discrete);
+  } else {
+    step = model.period->si();
   }
   const auto samples =
       static_cast<Eigen::Index>(std::clamp(std::ceil(horizon.end / step), 10.0, 2000.0) + 1.0);
+  const Eigen::VectorXd at_rest = Eigen::VectorXd::Zero(system.A.rows());
   std::vector<StepResponse> responses;
-  for (Eigen::Index input = 0; input < model.system.B.cols(); ++input) {
-    StepResponse response;
-    response.time =
-        Eigen::VectorXd::LinSpaced(samples, 0.0, step * static_cast<double>(samples - 1));
-    response.y.resize(samples, model.system.C.rows());
-    Eigen::VectorXd x = Eigen::VectorXd::Zero(model.system.A.rows());
-    for (Eigen::Index k = 0; k < samples; ++k) {
-      response.y.row(k) = (model.system.C * x + model.system.D.col(input)).transpose();
-      x = (sampled.A * x + sampled.B.col(input)).eval();
-    }
-    responses.push_back(std::move(response));
+  for (Eigen::Index input = 0; input < std::min(system.B.cols(), most_steps); ++input) {
+    MatrixXd u = MatrixXd::Zero(samples, system.B.cols());
+    u.col(input).setOnes();
+    responses.push_back(
+        {Eigen::VectorXd::LinSpaced(samples, 0.0, step * static_cast<double>(samples - 1)),
+         linear_response(sampled, system.C, system.D, u, at_rest).y});
   }
   return responses;
 }
 
+/// Names for all that have none: an output that is one state has the state's.
+void complete_names(ModelFile& model) {
+  const ContinuousSystem<>& system = model.system;
+  const auto complete = [](std::vector<std::string>& names, Eigen::Index count, char letter) {
+    for (auto k = static_cast<Eigen::Index>(names.size()); k < count; ++k) {
+      names.push_back(fmt::format("{}{}", letter, k + 1));
+    }
+  };
+  const bool named = !model.states.empty();
+  complete(model.states, system.A.rows(), 'x');
+  complete(model.inputs, system.B.cols(), 'u');
+  for (auto k = static_cast<Eigen::Index>(model.outputs.size()); k < system.C.rows(); ++k) {
+    Eigen::Index state = 0;
+    const double largest = system.C.row(k).cwiseAbs().maxCoeff(&state);
+    const bool is_state = system.C(k, state) == 1.0 && largest == system.C.row(k).lpNorm<1>() &&
+                          system.D.row(k).isZero(0.0);
+    model.outputs.push_back(named && is_state ? model.states[static_cast<std::size_t>(state)]
+                                              : fmt::format("y{}", k + 1));
+  }
+}
+
+Expected<SampledAnalysis> sampled_analysis(const ContinuousSystem<>& system, Time period) {
+  auto discrete = discretize_zoh(system.A, system.B, period);
+  if (!discrete) {
+    return tl::unexpected(std::move(discrete).error());
+  }
+  auto structure = analyze_structure({discrete->A, discrete->B, system.C, system.D},
+                                     TimeDomain::discrete, period);
+  if (!structure) {
+    return tl::unexpected(std::move(structure).error());
+  }
+  return analyze_sampling(system, period).map([&](const SamplingAnalysis& sampling) {
+    return SampledAnalysis{*std::move(structure), *std::move(discrete), sampling};
+  });
+}
+
+void add_gains(ModelAnalysis& analysis) {
+  const ContinuousSystem<>& system = analysis.model.system;
+  const bool continuous = analysis.model.domain == TimeDomain::continuous;
+  const DiscreteSystem<> discrete{system.A, system.B, system.C, system.D,
+                                  analysis.model.period.value_or(Time(1.0))};
+  if (const auto dc = continuous ? transfer_at(system, 0.0) : transfer_at(discrete, 1.0)) {
+    analysis.dc_gain = dc->real();
+  }
+  if (analysis.modes.stability != Stability::stable) {
+    return;
+  }
+  if (const auto h2 = continuous ? h2_norm(system) : h2_norm(discrete)) {
+    analysis.h2_norm = *h2;
+  }
+  if (const auto peak = continuous ? h_infinity_norm(system) : h_infinity_norm(discrete)) {
+    analysis.h_infinity_norm = *peak;
+  }
+}
+
 }  // namespace
 
-Expected<ModelFile> parse_model(std::string_view text, const std::string& name) {
-  const auto malformed = [&](std::string got, std::string expected) {
-    return tl::unexpected(Error(ArgumentError::malformed)
-                              .in("analyze")
-                              .about(name)
-                              .got(std::move(got))
-                              .expected(std::move(expected)));
-  };
-  const Json object = Json::parse(text, nullptr, false);
-  if (object.is_discarded() || !object.is_object()) {
-    return malformed("not a JSON object",
-                     "a model such as {\"A\": [[0, 1], [0, -2]], \"B\": [[0], [1]]}");
-  }
-  for (const auto& [key, value] : object.items()) {
-    if (std::find(std::begin(fields), std::end(fields), key) == std::end(fields)) {
-      return malformed("a field \"" + key.substr(0, 40) + "\"",
-                       "the fields A, B, C, D, domain, T and states");
-    }
-  }
-  ProblemReader reader(object, "analyze");
-  if (!reader.has("A") || !reader.has("B")) {
-    return malformed("without A or B", "a model with both");
-  }
-  ModelFile model;
-  model.system.A = reader.matrix("A");
-  model.system.B = reader.matrix("B");
-  model.system.C = reader.matrix_or_identity("C", model.system.A.rows());
-  model.system.D = reader.matrix_or_zero("D", model.system.C.rows(), model.system.B.cols());
-  if (reader.has("domain")) {
-    const std::string domain = reader.text("domain");
-    if (domain != "continuous" && domain != "discrete") {
-      return malformed("the domain \"" + domain.substr(0, 40) + "\"",
-                       "\"continuous\" or \"discrete\"");
-    }
-    model.domain = domain == "discrete" ? TimeDomain::discrete : TimeDomain::continuous;
-  }
-  if (reader.has("T")) {
-    model.period = Time(reader.number("T"));
-  } else if (model.domain == TimeDomain::discrete) {
-    return malformed("a discrete model without T", "its sample period T in seconds");
-  }
-  if (reader.has("states")) {
-    const Json& names = object.at("states");
-    if (!names.is_array() || names.size() != static_cast<std::size_t>(model.system.A.rows()) ||
-        !std::all_of(names.begin(), names.end(), [](const Json& n) { return n.is_string(); })) {
-      return malformed("states that are not a name for each row of A",
-                       "a list such as [\"position\", \"velocity\"]");
-    }
-    model.states = names.get<std::vector<std::string>>();
-  }
-  if (!reader.status()) {
-    return tl::unexpected(reader.status().error());
-  }
-  if (auto checked = check_all(check_system(model.system, "analyze"),
-                               check_positive(model.period.si(), "analyze", "T", "s"));
-      !checked) {
+Expected<StructureAnalysis> analyze_structure(const ContinuousSystem<>& system, TimeDomain domain,
+                                              Time period) {
+  if (auto checked = check_system(system, "analyze"); !checked) {
     return tl::unexpected(checked.error());
   }
-  return model;
+  auto modes = analyze_modes(system.A, domain, period);
+  if (!modes) {
+    return tl::unexpected(std::move(modes).error());
+  }
+  auto controllability = analyze_controllability(system.A, system.B, domain);
+  if (!controllability) {
+    return tl::unexpected(std::move(controllability).error());
+  }
+  return analyze_observability(system.A, system.C, domain)
+      .map([&](ObservabilityAnalysis&& observability) {
+        return StructureAnalysis{*std::move(modes), *std::move(controllability),
+                                 std::move(observability)};
+      });
 }
 
 Expected<ModelAnalysis> analyze(const ModelFile& model) {
-  const ContinuousSystem<>& system = model.system;
-  auto modes = analyze_modes(system.A, model.domain, model.period);
-  if (!modes) {
-    return tl::unexpected(modes.error());
-  }
-  auto controllability = analyze_controllability(system.A, system.B, model.domain);
-  if (!controllability) {
-    return tl::unexpected(controllability.error());
-  }
-  auto observability = analyze_observability(system.A, system.C, model.domain);
-  if (!observability) {
-    return tl::unexpected(observability.error());
-  }
-  auto steps = step_responses(model, *modes);
-  if (!steps) {
-    return tl::unexpected(steps.error());
-  }
-  ModelAnalysis analysis{model,
-                         *std::move(modes),
-                         *std::move(controllability),
-                         *std::move(observability),
-                         std::nullopt,
-                         std::nullopt,
-                         std::nullopt,
-                         *std::move(steps)};
-  const DiscreteSystem<> discrete{system.A, system.B, system.C, system.D, model.period};
   const bool continuous = model.domain == TimeDomain::continuous;
-  const auto dc = continuous ? transfer_at(system, 0.0) : transfer_at(discrete, 1.0);
-  if (dc) {
-    analysis.dc_gain = dc->real();
+  if (!continuous && !model.period) {
+    return tl::unexpected(Error(ArgumentError::malformed)
+                              .in("analyze")
+                              .about("period")
+                              .got("left out")
+                              .expected("the sample period of the discrete system"));
   }
-  if (analysis.modes.stability == Stability::stable) {
-    const auto h2 = continuous ? h2_norm(system) : h2_norm(discrete);
-    if (h2) {
-      analysis.h2_norm = *h2;
-    }
-    const auto peak = continuous ? h_infinity_norm(system) : h_infinity_norm(discrete);
-    if (peak) {
-      analysis.h_infinity_norm = *peak;
+  auto structure = analyze_structure(model.system, model.domain, model.period.value_or(Time(1.0)));
+  if (!structure) {
+    return tl::unexpected(std::move(structure).error());
+  }
+  ModelAnalysis analysis{*std::move(structure), model, {}, {}, {}, {}, {}};
+  complete_names(analysis.model);
+  if (continuous && model.period) {
+    auto sampled = sampled_analysis(model.system, *model.period);
+    if (sampled) {
+      analysis.sampled = *std::move(sampled);
+    } else {
+      // The continuous system is what was asked about.
+      analysis.model.notes.push_back(
+          {"not_sampled", Severity::warning, "as sampled: " + to_string(sampled.error())});
     }
   }
+  auto steps = step_responses(model, analysis.modes);
+  if (!steps) {
+    return tl::unexpected(std::move(steps).error());
+  }
+  analysis.steps = *std::move(steps);
+  add_gains(analysis);
   return analysis;
 }
 

@@ -17,6 +17,12 @@ struct LinearModel {
 };
 [[nodiscard]] Expected<LinearModel> linear_model(const PlantDescription& plant, double period);
 
+/// What is done without kA.
+[[nodiscard]] Diagnostic unknown_kA(mechanisms::MechanismKind kind);
+
+/// Standard deviation of one reading: as given, or what the resolution and the mechanism suggest.
+[[nodiscard]] double measurement_std(const DesignJob& job);
+
 /// Largest acceptable errors to begin with when the person named none.
 [[nodiscard]] std::vector<double> default_tolerances(const PlantDescription& plant,
                                                      std::size_t states);

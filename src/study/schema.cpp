@@ -1,12 +1,11 @@
 #include <flyball/study/schema.hpp>
 
-#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <flyball/core/version.hpp>
+#include "study/json.hpp"
 
 namespace flyball::study {
 
@@ -16,23 +15,12 @@ using Json = nlohmann::ordered_json;
 using identification::GainEstimate;
 using mechanisms::MechanismKind;
 
-// JSON has no infinity: it is a text, and what is not a number is null.
-Json number(double value) {
-  if (std::isnan(value)) {
-    return nullptr;
-  }
-  if (std::isinf(value)) {
-    return value > 0.0 ? "inf" : "-inf";
-  }
-  return value;
-}
-
 Json matrix(const Eigen::MatrixXd& M) {
   Json rows = Json::array();
   for (Eigen::Index i = 0; i < M.rows(); ++i) {
     Json row = Json::array();
     for (Eigen::Index j = 0; j < M.cols(); ++j) {
-      row.push_back(number(M(i, j)));
+      row.push_back(json_of(M(i, j)));
     }
     rows.push_back(std::move(row));
   }
@@ -42,40 +30,9 @@ Json matrix(const Eigen::MatrixXd& M) {
 Json complex_list(const Eigen::VectorXcd& values) {
   Json list = Json::array();
   for (Eigen::Index i = 0; i < values.size(); ++i) {
-    list.push_back({number(values(i).real()), number(values(i).imag())});
+    list.push_back({json_of(values(i).real()), json_of(values(i).imag())});
   }
   return list;
-}
-
-Json diagnostics_json(const std::vector<Diagnostic>& diagnostics) {
-  Json list = Json::array();
-  for (const Diagnostic& diagnostic : diagnostics) {
-    list.push_back({{"code", diagnostic.code},
-                    {"severity", std::string(to_string(diagnostic.severity))},
-                    {"message", diagnostic.message}});
-  }
-  return list;
-}
-
-Json error_json(const Error& error) {
-  Json json = {{"code", std::string(error.code())}, {"message", to_string(error)}};
-  for (const Evidence& evidence : error.evidence()) {
-    if (json.contains(evidence.name)) {
-      continue;
-    }
-    if (evidence.values.size() == 1) {
-      json[evidence.name] = number(evidence.values.front());
-    } else if (!evidence.values.empty()) {
-      Json list = Json::array();
-      for (const double value : evidence.values) {
-        list.push_back(number(value));
-      }
-      json[evidence.name] = std::move(list);
-    } else {
-      json[evidence.name] = evidence.text;
-    }
-  }
-  return json;
 }
 
 Json gain_json(const GainEstimate& gain, const std::string& unit) {
@@ -83,23 +40,23 @@ Json gain_json(const GainEstimate& gain, const std::string& unit) {
     return {{"value", nullptr},
             {"determined", false},
             {"unit", unit},
-            {"upper_bound", number(gain.upper_bound)},
+            {"upper_bound", json_of(gain.upper_bound)},
             {"reason", gain.reason}};
   }
-  return {{"value", number(gain.value)},
+  return {{"value", json_of(gain.value)},
           {"determined", true},
           {"unit", unit},
-          {"standard_error", number(gain.standard_error)},
-          {"interval", {number(gain.interval[0]), number(gain.interval[1])}}};
+          {"standard_error", json_of(gain.standard_error)},
+          {"interval", {json_of(gain.interval[0]), json_of(gain.interval[1])}}};
 }
 
 Json one_step_json(const identification::OneStepFit& fit, bool gravity) {
-  Json json = {{"kS", number(fit.kS)},
-               {"kV", number(fit.kV)},
-               {"kA", number(fit.kA)},
-               {"r_squared", number(fit.r_squared)}};
+  Json json = {{"kS", json_of(fit.kS)},
+               {"kV", json_of(fit.kV)},
+               {"kA", json_of(fit.kA)},
+               {"r_squared", json_of(fit.r_squared)}};
   if (gravity) {
-    json["kG"] = number(fit.kG);
+    json["kG"] = json_of(fit.kG);
   }
   return json;
 }
@@ -123,9 +80,9 @@ Json source_json(const LoadedRecording& source) {
 Json identify_json(const IdentifyResult& result) {
   Json json = {{"schema", "flyball.identify/1"}};
   if (!result.report.fit) {
-    json["error"] = error_json(result.report.fit.error());
+    json["error"] = json_of(result.report.fit.error());
     json["log"] = source_json(result.source);
-    json["diagnostics"] = diagnostics_json(result.diagnostics());
+    json["diagnostics"] = json_of(result.diagnostics());
     return json;
   }
   const identification::FeedforwardFit& fit = *result.report.fit;
@@ -142,17 +99,17 @@ Json identify_json(const IdentifyResult& result) {
     gains["angle_offset"] = gain_json(*fit.angle_offset, "rad");
   }
   json["gains"] = std::move(gains);
-  json["fit"] = {{"r_squared", number(fit.r_squared)},
-                 {"velocity_nrmse", number(fit.velocity_nrmse)},
-                 {"position_delay", number(fit.position_delay)},
-                 {"velocity_delay", number(fit.velocity_delay)},
-                 {"averaging_width", number(fit.averaging_width)},
+  json["fit"] = {{"r_squared", json_of(fit.r_squared)},
+                 {"velocity_nrmse", json_of(fit.velocity_nrmse)},
+                 {"position_delay", json_of(fit.position_delay)},
+                 {"velocity_delay", json_of(fit.velocity_delay)},
+                 {"averaging_width", json_of(fit.averaging_width)},
                  {"iterations", fit.iterations}};
   if (fit.one_step) {
     json["one_step_regression"] = one_step_json(*fit.one_step, fit.kG.has_value());
   }
   json["log"] = source_json(result.source);
-  json["diagnostics"] = diagnostics_json(result.diagnostics());
+  json["diagnostics"] = json_of(result.diagnostics());
   return json;
 }
 
@@ -162,34 +119,34 @@ Json design_body(const DesignResult& result) {
   Json paste = Json::array();
   for (const PasteGains& entry : result.paste) {
     paste.push_back({{"per", entry.per},
-                     {"kP", number(entry.kP)},
-                     {"kD", number(entry.kD)},
-                     {"kS", number(entry.kS)},
-                     {"kV", number(entry.kV)},
-                     {"kA", number(entry.kA)},
-                     {"kG", number(entry.kG)}});
+                     {"kP", json_of(entry.kP)},
+                     {"kD", json_of(entry.kD)},
+                     {"kS", json_of(entry.kS)},
+                     {"kV", json_of(entry.kV)},
+                     {"kA", json_of(entry.kA)},
+                     {"kG", json_of(entry.kG)}});
   }
   Json grid = Json::array();
   for (const RobustnessPoint& point : result.robustness) {
-    grid.push_back({{"inertia_factor", number(point.inertia_factor)},
-                    {"gain_factor", number(point.gain_factor)},
+    grid.push_back({{"inertia_factor", json_of(point.inertia_factor)},
+                    {"gain_factor", json_of(point.gain_factor)},
                     {"stable", point.stable},
-                    {"spectral_radius", number(point.spectral_radius)},
-                    {"overshoot", number(point.overshoot)}});
+                    {"spectral_radius", json_of(point.spectral_radius)},
+                    {"overshoot", json_of(point.overshoot)}});
   }
-  Json feedforward = {{"kS", number(gains.kS)},
-                      {"kV", number(gains.kV)},
-                      {"kA", plant.kA_determined ? number(gains.kA) : Json(nullptr)},
-                      {"kG", number(gains.kG)},
+  Json feedforward = {{"kS", json_of(gains.kS)},
+                      {"kV", json_of(gains.kV)},
+                      {"kA", plant.kA_determined ? json_of(gains.kA) : Json(nullptr)},
+                      {"kG", json_of(gains.kG)},
                       {"plant_inversion", matrix(result.inversion)}};
   if (plant.kind == MechanismKind::arm) {
-    feedforward["angle_offset"] = number(gains.angle_offset);
+    feedforward["angle_offset"] = json_of(gains.angle_offset);
   }
   return {
       {"mechanism", std::string(to_string(plant.kind))},
       {"unit", plant.unit},
-      {"period", number(result.job.controller.period)},
-      {"delay", number(result.job.controller.delay.value_or(0.0))},
+      {"period", json_of(result.job.controller.period)},
+      {"delay", json_of(result.job.controller.delay.value_or(0.0))},
       {"states", result.states},
       {"input", result.velocity_servo ? "velocity" : "voltage"},
       {"K", matrix(result.K)},
@@ -199,25 +156,25 @@ Json design_body(const DesignResult& result) {
       {"estimator_poles", complex_list(result.estimator_poles)},
       {"feedforward", std::move(feedforward)},
       {"margins",
-       {{"gain_margin", number(result.margins.gain_margin)},
-        {"gain_reduction", number(result.margins.gain_reduction)},
-        {"phase_margin", number(result.margins.phase_margin)},
-        {"delay_margin", number(result.margins.delay_margin)},
-        {"disk_margin", number(result.margins.disk_margin)},
-        {"crossover", number(result.margins.crossover)}}},
+       {{"gain_margin", json_of(result.margins.gain_margin)},
+        {"gain_reduction", json_of(result.margins.gain_reduction)},
+        {"phase_margin", json_of(result.margins.phase_margin)},
+        {"delay_margin", json_of(result.margins.delay_margin)},
+        {"disk_margin", json_of(result.margins.disk_margin)},
+        {"crossover", json_of(result.margins.crossover)}}},
       {"robustness",
        {{"stable", result.robust},
-        {"worst_overshoot", number(result.worst_overshoot)},
+        {"worst_overshoot", json_of(result.worst_overshoot)},
         {"grid", std::move(grid)}}},
       {"motion",
-       {{"max_velocity", number(result.motion.max_velocity)},
-        {"max_acceleration", number(result.motion.max_acceleration)},
-        {"goal", number(result.motion.goal)},
-        {"duration", number(result.motion.duration)},
-        {"voltage_reserve", number(result.motion.voltage_reserve)}}},
+       {{"max_velocity", json_of(result.motion.max_velocity)},
+        {"max_acceleration", json_of(result.motion.max_acceleration)},
+        {"goal", json_of(result.motion.goal)},
+        {"duration", json_of(result.motion.duration)},
+        {"voltage_reserve", json_of(result.motion.voltage_reserve)}}},
       {"simulation",
-       {{"tracking_error_rms", number(result.tracking_error_rms)},
-        {"tracking_error_max", number(result.tracking_error_max)},
+       {{"tracking_error_rms", json_of(result.tracking_error_rms)},
+        {"tracking_error_max", json_of(result.tracking_error_max)},
         {"seed", result.job.seed}}},
       {"plant",
        {{"A", matrix(result.A)},
@@ -227,13 +184,8 @@ Json design_body(const DesignResult& result) {
         {"B_continuous", matrix(result.B_continuous)}}},
       {"weights", {{"Q", matrix(result.Q)}, {"R", matrix(result.R)}}},
       {"paste", std::move(paste)},
-      {"diagnostics", diagnostics_json(result.diagnostics)},
+      {"diagnostics", json_of(result.diagnostics)},
   };
-}
-
-std::string dump(const Json& json) {
-  // Log texts may hold bytes that are not UTF-8; they must not throw here.
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace
@@ -253,9 +205,9 @@ std::string to_json(const TuneResult& result) {
   const bool fitted = result.identification.report.fit.has_value();
   const bool designed = result.design.has_value() && result.design->has_value();
   if (!fitted) {
-    json["error"] = error_json(result.identification.report.fit.error());
+    json["error"] = json_of(result.identification.report.fit.error());
   } else if (!designed && result.design) {
-    json["error"] = error_json(result.design->error());
+    json["error"] = json_of(result.design->error());
   }
   json["identification"] = identify_json(result.identification);
   if (designed) {
@@ -267,7 +219,7 @@ std::string to_json(const TuneResult& result) {
 }
 
 std::string to_json(const Error& error, const std::string& schema) {
-  return dump({{"schema", schema}, {"error", error_json(error)}, {"diagnostics", Json::array()}});
+  return dump({{"schema", schema}, {"error", json_of(error)}, {"diagnostics", Json::array()}});
 }
 
 }  // namespace flyball::study

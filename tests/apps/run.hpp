@@ -44,9 +44,11 @@ class Command : public ::testing::Test {
   }
 
   /// @param arguments  As typed in a shell, in the test's folder.
-  [[nodiscard]] Answer run(const std::string& arguments) const {
+  /// @param input  The file that is the standard input.
+  [[nodiscard]] Answer run(const std::string& arguments,
+                           const std::string& input = "/dev/null") const {
     const std::string line = "cd '" + work().string() + "' && '" FLYBALL_COMMAND "' " + arguments +
-                             " >../out 2>../err </dev/null";
+                             " >../out 2>../err <'" + input + "'";
     const int status = std::system(line.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status),
             contents(folder_ / "out"), contents(folder_ / "err")};

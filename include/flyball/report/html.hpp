@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include <flyball/study/analyze.hpp>
 #include <flyball/study/design.hpp>
 #include <flyball/study/identify.hpp>
 #include <flyball/study/tune.hpp>
@@ -28,6 +29,8 @@ struct Provenance {
 [[nodiscard]] std::string to_html(const study::DesignResult& result,
                                   const Provenance& provenance = {});
 [[nodiscard]] std::string to_html(const study::TuneResult& result,
+                                  const Provenance& provenance = {});
+[[nodiscard]] std::string to_html(const study::ModelAnalysis& result,
                                   const Provenance& provenance = {});
 
 }  // namespace flyball::report

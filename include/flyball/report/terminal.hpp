@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include <flyball/mechanisms/motor.hpp>
+#include <flyball/study/analyze.hpp>
 #include <flyball/study/design.hpp>
 #include <flyball/study/identify.hpp>
 #include <flyball/study/tune.hpp>
@@ -34,6 +35,12 @@ struct TerminalStyle {
                                       std::string_view report_folder = {});
 /// Both. If the fit or the design was refused, what there is and the reason.
 [[nodiscard]] std::string to_terminal(const study::TuneResult& result,
+                                      const TerminalStyle& style = {},
+                                      std::string_view report_folder = {});
+
+/// A linear system: what it is, its poles, what can be moved and seen, gains, what sampling makes
+/// of it.
+[[nodiscard]] std::string to_terminal(const study::ModelAnalysis& result,
                                       const TerminalStyle& style = {},
                                       std::string_view report_folder = {});
 

@@ -12,8 +12,9 @@ namespace flyball::report {
 ///
 /// index.html (to_html), result.json (study::to_json), gains.toml (a project file: `flyball design`
 /// reads it), data/*.csv (each run measured against simulated, the closed-loop response, the
-/// robustness grid), pictures/*.svg and *.png, constants/*.txt, and the generated C++ header. What
-/// a result does not have is left out. The same result gives the same bytes.
+/// robustness grid, the step responses), pictures/*.svg and *.png, constants/*.txt, and the
+/// generated C++ header. What a result does not have is left out. The same result gives the same
+/// bytes.
 ///
 /// @param folder  Where it shall stand. @param provenance  Its `files` are filled in here.
 /// @errors FileError. A picture that gnuplot refuses is left out and said so in the page.
@@ -26,5 +27,8 @@ namespace flyball::report {
 [[nodiscard]] Expected<void> write_tune_report(const study::TuneResult& result,
                                                const std::string& folder,
                                                const Provenance& provenance = {});
+[[nodiscard]] Expected<void> write_analyze_report(const study::ModelAnalysis& result,
+                                                  const std::string& folder,
+                                                  const Provenance& provenance = {});
 
 }  // namespace flyball::report

@@ -5,25 +5,66 @@
 #include <string_view>
 #include <vector>
 
+#include <flyball/study/project.hpp>
 #include <flyball/systems/controllability.hpp>
+#include <flyball/systems/discretize.hpp>
 #include <flyball/systems/norms.hpp>
+#include <flyball/systems/sampling.hpp>
 
 namespace flyball::study {
 
 /// A linear system as a person writes it down.
 struct ModelFile {
+  std::string path{};         ///< Where it comes from, for titles.
   ContinuousSystem<> system;  ///< A, B, C, D; of a discrete system its matrices too.
   TimeDomain domain = TimeDomain::continuous;
-  Time period{1.0};                 ///< T, s, of a discrete system.
-  std::vector<std::string> states;  ///< Names; x1, x2, … where there are none.
+  /// T, s: of a discrete system; of a continuous one the period of the loop that will sample it, if
+  /// it is known.
+  std::optional<Time> period{};
+  std::vector<std::string> states{};        ///< Names, with units; x1, x2, … where there are fewer.
+  std::vector<std::string> inputs{};        ///< The same; u1, u2, …
+  std::vector<std::string> outputs{};       ///< The same; a state's name or y1, y2, …
+  std::optional<PlantDescription> plant{};  ///< The mechanism, if the model is one's.
+  std::vector<Diagnostic> notes{};          ///< What the linear model leaves out.
 };
 
-/// A model from JSON text: A and B, and where they are not left out C (identity), D (zero),
-/// `domain` ("continuous"), `T` in seconds (which a discrete model must have) and the names
-/// `states`.
-/// @param name  What the text is called in messages.
-/// @errors ArgumentError for text that is not such an object, unknown fields, shapes and entries.
+/// A model from its text.
+///
+/// JSON, which begins with `{`: A and B, and where they are not left out C (identity), D (zero),
+/// `domain` ("continuous"), `T` in seconds (which a discrete model must have; a continuous one is
+/// also looked at as sampled), and the names `states`, `inputs` and `outputs`. All else is a
+/// project file (TOML) of a mechanism: its linear model with the voltage as input, and the
+/// controller's period as T.
+/// @param name  What the text is called in messages; one that ends in .json or .toml decides.
+/// @errors ArgumentError for text that is no such object, unknown fields, shapes and entries;
+///         ProjectError and those of `parse_project` for a project, also for one that does not say
+///         what its mechanism is made of.
 [[nodiscard]] Expected<ModelFile> parse_model(std::string_view text, const std::string& name);
+
+/// The model of a project's mechanism. @errors Project::plant_error; those of the mechanism.
+[[nodiscard]] Expected<ModelFile> model_of(const Project& project);
+
+/// Reads a model. @param path  "-" is standard input. @errors FileError, and as `parse_model`.
+[[nodiscard]] Expected<ModelFile> read_model(const std::string& path);
+
+/// Poles, and what of a system can be moved and seen.
+struct StructureAnalysis {
+  ModalAnalysis modes;
+  ControllabilityAnalysis controllability;
+  ObservabilityAnalysis observability;
+};
+/// @param system  Of a discrete system its matrices too. @param period  T, s, of a discrete system.
+/// @errors ArgumentError for the system; those of analyze_modes, analyze_controllability and
+///         analyze_observability.
+[[nodiscard]] Expected<StructureAnalysis> analyze_structure(const ContinuousSystem<>& system,
+                                                            TimeDomain domain,
+                                                            Time period = Time(1.0));
+
+/// A continuous system as a loop of a certain period meets it.
+struct SampledAnalysis : StructureAnalysis {
+  DiscretizedMatrices system;  ///< Zero-order hold.
+  SamplingAnalysis sampling;
+};
 
 /// The outputs after a unit step of one input, from rest.
 struct StepResponse {
@@ -32,19 +73,20 @@ struct StepResponse {
 };
 
 /// What a linear system is like.
-struct ModelAnalysis {
-  ModelFile model;
-  ModalAnalysis modes;
-  ControllabilityAnalysis controllability;
-  ObservabilityAnalysis observability;
+struct ModelAnalysis : StructureAnalysis {
+  ModelFile model;                         ///< With a name for every state, input and output.
+  std::optional<SampledAnalysis> sampled;  ///< Of a continuous model with a period; nothing, and
+                                           ///< a note, where a mode outgrows it.
   std::optional<Eigen::MatrixXd> dc_gain;  ///< outputs x inputs; nothing with an integrator.
   std::optional<double> h2_norm;           ///< Of a stable system without an infinite one.
-  std::optional<HInfinityNorm> h_infinity_norm;
-  std::vector<StepResponse> steps;  ///< One an input.
+  std::optional<HInfinityNorm> h_infinity_norm;  ///< Of a stable system.
+  std::vector<StepResponse> steps;  ///< One an input, of the first 16; a growing one is shown for
+                                    ///< a few of its time constants.
 };
 
 /// Poles, controllability and observability, gains and step responses of a model.
-/// @errors Those of analyze_modes, analyze_controllability and analyze_observability.
+/// @errors ArgumentError for the system and for a discrete one without a period; those of
+///         analyze_structure; that of the step responses' discretisation.
 [[nodiscard]] Expected<ModelAnalysis> analyze(const ModelFile& model);
 
 }  // namespace flyball::study

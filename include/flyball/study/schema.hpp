@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include <flyball/study/analyze.hpp>
 #include <flyball/study/design.hpp>
 #include <flyball/study/identify.hpp>
 #include <flyball/study/tune.hpp>
@@ -14,6 +15,8 @@ namespace flyball::study {
 [[nodiscard]] std::string to_json(const DesignResult& result);
 /// Schema "flyball.tune/1".
 [[nodiscard]] std::string to_json(const TuneResult& result);
+/// Schema "flyball.analyze/1".
+[[nodiscard]] std::string to_json(const ModelAnalysis& analysis);
 /// A refusal: {"schema": …, "error": {"code", "message", …evidence}, "diagnostics": […]}.
 [[nodiscard]] std::string to_json(const Error& error, const std::string& schema);
 

@@ -1,0 +1,217 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <flyball/control/feedforward.hpp>
+#include <flyball/control/latency.hpp>
+#include <flyball/control/lqr.hpp>
+#include <flyball/estimation/kalman_gain.hpp>
+#include <flyball/math/matrix_function.hpp>
+#include <flyball/mechanisms/arm.hpp>
+#include <flyball/mechanisms/elevator.hpp>
+#include <flyball/mechanisms/flywheel.hpp>
+#include <flyball/mechanisms/velocity_servo.hpp>
+#include <flyball/systems/discretize.hpp>
+
+#include "study/design_steps.hpp"
+
+// The plant, and the loop that a choice of tolerances gives.
+namespace flyball::study {
+
+using mechanisms::MechanismKind;
+
+namespace {
+
+template <class Mechanism>
+void take(LinearModel& model, const Mechanism& mechanism) {
+  model.A = mechanism.A;
+  model.B = mechanism.B;
+  model.C = mechanism.C;
+}
+
+double top_speed(const PlantDescription& plant) {
+  return plant.nominal_voltage / plant.gains.kV;
+}
+
+// Process noise per sample: the model's voltage is believed to within half a volt.
+Eigen::MatrixXd process_covariance(const LinearModel& model, const DesignJob& job) {
+  if (!job.estimator.model_std.empty()) {
+    const Eigen::Map<const Eigen::VectorXd> std(
+        job.estimator.model_std.data(), static_cast<Eigen::Index>(job.estimator.model_std.size()));
+    return std.array().square().matrix().asDiagonal();
+  }
+  constexpr double voltage_std = 0.5;
+  const Eigen::MatrixXd Bv = model.discrete.B * voltage_std;
+  return Bv * Bv.transpose();
+}
+
+}  // namespace
+
+double measurement_std(const DesignJob& job) {
+  if (job.estimator.measurement_std) {
+    return *job.estimator.measurement_std;
+  }
+  // A quantised reading errs uniformly over one step: q/√12.
+  const double quantisation = job.sensor.resolution / std::sqrt(12.0);
+  const double floor = job.plant.kind == MechanismKind::flywheel ? 0.005 * top_speed(job.plant)
+                       : job.plant.unit == "m"                   ? 5e-4
+                                                                 : 1e-3;
+  return std::max(quantisation, floor);
+}
+
+Expected<LinearModel> linear_model(const PlantDescription& plant, double period) {
+  LinearModel model;
+  const std::string position = fmt::format("position ({})", plant.unit);
+  const std::string velocity = fmt::format("velocity ({}/s)", plant.unit);
+  const bool flywheel = plant.kind == MechanismKind::flywheel;
+  const auto zero = Eigen::MatrixXd::Zero(1, 1);
+  if (!plant.kA_determined) {
+    model.states = {flywheel ? velocity : position};
+    model.C = Eigen::MatrixXd::Identity(1, 1);
+    if (flywheel) {
+      // The velocity u/kV is reached within a period: x_{k+1} = u_k/kV. Its continuous model for
+      // the margins is as fast as the period can show.
+      const double kA = 0.1 * plant.gains.kV * period;
+      model.A = Eigen::MatrixXd::Constant(1, 1, -plant.gains.kV / kA);
+      model.B = Eigen::MatrixXd::Constant(1, 1, 1.0 / kA);
+      model.discrete = {zero, Eigen::MatrixXd::Constant(1, 1, 1.0 / plant.gains.kV), model.C, zero,
+                        Time(period)};
+      return model;
+    }
+    // Theorem 14.3.2, its velocity written as the volts kV v.
+    const auto servo = mechanisms::velocity_servo();
+    model.A = servo.A;
+    model.B = servo.B / plant.gains.kV;
+    model.discrete = {Eigen::MatrixXd::Identity(1, 1), model.B * period, model.C, zero,
+                      Time(period)};
+    return model;
+  }
+  if (flywheel) {
+    auto built = mechanisms::flywheel(plant.gains);
+    if (!built) {
+      return tl::unexpected(std::move(built).error());
+    }
+    take(model, *built);
+    model.states = {velocity};
+  } else {
+    auto built = plant.kind == MechanismKind::elevator ? mechanisms::elevator(plant.gains)
+                                                       : mechanisms::arm(plant.gains);
+    if (!built) {
+      return tl::unexpected(std::move(built).error());
+    }
+    take(model, *built);
+    model.states = {position, velocity};
+  }
+  auto discrete = discretize_zoh(model.A, model.B, Time(period));
+  if (!discrete) {
+    return tl::unexpected(std::move(discrete).error());
+  }
+  model.discrete = {discrete->A, discrete->B, model.C, zero, Time(period)};
+  return model;
+}
+
+Diagnostic unknown_kA(MechanismKind kind) {
+  return {"kA_not_determined", Severity::info,
+          kind == MechanismKind::flywheel
+              ? "kA is not known: the flywheel is taken to follow its voltage within a period, and "
+                "feedforward alone drives it"
+              : "kA is not known: the velocity is taken as the input (Theorem 14.3.2)"};
+}
+
+std::vector<double> default_tolerances(const PlantDescription& plant, std::size_t states) {
+  const double speed = top_speed(plant);
+  std::vector<double> tolerances;
+  if (plant.kind == MechanismKind::flywheel) {
+    tolerances = {0.01 * speed};
+  } else {
+    const double position = plant.unit == "m" ? 0.005 : std::numbers::pi / 360.0;
+    tolerances = {position, 0.1 * speed};
+  }
+  tolerances.resize(states);
+  return tolerances;
+}
+
+Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
+                                 const std::vector<double>& tolerances) {
+  const ControllerOptions& controller = job.controller;
+  const DiscreteSystem<>& plant = model.discrete;
+  const Time delay(controller.delay.value_or(0.0));
+  if (static_cast<Eigen::Index>(tolerances.size()) != plant.A.rows()) {
+    return tl::unexpected(
+        Error(ArgumentError::wrong_shape)
+            .in("design")
+            .about("state_tolerance")
+            .got(fmt::format("{} values long", tolerances.size()))
+            .expected(fmt::format("one value a state: {}", fmt::join(model.states, ", "))));
+  }
+  LoopDesign loop;
+  auto Q = bryson(tolerances);
+  auto R = bryson({controller.input_tolerance});
+  if (!Q || !R) {
+    return tl::unexpected(!Q ? Q.error() : R.error());
+  }
+  loop.Q = *Q;
+  loop.R = *R;
+  auto regulator = lqr(plant, *Q, *R);
+  if (!regulator) {
+    return tl::unexpected(std::move(regulator).error());
+  }
+  loop.K = regulator->K;
+  loop.poles = regulator->poles;
+
+  auto delayed = compensate_latency(loop.K, plant.A, plant.B, plant.period, delay);
+  if (!delayed && delayed.error().is(MatrixFunctionError::no_real_power)) {
+    // A closed-loop pole on the negative real axis has no real fractional power.
+    loop.whole_periods = true;
+    const Time whole(std::round(delay.si() / plant.period.si()) * plant.period.si());
+    delayed = compensate_latency(loop.K, plant.A, plant.B, plant.period, whole);
+  }
+  if (!delayed) {
+    return tl::unexpected(std::move(delayed).error());
+  }
+  loop.K_delayed = *delayed;
+
+  const double sigma = measurement_std(job);
+  auto observer = kalman_gain(plant, process_covariance(model, job), standard_deviations({sigma}));
+  if (!observer) {
+    return tl::unexpected(std::move(observer).error());
+  }
+  loop.kalman_gain = observer->K;
+  loop.estimator_poles = observer->poles;
+
+  const auto inversion = pseudoinverse(plant.B);
+  if (!inversion) {
+    return tl::unexpected(inversion.error());
+  }
+  loop.inversion = inversion->X;
+
+  auto opened = observer_regulator_loop(model.A, model.B, model.C, plant, loop.K_delayed,
+                                        loop.kalman_gain, delay);
+  if (!opened) {
+    return tl::unexpected(std::move(opened).error());
+  }
+  auto margins = stability_margins(*opened);
+  if (!margins) {
+    return tl::unexpected(std::move(margins).error());
+  }
+  loop.margins = *std::move(margins);
+  auto grid =
+      robustness_grid(model.A, model.B, model.C, plant, loop.K_delayed, loop.kalman_gain, delay);
+  if (!grid) {
+    return tl::unexpected(std::move(grid).error());
+  }
+  loop.robustness = *std::move(grid);
+  return loop;
+}
+
+bool is_comfortable(const LoopDesign& loop) {
+  const StabilityMargins& margins = loop.margins;
+  return margins.stable && margins.gain_margin_up >= 2.0 && margins.phase_margin >= 45.0 &&
+         margins.disk_margin >= 0.5 && loop.robustness.all_stable;
+}
+
+}  // namespace flyball::study

@@ -1,0 +1,172 @@
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include <flyball/io/file.hpp>
+#include <flyball/study/analyze.hpp>
+
+#include "study/design_steps.hpp"
+#include "study/problem_reader.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+using mechanisms::MechanismKind;
+
+constexpr std::size_t largest_model = std::size_t{64} << 20;
+
+Expected<void> check_names(const std::vector<std::string>& names, Eigen::Index count,
+                           const std::string& where, std::string_view field,
+                           std::string_view meaning) {
+  if (names.empty() || static_cast<Eigen::Index>(names.size()) == count) {
+    return {};
+  }
+  return tl::unexpected(Error(ArgumentError::wrong_shape)
+                            .in(where)
+                            .about(std::string(field))
+                            .got(fmt::format("{} names long", names.size()))
+                            .expected(fmt::format("{}, {} names", meaning, count)));
+}
+
+Expected<ModelFile> parse_matrices(std::string_view text, const std::string& name) {
+  const auto object = parse_object(text, name, "model");
+  if (!object) {
+    return tl::unexpected(object.error());
+  }
+  if (auto known = check_fields(*object, name, "A B", "C D domain T states inputs outputs");
+      !known) {
+    return tl::unexpected(known.error());
+  }
+  ProblemReader reader(*object, name);
+  ModelFile model;
+  model.path = name;
+  model.system = reader.system();
+  if (reader.has("domain")) {
+    model.domain = reader.domain();
+  }
+  if (reader.has("T")) {
+    model.period = Time(reader.number("T"));
+  }
+  model.states = reader.names("states");
+  model.inputs = reader.names("inputs");
+  model.outputs = reader.names("outputs");
+  if (!reader.status()) {
+    return tl::unexpected(reader.status().error());
+  }
+  if (model.domain == TimeDomain::discrete && !model.period) {
+    return tl::unexpected(Error(ArgumentError::malformed)
+                              .in(name)
+                              .about("T")
+                              .got("left out")
+                              .expected("the sample period of the discrete model in seconds"));
+  }
+  const ContinuousSystem<>& system = model.system;
+  if (auto checked = check_all(
+          check_system(system, name),
+          check_positive(model.period.value_or(Time(1.0)).si(), name, "T", "s"),
+          check_names(model.states, system.A.rows(), name, "states", "one for each row of A"),
+          check_names(model.inputs, system.B.cols(), name, "inputs", "one for each column of B"),
+          check_names(model.outputs, system.C.rows(), name, "outputs", "one for each row of C"));
+      !checked) {
+    return tl::unexpected(checked.error());
+  }
+  return model;
+}
+
+/// What friction and gravity do, no matrix says.
+void note_what_is_left_out(const PlantDescription& plant, std::vector<Diagnostic>& notes) {
+  const mechanisms::FeedforwardGains& gains = plant.gains;
+  std::vector<std::string> left_out;
+  if (gains.kS > 0.0) {
+    left_out.push_back(fmt::format("static friction (kS = {} V)", format_number(gains.kS, 3)));
+  }
+  if (gains.kG != 0.0) {
+    left_out.push_back(fmt::format("gravity (kG = {} V)", format_number(gains.kG, 3)));
+  }
+  if (!left_out.empty()) {
+    notes.push_back(
+        {"left_out", Severity::info,
+         fmt::format("{} {} no part of a linear model; the feedforward of `flyball "
+                     "design` cancels {}",
+                     left_out.size() == 2 ? left_out[0] + " and " + left_out[1] : left_out[0],
+                     left_out.size() == 2 ? "are" : "is", left_out.size() == 2 ? "them" : "it")});
+  }
+}
+
+/// A file that is no text is named so, instead of a complaint about its first byte.
+bool is_binary(std::string_view text) {
+  const std::string_view head = text.substr(0, 4096);
+  return std::any_of(head.begin(), head.end(), [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return byte < 0x09 || byte == 0xff || byte == 0xfe;  // the last two never stand in UTF-8
+  });
+}
+
+bool is_json(std::string_view text, std::string_view name) {
+  if (name.ends_with(".json") || name.ends_with(".toml")) {
+    return name.ends_with(".json");
+  }
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  return first != std::string_view::npos && text[first] == '{';
+}
+
+}  // namespace
+
+Expected<ModelFile> parse_model(std::string_view text, const std::string& name) {
+  const bool blank = text.find_first_not_of(" \t\r\n") == std::string_view::npos;
+  if (blank || is_binary(text)) {
+    return tl::unexpected(Error(blank ? ArgumentError::empty : ArgumentError::malformed)
+                              .in(name)
+                              .about("the model")
+                              .got(blank ? "empty" : "binary")
+                              .expected("a JSON object with A and B, or a project file (TOML)"));
+  }
+  if (is_json(text, name)) {
+    return parse_matrices(text, name);
+  }
+  return parse_project(text, name).and_then(&model_of);
+}
+
+Expected<ModelFile> model_of(const Project& project) {
+  if (project.plant_error) {
+    return tl::unexpected(*project.plant_error);
+  }
+  const PlantDescription& plant = project.job.plant;
+  const double period = project.job.controller.period;
+  auto linear = linear_model(plant, period);
+  if (!linear) {
+    return tl::unexpected(std::move(linear).error());
+  }
+  ModelFile model;
+  model.path = project.path;
+  model.period = Time(period);
+  model.states = linear->states;
+  model.inputs = {"voltage (V)"};
+  model.outputs = {model.states.front()};
+  model.plant = plant;
+  const DiscreteSystem<>& discrete = linear->discrete;
+  if (plant.kA_determined || plant.kind != MechanismKind::flywheel) {
+    model.system = {linear->A, linear->B, linear->C, discrete.D};
+  } else {
+    // What happens within the period is not known.
+    model.domain = TimeDomain::discrete;
+    model.system = {discrete.A, discrete.B, discrete.C, discrete.D};
+  }
+  if (!plant.kA_determined) {
+    model.notes.push_back(unknown_kA(plant.kind));
+  }
+  note_what_is_left_out(plant, model.notes);
+  return model;
+}
+
+Expected<ModelFile> read_model(const std::string& path) {
+  const bool standard_input = path == "-";
+  const auto text = read_file(standard_input ? "/dev/stdin" : path, largest_model);
+  if (!text) {
+    return tl::unexpected(text.error());
+  }
+  return parse_model(*text, standard_input ? "standard input" : path);
+}
+
+}  // namespace flyball::study
