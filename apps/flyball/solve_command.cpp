@@ -128,6 +128,8 @@ void add_solve_command(CLI::App& program, Invocation& invocation) {
                   "\"-inf\"; a field id is echoed.\n"
                   "domain is \"continuous\" or \"discrete\"; method is zoh, foh, tustin, "
                   "forward-euler, backward-euler or matched.\n"
+                  "Exit status: 0 all solved, 1 some problem has no solution, 2 some line was no "
+                  "problem.\n"
                   "\n  echo '{\"A\": [[1]], \"B\": [[1]], \"Q\": [[1]], \"R\": [[1]]}' | flyball "
                   "solve dare");
   auto kind = std::make_shared<std::string>();

@@ -63,13 +63,13 @@ std::string behaviour(const Mode& mode) {
   const bool oscillates = mode.s.imag() != 0.0;
   switch (mode.stability) {
     case Stability::marginal:
-      return oscillates ? "oscillates for ever" : "integrates: neither decays nor grows";
+      return oscillates ? "rings for ever" : "integrates";
     case Stability::stable:
       return std::isinf(mode.s.real()) ? "is gone after one sample"
-             : oscillates              ? "decays, oscillating"
+             : oscillates              ? "decays ringing"
                                        : "decays";
     case Stability::unstable:
-      return oscillates ? "grows, oscillating" : "grows";
+      return oscillates ? "grows ringing" : "grows";
   }
   return {};
 }

@@ -19,6 +19,21 @@ constexpr std::size_t largest_model = std::size_t{64} << 20;
 Expected<void> check_names(const std::vector<std::string>& names, Eigen::Index count,
                            const std::string& where, std::string_view field,
                            std::string_view meaning) {
+  constexpr std::size_t longest = 80;
+  for (const std::string& name : names) {
+    const bool control = std::any_of(name.begin(), name.end(), [](char c) {
+      return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+    });
+    if (name.empty() || name.size() > longest || control) {
+      return tl::unexpected(Error(ArgumentError::malformed)
+                                .in(where)
+                                .about("a name of " + std::string(field))
+                                .got(name.empty() ? "empty"
+                                     : control    ? "not plain text"
+                                                  : fmt::format("{} bytes long", name.size()))
+                                .expected(fmt::format("one line of at most {} bytes", longest)));
+    }
+  }
   if (names.empty() || static_cast<Eigen::Index>(names.size()) == count) {
     return {};
   }

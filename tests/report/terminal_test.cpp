@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <flyball/report/html.hpp>
 #include <flyball/study/schema.hpp>
 
 #include "fixtures.hpp"
@@ -178,6 +179,31 @@ TEST(Terminal, TextOfALogCannotSteerTheTerminal) {
   const std::string text = to_terminal(result, {.color = false});
   EXPECT_EQ(text.find('\x1b'), std::string::npos);
   EXPECT_EQ(text.find('\x07'), std::string::npos);
+}
+
+// Two carts on springs, one of them out of the input's reach, with the poles ±2j and -1.
+TEST(Terminal, ALinearSystemIsToldInWordsAndNumbers) {
+  const auto analysis =
+      study::parse_model(R"({"A":[[0,1,0],[-4,0,0],[0,0,-1]],"B":[[0],[1],[0]],"T":0.1,
+ "states":["position of a cart that has a long name","its velocity","<b>"]})",
+                         "carts")
+          .and_then(&study::analyze)
+          .value();
+  const std::string text = to_terminal(analysis);
+  for (const std::string& line : lines_of(text)) {
+    EXPECT_LE(display_width(line), 100U) << line;
+  }
+  EXPECT_TRUE(has(text, "Linear system from carts"));
+  EXPECT_TRUE(has(text, "0 ± 2j"));
+  EXPECT_TRUE(has(text, "rings for ever"));
+  EXPECT_TRUE(has(text, "Not controllable, but stabilizable"));
+  EXPECT_TRUE(has(text, "No input moves <b>."));
+  EXPECT_TRUE(has(text, "0.9801 ± 0.1987j")) << "e^{2jT}";
+  EXPECT_EQ(text.find('\x1b'), std::string::npos);
+  EXPECT_NE(to_terminal(analysis, {.color = true}).find('\x1b'), std::string::npos);
+  const std::string page = to_html(analysis);
+  EXPECT_TRUE(has(page, "&lt;b&gt;"));
+  EXPECT_FALSE(has(page, "<b>"));
 }
 
 TEST(Terminal, NamesTheReport) {

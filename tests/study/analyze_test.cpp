@@ -59,58 +59,63 @@ TEST(Analyze, AGrowingModeEndsTheStepResponse) {
   const Eigen::Index last = step.time.size() - 1;
   EXPECT_NEAR(step.time(last), 5.0, 0.02);
   EXPECT_NEAR(step.y(last, 0), std::exp(step.time(last)) - 1.0, 1e-10);
+}
 
-  // dv/dt = -(kV/kA) v + u/kA: pole -4, which 50 ms sample as e^-0.2.
-  TEST(Analyze, ProjectsAreSampledWithTheirPeriod) {
-    const std::string text =
-        "[mechanism]\ntype = \"flywheel\"\n[gains]\nkS = 0.2\nkV = 0.02\nkA = 0.005\n"
-        "[controller]\nperiod = \"50 ms\"\n";
-    const auto analysis = analyze(parse_model(text, "wheel.toml").value()).value();
-    EXPECT_EQ(analysis.model.plant->kind, mechanisms::MechanismKind::flywheel);
-    EXPECT_EQ(analysis.model.states, std::vector<std::string>{"velocity (rad/s)"});
-    EXPECT_EQ(analysis.model.outputs, analysis.model.states);
-    EXPECT_EQ(analysis.model.notes.at(0).code, "left_out");
-    EXPECT_DOUBLE_EQ(analysis.modes.modes.at(0).pole.real(), -4.0);
-    ASSERT_TRUE(analysis.sampled);
-    EXPECT_NEAR(analysis.sampled->modes.modes.at(0).pole.real(), std::exp(-0.2), 1e-15);
-    EXPECT_NEAR(analysis.sampled->system.B(0, 0), 50.0 * (1.0 - std::exp(-0.2)), 1e-13);
-    EXPECT_NEAR((*analysis.dc_gain)(0, 0), 50.0, 1e-12);
-  }
+// dv/dt = -(kV/kA) v + u/kA: pole -4, which 50 ms sample as e^-0.2.
+TEST(Analyze, ProjectsAreSampledWithTheirPeriod) {
+  const std::string text =
+      "[mechanism]\ntype = \"flywheel\"\n[gains]\nkS = 0.2\nkV = 0.02\nkA = 0.005\n"
+      "[controller]\nperiod = \"50 ms\"\n";
+  const auto analysis = analyze(parse_model(text, "wheel.toml").value()).value();
+  EXPECT_EQ(analysis.model.plant->kind, mechanisms::MechanismKind::flywheel);
+  EXPECT_EQ(analysis.model.states, std::vector<std::string>{"velocity (rad/s)"});
+  EXPECT_EQ(analysis.model.outputs, analysis.model.states);
+  EXPECT_EQ(analysis.model.notes.at(0).code, "left_out");
+  EXPECT_DOUBLE_EQ(analysis.modes.modes.at(0).pole.real(), -4.0);
+  ASSERT_TRUE(analysis.sampled);
+  EXPECT_NEAR(analysis.sampled->modes.modes.at(0).pole.real(), std::exp(-0.2), 1e-15);
+  EXPECT_NEAR(analysis.sampled->system.B(0, 0), 50.0 * (1.0 - std::exp(-0.2)), 1e-13);
+  EXPECT_NEAR((*analysis.dc_gain)(0, 0), 50.0, 1e-12);
+}
 
-  // A period that a growing mode outgrows (e^1000) leaves the continuous analysis standing.
-  TEST(Analyze, WhatCannotBeSampledIsNoted) {
-    const auto analysis =
-        analyze(parse_model(R"({"A":[[1000]],"B":[[1]],"T":1})", "m").value()).value();
-    EXPECT_FALSE(analysis.sampled);
-    EXPECT_EQ(analysis.model.notes.at(0).code, "not_sampled");
-  }
+// A period that a growing mode outgrows (e^1000) leaves the continuous analysis standing.
+TEST(Analyze, WhatCannotBeSampledIsNoted) {
+  const auto analysis =
+      analyze(parse_model(R"({"A":[[1000]],"B":[[1]],"T":1})", "m").value()).value();
+  EXPECT_FALSE(analysis.sampled);
+  EXPECT_EQ(analysis.model.notes.at(0).code, "not_sampled");
+}
 
-  TEST(Analyze, NamesOutputsByTheirStates) {
-    const auto analysis = analyze(parse_model(R"({"A":[[0,1],[0,0]],"B":[[0],[1]],"C":[[0,1],[2,0]],
+TEST(Analyze, NamesOutputsByTheirStates) {
+  const auto analysis = analyze(parse_model(R"({"A":[[0,1],[0,0]],"B":[[0],[1]],"C":[[0,1],[2,0]],
  "states":["x","v"]})",
-                                              "m")
-                                      .value())
-                              .value();
-    EXPECT_EQ(analysis.model.outputs, (std::vector<std::string>{"v", "y2"}));
-    EXPECT_EQ(analysis.model.inputs, std::vector<std::string>{"u1"});
-  }
+                                            "m")
+                                    .value())
+                            .value();
+  EXPECT_EQ(analysis.model.outputs, (std::vector<std::string>{"v", "y2"}));
+  EXPECT_EQ(analysis.model.inputs, std::vector<std::string>{"u1"});
+}
 
-  TEST(Analyze, RefusesBadModels) {
-    const auto refused = [](const char* text) {
-      return parse_model(text, "m.json").error().code();
-    };
-    EXPECT_EQ(refused("{"), "malformed");
-    EXPECT_EQ(refused("[1]"), "malformed");
-    EXPECT_EQ(refused(R"({"A":[[1]]})"), "malformed");
-    EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"E":[[1]]})"), "unknown_name");
-    EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"domain":"z"})"), "unknown_name");
-    EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"domain":"discrete"})"), "malformed");
-    EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"domain":"discrete","T":0})"), "not_positive");
-    EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"states":["a","b"]})"), "wrong_shape");
-    EXPECT_EQ(refused(R"({"A":[[1,2],[3]],"B":[[1]]})"), "malformed");
-    EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1],[2]]})"), "wrong_shape");
-    EXPECT_EQ(refused(R"({"A":[["nan"]],"B":[[1]]})"), "not_finite");
-  }
+TEST(Analyze, RefusesBadModels) {
+  const auto refused = [](const std::string& text) {
+    return parse_model(text, "m.json").error().code();
+  };
+  EXPECT_EQ(refused("{"), "malformed");
+  EXPECT_EQ(refused("[1]"), "malformed");
+  EXPECT_EQ(refused(R"({"A":[[1]]})"), "malformed");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"E":[[1]]})"), "unknown_name");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"domain":"z"})"), "unknown_name");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"domain":"discrete"})"), "malformed");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"domain":"discrete","T":0})"), "not_positive");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"states":["a","b"]})"), "wrong_shape");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"states":[""]})"), "malformed");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"states":["a\nb"]})"), "malformed");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1]],"states":[")" + std::string(81, 'x') + R"("]})"),
+            "malformed");
+  EXPECT_EQ(refused(R"({"A":[[1,2],[3]],"B":[[1]]})"), "malformed");
+  EXPECT_EQ(refused(R"({"A":[[1]],"B":[[1],[2]]})"), "wrong_shape");
+  EXPECT_EQ(refused(R"({"A":[["nan"]],"B":[[1]]})"), "not_finite");
+}
 
 }  // namespace
 }  // namespace flyball::study
