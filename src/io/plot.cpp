@@ -18,7 +18,8 @@ using io::ProcessResult;
 
 /// The picture that gnuplot makes of a program. No shell, no files of the user's settings (-d).
 Expected<std::string> run_gnuplot(const std::string& script) {
-  ProcessResult result = io::run_process({"gnuplot", "-d", "-"}, script, 30.0);
+  // By its path: gnuplot reads a program from "-" byte by byte.
+  ProcessResult result = io::run_process({"gnuplot", "-d", "/dev/stdin"}, script, 30.0);
   std::replace_if(
       result.err.begin(), result.err.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
   const std::string words = io::printable(io::trim(result.err), 400);

@@ -114,8 +114,15 @@ class MapScript {
   std::back_insert_iterator<std::string> out() { return std::back_inserter(script_); }
 
   void add_data(const SurfacePlot& map, std::size_t index) {
-    fmt::format_to(out(), "$z{} << EOD\n", index);
+    // With the axes in the first row and column: gnuplot takes twenty times as long where it has to
+    // compute them from the indices.
+    fmt::format_to(out(), "$z{} << EOD\n0", index);
+    for (const double x : map.x) {
+      fmt::format_to(out(), " {:.9g}", x);
+    }
+    script_ += "\n";
     for (std::size_t i = 0; i < map.y.size(); ++i) {
+      fmt::format_to(out(), "{:.9g} ", map.y[i]);
       for (std::size_t j = 0; j < map.x.size(); ++j) {
         const double value = map.z[i * map.x.size() + j];
         // gnuplot leaves pixels that are no number transparent.
@@ -185,8 +192,7 @@ class MapScript {
     } else {
       script_ += "unset colorbox\n";
     }
-    fmt::format_to(out(), "plot $z{} matrix using ({}+$1*{}):({}+$2*{}):3 with image", index,
-                   map.x.front(), dx, map.y.front(), dy);
+    fmt::format_to(out(), "plot $z{} nonuniform matrix using 1:2:3 with image", index);
     if (map.unit_circle) {
       fmt::format_to(out(), ", $circle{} with lines lc rgb '#333333' lw 1.5", index);
     }
