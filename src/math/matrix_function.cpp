@@ -69,8 +69,21 @@ MatrixXd whole_power(MatrixXd base, long long exponent) {
   return result;
 }
 
+/// Whether only the part on and below the diagonal has entries: f(A) = f(Aᵀ)ᵀ keeps it so, and its
+/// small entries their digits.
+bool is_lower_triangular(const MatrixRef& A) {
+  for (Index j = 1; j < A.cols(); ++j) {
+    if (!A.col(j).head(j).isZero(0.0)) {
+      return false;
+    }
+  }
+  return A.cols() > 1;
+}
+
 /// A^f, 0 < f < 1.
-Expected<MatrixXd> fractional_power(const MatrixRef& A, double f, std::string_view where) {
+Expected<MatrixXd> fractional_power(const MatrixRef& given, double f, std::string_view where) {
+  const bool lower = is_lower_triangular(given);
+  const MatrixXd A = lower ? MatrixXd(given.transpose()) : MatrixXd(given);
   Triangularized form = triangularize(A);
   if (!form.schur.converged) {
     return tl::unexpected(no_answer(MatrixFunctionError::no_real_power, where,
@@ -112,15 +125,33 @@ Expected<MatrixXd> fractional_power(const MatrixRef& A, double f, std::string_vi
     return form.assemble(P);
   };
   const MatrixXd result = power(f);
-  // A^f A^(1-f) = A holds for the principal power and fails where a defective zero spoils it.
-  const double size = detail::norm1(A);
+  // A^f A^(1-f) = A holds for the principal power and fails where a defective zero spoils it; in
+  // balanced units, lest large entries hide the small ones.
+  const auto size = [&](const MatrixXd& M) {
+    return detail::norm1(form.d.cwiseInverse().asDiagonal() * M * form.d.asDiagonal());
+  };
   if (!result.allFinite() ||
-      !(detail::norm1(detail::product(result, power(1.0 - f)) - A) <= 1e-7 * size)) {
+      !(size(detail::product(result, power(1.0 - f)) - A) <= 1e-7 * size(A))) {
     return tl::unexpected(no_answer(MatrixFunctionError::no_real_power, where,
                                     "not real: an eigenvalue near zero is defective", smallest)
                               .hint("round the power to a whole number"));
   }
-  return result;
+  return lower ? MatrixXd(result.transpose()) : result;
+}
+
+/// A⁻¹, solved in balanced units.
+Expected<MatrixXd> inverse_of(const MatrixRef& A, std::string_view where) {
+  const Eigen::VectorXd d = detail::balance_of(A);
+  const MatrixXd M = d.cwiseInverse().asDiagonal() * A * d.asDiagonal();
+  double rcond = 0.0;
+  const MatrixXd inverse = detail::solve_linear(M, MatrixXd::Identity(A.rows(), A.cols()), &rcond);
+  if (!(rcond > 0.0) || !inverse.allFinite()) {
+    return tl::unexpected(Error(MatrixFunctionError::singular)
+                              .in(std::string(where))
+                              .about("A")
+                              .with("reciprocal condition", rcond));
+  }
+  return MatrixXd(d.asDiagonal() * inverse * d.cwiseInverse().asDiagonal());
 }
 
 }  // namespace
@@ -156,7 +187,8 @@ Expected<MatrixXd> logm(const MatrixRef& A) {
   if (detail::norm1(X) <= detail::near_identity) {
     return detail::logarithm_near_identity(X);
   }
-  const Triangularized form = triangularize(A);
+  const bool lower = is_lower_triangular(A);
+  const Triangularized form = lower ? triangularize(MatrixXd(A.transpose())) : triangularize(A);
   if (!form.schur.converged) {
     return tl::unexpected(no_answer(MatrixFunctionError::no_real_logarithm, where,
                                     "a matrix whose eigenvalues cannot be found", 0.0));
@@ -173,7 +205,7 @@ Expected<MatrixXd> logm(const MatrixRef& A) {
   if (!L.allFinite()) {
     return tl::unexpected(Error(MatrixFunctionError::overflow).in(std::string(where)));
   }
-  return L;
+  return lower ? MatrixXd(L.transpose()) : L;
 }
 
 Expected<MatrixXd> powm(const MatrixRef& A, double power) {
@@ -196,26 +228,32 @@ Expected<MatrixXd> powm(const MatrixRef& A, double power) {
   // Quotients such as L/T of decimal fractions are seldom whole to the last bit.
   const double nearest = std::round(power);
   const bool whole = std::abs(power - nearest) <= 1e-12 * std::max(1.0, std::abs(power));
-  const double integer = whole ? nearest : std::floor(power);
-  MatrixXd result = whole_power(A, static_cast<long long>(std::abs(integer)));
-  if (integer < 0.0) {
-    double rcond = 0.0;
-    const MatrixXd inverse =
-        detail::solve_linear(A, MatrixXd::Identity(A.rows(), A.cols()), &rcond);
-    if (!(rcond > 0.0) || !inverse.allFinite()) {
-      return tl::unexpected(Error(MatrixFunctionError::singular)
-                                .in(std::string(where))
-                                .about("A")
-                                .with("reciprocal condition", rcond));
+  const double magnitude = std::abs(whole ? nearest : power);
+  const double integer = std::floor(magnitude);
+  // A whole negative power is one of the inverse; another one the inverse of the positive power,
+  // because A⁻¹A^{1-p} would lose as many digits as A has, not as A^p has.
+  MatrixXd base = A;
+  if (power < 0.0 && whole && integer > 0.0) {
+    auto inverse = inverse_of(A, where);
+    if (!inverse) {
+      return inverse;
     }
-    result = whole_power(inverse, static_cast<long long>(-integer));
+    base = *std::move(inverse);
   }
+  MatrixXd result = whole_power(base, static_cast<long long>(integer));
   if (!whole) {
-    const auto fraction = fractional_power(A, power - integer, where);
+    const auto fraction = fractional_power(A, magnitude - integer, where);
     if (!fraction) {
       return tl::unexpected(Error(fraction.error()).about("the power " + format_number(power)));
     }
     result = detail::product(result, *fraction);
+    if (power < 0.0 && result.allFinite()) {
+      auto inverse = inverse_of(result, where);
+      if (!inverse) {
+        return inverse;
+      }
+      result = *std::move(inverse);
+    }
   }
   if (!result.allFinite()) {
     return tl::unexpected(Error(MatrixFunctionError::overflow).in(std::string(where)));

@@ -4,27 +4,18 @@
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
-#include <flyball/core/random.hpp>
-#include <flyball/math/matrix_equation.hpp>
 #include <flyball/math/riccati.hpp>
 
 #include "math/matrices_json.hpp"
+#include "support/random_systems.hpp"
 
 namespace flyball {
 namespace {
 
-using Eigen::Index;
 using Eigen::MatrixXd;
+using test::scalar;
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-
-MatrixXd scalar(double value) {
-  return MatrixXd::Constant(1, 1, value);
-}
-
-MatrixXd normal(Random& random, Index rows, Index columns) {
-  return MatrixXd::NullaryExpr(rows, columns, [&] { return random.normal(); });
-}
 
 // 2ax - b²x²/r + q = 0 with a = b = q = r = 1: x = 1 + √2, k = x, pole -√2.
 TEST(Care, ScalarClosedForm) {
@@ -128,59 +119,6 @@ TEST(Care, RefusesMisuse) {
   EXPECT_TRUE(care(A, B, asymmetric, R).error().is(ArgumentError::not_symmetric));
   EXPECT_TRUE(care(std::nan("") * A, B, Q, R).error().is(ArgumentError::not_finite));
   EXPECT_EQ(care(MatrixXd::Ones(2, 3), B, Q, R).error().where(), "care");
-}
-
-// The cost of the closed loop is the solution of its own Lyapunov equation,
-//   SᵀX + XS + Q + KᵀRK - NK - KᵀNᵀ = 0, S = A - BK,
-// over 10 000 systems: stable, unstable, scaled by 1e±8, weakly reachable.
-TEST(Care, IsTheCostOfItsClosedLoop) {
-  Random random(21);
-  int refused = 0;
-  for (int trial = 0; trial < 10000; ++trial) {
-    const Index n = 1 + static_cast<Index>(random.bits() % 6);
-    const Index m = 1 + static_cast<Index>(random.bits() % static_cast<std::uint64_t>(n));
-    MatrixXd A = normal(random, n, n);
-    MatrixXd B = normal(random, n, m);
-    const MatrixXd C = normal(random, n + m, n + m);
-    const MatrixXd W = C.transpose() * C;
-    MatrixXd Q = W.topLeftCorner(n, n);
-    const MatrixXd R = W.bottomRightCorner(m, m);
-    MatrixXd N = W.topRightCorner(n, m);
-    if (trial % 4 == 1) {
-      B.row(0) *= std::pow(10.0, random.uniform(-6.0, 0.0));
-    }
-    if (trial % 4 == 2) {
-      A -= 3.0 * MatrixXd::Identity(n, n);
-    }
-    Eigen::VectorXd d = Eigen::VectorXd::Ones(n);
-    if (trial % 4 == 3) {
-      for (double& entry : d) {
-        entry = std::pow(10.0, random.uniform(-8.0, 8.0));
-      }
-      A = (d.cwiseInverse().asDiagonal() * A * d.asDiagonal()).eval();
-      B = (d.cwiseInverse().asDiagonal() * B).eval();
-      Q = (d.asDiagonal() * Q * d.asDiagonal()).eval();
-      Q = (0.5 * (Q + Q.transpose())).eval();
-      N = (d.asDiagonal() * N).eval();
-    }
-    const auto s = care(A, B, Q, R, N);
-    if (!s) {
-      ++refused;
-      continue;
-    }
-    ASSERT_TRUE(s->X.allFinite() && s->K.allFinite());
-    ASSERT_LT(s->poles.real().maxCoeff(), 0.0);
-    const MatrixXd S = A - B * s->K;
-    const MatrixXd cost =
-        Q + s->K.transpose() * R * s->K - N * s->K - s->K.transpose() * N.transpose();
-    const auto X = lyapunov(S.transpose(), 0.5 * (cost + cost.transpose()));
-    ASSERT_TRUE(X) << trial;
-    // In coordinates in which X has a unit diagonal.
-    const Eigen::VectorXd unit = s->X.diagonal().cwiseAbs().cwiseSqrt().cwiseInverse();
-    const MatrixXd difference = unit.asDiagonal() * (s->X - X->X) * unit.asDiagonal();
-    EXPECT_LT(difference.norm(), 1e-13 * (1.0 + s->condition) * (1.0 + X->condition)) << trial;
-  }
-  EXPECT_LE(refused, 50);
 }
 
 }  // namespace

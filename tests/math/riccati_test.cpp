@@ -9,18 +9,17 @@
 #include <flyball/core/random.hpp>
 
 #include "math/matrices_json.hpp"
+#include "support/random_systems.hpp"
 
 namespace flyball {
 namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+using test::random_matrix;
+using test::scalar;
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-
-MatrixXd scalar(double value) {
-  return MatrixXd::Constant(1, 1, value);
-}
 
 // a²x - x - a²b²x²/(r + b²x) + q = 0 with a = 2, b = q = r = 1:
 // 3x + 1 = 4x²/(1 + x)  <=>  x² - 4x - 1 = 0, so x = 2 + √5, k = 2x/(1 + x) = (1 + √5)/2 and the
@@ -143,21 +142,13 @@ struct Equation {
   MatrixXd A, B, Q, R, N;
 };
 
-MatrixXd normal(Random& random, Index rows, Index columns) {
-  MatrixXd M(rows, columns);
-  for (double& entry : M.reshaped()) {
-    entry = random.normal();
-  }
-  return M;
-}
-
 /// Stable and unstable systems of up to nine states with a joint weight [Q N; N' R] >= 0.
 Equation random_equation(Random& random) {
   const auto n = static_cast<Index>(1 + random.bits() % 9);
   const auto m = static_cast<Index>(1 + random.bits() % static_cast<std::uint64_t>(n));
-  Equation e{normal(random, n, n), normal(random, n, m), {}, {}, {}};
+  Equation e{random_matrix(random, n, n), random_matrix(random, n, m), {}, {}, {}};
   e.A *= random.uniform(0.3, 1.6) / e.A.eigenvalues().cwiseAbs().maxCoeff();
-  const MatrixXd C = normal(random, n + m, n + m);
+  const MatrixXd C = random_matrix(random, n + m, n + m);
   const MatrixXd W = C.transpose() * C;
   e.Q = W.topLeftCorner(n, n);
   e.R = W.bottomRightCorner(m, m);
@@ -284,8 +275,8 @@ template <int States, int Inputs>
 void expect_fixed_is_dynamic() {
   Random random(6);
   for (int k = 0; k < 20; ++k) {
-    const Eigen::Matrix<double, States, States> A = normal(random, States, States);
-    const Eigen::Matrix<double, States, Inputs> B = normal(random, States, Inputs);
+    const Eigen::Matrix<double, States, States> A = random_matrix(random, States, States);
+    const Eigen::Matrix<double, States, Inputs> B = random_matrix(random, States, Inputs);
     const Eigen::Matrix<double, States, States> Q = A.transpose() * A;
     const Eigen::Matrix<double, Inputs, Inputs> R =
         Eigen::Matrix<double, Inputs, Inputs>::Identity();
@@ -317,7 +308,7 @@ TEST(Riccati, FixedIsDynamic) {
 // for an overactuated vehicle.
 TEST(Riccati, BlocksAndManyInputs) {
   Random random(8);
-  const MatrixXd big = normal(random, 12, 12);
+  const MatrixXd big = random_matrix(random, 12, 12);
   const MatrixXd Q = MatrixXd::Identity(3, 3);
   const MatrixXd R = MatrixXd::Identity(5, 5);
   const auto blocks = dare(big.topLeftCorner(3, 3), big.block(4, 4, 3, 5), Q, R);

@@ -1,26 +1,20 @@
 #pragma once
 
-#include <cmath>
+#include <complex>
 
 #include <Eigen/Dense>
 
-#include <flyball/core/random.hpp>
 #include <flyball/systems/system.hpp>
+
+#include "support/random_systems.hpp"
 
 namespace flyball::test {
 
-inline Eigen::MatrixXd random_matrix(Random& random, Eigen::Index rows, Eigen::Index columns) {
-  return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return random.normal(); });
+inline ContinuousSystem<> continuous(const RandomSystem& s) {
+  return {s.A, s.B, s.C, s.D};
 }
-
-inline Eigen::MatrixXd random_rotation(Random& random, Eigen::Index n) {
-  return random_matrix(random, n, n).householderQr().householderQ();
-}
-
-/// Powers of ten between 10^-decades and 10^decades.
-inline Eigen::VectorXd random_scales(Random& random, Eigen::Index n, double decades) {
-  return Eigen::VectorXd::NullaryExpr(
-      n, [&] { return std::pow(10.0, random.uniform(-decades, decades)); });
+inline DiscreteSystem<> discrete(const RandomSystem& s, double period = 0.02) {
+  return {s.A, s.B, s.C, s.D, Time(period)};
 }
 
 inline ContinuousSystem<> random_system(Random& random, Eigen::Index n, Eigen::Index m,
