@@ -191,6 +191,18 @@ Expected<DiscreteSystem<>> match_to_discrete(const ContinuousSystem<>& system, T
     gain *= T * phi(p * T);
   }
   for (const Complex& z : zpk->zeros) {
+    // The zero of a small D far to the right: with the gain that belongs to it nothing is left.
+    constexpr double largest_exponent = 300.0;
+    if (z.real() * T > largest_exponent) {
+      return tl::unexpected(
+          Error(SystemError::no_image)
+              .in(std::string(where))
+              .about("a zero")
+              .got("whose image exp(s T) a double cannot hold")
+              .expected("s T below " + format_number(largest_exponent))
+              .hint("shorten the period, set a negligible D to zero, or choose zoh")
+              .with("zero", std::vector<double>{z.real(), z.imag()}));
+    }
     image.zeros.push_back(std::exp(z * T));
     gain /= T * phi(z * T);
   }
@@ -360,22 +372,26 @@ Expected<ContinuousSystem<>> convert_to_continuous(const DiscreteSystem<>& syste
   switch (method) {
     case ConversionMethod::zoh:
     case ConversionMethod::foh: {
-      auto found = logarithm(A, T);
+      // In balanced units d, because φ₁ is inverted beside I.
+      const Eigen::VectorXd d = detail::balance_of(A);
+      const Eigen::VectorXd d_inverse = d.cwiseInverse();
+      const auto found = logarithm(d_inverse.asDiagonal() * A * d.asDiagonal(), T);
       if (!found) {
-        return tl::unexpected(std::move(found).error());
+        return tl::unexpected(found.error());
       }
-      continuous.A = *found;
+      continuous.A = d.asDiagonal() * *found * d_inverse.asDiagonal();
       // B_d = T φ₁(AT) B, or T φ₁(AT)² B: φ₁ - φ₂ + eˣφ₂ = φ₁². The principal logarithm keeps φ₁
       // regular.
-      const auto parts = holds(continuous.A, I, T);
+      const auto parts = holds(*found, I, T);
       if (!parts) {
         return tl::unexpected(parts.error());
       }
-      continuous.B = detail::solve_linear(parts->one, B);
+      MatrixXd balanced = detail::solve_linear(parts->one, d_inverse.asDiagonal() * B);
       if (method == ConversionMethod::foh) {
-        continuous.B = T * detail::solve_linear(parts->one, continuous.B);
-        continuous.D = D - product(C, product(parts->two, continuous.B));
+        balanced = T * detail::solve_linear(parts->one, balanced);
+        continuous.D = D - product(C * d.asDiagonal(), product(parts->two, balanced));
       }
+      continuous.B = d.asDiagonal() * balanced;
       break;
     }
     case ConversionMethod::tustin: {

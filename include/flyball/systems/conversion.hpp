@@ -39,8 +39,9 @@ enum class ConversionMethod {
 ///                 s = ω/tan(ωT/2) (z - 1)/(z + 1). Zero: none. Below π/T.
 /// @return The system of as many states.
 /// @errors ArgumentError for shapes, entries, period and prewarp; SystemError::no_image with the
-///         eigenvalue where I - A T/2 (tustin) or I - A T (backward Euler) is singular;
-///         SystemError::zero_transfer (matched); MatrixExponentialError::overflow.
+///         eigenvalue where I - A T/2 (tustin) or I - A T (backward Euler) is singular, or with
+///         the zero whose image exceeds 1e130 (matched); SystemError::zero_transfer (matched);
+///         MatrixExponentialError::overflow.
 /// Cost: O(n³), allocates.
 /// Source: book, Tables 7.2 and E.3; foh and matched: Franklin, Powell and Workman, "Digital
 /// Control of Dynamic Systems", 3rd ed., sections 6.1 and 6.3.
