@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
+#include <flyball/control/continuous_lqr.hpp>
 #include <flyball/core/random.hpp>
 #include <flyball/math/riccati.hpp>
 #include <flyball/mechanisms/arm.hpp>
@@ -13,14 +14,14 @@
 #include <flyball/mechanisms/flywheel.hpp>
 #include <flyball/systems/discretize.hpp>
 
+#include "support/laws.hpp"
+#include "support/random_systems.hpp"
+
 namespace flyball {
 namespace {
 
 using namespace flyball::literals;
-
-Eigen::MatrixXd random_matrix(Random& random, Eigen::Index rows, Eigen::Index columns) {
-  return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return random.normal(); });
-}
+using test::random_matrix;
 
 TEST(Bryson, IsOneOverTheSquares) {
   const Eigen::MatrixXd Q = bryson({0.02, 0.4}).value();
@@ -252,6 +253,62 @@ TEST(Lqr, SaysWhichModeNothingReaches) {
   EXPECT_EQ(design.error().kind(), ErrorKind::no_answer);
   ASSERT_FALSE(design.error().evidence().empty());
   EXPECT_NEAR(design.error().evidence().front().values.front(), 1.1, 1e-9);
+}
+
+// (R + BᵀSB) K = BᵀSA + Nᵀ, or R K = BᵀS + Nᵀ for a continuous plant, entry by entry against the
+// terms; A - BK is stable, and its eigenvalues are the poles.
+TEST(Lqr, GainIsItsFormula) {
+  for (const test::Plane plane : {test::Plane::s, test::Plane::z}) {
+    const bool continuous = plane == test::Plane::s;
+    test::RandomSystems systems(61, plane);
+    test::Refusals refusals;
+    test::Law gain("gain");
+    test::Law poles("pole");
+    test::Law sum("sum of the poles");
+    for (int trial = 0; trial < 10000; ++trial) {
+      const test::RandomSystem s = systems.next();
+      const auto design =
+          continuous ? continuous_lqr(s.A, s.B, s.Q, s.R, s.N) : lqr(s.A, s.B, s.Q, s.R, s.N);
+      if (!design) {
+        refusals.add(design.error(), trial, s);
+        continue;
+      }
+      const test::LongMatrix B = test::wide(s.B).transpose();
+      const test::LongMatrix S = test::wide(design->S);
+      const test::LongMatrix K = test::wide(design->K);
+      const test::LongMatrix R = test::wide(s.R);
+      const auto sides = [&](const auto& of) {
+        const test::LongMatrix BS = of(B) * of(S);
+        const test::LongMatrix weight =
+            continuous ? of(R) : test::LongMatrix(of(R) + BS * of(test::wide(s.B)));
+        const test::LongMatrix right =
+            (continuous ? BS : test::LongMatrix(BS * of(test::wide(s.A)))) +
+            of(test::wide(s.N).transpose());
+        return std::pair(test::LongMatrix(weight * of(K)), right);
+      };
+      const auto [left, right] = sides([](const auto& M) { return test::LongMatrix(M); });
+      const auto [a, b] = sides([](const auto& M) { return test::LongMatrix(M.cwiseAbs()); });
+      const test::LongMatrix size = (a + b).cwiseMax(1e-300L);
+      gain.holds((left - right).cwiseAbs().cwiseQuotient(size).maxCoeff(), trial, s);
+      const test::RandomSystem p = test::plain(s);
+      const Eigen::MatrixXd K_plain =
+          s.inputs.asDiagonal() * design->K * s.states.cwiseInverse().asDiagonal();
+      const Eigen::MatrixXd loop =
+          (test::wide(p.A) - test::wide(p.B) * test::wide(K_plain)).cast<double>();
+      const Eigen::VectorXcd found = loop.eigenvalues();
+      const auto worst = [&](const Eigen::VectorXcd& values) {
+        return continuous ? values.real().maxCoeff() : values.cwiseAbs().maxCoeff() - 1.0;
+      };
+      poles.holds(std::max(worst(found), worst(design->poles)), trial, s);
+      sum.holds(std::abs(design->poles.sum() - loop.trace()) /
+                    (loop.norm() + p.A.norm() + (p.A - loop).norm()),
+                trial, s);
+    }
+    refusals.expect_at_most(50);
+    gain.expect_within(1e-13);
+    poles.expect_within(0.0);
+    sum.expect_within(1e-11);
+  }
 }
 
 }  // namespace
