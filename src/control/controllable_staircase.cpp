@@ -8,7 +8,7 @@ namespace flyball::detail {
 ControllableStaircase controllable_staircase(const MatrixRef& A, const MatrixRef& B) {
   const Eigen::Index n = A.rows();
   // An input counts however weak it is made: only its direction is judged.
-  ControllableStaircase form{Eigen::MatrixXd::Identity(n, n), A, B, 0};
+  ControllableStaircase form{Eigen::MatrixXd::Identity(n, n), A, B, 0, 0, {}};
   const double epsilon = std::numeric_limits<double>::epsilon();
   const double tolerance =
       20.0 * static_cast<double>(n) * epsilon * std::max(form.A.norm(), 1e-300);
@@ -40,13 +40,19 @@ ControllableStaircase controllable_staircase(const MatrixRef& A, const MatrixRef
       const Eigen::Index before = entering.cols();
       form.A.block(done + rank, done - before, rest - rank, before).setZero();
     }
+    form.first.insert(form.first.end(), static_cast<std::size_t>(rank),
+                      done > 0 ? done - entering.cols() : 0);
+    if (done == 0) {
+      form.rank = rank;
+    }
     done += rank;
     entering = form.A.block(done, done - rank, n - done, rank);
     threshold = tolerance;
   }
   form.controllable = done;
+  form.first.insert(form.first.end(), static_cast<std::size_t>(n - done), done);
   form.B = transposed_product(form.Q, B);
-  form.B.bottomRows(n - done).setZero();
+  form.B.bottomRows(n - form.rank).setZero();
   if (done < n && done > 0) {
     form.A.bottomLeftCorner(n - done, done).setZero();
   }

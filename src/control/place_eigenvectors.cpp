@@ -1,4 +1,5 @@
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include <flyball/core/random.hpp>
@@ -38,10 +39,9 @@ struct Eigenvectors {
   }
 };
 
-/// The eigenvector spaces S_j = {x : U_1ᵀ (A - p_j I) x = 0}, orthonormal bases.
+/// The eigenvector spaces S_j = {x : [0 I] (A - p_j I) x = 0}, orthonormal bases.
 std::vector<Eigen::MatrixXcd> allowed_spaces(const PlacementProblem& problem) {
   const Eigen::Index n = problem.A.rows();
-  const Eigen::MatrixXd rows_A = product(problem.null_rows, problem.A);
   std::vector<Eigen::MatrixXcd> spaces;
   for (Eigen::Index j = 0; j < n; ++j) {
     if (j > 0 && problem.poles(j) == problem.poles(j - 1)) {
@@ -49,9 +49,11 @@ std::vector<Eigen::MatrixXcd> allowed_spaces(const PlacementProblem& problem) {
     } else if (j > 0 && problem.poles(j) == std::conj(problem.poles(j - 1)) &&
                problem.poles(j).imag() != 0.0) {
       spaces.push_back(spaces.back().conjugate());
+    } else if (problem.poles(j).imag() == 0.0) {
+      spaces.emplace_back(
+          UnreachedRows<double>(problem, problem.poles(j).real()).null_space().cast<Complex>());
     } else {
-      spaces.push_back(null_space_of(rows_A.cast<Complex>() -
-                                     problem.poles(j) * problem.null_rows.cast<Complex>()));
+      spaces.push_back(UnreachedRows<Complex>(problem, problem.poles(j)).null_space());
     }
   }
   return spaces;
@@ -163,41 +165,42 @@ void sweep(const PlacementProblem& problem, const std::vector<Eigen::MatrixXcd>&
   }
 }
 
-/// X Λ X⁻¹ in real arithmetic: [Re x, Im x] carries [α β; -β α].
-Eigen::MatrixXd closed_loop_of(const Eigen::MatrixXcd& X, const Eigen::VectorXcd& poles) {
+/// In real arithmetic: [Re x, Im x] carries [α β; -β α].
+PlacedLoop real_loop(const Eigen::MatrixXcd& X, const Eigen::VectorXcd& poles) {
   const Eigen::Index n = X.rows();
-  Eigen::MatrixXd real(n, n);
-  Eigen::MatrixXd moved(n, n);
+  PlacedLoop loop{Eigen::MatrixXd(n, n), Eigen::MatrixXd::Zero(n, n), 0.0};
   for (Eigen::Index j = 0; j < n; ++j) {
     const double alpha = poles(j).real();
     const double beta = poles(j).imag();
+    loop.T(j, j) = alpha;
     if (beta == 0.0) {
       // A real space has a real basis up to one common phase.
       Eigen::Index largest = 0;
       X.col(j).cwiseAbs().maxCoeff(&largest);
       const Complex phase = X(largest, j) / std::abs(X(largest, j));
-      real.col(j) = (X.col(j) * std::conj(phase)).real();
-      moved.col(j) = alpha * real.col(j);
+      loop.X.col(j) = (X.col(j) * std::conj(phase)).real();
       continue;
     }
-    real.col(j) = X.col(j).real();
-    real.col(j + 1) = X.col(j).imag();
-    moved.col(j) = alpha * real.col(j) - beta * real.col(j + 1);
-    moved.col(j + 1) = beta * real.col(j) + alpha * real.col(j + 1);
+    loop.X.col(j) = X.col(j).real();
+    loop.X.col(j + 1) = X.col(j).imag();
+    loop.T(j, j + 1) = beta;
+    loop.T(j + 1, j) = -beta;
+    loop.T(j + 1, j + 1) = alpha;
     ++j;
   }
-  return solve_linear(real.transpose(), moved.transpose()).transpose();
+  return loop;
 }
 
 }  // namespace
 
 std::optional<PlacedLoop> place_eigenvectors(const PlacementProblem& problem) {
   constexpr int sweeps = 60;
+  constexpr int fresh = 8;  // Sweeps until the inverse is made anew: rounding adds up.
   constexpr double worthwhile = 1e-3;
   const std::vector<Eigen::MatrixXcd> spaces = allowed_spaces(problem);
   Random random(1);
   const int starts = problem.A.rows() <= 30 ? 3 : 2;
-  std::optional<PlacedLoop> best;
+  double best = std::numeric_limits<double>::infinity();
   Eigen::MatrixXcd best_X;
   for (int start = 0; start < starts; ++start) {
     Eigenvectors eigenvectors{
@@ -209,7 +212,7 @@ std::optional<PlacedLoop> place_eigenvectors(const PlacementProblem& problem) {
     Eigen::MatrixXcd kept = eigenvectors.X;
     for (int i = 0; i < sweeps; ++i) {
       sweep(problem, spaces, eigenvectors);
-      if (!eigenvectors.invert()) {
+      if (i % fresh == fresh - 1 && !eigenvectors.invert()) {
         break;
       }
       const double now = eigenvectors.condition();
@@ -223,21 +226,22 @@ std::optional<PlacedLoop> place_eigenvectors(const PlacementProblem& problem) {
         break;
       }
     }
-    if (!best || condition < best->condition) {
-      best = PlacedLoop{{}, condition};
+    if (condition < best) {
+      best = condition;
       best_X = kept;
     }
   }
-  if (best) {
-    best->M = closed_loop_of(best_X, problem.poles);
-    if (!best->M.allFinite()) {
-      return std::nullopt;
-    }
-    const Eigen::MatrixXcd inverse =
-        solve_complex(best_X, Eigen::MatrixXcd::Identity(best_X.rows(), best_X.cols()));
-    best->condition = norm2(best_X) * norm2(inverse);
+  if (best_X.size() == 0) {
+    return std::nullopt;
   }
-  return best;
+  PlacedLoop loop = real_loop(best_X, problem.poles);
+  loop.condition =
+      norm2(best_X) *
+      norm2(solve_complex(best_X, Eigen::MatrixXcd::Identity(best_X.rows(), best_X.cols())));
+  if (!loop.X.allFinite() || !std::isfinite(loop.condition)) {
+    return std::nullopt;
+  }
+  return loop;
 }
 
 }  // namespace flyball::detail

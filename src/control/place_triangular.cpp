@@ -15,6 +15,7 @@ struct Columns {
   Eigen::MatrixXd above;  ///< T above the diagonal.
   Eigen::MatrixXd block;  ///< 1 x 1, or 2 x 2 with a conjugate pair.
   double departure = std::numeric_limits<double>::infinity();  ///< From normality, squared.
+  double size = 1.0;  ///< Of the second of a pair, for a block [α βs; -β/s α], s a power of two.
 };
 
 /// An invariant vector z + iy (complement coordinates w, coordinates t of the columns before) for a
@@ -42,7 +43,9 @@ Columns real_pair(Eigen::VectorXcd w, Eigen::VectorXcd t, Complex pole) {
   const double alpha = pole.real();
   const double beta = pole.imag();
   columns.block.resize(2, 2);
-  columns.block << alpha, beta * (a / b), -beta * (b / a), alpha;
+  const double s = std::exp2(std::round(std::log2(a / b)));
+  columns.block << alpha, beta * s, -beta / s, alpha;
+  columns.size = s * (b / a);
   const double skew = beta * (a / b - b / a);
   columns.departure = columns.above.squaredNorm() + skew * skew;
   return columns;
@@ -91,18 +94,20 @@ Columns next_columns(const Eigen::MatrixXcd& space, Eigen::Index complement, Com
 
 std::optional<PlacedLoop> place_triangular(const PlacementProblem& problem) {
   const Eigen::Index n = problem.A.rows();
-  // The columns of an orthogonal Q from the left: A q - Q t - p q must lie in the range of B.
+  // The columns of an orthogonal Q from the left: A q - Q t - p q must lie in the range of B, [0 I]
+  // of it vanish.
   Eigen::MatrixXd Q(n, 0);
   Eigen::MatrixXd complement = Eigen::MatrixXd::Identity(n, n);
   Eigen::MatrixXd T = Eigen::MatrixXd::Zero(n, n);
-  const Eigen::MatrixXd rows_A = product(problem.null_rows, problem.A);
+  const Eigen::Index unreached = n - problem.rank;
+  Eigen::VectorXd sizes = Eigen::VectorXd::Ones(n);
   for (Eigen::Index j = 0; j < n;) {
     const Complex pole = problem.poles(j);
     const Eigen::Index free = n - j;
-    Eigen::MatrixXcd M(problem.null_rows.rows(), n);
-    M.leftCols(free) = product(rows_A, complement).cast<Complex>() -
-                       pole * product(problem.null_rows, complement).cast<Complex>();
-    M.rightCols(j) = -product(problem.null_rows, Q).cast<Complex>();
+    Eigen::MatrixXcd M(unreached, n);
+    M.leftCols(free) = product(problem.A.bottomRows(unreached), complement).cast<Complex>() -
+                       pole * complement.bottomRows(unreached).cast<Complex>();
+    M.rightCols(j) = -Q.bottomRows(unreached).cast<Complex>();
     const Columns columns = next_columns(null_space_of(M), free, pole);
     if (!std::isfinite(columns.departure)) {
       return std::nullopt;
@@ -113,6 +118,7 @@ std::optional<PlacedLoop> place_triangular(const PlacementProblem& problem) {
     }
     T.block(0, j, j, width) = columns.above;
     T.block(j, j, width, width) = columns.block;
+    sizes(j + width - 1) = columns.size;
     // The complement's coordinates of the new columns, completed to an orthogonal matrix; its first
     // columns are the new ones up to sign, which the triangular factor has.
     const OrthogonalTriangular completed = full_qr(columns.q);
@@ -127,8 +133,16 @@ std::optional<PlacedLoop> place_triangular(const PlacementProblem& problem) {
     complement = turned.rightCols(free - width);
     j += width;
   }
-  PlacedLoop loop{product_transposed(product(Q, T), Q), std::numeric_limits<double>::infinity()};
-  if (!loop.M.allFinite()) {
+  // In columns of these sizes the blocks of pairs have their poles to the last bit.
+  const Eigen::MatrixXd blocks = T;
+  T = sizes.cwiseInverse().asDiagonal() * T * sizes.asDiagonal();
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const Eigen::Index width = problem.poles(j).imag() != 0.0 ? 2 : 1;
+    T.block(j, j, width, width) = blocks.block(j, j, width, width);
+    j += width - 1;
+  }
+  PlacedLoop loop{Q * sizes.asDiagonal(), T, 0.0};
+  if (!loop.X.allFinite() || !loop.T.allFinite()) {
     return std::nullopt;
   }
   return loop;

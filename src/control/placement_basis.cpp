@@ -5,36 +5,49 @@
 
 namespace flyball::detail {
 
-Eigen::MatrixXcd null_space_of(const ComplexMatrixRef& M) {
-  // Householder reflections that take the columns of Mᴴ, one after the other, to a triangle: the
-  // last columns of their product are orthogonal to all of them.
-  using Complex = std::complex<double>;
-  Eigen::MatrixXcd work = M.adjoint();
+namespace {
+
+/// Householder reflections that take the columns of Mᴴ, one after the other, to a triangle: the
+/// last columns of their product are orthogonal to all of them.
+template <class Matrix>
+Matrix null_space(const Matrix& M) {
+  using Scalar = typename Matrix::Scalar;
+  using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
+  using Row = Eigen::Matrix<Scalar, 1, Eigen::Dynamic>;
+  Matrix work = M.adjoint();
   const Eigen::Index size = work.rows();
   const Eigen::Index count = work.cols();
-  Eigen::MatrixXcd reflections = Eigen::MatrixXcd::Zero(size, count);
+  Matrix reflections = Matrix::Zero(size, count);
   for (Eigen::Index k = 0; k < count; ++k) {
-    Eigen::VectorXcd v = work.col(k).tail(size - k);
+    Vector v = work.col(k).tail(size - k);
     const double length = v.norm();
     if (length == 0.0) {
       continue;
     }
     const double first = std::abs(v(0));
-    const Complex phase = first > 0.0 ? v(0) / first : Complex(1.0);
-    v(0) += phase * length;
+    v(0) += first > 0.0 ? Scalar(v(0) / first * length) : Scalar(length);
     v /= v.norm();
-    const Eigen::RowVectorXcd along = v.adjoint() * work.bottomRightCorner(size - k, count - k);
+    const Row along = v.adjoint() * work.bottomRightCorner(size - k, count - k);
     work.bottomRightCorner(size - k, count - k).noalias() -= 2.0 * v * along;
     reflections.col(k).tail(size - k) = v;
   }
-  Eigen::MatrixXcd basis = Eigen::MatrixXcd::Zero(size, size - count);
+  Matrix basis = Matrix::Zero(size, size - count);
   basis.bottomRows(size - count).setIdentity();
   for (Eigen::Index k = count - 1; k >= 0; --k) {
-    const Eigen::VectorXcd v = reflections.col(k);
-    const Eigen::RowVectorXcd along = v.adjoint() * basis;
-    basis.noalias() -= 2.0 * v * along;
+    const auto v = reflections.col(k).tail(size - k);
+    const Row along = v.adjoint() * basis.bottomRows(size - k);
+    basis.bottomRows(size - k).noalias() -= 2.0 * v * along;
   }
   return basis;
+}
+
+}  // namespace
+
+Eigen::MatrixXcd null_space_of(const ComplexMatrixRef& M) {
+  if (M.imag().isZero(0.0)) {
+    return null_space<Eigen::MatrixXd>(M.real()).cast<std::complex<double>>();
+  }
+  return null_space<Eigen::MatrixXcd>(M);
 }
 
 Eigen::MatrixXcd leading_directions(const ComplexMatrixRef& M, Eigen::Index count) {

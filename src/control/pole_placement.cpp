@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <string>
 
 #include <fmt/format.h>
+
+#include <flyball/core/random.hpp>
 
 #include "control/placement.hpp"
 
@@ -16,11 +17,6 @@ namespace {
 
 using Complex = std::complex<double>;
 constexpr std::string_view where = "place";
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-double scale_of(Complex pole) {
-  return std::max(1.0, std::abs(pole));
-}
 
 /// Real poles first, then pairs side by side with their conjugates made exact.
 Expected<Eigen::VectorXcd> paired(const Eigen::VectorXcd& poles) {
@@ -41,7 +37,7 @@ Expected<Eigen::VectorXcd> paired(const Eigen::VectorXcd& poles) {
       return std::abs(a - std::conj(pole)) < std::abs(b - std::conj(pole));
     });
     if (partner == lower.end() ||
-        std::abs(*partner - std::conj(pole)) > conjugate * scale_of(pole)) {
+        std::abs(*partner - std::conj(pole)) > conjugate * std::max(1.0, std::abs(pole))) {
       return tl::unexpected(Error(PolePlacementError::not_conjugate)
                                 .in(std::string(where))
                                 .about("poles")
@@ -63,73 +59,6 @@ Expected<Eigen::VectorXcd> paired(const Eigen::VectorXcd& poles) {
       Eigen::Map<const Eigen::VectorXcd>(sorted.data(), static_cast<Eigen::Index>(sorted.size())));
 }
 
-/// The candidates in the order of what they are to match; nearest pairs are matched first.
-std::vector<std::size_t> matched(const Eigen::VectorXcd& wanted, const Eigen::VectorXcd& got) {
-  struct Pair {
-    double distance;
-    std::size_t wanted, got;
-  };
-  std::vector<Pair> pairs;
-  for (Eigen::Index i = 0; i < wanted.size(); ++i) {
-    for (Eigen::Index j = 0; j < got.size(); ++j) {
-      pairs.push_back({std::abs(wanted(i) - got(j)) / scale_of(wanted(i)),
-                       static_cast<std::size_t>(i), static_cast<std::size_t>(j)});
-    }
-  }
-  std::stable_sort(pairs.begin(), pairs.end(),
-                   [](const Pair& a, const Pair& b) { return a.distance < b.distance; });
-  constexpr auto none = static_cast<std::size_t>(-1);
-  std::vector<std::size_t> match(static_cast<std::size_t>(wanted.size()), none);
-  std::vector<bool> taken(static_cast<std::size_t>(got.size()), false);
-  for (const Pair& pair : pairs) {
-    if (match[pair.wanted] == none && !taken[pair.got]) {
-      match[pair.wanted] = pair.got;
-      taken[pair.got] = true;
-    }
-  }
-  return match;
-}
-
-/// The closed loop's eigenvalues in the order of the wanted poles, how sensitive each is, and the
-/// condition of the eigenvectors.
-struct Reached {
-  Eigen::VectorXcd poles;
-  Eigen::VectorXd sensitivity;  ///< 1/|yᴴx| for unit left and right eigenvectors.
-  double condition = infinity;
-  double pole_error = infinity;
-  bool accepted = false;
-};
-
-Reached reached_by(const Eigen::MatrixXd& closed, const Eigen::VectorXcd& wanted) {
-  const Eigen::Index n = wanted.size();
-  Reached reached;
-  const detail::Eigensystem system = detail::eigensystem_of(closed);
-  if (!system.values.allFinite()) {
-    return reached;
-  }
-  double rcond = 0.0;
-  const Eigen::MatrixXcd left =
-      detail::solve_complex(system.vectors, Eigen::MatrixXcd::Identity(n, n), &rcond);
-  reached.condition = detail::norm2(system.vectors) * detail::norm2(left);
-  reached.condition = std::isfinite(reached.condition) ? reached.condition : infinity;
-  reached.poles.resize(n);
-  reached.sensitivity.resize(n);
-  reached.pole_error = 0.0;
-  reached.accepted = true;
-  const std::vector<std::size_t> order = matched(wanted, system.values);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const auto k = static_cast<Eigen::Index>(order[static_cast<std::size_t>(i)]);
-    reached.poles(i) = system.values(k);
-    const double size = left.row(k).norm();
-    reached.sensitivity(i) = std::isfinite(size) ? std::max(1.0, size) : infinity;
-    const double error = std::abs(reached.poles(i) - wanted(i));
-    reached.pole_error = std::max(reached.pole_error, error);
-    reached.accepted =
-        reached.accepted && error <= 1e-8 * scale_of(wanted(i)) * reached.sensitivity(i);
-  }
-  return reached;
-}
-
 /// How many times the most repeated pole is repeated.
 Eigen::Index largest_multiplicity(const Eigen::VectorXcd& poles) {
   Eigen::Index largest = 0;
@@ -139,182 +68,158 @@ Eigen::Index largest_multiplicity(const Eigen::VectorXcd& poles) {
   return largest;
 }
 
-/// A gain, and the condition of the eigenvectors that it was made from (0: of none).
-struct Gain {
-  Eigen::MatrixXd K;
-  double condition = 0.0;
+/// The plant with each state measured in its unit.
+struct Scaled {
+  Eigen::MatrixXd A;
+  Eigen::MatrixXd B;
+  detail::StateUnits units;
 };
 
-/// K for a controllable pair.
-std::optional<Gain> place_controllable(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B,
-                                       const Eigen::VectorXcd& poles) {
-  const Eigen::Index n = A.rows();
-  const Eigen::Index m = B.cols();
-  // Columns of one size: what an input's unit is must not decide the rank.
-  Eigen::VectorXd unit = Eigen::VectorXd::Ones(m);
-  for (Eigen::Index j = 0; j < m; ++j) {
-    const double size = B.col(j).norm();
-    unit(j) = size > 0.0 ? 1.0 / size : 1.0;
-  }
-  const detail::SingularValues parts = detail::svd_of(B * unit.asDiagonal());
-  const double threshold =
-      20.0 * static_cast<double>(n) * std::numeric_limits<double>::epsilon() * parts.values(0);
-  Eigen::Index rank = 0;
-  while (rank < parts.values.size() && parts.values(rank) > threshold) {
-    ++rank;
-  }
-  detail::PlacementProblem problem;
-  problem.A = A;
-  problem.range = parts.U.leftCols(rank);
-  problem.null_rows = parts.U.rightCols(n - rank).transpose();
-  problem.poles = poles;
-  if (rank == m) {
-    problem.B_pinv =
-        unit.asDiagonal() * detail::product_transposed(
-                                parts.V * parts.values.cwiseInverse().asDiagonal(), problem.range);
-  } else {
-    // Of the gains that do the same, the smallest.
-    problem.B_pinv = detail::product_transposed(
-        detail::solve_least_squares(detail::transposed_product(problem.range, B),
-                                    Eigen::MatrixXd::Identity(rank, rank)),
-        problem.range);
-  }
+/// A gain in those units, and where it puts the poles.
+struct Candidate {
+  Eigen::MatrixXd K;
+  detail::Reached reached;
+  bool determined = true;  ///< By the plant's digits.
+};
 
-  const auto gain_of = [&](const detail::PlacedLoop& loop) {
-    return detail::product(problem.B_pinv, A - loop.M);
+/// The pair to be placed in the coordinates of its staircase, A = Q problem.A Qᵀ.
+struct Part {
+  Eigen::MatrixXd A;
+  Eigen::MatrixXd B;
+  Eigen::MatrixXd Q;
+  detail::PlacementProblem problem;
+};
+
+/// The whole plant where all of it is controllable; else the part that is, as its own plant.
+Part controllable_part(const Scaled& plant, const detail::ControllableStaircase& form,
+                       const Eigen::VectorXcd& poles) {
+  const Eigen::Index n_c = form.controllable;
+  Part part;
+  part.problem = {form.A.topLeftCorner(n_c, n_c), form.rank, form.first, poles};
+  if (n_c == plant.A.rows()) {
+    part.A = plant.A;
+    part.B = plant.B;
+    part.Q = form.Q;
+  } else {
+    part.A = part.problem.A;
+    part.B = form.B.topRows(n_c);
+    part.Q = Eigen::MatrixXd::Identity(n_c, n_c);
+  }
+  return part;
+}
+
+/// False if rounding of the plant's entries would make another gain. One coupled to a mode by 1e-10
+/// changes by 1e-5; where the coupling itself is rounding, nothing of it remains.
+bool is_determined(const Part& part, const detail::PlacedLoop& loop, const Eigen::MatrixXd& K) {
+  constexpr double suspicious = 1e8;
+  constexpr double other = 0.1;
+  const Eigen::Index n = part.A.rows();
+  const Eigen::MatrixXd driven = part.B.colwise().norm().asDiagonal() * K;
+  if (driven.norm() <= suspicious * (part.A.norm() + part.problem.poles.cwiseAbs().maxCoeff())) {
+    return true;
+  }
+  Random random(1);
+  const double step = static_cast<double>(n) * std::numeric_limits<double>::epsilon();
+  const auto rounded = [&](double x) {
+    return x * (random.uniform() < 0.5 ? 1.0 - step : 1.0 + step);
   };
-  const auto accepted = [&](const Eigen::MatrixXd& K) {
-    return reached_by(A - detail::product(B, K), poles).accepted;
+  const auto moved = detail::exact_gain(part.problem, loop, part.Q, part.A.unaryExpr(rounded),
+                                        part.B.unaryExpr(rounded));
+  return moved && (part.B.colwise().norm().asDiagonal() * (moved->K.rounded() - K)).norm() <=
+                      other * driven.norm();
+}
+
+std::optional<Candidate> candidate_of(const Scaled& plant, const Part& part,
+                                      const detail::ControllableStaircase& form,
+                                      const Eigen::VectorXcd& wanted,
+                                      const std::optional<detail::PlacedLoop>& loop) {
+  if (!loop) {
+    return std::nullopt;
+  }
+  auto exact = detail::exact_gain(part.problem, *loop, part.Q, part.A, part.B);
+  if (!exact) {
+    return std::nullopt;
+  }
+  Eigen::MatrixXd K = exact->K.rounded();
+  const bool determined = is_determined(part, *loop, K);
+  if (form.controllable < plant.A.rows()) {
+    K = detail::product_transposed(K, form.Q.leftCols(form.controllable));
+    auto reached = detail::reached_by(plant.A, plant.B, K, plant.units, wanted);
+    return Candidate{std::move(K), std::move(reached), determined};
+  }
+  const auto reached_with = [&](const Eigen::MatrixXd& gain) {
+    return detail::reached_by(plant.A, plant.B, gain, exact->X, exact->inverse, plant.units,
+                              wanted);
   };
-  std::optional<Gain> chosen;
+  detail::Reached reached = reached_with(K);
+  // The bar is 1e-8; what is near it another judge of the poles may see above it.
+  constexpr double near_bar = 1e-9;
+  if (reached.misplaced > near_bar && determined && form.rank > 1) {
+    if (auto together = detail::rounded_together(plant.B, exact->K, reached)) {
+      detail::Reached now = reached_with(*together);
+      if (now.misplaced < reached.misplaced) {
+        K = std::move(*together);
+        reached = std::move(now);
+      }
+    }
+  }
+  // Repeated poles leave it open which of their eigenvectors an eigenvalue routine finds.
+  if (loop->condition > 0.0 && (plant.units.given.array() == 1.0).all()) {
+    reached.condition = std::min(reached.condition, loop->condition);
+  }
+  return Candidate{std::move(K), std::move(reached), determined};
+}
+
+/// The gain of the method that serves these poles best.
+std::optional<Candidate> best_candidate(const Scaled& plant, const Part& part,
+                                        const detail::ControllableStaircase& form,
+                                        const Eigen::VectorXcd& wanted) {
+  const Eigen::VectorXcd& poles = part.problem.poles;
+  if (poles.size() == 0) {
+    Eigen::MatrixXd K = Eigen::MatrixXd::Zero(plant.B.cols(), plant.A.rows());
+    auto reached = detail::reached_by(plant.A, plant.B, K, plant.units, wanted);
+    return Candidate{std::move(K), std::move(reached)};
+  }
   // Eigenvectors this dependent say less than the triangular form keeps.
   constexpr double dependent = 1e6;
-  if (rank > 1 && largest_multiplicity(poles) <= rank) {
-    if (const auto loop = detail::place_eigenvectors(problem)) {
-      chosen = Gain{gain_of(*loop), loop->condition};
-      if (loop->condition < dependent && accepted(chosen->K)) {
-        return chosen;
-      }
+  std::optional<Candidate> chosen;
+  if (form.rank > 1 && largest_multiplicity(poles) <= form.rank) {
+    const auto loop = detail::place_eigenvectors(part.problem);
+    chosen = candidate_of(plant, part, form, wanted, loop);
+    if (chosen && chosen->reached.accepted() && loop->condition < dependent) {
+      return chosen;
     }
   }
-  if (const auto loop = detail::place_triangular(problem)) {
-    Eigen::MatrixXd triangular = gain_of(*loop);
-    if (m == 1) {
-      // K is unique: where the formula in twice the precision agrees, it has all the digits.
-      if (auto exact = detail::ackermann(A, B, poles);
-          exact && (*exact - triangular).norm() <= 1e-2 * triangular.norm()) {
-        triangular = *exact;
-      }
-    }
-    if (!chosen || accepted(triangular) || !accepted(chosen->K)) {
-      chosen = Gain{std::move(triangular), 0.0};
-    }
-  }
-  return chosen;
-}
-
-/// The answer to poles that leave out a mode which no input reaches.
-Error uncontrollable_mode(const detail::ControllableStaircase& form, const Eigen::VectorXd& units,
-                          Complex mode) {
-  const Eigen::Index n = form.A.rows();
-  const Eigen::Index rest = n - form.controllable;
-  // The mode is a combination yᴴx of states on which no input acts: yᴴ A = λ yᴴ, yᴴ B = 0.
-  const detail::Eigensystem left =
-      detail::eigensystem_of(form.A.bottomRightCorner(rest, rest).transpose());
-  Eigen::Index nearest = 0;
-  (left.values.array() - mode).abs().minCoeff(&nearest);
-  Eigen::VectorXd share =
-      (form.Q.rightCols(rest).cast<Complex>() * left.vectors.col(nearest)).cwiseAbs();
-  share = share.cwiseQuotient(units);
-  share /= share.maxCoeff();
-  std::string states;
-  for (Eigen::Index i = 0; i < n; ++i) {
-    if (share(i) > 0.1) {
-      states += fmt::format("{}{}", states.empty() ? "" : ", ", i);
-    }
-  }
-  return Error(PolePlacementError::not_controllable)
-      .in(std::string(where))
-      .about("(A, B)")
-      .hint("keep this mode among the poles, or give it an input")
-      .with("mode", {mode.real(), mode.imag()})
-      .with("states it lives in (counted from 0)", states);
-}
-
-/// The poles that are left for the controllable part once each mode that stays has taken its own;
-/// the error if one finds none.
-Expected<Eigen::VectorXcd> poles_to_move(const detail::ControllableStaircase& form,
-                                         const Eigen::VectorXd& units,
-                                         const Eigen::VectorXcd& wanted,
-                                         std::vector<Complex>& staying) {
-  const Eigen::Index n = form.A.rows();
-  const Eigen::Index rest = n - form.controllable;
-  const Eigen::MatrixXd A_u = form.A.bottomRightCorner(rest, rest);
-  const detail::Eigensystem right = detail::eigensystem_of(A_u);
-  const detail::Eigensystem left = detail::eigensystem_of(A_u.transpose());
-  const std::vector<std::size_t> order = matched(right.values, wanted);
-  std::vector<bool> stays(static_cast<std::size_t>(n), false);
-  for (Eigen::Index i = 0; i < rest; ++i) {
-    const Complex mode = right.values(i);
-    const std::size_t match = order[static_cast<std::size_t>(i)];
-    // The mode itself is known to rounding times its sensitivity.
-    Eigen::Index same = 0;
-    (left.values.array() - mode).abs().minCoeff(&same);
-    const double along =
-        std::abs((left.vectors.col(same).transpose() * right.vectors.col(i)).value());
-    const double tolerance = std::min(1e-4, 1e-8 / std::max(along, 1e-16)) * scale_of(mode);
-    if (!(std::abs(wanted(static_cast<Eigen::Index>(match)) - mode) <= tolerance)) {
-      return tl::unexpected(uncontrollable_mode(form, units, mode));
-    }
-    stays[match] = true;
-    staying.push_back(mode);
-  }
-  Eigen::VectorXcd moved(form.controllable);
-  Eigen::Index count = 0;
-  for (Eigen::Index i = 0; i < n; ++i) {
-    if (!stays[static_cast<std::size_t>(i)]) {
-      moved(count++) = wanted(i);
-    }
-  }
-  return moved;
+  auto other = candidate_of(plant, part, form, wanted, detail::place_triangular(part.problem));
+  const bool better =
+      !chosen || (other && other->reached.accepted() &&
+                  (!chosen->reached.accepted() || other->K.norm() < chosen->K.norm()));
+  return better ? other : chosen;
 }
 
 /// The gain found with each state measured in its unit, for the plant in the units it came in.
 Expected<PolePlacement<>> place_in_units(const MatrixRef& A, const MatrixRef& B,
                                          const Eigen::VectorXcd& wanted,
                                          const Eigen::VectorXcd& poles,
-                                         const Eigen::VectorXd& units) {
-  const Eigen::Index n = A.rows();
-  const Eigen::MatrixXd A_used = units.cwiseInverse().asDiagonal() * A * units.asDiagonal();
-  const Eigen::MatrixXd B_used = units.cwiseInverse().asDiagonal() * B;
-  const detail::ControllableStaircase form = detail::controllable_staircase(A_used, B_used);
-  const Eigen::Index n_c = form.controllable;
+                                         const Eigen::VectorXd& units,
+                                         const Eigen::VectorXd& balanced) {
+  const Scaled plant{units.cwiseInverse().asDiagonal() * A * units.asDiagonal(),
+                     units.cwiseInverse().asDiagonal() * B,
+                     {units, units.cwiseQuotient(balanced)}};
+  const detail::ControllableStaircase form = detail::controllable_staircase(plant.A, plant.B);
   PolePlacement<> placed;
-  if (n_c == n) {
-    if (auto found = place_controllable(A_used, B_used, wanted)) {
-      placed.K = std::move(found->K);
-      // Repeated poles leave it open which of their eigenvectors an eigenvalue routine finds.
-      placed.condition = (units.array() == 1.0).all() ? found->condition : 0.0;
-    }
-  } else {
-    auto moved = poles_to_move(form, units, wanted, placed.uncontrollable);
-    if (!moved) {
-      return tl::unexpected(std::move(moved).error());
-    }
-    placed.K = Eigen::MatrixXd::Zero(B.cols(), n);
-    if (n_c > 0) {
-      const auto found =
-          place_controllable(form.A.topLeftCorner(n_c, n_c), form.B.topRows(n_c), *moved);
-      placed.K =
-          found ? detail::product_transposed(found->K, form.Q.leftCols(n_c)) : Eigen::MatrixXd();
-    }
+  auto moved = detail::poles_to_move(form, units, wanted, placed.uncontrollable);
+  if (!moved) {
+    return tl::unexpected(std::move(moved).error().in(std::string(where)));
   }
-  Reached reached;
-  if (placed.K.size() > 0) {
-    placed.K = (placed.K * units.cwiseInverse().asDiagonal()).eval();
-    reached = reached_by(A - detail::product(B, placed.K), poles);
+  const Part part = controllable_part(plant, form, *moved);
+  const std::optional<Candidate> found = best_candidate(plant, part, form, poles);
+  if (found && !found->determined) {
+    return tl::unexpected(
+        detail::weakest_mode(plant.A, plant.B, units, wanted).in(std::string(where)));
   }
-  if (!reached.accepted || !placed.K.allFinite()) {
+  if (!found || !found->reached.accepted()) {
+    const detail::Reached reached = found ? found->reached : detail::Reached{};
     return tl::unexpected(
         Error(PolePlacementError::not_reached)
             .in(std::string(where))
@@ -323,11 +228,27 @@ Expected<PolePlacement<>> place_in_units(const MatrixRef& A, const MatrixRef& B,
             .with("largest distance of a pole from its place", reached.pole_error)
             .with("condition of the eigenvectors", reached.condition));
   }
-  placed.poles = reached.poles;
-  placed.condition =
-      placed.condition > 0.0 ? std::min(placed.condition, reached.condition) : reached.condition;
-  placed.pole_error = reached.pole_error;
+  placed.K = found->K * units.cwiseInverse().asDiagonal();
+  placed.poles = found->reached.poles;
+  placed.condition = found->reached.condition;
+  placed.pole_error = found->reached.pole_error;
   return placed;
+}
+
+/// Units in which the rows of [A B] are as large as the columns of A; an input made this small does
+/// not decide which of them the largest column is in.
+Eigen::VectorXd units_with_inputs(const MatrixRef& A, const MatrixRef& B,
+                                  const Eigen::VectorXd& balanced) {
+  const Eigen::Index n = A.rows();
+  Eigen::MatrixXd both = Eigen::MatrixXd::Zero(n + B.cols(), n + B.cols());
+  both.topLeftCorner(n, n) = balanced.cwiseInverse().asDiagonal() * A * balanced.asDiagonal();
+  both.topRightCorner(n, B.cols()) = balanced.cwiseInverse().asDiagonal() * B;
+  const double size = 1e-3 * both.leftCols(n).norm();
+  for (Eigen::Index j = n; j < both.cols(); ++j) {
+    const double length = both.col(j).norm();
+    both.col(j) *= length > 0.0 ? size / length : 0.0;
+  }
+  return detail::balance_of(both).head(n).cwiseProduct(balanced);
 }
 
 Expected<void> check_arguments(const MatrixRef& A, const MatrixRef& B,
@@ -385,15 +306,21 @@ Expected<PolePlacement<>> place(const MatrixRef& A, const MatrixRef& B,
   if (!wanted) {
     return tl::unexpected(wanted.error());
   }
-  // Coarse units can hide a coupling, or cost digits: then all states are made of one size.
+  // Coarse units can hide a coupling, or cost digits: then all states are made of one size. What
+  // only inputs scale shows in units that balance them too.
   constexpr double coarse = 1e4;
   const Eigen::VectorXd as_given = Eigen::VectorXd::Ones(A.rows());
   const Eigen::VectorXd balanced = detail::balance_of(A);
   const bool first = balanced.maxCoeff() > coarse * balanced.minCoeff();
-  auto placed = place_in_units(A, B, *wanted, poles, first ? balanced : as_given);
-  if (!placed && balanced != as_given) {
-    if (auto again = place_in_units(A, B, *wanted, poles, first ? as_given : balanced)) {
-      return again;
+  auto placed = place_in_units(A, B, *wanted, poles, first ? balanced : as_given, balanced);
+  if (!placed) {
+    for (const Eigen::VectorXd& units :
+         {first ? as_given : balanced, units_with_inputs(A, B, balanced)}) {
+      if (units != (first ? balanced : as_given)) {
+        if (auto again = place_in_units(A, B, *wanted, poles, units, balanced)) {
+          return again;
+        }
+      }
     }
   }
   return placed;

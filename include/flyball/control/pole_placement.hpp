@@ -14,7 +14,7 @@ namespace flyball {
 enum class PolePlacementError {
   not_conjugate,     ///< A complex pole without its conjugate: no real gain has such poles.
   not_controllable,  ///< A mode that no input reaches is not among the poles that were asked for.
-  not_reached,       ///< The gain that was found does not place the poles well enough.
+  not_reached,       ///< No gain was found that places the poles well enough once it is rounded.
 };
 [[nodiscard]] ErrorInfo error_info(PolePlacementError code);
 
@@ -22,7 +22,8 @@ enum class PolePlacementError {
 template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic>
 struct PolePlacement {
   Eigen::Matrix<double, Inputs, States> K;  ///< Inputs x states, gain of u = K (r - x).
-  /// Eigenvalues of A - B K as computed from K, in the order of the poles that were asked for.
+  /// Eigenvalues of A - B K for the K above, in the order of the poles that were asked for. Twice
+  /// the working precision goes into A - B K: in doubles a large K would hide them.
   Eigen::Matrix<std::complex<double>, States, 1> poles;
   /// ‖V‖ ‖V⁻¹‖ of the closed loop's unit eigenvectors: how much a relative error of A - B K moves
   /// a pole. Infinite (or above 1e8) where the closed loop cannot be diagonalised.
@@ -44,21 +45,33 @@ struct PolePlacement {
 /// times each copy gets its own eigenvector; beyond that (deadbeat, or one input) the closed loop
 /// is built as an orthogonal triangular form column by column, which needs no eigenvectors.
 ///
+/// Either way a basis X and a triangular T with the poles to the last bit are found, and then
+///
+///   A X - B F = X T,  K = F X⁻¹
+///
+/// is solved in twice the working precision, so that K is right to its last digit even where modes
+/// are coupled by 1e-10 and K is as large as 1e10. If rounding K entry by entry still moved the
+/// poles, the entries are rounded together such that their errors cancel.
+///
 /// The same function serves continuous and discrete plants; place an observer's poles with
 /// place(Aᵀ, Cᵀ, poles), whose gain is Lᵀ.
 ///
 /// @param A  n x n. @param B  n x m; its columns may depend on each other.
 /// @param poles  n, complex ones in conjugate pairs (1e-10 of each other), in any order.
 /// @errors ArgumentError for shapes and entries that are not finite; PolePlacementError::
-///         not_conjugate naming the pole; not_controllable with the mode that no input reaches and
-///         the states that it lives in, if `poles` does not contain it; not_reached if rounding
-///         leaves a pole further than 1e-8 max(1, |p|) times its own condition from its place.
-/// Cost: O(n³) a sweep over the eigenvectors, at most 60; O(n⁴) for a triangular form. Allocates.
+///         not_conjugate naming the pole; not_controllable with the mode that no input reaches, or
+///         by rounding of A and B only, and the states that it lives in, if `poles` does not
+///         contain it; not_reached if a pole of A - B K is further than 1e-8 max(1, |p|) times its
+///         own condition (in the given units or in balanced ones) from its place.
+/// Cost: with several inputs O(n³) a sweep over the eigenvectors, at most 60, and O(n³ rank B)
+/// once; O(n⁴) for a triangular form (one input, poles repeated more often than rank B). Allocates.
 ///
 /// Source: book, section 7.6. Kautsky, Nichols and Van Dooren, Int. J. Control 41 (1985), method 0;
 /// complex pairs: Tits and Yang, IEEE Trans. Automatic Control 41 (1996); triangular form: Chu,
 /// Systems & Control Letters 56 (2007); modes that stay: Varga, IEEE Trans. Automatic Control 26
-/// (1981).
+/// (1981); staircase form: Van Dooren, IEEE Trans. Automatic Control 26 (1981); rounding together:
+/// Lenstra, Lenstra and Lovász, Mathematische Annalen 261 (1982), and Babai, Combinatorica 6
+/// (1986).
 [[nodiscard]] Expected<PolePlacement<>> place(const MatrixRef& A, const MatrixRef& B,
                                               const Eigen::VectorXcd& poles);
 [[nodiscard]] Expected<PolePlacement<>> place(const MatrixRef& A, const MatrixRef& B,
