@@ -346,8 +346,8 @@ TEST(Place, Errors) {
   EXPECT_TRUE(place(A, B, {Complex(-1, -2), -2.0}).error().is(PolePlacementError::not_conjugate));
 }
 
-// A chain of couplings 1e-9: controllable, but no gain in double precision holds its poles.
-TEST(Place, SaysWhereRoundingEndsIt) {
+// One of six modes is coupled by 1e-14: in turned coordinates that is what rounding made of it.
+TEST(Place, RefusesWhatOnlyRoundingReaches) {
   const Eigen::Index n = 6;
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -359,7 +359,22 @@ TEST(Place, SaysWhereRoundingEndsIt) {
   Eigen::MatrixXd b = Eigen::VectorXd::Ones(n);
   b(n - 1) = 1e-14;
   const auto placed = place(turn * A * turn.transpose(), turn * b, {-1, -2, -3, -4, -5, -6});
-  EXPECT_FALSE(placed.has_value());
+  ASSERT_FALSE(placed.has_value());
+  EXPECT_TRUE(placed.error().is(PolePlacementError::not_controllable));
+  EXPECT_NEAR(placed.error().evidence().front().values.front(), 6.0, 1e-12);
+}
+
+// Two inputs of which only differences of 1e-10 reach the second state: the sum that leaves the
+// first alone is large, and each entry of K rounded by 1e-6 for itself would move the first.
+TEST(Place, LargeGainsAreRoundedTogether) {
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(0.7).toRotationMatrix();
+  const Eigen::Matrix2d A = turn * Eigen::Vector2d(0.3, 0.9).asDiagonal() * turn.transpose();
+  Eigen::Matrix2d B;
+  B << 1.0, 0.7, 1e-10, -0.3e-10;
+  const auto placed = place(A, turn * B, {-1.0, -2.0}).value();
+  EXPECT_GT(placed.K.cwiseAbs().minCoeff(), 1e9);
+  EXPECT_LT(placed.condition, 2.0);
+  EXPECT_LT(placed.pole_error, 2e-9);
 }
 
 }  // namespace
