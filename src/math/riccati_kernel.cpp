@@ -16,9 +16,7 @@ bool solve_riccati_quickly(const RiccatiData& data, RiccatiAnswer& answer) {
     pivots = integers.get();
   }
 #ifdef FLYBALL_WIDE_VECTORS
-  static const bool wide_vectors =
-      __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
-  if (wide_vectors) {
+  if (has_wide_vectors()) {
     return wide::solve_riccati(data, answer, memory, pivots);
   }
 #endif

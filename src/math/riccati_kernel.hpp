@@ -2,6 +2,8 @@
 
 #include <flyball/math/riccati.hpp>
 
+#include "math/instruction_set.hpp"
+
 namespace flyball::detail {
 
 /// The short way for ordinary data: R positive definite, doubling without balancing, one residual.
@@ -34,8 +36,7 @@ namespace baseline {
 [[nodiscard]] bool solve_riccati(const RiccatiData& data, RiccatiAnswer& answer, double* memory,
                                  int* pivots);
 }
-#if defined(__x86_64__) && !defined(__AVX2__)
-#define FLYBALL_WIDE_VECTORS
+#ifdef FLYBALL_WIDE_VECTORS
 namespace wide {
 [[nodiscard]] bool solve_riccati(const RiccatiData& data, RiccatiAnswer& answer, double* memory,
                                  int* pivots);

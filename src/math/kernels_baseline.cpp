@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <limits>
 
+#include "math/matrix_exponential_kernel.hpp"
 #include "math/riccati_kernel.hpp"
 
 #define FLYBALL_VARIANT baseline
+#include "math/matrix_exponential_kernel_body.hpp"
 #include "math/riccati_kernel_body.hpp"

@@ -5,11 +5,12 @@
 #include <cstdint>
 #include <limits>
 
+#include "math/matrix_exponential_kernel.hpp"
 #include "math/riccati_kernel.hpp"
 
 // The same source for processors with 256-bit vectors and fused multiply-add, which
-// riccati_kernel.cpp asks for when running. Only functions of this variant's namespace are compiled
-// for them: everything else is declared above.
+// instruction_set.hpp asks for when running. Only functions of this variant's namespace are
+// compiled for them: everything else is declared above.
 #ifdef FLYBALL_WIDE_VECTORS
 #define FLYBALL_VARIANT wide
 #ifdef __clang__
@@ -18,6 +19,7 @@
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 #endif
+#include "math/matrix_exponential_kernel_body.hpp"
 #include "math/riccati_kernel_body.hpp"
 #ifdef __clang__
 #pragma clang attribute pop

@@ -1,0 +1,565 @@
+#pragma once
+
+// The kernel of matrix_exponential_kernel.hpp for one instruction set; see riccati_kernel_body.hpp.
+
+#include "math/small_matrix.hpp"
+
+namespace flyball::detail::FLYBALL_VARIANT {
+
+/// (e^x - e^y) / (x - y), for any distance of x and y.
+inline double divided_difference(double x, double y) {
+  const double half = 0.5 * (x - y);
+  if (std::abs(half) < 1.0) {
+    // e^((x+y)/2) sinh(h)/h; the series of sinh(h)/h below h where it is exact.
+    const double sinch = std::abs(half) < 1e-4 ? 1.0 + half * half / 6.0 : std::sinh(half) / half;
+    return std::exp(0.5 * (x + y)) * sinch;
+  }
+  return (std::exp(x) - std::exp(y)) / (x - y);
+}
+
+/// p q - r s without cancellation of the products' rounding errors (Kahan).
+inline double difference_of_products(double p, double q, double r, double s) {
+  const double rs = r * s;
+  return std::fma(p, q, -rs) + std::fma(-r, s, rs);
+}
+
+/// Closed form of a 2x2: exp(A) = e^μ (cosh δ I + sinh δ / δ (A - μ I)), μ = (a + d)/2,
+/// δ² = ((a - d)/2)² + b c, written in the eigenvalues μ ± δ so that nothing overflows on the way.
+inline void exponential_2x2(const double* A, double* E) {
+  const double a = A[0];
+  const double b = A[2];
+  const double c = A[1];
+  const double d = A[3];
+  const double mean = 0.5 * a + 0.5 * d;
+  const double half = 0.5 * a - 0.5 * d;
+  const double discriminant = difference_of_products(half, half, -b, c);
+  double f = 0.0;
+  double diagonal = 0.0;
+  if (b == 0.0 || c == 0.0) {
+    f = divided_difference(a, d);
+    E[0] = std::exp(a);
+    E[1] = c == 0.0 ? 0.0 : c * f;
+    E[2] = b == 0.0 ? 0.0 : b * f;
+    E[3] = std::exp(d);
+    return;
+  }
+  if (discriminant >= 0.0) {
+    const double delta = std::sqrt(discriminant);
+    // The eigenvalue of larger magnitude is free of cancellation; the other is det / it.
+    const double large = mean >= 0.0 ? mean + delta : mean - delta;
+    // Below one no eigenvalue is stiff, and the two must rather agree on δ: it may be rounding.
+    const double small =
+        std::abs(large) < 1.0 ? 2.0 * mean - large : difference_of_products(a, d, b, c) / large;
+    f = divided_difference(large, small);
+    diagonal = 0.5 * (std::exp(large) + std::exp(small));
+  } else {
+    const double omega = std::sqrt(-discriminant);
+    const double scale = std::exp(mean);
+    f = scale * (std::sin(omega) / omega);
+    diagonal = scale * std::cos(omega);
+  }
+  E[0] = diagonal + half * f;
+  E[1] = c * f;
+  E[2] = b * f;
+  E[3] = diagonal - half * f;
+}
+
+/// A Padé approximant of exp of order m: the numerator's coefficients, the norm up to which it is
+/// exact to rounding (Higham 2005; Al-Mohy and Higham 2009, Table 3.1), and log₂ of the inverse of
+/// the backward error's first coefficient, binomial(2m, m) (2m + 1)!.
+struct Pade {
+  int order;
+  double theta;
+  double log2_inverse_error;
+  double b[14];
+};
+constexpr Pade pade[5] = {
+    {3, 1.495585217958292e-2, 16.62113611327464, {120.0, 60.0, 12.0, 1.0}},
+    {5, 2.539398330063230e-1, 33.227772656854164, {30240.0, 15120.0, 3360.0, 420.0, 30.0, 1.0}},
+    {7,
+     9.504178996162932e-1,
+     51.994974307382165,
+     {17297280.0, 8648640.0, 1995840.0, 277200.0, 25200.0, 1512.0, 56.0, 1.0}},
+    {9,
+     2.097847961257068,
+     72.32471809893495,
+     {17643225600.0, 8821612800.0, 2075673600.0, 302702400.0, 30270240.0, 2162160.0, 110880.0,
+      3960.0, 90.0, 1.0}},
+    {13,
+     4.25,
+     116.447004251763,
+     {64764752532480000.0, 32382376266240000.0, 7771770303897600.0, 1187353796428800.0,
+      129060195264000.0, 10559470521600.0, 670442572800.0, 33522128640.0, 1323241920.0, 40840800.0,
+      960960.0, 16380.0, 182.0, 1.0}}};
+
+/// Scaling and squaring after Al-Mohy and Higham, "A new scaling and squaring algorithm for the
+/// matrix exponential", SIAM J. Matrix Anal. Appl. 31 (2009), Algorithms 2.1, 5.1 and 6.1.
+template <int N>
+class Exponential {
+ public:
+  Exponential(int n, double* memory) : n_{n} {
+    Workspace work(memory);
+    for (double** matrix : {&A_, &A2_, &A4_, &A6_, &U_, &V_, &W_, &T_}) {
+      *matrix = work.take(size());
+    }
+    original_ = work.take(size());
+    sums_ = work.take(ld());
+    next_ = work.take(ld());
+    d_ = work.take(ld());
+  }
+
+  void run(const double* data, double* E) {
+    const int n = n_();
+    pad(A_, ld(), data, n, n);
+    const bool upper = is_triangular(true);
+    const bool lower = !upper && is_triangular(false);
+    const bool triangular = upper || lower;
+    if (lower) {
+      copy(T_, A_);
+      for (int k = 0; k < size(); ++k) {
+        A_[k] = 0.0;
+      }
+      transpose(n_, A_, T_);
+    }
+    if (triangular) {
+      copy(original_, A_);
+    } else {
+      balance();
+    }
+    const int squarings = approximate();
+    double* result = V_;
+    double* other = W_;
+    if (triangular) {
+      for (int j = 0; j < n; ++j) {
+        for (int i = j + 1; i < n; ++i) {
+          result[i + j * ld()] = 0.0;
+        }
+      }
+      restore_diagonals(squarings, result);
+    }
+    for (int k = squarings - 1; k >= 0; --k) {
+      square(other, result, result);
+      double* const held = result;
+      result = other;
+      other = held;
+      if (triangular) {
+        restore_diagonals(k, result);
+      }
+    }
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < n; ++i) {
+        E[i + j * n] = lower        ? result[j + i * ld()]
+                       : triangular ? result[i + j * ld()]
+                                    : result[i + j * ld()] * (d_[i] / d_[j]);
+      }
+    }
+  }
+
+ private:
+  [[nodiscard]] int ld() const { return n_.padded(); }
+  [[nodiscard]] int size() const { return ld() * n_(); }
+
+  void copy(double* to, const double* from) const {
+    for (int k = 0; k < size(); ++k) {
+      to[k] = from[k];
+    }
+  }
+  void square(double* C, const double* A, const double* B) const {
+    multiply(n_, C, ld(), A, ld(), B, ld(), n_(), n_());
+  }
+  void scale(double* M, double factor) const {
+    for (int k = 0; k < size(); ++k) {
+      M[k] *= factor;
+    }
+  }
+
+  [[nodiscard]] bool is_triangular(bool upper) const {
+    for (int j = 0; j < n_(); ++j) {
+      for (int i = j + 1; i < n_(); ++i) {
+        if (A_[upper ? i + j * ld() : j + i * ld()] != 0.0) {
+          return false;
+        }
+      }
+    }
+    return true;
+  }
+
+  /// ‖M‖₁.
+  [[nodiscard]] double norm1(const double* M) const {
+    double largest = 0.0;
+    for (int j = 0; j < n_(); ++j) {
+      Vector4 sum{};
+      for (int i = 0; i < ld(); i += 4) {
+        const Vector4& entries = load4(M + i + j * ld());
+        sum += entries < 0.0 ? -entries : entries;
+      }
+      const double total = (sum[0] + sum[2]) + (sum[1] + sum[3]);
+      // Not a number stays one.
+      largest = total <= largest ? largest : total;
+    }
+    return largest;
+  }
+
+  /// A ← D⁻¹AD with powers of two D such that rows and columns are of one size without the diagonal
+  /// (Osborne; Parlett and Reinsch). A state that only drives others, or is only driven, is scaled
+  /// until what connects it is no larger than the diagonal.
+  void balance() {
+    const int n = n_();
+    double diagonal = 0.0;
+    for (int i = 0; i < n; ++i) {
+      d_[i] = 1.0;
+      diagonal = std::max(diagonal, std::abs(A_[i + i * ld()]));
+    }
+    if (is_balanced()) {
+      return;
+    }
+    for (int sweep = 0; sweep < 20; ++sweep) {
+      bool changed = false;
+      for (int i = 0; i < n; ++i) {
+        double column = 0.0;
+        double row = 0.0;
+        for (int k = 0; k < n; ++k) {
+          if (k != i) {
+            column += std::abs(A_[k + i * ld()]);
+            row += std::abs(A_[i + k * ld()]);
+          }
+        }
+        if (!std::isfinite(column + row)) {
+          continue;
+        }
+        if (column <= 0.0 || row <= 0.0) {
+          if (column + row <= diagonal || !(diagonal > 0.0)) {
+            continue;
+          }
+          const double least = std::max(diagonal * (diagonal / (column + row)), 1e-300);
+          column = std::max(column, least);
+          row = std::max(row, least);
+        }
+        // A factor of 2 cannot gain 5 % between 1/2 and 2.
+        if (row < 2.0 * column && column < 2.0 * row) {
+          continue;
+        }
+        const int exponent =
+            static_cast<int>(std::lround(0.5 * (std::log2(row) - std::log2(column))));
+        const double f = std::ldexp(1.0, exponent);
+        if (exponent == 0 || column * f + row / f > 0.95 * (column + row)) {
+          continue;
+        }
+        d_[i] *= f;
+        for (int k = 0; k < n; ++k) {
+          if (k != i) {
+            A_[k + i * ld()] *= f;
+            A_[i + k * ld()] /= f;
+          }
+        }
+        changed = true;
+      }
+      if (!changed) {
+        break;
+      }
+    }
+  }
+
+  /// No row's sum is eight times its column's or an eighth of it: less is not worth the search.
+  [[nodiscard]] bool is_balanced() {
+    double* const rows = sums_;
+    double* const columns = next_;
+    const int height = ld();
+    for (int i = 0; i < height; ++i) {
+      rows[i] = 0.0;
+    }
+    for (int j = 0; j < n_(); ++j) {
+      const double* const column = A_ + j * height;
+      Vector4 sum{};
+      for (int i = 0; i < height; i += 4) {
+        const Vector4& entries = load4(column + i);
+        const Vector4 magnitudes = entries < 0.0 ? -entries : entries;
+        sum += magnitudes;
+        *reinterpret_cast<Vector4*>(rows + i) += magnitudes;
+      }
+      columns[j] = (sum[0] + sum[2]) + (sum[1] + sum[3]);
+    }
+    bool balanced = true;
+    for (int i = 0; i < n_(); ++i) {
+      const double diagonal = std::abs(A_[i + i * height]);
+      const double row = rows[i] - diagonal;
+      const double column = columns[i] - diagonal;
+      // Where the diagonal dwarfs the others, the differences say nothing.
+      balanced = balanced && row < 8.0 * column && column < 8.0 * row && row > 1e-8 * diagonal;
+    }
+    return balanced;
+  }
+
+  /// Extra squarings that the rounding of the approximant asks for (Algorithm 5.1), of 2⁻ˢA:
+  /// ‖ |A|^(2m+1) ‖₁ is exact by products of |A| with a vector, here of |A|/‖A‖.
+  [[nodiscard]] int extra_squarings(const Pade& p, double norm, int s) {
+    const double log2_norm = std::log2(norm) - s;
+    if (2.0 * p.order * log2_norm - p.log2_inverse_error + 53.0 <= 0.0) {
+      return 0;  // ‖A‖^(2m+1) bounds it
+    }
+    const double inverse = 1.0 / norm;
+    double* const T = W_;
+    for (int k = 0; k < size(); ++k) {
+      T[k] = 0.0;
+    }
+    for (int j = 0; j < n_(); ++j) {
+      for (int i = 0; i < n_(); ++i) {
+        T[j + i * ld()] = std::abs(A_[i + j * ld()]) * inverse;
+      }
+    }
+    double* sums = sums_;
+    double* next = next_;
+    for (int i = 0; i < ld(); ++i) {
+      sums[i] = i < n_() ? 1.0 : 0.0;
+    }
+    const auto advance = [&](const double* M) {
+      multiply(n_, next, ld(), M, ld(), sums, ld(), n_(), 1);
+      double* const held = sums;
+      sums = next;
+      next = held;
+    };
+    advance(T);
+    if (n_() <= 12) {  // a product for m of the steps
+      square(V_, T, T);
+      for (int k = 0; k < p.order; ++k) {
+        advance(V_);
+      }
+    } else {
+      for (int k = 0; k < 2 * p.order; ++k) {
+        advance(T);
+      }
+    }
+    double largest = 0.0;
+    for (int i = 0; i < n_(); ++i) {
+      largest = std::max(largest, sums[i]);
+    }
+    if (!(largest > 0.0)) {
+      return 0;
+    }
+    const double log2_alpha = std::log2(largest) + 2.0 * p.order * log2_norm - p.log2_inverse_error;
+    return std::max(0, static_cast<int>(std::ceil((log2_alpha + 53.0) / (2.0 * p.order))));
+  }
+
+  /// V_ ← the approximant of exp(2⁻ˢA); returns s.
+  int approximate() {
+    double norm = norm1(A_);
+    if (!(norm > 0.0)) {
+      set_identity(V_);
+      return 0;
+    }
+    // Powers up to the tenth must not overflow while the order is chosen.
+    const int prescale = norm > 1e25 ? static_cast<int>(std::ceil(std::log2(norm / 1e25))) : 0;
+    if (prescale > 0) {
+      scale(A_, std::ldexp(1.0, -prescale));
+      norm = norm1(A_);
+    }
+    square(A2_, A_, A_);
+    // ‖A‖ bounds every ‖Aᵏ‖^(1/k), and where it serves, no squaring can be called for.
+    if (norm <= pade[0].theta) {
+      quotient(pade[0]);
+      return 0;
+    }
+    square(A4_, A2_, A2_);
+    if (norm <= pade[1].theta) {
+      quotient(pade[1]);
+      return 0;
+    }
+    square(A6_, A2_, A4_);
+    if (norm <= pade[2].theta) {
+      quotient(pade[2]);
+      return 0;
+    }
+    const double d4 = std::sqrt(std::sqrt(norm1(A4_)));
+    const double d6 = std::cbrt(std::sqrt(norm1(A6_)));
+    const bool unscaled = prescale == 0;
+    const double eta1 = std::max(d4, d6);
+    for (int k = 0; k < 2; ++k) {
+      if (unscaled && eta1 <= pade[k].theta && extra_squarings(pade[k], norm, 0) == 0) {
+        quotient(pade[k]);
+        return 0;
+      }
+    }
+    double eta5 = eta1;
+    if (!unscaled || d6 <= pade[3].theta || eta1 > pade[4].theta) {
+      square(A8(), A4_, A4_);
+      const double d8 = std::sqrt(std::sqrt(std::sqrt(norm1(A8()))));
+      const double eta3 = std::max(d6, d8);
+      for (int k = 2; k < 4; ++k) {
+        if (unscaled && eta3 <= pade[k].theta && extra_squarings(pade[k], norm, 0) == 0) {
+          quotient(pade[k]);
+          return 0;
+        }
+      }
+      eta5 = std::min(eta5, eta3);
+      if (d8 < eta3 && eta5 > pade[4].theta) {
+        square(T_, A4_, A6_);
+        eta5 = std::min(eta5, std::max(d8, std::pow(norm1(T_), 0.1)));
+      }
+    }
+    int s = eta5 > pade[4].theta ? static_cast<int>(std::ceil(std::log2(eta5 / pade[4].theta))) : 0;
+    s += extra_squarings(pade[4], norm, s);
+    scale(A_, std::ldexp(1.0, -s));
+    scale(A2_, std::ldexp(1.0, -2 * s));
+    scale(A4_, std::ldexp(1.0, -4 * s));
+    scale(A6_, std::ldexp(1.0, -6 * s));
+    quotient_13();
+    return prescale + s;
+  }
+
+  double* A8() { return T_; }
+
+  void set_identity(double* M) const {
+    for (int k = 0; k < size(); ++k) {
+      M[k] = 0.0;
+    }
+    for (int i = 0; i < n_(); ++i) {
+      M[i + i * ld()] = 1.0;
+    }
+  }
+
+  /// V_ ← (V - U)⁻¹(V + U) with the odd part U = A·(…) and the even part V of the numerator.
+  void quotient(const Pade& p) {
+    double* const odd = W_;
+    double* const V = V_;
+    const double* const even_powers[5] = {nullptr, A2_, A4_, A6_, A8()};
+    const double* const A2 = A2_;
+    const double even_1 = p.b[2];
+    const double odd_1 = p.b[3];
+    for (int k = 0; k < size(); ++k) {
+      V[k] = even_1 * A2[k];
+      odd[k] = odd_1 * A2[k];
+    }
+    for (int power = 2; 2 * power < p.order; ++power) {
+      const double* const M = even_powers[power];
+      const double even = p.b[2 * power];
+      const double uneven = p.b[2 * power + 1];
+      for (int k = 0; k < size(); ++k) {
+        V[k] += even * M[k];
+        odd[k] += uneven * M[k];
+      }
+    }
+    for (int i = 0; i < n_(); ++i) {
+      V[i + i * ld()] += p.b[0];
+      odd[i + i * ld()] += p.b[1];
+    }
+    square(U_, A_, odd);
+    divide();
+  }
+
+  void quotient_13() {
+    const double* const b = pade[4].b;
+    double* const T = T_;
+    double* const W = W_;
+    double* const V = V_;
+    const double* const A2 = A2_;
+    const double* const A4 = A4_;
+    const double* const A6 = A6_;
+    for (int k = 0; k < size(); ++k) {
+      T[k] = b[13] * A6[k] + b[11] * A4[k] + b[9] * A2[k];
+      V[k] = b[12] * A6[k] + b[10] * A4[k] + b[8] * A2[k];
+    }
+    square(W, A6, T);
+    square(T, A6, V);
+    for (int k = 0; k < size(); ++k) {
+      W[k] += b[7] * A6[k] + b[5] * A4[k] + b[3] * A2[k];
+      V[k] = T[k] + (b[6] * A6[k] + b[4] * A4[k] + b[2] * A2[k]);
+    }
+    for (int i = 0; i < n_(); ++i) {
+      W[i + i * ld()] += b[1];
+      V[i + i * ld()] += b[0];
+    }
+    square(U_, A_, W);
+    divide();
+  }
+
+  /// V ← (V - U)⁻¹(V + U) by Gauss-Jordan elimination with partial pivoting.
+  void divide() {
+    const int n = n_();
+    const int rows = ld();
+    double* const M = U_;
+    double* const R = V_;
+    for (int k = 0; k < size(); ++k) {
+      const double u = M[k];
+      const double v = R[k];
+      M[k] = v - u;
+      R[k] = v + u;
+    }
+    for (int k = 0; k < n; ++k) {
+      double* const column = M + k * rows;
+      int pivot = k;
+      for (int i = k + 1; i < n; ++i) {
+        pivot = std::abs(column[i]) > std::abs(column[pivot]) ? i : pivot;
+      }
+      if (pivot != k) {
+        for (int j = k; j < n; ++j) {
+          const double held = M[k + j * rows];
+          M[k + j * rows] = M[pivot + j * rows];
+          M[pivot + j * rows] = held;
+        }
+        for (int j = 0; j < n; ++j) {
+          const double held = R[k + j * rows];
+          R[k + j * rows] = R[pivot + j * rows];
+          R[pivot + j * rows] = held;
+        }
+      }
+      const double inverse = 1.0 / column[k];
+      for (int i = 0; i < rows; ++i) {
+        column[i] *= -inverse;
+      }
+      column[k] = 0.0;
+      const auto eliminate = [=](double* other) {
+        const double factor = other[k];
+        for (int i = 0; i < rows; i += 4) {
+          *reinterpret_cast<Vector4*>(other + i) += load4(column + i) * factor;
+        }
+        other[k] = factor * inverse;
+      };
+      for (int j = k + 1; j < n; ++j) {
+        eliminate(M + j * rows);
+      }
+      for (int j = 0; j < n; ++j) {
+        eliminate(R + j * rows);
+      }
+    }
+  }
+
+  /// The exact diagonal and first superdiagonal of exp(2^-k T) (Algorithm 2.1), T upper triangular.
+  void restore_diagonals(int k, double* E) const {
+    const double* const T = original_;
+    for (int i = 0; i < n_(); ++i) {
+      const double here = std::ldexp(T[i + i * ld()], -k);
+      E[i + i * ld()] = std::exp(here);
+      if (i + 1 < n_()) {
+        const double there = std::ldexp(T[(i + 1) * (ld() + 1)], -k);
+        E[i + (i + 1) * ld()] =
+            std::ldexp(T[i + (i + 1) * ld()], -k) * divided_difference(here, there);
+      }
+    }
+  }
+
+  Size<N> n_;
+  double *A_, *A2_, *A4_, *A6_, *U_, *V_, *W_, *T_, *original_;
+  double *sums_, *next_, *d_;
+};
+
+void exponential(int n, const double* A, double* E, double* memory) {
+  switch (n) {
+    case 1:
+      E[0] = std::exp(A[0]);
+      return;
+    case 2:
+      return exponential_2x2(A, E);
+    case 3:
+      return Exponential<3>(n, memory).run(A, E);
+    case 4:
+      return Exponential<4>(n, memory).run(A, E);
+    case 5:
+      return Exponential<5>(n, memory).run(A, E);
+    case 6:
+      return Exponential<6>(n, memory).run(A, E);
+    default:
+      return Exponential<0>(n, memory).run(A, E);
+  }
+}
+
+}  // namespace flyball::detail::FLYBALL_VARIANT
