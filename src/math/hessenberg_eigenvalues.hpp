@@ -83,7 +83,6 @@ inline bool eigenvalues(Size<N> size, double* H, std::complex<double>* lambda) {
     }
   }
 
-  constexpr double epsilon = std::numeric_limits<double>::epsilon();
   double norm = 0.0;
   for (int j = 0; j < n; ++j) {
     for (int i = 0; i <= std::min(j + 1, n - 1); ++i) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "math/lyapunov_kernel.hpp"
 #include "math/matrix_exponential_kernel.hpp"
 #include "math/riccati_kernel.hpp"
 
@@ -19,6 +20,7 @@
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 #endif
+#include "math/lyapunov_kernel_body.hpp"
 #include "math/matrix_exponential_kernel_body.hpp"
 #include "math/riccati_kernel_body.hpp"
 #ifdef __clang__

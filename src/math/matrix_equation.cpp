@@ -7,6 +7,7 @@
 
 #include "math/dense.hpp"
 #include "math/double_double.hpp"
+#include "math/lyapunov_kernel.hpp"
 
 namespace flyball {
 
@@ -25,6 +26,19 @@ bool is_triangular(const MatrixXd& M) {
   for (Index j = 0; j + 1 < M.cols(); ++j) {
     if (!M.col(j).tail(M.rows() - j - 1).isZero(0.0)) {
       return false;
+    }
+  }
+  return true;
+}
+
+/// As a product CᵀC is, whose entries are summed in different orders.
+bool is_symmetric_but_for_rounding(const MatrixRef& Q) {
+  for (Index j = 0; j < Q.cols(); ++j) {
+    for (Index i = 0; i < j; ++i) {
+      const double size = std::max(std::abs(Q(i, j)), std::sqrt(std::abs(Q(i, i) * Q(j, j))));
+      if (!(std::abs(Q(i, j) - Q(j, i)) <= 16.0 * epsilon * size)) {
+        return false;
+      }
     }
   }
   return true;
@@ -115,24 +129,29 @@ class Equation {
     MatrixXcd Y = transform(F);
     const MatrixXcd& S = a_.T;
     const MatrixXcd& T = b_.T;
+    Eigen::VectorXcd known(Y.rows());
     for (Index j = 0; j < Y.cols(); ++j) {
-      MatrixXcd shifted = S;
-      if (domain_ == Domain::continuous) {
-        if (j > 0) {
-          Y.col(j) -= Y.leftCols(j).lazyProduct(T.col(j).head(j));
+      // Column j of S Y + Y T, or of S Y T - Y, by back substitution.
+      const Complex t = T(j, j);
+      const bool continuous = domain_ == Domain::continuous;
+      if (continuous) {
+        for (Index k = 0; k < j; ++k) {
+          Y.col(j) -= T(k, j) * Y.col(k);
         }
-        shifted.diagonal().array() += T(j, j);
       } else {
-        if (j > 0) {
-          const Eigen::VectorXcd known = Y.leftCols(j).lazyProduct(T.col(j).head(j));
-          Y.col(j) -= S.lazyProduct(known);
+        known.setZero();
+        for (Index k = 0; k < j; ++k) {
+          known += T(k, j) * Y.col(k);
         }
-        shifted *= T(j, j);
-        shifted.diagonal().array() -= 1.0;
+        for (Index k = 0; k < S.cols(); ++k) {
+          Y.col(j).head(k + 1) -= known(k) * S.col(k).head(k + 1);
+        }
       }
       for (Index k = Y.rows() - 1; k >= 0; --k) {
-        Y(k, j) /= shifted(k, k);
-        Y.col(j).head(k) -= Y(k, j) * shifted.col(k).head(k);
+        const Complex pivot = continuous ? S(k, k) + t : S(k, k) * t - 1.0;
+        const Complex y = Y(k, j) / pivot;
+        Y(k, j) = y;
+        Y.col(j).head(k) -= (continuous ? y : y * t) * S.col(k).head(k);
       }
     }
     const MatrixXcd left = detail::complex_product(a_.U, Y);
@@ -150,6 +169,14 @@ class Equation {
     }
     const Matrix rest = sum(Matrix(F), 1.0, Matrix(X));
     return add_product(rest, -1.0, Matrix(A_), detail::product(Matrix(X), Matrix(B_))).rounded();
+  }
+
+  /// The same in working precision.
+  [[nodiscard]] MatrixXd defect(const MatrixXd& X, const MatrixXd& F) const {
+    if (domain_ == Domain::continuous) {
+      return F - detail::product(A_, X) - detail::product(X, B_);
+    }
+    return F + X - detail::product(A_, detail::product(X, B_));
   }
 
   /// The sum of the norms of the equation's terms.
@@ -193,7 +220,8 @@ Expected<LinearMatrixSolution> solve(const Equation& equation, const MatrixXd& F
     if (symmetric) {
       X = detail::symmetrized(X);
     }
-    if (step <= epsilon * X.norm()) {
+    // The next step would be as much smaller than this one as this one is than X.
+    if (step <= std::sqrt(epsilon) * X.norm()) {
       break;
     }
     previous = step;
@@ -202,7 +230,7 @@ Expected<LinearMatrixSolution> solve(const Equation& equation, const MatrixXd& F
     return tl::unexpected(Error(MatrixEquationError::overflow).in(std::string(where)));
   }
   const double scale = equation.scale(X, F);
-  solution.residual = scale > 0.0 ? equation.residual(X, F).norm() / scale : 0.0;
+  solution.residual = scale > 0.0 ? equation.defect(X, F).norm() / scale : 0.0;
   // ‖L⁻¹‖ from two matrices of signs, which no direction is orthogonal to.
   double gain = 0.0;
   for (const Index stride : {1, 3}) {
@@ -226,7 +254,21 @@ Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A,
       !check) {
     return tl::unexpected(std::move(check).error());
   }
-  return solve(Equation(domain, A), -Q, Q == Q.transpose(), where);
+  const bool symmetric = Q == Q.transpose();
+  if (is_symmetric_but_for_rounding(Q) && A.outerStride() == A.rows() &&
+      Q.outerStride() == Q.rows()) {
+    LinearMatrixSolution solution;
+    solution.X.resize(A.rows(), A.rows());
+    detail::LyapunovAnswer answer{solution.X.data()};
+    if (detail::solve_stable_lyapunov(
+            {static_cast<int>(A.rows()), domain == Domain::continuous, A.data(), Q.data()},
+            answer)) {
+      solution.residual = answer.residual;
+      solution.condition = answer.condition;
+      return solution;
+    }
+  }
+  return solve(Equation(domain, A), -Q, symmetric, where);
 }
 
 Expected<LinearMatrixSolution> solve_sylvester(Domain domain, const MatrixRef& A,

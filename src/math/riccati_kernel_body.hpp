@@ -10,8 +10,6 @@
 
 namespace flyball::detail::FLYBALL_VARIANT {
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-
 /// The whole of one solution, in one block of memory.
 template <int N>
 class Kernel {
@@ -47,7 +45,7 @@ class Kernel {
       const double bound = epsilon * size_X_;
       // The computed defect itself is rounded by about eps times the terms.
       const double error = gain * (defect_ + epsilon * scale_);
-      answer_.condition = gain * scale_ / size_X_;
+      answer_.condition = size_X_ > 0.0 ? gain * scale_ / size_X_ : gain;
       if (refinements == 0 && error <= allowed * bound) {
         break;
       }
@@ -60,6 +58,10 @@ class Kernel {
       }
       // What a step leaves is its square and its rounding, both times the condition.
       if (step * answer_.condition * (step / size_X_ + epsilon) <= bound) {
+        // Where XB cancels, K and with it the condition are not what X's exact ones are.
+        if (!(answer_.residual <= 1e3 * n_() * epsilon)) {
+          return false;
+        }
         break;
       }
     }

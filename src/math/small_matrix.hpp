@@ -6,6 +6,8 @@
 
 namespace flyball::detail::FLYBALL_VARIANT {
 
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
 /// A size that is known when compiling (N > 0) or not (N = 0).
 template <int N>
 struct Size {

@@ -11,6 +11,8 @@
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/systems/discretize.hpp>
 
+#include "support/oracle.hpp"
+
 namespace flyball {
 namespace {
 
@@ -49,12 +51,12 @@ TEST(ContinuousLqr, PolesAreTheHamiltoniansStableHalf) {
     const Eigen::MatrixXd N = W.topRightCorner(n, m);
     const auto design = continuous_lqr(A, B, Q, R, N);
     ASSERT_TRUE(design.has_value()) << to_string(design.error());
-    const Eigen::MatrixXd R_inverse = R.inverse();
+    const Eigen::MatrixXd R_inverse = test::inverse(R);
     const Eigen::MatrixXd A_shifted = A - B * R_inverse * N.transpose();
     Eigen::MatrixXd H(2 * n, 2 * n);
     H << A_shifted, -B * R_inverse * B.transpose(), -(Q - N * R_inverse * N.transpose()),
         -A_shifted.transpose();
-    const Eigen::VectorXcd all = H.eigenvalues();
+    const Eigen::VectorXcd all = test::eigenvalues(H);
     for (const auto& pole : design->poles) {
       ASSERT_LT(pole.real(), 0.0);
       ASSERT_LT((all.array() - pole).abs().minCoeff(), 1e-5 * (1.0 + std::abs(pole)));
@@ -100,7 +102,7 @@ TEST(ContinuousLqi, TracksUnderADisturbance) {
   EXPECT_LT(design.poles.real().maxCoeff(), 0.0);
   Eigen::Matrix3d closed;
   closed << plant.A - plant.B * design.K, -plant.B * design.K_I, -plant.C, 0.0;
-  EXPECT_LT(closed.eigenvalues().real().maxCoeff(), 0.0);
+  EXPECT_LT(test::eigenvalues(closed).real().maxCoeff(), 0.0);
   EXPECT_TRUE(continuous_lqi(ContinuousSystem<>{Eigen::MatrixXd(0, 0), {}, {}, {}},
                              Eigen::MatrixXd::Identity(2, 2), Eigen::MatrixXd::Ones(1, 1))
                   .error()

@@ -7,6 +7,8 @@
 #include <flyball/core/random.hpp>
 #include <flyball/math/riccati.hpp>
 
+#include "support/oracle.hpp"
+
 namespace flyball {
 namespace {
 
@@ -151,7 +153,7 @@ TEST(ContinuousFiniteHorizonLqr, IsTheDifferentialEquations) {
     const Eigen::MatrixXd& S = fine.S[1500];
     const Eigen::MatrixXd rate = (fine.S[1501] - fine.S[1499]) / 2e-3;
     const Eigen::MatrixXd K =
-        problem.cost.R.ldlt().solve(problem.B.transpose() * S + problem.cost.N.transpose());
+        test::solve(problem.cost.R, problem.B.transpose() * S + problem.cost.N.transpose());
     const Eigen::MatrixXd right = problem.A.transpose() * S + S * problem.A -
                                   K.transpose() * problem.cost.R * K + problem.cost.Q;
     ASSERT_LT((rate + right).norm(), 1e-3 * (1.0 + problem.cost.Q.norm() + right.norm()));

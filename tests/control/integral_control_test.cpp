@@ -14,6 +14,7 @@
 #include <flyball/systems/discretize.hpp>
 
 #include "support/allocation_count.hpp"
+#include "support/oracle.hpp"
 
 namespace flyball {
 namespace {
@@ -101,7 +102,7 @@ TEST(Lqi, RandomPlantsAreStableAndTrack) {
     const Eigen::MatrixXd B_K = plant.B * design->K;
     closed << plant.A - B_K, -plant.B * design->K_I, -0.1 * (plant.C - plant.D * design->K),
         Eigen::MatrixXd::Identity(m, m) + 0.1 * plant.D * design->K_I;
-    ASSERT_LT(closed.eigenvalues().cwiseAbs().maxCoeff(), 1.0) << trial;
+    ASSERT_LT(test::eigenvalues(closed).cwiseAbs().maxCoeff(), 1.0) << trial;
   }
 }
 

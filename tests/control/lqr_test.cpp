@@ -15,6 +15,7 @@
 #include <flyball/systems/discretize.hpp>
 
 #include "support/laws.hpp"
+#include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
 namespace flyball {
@@ -156,7 +157,7 @@ TEST(Lqr, CrossTermIsAChangeOfVariables) {
     const Eigen::MatrixXd Q = W.topLeftCorner(n, n);
     const Eigen::MatrixXd R = W.bottomRightCorner(m, m);
     const Eigen::MatrixXd N = W.topRightCorner(n, m);
-    const Eigen::MatrixXd shift = R.ldlt().solve(N.transpose());
+    const Eigen::MatrixXd shift = test::solve(R, N.transpose());
     const Eigen::MatrixXd Q_shifted = Q - N * shift;
     const auto with = lqr(A, B, Q, R, N).value();
     const auto without = lqr(Eigen::MatrixXd(A - B * shift), B,
@@ -295,7 +296,7 @@ TEST(Lqr, GainIsItsFormula) {
           s.inputs.asDiagonal() * design->K * s.states.cwiseInverse().asDiagonal();
       const Eigen::MatrixXd loop =
           (test::wide(p.A) - test::wide(p.B) * test::wide(K_plain)).cast<double>();
-      const Eigen::VectorXcd found = loop.eigenvalues();
+      const Eigen::VectorXcd found = test::eigenvalues(loop);
       const auto worst = [&](const Eigen::VectorXcd& values) {
         return continuous ? values.real().maxCoeff() : values.cwiseAbs().maxCoeff() - 1.0;
       };

@@ -12,6 +12,9 @@
 #include <flyball/control/pole_placement.hpp>
 #include <flyball/core/random.hpp>
 
+#include "support/oracle.hpp"
+#include "support/random_systems.hpp"
+
 namespace flyball {
 namespace {
 
@@ -27,7 +30,7 @@ MatrixXd random_matrix(Random& random, Index rows, Index columns) {
 }
 
 MatrixXd random_turn(Random& random, Index n) {
-  return Eigen::HouseholderQR<MatrixXd>(random_matrix(random, n, n)).householderQ();
+  return test::random_rotation(random, n);
 }
 
 double random_power(Random& random, double least, double most) {
@@ -115,7 +118,7 @@ Problem weak_modes(Random& random, int trial) {
 double distance_to_uncontrollable(const MatrixXd& A, const MatrixXd& B) {
   const Index n = A.rows();
   double smallest = std::numeric_limits<double>::infinity();
-  for (const Complex& mode : A.eigenvalues()) {
+  for (const Complex& mode : test::eigenvalues(A)) {
     Eigen::MatrixXcd pencil(n, n + B.cols());
     pencil << A.cast<Complex>() / A.norm(), B.colwise().normalized().cast<Complex>();
     pencil.diagonal().array() -= mode / A.norm();

@@ -11,6 +11,9 @@
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/systems/discretize.hpp>
 
+#include "support/oracle.hpp"
+#include "support/random_systems.hpp"
+
 namespace flyball {
 namespace {
 
@@ -43,25 +46,24 @@ Eigen::VectorXcd poles_from(const nlohmann::json& rows) {
 
 /// The largest of |reached - wanted| / (max(1, |wanted|) condition of that eigenvalue), by Eigen.
 double worst(const Eigen::MatrixXd& closed, const Eigen::VectorXcd& wanted) {
-  const Eigen::EigenSolver<Eigen::MatrixXd> solver(closed);
-  Eigen::MatrixXcd V = solver.eigenvectors();
+  const auto [values, vectors] = test::modes_of(closed);
+  Eigen::MatrixXcd V = vectors;
   V.colwise().normalize();
-  const Eigen::MatrixXcd left = V.fullPivLu().inverse();
+  const Eigen::MatrixXcd left = test::inverse(V);
   std::vector<bool> taken(static_cast<std::size_t>(wanted.size()), false);
   double largest = 0.0;
   for (const Complex& pole : wanted) {
     Eigen::Index nearest = -1;
     for (Eigen::Index i = 0; i < wanted.size(); ++i) {
       if (!taken[static_cast<std::size_t>(i)] &&
-          (nearest < 0 || std::abs(solver.eigenvalues()(i) - pole) <
-                              std::abs(solver.eigenvalues()(nearest) - pole))) {
+          (nearest < 0 || std::abs(values(i) - pole) < std::abs(values(nearest) - pole))) {
         nearest = i;
       }
     }
     taken[static_cast<std::size_t>(nearest)] = true;
     const double sensitivity = std::max(1.0, left.row(nearest).norm());
-    largest = std::max(largest, std::abs(solver.eigenvalues()(nearest) - pole) /
-                                    (std::max(1.0, std::abs(pole)) * sensitivity));
+    largest = std::max(
+        largest, std::abs(values(nearest) - pole) / (std::max(1.0, std::abs(pole)) * sensitivity));
   }
   return largest;
 }
@@ -289,8 +291,7 @@ TEST(Place, KeepsWhatNothingReaches) {
     A(3, 3) = -0.7;
     Eigen::MatrixXd B = random_matrix(random, n, 1 + trial % 2);
     B.row(3).setZero();
-    const Eigen::MatrixXd turn =
-        Eigen::HouseholderQR<Eigen::MatrixXd>(random_matrix(random, n, n)).householderQ();
+    const Eigen::MatrixXd turn = test::random_rotation(random, n);
     A = (turn * A * turn.transpose()).eval();
     B = (turn * B).eval();
     const auto placed = place(A, B, {-1.0, -0.7, -2.0, -3.0});
@@ -354,8 +355,7 @@ TEST(Place, RefusesWhatOnlyRoundingReaches) {
     A(i, i) = static_cast<double>(i + 1);
   }
   Random random(11);
-  const Eigen::MatrixXd turn =
-      Eigen::HouseholderQR<Eigen::MatrixXd>(random_matrix(random, n, n)).householderQ();
+  const Eigen::MatrixXd turn = test::random_rotation(random, n);
   Eigen::MatrixXd b = Eigen::VectorXd::Ones(n);
   b(n - 1) = 1e-14;
   const auto placed = place(turn * A * turn.transpose(), turn * b, {-1, -2, -3, -4, -5, -6});

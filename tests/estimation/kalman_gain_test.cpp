@@ -11,6 +11,8 @@
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/systems/discretize.hpp>
 
+#include "support/oracle.hpp"
+
 namespace flyball {
 namespace {
 
@@ -77,7 +79,7 @@ TEST(KalmanGain, SatisfiesItsEquations) {
     EXPECT_LT((gain.L - A * gain.K).norm(), 1e-10 * (1.0 + gain.L.norm()));
     EXPECT_LT((gain.K * (C * P * C.transpose() + R) - P * C.transpose()).norm(), 1e-11 * size);
     EXPECT_LT(gain.poles.cwiseAbs().maxCoeff(), 1.0);
-    const Eigen::VectorXcd expected = Eigen::MatrixXd(A - gain.L * C).eigenvalues();
+    const Eigen::VectorXcd expected = test::eigenvalues(A - gain.L * C);
     for (const auto& pole : expected) {
       EXPECT_LT((gain.poles.array() - pole).abs().minCoeff(), 1e-7);
     }

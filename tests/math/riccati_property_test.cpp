@@ -5,6 +5,7 @@
 #include <flyball/math/riccati.hpp>
 
 #include "support/laws.hpp"
+#include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
 namespace flyball {
@@ -164,7 +165,7 @@ struct Laws {
         K_found.norm() * (2.0L * e.N.norm() + e.R.norm() * K_found.norm());
     cost.holds(rest.norm() / (epsilon * size), trial, s);
 
-    const Eigen::VectorXcd values = MatrixXd(S_found.cast<double>()).eigenvalues();
+    const Eigen::VectorXcd values = test::eigenvalues(S_found.cast<double>());
     poles.holds(plane == Plane::s ? values.real().maxCoeff() : values.cwiseAbs().maxCoeff() - 1.0,
                 trial, s);
     poles.holds(

@@ -9,6 +9,7 @@
 #include <flyball/core/random.hpp>
 
 #include "math/matrices_json.hpp"
+#include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
 namespace flyball {
@@ -147,7 +148,7 @@ Equation random_equation(Random& random) {
   const auto n = static_cast<Index>(1 + random.bits() % 9);
   const auto m = static_cast<Index>(1 + random.bits() % static_cast<std::uint64_t>(n));
   Equation e{random_matrix(random, n, n), random_matrix(random, n, m), {}, {}, {}};
-  e.A *= random.uniform(0.3, 1.6) / e.A.eigenvalues().cwiseAbs().maxCoeff();
+  e.A *= random.uniform(0.3, 1.6) / test::eigenvalues(e.A).cwiseAbs().maxCoeff();
   const MatrixXd C = random_matrix(random, n + m, n + m);
   const MatrixXd W = C.transpose() * C;
   e.Q = W.topLeftCorner(n, n);
@@ -168,7 +169,7 @@ double relative_residual(const Equation& e, const RiccatiSolution& s) {
 void expect_solved(const Equation& e, const RiccatiSolution& s, double tolerance) {
   EXPECT_LT(relative_residual(e, s), tolerance);
   EXPECT_EQ(s.X, s.X.transpose());
-  EXPECT_LT((e.A - e.B * s.K).eigenvalues().cwiseAbs().maxCoeff(), 1.0);
+  EXPECT_LT(test::eigenvalues(e.A - e.B * s.K).cwiseAbs().maxCoeff(), 1.0);
   EXPECT_LT(s.poles.cwiseAbs().maxCoeff(), 1.0);
   const MatrixXd Rt = e.R + e.B.transpose() * s.X * e.B;
   const MatrixXd cross = e.B.transpose() * s.X * e.A + e.N.transpose();
@@ -333,7 +334,7 @@ TEST(Riccati, TwoStatesAgreeWithTheGeneralKernel) {
     const Index m = 1 + trial % 4 / 2;
     MatrixXd A = normal(2, 2);
     if (trial % 3 == 0) {
-      const Eigen::VectorXcd poles = A.eigenvalues();
+      const Eigen::VectorXcd poles = test::eigenvalues(A);
       continuous ? void(A.diagonal().array() -= poles.real().maxCoeff())
                  : void(A /= poles.cwiseAbs().maxCoeff());
     }

@@ -8,6 +8,7 @@
 #include <flyball/systems/sampled_cost.hpp>
 
 #include "support/laws.hpp"
+#include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
 
 namespace flyball {
@@ -151,7 +152,7 @@ TEST(ConversionProperties, BothWaysSatisfyTheDefinition) {
     for (int trial = 0; trial < 10000; ++trial) {
       const RandomSystem s = systems.next();
       const ContinuousSystem<> plant = test::continuous(test::plain(s));
-      const double frequency = plant.A.eigenvalues().imag().cwiseAbs().maxCoeff();
+      const double frequency = test::eigenvalues(plant.A).imag().cwiseAbs().maxCoeff();
       const double wanted = std::pow(10.0, random.uniform(-3.0, 0.8)) / plant.A.norm();
       // Below the Nyquist frequency, so that there is a way back.
       const double T = frequency * wanted > 3.0 ? 3.0 / frequency : wanted;
@@ -212,16 +213,16 @@ TEST(ConversionProperties, MatchedPolesAndGain) {
     const std::complex<double> z = std::polar(random.uniform(8.0, 10.0), random.uniform(0.1, 3.0));
     std::complex<double> expected = 1.0;
     std::complex<double> found = 1.0;
-    for (const std::complex<double>& lambda : plant.A.eigenvalues()) {
+    for (const std::complex<double>& lambda : test::eigenvalues(plant.A)) {
       expected *= z - std::exp(lambda * T);
     }
-    for (const std::complex<double>& lambda : discrete->A.eigenvalues()) {
+    for (const std::complex<double>& lambda : test::eigenvalues(discrete->A)) {
       found *= z - lambda;
     }
     if (discrete->A.norm() < 1e3) {  // where a zero is beyond, the eigenvalues of A_d lose digits
       poles.holds(std::abs(found - expected) / std::abs(expected), trial, s);
     }
-    const Eigen::VectorXd values = plant.A.jacobiSvd().singularValues();
+    const Eigen::VectorXd values = test::singular_values(plant.A);
     const double smallest = values(values.size() - 1);
     if (smallest > 1e-6 * values(0)) {
       const double rest = test::response(plant, 0.0)(0, 0).real();
@@ -308,11 +309,9 @@ TEST(ConversionProperties, NoiseCovariance) {
     identity.holds((AQ + AQ.transpose() - moved + wide(Q)).norm() /
                        (unit * (A.norm() * covariance.norm() + moved.norm() + Q.norm())),
                    trial, s);
-    const Eigen::VectorXd eigenvalues =
-        covariance.selfadjointView<Eigen::Lower>().eigenvalues().cwiseAbs();
-    semidefinite.holds(
-        -covariance.selfadjointView<Eigen::Lower>().eigenvalues()(0) / eigenvalues.maxCoeff(),
-        trial, s);
+    const Eigen::VectorXd eigenvalues = test::symmetric_eigenvalues(covariance).cwiseAbs();
+    semidefinite.holds(-test::symmetric_eigenvalues(covariance)(0) / eigenvalues.maxCoeff(), trial,
+                       s);
   }
   refusals.expect_at_most(0);
   value.expect_within(100.0, 8500);

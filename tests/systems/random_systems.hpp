@@ -6,6 +6,7 @@
 
 #include <flyball/systems/system.hpp>
 
+#include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
 namespace flyball::test {
@@ -27,7 +28,7 @@ inline ContinuousSystem<> random_system(Random& random, Eigen::Index n, Eigen::I
 inline ContinuousSystem<> random_stable_system(Random& random, Eigen::Index n, Eigen::Index m,
                                                Eigen::Index p, double margin = 0.1) {
   ContinuousSystem<> system = random_system(random, n, m, p);
-  const double abscissa = system.A.eigenvalues().real().maxCoeff();
+  const double abscissa = test::eigenvalues(system.A).real().maxCoeff();
   system.A.diagonal().array() -= abscissa + margin;
   return system;
 }
@@ -41,11 +42,7 @@ inline ContinuousSystem<> rescaled(const ContinuousSystem<>& s, const Eigen::Vec
 /// C (s I - A)⁻¹ B + D.
 template <class System>
 Eigen::MatrixXcd response(const System& system, std::complex<double> s) {
-  Eigen::MatrixXcd shifted = -system.A.template cast<std::complex<double>>();
-  shifted.diagonal().array() += s;
-  return system.C.template cast<std::complex<double>>() *
-             shifted.partialPivLu().solve(system.B.template cast<std::complex<double>>()) +
-         system.D.template cast<std::complex<double>>();
+  return response(system.A, system.B, system.C, system.D, s);
 }
 
 }  // namespace flyball::test

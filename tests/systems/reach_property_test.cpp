@@ -8,6 +8,7 @@
 #include <flyball/systems/norms.hpp>
 
 #include "support/laws.hpp"
+#include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
 
 namespace flyball {
@@ -26,7 +27,7 @@ using test::wide;
 
 /// Nearest pair of eigenvalues that mirror each other, relative: no Gramian exists at zero.
 double mirror_distance(const MatrixXd& A, Plane plane) {
-  const Eigen::VectorXcd values = A.eigenvalues();
+  const Eigen::VectorXcd values = test::eigenvalues(A);
   double nearest = std::numeric_limits<double>::infinity();
   for (const Complex& a : values) {
     for (const Complex& b : values) {
@@ -133,10 +134,9 @@ TEST(ReachProperties, PowerOfTheOutput) {
 class Sweep {
  public:
   Sweep(const RandomSystem& s, Plane plane) : s_(s), plane_(plane) {
-    const Eigen::EigenSolver<MatrixXd> modes(s.A);
-    poles_ = modes.eigenvalues();
-    const Eigen::MatrixXcd V = modes.eigenvectors();
-    B_ = V.partialPivLu().solve(s.B.cast<Complex>());
+    const auto [poles, V] = test::modes_of(s.A);
+    poles_ = poles;
+    B_ = test::solve(V, s.B.cast<Complex>());
     C_ = s.C.cast<Complex>() * V;
   }
   /// Estimates the gain at each frequency and checks the largest exactly.
@@ -169,9 +169,9 @@ class Sweep {
   }
   [[nodiscard]] double exact(double w) const {
     if (std::isinf(w)) {
-      return s_.D.jacobiSvd().singularValues()(0);
+      return test::singular_values(s_.D)(0);
     }
-    return test::response(s_, boundary(w)).jacobiSvd().singularValues()(0);
+    return test::singular_values(test::response(s_, boundary(w)))(0);
   }
 
  private:
@@ -292,8 +292,8 @@ TEST(ReachProperties, HiddenModesAreFound) {
     p.A.bottomLeftCorner(hidden, n - hidden).setZero();
     p.B.bottomRows(hidden).setZero();
     const MatrixXd A_2 = p.A.bottomRightCorner(hidden, hidden);
-    const Eigen::VectorXcd expected = A_2.eigenvalues();
-    const Eigen::VectorXcd others = p.A.topLeftCorner(n - hidden, n - hidden).eigenvalues();
+    const Eigen::VectorXcd expected = test::eigenvalues(A_2);
+    const Eigen::VectorXcd others = test::eigenvalues(p.A.topLeftCorner(n - hidden, n - hidden));
     const MatrixXd U = test::random_rotation(systems.random(), n);
     const RandomSystem turned = test::turned(p, U);
     const RandomSystem given = test::rescaled(turned, s.states, s.inputs, s.outputs);

@@ -25,8 +25,10 @@ struct LinearMatrixSolution {
 
 /// The continuous Lyapunov equation A X + X Aᵀ + Q = 0.
 ///
-/// By the Schur form of the balanced A (Bartels and Stewart), with the residual formed in twice the
-/// working precision and corrected until it is rounding.
+/// For a stable A and a symmetric Q by Smith's squared iteration (after a Cayley transform), whose
+/// result is taken where its residual times the condition vouches for it. Else by the Schur form of
+/// the balanced A (Bartels and Stewart), with the residual formed in twice the working precision
+/// and corrected until it is rounding.
 ///
 /// @param A  n x n, no two of whose eigenvalues add up to zero. It need not be stable.
 /// @param Q  n x n; X is symmetric where Q is.
@@ -34,7 +36,8 @@ struct LinearMatrixSolution {
 ///           with the pair of eigenvalues as evidence.
 /// Cost: O(n³), allocates.
 ///
-/// Source: book, section 5.11.3, equation 5.3; Bartels and Stewart, Comm. ACM 15 (1972).
+/// Source: book, section 5.11.3, equation 5.3; Bartels and Stewart, Comm. ACM 15 (1972); Smith,
+/// SIAM J. Appl. Math. 16 (1968).
 [[nodiscard]] Expected<LinearMatrixSolution> lyapunov(const MatrixRef& A, const MatrixRef& Q);
 
 /// The discrete Lyapunov equation A X Aᵀ - X + Q = 0; no product of two eigenvalues of A may be
