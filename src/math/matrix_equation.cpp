@@ -221,7 +221,7 @@ Expected<LinearMatrixSolution> solve(const Equation& equation, const MatrixXd& F
       X = detail::symmetrized(X);
     }
     // The next step would be as much smaller than this one as this one is than X.
-    if (step <= std::sqrt(epsilon) * X.norm()) {
+    if (step <= 1e-12 * X.norm()) {
       break;
     }
     previous = step;

@@ -161,7 +161,7 @@ TEST(RealizationProperties, BalancedIsTheSameSystem) {
     refusals.expect_at_most(50);
     transfer.expect_within(1e-9);
     gramians.expect_within(1e-9);
-    hankel.expect_within(1e-8, 1e-6, 9000);
+    hankel.expect_within(1e-8, 1e-5, 9000);
   }
 }
 
