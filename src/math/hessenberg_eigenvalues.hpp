@@ -30,7 +30,7 @@ template <int N>
 inline bool eigenvalues(Size<N> size, double* H, std::complex<double>* lambda) {
   const int n = size();
   const int ld = size.padded();
-  const auto h = [H, ld](int i, int j) -> double& { return H[i + j * ld]; };
+  const auto h = [=](int i, int j) -> double& { return H[i + j * ld]; };
   if (n == 1) {
     lambda[0] = H[0];
     return true;

@@ -51,7 +51,8 @@ struct PolePlacement {
 ///
 /// is solved in twice the working precision, so that K is right to its last digit even where modes
 /// are coupled by 1e-10 and K is as large as 1e10. If rounding K entry by entry still moved the
-/// poles, the entries are rounded together such that their errors cancel.
+/// poles, the entries are rounded together such that their errors cancel; such a K has to be passed
+/// on with all its digits.
 ///
 /// The same function serves continuous and discrete plants; place an observer's poles with
 /// place(Aᵀ, Cᵀ, poles), whose gain is Lᵀ.
