@@ -75,25 +75,26 @@ struct Curve {
   std::vector<double> n, time, memory_n, memory;
 };
 
-Curve measure(bool continuous) {
-  Curve curve;
-  std::printf("%s\n%5s %12s %14s %12s %14s\n", continuous ? "care" : "dare", "n", "ms", "ns / n^3",
-              "MB", "doubles / n^2");
+/// Before any time is taken: what this process has freed, its children find again.
+void measure_memory(bool continuous, Curve& curve) {
+  for (const int n : {100, 150, 200, 300, 400}) {
+    const double memory =
+        peak_megabytes(n, true, continuous) - peak_megabytes(n, false, continuous);
+    curve.memory_n.push_back(n);
+    curve.memory.push_back(memory);
+    std::printf("%s %5d %12.1f MB %8.1f n^2 doubles\n", continuous ? "care" : "dare", n, memory,
+                memory * 131072.0 / std::pow(n, 2));
+  }
+}
+
+void measure_time(bool continuous, Curve& curve) {
   for (const int n : {10, 20, 40, 60, 100, 150, 200, 300, 400}) {
     const double time = milliseconds(random_equation(n), continuous);
     curve.n.push_back(n);
     curve.time.push_back(time);
-    std::printf("%5d %12.3f %14.3f", n, time, time * 1e6 / std::pow(n, 3));
-    if (n >= 100) {
-      const double memory =
-          peak_megabytes(n, true, continuous) - peak_megabytes(n, false, continuous);
-      curve.memory_n.push_back(n);
-      curve.memory.push_back(memory);
-      std::printf(" %12.1f %14.1f", memory, memory * 131072.0 / std::pow(n, 2));
-    }
-    std::printf("\n");
+    std::printf("%s %5d %12.3f ms %8.2f n^3 ns\n", continuous ? "care" : "dare", n, time,
+                time * 1e6 / std::pow(n, 3));
   }
-  return curve;
 }
 
 /// A power of n through the last point.
@@ -110,8 +111,12 @@ flyball::PlotLine guide(const char* label, const std::vector<double>& n,
 }  // namespace
 
 int main(int argc, char** argv) {
-  const Curve dare = measure(false);
-  const Curve care = measure(true);
+  Curve dare;
+  Curve care;
+  measure_memory(false, dare);
+  measure_memory(true, care);
+  measure_time(false, dare);
+  measure_time(true, care);
   if (argc < 2) {
     return 0;
   }
