@@ -4,7 +4,6 @@
 // repetitions that alternate between the two.
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <vector>
@@ -13,6 +12,8 @@
 
 #include <flyball/core/random.hpp>
 #include <flyball/math/matrix_equation.hpp>
+
+#include "timing.hpp"
 
 extern "C" {
 void sb03md_(const char* dico, const char* job, const char* fact, const char* trana, const int* n,
@@ -27,9 +28,9 @@ void openblas_set_num_threads(int threads);
 
 namespace {
 
+using bench::microseconds;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using Clock = std::chrono::steady_clock;
 
 enum class Kind { lyapunov, discrete_lyapunov, sylvester };
 
@@ -107,16 +108,6 @@ flyball::Expected<flyball::LinearMatrixSolution> solve_ours(const Equation& e, K
       break;
   }
   return flyball::sylvester(e.A, e.B, e.C);
-}
-
-template <class Work>
-double microseconds(int calls, Work&& work) {
-  const auto start = Clock::now();
-  for (int k = 0; k < calls; ++k) {
-    work();
-  }
-  const std::chrono::duration<double, std::micro> elapsed = Clock::now() - start;
-  return elapsed.count() / calls;
 }
 
 void compare(Kind kind, int n, int repetitions) {

@@ -3,7 +3,6 @@
 // alternate between the two; `least` is the smallest ratio of one matrix.
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -15,20 +14,12 @@
 #include <flyball/core/random.hpp>
 #include <flyball/math/matrix_exponential.hpp>
 
+#include "timing.hpp"
+
 namespace {
 
+using bench::microseconds;
 using Eigen::MatrixXd;
-using Clock = std::chrono::steady_clock;
-
-template <class Work>
-double microseconds(int calls, Work&& work) {
-  const auto start = Clock::now();
-  for (int k = 0; k < calls; ++k) {
-    work();
-  }
-  const std::chrono::duration<double, std::micro> elapsed = Clock::now() - start;
-  return elapsed.count() / calls;
-}
 
 void compare(int n, double norm, int repetitions) {
   flyball::Random random(static_cast<std::uint64_t>(n));

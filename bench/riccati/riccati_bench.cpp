@@ -4,7 +4,6 @@
 // of them.
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <vector>
@@ -13,6 +12,8 @@
 
 #include <flyball/core/random.hpp>
 #include <flyball/math/riccati.hpp>
+
+#include "timing.hpp"
 
 extern "C" {
 void sb02od_(const char* dico, const char* jobb, const char* fact, const char* uplo,
@@ -28,9 +29,9 @@ void openblas_set_num_threads(int threads);
 
 namespace {
 
+using bench::microseconds;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using Clock = std::chrono::steady_clock;
 
 struct Equation {
   MatrixXd A, B, Q, R;
@@ -100,16 +101,6 @@ class Slicot {
   VectorXd work_;
 };
 
-template <class Work>
-double microseconds(int calls, Work&& work) {
-  const auto start = Clock::now();
-  for (int k = 0; k < calls; ++k) {
-    work(k);
-  }
-  const std::chrono::duration<double, std::micro> elapsed = Clock::now() - start;
-  return elapsed.count() / calls;
-}
-
 /// Two states whose closed loop keeps a pole about `margin` inside the boundary: one mode of A lies
 /// on it and is weighed by `margin`², or lies `margin` outside and is not weighed at all.
 Equation near_margin(flyball::Random& random, bool continuous, double margin, bool weighed) {
@@ -158,10 +149,9 @@ void compare(bool continuous, const std::vector<Equation>& equations, int repeti
     double best_ours = 1e300;
     double best_slicot = 1e300;
     for (int r = 0; r < repetitions; ++r) {
-      best_ours =
-          std::min(best_ours, microseconds(calls, [&](int) { sink += solve_ours(e)->X(0, 0); }));
+      best_ours = std::min(best_ours, microseconds(calls, [&] { sink += solve_ours(e)->X(0, 0); }));
       best_slicot =
-          std::min(best_slicot, microseconds(calls, [&](int) { sink += slicot.solve(e, domain); }));
+          std::min(best_slicot, microseconds(calls, [&] { sink += slicot.solve(e, domain); }));
     }
     time_ours += best_ours;
     time_slicot += best_slicot;
@@ -183,11 +173,9 @@ void absolute(const char* name, const Equation& e, const char* wpimath, int repe
   double dynamic = 1e300;
   double sink = 0.0;
   for (int r = 0; r < 20 * repetitions; ++r) {
-    fixed = std::min(fixed,
-                     microseconds(100, [&](int) { sink += flyball::dare(A, B, Q, R)->X(0, 0); }));
-    dynamic = std::min(dynamic, microseconds(100, [&](int) {
-                         sink += flyball::dare(e.A, e.B, e.Q, e.R)->X(0, 0);
-                       }));
+    fixed = std::min(fixed, microseconds(100, [&] { sink += flyball::dare(A, B, Q, R)->X(0, 0); }));
+    dynamic = std::min(
+        dynamic, microseconds(100, [&] { sink += flyball::dare(e.A, e.B, e.Q, e.R)->X(0, 0); }));
   }
   const auto solution = flyball::dare(e.A, e.B, e.Q, e.R).value();
   std::printf("%-28s %8.2f %8.2f   %-12s tr X = %.9g, condition %.1e, %d iterations%s\n", name,

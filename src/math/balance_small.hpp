@@ -2,6 +2,7 @@
 
 // Compiled once for each instruction set, in its own namespace (see small_matrix.hpp).
 
+#include "math/balance_columns.hpp"
 #include "math/small_matrix.hpp"
 
 namespace flyball::detail::FLYBALL_VARIANT {
@@ -39,65 +40,16 @@ template <int N>
   return balanced;
 }
 
-/// A ← D⁻¹AD with powers of two D such that rows and columns are of one size without the diagonal
-/// (Osborne; Parlett and Reinsch). A state that only drives others, or is only driven, is scaled
-/// until what connects it is no larger than the diagonal.
+/// A ← D⁻¹AD where it is worth it.
 template <int N>
 void balance(Size<N> size, double* A, double* d, double* rows, double* columns) {
   const int n = size();
   const int ld = size.padded();
-  double diagonal = 0.0;
   for (int i = 0; i < n; ++i) {
     d[i] = 1.0;
-    diagonal = std::max(diagonal, std::abs(A[i + i * ld]));
   }
-  if (is_balanced(size, A, rows, columns)) {
-    return;
-  }
-  for (int sweep = 0; sweep < 20; ++sweep) {
-    bool changed = false;
-    for (int i = 0; i < n; ++i) {
-      double column = 0.0;
-      double row = 0.0;
-      for (int k = 0; k < n; ++k) {
-        if (k != i) {
-          column += std::abs(A[k + i * ld]);
-          row += std::abs(A[i + k * ld]);
-        }
-      }
-      if (!std::isfinite(column + row)) {
-        continue;
-      }
-      if (column <= 0.0 || row <= 0.0) {
-        if (column + row <= diagonal || !(diagonal > 0.0)) {
-          continue;
-        }
-        const double least = std::max(diagonal * (diagonal / (column + row)), 1e-300);
-        column = std::max(column, least);
-        row = std::max(row, least);
-      }
-      // A factor of 2 cannot gain 5 % between 1/2 and 2.
-      if (row < 2.0 * column && column < 2.0 * row) {
-        continue;
-      }
-      const int exponent =
-          static_cast<int>(std::lround(0.5 * (std::log2(row) - std::log2(column))));
-      const double f = std::ldexp(1.0, exponent);
-      if (exponent == 0 || column * f + row / f > 0.95 * (column + row)) {
-        continue;
-      }
-      d[i] *= f;
-      for (int k = 0; k < n; ++k) {
-        if (k != i) {
-          A[k + i * ld] *= f;
-          A[i + k * ld] /= f;
-        }
-      }
-      changed = true;
-    }
-    if (!changed) {
-      break;
-    }
+  if (!is_balanced(size, A, rows, columns)) {
+    balance_columns(n, A, ld, d);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 
+#include "math/balance_columns.hpp"
 #include "math/dense.hpp"
 
 namespace flyball::detail {
@@ -71,44 +72,8 @@ OrthogonalTriangular pivoted_qr(const MatrixRef& A) {
 Eigen::VectorXd balance_of(const MatrixRef& A) {
   const Index n = A.rows();
   Eigen::VectorXd d = Eigen::VectorXd::Ones(n);
-  // Without the diagonal, which does not change: in its sums small entries would be lost.
-  MatrixXd M = A.cwiseAbs();
-  M.diagonal().setZero();
-  const double diagonal = n == 0 ? 0.0 : A.diagonal().cwiseAbs().maxCoeff();
-  for (int sweep = 0; sweep < 20; ++sweep) {
-    bool changed = false;
-    for (Index i = 0; i < n; ++i) {
-      double column = M.col(i).sum();
-      double row = M.row(i).sum();
-      if (!std::isfinite(column + row)) {
-        continue;
-      }
-      // A state that only drives others, or is only driven, can be scaled until what connects it is
-      // no larger than the diagonal.
-      if (column <= 0.0 || row <= 0.0) {
-        if (column + row <= diagonal || !(diagonal > 0.0)) {
-          continue;
-        }
-        const double least = std::max(diagonal * (diagonal / (column + row)), 1e-300);
-        column = std::max(column, least);
-        row = std::max(row, least);
-      }
-      const int exponent =
-          static_cast<int>(std::lround(0.5 * (std::log2(row) - std::log2(column))));
-      const double f = std::ldexp(1.0, exponent);
-      if (exponent == 0 || column * f + row / f > 0.95 * (column + row)) {
-        continue;
-      }
-      d(i) *= f;
-      M.col(i) *= f;
-      M.row(i) /= f;
-      changed = true;
-    }
-    if (!changed) {
-      break;
-    }
-  }
-  const MatrixXd balanced = d.cwiseInverse().asDiagonal() * A * d.asDiagonal();
+  MatrixXd balanced = A;
+  balance_columns(static_cast<int>(n), balanced.data(), static_cast<int>(n), d.data());
   return norm1(balanced) < norm1(A) ? d : Eigen::VectorXd::Ones(n);
 }
 

@@ -229,26 +229,41 @@ class Exponential {
       sums = next;
       next = held;
     };
+    const auto largest_sum = [&] {
+      double largest = 0.0;
+      for (int i = 0; i < n_(); ++i) {
+        largest = std::max(largest, sums[i]);
+      }
+      return largest;
+    };
+    const double rest = 2.0 * p.order * log2_norm - p.log2_inverse_error;
     advance(T);
-    if (n_() <= 12) {  // a product for m of the steps
+    advance(T);
+    if (p.order * std::log2(largest_sum()) + rest + 53.0 <= 0.0) {
+      return 0;  // ‖ |A|² ‖ᵐ ‖A‖ bounds it
+    }
+    if (n_() <= 12) {  // a product for half of the steps
+      advance(T);
       square(V_, T, T);
-      for (int k = 0; k < p.order; ++k) {
+      for (int k = 1; k < p.order; ++k) {
         advance(V_);
       }
     } else {
-      for (int k = 0; k < 2 * p.order; ++k) {
+      for (int k = 2; k < 2 * p.order + 1; ++k) {
         advance(T);
       }
     }
-    double largest = 0.0;
-    for (int i = 0; i < n_(); ++i) {
-      largest = std::max(largest, sums[i]);
-    }
+    const double largest = largest_sum();
     if (!(largest > 0.0)) {
       return 0;
     }
-    const double log2_alpha = std::log2(largest) + 2.0 * p.order * log2_norm - p.log2_inverse_error;
+    const double log2_alpha = std::log2(largest) + rest;
     return std::max(0, static_cast<int>(std::ceil((log2_alpha + 53.0) / (2.0 * p.order))));
+  }
+
+  /// By which ‖Aᵏ‖^(1/k) = eta comes within the reach of the highest order.
+  static int squarings_for(double eta) {
+    return eta > pade[4].theta ? static_cast<int>(std::ceil(std::log2(eta / pade[4].theta))) : 0;
   }
 
   /// V_ ← the approximant of exp(2⁻ˢA); returns s.
@@ -290,8 +305,10 @@ class Exponential {
         return 0;
       }
     }
-    double eta5 = eta1;
-    if (!unscaled || d6 <= pade[3].theta || eta1 > pade[4].theta) {
+    // max(d6, d8) is at least d6 and max(d8, d10) at least d8: where that bound asks for as many
+    // squarings, the next product is not worth it.
+    int s = squarings_for(eta1);
+    if (!unscaled || d6 <= pade[3].theta || squarings_for(d6) < s) {
       square(A8(), A4_, A4_);
       const double d8 = std::sqrt(std::sqrt(std::sqrt(norm1(A8()))));
       const double eta3 = std::max(d6, d8);
@@ -301,13 +318,12 @@ class Exponential {
           return 0;
         }
       }
-      eta5 = std::min(eta5, eta3);
-      if (d8 < eta3 && eta5 > pade[4].theta) {
+      s = std::min(s, squarings_for(eta3));
+      if (squarings_for(d8) < s) {
         square(T_, A4_, A6_);
-        eta5 = std::min(eta5, std::max(d8, std::pow(norm1(T_), 0.1)));
+        s = std::min(s, squarings_for(std::max(d8, std::pow(norm1(T_), 0.1))));
       }
     }
-    int s = eta5 > pade[4].theta ? static_cast<int>(std::ceil(std::log2(eta5 / pade[4].theta))) : 0;
     s += extra_squarings(pade[4], norm, s);
     scale(A_, std::ldexp(1.0, -s));
     scale(A2_, std::ldexp(1.0, -2 * s));

@@ -1,0 +1,10 @@
+#pragma once
+
+namespace flyball::detail {
+
+/// A ← D⁻¹AD and d ← d D with powers of two D such that rows and columns are of one size without
+/// the diagonal (Osborne; Parlett and Reinsch). A state that only drives others, or is only driven,
+/// is scaled until what connects it is no larger than the diagonal. Columns of A lie `ld` apart.
+void balance_columns(int n, double* A, int ld, double* d);
+
+}  // namespace flyball::detail
