@@ -25,12 +25,42 @@ endif()
 
 set_property(GLOBAL PROPERTY FLYBALL_DOMAINS "")
 
-# flyball_add_domain(<domain> SOURCES <files...> [DEPENDS <domains...>] [PRIVATE_LIBRARIES <...>])
+# flyball_precompile(<target>)
+#
+# The headers that nearly every source includes. A precompiled header serves targets that compile
+# with the same flags: the first target of each kind makes it. Text kind: sources that read, write
+# and print; they are compiled for size of build, since no robot waits for them.
+function(flyball_precompile target)
+  get_target_property(is_text ${target} FLYBALL_TEXT)
+  if(is_text)
+    set(kind TEXT)
+    set(header ${PROJECT_SOURCE_DIR}/src/io/precompiled.hpp)
+    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+  else()
+    set(kind NUMERIC)
+    set(header ${PROJECT_SOURCE_DIR}/src/core/precompiled.hpp)
+  endif()
+  if(BUILD_SHARED_LIBS)
+    return()
+  endif()
+  get_property(maker GLOBAL PROPERTY FLYBALL_PRECOMPILED_${kind})
+  if(maker)
+    target_precompile_headers(${target} REUSE_FROM ${maker})
+  else()
+    target_precompile_headers(${target} PRIVATE ${header})
+    set_property(GLOBAL PROPERTY FLYBALL_PRECOMPILED_${kind} ${target})
+  endif()
+endfunction()
+
+# flyball_add_domain(<domain> [TEXT] SOURCES <files...> [DEPENDS <domains...>]
+#                    [PRIVATE_HEADERS <targets...>] [PRIVATE_LIBRARIES <targets...>])
 #
 # One library a domain folder: flyball_<domain>, alias flyball::<domain>. DEPENDS may only name
-# domains that the table of docs/architecture.md allows; a test checks the includes.
+# domains that the table of docs/architecture.md allows; a test checks the includes. A library with
+# compiled code (PRIVATE_LIBRARIES) must be linked by whoever links ours, if it is static:
+# flyballConfig.cmake finds it for them. Header-only ones leave no trace in what we install.
 function(flyball_add_domain domain)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PRIVATE_LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "TEXT" "" "SOURCES;DEPENDS;PRIVATE_HEADERS;PRIVATE_LIBRARIES" ${ARGN})
   set(target flyball_${domain})
   add_library(${target} ${ARG_SOURCES})
   add_library(flyball::${domain} ALIAS ${target})
@@ -53,17 +83,11 @@ function(flyball_add_domain domain)
     target_link_libraries(${target} PUBLIC flyball::${dependency})
   endforeach()
   target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:flyball_options>)
-  # Every domain formats; with the same flags everywhere one precompiled header serves them all.
-  target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:fmt::fmt-header-only>)
-  if(NOT BUILD_SHARED_LIBS)
-    if(domain STREQUAL core)
-      target_precompile_headers(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src/core/precompiled.hpp)
-    else()
-      target_precompile_headers(${target} REUSE_FROM flyball_core)
-    endif()
-  endif()
-  foreach(library IN LISTS ARG_PRIVATE_LIBRARIES)
+  target_link_libraries(${target} PRIVATE ${ARG_PRIVATE_LIBRARIES})
+  foreach(library IN LISTS ARG_PRIVATE_HEADERS)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:${library}>)
   endforeach()
+  set_target_properties(${target} PROPERTIES FLYBALL_TEXT "${ARG_TEXT}")
+  flyball_precompile(${target})
   set_property(GLOBAL APPEND PROPERTY FLYBALL_DOMAINS ${domain})
 endfunction()

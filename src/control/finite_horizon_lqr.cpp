@@ -5,11 +5,10 @@
 #include <optional>
 #include <string>
 
-#include <fmt/format.h>
-
 #include <flyball/math/matrix_exponential.hpp>
 #include <flyball/math/riccati.hpp>
 
+#include "core/format.hpp"
 #include "math/dense.hpp"
 
 namespace flyball {
@@ -69,8 +68,8 @@ Expected<void> check_steps(std::size_t steps, Eigen::Index n, std::string_view w
       Error(ArgumentError::out_of_range)
           .in(std::string(where))
           .about("steps")
-          .got(fmt::format("{}", steps))
-          .expected(fmt::format("from 1 to {:.0f}", most_entries / static_cast<double>(n * n))));
+          .got(detail::format("{}", steps))
+          .expected(detail::format("from 1 to {:.0f}", most_entries / static_cast<double>(n * n))));
 }
 
 Error not_definite(std::string_view where, std::string_view what, std::size_t step) {

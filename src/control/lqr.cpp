@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-#include <fmt/format.h>
-
 #include <flyball/math/riccati.hpp>
+
+#include "core/format.hpp"
 
 namespace flyball {
 
@@ -65,7 +65,7 @@ Expected<Eigen::MatrixXd> bryson(std::span<const double> tolerances, double rho)
     if (std::isinf(tolerance) && tolerance > 0.0) {
       continue;
     }
-    const std::string entry = fmt::format("tolerance {}", i);
+    const std::string entry = detail::format("tolerance {}", i);
     if (auto checked = check_positive(tolerance, name, entry); !checked) {
       return tl::unexpected(
           Error(std::move(checked.error()))

@@ -3,11 +3,10 @@
 #include <limits>
 #include <string>
 
-#include <fmt/format.h>
-
 #include <flyball/control/pid_tuning.hpp>
 
 #include "control/single_loop.hpp"
+#include "core/format.hpp"
 
 namespace flyball {
 
@@ -43,21 +42,21 @@ double jitter_of(const PidResponse& response, const PidSettings& settings) {
 std::string seen_in(const ResponseMetrics& metrics, double jitter) {
   std::string text;
   if (metrics.overshoot > 1e-3) {
-    text = fmt::format("the output goes over the reference by {:.1f} % and crosses it {} times",
-                       100.0 * metrics.overshoot, metrics.crossings);
+    text = detail::format("the output goes over the reference by {:.1f} % and crosses it {} times",
+                          100.0 * metrics.overshoot, metrics.crossings);
   } else if (metrics.rise_time) {
     text = "the output reaches the reference without going over it";
   } else {
-    text = fmt::format("the output ends {} short of the reference",
-                       format_number(metrics.steady_state_error, 3));
+    text = detail::format("the output ends {} short of the reference",
+                          format_number(metrics.steady_state_error, 3));
   }
   if (metrics.settling_time) {
-    text += fmt::format(", settled after {} s", format_number(*metrics.settling_time, 3));
+    text += detail::format(", settled after {} s", format_number(*metrics.settling_time, 3));
   } else {
     text += ", not settled";
   }
   if (jitter > jittering) {
-    text += fmt::format("; the input jitters by {:.0f} % of its range a period", 100.0 * jitter);
+    text += detail::format("; the input jitters by {:.0f} % of its range a period", 100.0 * jitter);
   }
   return text;
 }
@@ -120,14 +119,14 @@ Expected<PidGains> raise_kp(Bench& bench, double first, double sign, bool veloci
       continue;
     }
     if (velocity || (*step)->jitter > jittering) {
-      (*step)->decided =
-          fmt::format("take Kp back to {}: {}", format_number(calm.kp, 4),
-                      velocity ? "a velocity controller has no Kd to damp an oscillation (6.10.7)"
-                               : "the loop is at the edge of its sample rate");
+      (*step)->decided = detail::format(
+          "take Kp back to {}: {}", format_number(calm.kp, 4),
+          velocity ? "a velocity controller has no Kd to damp an oscillation (6.10.7)"
+                   : "the loop is at the edge of its sample rate");
       return calm;
     }
-    (*step)->decided = fmt::format("keep Kp = {}: it starts to oscillate, which Kd is to damp",
-                                   format_number(gains.kp, 4));
+    (*step)->decided = detail::format("keep Kp = {}: it starts to oscillate, which Kd is to damp",
+                                      format_number(gains.kp, 4));
     return gains;
   }
   bench.steps().back().decided = "keep Kp: more of it changes nothing";
@@ -151,7 +150,8 @@ Expected<PidGains> raise_kd(Bench& bench, PidGains gains, double period) {
       return tl::unexpected(step.error());
     }
     if ((*step)->jitter > jittering) {
-      (*step)->decided = fmt::format("take Kd back to {}: it jitters", format_number(best.kd, 4));
+      (*step)->decided =
+          detail::format("take Kd back to {}: it jitters", format_number(best.kd, 4));
       break;
     }
     const double cost = cost_of(**step);
@@ -162,8 +162,8 @@ Expected<PidGains> raise_kd(Bench& bench, PidGains gains, double period) {
     } else if ((*step)->metrics.overshoot > oscillating) {
       (*step)->decided = "increase Kd: it still oscillates";
     } else {
-      (*step)->decided = fmt::format("take Kd back to {}: more of it only slows the response",
-                                     format_number(best.kd, 4));
+      (*step)->decided = detail::format("take Kd back to {}: more of it only slows the response",
+                                        format_number(best.kd, 4));
       break;
     }
   }
@@ -182,8 +182,8 @@ Expected<PidGains> raise_ki(Bench& bench, PidGains gains, double duration) {
       return tl::unexpected(step.error());
     }
     if (bench.oscillates(**step)) {
-      (*step)->decided = fmt::format("take Ki back to {}: it goes too far over the reference",
-                                     format_number(best.ki, 4));
+      (*step)->decided = detail::format("take Ki back to {}: it goes too far over the reference",
+                                        format_number(best.ki, 4));
       break;
     }
     const double error = bench.error_of(**step);
@@ -193,7 +193,7 @@ Expected<PidGains> raise_ki(Bench& bench, PidGains gains, double duration) {
     }
     if (error <= exact && (*step)->metrics.settling_time) {
       (*step)->decided =
-          fmt::format("keep Ki = {}: the error is gone in time", format_number(gains.ki, 4));
+          detail::format("keep Ki = {}: the error is gone in time", format_number(gains.ki, 4));
       break;
     }
     (*step)->decided = "increase Ki: an error remains";

@@ -1,6 +1,6 @@
 #include <flyball/control/observer_regulator.tpp>
 
-#include <fmt/format.h>
+#include "core/format.hpp"
 
 namespace flyball {
 
@@ -30,10 +30,10 @@ Expected<void> check_regulator(const MatrixRef& A, const MatrixRef& B, const Mat
     if (!(u_min(i, 0) < u_max(i, 0))) {
       return tl::unexpected(Error(ArgumentError::out_of_range)
                                 .in(std::string(where))
-                                .about(fmt::format("u_min({})", i))
+                                .about(detail::format("u_min({})", i))
                                 .got(format_number(u_min(i, 0)))
-                                .expected(fmt::format("below u_max({}), which is {}", i,
-                                                      format_number(u_max(i, 0)))));
+                                .expected(detail::format("below u_max({}), which is {}", i,
+                                                         format_number(u_max(i, 0)))));
     }
   }
   return {};

@@ -3,12 +3,11 @@
 #include <numbers>
 #include <string>
 
-#include <fmt/format.h>
-
 #include <flyball/control/pid_tuning.hpp>
 #include <flyball/core/random.hpp>
 
 #include "control/single_loop.hpp"
+#include "core/format.hpp"
 
 namespace flyball {
 
@@ -187,7 +186,7 @@ Expected<ReactionCurve> reaction_curve(std::span<const double> times,
     return tl::unexpected(Error(ArgumentError::wrong_shape)
                               .in(std::string(where))
                               .about("values")
-                              .got(fmt::format("{} for {} times", values.size(), times.size()))
+                              .got(detail::format("{} for {} times", values.size(), times.size()))
                               .expected("as many as times, at least 10"));
   }
   for (std::size_t k = 0; k < times.size(); ++k) {

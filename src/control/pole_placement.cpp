@@ -5,11 +5,10 @@
 #include <limits>
 #include <string>
 
-#include <fmt/format.h>
-
 #include <flyball/core/random.hpp>
 
 #include "control/placement.hpp"
+#include "core/format.hpp"
 
 namespace flyball {
 
@@ -271,8 +270,8 @@ Expected<void> check_arguments(const MatrixRef& A, const MatrixRef& B,
     return tl::unexpected(Error(ArgumentError::wrong_shape)
                               .in(std::string(where))
                               .about("poles")
-                              .got(fmt::format("{} numbers", poles.size()))
-                              .expected(fmt::format("one pole a state ({})", n)));
+                              .got(detail::format("{} numbers", poles.size()))
+                              .expected(detail::format("one pole a state ({})", n)));
   }
   return check_all(check_finite(A, where, "A"), check_finite(B, where, "B"),
                    check_finite(Eigen::MatrixXd(poles.real()), where, "poles"),

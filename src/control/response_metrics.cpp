@@ -3,9 +3,9 @@
 #include <cmath>
 #include <string>
 
-#include <fmt/format.h>
-
 #include <flyball/core/argument.hpp>
+
+#include "core/format.hpp"
 
 namespace flyball {
 
@@ -18,7 +18,7 @@ Expected<void> check_samples(std::span<const double> times, std::span<const doub
     return tl::unexpected(Error(ArgumentError::wrong_shape)
                               .in(std::string(where))
                               .about("values")
-                              .got(fmt::format("{} for {} times", values.size(), times.size()))
+                              .got(detail::format("{} for {} times", values.size(), times.size()))
                               .expected("as many as times, at least two"));
   }
   for (std::size_t k = 0; k < times.size(); ++k) {
@@ -31,7 +31,7 @@ Expected<void> check_samples(std::span<const double> times, std::span<const doub
       return tl::unexpected(
           Error(ArgumentError::out_of_range)
               .in(std::string(where))
-              .about(fmt::format("times[{}]", k))
+              .about(detail::format("times[{}]", k))
               .got(format_number(times[k]))
               .expected("after the one before it, " + format_number(times[k - 1])));
     }

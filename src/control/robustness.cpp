@@ -2,11 +2,10 @@
 #include <cmath>
 #include <limits>
 
-#include <fmt/format.h>
-
 #include <flyball/control/margins.hpp>
 
 #include "control/sampled_loop.hpp"
+#include "core/format.hpp"
 #include "math/dense.hpp"
 
 namespace flyball {
@@ -57,7 +56,7 @@ Expected<void> check_factors(const std::vector<double>& factors, std::string_vie
                               .expected("at least one factor"));
   }
   for (std::size_t i = 0; i < factors.size(); ++i) {
-    if (auto checked = check_positive(factors[i], where, fmt::format("{} factor {}", name, i));
+    if (auto checked = check_positive(factors[i], where, detail::format("{} factor {}", name, i));
         !checked) {
       return checked;
     }

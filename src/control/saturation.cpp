@@ -5,8 +5,7 @@
 #include <limits>
 #include <string>
 
-#include <fmt/format.h>
-
+#include "core/format.hpp"
 #include "math/dense.hpp"
 
 namespace flyball {
@@ -22,12 +21,12 @@ Expected<void> check_limits(const Eigen::VectorXd& u_min, const Eigen::VectorXd&
   }
   for (Eigen::Index i = 0; i < m; ++i) {
     if (!(u_min(i) < u_max(i))) {
-      return tl::unexpected(
-          Error(ArgumentError::out_of_range)
-              .in(std::string(where))
-              .about(fmt::format("u_min({})", i))
-              .got(format_number(u_min(i)))
-              .expected(fmt::format("below u_max({}), which is {}", i, format_number(u_max(i)))));
+      return tl::unexpected(Error(ArgumentError::out_of_range)
+                                .in(std::string(where))
+                                .about(detail::format("u_min({})", i))
+                                .got(format_number(u_min(i)))
+                                .expected(detail::format("below u_max({}), which is {}", i,
+                                                         format_number(u_max(i)))));
     }
   }
   return {};
@@ -109,7 +108,7 @@ Expected<SaturatedStep> saturation_of_step(const DiscreteSystem<>& plant, const 
     return tl::unexpected(Error(ArgumentError::out_of_range)
                               .in(std::string(where))
                               .about("steps")
-                              .got(fmt::format("{}", steps))
+                              .got(detail::format("{}", steps))
                               .expected("from 1 to 10000000"));
   }
   SaturatedStep step;

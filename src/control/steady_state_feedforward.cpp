@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include <fmt/format.h>
-
+#include "core/format.hpp"
 #include "math/dense.hpp"
 
 namespace flyball {
@@ -34,7 +33,7 @@ Expected<SteadyStateFeedforward<>> solve(const MatrixRef& A, const MatrixRef& B,
       if (!(std::abs(rest(i, j)) <= left_over * size) && size > 0.0) {
         return tl::unexpected(Error(FeedforwardError::no_steady_state)
                                   .in(std::string(where))
-                                  .about(fmt::format("output {}", first_output + j))
+                                  .about(detail::format("output {}", first_output + j))
                                   .hint("hold another output, or give the plant an input that can")
                                   .with("what is left of its equation", rest.col(j).norm()));
       }
@@ -82,8 +81,8 @@ Expected<SteadyStateFeedforward<>> steady_state_feedforward_of_pairs(const Matri
     return tl::unexpected(Error(ArgumentError::wrong_shape)
                               .in(std::string(where))
                               .about("inputs")
-                              .got(fmt::format("{} entries", inputs.size()))
-                              .expected(fmt::format("one an output ({})", p)));
+                              .got(detail::format("{} entries", inputs.size()))
+                              .expected(detail::format("one an output ({})", p)));
   }
   SteadyStateFeedforward<> sum{Eigen::MatrixXd::Zero(n, p), Eigen::MatrixXd::Zero(m, p),
                                Eigen::MatrixXd::Zero(m, n)};
@@ -92,9 +91,9 @@ Expected<SteadyStateFeedforward<>> steady_state_feedforward_of_pairs(const Matri
     if (input < 0 || input >= m) {
       return tl::unexpected(Error(ArgumentError::out_of_range)
                                 .in(std::string(where))
-                                .about(fmt::format("the input of output {}", j))
-                                .got(fmt::format("{}", input))
-                                .expected(fmt::format("from 0 to {}", m - 1)));
+                                .about(detail::format("the input of output {}", j))
+                                .got(detail::format("{}", input))
+                                .expected(detail::format("from 0 to {}", m - 1)));
     }
     auto pair = solve(A, B.col(input), C.row(j), D.block(j, input, 1, 1), j);
     if (!pair) {

@@ -3,11 +3,10 @@
 #include <limits>
 #include <string>
 
-#include <fmt/format.h>
-
 #include <flyball/control/pole_placement.hpp>
 
 #include "control/placement.hpp"
+#include "core/format.hpp"
 
 namespace flyball::detail {
 
@@ -22,7 +21,7 @@ Error uncontrollable_mode(const Eigen::VectorXcd& y, const Eigen::VectorXd& unit
   std::string states;
   for (Eigen::Index i = 0; i < share.size(); ++i) {
     if (share(i) > 0.1) {
-      states += fmt::format("{}{}", states.empty() ? "" : ", ", i);
+      states += detail::format("{}{}", states.empty() ? "" : ", ", i);
     }
   }
   return Error(PolePlacementError::not_controllable)

@@ -2,24 +2,24 @@
 
 #include <cmath>
 
-#include <fmt/format.h>
+#include "core/format.hpp"
 
 namespace flyball {
 
 namespace {
 
 std::string shape_text(const MatrixRef& M) {
-  return fmt::format("{}x{}", M.rows(), M.cols());
+  return detail::format("{}x{}", M.rows(), M.cols());
 }
 
 std::string with_unit(double value, std::string_view unit) {
-  return fmt::format("{}{}{}", format_number(value), unit.empty() ? "" : " ", unit);
+  return detail::format("{}{}{}", format_number(value), unit.empty() ? "" : " ", unit);
 }
 
 }  // namespace
 
 std::string format_number(double value, int digits) {
-  return fmt::format("{:.{}g}", value, digits);
+  return detail::format("{:.{}g}", value, digits);
 }
 
 Expected<void> check_shape(const MatrixRef& M, Eigen::Index rows, Eigen::Index columns,
@@ -33,8 +33,8 @@ Expected<void> check_shape(const MatrixRef& M, Eigen::Index rows, Eigen::Index c
                             .about(std::string(name))
                             .got(shape_text(M))
                             .expected(meaning.empty()
-                                          ? fmt::format("{}x{}", rows, columns)
-                                          : fmt::format("{} ({}x{})", meaning, rows, columns)));
+                                          ? detail::format("{}x{}", rows, columns)
+                                          : detail::format("{} ({}x{})", meaning, rows, columns)));
 }
 
 Expected<void> check_square(const MatrixRef& M, std::string_view where, std::string_view name) {
@@ -61,7 +61,7 @@ Expected<void> check_finite(const MatrixRef& M, std::string_view where, std::str
       if (!std::isfinite(M(i, j))) {
         return tl::unexpected(Error(ArgumentError::not_finite)
                                   .in(std::string(where))
-                                  .about(fmt::format("{}({}, {})", name, i, j))
+                                  .about(detail::format("{}({}, {})", name, i, j))
                                   .got(format_number(M(i, j)))
                                   .expected("a finite number"));
       }
@@ -93,10 +93,10 @@ Expected<void> check_symmetric(const MatrixRef& M, std::string_view where, std::
             Error(ArgumentError::not_symmetric)
                 .in(std::string(where))
                 .about(std::string(name))
-                .got(
-                    fmt::format("not symmetric: entries ({0}, {1}) and ({1}, {0}) are {2:.17g} and "
-                                "{3:.17g}",
-                                i, j, M(i, j), M(j, i)))
+                .got(detail::format(
+                    "not symmetric: entries ({0}, {1}) and ({1}, {0}) are {2:.17g} and "
+                    "{3:.17g}",
+                    i, j, M(i, j), M(j, i)))
                 .expected("symmetric"));
       }
     }

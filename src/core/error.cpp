@@ -2,8 +2,7 @@
 
 #include <utility>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include "core/format.hpp"
 
 namespace flyball {
 
@@ -70,16 +69,16 @@ std::string to_string(const Error& error) {
     text += error.where_ + ": ";
   }
   if (!error.subject_.empty() && !error.got_.empty()) {
-    text += fmt::format("{} is {}", error.subject_, error.got_);
+    text += detail::format("{} is {}", error.subject_, error.got_);
   } else if (!error.subject_.empty()) {
-    text += fmt::format("{}: {}", error.subject_, error.info_.summary);
+    text += detail::format("{}: {}", error.subject_, error.info_.summary);
   } else if (!error.got_.empty()) {
-    text += fmt::format("{}: got {}", error.info_.summary, error.got_);
+    text += detail::format("{}: got {}", error.info_.summary, error.got_);
   } else {
     text += error.info_.summary;
   }
   if (!error.expected_.empty()) {
-    text += fmt::format("; it must be {}", error.expected_);
+    text += detail::format("; it must be {}", error.expected_);
   }
   if (!error.hint_.empty()) {
     text += "; " + error.hint_;
@@ -90,11 +89,12 @@ std::string to_string(const Error& error) {
       const Evidence& evidence = error.evidence_[i];
       text += i == 0 ? "" : ", ";
       if (evidence.values.size() == 1) {
-        text += fmt::format("{} = {:.6g}", evidence.name, evidence.values.front());
+        text += detail::format("{} = {:.6g}", evidence.name, evidence.values.front());
       } else if (!evidence.values.empty()) {
-        text += fmt::format("{} = [{:.6g}]", evidence.name, fmt::join(evidence.values, ", "));
+        text += detail::format("{} = [{}]", evidence.name,
+                               detail::comma_separated("{:.6g}", evidence.values));
       } else {
-        text += fmt::format("{}: {}", evidence.name, evidence.text);
+        text += detail::format("{}: {}", evidence.name, evidence.text);
       }
     }
     text += ")";

@@ -13,5 +13,5 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <tl/expected.hpp>

@@ -5,10 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include <flyball/core/text.hpp>
 
+#include "core/format.hpp"
 #include "core/unit_table.hpp"
 
 namespace flyball {
@@ -157,7 +156,7 @@ std::string_view trim(std::string_view text) {
 std::string article(Dimension dimension) {
   const std::string_view name = to_string(dimension);
   const bool vowel = std::string_view("aeiou").find(name.front()) != std::string_view::npos;
-  return fmt::format("{} {}", vowel ? "an" : "a", name);
+  return detail::format("{} {}", vowel ? "an" : "a", name);
 }
 
 }  // namespace
@@ -245,9 +244,10 @@ Expected<Unit> parse_unit(std::string_view text) {
   const std::string nearest = nearest_unit(text);
   return tl::unexpected(Error(ArgumentError::wrong_unit)
                             .about("unit")
-                            .got(fmt::format("\"{}\", which is not known", text))
-                            .hint(nearest.empty() ? "units are written like kg, cm, in, rpm, V"
-                                                  : fmt::format("did you mean \"{}\"?", nearest)));
+                            .got(detail::format("\"{}\", which is not known", text))
+                            .hint(nearest.empty()
+                                      ? "units are written like kg, cm, in, rpm, V"
+                                      : detail::format("did you mean \"{}\"?", nearest)));
 }
 
 Expected<double> parse_quantity(std::string_view text, Dimension dimension, std::string_view name) {
@@ -257,20 +257,20 @@ Expected<double> parse_quantity(std::string_view text, Dimension dimension, std:
   const auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), number,
                                              std::chars_format::general);
   const auto expected = [&] {
-    return fmt::format("{} such as {}", article(dimension), example(dimension));
+    return detail::format("{} such as {}", article(dimension), example(dimension));
   };
   if (status != std::errc{} || end == digits.data() || trimmed.starts_with("+-")) {
     return tl::unexpected(Error(status == std::errc::result_out_of_range ? ArgumentError::not_finite
                                                                          : ArgumentError::malformed)
                               .about(std::string(name))
-                              .got(fmt::format("\"{}\"", text))
+                              .got(detail::format("\"{}\"", text))
                               .expected(expected()));
   }
   const auto not_finite = [&] {
     return tl::unexpected(Error(ArgumentError::not_finite)
                               .about(std::string(name))
-                              .got(fmt::format("\"{}\"", text))
-                              .expected(fmt::format("finite, {}", expected())));
+                              .got(detail::format("\"{}\"", text))
+                              .expected(detail::format("finite, {}", expected())));
   };
   if (!std::isfinite(number)) {
     return not_finite();
@@ -280,7 +280,7 @@ Expected<double> parse_quantity(std::string_view text, Dimension dimension, std:
   if (unit_text.empty() && dimension != dimensionless) {
     return tl::unexpected(Error(ArgumentError::wrong_unit)
                               .about(std::string(name))
-                              .got(fmt::format("\"{}\", without a unit", text))
+                              .got(detail::format("\"{}\", without a unit", text))
                               .expected(expected()));
   }
   auto unit = parse_unit(unit_text);
@@ -288,16 +288,16 @@ Expected<double> parse_quantity(std::string_view text, Dimension dimension, std:
     const std::string nearest = nearest_unit(unit_text);
     return tl::unexpected(Error(ArgumentError::wrong_unit)
                               .about(std::string(name))
-                              .got(fmt::format("\"{}\", in an unknown unit", text))
+                              .got(detail::format("\"{}\", in an unknown unit", text))
                               .expected(expected())
                               .hint(nearest.empty()
                                         ? std::string("see the list of units in the docs")
-                                        : fmt::format("did you mean \"{}\"?", nearest)));
+                                        : detail::format("did you mean \"{}\"?", nearest)));
   }
   if (unit->dimension != dimension) {
     return tl::unexpected(Error(ArgumentError::wrong_unit)
                               .about(std::string(name))
-                              .got(fmt::format("\"{}\", {}", text, article(unit->dimension)))
+                              .got(detail::format("\"{}\", {}", text, article(unit->dimension)))
                               .expected(expected()));
   }
   const double si = number * unit->factor;
@@ -309,7 +309,7 @@ Expected<double> parse_quantity(std::string_view text, Dimension dimension, std:
 
 std::string to_text(double si, Dimension dimension) {
   const std::string_view unit = si_unit(dimension);
-  return unit.empty() ? fmt::format("{}", si) : fmt::format("{} {}", si, unit);
+  return unit.empty() ? detail::format("{}", si) : detail::format("{} {}", si, unit);
 }
 
 }  // namespace flyball

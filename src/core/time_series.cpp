@@ -4,7 +4,7 @@
 #include <cassert>
 #include <utility>
 
-#include <fmt/format.h>
+#include "core/format.hpp"
 
 namespace flyball {
 
@@ -13,8 +13,8 @@ Expected<void> TimeSeries::add(std::string name, std::string unit, std::vector<d
     return tl::unexpected(Error(ArgumentError::wrong_shape)
                               .in("TimeSeries::add")
                               .about(name)
-                              .got(fmt::format("{} values long", values.size()))
-                              .expected(fmt::format("one value a row ({})", time_.size())));
+                              .got(detail::format("{} values long", values.size()))
+                              .expected(detail::format("one value a row ({})", time_.size())));
   }
   columns_.push_back({std::move(name), std::move(unit), std::move(values)});
   return {};

@@ -1,8 +1,8 @@
 #include <flyball/estimation/covariance.hpp>
 
-#include <fmt/format.h>
-
 #include <flyball/core/argument.hpp>
+
+#include "core/format.hpp"
 
 namespace flyball {
 
@@ -19,7 +19,7 @@ Expected<Eigen::MatrixXd> standard_deviations(std::span<const double> sigmas) {
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const double sigma = sigmas[static_cast<std::size_t>(i)];
-    if (auto checked = check_not_negative(sigma, where, fmt::format("standard deviation {}", i));
+    if (auto checked = check_not_negative(sigma, where, detail::format("standard deviation {}", i));
         !checked) {
       return tl::unexpected(checked.error());
     }

@@ -2,8 +2,7 @@
 #include <cmath>
 #include <string>
 
-#include <fmt/format.h>
-
+#include "core/format.hpp"
 #include "identification/channels.hpp"
 #include "identification/statistics.hpp"
 
@@ -201,10 +200,10 @@ void mend_signs(PreparedRecording& prepared) {
       }
       prepared.diagnostics.push_back(
           {"sign_mismatch", Severity::warning,
-           fmt::format("position and velocity have opposite signs (velocity is {:.2f} times the "
-                       "derivative of position); the {} disagrees with the voltage and was "
-                       "negated",
-                       ratio, position_right ? "velocity" : "position")});
+           detail::format("position and velocity have opposite signs (velocity is {:.2f} times the "
+                          "derivative of position); the {} disagrees with the voltage and was "
+                          "negated",
+                          ratio, position_right ? "velocity" : "position")});
       refresh_derived_columns(prepared);
     }
   }
@@ -235,10 +234,11 @@ void mend_signs(PreparedRecording& prepared) {
     }
     prepared.diagnostics.push_back(
         {"sign_mismatch", Severity::warning,
-         fmt::format("the voltage column carries no sign: it is positive in all {} tests, but the "
-                     "mechanism moves backwards in {} of them ({} rows); the voltage was negated "
-                     "there",
-                     moved, mismatched.size(), rows)});
+         detail::format(
+             "the voltage column carries no sign: it is positive in all {} tests, but the "
+             "mechanism moves backwards in {} of them ({} rows); the voltage was negated "
+             "there",
+             moved, mismatched.size(), rows)});
     return;
   }
   if (mismatched.size() == moved) {
@@ -249,11 +249,12 @@ void mend_signs(PreparedRecording& prepared) {
     }
     prepared.diagnostics.push_back(
         {"sign_mismatch", Severity::warning,
-         fmt::format("inverted encoder: positive voltage moves the encoder backwards in all {} "
-                     "tests that moved ({} rows); position and velocity were negated, so gravity "
-                     "and zero refer to the negated position. Invert the encoder or the motor in "
-                     "the robot's code before using the gains",
-                     moved, rows)});
+         detail::format(
+             "inverted encoder: positive voltage moves the encoder backwards in all {} "
+             "tests that moved ({} rows); position and velocity were negated, so gravity "
+             "and zero refer to the negated position. Invert the encoder or the motor in "
+             "the robot's code before using the gains",
+             moved, rows)});
     refresh_derived_columns(prepared);
     return;
   }
@@ -264,7 +265,7 @@ void mend_signs(PreparedRecording& prepared) {
   }
   prepared.diagnostics.push_back(
       {"sign_mismatch", Severity::warning,
-       fmt::format(
+       detail::format(
            "voltage and motion have opposite signs in {} of {} tests ({}; {} rows), as if "
            "the encoder or the motor had been inverted between tests; the voltage was given "
            "the sign of the motion there, as the reference analyser does. Record these "
@@ -283,7 +284,7 @@ void drop_coarse_velocity(PreparedRecording& prepared) {
   prepared.has_velocity = false;
   prepared.diagnostics.push_back(
       {"coarse_velocity", Severity::warning,
-       fmt::format(
+       detail::format(
            "the velocity column has steps of {:.3g} {}/s at a top speed of {:.3g}; only the "
            "position is used",
            prepared.velocity_quantum, prepared.unit, prepared.top_speed)});
@@ -305,9 +306,10 @@ void check_velocity_scale(PreparedRecording& prepared) {
     prepared.diagnostics.push_back(
         {"velocity_disagrees_with_position",
          std::abs(ratio - 1.0) > 0.15 ? Severity::warning : Severity::info,
-         fmt::format("the velocity column is {:.3g} times the derivative of the position column; "
-                     "the position is believed and the velocity's scale is fitted with the gains",
-                     ratio)});
+         detail::format(
+             "the velocity column is {:.3g} times the derivative of the position column; "
+             "the position is believed and the velocity's scale is fitted with the gains",
+             ratio)});
   }
 }
 

@@ -5,8 +5,7 @@
 #include <string>
 #include <utility>
 
-#include <fmt/format.h>
-
+#include "core/format.hpp"
 #include "identification/cross_checks.hpp"
 #include "identification/statistics.hpp"
 
@@ -128,9 +127,10 @@ void compare_channels(OutputErrorProblem& problem, const RobustFit& best, const 
   if (std::abs(difference) > 0.15 && std::abs(difference) > 3.0 * spread) {
     diagnostics.push_back(
         {"channels_disagree", Severity::warning,
-         fmt::format("kA is {:.3g} from the position alone but {:.3g} from the velocity alone; the "
-                     "velocity's filter is not the moving average that the fit supposes",
-                     std::exp(by_position->log_kA), std::exp(by_velocity->log_kA))});
+         detail::format(
+             "kA is {:.3g} from the position alone but {:.3g} from the velocity alone; the "
+             "velocity's filter is not the moving average that the fit supposes",
+             std::exp(by_position->log_kA), std::exp(by_velocity->log_kA))});
   }
 }
 
@@ -157,7 +157,7 @@ void compare_repeats(const FeedforwardFit& fit, std::vector<Diagnostic>& diagnos
     if (range.first > 0.0 && range.second / range.first > 1.1) {
       diagnostics.push_back(
           {"repeats_disagree", Severity::warning,
-           fmt::format(
+           detail::format(
                "two {} tests differ in speed by a factor {:.2f} under the same voltage; was "
                "the mechanism changed between them? Identify them apart",
                to_string(kind), range.second / range.first)});
@@ -179,11 +179,12 @@ void detect_elasticity(const PreparedRecording& prepared, const FeedforwardFit& 
     if (measured > 1.15 * std::max(1.0, simulated)) {
       diagnostics.push_back(
           {"elastic", Severity::warning,
-           fmt::format("{}: the speed overshoots by {:.0f} % after the step and falls again, the "
-                       "simulated one by {:.0f} %; backlash or elasticity, which the model lacks, "
-                       "limits how fast a controller may be",
-                       to_string(run.run.kind), 100.0 * (measured - 1.0),
-                       100.0 * (std::max(1.0, simulated) - 1.0))});
+           detail::format(
+               "{}: the speed overshoots by {:.0f} % after the step and falls again, the "
+               "simulated one by {:.0f} %; backlash or elasticity, which the model lacks, "
+               "limits how fast a controller may be",
+               to_string(run.run.kind), 100.0 * (measured - 1.0),
+               100.0 * (std::max(1.0, simulated) - 1.0))});
     }
   }
 }

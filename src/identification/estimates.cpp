@@ -2,8 +2,7 @@
 #include <cmath>
 #include <string>
 
-#include <fmt/format.h>
-
+#include "core/format.hpp"
 #include "identification/estimates.hpp"
 #include "identification/output_error.hpp"
 
@@ -63,19 +62,21 @@ GainEstimate inertia_gain(const PreparedRecording& prepared, const Eigen::Vector
   if (x[kLogTimeConstant] <= bounds.lower[kLogTimeConstant] + 1e-6) {
     mark_undetermined(
         kA, kA.interval[1],
-        fmt::format("the speed-up is over within one sensor value ({:.0f} ms)", 1e3 * refresh));
+        detail::format("the speed-up is over within one sensor value ({:.0f} ms)", 1e3 * refresh));
   } else if (x[kLogTimeConstant] >= bounds.upper[kLogTimeConstant] - 1e-6) {
     mark_undetermined(kA, kA.interval[1], "the speed hardly settles within the tests");
   } else if (tau < refresh) {
-    mark_undetermined(kA, kA.interval[1],
-                      fmt::format("the time constant kA/kV = {:.1f} ms is shorter than the {:.0f} "
-                                  "ms between sensor values",
-                                  1e3 * tau, 1e3 * refresh));
+    mark_undetermined(
+        kA, kA.interval[1],
+        detail::format("the time constant kA/kV = {:.1f} ms is shorter than the {:.0f} "
+                       "ms between sensor values",
+                       1e3 * tau, 1e3 * refresh));
   } else if (kNormal95 * relative > kWidestTimeConstant) {
-    mark_undetermined(kA, kA.interval[1],
-                      fmt::format("its 95 % interval is ±{:.0f} %: it trades against the sensors' "
-                                  "delay and averaging",
-                                  100.0 * kNormal95 * relative));
+    mark_undetermined(
+        kA, kA.interval[1],
+        detail::format("its 95 % interval is ±{:.0f} %: it trades against the sensors' "
+                       "delay and averaging",
+                       100.0 * kNormal95 * relative));
   }
   return kA;
 }
@@ -139,7 +140,7 @@ Expected<void> estimate_gains(const PreparedRecording& prepared, const Eigen::Ve
     return tl::unexpected(Error(IdentificationError::unphysical_gains)
                               .in("identify")
                               .about("kV")
-                              .got(fmt::format("{:.4g} V/({}/s)", fit.kV.value, fit.unit))
+                              .got(detail::format("{:.4g} V/({}/s)", fit.kV.value, fit.unit))
                               .expected("positive")
                               .hint("check the signs and units of voltage and velocity"));
   }
@@ -147,8 +148,8 @@ Expected<void> estimate_gains(const PreparedRecording& prepared, const Eigen::Ve
     return tl::unexpected(Error(IdentificationError::singular)
                               .in("identify")
                               .about("kV")
-                              .got(fmt::format("{:.4g} ± {:.2g} V/({}/s)", fit.kV.value,
-                                               kNormal95 * fit.kV.standard_error, fit.unit))
+                              .got(detail::format("{:.4g} ± {:.2g} V/({}/s)", fit.kV.value,
+                                                  kNormal95 * fit.kV.standard_error, fit.unit))
                               .expected("known to better than 50 %")
                               .hint("record longer tests with more travel"));
   }
@@ -157,7 +158,7 @@ Expected<void> estimate_gains(const PreparedRecording& prepared, const Eigen::Ve
         Error(IdentificationError::unphysical_gains)
             .in("identify")
             .about("the simulated velocity")
-            .got(fmt::format("unlike the measured one (R² = {:.2f})", fit.r_squared))
+            .got(detail::format("unlike the measured one (R² = {:.2f})", fit.r_squared))
             .hint("no gains of this model explain the log; check the mechanism's kind, the units "
                   "and the signs"));
   }
@@ -169,47 +170,48 @@ void report_fit(const PreparedRecording& prepared, const FeedforwardFit& fit,
   const std::string& unit = fit.unit;
   if (!fit.kA.determined) {
     diagnostics.push_back({"kA_not_determined", Severity::warning,
-                           fmt::format("kA is below {:.3g} V·s²/{} but not determined: {}",
-                                       fit.kA.upper_bound, unit, fit.kA.reason)});
+                           detail::format("kA is below {:.3g} V·s²/{} but not determined: {}",
+                                          fit.kA.upper_bound, unit, fit.kA.reason)});
   }
   if (!fit.kS.determined) {
     diagnostics.push_back(
         {"kS_indistinguishable", Severity::info,
-         fmt::format("kS is below {:.3g} V: {}", fit.kS.upper_bound, fit.kS.reason)});
+         detail::format("kS is below {:.3g} V: {}", fit.kS.upper_bound, fit.kS.reason)});
   }
   if (fit.kG && !fit.kG->determined) {
     diagnostics.push_back(
         {"kG_indistinguishable", Severity::warning,
-         fmt::format("|kG| is below {:.3g} V: {}", fit.kG->upper_bound, fit.kG->reason)});
+         detail::format("|kG| is below {:.3g} V: {}", fit.kG->upper_bound, fit.kG->reason)});
   }
   if (prepared.has_velocity && fit.averaging_width > 0.03 && fit.velocity_delay > 0.0) {
     diagnostics.push_back(
         {"velocity_filtered", Severity::info,
-         fmt::format("the velocity column is averaged over about {:.0f} ms; a controller that uses "
-                     "it sees the velocity {:.0f} ms late",
-                     1e3 * fit.averaging_width, 1e3 * fit.velocity_delay)});
+         detail::format(
+             "the velocity column is averaged over about {:.0f} ms; a controller that uses "
+             "it sees the velocity {:.0f} ms late",
+             1e3 * fit.averaging_width, 1e3 * fit.velocity_delay)});
   }
   if (prepared.has_position && prepared.has_velocity &&
       std::abs(fit.velocity_delay - 0.5 * fit.averaging_width - fit.position_delay) > 0.015) {
     diagnostics.push_back(
         {"channel_skew", Severity::info,
-         fmt::format("position is {:.0f} ms and velocity {:.0f} ms older than the voltage of the "
-                     "same row (averaging taken off); the fit accounts for it",
-                     1e3 * fit.position_delay,
-                     1e3 * (fit.velocity_delay - 0.5 * fit.averaging_width))});
+         detail::format(
+             "position is {:.0f} ms and velocity {:.0f} ms older than the voltage of the "
+             "same row (averaging taken off); the fit accounts for it",
+             1e3 * fit.position_delay, 1e3 * (fit.velocity_delay - 0.5 * fit.averaging_width))});
   } else if (prepared.has_position && fit.position_delay > 0.015) {
     diagnostics.push_back(
         {"channel_delay", Severity::info,
-         fmt::format("the encoder's values are {:.0f} ms older than the voltage of "
-                     "the same row; the fit accounts for it",
-                     1e3 * fit.position_delay)});
+         detail::format("the encoder's values are {:.0f} ms older than the voltage of "
+                        "the same row; the fit accounts for it",
+                        1e3 * fit.position_delay)});
   }
   if (fit.velocity_nrmse > 0.2) {
     diagnostics.push_back(
         {"poor_fit", Severity::warning,
-         fmt::format("the simulated velocity misses {:.0f} % of the measured one's spread (R² = "
-                     "{:.3f}): the mechanism does more than the model says",
-                     100.0 * fit.velocity_nrmse, fit.r_squared)});
+         detail::format("the simulated velocity misses {:.0f} % of the measured one's spread (R² = "
+                        "{:.3f}): the mechanism does more than the model says",
+                        100.0 * fit.velocity_nrmse, fit.r_squared)});
   }
 }
 

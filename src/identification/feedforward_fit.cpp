@@ -5,10 +5,9 @@
 #include <string>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include <flyball/core/argument.hpp>
 
+#include "core/format.hpp"
 #include "identification/cross_checks.hpp"
 #include "identification/estimates.hpp"
 #include "identification/output_error.hpp"

@@ -6,10 +6,9 @@
 #include <numeric>
 #include <string>
 
-#include <fmt/format.h>
-
 #include <flyball/core/argument.hpp>
 
+#include "core/format.hpp"
 #include "identification/channels.hpp"
 #include "identification/statistics.hpp"
 #include "identification/trimming.hpp"
@@ -32,9 +31,9 @@ Expected<void> check_columns(const TestRun& run, std::size_t index) {
   return tl::unexpected(
       Error(ArgumentError::wrong_shape)
           .in(std::string(kWhere))
-          .about(fmt::format("run {} ({})", index, to_string(run.kind)))
-          .got(fmt::format("{} times, {} voltages, {} positions, {} velocities", rows,
-                           run.voltage.size(), run.position.size(), run.velocity.size()))
+          .about(detail::format("run {} ({})", index, to_string(run.kind)))
+          .got(detail::format("{} times, {} voltages, {} positions, {} velocities", rows,
+                              run.voltage.size(), run.position.size(), run.velocity.size()))
           .expected("columns of one length, position or velocity among them"));
 }
 
@@ -203,7 +202,7 @@ void report_rows(const RowDefects& defects, std::vector<Diagnostic>& diagnostics
     if (count > 0) {
       diagnostics.push_back(
           {std::move(code), Severity::warning,
-           fmt::format("{} of {} rows {}; {}", count, defects.total, what, done)});
+           detail::format("{} of {} rows {}; {}", count, defects.total, what, done)});
     }
   };
   tell(defects.not_finite, "non_finite_rows", "hold NaN or infinity", "they were dropped");
@@ -254,7 +253,7 @@ void report_repeats(PreparedRecording& prepared) {
   if (share > 0.2) {
     prepared.diagnostics.push_back(
         {"repeated_rows", Severity::info,
-         fmt::format(
+         detail::format(
              "{:.0f} % of the rows repeat the encoder value before (rows every {:.1f} ms, "
              "new values every {:.1f} ms); only rows with new values are compared with the "
              "simulation",
@@ -272,7 +271,7 @@ void report_missing_tests(PreparedRecording& prepared) {
     if (!present) {
       prepared.diagnostics.push_back(
           {"missing_test", Severity::warning,
-           fmt::format("the {} test is missing from the log", to_string(kind))});
+           detail::format("the {} test is missing from the log", to_string(kind))});
     }
   }
 }
@@ -291,7 +290,7 @@ void report_travel(PreparedRecording& prepared) {
   if (travel > kTurn) {
     prepared.diagnostics.push_back(
         {"travel_exceeds_turn", Severity::warning,
-         fmt::format(
+         detail::format(
              "the arm's position spans {:.1f} rad ({:.1f} turns) in one test: it looks like "
              "the motor's angle, not the arm's; gravity cannot be found and all gains are per "
              "radian of that angle. Give the gearing to the encoder",

@@ -2,8 +2,7 @@
 #include <cmath>
 #include <string>
 
-#include <fmt/format.h>
-
+#include "core/format.hpp"
 #include "identification/statistics.hpp"
 #include "identification/trimming.hpp"
 
@@ -83,7 +82,7 @@ void keep_longest_stretch(PreparedRun& prepared, double longest_gap,
   if (gaps > 0) {
     diagnostics.push_back(
         {"gaps", Severity::warning,
-         fmt::format(
+         detail::format(
              "{}: {} gap{} in time (the widest {:.0f} ms); only the longest stretch without "
              "one is used ({} of {} rows)",
              to_string(prepared.run.kind), gaps, gaps == 1 ? "" : "s", 1e3 * widest,
@@ -153,10 +152,10 @@ void mark_window(PreparedRun& prepared, PreparedRecording& recording,
         lasts(run.time, i, end, kStalled, stalls)) {
       recording.diagnostics.push_back(
           {"hit_stop", Severity::warning,
-           fmt::format("{}: the mechanism stalls under {:.2f} V after {:.2f} s (a stop or a "
-                       "blockage); what follows and the {:.0f} ms before are not used",
-                       name, std::abs(run.voltage[i]), run.time[i] - run.time.front(),
-                       1e3 * options.stall_margin)});
+           detail::format("{}: the mechanism stalls under {:.2f} V after {:.2f} s (a stop or a "
+                          "blockage); what follows and the {:.0f} ms before are not used",
+                          name, std::abs(run.voltage[i]), run.time[i] - run.time.front(),
+                          1e3 * options.stall_margin)});
       end = std::max(begin, lower_index(run.time, run.time[i] - options.stall_margin));
       break;
     }
@@ -177,13 +176,13 @@ void mark_window(PreparedRun& prepared, PreparedRecording& recording,
     prepared.last = prepared.first;
     recording.diagnostics.push_back(
         {ramp ? "short_quasistatic_test" : "short_dynamic_test", Severity::warning,
-         fmt::format("{}: only {:.2f} s of motion, too short to use", name, duration)});
+         detail::format("{}: only {:.2f} s of motion, too short to use", name, duration)});
   } else if (!ramp && duration < kShortStep) {
     recording.diagnostics.push_back(
         {"short_dynamic_test", Severity::warning,
-         fmt::format("{}: only {:.2f} s of acceleration; kA may not be determined. Give the "
-                     "mechanism more travel or a lower voltage",
-                     name, duration)});
+         detail::format("{}: only {:.2f} s of acceleration; kA may not be determined. Give the "
+                        "mechanism more travel or a lower voltage",
+                        name, duration)});
   }
 }
 
@@ -253,7 +252,7 @@ void trim_runs(PreparedRecording& prepared, const PreparationOptions& options) {
     }
     prepared.diagnostics.push_back(
         {"no_motion", Severity::warning,
-         fmt::format(
+         detail::format(
              "{}: no motion under up to {:.2f} V ({} spans {:.3g} {}); the test is not used",
              to_string(run.run.kind), top_of(run.run.voltage, 1.0),
              prepared.has_position ? "position" : "velocity", range,

@@ -6,11 +6,10 @@
 #include <numbers>
 #include <vector>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include <flyball/core/argument.hpp>
 #include <flyball/core/text.hpp>
+
+#include "core/format.hpp"
 
 namespace flyball::mechanisms {
 
@@ -124,7 +123,7 @@ Expected<DcMotor> motor(std::string_view name, const MotorDatasheet& one, int co
             .in(std::string(where))
             .about("free_current")
             .got(to_text(one.free_current))
-            .expected(fmt::format("below the stall current ({})", to_text(one.stall_current))));
+            .expected(detail::format("below the stall current ({})", to_text(one.stall_current))));
   }
   DcMotor result = from_datasheet(name, one, count);
   // Numbers can have quotients that are none: 1e300 V / 1e-300 A.
@@ -155,10 +154,11 @@ Expected<DcMotor> motor(std::string_view name, int count) {
     return table_motor(candidates.front(), count);
   }
   if (!candidates.empty()) {
-    return tl::unexpected(Error(ArgumentError::ambiguous_name)
-                              .about("motor")
-                              .got(fmt::format("\"{}\", which fits several", name))
-                              .expected(fmt::format("one of {}", fmt::join(candidates, ", "))));
+    return tl::unexpected(
+        Error(ArgumentError::ambiguous_name)
+            .about("motor")
+            .got(detail::format("\"{}\", which fits several", name))
+            .expected(detail::format("one of {}", detail::comma_separated("{}", candidates))));
   }
   std::vector<std::string_view> names;
   names.reserve(table.size());
@@ -169,11 +169,11 @@ Expected<DcMotor> motor(std::string_view name, int count) {
   return tl::unexpected(
       Error(ArgumentError::unknown_name)
           .about("motor")
-          .got(fmt::format("\"{}\", which is not in the table", name))
-          .hint(nearest.empty() ? fmt::format("known motors are {}; another one can be given by "
-                                              "its five datasheet numbers",
-                                              fmt::join(names, ", "))
-                                : fmt::format("did you mean \"{}\"?", nearest)));
+          .got(detail::format("\"{}\", which is not in the table", name))
+          .hint(nearest.empty() ? detail::format("known motors are {}; another one can be given by "
+                                                 "its five datasheet numbers",
+                                                 detail::comma_separated("{}", names))
+                                : detail::format("did you mean \"{}\"?", nearest)));
 }
 
 DcMotor cim(int count) {

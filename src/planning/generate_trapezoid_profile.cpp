@@ -3,9 +3,9 @@
 #include <cmath>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include <flyball/core/argument.hpp>
+
+#include "core/format.hpp"
 
 namespace flyball {
 
@@ -32,7 +32,7 @@ Expected<TimeSeries> generate_trapezoid_profile(double max_velocity, Time time_t
     return tl::unexpected(Error(ArgumentError::out_of_range)
                               .in(std::string(where))
                               .about("the profile")
-                              .got(fmt::format("{:.3g} periods long", end / dt))
+                              .got(detail::format("{:.3g} periods long", end / dt))
                               .expected("at most ten million periods long"));
   }
 

@@ -5,9 +5,9 @@
 #include <deque>
 #include <string>
 
-#include <fmt/format.h>
-
 #include <flyball/control/observer_regulator.hpp>
+
+#include "core/format.hpp"
 
 namespace flyball {
 
@@ -36,7 +36,7 @@ Expected<void> check_job(const ClosedLoopJob& job) {
     return tl::unexpected(Error(ArgumentError::wrong_shape)
                               .in(std::string(where))
                               .about("the regulator's plant")
-                              .got(fmt::format("of {} states", n))
+                              .got(detail::format("of {} states", n))
                               .expected(flywheel ? "of one state, the velocity"
                                                  : "of one state, the position, or of two, "
                                                    "position and velocity"));
@@ -49,7 +49,7 @@ Expected<void> check_job(const ClosedLoopJob& job) {
                               .expected("one row a period"));
   }
   for (std::size_t k = 0; k < job.reference.size(); ++k) {
-    const std::string row = fmt::format("reference {}", k);
+    const std::string row = detail::format("reference {}", k);
     if (auto checked = check_all(check_finite(job.reference[k].position, where, row),
                                  check_finite(job.reference[k].velocity, where, row));
         !checked) {

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <limits>
 
-#include <fmt/format.h>
-
 #include <flyball/control/feedforward.hpp>
 #include <flyball/simulation/closed_loop.hpp>
+
+#include "core/format.hpp"
 
 namespace flyball {
 

@@ -5,10 +5,9 @@
 #include <limits>
 #include <numeric>
 
-#include <fmt/format.h>
-
 #include <flyball/math/matrix_equation.hpp>
 
+#include "core/format.hpp"
 #include "math/dense.hpp"
 #include "systems/balance.hpp"
 #include "systems/modes.hpp"
@@ -152,8 +151,8 @@ JudgedEigenvalues judged_eigenvalues(const MatrixRef& A, TimeDomain domain, doub
 
 std::string pole_text(Complex pole) {
   return pole.imag() == 0.0 ? format_number(pole.real(), 4)
-                            : fmt::format("{} +/- {}i", format_number(pole.real(), 4),
-                                          format_number(std::abs(pole.imag()), 4));
+                            : detail::format("{} +/- {}i", format_number(pole.real(), 4),
+                                             format_number(std::abs(pole.imag()), 4));
 }
 
 }  // namespace detail
@@ -224,23 +223,24 @@ Expected<ModalAnalysis> analyze_modes(const MatrixRef& A, TimeDomain domain, Tim
 }
 
 std::string describe(const ModalAnalysis& analysis) {
-  std::string text = fmt::format("{}\n", to_string(analysis.stability));
+  std::string text = detail::format("{}\n", to_string(analysis.stability));
   for (const Mode& mode : analysis.modes) {
     if (mode.pole.imag() < 0.0) {
       continue;
     }
     text += detail::pole_text(mode.pole) + ": ";
-    const std::string frequency = fmt::format("{} rad/s", format_number(mode.natural_frequency, 3));
+    const std::string frequency =
+        detail::format("{} rad/s", format_number(mode.natural_frequency, 3));
     if (mode.stability == Stability::marginal) {
       text += mode.s.imag() != 0.0 ? "oscillates at " + frequency + " for ever"
                                    : std::string("integrates");
     } else {
       text += mode.stability == Stability::stable ? "decays" : "grows";
-      text += fmt::format(" with the time constant {} s",
-                          format_number(std::abs(mode.time_constant), 3));
+      text += detail::format(" with the time constant {} s",
+                             format_number(std::abs(mode.time_constant), 3));
       if (mode.s.imag() != 0.0) {
-        text += fmt::format(", oscillating at {} with the damping ratio {}", frequency,
-                            format_number(mode.damping_ratio, 3));
+        text += detail::format(", oscillating at {} with the damping ratio {}", frequency,
+                               format_number(mode.damping_ratio, 3));
       }
     }
     text += '\n';

@@ -4,10 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include <fmt/format.h>
-
 #include <flyball/math/matrix_equation.hpp>
 
+#include "core/format.hpp"
 #include "math/dense.hpp"
 #include "systems/balance.hpp"
 #include "systems/modes.hpp"
@@ -255,7 +254,7 @@ Expected<void> check_pair(const MatrixRef& A, const MatrixRef& B, Index rows, In
 
 std::string name_of(Index k, std::span<const std::string> names) {
   const auto index = static_cast<std::size_t>(k);
-  return index < names.size() ? names[index] : fmt::format("x{}", k + 1);
+  return index < names.size() ? names[index] : detail::format("x{}", k + 1);
 }
 
 /// "x1", "0.71 x1 - 0.71 x2".
@@ -306,10 +305,10 @@ struct Words {
 
 std::string describe(const ReachAnalysis& analysis, std::string_view headline, const Words& words,
                      std::span<const std::string> names) {
-  std::string text = fmt::format("{}: {} of {} states {}\n", headline, analysis.rank,
-                                 analysis.order, words.reached);
+  std::string text = detail::format("{}: {} of {} states {}\n", headline, analysis.rank,
+                                    analysis.order, words.reached);
   for (Index k = 0; k < analysis.hidden.cols(); ++k) {
-    text += fmt::format("{} {}\n", words.verb, combination(analysis.hidden.col(k), names));
+    text += detail::format("{} {}\n", words.verb, combination(analysis.hidden.col(k), names));
   }
   double scale = 0.0;
   for (const ModeReach& mode : analysis.modes) {
@@ -321,14 +320,14 @@ std::string describe(const ReachAnalysis& analysis, std::string_view headline, c
     }
     const std::string pole = detail::pole_text(without_rounding(mode.eigenvalue, scale));
     if (!mode.reached) {
-      text += fmt::format("{} the mode {} ({}; {})\n", words.verb, pole, to_string(mode.stability),
-                          owners(mode.participation, names));
+      text += detail::format("{} the mode {} ({}; {})\n", words.verb, pole,
+                             to_string(mode.stability), owners(mode.participation, names));
     } else {
       constexpr double weak = 1e-6;
-      text += fmt::format("{} {} ({}; {}): distance {} from being cut off\n",
-                          mode.distance < weak ? words.weak : std::string_view("mode"), pole,
-                          to_string(mode.stability), owners(mode.participation, names),
-                          format_number(mode.distance, 2));
+      text += detail::format("{} {} ({}; {}): distance {} from being cut off\n",
+                             mode.distance < weak ? words.weak : std::string_view("mode"), pole,
+                             to_string(mode.stability), owners(mode.participation, names),
+                             format_number(mode.distance, 2));
     }
   }
   return text;

@@ -2,10 +2,9 @@
 
 #include <cmath>
 
-#include <fmt/format.h>
-
 #include <flyball/math/matrix_exponential.hpp>
 
+#include "core/format.hpp"
 #include "systems/quadratic_integral.hpp"
 
 namespace flyball {
@@ -70,7 +69,8 @@ Expected<Eigen::MatrixXd> discretize(const MatrixRef& A, const ProcessDensity& d
         Error(ArgumentError::not_finite)
             .in(std::string(where))
             .about("the discretised Q")
-            .got(fmt::format("too large for a double: A grows by more than 1e150 within {} s", T))
+            .got(
+                detail::format("too large for a double: A grows by more than 1e150 within {} s", T))
             .hint("shorten the period"));
   }
   return Q_d;

@@ -1,0 +1,9 @@
+#include "core/format.hpp"
+
+namespace flyball::detail {
+
+std::string format_arguments(fmt::string_view pattern, fmt::format_args arguments) {
+  return fmt::vformat(pattern, arguments);
+}
+
+}  // namespace flyball::detail
