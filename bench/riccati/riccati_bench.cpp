@@ -8,10 +8,11 @@
 #include <cstdlib>
 #include <vector>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include <flyball/core/random.hpp>
 #include <flyball/math/riccati.hpp>
+#include <flyball/systems/system.hpp>
 
 #include "timing.hpp"
 
@@ -48,7 +49,7 @@ Equation random_equation(flyball::Random& random, int n, int m, bool identity) {
     return M;
   };
   Equation e{normal(n, n), normal(n, m), MatrixXd::Identity(n, n), MatrixXd::Identity(m, m)};
-  e.A *= 1.05 / e.A.eigenvalues().cwiseAbs().maxCoeff();
+  e.A *= 1.05 / flyball::poles(e.A)->cwiseAbs().maxCoeff();
   if (!identity) {
     const MatrixXd C = normal(std::max(1, n / 2), n);
     e.Q = C.transpose() * C;
@@ -107,9 +108,9 @@ Equation near_margin(flyball::Random& random, bool continuous, double margin, bo
   Equation e = random_equation(random, 2, 1, true);
   const double outside = weighed ? 0.0 : margin;
   if (continuous) {
-    e.A.diagonal().array() -= e.A.eigenvalues().real().maxCoeff() - outside;
+    e.A.diagonal().array() -= flyball::poles(e.A)->real().maxCoeff() - outside;
   } else {
-    e.A *= (1.0 + outside) / e.A.eigenvalues().cwiseAbs().maxCoeff();
+    e.A *= (1.0 + outside) / flyball::poles(e.A)->cwiseAbs().maxCoeff();
   }
   const MatrixXd C = MatrixXd::NullaryExpr(1, 2, [&random] { return random.normal(); });
   e.Q = weighed ? MatrixXd(margin * margin * C.transpose() * C) : MatrixXd(MatrixXd::Zero(2, 2));

@@ -10,7 +10,7 @@
 #include <fstream>
 #include <vector>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "report/format.hpp"
 
@@ -34,7 +35,8 @@ std::string number(double value, int digits) {
     return value > 0.0 ? "∞" : "-∞";
   }
   const double magnitude = std::abs(value);
-  if (magnitude == 0.0) {
+  // Of a subnormal number, as broken recorders write, no digit is right.
+  if (magnitude < std::numeric_limits<double>::min()) {
     return "0";
   }
   if (magnitude < 1e-4 || magnitude >= 1e6) {

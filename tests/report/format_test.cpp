@@ -18,6 +18,7 @@ TEST(Format, NumbersHaveSensibleDigits) {
   EXPECT_EQ(number(0.15), "0.15");
   EXPECT_EQ(number(12.0), "12");
   EXPECT_EQ(number(0.0), "0");
+  EXPECT_EQ(number(-2.4e-311), "0");
   EXPECT_EQ(number(-0.00004), "-4e-05");
   EXPECT_EQ(number(1234567.0), "1.235e+06");
   EXPECT_EQ(number(infinity), "∞");

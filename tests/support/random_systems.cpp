@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 
 #include "math/matrices_json.hpp"
+#include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
 namespace flyball::test {
@@ -135,7 +136,7 @@ RandomSystem RandomSystems::next_stable() {
 
 /// The spectral abscissa or radius to a place drawn on the side that is asked for.
 void RandomSystems::move_poles(MatrixXd& A, bool stable) {
-  const Eigen::VectorXcd poles = A.eigenvalues();
+  const Eigen::VectorXcd poles = test::eigenvalues(A);
   if (plane_ == Plane::s) {
     const double margin = std::pow(10.0, random_.uniform(-3.0, 0.0)) * A.norm();
     A.diagonal().array() -= poles.real().maxCoeff() + (stable ? margin : -margin);
