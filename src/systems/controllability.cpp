@@ -8,7 +8,9 @@
 
 #include "core/format.hpp"
 #include "math/dense.hpp"
+#include "math/dense_reduction.hpp"
 #include "systems/balance.hpp"
+#include "systems/mode_distance.hpp"
 #include "systems/modes.hpp"
 #include "systems/staircase.hpp"
 
@@ -23,70 +25,6 @@ using Eigen::MatrixXd;
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr double infinity = std::numeric_limits<double>::infinity();
-
-/// The smallest singular value of [A - λI, B] and the left vector that belongs to it.
-struct Pencil {
-  double smallest = 0.0;
-  Eigen::VectorXcd left;
-};
-
-/// [Re -Im; Im Re] has the singular values of the complex pencil, each twice.
-MatrixXd doubled_pencil(const MatrixXd& A, const MatrixXd& B, Complex lambda) {
-  const Index n = A.rows();
-  const Index m = B.cols();
-  MatrixXd M = MatrixXd::Zero(2 * n, 2 * (n + m));
-  M.block(0, 0, n, n) = A;
-  M.block(0, 0, n, n).diagonal().array() -= lambda.real();
-  M.block(0, n, n, m) = B;
-  M.block(n, n + m, n, n + m) = M.block(0, 0, n, n + m);
-  M.block(0, n + m, n, n).diagonal().setConstant(lambda.imag());
-  M.block(n, 0, n, n).diagonal().setConstant(-lambda.imag());
-  return M;
-}
-
-Pencil pencil_at(const MatrixXd& A, const MatrixXd& B, Complex lambda) {
-  const Index n = A.rows();
-  const Index m = B.cols();
-  if (lambda.imag() == 0.0) {
-    MatrixXd M(n, n + m);
-    M << A, B;
-    M.leftCols(n).diagonal().array() -= lambda.real();
-    const detail::SingularValues svd = detail::svd_of(M);
-    return {svd.values(n - 1), svd.U.col(n - 1).cast<Complex>()};
-  }
-  const detail::SingularValues svd = detail::svd_of(doubled_pencil(A, B, lambda));
-  Pencil pencil{svd.values(2 * n - 1), Eigen::VectorXcd(n)};
-  pencil.left.real() = svd.U.col(2 * n - 1).head(n);
-  pencil.left.imag() = svd.U.col(2 * n - 1).tail(n);
-  return pencil;
-}
-
-/// The distance of a mode: the smallest singular value near its computed eigenvalue, which rounding
-/// has displaced: λ = uᴴAu is the best for the vector u that was found.
-double distance_of(const MatrixXd& A, const MatrixXd& B, Complex lambda, double tolerance) {
-  const Index n = A.rows();
-  constexpr Index largest_for_vectors = 40;
-  if (n > largest_for_vectors) {
-    const MatrixXd R = detail::pivoted_qr(doubled_pencil(A, B, lambda).transpose()).R;
-    return std::abs(R(2 * n - 1, 2 * n - 1));
-  }
-  Pencil pencil = pencil_at(A, B, lambda);
-  constexpr double suspicious = 1e-5;
-  for (int pass = 0; pass < 4; ++pass) {
-    if (pencil.smallest <= tolerance || pencil.smallest > suspicious * A.norm()) {
-      break;
-    }
-    const Eigen::VectorXcd& u = pencil.left;
-    const Complex better = u.dot(A.cast<Complex>().lazyProduct(u));
-    const Complex next = lambda.imag() == 0.0 ? Complex(better.real(), 0.0) : better;
-    const Pencil tried = pencil_at(A, B, next);
-    if (!(tried.smallest < 0.5 * pencil.smallest)) {
-      break;
-    }
-    pencil = tried;
-  }
-  return pencil.smallest;
-}
 
 /// |v_i w_i| of each eigenvalue, independent of the states' units.
 std::vector<Eigen::VectorXd> participations(const MatrixXd& A, Eigen::VectorXcd& values) {
@@ -125,6 +63,36 @@ MatrixXd krylov(const MatrixXd& A, const MatrixXd& B) {
     power = product(A, power);
   }
   return K;
+}
+
+/// A matrix of the singular values of `krylov(A, B)`. That of many inputs would take O(n³m); here
+/// [K, AᵏK] is L of n columns each time that the number k of powers doubles.
+MatrixXd krylov_factor(const MatrixXd& A, const MatrixXd& B) {
+  const Index n = A.rows();
+  constexpr Index few = 16;
+  if (B.cols() <= few) {
+    return krylov(A, B);
+  }
+  const auto joined = [n](const MatrixXd& left, const MatrixXd& right) {
+    MatrixXd both(n, left.cols() + right.cols());
+    both << left, right;
+    return both.cols() > n ? MatrixXd(detail::triangle_of(both.transpose()).transpose()) : both;
+  };
+  MatrixXd L = B;
+  MatrixXd power = A;
+  Index bit = 1;
+  while (2 * bit <= n) {
+    bit *= 2;
+  }
+  for (bit /= 2; bit > 0; bit /= 2) {
+    L = joined(L, product(power, L));
+    power = product(power, power);
+    if ((n & bit) != 0) {
+      L = joined(B, product(A, L));
+      power = product(A, power);
+    }
+  }
+  return L;
 }
 
 struct Verdict {
@@ -182,13 +150,14 @@ Expected<Verdict> analyze(const MatrixRef& A_given, const MatrixRef& B_given, Ti
     return tl::unexpected(
         Error(SystemError::no_convergence).in(std::string(where)).about("the eigenvalues of A"));
   }
+  const detail::ModeDistance distances(A_r, B_r);
   std::vector<Complex> missed;
   double last = 0.0;
   for (Index k = 0; k < seen.values.size(); ++k) {
     const Complex lambda = seen.values(k);
     const bool conjugate = k > 0 && lambda == std::conj(seen.values(k - 1)) && lambda.imag() != 0.0;
     const double distance =
-        conjugate ? last : distance_of(A_r, B_r, lambda, reach.tolerance * size) / size;
+        conjugate ? last : distances.near(lambda, reach.tolerance * size).value / size;
     last = distance;
     const Stability stability = seen.verdicts[static_cast<std::size_t>(k)];
     const bool reached = distance > reach.tolerance;
@@ -208,7 +177,7 @@ Expected<Verdict> analyze(const MatrixRef& A_given, const MatrixRef& B_given, Ti
   MatrixXd directions(n, n - r + static_cast<Index>(missed.size()));
   directions.leftCols(n - r) = stairs.Q.rightCols(n - r);
   for (std::size_t k = 0; k < missed.size(); ++k) {
-    const Eigen::VectorXcd left = pencil_at(A_r, B_r, missed[k]).left;
+    const Eigen::VectorXcd left = distances.at(missed[k]).left;
     const MatrixXd part = missed[k].imag() < 0.0 ? MatrixXd(left.imag()) : MatrixXd(left.real());
     directions.col(n - r + static_cast<Index>(k)) = product(stairs.Q.leftCols(r), part);
   }
@@ -222,12 +191,12 @@ Expected<Verdict> analyze(const MatrixRef& A_given, const MatrixRef& B_given, Ti
 
   const double unit = A.norm() > 0.0 ? A.norm() : 1.0;
   if (B.cols() > 0) {
-    const Eigen::VectorXd sizes = detail::singular_values_of(krylov(A / unit, B));
+    const Eigen::VectorXd sizes = detail::coarse_singular_values_of(krylov_factor(A / unit, B));
     reach.matrix_rank = numerical_rank(sizes, static_cast<double>(n) * epsilon);
   }
-  const MatrixXd raw = krylov(A_given, B_given);
+  const MatrixXd raw = krylov_factor(A_given, B_given);
   if (raw.cols() > 0 && raw.allFinite()) {
-    const Eigen::VectorXd raw_sizes = detail::singular_values_of(raw);
+    const Eigen::VectorXd raw_sizes = detail::coarse_singular_values_of(raw);
     const double smallest = raw_sizes(raw_sizes.size() - 1);
     reach.matrix_condition = smallest > 0.0 ? raw_sizes(0) / smallest : infinity;
   } else {
@@ -250,87 +219,6 @@ Expected<void> check_pair(const MatrixRef& A, const MatrixRef& B, Index rows, In
   }
   return check_all(check_shape(B, rows, columns, where, name, meaning), check_finite(A, where, "A"),
                    check_finite(B, where, name));
-}
-
-std::string name_of(Index k, std::span<const std::string> names) {
-  const auto index = static_cast<std::size_t>(k);
-  return index < names.size() ? names[index] : detail::format("x{}", k + 1);
-}
-
-/// "x1", "0.71 x1 - 0.71 x2".
-std::string combination(const Eigen::VectorXd& w, std::span<const std::string> names) {
-  const double largest = w.cwiseAbs().maxCoeff();
-  std::vector<Index> parts;
-  for (Index k = 0; k < w.size(); ++k) {
-    if (std::abs(w(k)) > 1e-6 * largest) {
-      parts.push_back(k);
-    }
-  }
-  if (parts.size() == 1) {
-    return name_of(parts.front(), names);
-  }
-  const double sign = w(parts.front()) < 0.0 ? -1.0 : 1.0;
-  std::string text;
-  for (const Index k : parts) {
-    const double value = sign * w(k);
-    text += text.empty() ? (value < 0.0 ? "-" : "") : (value < 0.0 ? " - " : " + ");
-    text += format_number(std::abs(value), 3) + ' ' + name_of(k, names);
-  }
-  return text;
-}
-
-/// "mostly x1 and x2".
-std::string owners(const Eigen::VectorXd& participation, std::span<const std::string> names) {
-  std::string text;
-  for (Index k = 0; k < participation.size(); ++k) {
-    if (participation(k) >= 0.25) {
-      text += (text.empty() ? "" : ", ") + name_of(k, names);
-    }
-  }
-  return text.empty() ? "all states together" : text;
-}
-
-/// For words only: parts that are rounding beside the other eigenvalues are zero.
-std::complex<double> without_rounding(std::complex<double> eigenvalue, double scale) {
-  constexpr double rounding = 1e-12;
-  const auto part = [&](double value) { return std::abs(value) < rounding * scale ? 0.0 : value; };
-  return {part(eigenvalue.real()), part(eigenvalue.imag())};
-}
-
-struct Words {
-  std::string_view verb;     ///< "no input moves"
-  std::string_view reached;  ///< "reached by the inputs"
-  std::string_view weak;     ///< "an input barely moves"
-};
-
-std::string describe(const ReachAnalysis& analysis, std::string_view headline, const Words& words,
-                     std::span<const std::string> names) {
-  std::string text = detail::format("{}: {} of {} states {}\n", headline, analysis.rank,
-                                    analysis.order, words.reached);
-  for (Index k = 0; k < analysis.hidden.cols(); ++k) {
-    text += detail::format("{} {}\n", words.verb, combination(analysis.hidden.col(k), names));
-  }
-  double scale = 0.0;
-  for (const ModeReach& mode : analysis.modes) {
-    scale = std::max(scale, std::abs(mode.eigenvalue));
-  }
-  for (const ModeReach& mode : analysis.modes) {
-    if (mode.eigenvalue.imag() < 0.0) {
-      continue;
-    }
-    const std::string pole = detail::pole_text(without_rounding(mode.eigenvalue, scale));
-    if (!mode.reached) {
-      text += detail::format("{} the mode {} ({}; {})\n", words.verb, pole,
-                             to_string(mode.stability), owners(mode.participation, names));
-    } else {
-      constexpr double weak = 1e-6;
-      text += detail::format("{} {} ({}; {}): distance {} from being cut off\n",
-                             mode.distance < weak ? words.weak : std::string_view("mode"), pole,
-                             to_string(mode.stability), owners(mode.participation, names),
-                             format_number(mode.distance, 2));
-    }
-  }
-  return text;
 }
 
 }  // namespace
@@ -384,24 +272,6 @@ Expected<ObservabilityAnalysis> analyze_observability(const MatrixRef& A, const 
     analysis.detectable = verdict.hidden_decay;
     return analysis;
   });
-}
-
-std::string describe(const ControllabilityAnalysis& analysis, std::span<const std::string> states) {
-  return describe(analysis,
-                  analysis.controllable   ? "controllable"
-                  : analysis.stabilizable ? "not controllable, but stabilizable"
-                                          : "not controllable, nor stabilizable",
-                  {"no input moves", "are reached by the inputs", "an input barely moves the mode"},
-                  states);
-}
-
-std::string describe(const ObservabilityAnalysis& analysis, std::span<const std::string> states) {
-  return describe(analysis,
-                  analysis.observable   ? "observable"
-                  : analysis.detectable ? "not observable, but detectable"
-                                        : "not observable, nor detectable",
-                  {"no output shows", "are seen by the outputs", "an output barely shows the mode"},
-                  states);
 }
 
 }  // namespace flyball

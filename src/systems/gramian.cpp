@@ -8,6 +8,7 @@
 #include <flyball/math/matrix_equation.hpp>
 
 #include "math/dense.hpp"
+#include "math/dense_reduction.hpp"
 #include "systems/balance.hpp"
 #include "systems/gramian_factor.hpp"
 #include "systems/modes.hpp"
@@ -78,7 +79,7 @@ Expected<MatrixXd> gramian_factor(const MatrixRef& A, const MatrixRef& B, TimeDo
     both << L, next;
     if (both.cols() > n) {
       // L Lᵀ of fewer columns: Rᵀ R with R the triangle of bothᵀ.
-      L = full_qr(both.transpose()).R.topRows(n).transpose();
+      L = triangle_of(both.transpose()).transpose();
     } else {
       L = both;
     }

@@ -9,6 +9,7 @@
 #include <flyball/systems/conversion.hpp>
 
 #include "math/dense.hpp"
+#include "math/dense_reduction.hpp"
 #include "systems/balance.hpp"
 #include "systems/gramian_factor.hpp"
 
@@ -36,21 +37,85 @@ double largest_singular_value(const MatrixXd& M) {
   return M.size() == 0 ? 0.0 : detail::singular_values_of(M)(0);
 }
 
-/// The largest singular value of G(jω).
-double gain_at(const ContinuousSystem<>& system, double omega) {
-  if (std::isinf(omega)) {
-    return largest_singular_value(system.D);
+/// The largest singular value of G(jω) at many frequencies: with A in Hessenberg form each costs
+/// O(n²).
+class Gain {
+ public:
+  explicit Gain(const ContinuousSystem<>& system) : D_(system.D) {
+    const detail::Hessenberg form = detail::hessenberg_of(system.A);
+    H_ = form.H;
+    B_ = detail::transposed_product(form.Q, system.B);
+    C_ = product(system.C, form.Q);
+    if (B_.cols() > C_.rows()) {
+      // Gᵀ has the same gain and fewer columns to solve for; both orders reversed keep the form.
+      const MatrixXd B = C_.transpose().colwise().reverse();
+      C_ = B_.transpose().rowwise().reverse();
+      B_ = B;
+      H_ = H_.transpose().reverse().eval();
+      D_ = D_.transpose().eval();
+    }
   }
-  Eigen::MatrixXcd shifted = -system.A.cast<Complex>();
-  shifted.diagonal().array() += Complex(0.0, omega);
-  const Eigen::MatrixXcd x = detail::solve_complex(shifted, system.B.cast<Complex>());
-  const Eigen::MatrixXcd G =
-      detail::complex_product(system.C.cast<Complex>(), x) + system.D.cast<Complex>();
-  return G.rows() == 1 || G.cols() == 1 ? G.norm() : detail::singular_values_of_complex(G)(0);
-}
+
+  [[nodiscard]] double at(double omega) const {
+    if (std::isinf(omega)) {
+      return largest_singular_value(D_);
+    }
+    solve(omega);
+    G_ = D_.cast<Complex>();
+    for (Index j = 0; j < X_.cols(); ++j) {
+      for (Index k = 0; k < X_.rows(); ++k) {
+        G_.col(j) += C_.col(k) * X_(k, j);
+      }
+    }
+    return largest();
+  }
+
+ private:
+  /// X = (jωI - H)⁻¹B by elimination of the subdiagonal with row pivoting.
+  void solve(double omega) const {
+    const Index n = H_.rows();
+    U_ = -H_.cast<Complex>();
+    U_.diagonal().array() += Complex(0.0, omega);
+    X_ = B_.cast<Complex>();
+    for (Index k = 0; k + 1 < n; ++k) {
+      if (std::abs(U_(k + 1, k)) > std::abs(U_(k, k))) {
+        U_.row(k).tail(n - k).swap(U_.row(k + 1).tail(n - k));
+        X_.row(k).swap(X_.row(k + 1));
+      }
+      if (U_(k + 1, k) != 0.0) {
+        const Complex factor = U_(k + 1, k) / U_(k, k);
+        U_.row(k + 1).tail(n - k - 1) -= factor * U_.row(k).tail(n - k - 1);
+        X_.row(k + 1) -= factor * X_.row(k);
+      }
+    }
+    for (Index j = 0; j < X_.cols(); ++j) {
+      for (Index k = n - 1; k >= 0; --k) {
+        X_(k, j) /= U_(k, k);
+        X_.col(j).head(k) -= U_.col(k).head(k) * X_(k, j);
+      }
+    }
+  }
+
+  [[nodiscard]] double largest() const {
+    if (G_.cols() == 1) {
+      return G_.norm();
+    }
+    if (G_.cols() == 2) {
+      // The eigenvalues of [a b; b̄ d] = GᴴG.
+      const double a = G_.col(0).squaredNorm();
+      const double d = G_.col(1).squaredNorm();
+      const double b = std::abs(G_.col(0).dot(G_.col(1)));
+      return std::sqrt(0.5 * (a + d + std::hypot(a - d, 2.0 * b)));
+    }
+    return detail::singular_values_of_complex(G_)(0);
+  }
+
+  MatrixXd H_, B_, C_, D_;
+  mutable Eigen::MatrixXcd U_, X_, G_;  // Memory for `at`.
+};
 
 /// The frequencies at which a singular value of G may be γ: eigenvalues of the Hamiltonian near the
-/// imaginary axis. Too many only cost time; `gain_at` decides.
+/// imaginary axis. Too many only cost time; `Gain` decides.
 std::vector<double> crossings(const ContinuousSystem<>& s, double gamma) {
   const Index n = s.A.rows();
   const Index m = s.B.cols();
@@ -82,25 +147,25 @@ std::vector<double> crossings(const ContinuousSystem<>& s, double gamma) {
 }
 
 /// A maximum of the gain near `omega`, by golden section over [low, high].
-double climb(const ContinuousSystem<>& system, double low, double high, double& gain) {
+double climb(const Gain& gains, double low, double high, double& gain) {
   constexpr double golden = 0.6180339887498949;
   double a = high - golden * (high - low);
   double b = low + golden * (high - low);
-  double at_a = gain_at(system, a);
-  double at_b = gain_at(system, b);
+  double at_a = gains.at(a);
+  double at_b = gains.at(b);
   for (int k = 0; k < 90 && high - low > 1e-15 * high; ++k) {
     if (at_a >= at_b) {
       high = b;
       b = a;
       at_b = at_a;
       a = high - golden * (high - low);
-      at_a = gain_at(system, a);
+      at_a = gains.at(a);
     } else {
       low = a;
       a = b;
       at_a = at_b;
       b = low + golden * (high - low);
-      at_b = gain_at(system, b);
+      at_b = gains.at(b);
     }
   }
   gain = std::max(at_a, at_b);
@@ -119,23 +184,32 @@ ContinuousSystem<> inverted(const ContinuousSystem<>& s) {
 
 /// @param system  Stable, scaled.
 Expected<HInfinityNorm> largest_gain(const ContinuousSystem<>& system, std::string_view where) {
-  HInfinityNorm best{gain_at(system, infinity), infinity, 0.0, 0};
+  const Gain gains(system);
+  HInfinityNorm best{gains.at(infinity), infinity, 0.0, 0};
   const auto consider = [&](double omega) {
-    const double gain = gain_at(system, omega);
+    const double gain = gains.at(omega);
     if (gain > best.norm || (gain == best.norm && omega < best.frequency)) {
       best.norm = gain;
       best.frequency = omega;
     }
   };
   consider(0.0);
-  for (const Complex& pole : detail::eigenvalues_of(system.A)) {
+  const Eigen::VectorXcd poles = detail::eigenvalues_of(system.A);
+  for (const Complex& pole : poles) {
+    if (pole.imag() < 0.0) {
+      continue;
+    }
     consider(std::abs(pole));
-    consider(std::abs(pole.imag()));
-    // Where a second-order peak is: ω² = |p|² - 2 Re(p)².
-    const double peak = std::norm(pole) - 2.0 * pole.real() * pole.real();
-    consider(std::sqrt(std::max(0.0, peak)));
+    if (pole.imag() > 0.0) {
+      consider(pole.imag());
+      // Where a second-order peak is: ω² = |p|² - 2 Re(p)².
+      const double peak = std::norm(pole) - 2.0 * pole.real() * pole.real();
+      if (peak > 0.0) {
+        consider(std::sqrt(peak));
+      }
+    }
   }
-  const Eigen::VectorXd sizes = detail::eigenvalues_of(system.A).cwiseAbs();
+  const Eigen::VectorXd sizes = poles.cwiseAbs();
   const double slowest = sizes.minCoeff();
   const double fastest = sizes.maxCoeff();
   constexpr int grid = 48;
@@ -146,7 +220,7 @@ Expected<HInfinityNorm> largest_gain(const ContinuousSystem<>& system, std::stri
     return HInfinityNorm{0.0, 0.0, 0.0, 0};
   }
   // γ²I - DᵀD is regular only well above the gain at infinity, or else at the origin.
-  const bool turned = gain_at(system, infinity) > gain_at(system, 0.0);
+  const bool turned = gains.at(infinity) > gains.at(0.0);
   const ContinuousSystem<> representative = turned ? inverted(system) : system;
   constexpr int most_iterations = 60;
   for (best.iterations = 1; best.iterations <= most_iterations; ++best.iterations) {
@@ -181,7 +255,7 @@ Expected<HInfinityNorm> largest_gain(const ContinuousSystem<>& system, std::stri
       if (std::isfinite(best.frequency) && best.frequency > 0.0) {
         double gain = 0.0;
         const double omega =
-            climb(system, best.frequency * (1.0 - 1e-3), best.frequency * (1.0 + 1e-3), gain);
+            climb(gains, best.frequency * (1.0 - 1e-3), best.frequency * (1.0 + 1e-3), gain);
         if (gain > best.norm) {
           const bool grew = gain > best.norm * (1.0 + 0.5 * relative_accuracy);
           best.norm = gain;

@@ -1,12 +1,89 @@
 #include <algorithm>
+#include <cmath>
 
 #include "math/dense.hpp"
+#include "math/dense_reduction.hpp"
 #include "systems/staircase.hpp"
 
 namespace flyball::detail {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+
+namespace {
+
+/// An orthogonal U with Uᵀ block zero but for its first `rank` rows: reflections I - τvvᵀ, and then
+/// a matrix that turns the first rows among themselves.
+struct Turned {
+  Eigen::VectorXd values;   ///< The singular values of the block.
+  Index rank = 0;           ///< How many are above the threshold.
+  bool triangular = false;  ///< Whether Uᵀ block is upper triangular besides.
+  MatrixXd v;
+  Eigen::VectorXd tau;
+  MatrixXd turn;  ///< Empty: the identity.
+
+  /// Uᵀ M.
+  void from_left(Eigen::Ref<MatrixXd> M) const {
+    for (Index k = 0; k < v.cols(); ++k) {
+      const auto w = v.col(k).tail(v.rows() - k);
+      auto rows = M.bottomRows(v.rows() - k);
+      const Eigen::RowVectorXd products = tau(k) * (w.transpose() * rows);
+      rows.noalias() -= w * products;
+    }
+    if (turn.size() > 0) {
+      M.topRows(turn.rows()) = transposed_product(turn, M.topRows(turn.rows()));
+    }
+  }
+  /// M U.
+  void from_right(Eigen::Ref<MatrixXd> M) const {
+    for (Index k = 0; k < v.cols(); ++k) {
+      const auto w = v.col(k).tail(v.rows() - k);
+      auto columns = M.rightCols(v.rows() - k);
+      const Eigen::VectorXd products = tau(k) * (columns * w);
+      columns.noalias() -= products * w.transpose();
+    }
+    if (turn.size() > 0) {
+      M.leftCols(turn.rows()) = product(M.leftCols(turn.rows()), turn);
+    }
+  }
+};
+
+Turned turned_of(const MatrixXd& block, double threshold) {
+  const Index rows = block.rows();
+  const Index count = std::min(rows, block.cols());
+  Turned t;
+  t.v = MatrixXd::Zero(rows, block.cols() < rows ? count : 0);
+  t.tau = Eigen::VectorXd::Zero(t.v.cols());
+  MatrixXd R = block;
+  for (Index k = 0; k < t.v.cols(); ++k) {
+    auto x = R.col(k).tail(rows - k);
+    const double size = x.norm();
+    if (size == 0.0) {
+      continue;
+    }
+    const double head = x(0) + std::copysign(size, x(0));
+    auto w = t.v.col(k).tail(rows - k);
+    w = x / head;
+    w(0) = 1.0;
+    t.tau(k) = 2.0 / w.squaredNorm();
+    auto right = R.bottomRightCorner(rows - k, R.cols() - k);
+    const Eigen::RowVectorXd products = t.tau(k) * (w.transpose() * right);
+    right.noalias() -= w * products;
+  }
+  R = R.topRows(count).eval();
+  if (t.v.cols() > 0) {
+    R.triangularView<Eigen::StrictlyLower>().setZero();
+  }
+  t.values = coarse_singular_values_of(R);
+  t.rank = (t.values.array() > threshold).count();
+  t.triangular = t.rank == count && t.v.cols() > 0;
+  if (t.rank > 0 && t.rank < count) {
+    t.turn = svd_of(R).U;
+  }
+  return t;
+}
+
+}  // namespace
 
 Staircase staircase_of(const MatrixRef& A, const MatrixRef& B, double tolerance) {
   const Index n = A.rows();
@@ -21,30 +98,39 @@ Staircase staircase_of(const MatrixRef& A, const MatrixRef& B, double tolerance)
     if (!(unit > 0.0)) {
       break;
     }
-    const SingularValues svd = svd_of(block);
-    Index step = 0;
-    while (step < svd.values.size() && svd.values(step) > tolerance * unit) {
-      s.smallest_step = std::min(s.smallest_step, svd.values(step) / unit);
-      ++step;
-    }
-    if (step < svd.values.size()) {
-      s.largest_rest = std::max(s.largest_rest, svd.values(step) / unit);
+    const Index rest = n - s.rank;
+    const Index done = s.rank;
+    const Turned turned = turned_of(block, tolerance * unit);
+    const Index step = turned.rank;
+    for (Index k = 0; k < turned.values.size(); ++k) {
+      const double relative = turned.values(k) / unit;
+      if (k < step) {
+        s.smallest_step = std::min(s.smallest_step, relative);
+      } else {
+        s.largest_rest = std::max(s.largest_rest, relative);
+      }
     }
     if (step == 0) {
       break;
     }
-    const Index rest = n - s.rank;
-    const Index done = s.rank;
-    s.A.bottomRows(rest) = transposed_product(svd.U, s.A.bottomRows(rest));
-    s.A.rightCols(rest) = product(s.A.rightCols(rest), svd.U);
-    s.Q.rightCols(rest) = product(s.Q.rightCols(rest), svd.U);
+    turned.from_left(s.A.bottomRows(rest));
+    turned.from_right(s.A.rightCols(rest));
+    turned.from_right(s.Q.rightCols(rest));
     if (done == 0) {
-      s.B = transposed_product(svd.U, s.B);
+      turned.from_left(s.B);
       s.B.bottomRows(n - step).setZero();
+      if (turned.triangular) {
+        s.B.triangularView<Eigen::StrictlyLower>().setZero();
+      }
     } else {
       // Below the new stair the previous one's columns vanish.
       const Index before = s.stairs.back();
       s.A.block(done + step, done - before, n - done - step, before).setZero();
+      if (turned.triangular) {
+        s.A.block(done, done - before, step, before)
+            .triangularView<Eigen::StrictlyLower>()
+            .setZero();
+      }
     }
     s.stairs.push_back(step);
     s.rank += step;

@@ -9,7 +9,9 @@
 
 #include "support/laws.hpp"
 #include "support/oracle.hpp"
+#include "systems/mode_distance.hpp"
 #include "systems/random_systems.hpp"
+#include "systems/staircase.hpp"
 
 namespace flyball {
 namespace {
@@ -238,6 +240,65 @@ TEST(ReachProperties, LargestGain) {
     units.expect_within(1e-9);
     axes.expect_within(1e-8);
   }
+}
+
+/// The smallest singular value of [A - λI, B] by Jacobi's iteration, and that of this class, whose
+/// vector must belong to it; both relative to the pencil.
+void compare(Law& value, Law& relative, Law& vector, const MatrixXd& A, const MatrixXd& B,
+             Complex lambda, int trial, const RandomSystem& s) {
+  const Index n = A.rows();
+  Eigen::MatrixXcd pencil(n, n + B.cols());
+  pencil << A.cast<Complex>(), B.cast<Complex>();
+  pencil.diagonal().array() -= lambda;
+  const double size = pencil.norm();
+  const double expected = test::singular_values(pencil)(n - 1);
+  const auto found = detail::ModeDistance(A, B).at(lambda);
+  value.holds(std::abs(found.value - expected) / size, trial, s);
+  if (expected > 1e-9 * size) {
+    relative.holds(std::abs(found.value / expected - 1.0), trial, s);
+  }
+  vector.holds(std::abs((found.left.adjoint() * pencil).norm() - expected) / size, trial, s);
+  EXPECT_NEAR(found.left.norm(), 1.0, 1e-14);
+}
+
+// At modes and elsewhere, in the form of a staircase and in any other.
+TEST(ReachProperties, DistanceIsTheSmallestSingularValue) {
+  Law value("value");
+  Law relative("relative");
+  Law vector("vector");
+  const auto check = [&](const MatrixXd& A, const MatrixXd& B, Complex lambda, int trial,
+                         const RandomSystem& s) {
+    compare(value, relative, vector, A, B, lambda, trial, s);
+    const auto stairs = detail::staircase_of(A, B, 1e-13);
+    compare(value, relative, vector, stairs.A, stairs.B, lambda, trial, s);
+  };
+  test::RandomSystems systems(186, Plane::s);
+  for (int trial = 0; trial < 10000; ++trial) {
+    const RandomSystem s = test::plain(systems.next());
+    if (s.kind == SystemClass::reference) {
+      continue;
+    }
+    const Eigen::VectorXcd modes = test::eigenvalues(s.A);
+    check(s.A, s.B, trial % 3 == 0 ? Complex(0.1, trial % 2) : modes(trial % modes.size()), trial,
+          s);
+  }
+  for (int trial = 0; trial < 12; ++trial) {
+    RandomSystem s;
+    s.kind = trial % 2 == 0 ? SystemClass::stable : SystemClass::nearly_uncontrollable;
+    const Index n = 60;
+    const Index hidden = 1 + trial % 3;
+    s.A = test::random_matrix(systems.random(), n, n);
+    s.B = test::random_matrix(systems.random(), n, Index{1} << trial % 7);
+    if (trial % 2 == 1) {
+      s.A.bottomLeftCorner(hidden, n - hidden) *= 1e-6;
+      s.B.bottomRows(hidden) *= 1e-6;
+    }
+    const Eigen::VectorXcd modes = test::eigenvalues(s.A.bottomRightCorner(hidden, hidden));
+    check(s.A, s.B, modes(0), trial, s);
+  }
+  value.expect_within(2e-15, 16000);
+  relative.expect_within(1e-7, 10000);
+  vector.expect_within(2e-15, 16000);
 }
 
 // Everything is reached and seen in random systems, weakly coupled ones included, and the weakest

@@ -32,8 +32,10 @@ struct ReachAnalysis {
   /// n x (n - rank). Controllability: columns w whose combinations wᵀx no input moves;
   /// observability: initial states x that no output shows. In the states' units, of norm 1.
   Eigen::MatrixXd hidden;
-  Eigen::Index matrix_rank = 0;   ///< Of (6.37) or (6.41), balanced, by singular values.
-  double matrix_condition = 0.0;  ///< σ_max/σ_min of that matrix in the units as given (6.12.1).
+  Eigen::Index matrix_rank = 0;  ///< Of (6.37) or (6.41), balanced, by singular values.
+  /// σ_max/σ_min of that matrix in the units as given (6.12.1). With tens of states it is beyond
+  /// 1e16, where σ_min is rounding and only this much is known.
+  double matrix_condition = 0.0;
   /// n, increasing: the Gramian's eigenvalues in balanced units, larger is easier; negative ones
   /// belong to unstable modes. Empty where the Gramian does not exist.
   Eigen::VectorXd gramian_eigenvalues;
@@ -71,7 +73,7 @@ struct ObservabilityAnalysis : ReachAnalysis {
 ///
 /// @param A  n x n. @param B  n x m. @param domain  Decides which modes decay by themselves.
 /// @errors ArgumentError for shapes and entries; SystemError::no_convergence.
-/// Cost: O(n³) for the verdict, O(n³) a mode for the distances; allocates.
+/// Cost: O(n³) for the verdict, O(n²m) a mode for the distances; allocates.
 /// Source: book, 6.12.1 to 6.12.4; Van Dooren, IEEE Trans. Automatic Control 26 (1981); Paige, same
 /// volume.
 [[nodiscard]] Expected<ControllabilityAnalysis> analyze_controllability(const MatrixRef& A,
