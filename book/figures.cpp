@@ -74,6 +74,22 @@ constexpr std::array table{
                 compute<table_7_3>},
 };
 
+/// Drawings of the chapters above, which show no numbers.
+struct Drawing {
+  std::string_view id;
+  std::string_view what;
+};
+constexpr std::array drawings{
+    Drawing{"2.1", "the block diagram of a P controller"},
+    Drawing{"2.2", "the block diagram of a PD controller"},
+    Drawing{"2.4", "the block diagram of a PI controller"},
+    Drawing{"2.8", "the block diagram of a PID controller"},
+    Drawing{"6.2", "the sketch of an elevator"},
+    Drawing{"6.4", "the sketch of a flywheel"},
+    Drawing{"6.8", "the sketch of a single-jointed arm"},
+    Drawing{"7.9", "the block diagram of plant inversion"},
+};
+
 /// "6.3" of "Figure 6.3", "fig. 6.3" or " 6.3 ", "TABLE7.1" of "table 7.1"; figures of the
 /// appendices begin with a capital.
 std::string bare_id(std::string_view text) {
@@ -118,6 +134,17 @@ Expected<const FigureEntry*> find_figure(std::string_view id) {
       std::ranges::find(table, wanted, [](const FigureEntry& entry) { return bare_id(entry.id); });
   if (found != table.end()) {
     return found;
+  }
+  const auto* drawing = std::ranges::find(drawings, wanted, &Drawing::id);
+  if (drawing != drawings.end()) {
+    return tl::unexpected(
+        Error(ArgumentError::unknown_name)
+            .in("book")
+            .about("figure")
+            .got(fmt::format("\"{}\", {}", id, drawing->what))
+            .expected("a figure that is computed: this one is a drawing, without numbers")
+            .hint(fmt::format("the nearest: {}; `flyball book --list` shows all",
+                              nearest_ids(wanted))));
   }
   return tl::unexpected(Error(ArgumentError::unknown_name)
                             .in("book")

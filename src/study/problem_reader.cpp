@@ -92,6 +92,25 @@ std::string complaint(std::string_view text, std::size_t byte) {
                    : fmt::format("not JSON from line {}, character {} on", line, column);
 }
 
+/// "[0, 1]" and "[[0], [1]]" for a message, of long lists the first numbers.
+std::pair<std::string, std::string> flat_and_column(const Json& list) {
+  constexpr std::size_t most = 4;
+  std::string flat;
+  std::string column;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::string separator = i == 0 ? "" : ", ";
+    if (i == most) {
+      flat += ", ...";
+      column += ", ...";
+      break;
+    }
+    const std::string entry = list[i].is_structured() ? kind_of(list[i]) : list[i].dump();
+    flat += separator + entry;
+    column += fmt::format("{}[{}]", separator, entry);
+  }
+  return {'[' + flat + ']', '[' + column + ']'};
+}
+
 }  // namespace
 
 Expected<Json> parse_object(std::string_view text, std::string_view where, std::string_view what) {
@@ -199,7 +218,14 @@ Eigen::MatrixXd ProblemReader::matrix(const char* name) {
   for (Eigen::Index i = 0; i < rows; ++i) {
     const Json& row = value[static_cast<std::size_t>(i)];
     if (!row.is_array()) {
-      fail(name, fmt::format("{} as row {}", kind_of(row), i), expected);
+      double entry = 0.0;
+      if (i == 0 && read(row, entry)) {
+        const auto [list, column] = flat_and_column(value);
+        fail(name, fmt::format("{}, without rows", list),
+             fmt::format("a list of rows: {} is a column, [{}] a row", column, list));
+      } else {
+        fail(name, fmt::format("{} as row {}", kind_of(row), i), expected);
+      }
       return {};
     }
     const auto columns = static_cast<Eigen::Index>(row.size());

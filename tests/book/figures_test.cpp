@@ -69,7 +69,9 @@ TEST(Figures, AreFoundAsPeopleWriteThem) {
 
 TEST(Figures, AnUnknownOneIsAnsweredWithTheNearest) {
   for (const auto& [text, nearest] : std::vector<std::pair<std::string, std::string>>{
-           {"6.4", "the nearest: 6.1, 6.3, 6.5, 6.6, 6.7, 6.9, 7.4, B.4;"},
+           {"6.4", "a drawing, without numbers"},
+           {"Figure 7.9", "the block diagram of plant inversion"},
+           {"6.14", "the nearest: 6.1;"},
            {"8.10", "the nearest: 7.10;"},
            {"figure 2.4", "the nearest: 2.3, 2.5, 2.6, 2.7, 2.9, 7.4, B.4;"},
            {"", "the nearest: 2.3, 2.5,"}}) {

@@ -137,6 +137,10 @@ TEST(Solve, RefusesBadInput) {
   EXPECT_EQ(refusal("dare", R"({"A":[1,2],"B":[[1]],"Q":[[1]],"R":[[1]]})"), "malformed");
   EXPECT_EQ(refusal("dare", R"({"A":[["x"]],"B":[[1]],"Q":[[1]],"R":[[1]]})"), "malformed");
   EXPECT_EQ(refusal("dare", R"({"A":[[1]],"B":[[1],[2]],"Q":[[1]],"R":[[1]]})"), "wrong_shape");
+  const Json flat = answer("dare", R"({"A":[[1]],"B":[0,1],"Q":[[1]],"R":[[1]]})");
+  EXPECT_EQ(flat.at("error").at("message"),
+            "dare: B is [0, 1], without rows; it must be a list of rows: [[0], [1]] is a column, "
+            "[[0, 1]] a row");
   EXPECT_EQ(refusal("expm", R"({"A":[[)"), "malformed");
   EXPECT_EQ(refusal("expm", "[1, 2]"), "malformed");
   EXPECT_EQ(refusal("expm", "\xff\xfe{"), "malformed");
