@@ -85,8 +85,16 @@ int main(int argc, char** argv) {
   } catch (const CLI::Success& answer) {
     return program.exit(answer);
   } catch (const CLI::ParseError& problem) {
-    std::fprintf(stderr, "flyball: %s\n", problem.what());
-    std::fprintf(stderr, "Run with --help for the commands and their options.\n");
+    if (argc < 2) {  // as git does: who does not know a command is told them all
+      std::fputs(program.help().c_str(), stderr);
+      return flyball::app::bad_input;
+    }
+    const auto commands = program.get_subcommands();
+    const std::string command = commands.empty() ? "" : commands.front()->get_name();
+    std::fprintf(stderr, "flyball: %s%s%s\n", command.c_str(), command.empty() ? "" : ": ",
+                 problem.what());
+    std::fprintf(stderr, "`flyball%s%s --help` tells what it takes.\n", command.empty() ? "" : " ",
+                 command.c_str());
     return flyball::app::bad_input;
   } catch (const std::exception& defect) {
     std::fprintf(stderr, "flyball: a defect of Flyball: %s\n", defect.what());

@@ -200,6 +200,15 @@ TEST_F(BadInput, OptionsOfTheCommandLine) {
   expect("identify " + example("logs/elevator.json") + " --scale 0", 2, "scale");
 }
 
+TEST_F(BadInput, CommandLinesThatEndTooSoon) {
+  expect("identify", 2, "identify: LOG is required");
+  expect("identify", 2, "`flyball identify --help`");
+  expect("tuen", 2, "did you mean \"tune\"?");
+  const Answer alone = run("");
+  EXPECT_EQ(alone.status, 2);
+  EXPECT_TRUE(holds(alone.err, "flyball tune arm.json")) << alone.err;
+}
+
 // Mathematics says no: the motor cannot lift it.
 TEST_F(BadInput, AMechanismThatTheMotorCannotMove) {
   project(with(good_elevator, "8 kg", "80000 kg"));
