@@ -42,9 +42,7 @@ std::string unknown_command(const CLI::App& program, int argc, char** argv) {
                                      : fmt::format("did you mean \"{}\"?", nearest));
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   CLI::App program{
       "Flyball takes a mechanism from its first log, or from its drawing, to a controller that "
       "has\n"
@@ -96,9 +94,19 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "`flyball%s%s --help` tells what it takes.\n", command.empty() ? "" : " ",
                  command.c_str());
     return flyball::app::bad_input;
-  } catch (const std::exception& defect) {
-    std::fprintf(stderr, "flyball: a defect of Flyball: %s\n", defect.what());
-    return flyball::app::bad_input;
   }
   return invocation.status;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& defect) {
+    std::fprintf(stderr, "flyball: a defect of Flyball: %s\n", defect.what());
+  } catch (...) {
+    std::fputs("flyball: a defect of Flyball\n", stderr);
+  }
+  return flyball::app::bad_input;
 }
