@@ -1,7 +1,7 @@
-// How long lyapunov(), discrete_lyapunov() and sylvester() take, checks, refinement and condition
-// estimate included, beside SLICOT's SB03MD and SB04MD, which give X alone, on the same data in the
-// same process, one thread: `bench_matrix_equation [repetitions]`. Minima per equation over
-// repetitions that alternate between the two.
+// How long lyapunov(), discrete_lyapunov(), sylvester() and discrete_sylvester() take, checks,
+// refinement and condition estimate included, beside SLICOT's SB03MD, SB04MD and SB04QD, which give
+// X alone, on the same data in the same process, one thread: `bench_matrix_equation [repetitions]`.
+// Minima per equation over repetitions that alternate between the two.
 
 #include <algorithm>
 #include <cstdio>
@@ -23,6 +23,9 @@ void sb03md_(const char* dico, const char* job, const char* fact, const char* tr
 void sb04md_(const int* n, const int* m, double* A, const int* lda, double* B, const int* ldb,
              double* C, const int* ldc, double* Z, const int* ldz, int* iwork, double* dwork,
              const int* ldwork, int* info);
+void sb04qd_(const int* n, const int* m, double* A, const int* lda, double* B, const int* ldb,
+             double* C, const int* ldc, double* Z, const int* ldz, int* iwork, double* dwork,
+             const int* ldwork, int* info);
 void openblas_set_num_threads(int threads);
 }
 
@@ -32,13 +35,26 @@ using bench::microseconds;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-enum class Kind { lyapunov, discrete_lyapunov, sylvester };
+enum class Kind {
+  lyapunov,
+  discrete_lyapunov,
+  sylvester,
+  unstable_lyapunov,
+  unstable_discrete_lyapunov,
+  mixed_sylvester,
+  discrete_sylvester
+};
+
+bool is_sylvester(Kind kind) {
+  return kind == Kind::sylvester || kind == Kind::mixed_sylvester ||
+         kind == Kind::discrete_sylvester;
+}
 
 struct Equation {
   MatrixXd A, B, C;
 };
 
-/// Stable A and B with eigenvalues well away from the boundary.
+/// Stable A and B with eigenvalues well away from the boundary, or eigenvalues on both sides of it.
 Equation random_equation(flyball::Random& random, int n, Kind kind) {
   const auto normal = [&random, n] {
     return MatrixXd(MatrixXd::NullaryExpr(n, n, [&random] { return random.normal(); }));
@@ -46,11 +62,11 @@ Equation random_equation(flyball::Random& random, int n, Kind kind) {
   Equation e{normal(), normal(), normal()};
   if (kind == Kind::discrete_lyapunov) {
     e.A *= 0.9 / e.A.eigenvalues().cwiseAbs().maxCoeff();
-  } else {
+  } else if (kind == Kind::lyapunov || kind == Kind::sylvester) {
     e.A.diagonal().array() -= e.A.eigenvalues().real().maxCoeff() + 0.5;
     e.B.diagonal().array() -= e.B.eigenvalues().real().maxCoeff() + 0.5;
   }
-  if (kind != Kind::sylvester) {
+  if (!is_sylvester(kind)) {
     e.C = e.C.transpose() * e.C;
   }
   return e;
@@ -67,23 +83,27 @@ class Slicot {
         work_(16 * n * n + 64 * n),
         integers_(static_cast<std::size_t>(std::max(n * n, 4 * n))) {}
 
-  /// X of AᵀX + XA = C or AᵀXA - X = C, or of AX + XB = C.
+  /// X of AX + XAᵀ = C or AXAᵀ - X = C, or of AX + XB = C or X - AXB = C.
   const MatrixXd& solve(const Equation& e, Kind kind) {
     A_ = e.A;
     X_ = e.C;
     const int ldwork = static_cast<int>(work_.size());
     int info = 0;
-    if (kind == Kind::sylvester) {
+    if (is_sylvester(kind)) {
       B_ = e.B;
-      sb04md_(&n_, &n_, A_.data(), &n_, B_.data(), &n_, X_.data(), &n_, U_.data(), &n_,
-              integers_.data(), work_.data(), &ldwork, &info);
+      if (kind == Kind::discrete_sylvester) {
+        A_ = -e.A;
+      }
+      (kind == Kind::discrete_sylvester ? sb04qd_ : sb04md_)(
+          &n_, &n_, A_.data(), &n_, B_.data(), &n_, X_.data(), &n_, U_.data(), &n_,
+          integers_.data(), work_.data(), &ldwork, &info);
     } else {
       double scale = 0.0;
       double sep = 0.0;
       double error = 0.0;
-      sb03md_(kind == Kind::lyapunov ? "C" : "D", "X", "N", "T", &n_, A_.data(), &n_, U_.data(),
-              &n_, X_.data(), &n_, &scale, &sep, &error, real_.data(), imaginary_.data(),
-              integers_.data(), work_.data(), &ldwork, &info);
+      sb03md_(kind == Kind::lyapunov || kind == Kind::unstable_lyapunov ? "C" : "D", "X", "N", "T",
+              &n_, A_.data(), &n_, U_.data(), &n_, X_.data(), &n_, &scale, &sep, &error,
+              real_.data(), imaginary_.data(), integers_.data(), work_.data(), &ldwork, &info);
     }
     if (info != 0) {
       X_.setConstant(0.0);
@@ -101,10 +121,15 @@ class Slicot {
 flyball::Expected<flyball::LinearMatrixSolution> solve_ours(const Equation& e, Kind kind) {
   switch (kind) {
     case Kind::lyapunov:
+    case Kind::unstable_lyapunov:
       return flyball::lyapunov(e.A, e.C);
     case Kind::discrete_lyapunov:
+    case Kind::unstable_discrete_lyapunov:
       return flyball::discrete_lyapunov(e.A, e.C);
+    case Kind::discrete_sylvester:
+      return flyball::discrete_sylvester(e.A, e.B, e.C);
     case Kind::sylvester:
+    case Kind::mixed_sylvester:
       break;
   }
   return flyball::sylvester(e.A, e.B, e.C);
@@ -113,7 +138,7 @@ flyball::Expected<flyball::LinearMatrixSolution> solve_ours(const Equation& e, K
 void compare(Kind kind, int n, int repetitions) {
   flyball::Random random(static_cast<std::uint64_t>(n));
   Slicot slicot(n);
-  const double sign = kind == Kind::sylvester ? 1.0 : -1.0;
+  const double sign = is_sylvester(kind) ? 1.0 : -1.0;
   const int calls = std::max(1, 2000 / (n * n * n + 50));
   constexpr int count = 6;
   double time_ours = 0.0;
@@ -150,9 +175,14 @@ int main(int argc, char** argv) {
   openblas_set_num_threads(1);
   const int repetitions = argc > 1 ? std::max(1, std::atoi(argv[1])) : 30;
   std::printf("minima in microseconds, one thread\n");
-  for (const auto& [kind, title] : {std::pair{Kind::lyapunov, "lyapunov, SB03MD"},
-                                    std::pair{Kind::discrete_lyapunov, "discrete_lyapunov, SB03MD"},
-                                    std::pair{Kind::sylvester, "sylvester, SB04MD"}}) {
+  for (const auto& [kind, title] :
+       {std::pair{Kind::lyapunov, "lyapunov, SB03MD"},
+        std::pair{Kind::discrete_lyapunov, "discrete_lyapunov, SB03MD"},
+        std::pair{Kind::sylvester, "sylvester, SB04MD"},
+        std::pair{Kind::unstable_lyapunov, "lyapunov, any A, SB03MD"},
+        std::pair{Kind::unstable_discrete_lyapunov, "discrete_lyapunov, any A, SB03MD"},
+        std::pair{Kind::mixed_sylvester, "sylvester, any A, B, SB04MD"},
+        std::pair{Kind::discrete_sylvester, "discrete_sylvester, any A, B, SB04QD"}}) {
     std::printf("%s\n%5s %12s %12s %9s %14s\n", title, "n", "flyball", "SLICOT", "ratio",
                 "difference");
     for (const int n : {2, 5, 10, 20, 50, 100}) {

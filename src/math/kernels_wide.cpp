@@ -8,6 +8,7 @@
 #include "math/lyapunov_kernel.hpp"
 #include "math/matrix_exponential_kernel.hpp"
 #include "math/riccati_kernel.hpp"
+#include "math/sylvester_kernel.hpp"
 
 // The same source for processors with 256-bit vectors and fused multiply-add, which
 // instruction_set.hpp asks for when running. Only functions of this variant's namespace are
@@ -23,6 +24,7 @@
 #include "math/lyapunov_kernel_body.hpp"
 #include "math/matrix_exponential_kernel_body.hpp"
 #include "math/riccati_kernel_body.hpp"
+#include "math/sylvester_kernel_body.hpp"
 #ifdef __clang__
 #pragma clang attribute pop
 #else

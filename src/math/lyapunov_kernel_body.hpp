@@ -24,13 +24,21 @@ class StableLyapunov {
   }
 
   bool run() {
-    load();
-    ClosedLoop<N> loop(n_, data_.continuous, S_, loop_work_, pivots_);
-    copy(X_, C_);
-    if (!loop.solve(X_)) {
+    // The eigenvalues' sum tells of many an unstable A.
+    double trace = 0.0;
+    for (int i = 0; i < n_(); ++i) {
+      trace += data_.A[i + i * n_()];
+    }
+    if (data_.continuous ? !(trace < 0.0) : !(std::abs(trace) < n_())) {
       return false;
     }
-    const double gain = loop.gain();
+    load();
+    ClosedLoop<N> loop(n_, data_.continuous, S_, loop_work_, pivots_);
+    const double gain = loop.gain(1e10);
+    copy(X_, C_);
+    if (!std::isfinite(gain) || !loop.solve(X_)) {
+      return false;
+    }
     for (int pass = 0;; ++pass) {
       const double defect = measure();
       const double error = gain * (defect + epsilon * scale_);

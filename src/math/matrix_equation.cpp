@@ -8,6 +8,7 @@
 #include "math/dense.hpp"
 #include "math/double_double.hpp"
 #include "math/lyapunov_kernel.hpp"
+#include "math/sylvester_kernel.hpp"
 
 namespace flyball {
 
@@ -244,6 +245,27 @@ Expected<LinearMatrixSolution> solve(const Equation& equation, const MatrixXd& F
   return solution;
 }
 
+/// What the kernel makes of A X + X B = F or A X B - X = F, B null: Aᵀ; false where it does not
+/// vouch for it.
+bool solve_quickly(Domain domain, const MatrixRef& A, const MatrixRef* B, const MatrixXd& F,
+                   bool symmetric, LinearMatrixSolution& solution) {
+  if (A.outerStride() != A.rows() || (B != nullptr && B->outerStride() != B->rows())) {
+    return false;
+  }
+  solution.X.resize(F.rows(), F.cols());
+  detail::SylvesterAnswer answer{solution.X.data()};
+  if (!detail::solve_sylvester_quickly(
+          {static_cast<int>(F.rows()), static_cast<int>(F.cols()), domain == Domain::continuous,
+           symmetric, A.data(), B == nullptr ? nullptr : B->data(), F.data()},
+          answer) ||
+      !solution.X.allFinite()) {
+    return false;
+  }
+  solution.residual = answer.residual;
+  solution.condition = answer.condition;
+  return true;
+}
+
 Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A, const MatrixRef& Q,
                                               std::string_view where) {
   if (auto check = check_square(A, where, "A"); !check) {
@@ -255,9 +277,9 @@ Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A,
     return tl::unexpected(std::move(check).error());
   }
   const bool symmetric = Q == Q.transpose();
+  LinearMatrixSolution solution;
   if (is_symmetric_but_for_rounding(Q) && A.outerStride() == A.rows() &&
       Q.outerStride() == Q.rows()) {
-    LinearMatrixSolution solution;
     solution.X.resize(A.rows(), A.rows());
     detail::LyapunovAnswer answer{solution.X.data()};
     if (detail::solve_stable_lyapunov(
@@ -268,7 +290,11 @@ Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A,
       return solution;
     }
   }
-  return solve(Equation(domain, A), -Q, symmetric, where);
+  const MatrixXd F = -Q;
+  if (solve_quickly(domain, A, nullptr, F, symmetric, solution)) {
+    return solution;
+  }
+  return solve(Equation(domain, A), F, symmetric, where);
 }
 
 Expected<LinearMatrixSolution> solve_sylvester(Domain domain, const MatrixRef& A,
@@ -287,7 +313,12 @@ Expected<LinearMatrixSolution> solve_sylvester(Domain domain, const MatrixRef& A
     return tl::unexpected(std::move(check).error());
   }
   const double sign = domain == Domain::continuous ? 1.0 : -1.0;
-  return solve(Equation(domain, A, B), sign * C, false, where);
+  const MatrixXd F = sign * C;
+  LinearMatrixSolution solution;
+  if (solve_quickly(domain, A, &B, F, false, solution)) {
+    return solution;
+  }
+  return solve(Equation(domain, A, B), F, false, where);
 }
 
 }  // namespace

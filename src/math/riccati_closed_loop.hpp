@@ -38,8 +38,9 @@ class ClosedLoop {
   }
 
   /// An estimate of trace(L⁻¹(I)), a bound of ‖L⁻¹‖: exact for few states, from four vectors of
-  /// signs else (Hutchinson); infinite where the powers of A do not fade.
-  double gain() {
+  /// signs else (Hutchinson); infinite where the powers of A do not fade, or grow beyond `most`
+  /// times their squared size.
+  double gain(double most = std::numeric_limits<double>::infinity()) {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     if (!valid_) {
       return infinity;
@@ -62,7 +63,7 @@ class ClosedLoop {
       }
       return trace;
     }
-    return sampled_gain();
+    return sampled_gain(most);
   }
 
   /// C ← L⁻¹(C), C symmetric; false where the powers of A do not fade.
@@ -136,7 +137,7 @@ class ClosedLoop {
     multiply(n_, C, ld, Mt, ld, work, ld, n_(), n_());
   }
 
-  double sampled_gain() {
+  double sampled_gain(double most) {
     const int ld = n_.padded();
     double* y = take(2);
     double* next = y + 4 * ld;
@@ -162,9 +163,13 @@ class ClosedLoop {
       unit = 2.0 * gamma_;
       sum = advance(M_);
     }
+    const double largest = most * sum;
     for (int k = 0; k < 2000; ++k) {
       const double norm = advance(A_);
       sum += norm;
+      if (!(norm <= largest)) {
+        break;
+      }
       if (norm < 1e-3 * sum) {
         return 0.25 * sum * unit;
       }

@@ -121,6 +121,31 @@ TEST(MatrixEquation, ResidualsOfRandomSystems) {
   }
 }
 
+// B = δI - A, whose eigenvalues differ from -A's by δ: (A X - X A) + δX = C. However small δ is,
+// what is left of the equation is rounding beside its terms, and the condition tells of δ; where δ
+// is lost in A's rounding, there is no answer. Sizes on both sides of the kernels' stack.
+TEST(MatrixEquation, EigenvaluesThatNearlyCancel) {
+  Random random(5);
+  for (const int n : {2, 3, 6, 11, 19}) {
+    const MatrixXd A = test::random_matrix(random, n, n);
+    const MatrixXd C = test::random_matrix(random, n, n);
+    for (const double gap : {1.0, 1e-3, 1e-6, 1e-8, 1e-10, 1e-12}) {
+      const MatrixXd B = gap * MatrixXd::Identity(n, n) - A;
+      const auto s = sylvester(A, B, C);
+      ASSERT_TRUE(s) << n << ' ' << gap << ": " << to_string(s.error());
+      const LongMatrix X = wide(s->X);
+      const LongMatrix left = wide(A) * X + X * wide(B) - wide(C);
+      const LongMatrix size = wide(A).cwiseAbs() * X.cwiseAbs() +
+                              X.cwiseAbs() * wide(B).cwiseAbs() + wide(C).cwiseAbs();
+      EXPECT_LE((left.array().abs() / size.array()).maxCoeff(), 1e-15L) << n << ' ' << gap;
+      EXPECT_GE(s->condition, 0.1 / gap) << n << ' ' << gap;
+    }
+    const auto none = sylvester(A, -A, C);
+    ASSERT_FALSE(none) << n;
+    EXPECT_TRUE(none.error().is(MatrixEquationError::no_unique_solution));
+  }
+}
+
 TEST(MatrixEquation, Errors) {
   const MatrixXd I = MatrixXd::Identity(2, 2);
   EXPECT_TRUE(lyapunov(MatrixXd(2, 3), I).error().is(ArgumentError::wrong_shape));

@@ -26,9 +26,10 @@ struct LinearMatrixSolution {
 /// The continuous Lyapunov equation A X + X Aᵀ + Q = 0.
 ///
 /// For a stable A and a symmetric Q by Smith's squared iteration (after a Cayley transform), whose
-/// result is taken where its residual times the condition vouches for it. Else by the Schur form of
-/// the balanced A (Bartels and Stewart), with the residual formed in twice the working precision
-/// and corrected until it is rounding.
+/// result is taken where its residual times the condition vouches for it. Else by the real Schur
+/// form of the balanced A and, where the condition is not ordinary, by its complex one (Bartels and
+/// Stewart), both with the residual formed in twice the working precision and corrected until it is
+/// rounding.
 ///
 /// @param A  n x n, no two of whose eigenvalues add up to zero. It need not be stable.
 /// @param Q  n x n; X is symmetric where Q is.
@@ -45,10 +46,12 @@ struct LinearMatrixSolution {
 [[nodiscard]] Expected<LinearMatrixSolution> discrete_lyapunov(const MatrixRef& A,
                                                                const MatrixRef& Q);
 
-/// The Sylvester equation A X + X B = C, X of n x m.
+/// The Sylvester equation A X + X B = C, X of n x m, by the Hessenberg form of the larger of A and
+/// B and the real Schur form of the other; else as `lyapunov`.
 /// @param A  n x n. @param B  m x m. @param C  n x m.
 /// @errors   As `lyapunov`; the pair is an eigenvalue of A and one of B.
-/// Source: Bartels and Stewart, Comm. ACM 15 (1972).
+/// Source: Bartels and Stewart, Comm. ACM 15 (1972); Golub, Nash and Van Loan, IEEE Trans.
+/// Automatic Control 24 (1979).
 [[nodiscard]] Expected<LinearMatrixSolution> sylvester(const MatrixRef& A, const MatrixRef& B,
                                                        const MatrixRef& C);
 
