@@ -21,7 +21,7 @@ struct LyapunovAnswer {
 /// Doubles of memory for n states.
 inline constexpr int lyapunov_workspace(int n) {
   const int ld = n <= 2 ? 2 : ((n + 3) / 4) * 4;
-  return 11 * ld * n + 9 * ld;
+  return 19 * ld * n + 9 * ld;
 }
 /// Up to this many states the workspace lies on the stack.
 inline constexpr int lyapunov_stack_states = 20;

@@ -15,6 +15,7 @@ class StableLyapunov {
       : data_(data), answer_(answer), n_{data.states}, pivots_(pivots) {
     Workspace work(memory);
     loop_work_ = work.take(6 * size());
+    powers_ = work.take(closed_loop_powers * size());
     for (double** matrix : {&S_, &C_, &X_, &F_, &T_}) {
       *matrix = work.take(size());
     }
@@ -33,33 +34,30 @@ class StableLyapunov {
       return false;
     }
     load();
-    ClosedLoop<N> loop(n_, data_.continuous, S_, loop_work_, pivots_);
+    ClosedLoop<N> loop(n_, data_.continuous, S_, loop_work_, pivots_, powers_);
     const double gain = loop.gain(1e10);
     copy(X_, C_);
     if (!std::isfinite(gain) || !loop.solve(X_)) {
       return false;
     }
-    for (int pass = 0;; ++pass) {
-      const double defect = measure();
-      const double error = gain * (defect + epsilon * scale_);
-      answer_.residual = scale_ > 0.0 ? defect / scale_ : 0.0;
-      answer_.condition = size_X_ > 0.0 ? std::max(1.0, gain * scale_ / size_X_) : gain;
-      // Beyond, the residual in twice the precision earns digits.
-      if (!(answer_.condition < 1e4)) {
-        return false;
-      }
-      if (pass > 0 || defect <= 2.0 * epsilon * scale_) {
-        if (!(error <= 250.0 * n_() * epsilon * size_X_) || !holds_by_entries()) {
-          return false;
-        }
-        break;
-      }
-      if (!loop.solve(F_)) {
-        return false;
-      }
-      for (int k = 0; k < size(); ++k) {
-        X_[k] += F_[k];
-      }
+    mirror(n_, X_);
+    // One correction by the defect in twice the working precision, of which two digits do.
+    defect_twice_precise();
+    if (!loop.solve(F_, 1e-2)) {
+      return false;
+    }
+    const double step = std::sqrt(squared_norm(n_, F_, n_()));
+    for (int k = 0; k < size(); ++k) {
+      X_[k] += F_[k];
+    }
+    const double defect = measure();
+    const double error = gain * (defect + epsilon * scale_);
+    answer_.residual = scale_ > 0.0 ? defect / scale_ : 0.0;
+    answer_.condition = size_X_ > 0.0 ? std::max(1.0, gain * scale_ / size_X_) : gain;
+    // Beyond, more corrections earn digits.
+    if (!(answer_.condition < 1e4) || !(step <= 1e-10 * size_X_) ||
+        !(error <= 250.0 * n_() * epsilon * size_X_) || !holds_by_entries()) {
+      return false;
     }
     for (int j = 0; j < n_(); ++j) {
       for (int i = 0; i < n_(); ++i) {
@@ -92,6 +90,51 @@ class StableLyapunov {
       for (int i = 0; i < n; ++i) {
         C_[i + j * ld()] = 0.5 * (data_.Q[i + j * n] + data_.Q[j + i * n]) / (d_[i] * d_[j]);
       }
+    }
+  }
+
+  /// F = C - L(X), summed in twice the working precision.
+  void defect_twice_precise() {
+    const int n = n_();
+    if constexpr (N == 2 || N == 0) {
+      if (n <= 2) {
+        // Of two states the rows are padded to two; wanted are four.
+        double A[8] = {};
+        double S[8] = {};
+        double X[8] = {};
+        double C[8] = {};
+        double R[8];
+        double work[16];
+        for (int j = 0; j < n; ++j) {
+          for (int i = 0; i < n; ++i) {
+            A[i + 4 * j] = S_[j + 2 * i];
+            S[i + 4 * j] = S_[i + 2 * j];
+            X[i + 4 * j] = X_[i + 2 * j];
+            C[i + 4 * j] = -C_[i + 2 * j];
+          }
+        }
+        sylvester_residual({n, n, data_.continuous, true, A, S, C}, X, R, work);
+        for (int j = 0; j < n; ++j) {
+          for (int i = 0; i < n; ++i) {
+            F_[i + 2 * j] = -R[i + 4 * j];
+          }
+          for (int i = n; i < 2; ++i) {
+            F_[i + 2 * j] = 0.0;
+          }
+        }
+        return;
+      }
+    }
+    double* const work = loop_work_ + 2 * size();
+    double* const A = loop_work_ + 4 * size();
+    for (int k = 0; k < size(); ++k) {
+      A[k] = 0.0;
+      T_[k] = -C_[k];
+    }
+    transpose(n_, A, S_);
+    sylvester_residual({n, n, data_.continuous, true, A, S_, T_}, X_, F_, work);
+    for (int k = 0; k < size(); ++k) {
+      F_[k] = -F_[k];
     }
   }
 
@@ -165,6 +208,7 @@ class StableLyapunov {
   Size<N> n_;
   int* pivots_;
   double* loop_work_;
+  double* powers_;
   double *S_, *C_, *X_, *F_, *T_;
   double *d_, *rows_, *columns_;
   double scale_ = 0.0;

@@ -8,15 +8,19 @@
 
 namespace flyball::detail::FLYBALL_VARIANT {
 
+constexpr int closed_loop_powers = 8;
+
 /// The Lyapunov operator of a closed loop, L(X) = X - SᵀXS or -(SᵀX + XS), whose inverse takes
 /// defects to errors. The continuous one becomes a discrete one by the Cayley transform
 /// A = (S - γI)⁻¹(S + γI) = I + 2γM, M = (S - γI)⁻¹: L⁻¹(C) = Σ (Aᵏ)ᵀ(2γ MᵀCM)Aᵏ.
 template <int N>
 class ClosedLoop {
  public:
-  /// `work` holds six matrices; S is kept.
-  ClosedLoop(Size<N> n, bool continuous, const double* S, double* work, int* pivots)
-      : n_(n), continuous_(continuous), S_(S), work_(work), A_(S) {
+  /// `work` holds six matrices; S is kept. Where `powers` holds `closed_loop_powers` matrices, the
+  /// powers of A are formed once for all solutions.
+  ClosedLoop(Size<N> n, bool continuous, const double* S, double* work, int* pivots,
+             double* powers = nullptr)
+      : n_(n), continuous_(continuous), S_(S), work_(work), powers_(powers), A_(S) {
     if (n() == 2 || !continuous) {
       return;
     }
@@ -66,8 +70,9 @@ class ClosedLoop {
     return sampled_gain(most);
   }
 
-  /// C ← L⁻¹(C), C symmetric; false where the powers of A do not fade.
-  bool solve(double* C) {
+  /// C ← L⁻¹(C), C symmetric; false where the powers of A do not fade. What the series lacks is
+  /// `fade`² beside its sum.
+  bool solve(double* C, double fade = 1e-9) {
     if (!valid_) {
       return false;
     }
@@ -79,43 +84,26 @@ class ClosedLoop {
       }
       return solved;
     }
-    const int ld = n_.padded();
-    const int size = ld * n_();
-    double* A = take(2);
-    double* T = take(3);
-    double* const At = take(4);
-    for (int k = 0; k < size; ++k) {
-      At[k] = 0.0;
-    }
+    const int size = n_.padded() * n_();
     if (continuous_) {
-      congruence(C, M_, At, T);
+      congruence<Product::assign>(C, C, M_);
       for (int k = 0; k < size; ++k) {
         C[k] *= 2.0 * gamma_;
       }
     }
-    for (int k = 0; k < size; ++k) {
-      A[k] = A_[k];
-    }
-    double* const term = take(5);
+    const double* A = A_;
     for (int k = 0; k < 50; ++k) {
-      for (int i = 0; i < size; ++i) {
-        term[i] = C[i];
+      if (k > 0) {
+        A = next_power(k, A);
       }
-      congruence(term, A, At, T);
-      for (int i = 0; i < size; ++i) {
-        C[i] += term[i];
-      }
-      const double power = squared_norm(n_, A, n_());
-      if (!(power < 1e300)) {
+      congruence<Product::add>(C, C, A);
+      const double size_of_power = squared_norm(n_, A, n_());
+      if (!(size_of_power < 1e300)) {
         return false;
       }
-      if (power < 1e-17) {
+      if (size_of_power < fade) {
         return true;
       }
-      multiply(n_, T, ld, A, ld, A, ld, n_(), n_());
-      double* const swapped = A;
-      A = T;
-      T = swapped;
     }
     return false;
   }
@@ -129,12 +117,40 @@ class ClosedLoop {
     }
   }
 
-  /// C ← MᵀCM.
-  void congruence(double* C, const double* M, double* Mt, double* work) const {
+  /// A^(2ᵏ), from the one before.
+  const double* next_power(int k, const double* before) {
     const int ld = n_.padded();
+    double* power = take(2 + k % 2);
+    if (powers_ != nullptr && k <= closed_loop_powers) {
+      power = powers_ + (k - 1) * ld * n_();
+      if (k <= known_powers_) {
+        return power;
+      }
+      known_powers_ = k;
+    }
+    multiply(n_, power, ld, before, ld, before, ld, n_(), n_());
+    return power;
+  }
+
+  /// R = or += MᵀCM, C and R symmetric.
+  template <Product Kind>
+  void congruence(double* R, const double* C, const double* M) const {
+    const int ld = n_.padded();
+    double* const Mt = take(4);
+    double* const CM = take(5);
+    for (int j = 0; j < n_(); ++j) {
+      for (int i = n_(); i < ld; ++i) {
+        Mt[i + j * ld] = 0.0;
+      }
+    }
     transpose(n_, Mt, M);
-    multiply(n_, work, ld, C, ld, M, ld, n_(), n_());
-    multiply(n_, C, ld, Mt, ld, work, ld, n_(), n_());
+    multiply(n_, CM, ld, C, ld, M, ld, n_(), n_());
+    if (n_() > 8) {
+      multiply<N, Kind, true>(n_, R, ld, Mt, ld, CM, ld, n_(), n_());
+      mirror(n_, R);
+    } else {
+      multiply<N, Kind>(n_, R, ld, Mt, ld, CM, ld, n_(), n_());
+    }
   }
 
   double sampled_gain(double most) {
@@ -183,6 +199,8 @@ class ClosedLoop {
   double gamma_ = 0.0;
   const double* S_;
   double* work_;
+  double* powers_;
+  int known_powers_ = 0;
   const double* A_;
   const double* M_ = nullptr;
 };

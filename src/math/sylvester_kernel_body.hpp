@@ -51,7 +51,7 @@ class HessenbergSchur {
     }
     double previous = std::numeric_limits<double>::infinity();
     for (int pass = 0;; ++pass) {
-      sylvester_residual({n_, m_, data_.continuous, false, A_, B_, F_}, X_, R_, first_);
+      sylvester_residual({n_, m_, data_.continuous, data_.symmetric, A_, B_, F_}, X_, R_, first_);
       transform(R_, Y_, lda_);
       if (!solve_transformed<1>()) {
         return false;

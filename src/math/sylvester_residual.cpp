@@ -56,7 +56,7 @@ inline __attribute__((always_inline)) void residual(const SylvesterData& data, c
     }
   }
   for (int j = 0; j < m; ++j) {
-    for (int i = 0; i < ld; i += width) {
+    for (int i = data.symmetric ? j / width * width : 0; i < ld; i += width) {
       Sums s{*reinterpret_cast<const Vector*>(data.F + i + j * ld), Vector{}};
       if (data.continuous) {
         add_columns(s, data.A + i, ld, X + j * ld, n, -1.0);
@@ -77,6 +77,16 @@ inline __attribute__((always_inline)) void residual(const SylvesterData& data, c
   }
 }
 
+/// The upper triangle of an R that is symmetric is its lower one.
+void mirror(int n, double* R) {
+  const int ld = padded_rows(n);
+  for (int j = 1; j < n; ++j) {
+    for (int i = 0; i < j; ++i) {
+      R[i + j * ld] = R[j + i * ld];
+    }
+  }
+}
+
 void residual_baseline(const SylvesterData& data, const double* X, double* R, double* work) {
   residual(data, X, R, work);
 }
@@ -92,12 +102,13 @@ __attribute__((target("avx2,fma"))) void residual_wide(const SylvesterData& data
 
 void sylvester_residual(const SylvesterData& padded, const double* X, double* R, double* work) {
 #ifdef FLYBALL_WIDE_VECTORS
-  if (has_wide_vectors()) {
-    residual_wide(padded, X, R, work);
-    return;
-  }
-#endif
+  (has_wide_vectors() ? residual_wide : residual_baseline)(padded, X, R, work);
+#else
   residual_baseline(padded, X, R, work);
+#endif
+  if (padded.symmetric) {
+    mirror(padded.rows, R);
+  }
 }
 
 }  // namespace flyball::detail

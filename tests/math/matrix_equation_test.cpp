@@ -48,8 +48,8 @@ TEST(MatrixEquation, GoldenCases) {
     }
     ASSERT_TRUE(s) << to_string(s.error());
     const MatrixXd X = test::matrix_from(c.at("X"));
-    EXPECT_LE((s->X - X).norm(), 4e-15 * X.norm());
-    EXPECT_LT(s->residual, 4e-15);
+    EXPECT_LE((s->X - X).norm(), 4e-16 * X.norm());
+    EXPECT_LT(s->residual, 1e-15);
   }
 }
 
@@ -116,8 +116,9 @@ TEST(MatrixEquation, ResidualsOfRandomSystems) {
         [&](const LongMatrix& X) -> LongMatrix { return a * X * b.cwiseAbs() + X + c.cwiseAbs(); });
   }
   refusals.expect_at_most(0);
+  // Of the reference cases, CAREX 2.7 alone is not corrected entry by entry.
   for (const test::Law* law : {&continuous, &discrete, &mixed, &product}) {
-    law->expect_within(1e-14, 1e-14, 9000);
+    law->expect_within(1e-15, 1e-14, 9000);
   }
 }
 

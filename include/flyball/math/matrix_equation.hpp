@@ -25,11 +25,11 @@ struct LinearMatrixSolution {
 
 /// The continuous Lyapunov equation A X + X Aᵀ + Q = 0.
 ///
-/// For a stable A and a symmetric Q by Smith's squared iteration (after a Cayley transform), whose
-/// result is taken where its residual times the condition vouches for it. Else by the real Schur
-/// form of the balanced A and, where the condition is not ordinary, by its complex one (Bartels and
-/// Stewart), both with the residual formed in twice the working precision and corrected until it is
-/// rounding.
+/// For a stable A and a symmetric Q by Smith's squared iteration (after a Cayley transform),
+/// corrected once by its residual in twice the working precision and taken where its residual times
+/// the condition vouches for it. Else by the real Schur form of the balanced A and, where the
+/// condition is not ordinary, by its complex one (Bartels and Stewart), both with the residual
+/// formed in twice the working precision and corrected until it is rounding.
 ///
 /// @param A  n x n, no two of whose eigenvalues add up to zero. It need not be stable.
 /// @param Q  n x n; X is symmetric where Q is.
