@@ -173,9 +173,9 @@ PencilMinimum ModeDistance::at(Complex lambda) const {
 
 PencilMinimum ModeDistance::near(Complex lambda, double enough) const {
   PencilMinimum best = at(lambda);
-  constexpr double suspicious = 1e-5;
+  const double suspicious = std::max(1e-5 * size_A_, 1e3 * enough);
   for (int pass = 0; pass < 4; ++pass) {
-    if (best.value <= enough || best.value > suspicious * size_A_) {
+    if (best.value <= enough || best.value > suspicious) {
       break;
     }
     const Eigen::VectorXcd& u = best.left;

@@ -227,12 +227,12 @@ Expected<MinimalRealization<Continuous>> minimal(const Continuous& system, doubl
   const MatrixXd B = scaling.states.cwiseInverse().asDiagonal() * system.B;
   const MatrixXd C = system.C * scaling.states.asDiagonal();
 
-  const detail::Staircase reach = detail::staircase_of(A, B, small);
-  const Index r = reach.rank;
-  const MatrixXd C_r = product(C, reach.Q.leftCols(r));
-  const detail::Staircase sight =
-      detail::staircase_of(reach.A.topLeftCorner(r, r).transpose(), C_r.transpose(), small);
-  const Index k = sight.rank;
+  const detail::ReachedPart reach = detail::reached_part_of(A, B, small, {A.norm(), B.norm()});
+  const Index r = reach.A.rows();
+  const MatrixXd C_r = product(C, reach.V);
+  const detail::ReachedPart sight =
+      detail::reached_part_of(reach.A.transpose(), C_r.transpose(), small, {A.norm(), C.norm()});
+  const Index k = sight.A.rows();
 
   MinimalRealization<Continuous> found;
   found.unreached = n - r;
@@ -242,12 +242,11 @@ Expected<MinimalRealization<Continuous>> minimal(const Continuous& system, doubl
     found.T = MatrixXd::Identity(n, n);
     return found;
   }
-  const MatrixXd B_r = reach.B.topRows(r);
-  found.system.A = sight.A.topLeftCorner(k, k).transpose();
-  found.system.B = detail::transposed_product(sight.Q.leftCols(k), B_r);
-  found.system.C = sight.B.topRows(k).transpose();
+  found.system.A = sight.A.transpose();
+  found.system.B = detail::transposed_product(sight.V, reach.B);
+  found.system.C = sight.B.transpose();
   found.system.D = system.D;
-  found.T = scaling.states.asDiagonal() * product(reach.Q.leftCols(r), sight.Q.leftCols(k));
+  found.T = scaling.states.asDiagonal() * product(reach.V, sight.V);
   return found;
 }
 

@@ -3,6 +3,7 @@
 
 #include "math/dense.hpp"
 #include "math/dense_reduction.hpp"
+#include "systems/mode_distance.hpp"
 #include "systems/staircase.hpp"
 
 namespace flyball::detail {
@@ -86,14 +87,17 @@ Turned turned_of(const MatrixXd& block, double threshold) {
 }  // namespace
 
 Staircase staircase_of(const MatrixRef& A, const MatrixRef& B, double tolerance) {
+  return staircase_of(A, B, tolerance, {A.norm(), B.norm()});
+}
+
+Staircase staircase_of(const MatrixRef& A, const MatrixRef& B, double tolerance, PairSizes sizes) {
   const Index n = A.rows();
   Staircase s;
   s.A = A;
   s.B = B;
   s.Q = MatrixXd::Identity(n, n);
-  const double size_A = A.norm();
   MatrixXd block = B;
-  double unit = B.norm();
+  double unit = sizes.B;
   while (s.rank < n && block.cols() > 0) {
     if (!(unit > 0.0)) {
       break;
@@ -135,12 +139,78 @@ Staircase staircase_of(const MatrixRef& A, const MatrixRef& B, double tolerance)
     s.stairs.push_back(step);
     s.rank += step;
     block = s.A.block(s.rank, s.rank - step, n - s.rank, step);
-    unit = size_A;
+    unit = sizes.A;
   }
   if (s.rank < n && s.rank > 0) {
     s.A.bottomLeftCorner(n - s.rank, s.rank).setZero();
   }
   return s;
+}
+
+namespace {
+
+/// The mode of the smallest distance, as columns that span its left vectors; none if each is above
+/// the threshold.
+MatrixXd cut_off_mode(const MatrixXd& A, const MatrixXd& B, double threshold) {
+  MatrixXd directions(A.rows(), 0);
+  const Eigen::VectorXcd modes = eigenvalues_of(A);
+  if (!modes.allFinite()) {
+    return directions;
+  }
+  const ModeDistance distances(A, B);
+  double least = threshold;
+  for (const std::complex<double>& lambda : modes) {
+    if (lambda.imag() < 0.0) {
+      continue;
+    }
+    PencilMinimum found = distances.near(lambda, threshold);
+    MatrixXd left = found.left.real();
+    if (lambda.imag() > 0.0) {
+      // A real change cuts off the plane of a complex vector: the flatter that is, the larger.
+      left.conservativeResize(Eigen::NoChange, 2);
+      left.col(1) = found.left.imag();
+      const double flatness = std::sqrt(2.0) * svd_of(left).values(1);
+      if (found.value > threshold * flatness) {
+        found = distances.near(lambda.real(), threshold);
+        left = found.left.real();
+      } else {
+        found.value /= flatness;
+      }
+    }
+    if (found.value <= least) {
+      least = found.value;
+      directions = left;
+    }
+  }
+  return directions;
+}
+
+}  // namespace
+
+ReachedPart reached_part_of(const MatrixRef& A, const MatrixRef& B, double tolerance,
+                            PairSizes sizes) {
+  const double unit = sizes.A > 0.0 && sizes.B > 0.0 ? sizes.A / sizes.B : 1.0;
+  const double threshold = tolerance * std::hypot(sizes.A, unit * sizes.B);
+  ReachedPart part{A, B, MatrixXd::Identity(A.rows(), A.rows())};
+  for (;;) {
+    const Staircase stairs = staircase_of(part.A, part.B, tolerance, sizes);
+    const Index r = stairs.rank;
+    part.V = product(part.V, stairs.Q.leftCols(r));
+    part.A = stairs.A.topLeftCorner(r, r);
+    part.B = stairs.B.topRows(r);
+    if (r == 0) {
+      return part;
+    }
+    const MatrixXd left = cut_off_mode(part.A, unit * part.B, threshold);
+    if (left.cols() == 0) {
+      return part;
+    }
+    // wᵀA = λwᵀ, wᵀB = 0: what is orthogonal to w stays so.
+    const MatrixXd rest = full_qr(left).Q.rightCols(r - left.cols());
+    part.A = transposed_product(rest, product(part.A, rest));
+    part.B = transposed_product(rest, part.B);
+    part.V = product(part.V, rest);
+  }
 }
 
 }  // namespace flyball::detail

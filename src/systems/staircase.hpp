@@ -25,4 +25,26 @@ struct Staircase {
 /// Trans. Automatic Control 26 (1981).
 [[nodiscard]] Staircase staircase_of(const MatrixRef& A, const MatrixRef& B, double tolerance);
 
+/// What a tolerance is relative to, where A and B are parts of larger matrices.
+struct PairSizes {
+  double A = 0.0;
+  double B = 0.0;
+};
+[[nodiscard]] Staircase staircase_of(const MatrixRef& A, const MatrixRef& B, double tolerance,
+                                     PairSizes sizes);
+
+/// What u moves: VᵀAV, VᵀB of an orthonormal V whose complement no input moves.
+struct ReachedPart {
+  Eigen::MatrixXd A;
+  Eigen::MatrixXd B;
+  Eigen::MatrixXd V;  ///< n x order.
+};
+
+/// The staircase's reached part, without the modes of it that their own test finds cut off: past a
+/// weak step ε the staircase sees what no input moves as rounding/ε.
+/// @param tolerance  What is left out would be cut off by changes of A, B of this size relative to
+/// `sizes`.
+[[nodiscard]] ReachedPart reached_part_of(const MatrixRef& A, const MatrixRef& B, double tolerance,
+                                          PairSizes sizes);
+
 }  // namespace flyball::detail
