@@ -107,7 +107,12 @@ class Gain {
       const double b = std::abs(G_.col(0).dot(G_.col(1)));
       return std::sqrt(0.5 * (a + d + std::hypot(a - d, 2.0 * b)));
     }
-    return detail::singular_values_of_complex(G_)(0);
+    // Squares lose nothing of the largest; the doubled real matrix has each of them twice.
+    const Eigen::MatrixXcd square = detail::complex_product(G_.adjoint(), G_);
+    const Index m = square.rows();
+    MatrixXd doubled(2 * m, 2 * m);
+    doubled << square.real(), -square.imag(), square.imag(), square.real();
+    return std::sqrt(detail::symmetric_eigensystem_of(doubled).values(2 * m - 1));
   }
 
   MatrixXd H_, B_, C_, D_;

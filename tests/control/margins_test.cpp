@@ -276,13 +276,25 @@ TEST(StabilityMargins, FlipStabilityForRandomPlants) {
 
 // A delay of many periods, where the loop's phase winds around several times.
 TEST(StabilityMargins, LongDelay) {
-  const auto plant = ContinuousSystem<>{scalar(-1.0), scalar(1.0), scalar(1.0), scalar(0.0)};
-  const auto loop =
-      state_feedback_loop(plant.A, plant.B, scalar(1.2), Time(0.005), Time(0.3)).value();
+  const double T = 0.005;
+  const auto loop_with = [&](double K) {
+    return state_feedback_loop(scalar(-1.0), scalar(1.0), scalar(K), Time(T), Time(0.3)).value();
+  };
+  const auto loop = loop_with(3.0);
   expect_margins_flip(loop);
-  const auto margins = stability_margins(loop).value();
+  EXPECT_GT(stability_margins(loop).value().phase_crossovers.size(), 20u);
+  // L = K b z⁻ᵈ/(z - a) is 1 in size at cos θ = (1 + a² - K²b²)/(2a), where the delay may turn it
+  // by π - arg(z - a) in all; 770 stored inputs are too many for eigenvalues. A part of a period is
+  // that part of its lag but for a few thousandths, T against the plant's time constant.
+  const double K = 1.2;
+  const double a = std::exp(-T);
+  const double b = -std::expm1(-T);
+  const double theta = std::acos((1.0 + a * a - K * K * b * b) / (2.0 * a));
+  const double periods = (pi - std::arg(std::polar(1.0, theta) - a)) / theta;
+  const auto margins = stability_margins(loop_with(K)).value();
   EXPECT_GT(margins.phase_crossovers.size(), 20u);
-  EXPECT_GT(margins.delay_margin, 1.0);
+  EXPECT_NEAR(margins.delay_margin, periods * T - 0.3, 5e-3 * T);
+  EXPECT_GT(margins.delay_margin, 3.0);
 }
 
 // The book's remark on 7.7.2: with state feedback and a short period the LQR keeps 60°, and a gain
