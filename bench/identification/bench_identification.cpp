@@ -101,10 +101,14 @@ void run(const scenarios::Truth& truth, std::uint64_t first, std::uint64_t seeds
       ols_kA.push_back(std::abs(fit->one_step->kA / truth.kA - 1.0));
     }
   }
+  const auto slowest = std::max_element(seconds.begin(), seconds.end()) - seconds.begin();
   std::printf(
-      "%s: %llu seeds, %zu refused, %.0f ms a fit (worst %.0f), one-step OLS kA error %.0f %%\n",
+      "%s: %llu seeds, %zu refused, %.0f ms a fit (worst %.0f, seed %llu), one-step OLS kA error "
+      "%.0f %%\n",
       std::string(truth.name).c_str(), static_cast<unsigned long long>(seeds), refused,
-      1e3 * quantile(seconds, 0.5), 1e3 * quantile(seconds, 1.0), 100.0 * quantile(ols_kA, 0.5));
+      1e3 * quantile(seconds, 0.5), 1e3 * quantile(seconds, 1.0),
+      static_cast<unsigned long long>(first) + static_cast<unsigned long long>(slowest),
+      100.0 * quantile(ols_kA, 0.5));
   for (const Tally& tally : tallies) {
     if (!tally.errors.empty()) {
       print(tally);
