@@ -26,8 +26,8 @@ bool solve_stable_lyapunov(const LyapunovData& data, LyapunovAnswer& answer) {
   }
   const auto n = static_cast<std::size_t>(data.states);
   const auto count = static_cast<std::size_t>(lyapunov_workspace(data.states));
-  return solve(data, answer, std::make_unique<double[]>(count).get(),
-               std::make_unique<int[]>(n).get());
+  return solve(data, answer, std::unique_ptr<double[]>(new double[count]).get(),
+               std::unique_ptr<int[]>(new int[n]).get());
 }
 
 }  // namespace flyball::detail

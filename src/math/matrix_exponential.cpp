@@ -52,7 +52,7 @@ Expected<MatrixXd> expm(const MatrixRef& A) {
     detail::exponential(n, A.data(), E.data(), memory);
   } else {
     const auto count = static_cast<std::size_t>(detail::exponential_workspace(n));
-    detail::exponential(n, A.data(), E.data(), std::make_unique<double[]>(count).get());
+    detail::exponential(n, A.data(), E.data(), std::unique_ptr<double[]>(new double[count]).get());
   }
   if (!E.allFinite()) {
     const double scale = std::max(1.0, A.cwiseAbs().maxCoeff());

@@ -3,6 +3,7 @@
 // The kernel of matrix_exponential_kernel.hpp for one instruction set; see riccati_kernel_body.hpp.
 
 #include "math/balance_small.hpp"
+#include "math/gauss_jordan.hpp"
 #include "math/small_matrix.hpp"
 
 namespace flyball::detail::FLYBALL_VARIANT {
@@ -410,6 +411,21 @@ class Exponential {
       const double v = R[k];
       M[k] = v - u;
       R[k] = v + u;
+    }
+    if (N == 0 && n >= 3 * panel_columns) {
+      int pivots[panel_columns];
+      for (int first = 0; first < n; first += panel_columns) {
+        const int count = std::min(panel_columns, n - first);
+        const double* const panel = M + first * rows;
+        if (!eliminate_panel(n_, M + first * rows, first, count, 1.0, pivots)) {
+          // Singular, or not a number: so is the result.
+          scale(R, std::numeric_limits<double>::quiet_NaN());
+          return;
+        }
+        apply_panel(n_, panel, first, count, pivots, M + (first + count) * rows, n - first - count);
+        apply_panel(n_, panel, first, count, pivots, R, n);
+      }
+      return;
     }
     for (int k = 0; k < n; ++k) {
       double* const column = M + k * rows;

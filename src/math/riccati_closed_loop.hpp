@@ -3,6 +3,7 @@
 // Part of riccati_kernel_body.hpp, compiled with it once for each instruction set: the Lyapunov
 // operator of a closed loop, by which the kernel judges and corrects what it found.
 
+#include "math/gauss_jordan.hpp"
 #include "math/riccati_two_states.hpp"
 #include "math/small_matrix.hpp"
 

@@ -3,6 +3,7 @@
 // The kernel of riccati_kernel.hpp for one instruction set: the including source has chosen
 // FLYBALL_VARIANT and included what stands in the standard library.
 
+#include "math/gauss_jordan.hpp"
 #include "math/hessenberg_eigenvalues.hpp"
 #include "math/riccati_closed_loop.hpp"
 #include "math/riccati_two_states.hpp"

@@ -147,6 +147,31 @@ TEST(MatrixEquation, EigenvaluesThatNearlyCancel) {
   }
 }
 
+// Stable equations of the sizes that are eliminated by panels, whole and not: what is left of each
+// entry is rounding beside its terms.
+TEST(MatrixEquation, ManyStates) {
+  Random random(6);
+  for (const int n : {23, 24, 31, 50}) {
+    MatrixXd A = test::random_matrix(random, n, n);
+    A -= (A.norm() + 0.1) * MatrixXd::Identity(n, n);
+    const MatrixXd B = test::random_matrix(random, n, 2);
+    const MatrixXd Q = B * B.transpose();
+    const LongMatrix a = wide(A);
+    const LongMatrix X = wide(lyapunov(A, Q).value().X);
+    const LongMatrix left = a * X + X * a.transpose() + wide(Q);
+    const LongMatrix size =
+        a.cwiseAbs() * X.cwiseAbs() + X.cwiseAbs() * a.cwiseAbs().transpose() + wide(Q).cwiseAbs();
+    EXPECT_LE((left.array().abs() / size.array()).maxCoeff(), 1e-15L) << n;
+    const MatrixXd F = A / (1.1 * A.norm());
+    const LongMatrix f = wide(F);
+    const LongMatrix Y = wide(discrete_lyapunov(F, Q).value().X);
+    const LongMatrix rest = f * Y * f.transpose() - Y + wide(Q);
+    const LongMatrix terms =
+        f.cwiseAbs() * Y.cwiseAbs() * f.cwiseAbs().transpose() + Y.cwiseAbs() + wide(Q).cwiseAbs();
+    EXPECT_LE((rest.array().abs() / terms.array()).maxCoeff(), 1e-15L) << n;
+  }
+}
+
 TEST(MatrixEquation, Errors) {
   const MatrixXd I = MatrixXd::Identity(2, 2);
   EXPECT_TRUE(lyapunov(MatrixXd(2, 3), I).error().is(ArgumentError::wrong_shape));

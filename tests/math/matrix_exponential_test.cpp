@@ -10,6 +10,7 @@
 #include <flyball/core/random.hpp>
 
 #include "math/matrices_json.hpp"
+#include "support/laws.hpp"
 
 namespace flyball {
 namespace {
@@ -111,6 +112,23 @@ TEST(MatrixExponential, BadScalingIsUndone) {
     const MatrixXd scaled = d.cwiseInverse().asDiagonal() * A * d.asDiagonal();
     const MatrixXd back = d.asDiagonal() * expm(scaled).value() * d.cwiseInverse().asDiagonal();
     EXPECT_LT(relative_error(back, expm(A).value()), 1e-13);
+  }
+}
+
+// Sizes whose quotient is eliminated by panels, whole and not, rows swapped, against the series in
+// 64 bits.
+TEST(MatrixExponential, ManyStates) {
+  Random random(7);
+  for (const int n : {23, 24, 31, 50}) {
+    for (const double norm : {0.01, 5.0, 60.0}) {
+      MatrixXd A = MatrixXd::NullaryExpr(n, n, [&random] { return random.normal(); });
+      A *= norm / A.norm();
+      const test::LongMatrix expected = test::exponential(test::wide(A));
+      const auto E = expm(A);
+      ASSERT_TRUE(E) << n << ' ' << norm;
+      EXPECT_LE((test::wide(*E) - expected).norm(), 1e-15L * (1.0 + norm) * expected.norm())
+          << n << ' ' << norm;
+    }
   }
 }
 
