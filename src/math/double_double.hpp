@@ -12,6 +12,8 @@
 namespace flyball::detail {
 
 struct DoubleDoubleMatrix {
+  static constexpr double precision = 1e-30;
+
   Eigen::MatrixXd hi;
   Eigen::MatrixXd lo;
 

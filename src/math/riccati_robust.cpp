@@ -2,6 +2,8 @@
 #include <cmath>
 #include <limits>
 
+#include <flyball/core/random.hpp>
+
 #include "math/dense.hpp"
 #include "math/riccati_robust.hpp"
 
@@ -64,6 +66,22 @@ VectorXd balance(const ReducedRiccati& reduced) {
 bool is_stable(const Eigen::VectorXcd& poles, const MatrixXd& closed_loop, bool continuous) {
   return continuous ? poles.real().maxCoeff() < -1e-15 * closed_loop.norm()
                     : poles.cwiseAbs().maxCoeff() < 1.0 - 1e-14;
+}
+
+/// Whether it stays stable whatever the last digits of its entries are: where X cancels to more
+/// than twice the working precision, the closed loop may hang on them.
+bool survives_rounding(const MatrixXd& closed_loop, bool continuous) {
+  constexpr int draws = 8;
+  constexpr double step = epsilon;
+  Random random(1);
+  for (int draw = 0; draw < draws; ++draw) {
+    const MatrixXd other = closed_loop.unaryExpr(
+        [&](double x) { return x * (random.uniform() < 0.5 ? 1.0 - step : 1.0 + step); });
+    if (!is_stable(eigenvalues_of(other), other, continuous)) {
+      return false;
+    }
+  }
+  return true;
 }
 
 }  // namespace
@@ -142,9 +160,24 @@ Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem) 
   solution.X = inverse.asDiagonal() * answer->X * inverse.asDiagonal();
   solution.K = answer->K * inverse.asDiagonal();
   solution.poles = eigenvalues_of(answer->closed_loop);
-  if (!solution.X.allFinite() || !solution.K.allFinite() ||
-      !is_stable(solution.poles, answer->closed_loop, p.continuous)) {
+  if (!solution.X.allFinite() || !solution.K.allFinite()) {
     return tl::unexpected(diagnose_riccati(p));
+  }
+  if (!is_stable(solution.poles, answer->closed_loop, p.continuous) ||
+      (answer->cancels && !survives_rounding(answer->closed_loop, p.continuous))) {
+    Error why = diagnose_riccati(p);
+    if (why.is(RiccatiError::no_convergence)) {
+      why = Error(RiccatiError::no_convergence)
+                .in(p.continuous ? "care" : "dare")
+                .about("A - BK")
+                .got("stable or not by the last digits of its entries")
+                .expected("stable")
+                .hint(
+                    "the plant grows too much in a step, or hangs on its inputs by too little, "
+                    "for 16 digits: sample faster, or add an input")
+                .with("size of X", answer->X.norm());
+    }
+    return tl::unexpected(std::move(why));
   }
   const double size = answer->X.norm();
   solution.residual = answer->scale > 0.0 ? answer->residual / answer->scale : 0.0;

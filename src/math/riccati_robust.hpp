@@ -43,11 +43,13 @@ struct ExtendedRiccati {
   double gain = 0.0;      ///< ‖L⁻¹(I)‖ of the closed loop's Lyapunov operator.
   double scale = 0.0;     ///< Sum of the norms of F's terms.
   double residual = 0.0;  ///< ‖F(X)‖ of the rounded X.
+  bool cancels = false;   ///< Twice the working precision was not enough.
   int iterations = 0;
 };
 
 /// Doubling and Newton's method in twice the working precision, from several shifts (discrete) and
-/// Cayley parameters (continuous); nothing where none converges to a stabilising solution.
+/// Cayley parameters (continuous), and in four times where that is not enough; nothing where none
+/// converges to a stabilising solution.
 [[nodiscard]] std::optional<ExtendedRiccati> solve_riccati_extended(const RiccatiProblem& p);
 
 /// Balances, solves in twice the working precision, verifies; the careful way for data that the
