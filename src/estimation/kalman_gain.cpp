@@ -1,12 +1,77 @@
 #include <flyball/estimation/kalman_gain.hpp>
 
+#include <optional>
 #include <string>
 
+#include <flyball/math/matrix_equation.hpp>
 #include <flyball/math/riccati.hpp>
 
 #include "math/dense.hpp"
+#include "math/double_double.hpp"
 
 namespace flyball {
+
+namespace {
+
+using detail::DoubleDoubleMatrix;
+
+/// What a measurement makes of the covariance P: K = P Cᵀ(C P Cᵀ + R)⁻¹, P⁺ = P - K C P.
+struct Update {
+  DoubleDoubleMatrix K;
+  DoubleDoubleMatrix P;
+};
+
+std::optional<Update> update_of(const DoubleDoubleMatrix& P, const DoubleDoubleMatrix& C,
+                                const DoubleDoubleMatrix& R) {
+  const DoubleDoubleMatrix CP = product(C, P);
+  const auto K = solve(symmetrized(add_product(R, 1.0, CP, C.transpose())), CP);
+  if (!K || !K->all_finite()) {
+    return std::nullopt;
+  }
+  DoubleDoubleMatrix gain = K->transpose();
+  DoubleDoubleMatrix posterior = symmetrized(add_product(P, -1.0, gain, CP));
+  return Update{std::move(gain), std::move(posterior)};
+}
+
+/// P to more digits than a double has, and its update. Where the outputs hardly show a growing
+/// mode, P is large along it, and what its rounding does elsewhere is more than K and P⁺ there:
+/// Newton's method with the residual in twice the working precision gives the missing digits.
+struct Filter {
+  DoubleDoubleMatrix P;
+  Update update;
+};
+
+std::optional<Filter> corrected(const MatrixRef& A, const MatrixRef& C, const Eigen::MatrixXd& Q,
+                                const Eigen::MatrixXd& R, const Eigen::MatrixXd& P) {
+  constexpr int most_steps = 5;
+  constexpr double small = 1e-3;
+  constexpr double last = 1e-12;
+  const DoubleDoubleMatrix a(A);
+  const DoubleDoubleMatrix c(C);
+  const DoubleDoubleMatrix q(detail::symmetrized(Q));
+  const DoubleDoubleMatrix r(detail::symmetrized(R));
+  DoubleDoubleMatrix p(P);
+  auto update = update_of(p, c, r);
+  for (int step = 0; step < most_steps && update; ++step) {
+    const DoubleDoubleMatrix predicted = add_product(q, 1.0, product(a, update->P), a.transpose());
+    const DoubleDoubleMatrix loop = add_product(a, -1.0, product(a, update->K), c);
+    const auto missing = discrete_lyapunov(loop.rounded(), sum(predicted, -1.0, p).rounded());
+    if (!missing || !(missing->X.norm() <= small * P.norm())) {
+      break;
+    }
+    p = symmetrized(sum(std::move(p), 1.0, DoubleDoubleMatrix(missing->X)));
+    update = update_of(p, c, r);
+    if (missing->X.norm() <= last * P.norm()) {
+      break;
+    }
+  }
+  if (!update) {
+    return std::nullopt;
+  }
+  return Filter{std::move(p), std::move(*update)};
+}
+
+}  // namespace
 
 Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const Covariance& Q,
                                    const Covariance& R) {
@@ -44,17 +109,19 @@ Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const
     return tl::unexpected(std::move(error));
   }
 
-  const Eigen::MatrixXd& P = dual->X;
-  const Eigen::MatrixXd S = C * P * C.transpose() + noise_R;
-  // L = A K is the dual's gain; K itself does not need an inverse of A.
-  const Eigen::MatrixXd K = detail::solve_symmetric(S, C * P).transpose();
-  const Eigen::MatrixXd I_KC = Eigen::MatrixXd::Identity(n, n) - K * C;
+  const auto filter = corrected(A, C, noise_Q, noise_R, dual->X);
+  if (!filter) {
+    return tl::unexpected(Error(RiccatiError::singular)
+                              .in(std::string(where))
+                              .about("C P Cᵀ + R")
+                              .got("singular")
+                              .hint("give each output a noise of its own in R"));
+  }
   KalmanGain<> gain;
-  gain.K = K;
-  gain.L = dual->K.transpose();
-  gain.P_prior = P;
-  const Eigen::MatrixXd posterior = I_KC * P * I_KC.transpose() + K * noise_R * K.transpose();
-  gain.P_posterior = 0.5 * (posterior + posterior.transpose());
+  gain.K = filter->update.K.rounded();
+  gain.L = product(DoubleDoubleMatrix(A), filter->update.K).rounded();
+  gain.P_prior = detail::symmetrized(filter->P.rounded());
+  gain.P_posterior = detail::symmetrized(filter->update.P.rounded());
   gain.poles = dual->poles;
   gain.residual = dual->residual;
   gain.condition = dual->condition;

@@ -11,14 +11,14 @@
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/systems/discretize.hpp>
 
+#include "support/laws.hpp"
 #include "support/oracle.hpp"
+#include "support/random_systems.hpp"
 
 namespace flyball {
 namespace {
 
-Eigen::MatrixXd random_matrix(Random& random, Eigen::Index rows, Eigen::Index columns) {
-  return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return random.normal(); });
-}
+using test::random_matrix;
 
 // A scalar random walk, A = C = 1, Q = q, R = r: P² - q P - q r = 0, so
 // P = (q + sqrt(q² + 4 q r))/2 and K = P/(P + r). With q = 1, r = 2: P = 2, K = 1/2, P⁺ = 1.
@@ -130,6 +130,124 @@ TEST(KalmanGain, Errors) {
   EXPECT_TRUE(hidden.error().is(RiccatiError::not_stabilizable));
   EXPECT_EQ(hidden.error().where(), "kalman_gain");
   EXPECT_FALSE(hidden.error().evidence().empty());
+}
+
+/// 10 000 systems' duals are plants with a filter: Q and R semidefinite and definite.
+struct FilterLaws {
+  test::Law gain{"K (C P C' + R) = P C'"};
+  test::Law predictor{"L = A K"};
+  test::Law update{"P+ = (I - K C) P (I - K C)' + K R K'"};
+  test::Law prediction{"P = A P+ A' + Q"};
+  test::Law definite{"P, P+ and P - P+ are semidefinite"};
+  test::Law poles{"poles of A (I - K C)"};
+
+  void check(const test::RandomSystem& s, const KalmanGain<>& found, int trial) {
+    using test::wide;
+    // In plain units: x = diag(states)⁻¹ x', y = diag(inputs)⁻¹ y'.
+    const test::RandomSystem p = test::plain(s);
+    const Eigen::MatrixXd x = s.states.cwiseInverse().asDiagonal();
+    const Eigen::MatrixXd y = s.inputs.asDiagonal();
+    const test::LongMatrix A = wide(p.A.transpose());
+    const test::LongMatrix C = wide(p.B.transpose());
+    const test::LongMatrix K = wide(x * found.K * y);
+    const test::LongMatrix L = wide(x * found.L * y);
+    const test::LongMatrix P = wide(x * found.P_prior * x);
+    const test::LongMatrix after = wide(x * found.P_posterior * x);
+    const test::LongMatrix R = wide(p.R);
+    const test::LongMatrix I = test::LongMatrix::Identity(P.rows(), P.cols());
+    const test::LongMatrix weight = C * P * C.transpose() + R;
+    const long double epsilon = test::epsilon;
+    gain.holds(
+        (K * weight - P * C.transpose()).norm() /
+            (epsilon * (K.norm() * (C.squaredNorm() * P.norm() + R.norm()) + P.norm() * C.norm())),
+        trial, s);
+    predictor.holds((L - A * K).norm() / (epsilon * A.norm() * K.norm()), trial, s);
+    const test::LongMatrix keep = I - K * C;
+    const long double kept = 1.0L + K.norm() * C.norm();
+    update.holds((after - keep * P * keep.transpose() - K * R * K.transpose()).norm() /
+                     (epsilon * (kept * kept * P.norm() + K.squaredNorm() * R.norm())),
+                 trial, s);
+    prediction.holds((A * after * A.transpose() + wide(p.Q) - P).norm() /
+                         (epsilon * (A.squaredNorm() * after.norm() + P.norm() + p.Q.norm() +
+                                     A.squaredNorm() * kept * P.norm())),
+                     trial, s);
+    const auto least = [](const test::LongMatrix& S) {
+      return test::symmetric_eigenvalues(S.cast<double>())(0);
+    };
+    const auto size = static_cast<double>(epsilon * P.norm());
+    // Weights of the reference cases may be indefinite.
+    if (s.kind != test::SystemClass::reference) {
+      definite.holds(-std::min({least(P), least(after), least(P - after)}) / size, trial, s);
+    }
+    const Eigen::MatrixXd loop = (A * keep).cast<double>();
+    poles.holds(
+        std::max(test::eigenvalues(loop).cwiseAbs().maxCoeff(), found.poles.cwiseAbs().maxCoeff()) -
+            1.0,
+        trial, s);
+  }
+};
+
+TEST(KalmanGainProperties, AreTheFilters) {
+  test::RandomSystems systems(62, test::Plane::z);
+  test::Refusals refusals;
+  FilterLaws laws;
+  for (int trial = 0; trial < 10000; ++trial) {
+    const test::RandomSystem s = systems.next();
+    const auto found = kalman_gain(s.A.transpose(), s.B.transpose(), s.Q, s.R);
+    if (!found) {
+      refusals.add(found.error(), trial, s);
+      continue;
+    }
+    ASSERT_TRUE(found->K.allFinite() && found->L.allFinite() && found->P_posterior.allFinite());
+    EXPECT_EQ(found->P_prior, found->P_prior.transpose()) << trial;
+    EXPECT_EQ(found->P_posterior, found->P_posterior.transpose()) << trial;
+    laws.check(s, *found, trial);
+  }
+  refusals.expect_at_most(10);
+  laws.gain.expect_within(2.0);
+  laws.predictor.expect_within(2.0);
+  laws.update.expect_within(2.0);
+  laws.prediction.expect_within(2.0);
+  laws.definite.expect_within(3.0);
+  laws.poles.expect_within(0.0);
+}
+
+// x' = U x, U orthogonal, and units that are powers of two: K' = U K, P' = U P Uᵀ, to conditioning.
+TEST(KalmanGainProperties, AxesAndUnitsChangeNothing) {
+  test::RandomSystems systems(63, test::Plane::z);
+  Random random(63);
+  test::Law turned("turned");
+  test::Law units("in other units");
+  for (int trial = 0; trial < 1000; ++trial) {
+    const test::RandomSystem s =
+        systems.next(trial % 2 == 0 ? test::SystemClass::stable : test::SystemClass::unstable);
+    const Eigen::Index n = s.A.rows();
+    const auto plain = kalman_gain(s.A.transpose(), s.B.transpose(), s.Q, s.R).value();
+    const double allowed = test::epsilon * std::max(1.0, plain.condition);
+    const Eigen::MatrixXd U = test::random_rotation(random, n);
+    const Eigen::MatrixXd Q = U * s.Q * U.transpose();
+    const auto other = kalman_gain(U * s.A.transpose() * U.transpose(),
+                                   s.B.transpose() * U.transpose(), 0.5 * (Q + Q.transpose()), s.R)
+                           .value();
+    turned.holds((U.transpose() * other.P_prior * U - plain.P_prior).norm() /
+                     (allowed * plain.P_prior.norm()),
+                 trial, s);
+    turned.holds((U.transpose() * other.K - plain.K).norm() / (allowed * plain.K.norm()), trial, s);
+    const Eigen::VectorXd d = test::random_units(random, n, 6.0);
+    const Eigen::VectorXd d_inverse = d.cwiseInverse();
+    const auto scaled = kalman_gain(d.asDiagonal() * s.A.transpose() * d_inverse.asDiagonal(),
+                                    s.B.transpose() * d_inverse.asDiagonal(),
+                                    d.asDiagonal() * s.Q * d.asDiagonal(), s.R)
+                            .value();
+    units.holds(
+        (d_inverse.asDiagonal() * scaled.P_prior * d_inverse.asDiagonal() - plain.P_prior).norm() /
+            (allowed * plain.P_prior.norm()),
+        trial, s);
+    units.holds((d_inverse.asDiagonal() * scaled.K - plain.K).norm() / (allowed * plain.K.norm()),
+                trial, s);
+  }
+  turned.expect_within(10.0);
+  units.expect_within(1.0);
 }
 
 }  // namespace

@@ -30,7 +30,10 @@ struct KalmanGain {
 /// @errors ArgumentError for shapes, entries and asymmetry; the error of a covariance's maker;
 ///         RiccatiError as `dare` of (Aᵀ, Cᵀ): not_stabilizable there means that (A, C) is not
 ///         detectable, with the mode that no output shows.
-/// Cost: one Riccati solution; allocates. Source: book, section 9.6, equations 9.21 to 9.24.
+/// P, K, L and P⁺ are right to their last digit where the Riccati equation determines them: its
+/// solution is corrected and used in twice the working precision.
+/// Cost: one Riccati solution and a Lyapunov equation for each correction; allocates. Source: book,
+/// section 9.6, equations 9.21 to 9.24.
 [[nodiscard]] Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C,
                                                  const Covariance& Q, const Covariance& R);
 
