@@ -117,6 +117,17 @@ Reached reached_by(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
     const bool lost = !(error <= std::max(scale_of(wanted(i)), A.norm()));
     reached.misplaced = std::max(reached.misplaced, lost ? infinite : off);
   }
+  // Nor one that makes a loop unstable of which stable poles were asked, in continuous time or in
+  // discrete: with one input and thirty states rounding K can.
+  const auto beyond = [&](const auto& measure) {
+    return measure(wanted).maxCoeff() < 0.0 && !(measure(reached.poles).maxCoeff() < 0.0);
+  };
+  if (n > 0 && (beyond([](const Eigen::VectorXcd& p) { return Eigen::VectorXd(p.real()); }) ||
+                beyond([](const Eigen::VectorXcd& p) {
+                  return Eigen::VectorXd(p.cwiseAbs().array() - 1.0);
+                }))) {
+    reached.misplaced = infinite;
+  }
   return reached;
 }
 

@@ -71,10 +71,8 @@ struct Problem {
   }
 };
 
-/// 1 to 5 states, 1 to 3 inputs, stable and unstable ones.
-Problem ordinary(Random& random, int trial) {
-  const Index n = 1 + trial % 5;
-  const Index m = 1 + (trial / 5) % std::min<Index>(n, 3);
+/// Stable and unstable ones.
+Problem ordinary(Random& random, Index n, Index m) {
   Problem problem{random_matrix(random, n, n), random_matrix(random, n, m), Eigen::VectorXcd(n),
                   VectorXd::Ones(n)};
   problem.A.diagonal().array() += random.uniform(-4.0, 4.0);
@@ -87,6 +85,12 @@ Problem ordinary(Random& random, int trial) {
     }
   }
   return problem;
+}
+
+/// 1 to 5 states, 1 to 3 inputs.
+Problem ordinary(Random& random, int trial) {
+  const Index n = 1 + trial % 5;
+  return ordinary(random, n, 1 + (trial / 5) % std::min<Index>(n, 3));
 }
 
 /// The last states are coupled to the others and to the inputs by 1e-3 to 1e-10.
@@ -188,6 +192,44 @@ TEST(PlaceProperty, OrdinaryPlants) {
     tally.add(ordinary(random, trial));
   }
   expect_placed(tally);
+}
+
+TEST(PlaceProperty, LargerPlants) {
+  Random random(27);
+  Tally tally;
+  for (Index n = 11; n <= 30 && !HasFatalFailure(); ++n) {
+    tally.add(ordinary(random, n, 3 + n % 4));
+  }
+  tally.add(ordinary(random, 50, 12));
+  expect_placed(tally);
+}
+
+// One input and thirty states, two and fifty: to move all poles takes a K whose rounding moves them
+// again. An answer is stable, as it was asked to be, and says where the poles are; or there is
+// none.
+TEST(PlaceProperty, TooFewInputs) {
+  Random random(28);
+  int refused = 0;
+  for (int trial = 0; trial < 12; ++trial) {
+    SCOPED_TRACE(trial);
+    const bool fifty = trial % 4 == 3;
+    const Problem problem =
+        ordinary(random, fifty ? 50 : 11 + 2 * trial, fifty ? 2 : 1 + trial % 2);
+    const auto placed = place(problem.A, problem.B, problem.poles);
+    if (!placed) {
+      EXPECT_EQ(placed.error().kind(), ErrorKind::no_answer);
+      EXPECT_FALSE(placed.error().evidence().empty());
+      ++refused;
+      continue;
+    }
+    EXPECT_LT(placed->poles.real().maxCoeff(), 0.0);
+    EXPECT_LT(misplaced(problem.A, problem.B, placed->K, problem.poles),
+              1e-8 + 1e-17 * problem.B.norm() * placed->K.norm());
+    EXPECT_GE(placed->pole_error * (1.0 + 1e-12),
+              (placed->poles - problem.poles).cwiseAbs().maxCoeff());
+  }
+  EXPECT_GE(refused, 1);
+  ::testing::Test::RecordProperty("refused", refused);
 }
 
 TEST(PlaceProperty, BadlyScaledPlants) {

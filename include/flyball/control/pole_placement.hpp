@@ -63,7 +63,7 @@ struct PolePlacement {
 ///         not_conjugate naming the pole; not_controllable with the mode that no input reaches, or
 ///         by rounding of A and B only, and the states that it lives in, if `poles` does not
 ///         contain it; not_reached if a pole of A - B K is further than 1e-8 max(1, |p|) times its
-///         own condition (in the given units or in balanced ones) from its place.
+///         own condition (in given units or balanced ones) from its place, or no longer stable.
 /// Cost: with several inputs O(n³) a sweep over the eigenvectors, at most 60, and O(n³ rank B)
 /// once; O(n⁴) for a triangular form (one input, poles repeated more often than rank B). Allocates.
 ///
