@@ -126,8 +126,7 @@ double distance_to_uncontrollable(const MatrixXd& A, const MatrixXd& B) {
     Eigen::MatrixXcd pencil(n, n + B.cols());
     pencil << A.cast<Complex>() / A.norm(), B.colwise().normalized().cast<Complex>();
     pencil.diagonal().array() -= mode / A.norm();
-    smallest =
-        std::min(smallest, Eigen::JacobiSVD<Eigen::MatrixXcd>(pencil).singularValues()(n - 1));
+    smallest = std::min(smallest, test::singular_values(pencil)(n - 1));
   }
   return smallest;
 }
