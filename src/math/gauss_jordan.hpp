@@ -139,4 +139,59 @@ inline bool invert(Size<N> size, double* M, int* pivots) {
   return true;
 }
 
+/// R ← M⁻¹R for as many columns as rows, by Gauss-Jordan elimination with partial pivoting; M is
+/// lost. Where a pivot vanishes false, or a result that is not finite.
+template <int N>
+inline bool solve_in_place(Size<N> size, double* M, double* R) {
+  const int n = size();
+  const int ld = size.padded();
+  if (N == 0 && n >= 3 * panel_columns) {
+    int pivots[panel_columns];
+    for (int first = 0; first < n; first += panel_columns) {
+      const int count = std::min(panel_columns, n - first);
+      double* const panel = M + first * ld;
+      if (!eliminate_panel(size, panel, first, count, 1.0, pivots)) {
+        return false;
+      }
+      apply_panel(size, panel, first, count, pivots, M + (first + count) * ld, n - first - count);
+      apply_panel(size, panel, first, count, pivots, R, n);
+    }
+    return true;
+  }
+  for (int k = 0; k < n; ++k) {
+    double* const column = M + k * ld;
+    int pivot = k;
+    for (int i = k + 1; i < n; ++i) {
+      pivot = std::abs(column[i]) > std::abs(column[pivot]) ? i : pivot;
+    }
+    if (pivot != k) {
+      for (int j = k; j < n; ++j) {
+        std::swap(M[k + j * ld], M[pivot + j * ld]);
+      }
+      for (int j = 0; j < n; ++j) {
+        std::swap(R[k + j * ld], R[pivot + j * ld]);
+      }
+    }
+    const double inverse = 1.0 / column[k];
+    for (int i = 0; i < ld; ++i) {
+      column[i] *= -inverse;
+    }
+    column[k] = 0.0;
+    const auto eliminate = [=](double* other) {
+      const double factor = other[k];
+      for (int i = 0; i < ld; i += 4) {
+        *reinterpret_cast<Vector4*>(other + i) += load4(column + i) * factor;
+      }
+      other[k] = factor * inverse;
+    };
+    for (int j = k + 1; j < n; ++j) {
+      eliminate(M + j * ld);
+    }
+    for (int j = 0; j < n; ++j) {
+      eliminate(R + j * ld);
+    }
+  }
+  return true;
+}
+
 }  // namespace flyball::detail::FLYBALL_VARIANT

@@ -3,68 +3,11 @@
 // The kernel of matrix_exponential_kernel.hpp for one instruction set; see riccati_kernel_body.hpp.
 
 #include "math/balance_small.hpp"
+#include "math/exponential_2x2.hpp"
 #include "math/gauss_jordan.hpp"
 #include "math/small_matrix.hpp"
 
 namespace flyball::detail::FLYBALL_VARIANT {
-
-/// (e^x - e^y) / (x - y), for any distance of x and y.
-inline double divided_difference(double x, double y) {
-  const double half = 0.5 * (x - y);
-  if (std::abs(half) < 1.0) {
-    // e^((x+y)/2) sinh(h)/h; the series of sinh(h)/h below h where it is exact.
-    const double sinch = std::abs(half) < 1e-4 ? 1.0 + half * half / 6.0 : std::sinh(half) / half;
-    return std::exp(0.5 * (x + y)) * sinch;
-  }
-  return (std::exp(x) - std::exp(y)) / (x - y);
-}
-
-/// p q - r s without cancellation of the products' rounding errors (Kahan).
-inline double difference_of_products(double p, double q, double r, double s) {
-  const double rs = r * s;
-  return std::fma(p, q, -rs) + std::fma(-r, s, rs);
-}
-
-/// Closed form of a 2x2: exp(A) = e^μ (cosh δ I + sinh δ / δ (A - μ I)), μ = (a + d)/2,
-/// δ² = ((a - d)/2)² + b c, written in the eigenvalues μ ± δ so that nothing overflows on the way.
-inline void exponential_2x2(const double* A, double* E) {
-  const double a = A[0];
-  const double b = A[2];
-  const double c = A[1];
-  const double d = A[3];
-  const double mean = 0.5 * a + 0.5 * d;
-  const double half = 0.5 * a - 0.5 * d;
-  const double discriminant = difference_of_products(half, half, -b, c);
-  double f = 0.0;
-  double diagonal = 0.0;
-  if (b == 0.0 || c == 0.0) {
-    f = divided_difference(a, d);
-    E[0] = std::exp(a);
-    E[1] = c == 0.0 ? 0.0 : c * f;
-    E[2] = b == 0.0 ? 0.0 : b * f;
-    E[3] = std::exp(d);
-    return;
-  }
-  if (discriminant >= 0.0) {
-    const double delta = std::sqrt(discriminant);
-    // The eigenvalue of larger magnitude is free of cancellation; the other is det / it.
-    const double large = mean >= 0.0 ? mean + delta : mean - delta;
-    // Below one no eigenvalue is stiff, and the two must rather agree on δ: it may be rounding.
-    const double small =
-        std::abs(large) < 1.0 ? 2.0 * mean - large : difference_of_products(a, d, b, c) / large;
-    f = divided_difference(large, small);
-    diagonal = 0.5 * (std::exp(large) + std::exp(small));
-  } else {
-    const double omega = std::sqrt(-discriminant);
-    const double scale = std::exp(mean);
-    f = scale * (std::sin(omega) / omega);
-    diagonal = scale * std::cos(omega);
-  }
-  E[0] = diagonal + half * f;
-  E[1] = c * f;
-  E[2] = b * f;
-  E[3] = diagonal - half * f;
-}
 
 /// A Padé approximant of exp of order m: the numerator's coefficients, the norm up to which it is
 /// exact to rounding (Higham 2005; Al-Mohy and Higham 2009, Table 3.1), and log₂ of the inverse of
@@ -400,10 +343,8 @@ class Exponential {
     divide();
   }
 
-  /// V ← (V - U)⁻¹(V + U) by Gauss-Jordan elimination with partial pivoting.
+  /// V ← (V - U)⁻¹(V + U).
   void divide() {
-    const int n = n_();
-    const int rows = ld();
     double* const M = U_;
     double* const R = V_;
     for (int k = 0; k < size(); ++k) {
@@ -412,57 +353,9 @@ class Exponential {
       M[k] = v - u;
       R[k] = v + u;
     }
-    if (N == 0 && n >= 3 * panel_columns) {
-      int pivots[panel_columns];
-      for (int first = 0; first < n; first += panel_columns) {
-        const int count = std::min(panel_columns, n - first);
-        const double* const panel = M + first * rows;
-        if (!eliminate_panel(n_, M + first * rows, first, count, 1.0, pivots)) {
-          // Singular, or not a number: so is the result.
-          scale(R, std::numeric_limits<double>::quiet_NaN());
-          return;
-        }
-        apply_panel(n_, panel, first, count, pivots, M + (first + count) * rows, n - first - count);
-        apply_panel(n_, panel, first, count, pivots, R, n);
-      }
-      return;
-    }
-    for (int k = 0; k < n; ++k) {
-      double* const column = M + k * rows;
-      int pivot = k;
-      for (int i = k + 1; i < n; ++i) {
-        pivot = std::abs(column[i]) > std::abs(column[pivot]) ? i : pivot;
-      }
-      if (pivot != k) {
-        for (int j = k; j < n; ++j) {
-          const double held = M[k + j * rows];
-          M[k + j * rows] = M[pivot + j * rows];
-          M[pivot + j * rows] = held;
-        }
-        for (int j = 0; j < n; ++j) {
-          const double held = R[k + j * rows];
-          R[k + j * rows] = R[pivot + j * rows];
-          R[pivot + j * rows] = held;
-        }
-      }
-      const double inverse = 1.0 / column[k];
-      for (int i = 0; i < rows; ++i) {
-        column[i] *= -inverse;
-      }
-      column[k] = 0.0;
-      const auto eliminate = [=](double* other) {
-        const double factor = other[k];
-        for (int i = 0; i < rows; i += 4) {
-          *reinterpret_cast<Vector4*>(other + i) += load4(column + i) * factor;
-        }
-        other[k] = factor * inverse;
-      };
-      for (int j = k + 1; j < n; ++j) {
-        eliminate(M + j * rows);
-      }
-      for (int j = 0; j < n; ++j) {
-        eliminate(R + j * rows);
-      }
+    if (!solve_in_place(n_, M, R)) {
+      // Singular, or not a number: so is the result.
+      scale(R, std::numeric_limits<double>::quiet_NaN());
     }
   }
 
