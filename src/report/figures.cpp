@@ -263,16 +263,14 @@ std::vector<RenderedFigure> render(std::vector<Figure> figures, bool png) {
     }
   };
   // Each picture is a process of its own; waiting for one costs nothing.
-  std::vector<std::thread> workers;
+  std::vector<std::jthread> workers;
   const std::size_t threads =
       std::min<std::size_t>(jobs, std::clamp(std::thread::hardware_concurrency(), 1U, 8U));
   for (std::size_t i = 1; i < threads; ++i) {
     workers.emplace_back(work);
   }
   work();
-  for (std::thread& worker : workers) {
-    worker.join();
-  }
+  workers.clear();
   for (std::size_t i = 0; i < rendered.size(); ++i) {
     rendered[i].problem = problems[i];
   }
