@@ -2,6 +2,7 @@
 
 // Compiled once for each instruction set; see small_matrix.hpp.
 
+#include "math/double_shift.hpp"
 #include "math/small_matrix.hpp"
 
 namespace flyball::detail::FLYBALL_VARIANT {
@@ -172,26 +173,11 @@ inline __attribute__((always_inline)) void reflect_columns(double* M, int ld, in
 /// Mathematik 14 (1970): hqr2). False where 30 iterations an eigenvalue do not suffice.
 inline bool real_schur(int n, int ld, double* H, double* U) {
   const auto h = [=](int i, int j) -> double& { return H[i + j * ld]; };
-  double norm = 0.0;
-  for (int j = 0; j < n; ++j) {
-    for (int i = 0; i <= std::min(j + 1, n - 1); ++i) {
-      norm += std::abs(h(i, j));
-    }
-  }
+  const double norm = hessenberg_norm(n, ld, H);
   int end = n - 1;
   int iteration = 0;
   while (end > 0) {
-    int low = end;
-    for (; low > 0; --low) {
-      double size_here = std::abs(h(low - 1, low - 1)) + std::abs(h(low, low));
-      if (size_here == 0.0) {
-        size_here = norm;
-      }
-      if (std::abs(h(low, low - 1)) <= epsilon * size_here) {
-        h(low, low - 1) = 0.0;
-        break;
-      }
-    }
+    const int low = start_of_block(ld, H, end, norm);
     if (low == end) {
       --end;
       iteration = 0;
@@ -215,32 +201,7 @@ inline bool real_schur(int n, int ld, double* H, double* U) {
       w = -0.4375 * s * s;
     }
     ++iteration;
-    // Two consecutive small subdiagonals let the sweep start below `low`.
-    int m = end - 2;
-    double p = 0.0;
-    double q = 0.0;
-    double r = 0.0;
-    for (;; --m) {
-      const double z = h(m, m);
-      const double rr = x - z;
-      const double ss = y - z;
-      p = (rr * ss - w) / h(m + 1, m) + h(m, m + 1);
-      q = h(m + 1, m + 1) - z - rr - ss;
-      r = h(m + 2, m + 1);
-      const double s = std::abs(p) + std::abs(q) + std::abs(r);
-      p /= s;
-      q /= s;
-      r /= s;
-      if (m == low) {
-        break;
-      }
-      const double u = std::abs(h(m, m - 1)) * (std::abs(q) + std::abs(r));
-      const double v =
-          std::abs(p) * (std::abs(h(m - 1, m - 1)) + std::abs(z) + std::abs(h(m + 1, m + 1)));
-      if (u <= epsilon * v) {
-        break;
-      }
-    }
+    auto [m, p, q, r] = start_of_sweep(ld, H, low, end, x, y, w);
     for (int k = m; k < end; ++k) {
       const bool last = k == end - 1;
       double scale = 1.0;
