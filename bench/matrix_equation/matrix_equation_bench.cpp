@@ -11,7 +11,7 @@
 #include <Eigen/Dense>
 
 #include <flyball/core/random.hpp>
-#include <flyball/math/matrix_equation.hpp>
+#include <flyball/math/equations/matrix_equation.hpp>
 
 #include "timing.hpp"
 

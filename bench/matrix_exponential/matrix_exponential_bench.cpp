@@ -12,7 +12,7 @@
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include <flyball/core/random.hpp>
-#include <flyball/math/matrix_exponential.hpp>
+#include <flyball/math/exponential/matrix_exponential.hpp>
 
 #include "timing.hpp"
 

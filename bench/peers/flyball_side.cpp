@@ -10,9 +10,9 @@
 #include <nlohmann/json.hpp>
 
 #include <flyball/control/pole_placement.hpp>
-#include <flyball/math/matrix_equation.hpp>
-#include <flyball/math/matrix_exponential.hpp>
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/equations/matrix_equation.hpp>
+#include <flyball/math/exponential/matrix_exponential.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 
 namespace {
 

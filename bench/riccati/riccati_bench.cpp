@@ -11,7 +11,7 @@
 #include <Eigen/Core>
 
 #include <flyball/core/random.hpp>
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 #include <flyball/systems/system.hpp>
 
 #include "timing.hpp"

@@ -17,7 +17,7 @@
 
 #include <flyball/core/random.hpp>
 #include <flyball/io/plot.hpp>
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 
 namespace {
 

@@ -3,7 +3,7 @@
 #include <string>
 
 #include <flyball/control/integral_control.hpp>
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 
 #include "control/weights.hpp"
 

@@ -5,11 +5,11 @@
 #include <optional>
 #include <string>
 
-#include <flyball/math/matrix_exponential.hpp>
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/exponential/matrix_exponential.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 
 #include "core/format.hpp"
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball {
 

@@ -2,10 +2,10 @@
 
 #include <string>
 
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 
 #include "control/placement.hpp"
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball {
 

@@ -2,10 +2,10 @@
 
 #include <string>
 
-#include <flyball/math/matrix_exponential.hpp>
-#include <flyball/math/matrix_function.hpp>
+#include <flyball/math/exponential/matrix_exponential.hpp>
+#include <flyball/math/exponential/matrix_function.hpp>
 
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball {
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 
 #include "core/format.hpp"
 

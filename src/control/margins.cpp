@@ -8,7 +8,7 @@
 #include "control/delay_margin.hpp"
 #include "control/line_search.hpp"
 #include "control/sampled_loop.hpp"
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball {
 

@@ -10,8 +10,8 @@
 #include <flyball/core/argument.hpp>
 #include <flyball/core/expected.hpp>
 
-#include "math/dense.hpp"
-#include "math/double_double.hpp"
+#include "math/dense/dense.hpp"
+#include "math/extended/double_double.hpp"
 
 /// The steps of pole placement, on a plant whose arguments have been checked.
 namespace flyball::detail {

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "control/weights.hpp"
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball {
 

@@ -6,7 +6,7 @@
 
 #include "control/sampled_loop.hpp"
 #include "core/format.hpp"
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball {
 

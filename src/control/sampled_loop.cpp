@@ -4,7 +4,7 @@
 #include <flyball/systems/input_delay.hpp>
 
 #include "control/sampled_loop.hpp"
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball {
 

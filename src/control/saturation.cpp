@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/format.hpp"
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball {
 

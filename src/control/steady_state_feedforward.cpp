@@ -4,7 +4,7 @@
 #include <string>
 
 #include "core/format.hpp"
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball {
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball {
 
@@ -82,9 +83,7 @@ Expected<void> check_finite(double value, std::string_view where, std::string_vi
 }
 
 Expected<void> check_symmetric(const MatrixRef& M, std::string_view where, std::string_view name) {
-  if (auto square = check_square(M, where, name); !square) {
-    return square;
-  }
+  FLYBALL_CHECK(check_square(M, where, name));
   const double limit = 1e-10 * M.cwiseAbs().maxCoeff();
   for (Eigen::Index j = 0; j < M.cols(); ++j) {
     for (Eigen::Index i = 0; i < j; ++i) {
@@ -106,9 +105,7 @@ Expected<void> check_symmetric(const MatrixRef& M, std::string_view where, std::
 
 Expected<void> check_positive(double value, std::string_view where, std::string_view name,
                               std::string_view unit) {
-  if (auto finite = check_finite(value, where, name); !finite) {
-    return finite;
-  }
+  FLYBALL_CHECK(check_finite(value, where, name));
   if (value > 0.0) {
     return {};
   }
@@ -121,9 +118,7 @@ Expected<void> check_positive(double value, std::string_view where, std::string_
 
 Expected<void> check_not_negative(double value, std::string_view where, std::string_view name,
                                   std::string_view unit) {
-  if (auto finite = check_finite(value, where, name); !finite) {
-    return finite;
-  }
+  FLYBALL_CHECK(check_finite(value, where, name));
   if (value >= 0.0) {
     return {};
   }

@@ -3,11 +3,11 @@
 #include <optional>
 #include <string>
 
-#include <flyball/math/matrix_equation.hpp>
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/equations/matrix_equation.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 
-#include "math/dense.hpp"
-#include "math/double_double.hpp"
+#include "math/dense/dense.hpp"
+#include "math/extended/double_double.hpp"
 
 namespace flyball {
 

@@ -4,7 +4,7 @@
 #include "identification/robust_fit.hpp"
 #include "identification/soft_loss.hpp"
 #include "identification/statistics.hpp"
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball::identification {
 namespace {

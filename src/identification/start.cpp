@@ -8,7 +8,7 @@
 
 #include "identification/start.hpp"
 #include "identification/statistics.hpp"
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball::identification {
 namespace {

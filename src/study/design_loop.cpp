@@ -10,7 +10,7 @@
 #include <flyball/control/latency.hpp>
 #include <flyball/control/lqr.hpp>
 #include <flyball/estimation/kalman_gain.hpp>
-#include <flyball/math/matrix_function.hpp>
+#include <flyball/math/exponential/matrix_function.hpp>
 #include <flyball/mechanisms/arm.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/mechanisms/flywheel.hpp>

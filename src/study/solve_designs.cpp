@@ -2,7 +2,7 @@
 
 #include <flyball/control/pole_placement.hpp>
 #include <flyball/estimation/kalman_gain.hpp>
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 #include <flyball/systems/discretize.hpp>
 
 #include "study/solve_kernels.hpp"

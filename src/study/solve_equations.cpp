@@ -1,9 +1,9 @@
 #include <optional>
 
-#include <flyball/math/matrix_equation.hpp>
-#include <flyball/math/matrix_exponential.hpp>
-#include <flyball/math/matrix_function.hpp>
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/equations/matrix_equation.hpp>
+#include <flyball/math/exponential/matrix_exponential.hpp>
+#include <flyball/math/exponential/matrix_function.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 
 #include "study/solve_kernels.hpp"
 

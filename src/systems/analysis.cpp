@@ -5,10 +5,10 @@
 #include <limits>
 #include <numeric>
 
-#include <flyball/math/matrix_equation.hpp>
+#include <flyball/math/equations/matrix_equation.hpp>
 
 #include "core/format.hpp"
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 #include "systems/balance.hpp"
 #include "systems/modes.hpp"
 

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <limits>
 
-#include <flyball/math/matrix_equation.hpp>
+#include <flyball/math/equations/matrix_equation.hpp>
 
 #include "core/format.hpp"
-#include "math/dense.hpp"
-#include "math/dense_reduction.hpp"
+#include "math/dense/dense.hpp"
+#include "math/dense/dense_reduction.hpp"
 #include "systems/balance.hpp"
 #include "systems/mode_distance.hpp"
 #include "systems/modes.hpp"

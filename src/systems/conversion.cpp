@@ -9,11 +9,11 @@
 #include <vector>
 
 #include <flyball/core/text.hpp>
-#include <flyball/math/matrix_exponential.hpp>
-#include <flyball/math/matrix_function.hpp>
+#include <flyball/math/exponential/matrix_exponential.hpp>
+#include <flyball/math/exponential/matrix_function.hpp>
 #include <flyball/systems/discretize.hpp>
 
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 #include "systems/matched_poles.hpp"
 
 namespace flyball {

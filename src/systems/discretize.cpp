@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include <flyball/math/matrix_exponential.hpp>
+#include <flyball/math/exponential/matrix_exponential.hpp>
 
 #include "core/format.hpp"
 #include "systems/quadratic_integral.hpp"

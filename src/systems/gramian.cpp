@@ -5,10 +5,10 @@
 #include <limits>
 #include <vector>
 
-#include <flyball/math/matrix_equation.hpp>
+#include <flyball/math/equations/matrix_equation.hpp>
 
-#include "math/dense.hpp"
-#include "math/dense_reduction.hpp"
+#include "math/dense/dense.hpp"
+#include "math/dense/dense_reduction.hpp"
 #include "systems/balance.hpp"
 #include "systems/gramian_factor.hpp"
 #include "systems/modes.hpp"

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include <flyball/math/matrix_exponential.hpp>
+#include <flyball/math/exponential/matrix_exponential.hpp>
 #include <flyball/systems/discretize.hpp>
 
 namespace flyball {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <string>
 
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 #include "systems/balance.hpp"
 
 namespace flyball {

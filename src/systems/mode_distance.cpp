@@ -2,7 +2,7 @@
 #include <cmath>
 #include <limits>
 
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 #include "systems/mode_distance.hpp"
 
 namespace flyball::detail {

@@ -8,8 +8,8 @@
 
 #include <flyball/systems/conversion.hpp>
 
-#include "math/dense.hpp"
-#include "math/dense_reduction.hpp"
+#include "math/dense/dense.hpp"
+#include "math/dense/dense_reduction.hpp"
 #include "systems/balance.hpp"
 #include "systems/gramian_factor.hpp"
 

@@ -1,8 +1,8 @@
 #include <cmath>
 
-#include <flyball/math/matrix_exponential.hpp>
+#include <flyball/math/exponential/matrix_exponential.hpp>
 
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 #include "systems/quadratic_integral.hpp"
 
 namespace flyball::detail {

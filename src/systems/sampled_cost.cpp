@@ -4,7 +4,7 @@
 
 #include <flyball/systems/discretize.hpp>
 
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 #include "systems/quadratic_integral.hpp"
 
 namespace flyball {

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "math/dense.hpp"
-#include "math/dense_reduction.hpp"
+#include "math/dense/dense.hpp"
+#include "math/dense/dense_reduction.hpp"
 #include "systems/mode_distance.hpp"
 #include "systems/staircase.hpp"
 

@@ -3,7 +3,7 @@
 #include <complex>
 #include <string>
 
-#include "math/dense.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball {
 

@@ -7,7 +7,7 @@
 #include <flyball/control/finite_horizon_lqr.hpp>
 #include <flyball/control/integral_control.hpp>
 #include <flyball/core/random.hpp>
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/systems/discretize.hpp>
 

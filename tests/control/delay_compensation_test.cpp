@@ -8,7 +8,7 @@
 
 #include <flyball/control/lqr.hpp>
 #include <flyball/core/random.hpp>
-#include <flyball/math/matrix_function.hpp>
+#include <flyball/math/exponential/matrix_function.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/systems/discretize.hpp>
 

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <flyball/core/random.hpp>
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 
 #include "support/oracle.hpp"
 

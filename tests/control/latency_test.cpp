@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <flyball/control/lqr.hpp>
-#include <flyball/math/matrix_function.hpp>
+#include <flyball/math/exponential/matrix_function.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/systems/discretize.hpp>
 

@@ -8,7 +8,7 @@
 
 #include <flyball/control/continuous_lqr.hpp>
 #include <flyball/core/random.hpp>
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 #include <flyball/mechanisms/arm.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/mechanisms/flywheel.hpp>

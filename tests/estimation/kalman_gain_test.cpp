@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <flyball/core/random.hpp>
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/systems/discretize.hpp>
 

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include <flyball/math/matrix_equation.hpp>
+#include <flyball/math/equations/matrix_equation.hpp>
 #include <flyball/systems/discretize.hpp>
 
 #include "support/oracle.hpp"

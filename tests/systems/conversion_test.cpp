@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <flyball/core/random.hpp>
-#include <flyball/math/matrix_function.hpp>
+#include <flyball/math/exponential/matrix_function.hpp>
 #include <flyball/systems/discretize.hpp>
 
 #include "math/matrices_json.hpp"

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <flyball/core/random.hpp>
-#include <flyball/math/matrix_exponential.hpp>
+#include <flyball/math/exponential/matrix_exponential.hpp>
 
 namespace flyball {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include <flyball/math/matrix_equation.hpp>
+#include <flyball/math/equations/matrix_equation.hpp>
 #include <flyball/systems/norms.hpp>
 
 #include "math/matrices_json.hpp"

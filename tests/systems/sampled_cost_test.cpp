@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include <flyball/math/matrix_exponential.hpp>
-#include <flyball/math/riccati.hpp>
+#include <flyball/math/exponential/matrix_exponential.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 #include <flyball/systems/discretize.hpp>
 
 #include "support/oracle.hpp"

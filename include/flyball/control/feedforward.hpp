@@ -1,6 +1,6 @@
 #pragma once
 
-#include <flyball/math/linear_algebra.hpp>
+#include <flyball/math/dense/linear_algebra.hpp>
 #include <flyball/mechanisms/mechanism.hpp>
 #include <flyball/systems/system.hpp>
 

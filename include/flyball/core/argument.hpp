@@ -45,15 +45,59 @@ using MatrixRef = Eigen::Ref<const Eigen::MatrixXd>;
 [[nodiscard]] Expected<void> check_not_negative(double value, std::string_view where,
                                                 std::string_view name, std::string_view unit = {});
 
-/// The first error of several checks, or nothing.
-/// The checks are evaluated by the caller, so pass only cheap ones that do not depend on each
-/// other's success.
-template <class... Checks>
-[[nodiscard]] Expected<void> check_all(Checks&&... checks) {
-  Expected<void> first{};
-  (void)((checks.has_value() ? true : (first = std::forward<Checks>(checks), false)) && ...);
-  return first;
-}
+/// The checks of one function's arguments, which say its name once. After the first error no other
+/// check is made, so a later one may rely on the earlier ones.
+///
+/// ```
+/// FLYBALL_CHECK(Checks("lqr").square(A, "A").shape(B, A.rows(), B.cols(), "B").positive(T, "T", "s"));
+/// ```
+class Checks {
+ public:
+  /// @param where  The function's name; it must outlive the checks.
+  explicit Checks(std::string_view where) noexcept : where_(where) {}
+
+  Checks& shape(const MatrixRef& M, Eigen::Index rows, Eigen::Index columns, std::string_view name,
+                std::string_view meaning = {}) {
+    return also([&] { return check_shape(M, rows, columns, where_, name, meaning); });
+  }
+  Checks& square(const MatrixRef& M, std::string_view name) {
+    return also([&] { return check_square(M, where_, name); });
+  }
+  Checks& finite(const MatrixRef& M, std::string_view name) {
+    return also([&] { return check_finite(M, where_, name); });
+  }
+  Checks& finite(double value, std::string_view name) {
+    return also([&] { return check_finite(value, where_, name); });
+  }
+  Checks& symmetric(const MatrixRef& M, std::string_view name) {
+    return also([&] { return check_symmetric(M, where_, name); });
+  }
+  Checks& positive(double value, std::string_view name, std::string_view unit = {}) {
+    return also([&] { return check_positive(value, where_, name, unit); });
+  }
+  Checks& not_negative(double value, std::string_view name, std::string_view unit = {}) {
+    return also([&] { return check_not_negative(value, where_, name, unit); });
+  }
+  /// Any other check, made only if those before it passed.
+  /// @param check  Answers an Expected<void>.
+  template <class Check>
+    requires requires(Check& check) { Expected<void>(check()); }
+  Checks& also(Check&& check) {
+    if (result_) {
+      result_ = check();
+    }
+    return *this;
+  }
+
+  [[nodiscard]] explicit operator bool() const noexcept { return result_.has_value(); }
+  [[nodiscard]] const Error& error() const noexcept { return result_.error(); }
+  // NOLINTNEXTLINE(google-explicit-constructor): it is what a function of checks returns.
+  [[nodiscard]] operator Expected<void>() const { return result_; }
+
+ private:
+  std::string_view where_;
+  Expected<void> result_{};
+};
 
 /// A number as people write it: shortest form that reads back to at least `digits` digits.
 [[nodiscard]] std::string format_number(double value, int digits = 6);

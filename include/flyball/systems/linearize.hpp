@@ -1,6 +1,6 @@
 #pragma once
 
-#include <flyball/math/differentiation.hpp>
+#include <flyball/math/derivatives/differentiation.hpp>
 #include <flyball/systems/system.hpp>
 
 namespace flyball {

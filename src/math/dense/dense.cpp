@@ -1,0 +1,84 @@
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <Eigen/QR>
+
+#include "math/dense/balance_columns.hpp"
+#include "math/dense/dense.hpp"
+
+namespace flyball::detail {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+MatrixXd product(const MatrixRef& A, const MatrixRef& B) {
+  MatrixXd C(A.rows(), B.cols());
+  C.noalias() = A * B;
+  return C;
+}
+
+MatrixXd transposed_product(const MatrixRef& A, const MatrixRef& B) {
+  MatrixXd C(A.cols(), B.cols());
+  C.noalias() = A.transpose() * B;
+  return C;
+}
+
+MatrixXd product_transposed(const MatrixRef& A, const MatrixRef& B) {
+  MatrixXd C(A.rows(), B.rows());
+  C.noalias() = A * B.transpose();
+  return C;
+}
+
+MatrixXd symmetrized(const MatrixRef& M) {
+  return 0.5 * (M + M.transpose());
+}
+
+MatrixXd solve_linear(const MatrixRef& A, const MatrixRef& B, double* rcond) {
+  const Eigen::PartialPivLU<MatrixXd> lu(A);
+  if (rcond != nullptr) {
+    const double smallest = lu.matrixLU().diagonal().cwiseAbs().minCoeff();
+    *rcond = smallest > 0.0 ? lu.rcond() : 0.0;
+  }
+  return lu.solve(B);
+}
+
+MatrixXd solve_symmetric(const MatrixRef& A, const MatrixRef& B) {
+  return A.ldlt().solve(B);
+}
+
+MatrixXd solve_least_squares(const MatrixRef& A, const MatrixRef& B) {
+  return A.completeOrthogonalDecomposition().solve(B);
+}
+
+std::optional<MatrixXd> cholesky_of(const MatrixRef& S) {
+  const Eigen::LLT<MatrixXd> llt(S);
+  if (llt.info() != Eigen::Success) {
+    return std::nullopt;
+  }
+  return MatrixXd(llt.matrixL());
+}
+
+OrthogonalTriangular full_qr(const MatrixRef& A) {
+  const Eigen::HouseholderQR<MatrixXd> qr(A);
+  return {qr.householderQ(), qr.matrixQR().triangularView<Eigen::Upper>()};
+}
+
+OrthogonalTriangular pivoted_qr(const MatrixRef& A) {
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(A);
+  return {qr.householderQ(), qr.matrixQR().triangularView<Eigen::Upper>()};
+}
+
+Eigen::VectorXd balance_of(const MatrixRef& A) {
+  const Index n = A.rows();
+  Eigen::VectorXd d = Eigen::VectorXd::Ones(n);
+  MatrixXd balanced = A;
+  balance_columns(static_cast<int>(n), balanced.data(), static_cast<int>(n), d.data());
+  return norm1(balanced) < norm1(A) ? d : Eigen::VectorXd::Ones(n);
+}
+
+double norm1(const MatrixRef& A) {
+  return A.size() == 0 ? 0.0 : A.cwiseAbs().colwise().sum().maxCoeff();
+}
+
+}  // namespace flyball::detail

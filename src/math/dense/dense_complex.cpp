@@ -1,0 +1,44 @@
+#include <limits>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include "math/dense/dense.hpp"
+
+namespace flyball::detail {
+
+using Eigen::MatrixXcd;
+
+MatrixXcd complex_product(const ComplexMatrixRef& A, const ComplexMatrixRef& B) {
+  MatrixXcd C(A.rows(), B.cols());
+  C.noalias() = A * B;
+  return C;
+}
+
+MatrixXcd solve_complex(const ComplexMatrixRef& A, const ComplexMatrixRef& B, double* rcond) {
+  const Eigen::PartialPivLU<MatrixXcd> lu(A);
+  if (rcond != nullptr) {
+    const double smallest = lu.matrixLU().diagonal().cwiseAbs().minCoeff();
+    *rcond = smallest > 0.0 ? lu.rcond() : 0.0;
+  }
+  return lu.solve(B);
+}
+
+ComplexSchur complex_schur_of_complex(const ComplexMatrixRef& A) {
+  const Eigen::ComplexSchur<MatrixXcd> schur(A);
+  return {schur.matrixT(), schur.matrixU(), schur.info() == Eigen::Success};
+}
+
+ComplexSchur complex_schur_of(const MatrixRef& A) {
+  return complex_schur_of_complex(A.cast<std::complex<double>>());
+}
+
+Eigen::VectorXcd eigenvalues_of_complex(const ComplexMatrixRef& A) {
+  const Eigen::ComplexSchur<MatrixXcd> schur(A, false);
+  if (schur.info() != Eigen::Success) {
+    return Eigen::VectorXcd::Constant(A.rows(), std::numeric_limits<double>::quiet_NaN());
+  }
+  return schur.matrixT().diagonal();
+}
+
+}  // namespace flyball::detail

@@ -1,0 +1,200 @@
+#pragma once
+
+// Compiled once for each instruction set; see small_matrix.hpp.
+
+#include "math/dense/double_shift.hpp"
+#include "math/dense/small_matrix.hpp"
+
+namespace flyball::detail::FLYBALL_VARIANT {
+
+/// The roots of λ² - trace λ + determinant of a 2x2 block, real ones without cancellation.
+inline void eigenvalues_2x2(double a, double b, double c, double d, std::complex<double>* lambda) {
+  const double p = 0.5 * (a - d);
+  const double discriminant = p * p + b * c;
+  if (discriminant >= 0.0) {
+    const double root = std::sqrt(discriminant);
+    const double z = p >= 0.0 ? p + root : p - root;
+    lambda[0] = d + z;
+    lambda[1] = z != 0.0 ? d - b * c / z : d;
+  } else {
+    const double root = std::sqrt(-discriminant);
+    lambda[0] = {d + p, root};
+    lambda[1] = {d + p, -root};
+  }
+}
+
+/// All eigenvalues of H (n x n, destroyed): reduction to Hessenberg form by stabilised elimination,
+/// then the double-shift QR iteration on the active block only (Martin, Peters and Wilkinson,
+/// Numerische Mathematik 14 (1970): elmhes and hqr). False where 30 iterations an eigenvalue do not
+/// suffice.
+template <int N>
+inline bool eigenvalues(Size<N> size, double* H, std::complex<double>* lambda) {
+  const int n = size();
+  const int ld = size.padded();
+  const auto h = [=](int i, int j) -> double& { return H[i + j * ld]; };
+  if (n == 1) {
+    lambda[0] = H[0];
+    return true;
+  }
+  if (n == 2) {
+    eigenvalues_2x2(h(0, 0), h(0, 1), h(1, 0), h(1, 1), lambda);
+    return true;
+  }
+
+  // The multipliers of one elimination, in memory that is written last: 2n doubles, at least `ld`.
+  double* const multipliers = reinterpret_cast<double*>(lambda);
+  for (int m = 1; m < n - 1; ++m) {
+    int pivot = m;
+    double largest = 0.0;
+    for (int i = m; i < n; ++i) {
+      if (std::abs(h(i, m - 1)) > largest) {
+        largest = std::abs(h(i, m - 1));
+        pivot = i;
+      }
+    }
+    if (largest == 0.0) {
+      continue;
+    }
+    if (pivot != m) {
+      for (int j = m - 1; j < n; ++j) {
+        std::swap(h(pivot, j), h(m, j));
+      }
+      for (int i = 0; i < n; ++i) {
+        std::swap(h(i, pivot), h(i, m));
+      }
+    }
+    const double inverse = 1.0 / h(m, m - 1);
+    for (int i = 0; i < ld; ++i) {
+      multipliers[i] = i > m && i < n ? h(i, m - 1) * inverse : 0.0;
+    }
+    for (int i = m + 1; i < n; ++i) {
+      h(i, m - 1) = 0.0;
+    }
+    for (int j = m; j < n; ++j) {
+      const double head = h(m, j);
+      for (int i = m / 4 * 4; i < ld; i += 4) {
+        *reinterpret_cast<Vector4*>(&h(i, j)) -= load4(multipliers + i) * head;
+      }
+    }
+    for (int k = m + 1; k < n; ++k) {
+      const double factor = multipliers[k];
+      for (int i = 0; i < ld; i += 4) {
+        *reinterpret_cast<Vector4*>(&h(i, m)) += load4(&h(i, k)) * factor;
+      }
+    }
+  }
+
+  const double norm = hessenberg_norm(n, ld, H);
+  int end = n - 1;
+  double shift = 0.0;
+  int iteration = 0;
+  while (end >= 0) {
+    const int low = start_of_block(ld, H, end, norm);
+    double x = h(end, end);
+    if (low == end) {
+      lambda[end--] = x + shift;
+      iteration = 0;
+      continue;
+    }
+    double y = h(end - 1, end - 1);
+    double w = h(end, end - 1) * h(end - 1, end);
+    if (low == end - 1) {
+      eigenvalues_2x2(y + shift, h(end - 1, end), h(end, end - 1), x + shift, lambda + end - 1);
+      end -= 2;
+      iteration = 0;
+      continue;
+    }
+    if (iteration == 30) {
+      return false;
+    }
+    if (iteration == 10 || iteration == 20) {
+      shift += x;
+      for (int i = 0; i <= end; ++i) {
+        h(i, i) -= x;
+      }
+      const double s = std::abs(h(end, end - 1)) + std::abs(h(end - 1, end - 2));
+      x = y = 0.75 * s;
+      w = -0.4375 * s * s;
+    }
+    ++iteration;
+    auto [m, p, q, r] = start_of_sweep(ld, H, low, end, x, y, w);
+    for (int i = m + 2; i <= end; ++i) {
+      h(i, i - 2) = 0.0;
+      if (i > m + 2) {
+        h(i, i - 3) = 0.0;
+      }
+    }
+    // Whole vectors of rows: those above `low` and below `end` belong to other blocks, whose
+    // eigenvalues do not depend on these columns; the others below the bulge are zero.
+    const int first = low / 4 * 4;
+    for (int k = m; k < end; ++k) {
+      const bool last = k == end - 1;
+      double scale = 1.0;
+      if (k != m) {
+        p = h(k, k - 1);
+        q = h(k + 1, k - 1);
+        r = last ? 0.0 : h(k + 2, k - 1);
+      }
+      double square = p * p + q * q + r * r;
+      if (!(square > 1e-280 && square < 1e280)) {
+        scale = std::abs(p) + std::abs(q) + std::abs(r);
+        if (!(scale > 0.0)) {
+          continue;
+        }
+        p /= scale;
+        q /= scale;
+        r /= scale;
+        square = p * p + q * q + r * r;
+      }
+      const double s = std::copysign(std::sqrt(square), p);
+      if (k != m) {
+        h(k, k - 1) = -s * scale;
+      } else if (low != m) {
+        h(k, k - 1) = -h(k, k - 1);
+      }
+      p += s;
+      const double inverse_s = 1.0 / s;
+      const double inverse_p = 1.0 / p;
+      x = p * inverse_s;
+      y = q * inverse_s;
+      const double z = r * inverse_s;
+      q *= inverse_p;
+      r *= inverse_p;
+      if (last) {
+        for (int j = k; j <= end; ++j) {
+          const double t = h(k, j) + q * h(k + 1, j);
+          h(k, j) -= t * x;
+          h(k + 1, j) -= t * y;
+        }
+        for (int i = first; i <= end; i += 4) {
+          Vector4& c0 = *reinterpret_cast<Vector4*>(&h(i, k));
+          Vector4& c1 = *reinterpret_cast<Vector4*>(&h(i, k + 1));
+          const Vector4 t = x * c0 + y * c1;
+          c0 -= t;
+          c1 -= t * q;
+        }
+      } else {
+        for (int j = k; j <= end; ++j) {
+          double* column = &h(k, j);
+          const double t = column[0] + q * column[1] + r * column[2];
+          column[0] -= t * x;
+          column[1] -= t * y;
+          column[2] -= t * z;
+        }
+        const int stop = std::min(end, k + 3);
+        for (int i = first; i <= stop; i += 4) {
+          Vector4& c0 = *reinterpret_cast<Vector4*>(&h(i, k));
+          Vector4& c1 = *reinterpret_cast<Vector4*>(&h(i, k + 1));
+          Vector4& c2 = *reinterpret_cast<Vector4*>(&h(i, k + 2));
+          const Vector4 t = x * c0 + y * c1 + z * c2;
+          c0 -= t;
+          c1 -= t * q;
+          c2 -= t * r;
+        }
+      }
+    }
+  }
+  return true;
+}
+
+}  // namespace flyball::detail::FLYBALL_VARIANT

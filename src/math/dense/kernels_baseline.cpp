@@ -1,0 +1,17 @@
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "math/equations/lyapunov_kernel.hpp"
+#include "math/exponential/matrix_exponential_kernel.hpp"
+#include "math/riccati/riccati_kernel.hpp"
+#include "math/equations/sylvester_kernel.hpp"
+
+#define FLYBALL_VARIANT baseline
+#include "math/equations/lyapunov_kernel_body.hpp"
+#include "math/exponential/matrix_exponential_kernel_body.hpp"
+#include "math/riccati/riccati_kernel_body.hpp"
+#include "math/equations/sylvester_kernel_body.hpp"

@@ -1,0 +1,131 @@
+#include <flyball/math/dense/linear_algebra.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "math/dense/dense.hpp"
+
+namespace flyball {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+Expected<void> check_symmetric_matrix(const MatrixRef& S, std::string_view where) {
+  if (auto square = check_square(S, where, "S"); !square) {
+    return square;
+  }
+  return check_all(check_finite(S, where, "S"), check_symmetric(S, where, "S"));
+}
+
+}  // namespace
+
+Expected<Pseudoinverse> pseudoinverse(const MatrixRef& A, double tolerance) {
+  constexpr std::string_view where = "pseudoinverse";
+  if (A.size() == 0) {
+    return tl::unexpected(
+        Error(ArgumentError::empty).in(std::string(where)).about("A").got("empty"));
+  }
+  if (auto checked =
+          check_all(check_finite(A, where, "A"), check_not_negative(tolerance, where, "tolerance"));
+      !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  if (tolerance >= 1.0) {
+    return tl::unexpected(Error(ArgumentError::out_of_range)
+                              .in(std::string(where))
+                              .about("tolerance")
+                              .got(format_number(tolerance))
+                              .expected("below 1"));
+  }
+  const detail::SingularValues svd = detail::svd_of(A);
+  const double relative =
+      tolerance > 0.0 ? tolerance : epsilon * static_cast<double>(std::max(A.rows(), A.cols()));
+  const double least = relative * svd.values(0);
+  Pseudoinverse result;
+  result.singular_values = svd.values;
+  result.rank = (svd.values.array() > least).count();
+  const Eigen::VectorXd inverse = svd.values.head(result.rank).cwiseInverse();
+  result.X = detail::product_transposed(svd.V.leftCols(result.rank) * inverse.asDiagonal(),
+                                        svd.U.leftCols(result.rank));
+  return result;
+}
+
+std::string_view to_string(Definiteness definiteness) {
+  switch (definiteness) {
+    case Definiteness::positive_definite:
+      return "positive definite";
+    case Definiteness::positive_semidefinite:
+      return "positive semidefinite";
+    case Definiteness::negative_definite:
+      return "negative definite";
+    case Definiteness::negative_semidefinite:
+      return "negative semidefinite";
+    case Definiteness::zero:
+      return "zero";
+    case Definiteness::indefinite:
+      return "indefinite";
+  }
+  return "unknown";
+}
+
+Expected<DefinitenessTest> test_definiteness(const MatrixRef& S) {
+  if (auto checked = check_symmetric_matrix(S, "test_definiteness"); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  DefinitenessTest test;
+  test.eigenvalues = detail::symmetric_eigensystem_of(detail::symmetrized(S)).values;
+  const double least = test.eigenvalues(0);
+  const double most = test.eigenvalues(test.eigenvalues.size() - 1);
+  test.tolerance =
+      epsilon * static_cast<double>(S.rows()) * std::max(std::abs(least), std::abs(most));
+  if (least > test.tolerance) {
+    test.definiteness = Definiteness::positive_definite;
+  } else if (most < -test.tolerance) {
+    test.definiteness = Definiteness::negative_definite;
+  } else if (least < -test.tolerance) {
+    test.definiteness =
+        most > test.tolerance ? Definiteness::indefinite : Definiteness::negative_semidefinite;
+  } else {
+    test.definiteness =
+        most > test.tolerance ? Definiteness::positive_semidefinite : Definiteness::zero;
+  }
+  return test;
+}
+
+Expected<bool> is_positive_definite(const MatrixRef& S) {
+  if (auto checked = check_symmetric_matrix(S, "is_positive_definite"); !checked) {
+    return tl::unexpected(std::move(checked).error());
+  }
+  if (!(S.diagonal().array() > 0.0).all()) {
+    return false;
+  }
+  const Eigen::VectorXd scale = S.diagonal().cwiseSqrt().cwiseInverse();
+  return detail::cholesky_of(scale.asDiagonal() * detail::symmetrized(S) * scale.asDiagonal())
+      .has_value();
+}
+
+MatrixXd block_diagonal(const std::vector<MatrixXd>& blocks) {
+  Index rows = 0;
+  Index columns = 0;
+  for (const MatrixXd& block : blocks) {
+    rows += block.rows();
+    columns += block.cols();
+  }
+  MatrixXd whole = MatrixXd::Zero(rows, columns);
+  rows = 0;
+  columns = 0;
+  for (const MatrixXd& block : blocks) {
+    whole.block(rows, columns, block.rows(), block.cols()) = block;
+    rows += block.rows();
+    columns += block.cols();
+  }
+  return whole;
+}
+
+}  // namespace flyball

@@ -1,0 +1,277 @@
+#pragma once
+
+// Compiled once for each instruction set; see small_matrix.hpp.
+
+#include "math/dense/double_shift.hpp"
+#include "math/dense/small_matrix.hpp"
+
+namespace flyball::detail::FLYBALL_VARIANT {
+
+/// H ← UᵀHU upper Hessenberg by Householder reflections, and U; `work` holds three vectors. All
+/// with `ld` rows, a multiple of four, the padding zero.
+inline void hessenberg(int n, int ld, double* H, double* U, double* work) {
+  double* const v = work;
+  double* const y = work + ld;
+  double* const u = work + 2 * ld;
+  for (int k = 0; k < ld * n; ++k) {
+    U[k] = 0.0;
+  }
+  for (int i = 0; i < n; ++i) {
+    U[i + i * ld] = 1.0;
+  }
+  for (int c = 0; c + 2 < n; ++c) {
+    double* const column = H + c * ld;
+    double tail = 0.0;
+    for (int i = c + 2; i < n; ++i) {
+      tail += column[i] * column[i];
+    }
+    if (tail == 0.0) {
+      continue;
+    }
+    const double head = column[c + 1];
+    const double norm = std::copysign(std::sqrt(head * head + tail), head);
+    for (int i = 0; i < ld; ++i) {
+      v[i] = i > c + 1 ? column[i] : 0.0;
+      y[i] = 0.0;
+      u[i] = 0.0;
+    }
+    v[c + 1] = head + norm;
+    const double beta = 1.0 / (norm * v[c + 1]);
+    column[c + 1] = -norm;
+    for (int i = c + 2; i < n; ++i) {
+      column[i] = 0.0;
+    }
+    // (I - βvvᵀ)H(I - βvvᵀ) = H - v(βHᵀv - γv)ᵀ - (βHv - γv)vᵀ, γ = β²vᵀHv/2.
+    const int first = (c + 1) / 4 * 4;
+    for (int j = c + 1; j < n; ++j) {
+      const double* const h = H + j * ld;
+      const double factor = v[j];
+      Vector4 dot{};
+      int i = 0;
+      for (; i < first; i += 4) {
+        *reinterpret_cast<Vector4*>(y + i) += load4(h + i) * factor;
+      }
+      for (; i < ld; i += 4) {
+        const Vector4 a = load4(h + i);
+        dot += a * load4(v + i);
+        *reinterpret_cast<Vector4*>(y + i) += a * factor;
+      }
+      u[j] = beta * ((dot[0] + dot[2]) + (dot[1] + dot[3]));
+    }
+    double gamma = 0.0;
+    for (int i = c + 1; i < n; ++i) {
+      gamma += v[i] * y[i];
+    }
+    gamma *= 0.5 * beta * beta;
+    for (int i = 0; i < ld; i += 4) {
+      Vector4& yi = *reinterpret_cast<Vector4*>(y + i);
+      yi = beta * yi - gamma * load4(v + i);
+      *reinterpret_cast<Vector4*>(u + i) -= gamma * load4(v + i);
+    }
+    for (int j = c + 1; j < n; ++j) {
+      double* const h = H + j * ld;
+      const double left = u[j];
+      const double right = v[j];
+      int i = 0;
+      for (; i < first; i += 4) {
+        *reinterpret_cast<Vector4*>(h + i) -= load4(y + i) * right;
+      }
+      for (; i < ld; i += 4) {
+        *reinterpret_cast<Vector4*>(h + i) -= load4(y + i) * right + load4(v + i) * left;
+      }
+    }
+    // U ← U(I - βvvᵀ).
+    for (int i = 0; i < ld; i += 4) {
+      Vector4 sum{};
+      for (int j = c + 1; j < n; ++j) {
+        sum += load4(U + i + j * ld) * v[j];
+      }
+      sum *= beta;
+      for (int j = c + 1; j < n; ++j) {
+        *reinterpret_cast<Vector4*>(U + i + j * ld) -= sum * v[j];
+      }
+    }
+  }
+}
+
+/// A rotation of rows and columns k, k+1 of T and of U's columns that gives the 2x2 block at k
+/// equal diagonal entries, or zero below them where its eigenvalues are real (LAPACK's xLANV2).
+inline void standardize(int n, int ld, double* T, double* U, int k) {
+  const double a = T[k + k * ld];
+  const double b = T[k + (k + 1) * ld];
+  const double c = T[k + 1 + k * ld];
+  const double d = T[k + 1 + (k + 1) * ld];
+  if (c == 0.0) {
+    return;
+  }
+  double cosine = 1.0;
+  double sine = 0.0;
+  const double p = 0.5 * (a - d);
+  const double larger = std::max(std::abs(b), std::abs(c));
+  const double smaller =
+      std::copysign(std::min(std::abs(b), std::abs(c)), b) * std::copysign(1.0, c);
+  const double scale = std::max(std::abs(p), larger);
+  const double z = (p / scale) * p + (larger / scale) * smaller;
+  bool real = false;
+  if (b == 0.0) {
+    cosine = 0.0;
+    sine = 1.0;
+    real = true;
+  } else if (z >= 0.0) {
+    const double root = p + std::copysign(std::sqrt(scale) * std::sqrt(z), p);
+    const double length = std::sqrt(c * c + root * root);
+    cosine = root / length;
+    sine = c / length;
+    real = true;
+  } else if (p != 0.0) {
+    const double sigma = b + c;
+    const double length = std::sqrt(sigma * sigma + 4.0 * p * p);
+    cosine = std::sqrt(0.5 * (1.0 + std::abs(sigma) / length));
+    sine = -(p / (length * cosine)) * std::copysign(1.0, sigma);
+  }
+  for (int j = k; j < n; ++j) {
+    double* const t = T + k + j * ld;
+    const double first = t[0];
+    t[0] = cosine * first + sine * t[1];
+    t[1] = cosine * t[1] - sine * first;
+  }
+  const auto rotate_columns = [=](double* M, int rows) {
+    double* const left = M + k * ld;
+    double* const right = M + (k + 1) * ld;
+    for (int i = 0; i < rows; ++i) {
+      const double first = left[i];
+      left[i] = cosine * first + sine * right[i];
+      right[i] = cosine * right[i] - sine * first;
+    }
+  };
+  rotate_columns(T, k + 2);
+  rotate_columns(U, ld);
+  if (real) {
+    T[k + 1 + k * ld] = 0.0;
+  } else {
+    const double mean = 0.5 * (T[k + k * ld] + T[k + 1 + (k + 1) * ld]);
+    T[k + k * ld] = T[k + 1 + (k + 1) * ld] = mean;
+  }
+}
+
+/// (c0 c1 c2) ← (c0 c1 c2)(I - (x y z)ᵀ(1 q r)) on rows 0..stop, whole vectors.
+inline __attribute__((always_inline)) void reflect_columns(double* M, int ld, int stop, double x,
+                                                           double y, double z, double q, double r) {
+  for (int i = 0; i <= stop; i += 4) {
+    Vector4& c0 = *reinterpret_cast<Vector4*>(M + i);
+    Vector4& c1 = *reinterpret_cast<Vector4*>(M + i + ld);
+    Vector4& c2 = *reinterpret_cast<Vector4*>(M + i + 2 * ld);
+    const Vector4 t = x * c0 + y * c1 + z * c2;
+    c0 -= t;
+    c1 -= t * q;
+    c2 -= t * r;
+  }
+}
+
+/// H (upper Hessenberg) ← real Schur form with standardised 2x2 blocks, U ← U times the
+/// transformation, by the double-shift QR iteration (Martin, Peters and Wilkinson, Numerische
+/// Mathematik 14 (1970): hqr2). False where 30 iterations an eigenvalue do not suffice.
+inline bool real_schur(int n, int ld, double* H, double* U) {
+  const auto h = [=](int i, int j) -> double& { return H[i + j * ld]; };
+  const double norm = hessenberg_norm(n, ld, H);
+  int end = n - 1;
+  int iteration = 0;
+  while (end > 0) {
+    const int low = start_of_block(ld, H, end, norm);
+    if (low == end) {
+      --end;
+      iteration = 0;
+      continue;
+    }
+    if (low == end - 1) {
+      standardize(n, ld, H, U, low);
+      end -= 2;
+      iteration = 0;
+      continue;
+    }
+    if (iteration == 30) {
+      return false;
+    }
+    double x = h(end, end);
+    double y = h(end - 1, end - 1);
+    double w = h(end, end - 1) * h(end - 1, end);
+    if (iteration == 10 || iteration == 20) {
+      const double s = std::abs(h(end, end - 1)) + std::abs(h(end - 1, end - 2));
+      x = y = x + 0.75 * s;
+      w = -0.4375 * s * s;
+    }
+    ++iteration;
+    auto [m, p, q, r] = start_of_sweep(ld, H, low, end, x, y, w);
+    for (int k = m; k < end; ++k) {
+      const bool last = k == end - 1;
+      double scale = 1.0;
+      if (k != m) {
+        p = h(k, k - 1);
+        q = h(k + 1, k - 1);
+        r = last ? 0.0 : h(k + 2, k - 1);
+      }
+      double square = p * p + q * q + r * r;
+      if (!(square > 1e-280 && square < 1e280)) {
+        scale = std::abs(p) + std::abs(q) + std::abs(r);
+        if (!(scale > 0.0)) {
+          continue;
+        }
+        p /= scale;
+        q /= scale;
+        r /= scale;
+        square = p * p + q * q + r * r;
+      }
+      const double s = std::copysign(std::sqrt(square), p);
+      if (k != m) {
+        h(k, k - 1) = -s * scale;
+        h(k + 1, k - 1) = 0.0;
+        if (!last) {
+          h(k + 2, k - 1) = 0.0;
+        }
+      } else if (low != m) {
+        h(k, k - 1) = -h(k, k - 1);
+      }
+      p += s;
+      const double inverse_s = 1.0 / s;
+      const double inverse_p = 1.0 / p;
+      x = p * inverse_s;
+      y = q * inverse_s;
+      const double z = r * inverse_s;
+      q *= inverse_p;
+      r *= inverse_p;
+      // Rows below the bulge and below `end` are zero in these columns: whole vectors.
+      if (last) {
+        for (int j = k; j < n; ++j) {
+          double* const column = &h(k, j);
+          const double t = column[0] + q * column[1];
+          column[0] -= t * x;
+          column[1] -= t * y;
+        }
+        const auto reflect_two = [=](double* M, int stop) {
+          for (int i = 0; i <= stop; i += 4) {
+            Vector4& c0 = *reinterpret_cast<Vector4*>(M + i + k * ld);
+            Vector4& c1 = *reinterpret_cast<Vector4*>(M + i + (k + 1) * ld);
+            const Vector4 t = x * c0 + y * c1;
+            c0 -= t;
+            c1 -= t * q;
+          }
+        };
+        reflect_two(H, end);
+        reflect_two(U, n - 1);
+      } else {
+        for (int j = k; j < n; ++j) {
+          double* const column = &h(k, j);
+          const double t = column[0] + q * column[1] + r * column[2];
+          column[0] -= t * x;
+          column[1] -= t * y;
+          column[2] -= t * z;
+        }
+        reflect_columns(H + k * ld, ld, std::min(end, k + 3), x, y, z, q, r);
+        reflect_columns(U + k * ld, ld, n - 1, x, y, z, q, r);
+      }
+    }
+  }
+  return true;
+}
+
+}  // namespace flyball::detail::FLYBALL_VARIANT

@@ -1,0 +1,114 @@
+#include "math/equations/sylvester_kernel.hpp"
+
+// Compiled with -ffp-contract=off: a fused product would no longer be what the next line corrects.
+
+namespace flyball::detail {
+
+namespace {
+
+constexpr int width = 4;
+using Vector = double __attribute__((vector_size(32), aligned(8), may_alias));
+
+/// `width` rows of unevaluated sums.
+struct Sums {
+  Vector hi;
+  Vector lo;
+};
+
+/// s += a b.
+inline __attribute__((always_inline)) void add_product(Sums& s, const double* rows, double b) {
+  const Vector a = *reinterpret_cast<const Vector*>(rows);
+  const Vector p = a * b;
+  const Vector e = {__builtin_fma(a[0], b, -p[0]), __builtin_fma(a[1], b, -p[1]),
+                    __builtin_fma(a[2], b, -p[2]), __builtin_fma(a[3], b, -p[3])};
+  const Vector sum = s.hi + p;
+  const Vector part = sum - s.hi;
+  s.lo += ((s.hi - (sum - part)) + (p - part)) + e;
+  s.hi = sum;
+}
+
+/// s += M b, M of `count` columns.
+inline __attribute__((always_inline)) void add_columns(Sums& s, const double* M, int ld,
+                                                       const double* b, int count, double sign) {
+  for (int k = 0; k < count; ++k) {
+    add_product(s, M + k * ld, sign * b[k]);
+  }
+}
+
+inline __attribute__((always_inline)) void residual(const SylvesterData& data, const double* X,
+                                                    double* R, double* work) {
+  const int n = data.rows;
+  const int m = data.columns;
+  const int ld = padded_rows(n);
+  const int ldb = padded_rows(m);
+  double* const low = work + ld * m;
+  if (!data.continuous) {
+    for (int j = 0; j < m; ++j) {
+      for (int i = 0; i < ld; i += width) {
+        Sums s{Vector{}, Vector{}};
+        add_columns(s, X + i, ld, data.B + j * ldb, m, 1.0);
+        for (int l = 0; l < width; ++l) {
+          const double sum = s.hi[l] + s.lo[l];
+          low[i + l + j * ld] = s.lo[l] - (sum - s.hi[l]);
+          work[i + l + j * ld] = sum;
+        }
+      }
+    }
+  }
+  for (int j = 0; j < m; ++j) {
+    for (int i = data.symmetric ? j / width * width : 0; i < ld; i += width) {
+      Sums s{*reinterpret_cast<const Vector*>(data.F + i + j * ld), Vector{}};
+      if (data.continuous) {
+        add_columns(s, data.A + i, ld, X + j * ld, n, -1.0);
+        add_columns(s, X + i, ld, data.B + j * ldb, m, -1.0);
+      } else {
+        add_product(s, X + i + j * ld, 1.0);
+        add_columns(s, data.A + i, ld, work + j * ld, n, -1.0);
+        for (int k = 0; k < n; ++k) {
+          for (int l = 0; l < width; ++l) {
+            s.lo[l] -= data.A[i + l + k * ld] * low[k + j * ld];
+          }
+        }
+      }
+      for (int l = 0; l < width; ++l) {
+        R[i + l + j * ld] = s.hi[l] + s.lo[l];
+      }
+    }
+  }
+}
+
+/// The upper triangle of an R that is symmetric is its lower one.
+void mirror(int n, double* R) {
+  const int ld = padded_rows(n);
+  for (int j = 1; j < n; ++j) {
+    for (int i = 0; i < j; ++i) {
+      R[i + j * ld] = R[j + i * ld];
+    }
+  }
+}
+
+void residual_baseline(const SylvesterData& data, const double* X, double* R, double* work) {
+  residual(data, X, R, work);
+}
+
+#ifdef FLYBALL_WIDE_VECTORS
+__attribute__((target("avx2,fma"))) void residual_wide(const SylvesterData& data, const double* X,
+                                                       double* R, double* work) {
+  residual(data, X, R, work);
+}
+#endif
+
+}  // namespace
+
+void sylvester_residual(const SylvesterData& padded, const double* X, double* R, double* work) {
+#ifdef FLYBALL_WIDE_VECTORS
+  (has_wide_vectors() ? residual_wide : residual_baseline)(padded, X, R, work);
+#else
+  residual_baseline(padded, X, R, work);
+#endif
+  if (padded.symmetric) {
+    mirror(padded.rows, R);
+  }
+}
+
+}  // namespace flyball::detail

@@ -1,0 +1,69 @@
+#include <flyball/math/exponential/matrix_exponential.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "math/dense/dense.hpp"
+#include "math/dense/instruction_set.hpp"
+#include "math/exponential/matrix_exponential_kernel.hpp"
+
+namespace flyball {
+
+using Eigen::MatrixXd;
+
+namespace detail {
+
+void exponential(int n, const double* A, double* E, double* memory) {
+#ifdef FLYBALL_WIDE_VECTORS
+  if (has_wide_vectors()) {
+    wide::exponential(n, A, E, memory);
+    return;
+  }
+#endif
+  baseline::exponential(n, A, E, memory);
+}
+
+}  // namespace detail
+
+ErrorInfo error_info(MatrixExponentialError code) {
+  constexpr std::string_view family = "matrix_exponential";
+  switch (code) {
+    case MatrixExponentialError::overflow:
+      return {family, "overflow", "exp(A) exceeds the largest double", ErrorKind::no_answer};
+  }
+  return {family, "unknown", "unknown error", ErrorKind::defect};
+}
+
+Expected<MatrixXd> expm(const MatrixRef& A) {
+  if (A.rows() == 0 || A.rows() != A.cols()) {
+    return tl::unexpected(check_square(A, "expm", "A").error());
+  }
+  if (auto check = check_finite(A, "expm", "A"); !check) {
+    return tl::unexpected(std::move(check).error());
+  }
+  if (A.outerStride() != A.rows()) {
+    return expm(MatrixXd(A));
+  }
+  const int n = static_cast<int>(A.rows());
+  MatrixXd E(n, n);
+  if (n <= detail::exponential_stack_states) {
+    alignas(32) double memory[detail::exponential_workspace(detail::exponential_stack_states)];
+    detail::exponential(n, A.data(), E.data(), memory);
+  } else {
+    const auto count = static_cast<std::size_t>(detail::exponential_workspace(n));
+    detail::exponential(n, A.data(), E.data(), std::unique_ptr<double[]>(new double[count]).get());
+  }
+  if (!E.allFinite()) {
+    const double scale = std::max(1.0, A.cwiseAbs().maxCoeff());
+    const double abscissa = detail::eigenvalues_of(A / scale).real().maxCoeff() * scale;
+    return tl::unexpected(Error(MatrixExponentialError::overflow)
+                              .in("expm")
+                              .about("exp(A)")
+                              .hint("exponents above 709.78 have no double; shorten the time step")
+                              .with("spectral abscissa of A", abscissa));
+  }
+  return E;
+}
+
+}  // namespace flyball

@@ -1,0 +1,264 @@
+#include <flyball/math/exponential/matrix_function.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <string>
+#include <vector>
+
+#include "math/dense/dense.hpp"
+#include "math/exponential/triangular_function.hpp"
+
+namespace flyball {
+
+namespace {
+
+using Complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+
+Error no_answer(MatrixFunctionError code, std::string_view where, std::string_view what,
+                const Complex& eigenvalue) {
+  return Error(code)
+      .in(std::string(where))
+      .got(std::string(what))
+      .with("eigenvalue", std::vector<double>{eigenvalue.real(), eigenvalue.imag()});
+}
+
+/// A, balanced by powers of two d, as U T Uᴴ.
+struct Triangularized {
+  Eigen::VectorXd d;
+  detail::ComplexSchur schur;
+  double zero = 0.0;  ///< Eigenvalues up to here are zero for all that rounding leaves of them.
+
+  [[nodiscard]] MatrixXd assemble(const MatrixXcd& F) const {
+    const MatrixXcd UF = detail::complex_product(schur.U, F);
+    const MatrixXd M = detail::complex_product(UF, schur.U.adjoint()).real();
+    return d.asDiagonal() * M * d.cwiseInverse().asDiagonal();
+  }
+};
+
+Triangularized triangularize(const MatrixRef& A) {
+  Triangularized form;
+  form.d = detail::balance_of(A);
+  const MatrixXd M = form.d.cwiseInverse().asDiagonal() * A * form.d.asDiagonal();
+  bool triangular = true;
+  for (Index j = 0; j + 1 < M.cols() && triangular; ++j) {
+    triangular = M.col(j).tail(M.rows() - j - 1).isZero(0.0);
+  }
+  if (triangular) {
+    form.schur = {M.cast<Complex>(), MatrixXcd::Identity(M.rows(), M.cols()), true};
+  } else {
+    form.schur = detail::complex_schur_of(M);
+  }
+  form.zero = 1e-15 * static_cast<double>(A.rows()) * detail::norm1(M);
+  return form;
+}
+
+MatrixXd whole_power(MatrixXd base, long long exponent) {
+  MatrixXd result = MatrixXd::Identity(base.rows(), base.cols());
+  for (; exponent > 0; exponent /= 2) {
+    if (exponent % 2 == 1) {
+      result = detail::product(result, base);
+    }
+    if (exponent > 1) {
+      base = detail::product(base, base);
+    }
+  }
+  return result;
+}
+
+/// Whether only the part on and below the diagonal has entries: f(A) = f(Aᵀ)ᵀ keeps it so, and its
+/// small entries their digits.
+bool is_lower_triangular(const MatrixRef& A) {
+  for (Index j = 1; j < A.cols(); ++j) {
+    if (!A.col(j).head(j).isZero(0.0)) {
+      return false;
+    }
+  }
+  return A.cols() > 1;
+}
+
+/// A^f, 0 < f < 1.
+Expected<MatrixXd> fractional_power(const MatrixRef& given, double f, std::string_view where) {
+  const bool lower = is_lower_triangular(given);
+  const MatrixXd A = lower ? MatrixXd(given.transpose()) : MatrixXd(given);
+  Triangularized form = triangularize(A);
+  if (!form.schur.converged) {
+    return tl::unexpected(no_answer(MatrixFunctionError::no_real_power, where,
+                                    "a matrix whose eigenvalues cannot be found", 0.0));
+  }
+  MatrixXcd& T = form.schur.T;
+  const Index n = T.rows();
+  Complex smallest = T(0, 0);
+  for (Index i = 0; i < n; ++i) {
+    const Complex lambda = T(i, i);
+    if (std::abs(lambda) < std::abs(smallest)) {
+      smallest = lambda;
+    }
+    if (lambda.real() < -form.zero && std::abs(lambda.imag()) <= form.zero) {
+      return tl::unexpected(no_answer(MatrixFunctionError::no_real_power, where,
+                                      "not real: an eigenvalue is negative", lambda)
+                                .hint("round the power to a whole number"));
+    }
+  }
+  Index rank = n;
+  for (Index i = n - 1; i >= 0; --i) {
+    if (std::abs(T(i, i)) <= form.zero) {
+      --rank;
+      detail::move_eigenvalue(T, form.schur.U, i, rank);
+    }
+  }
+  const auto power = [&](double p) {
+    // [T₁ T₁₂; 0 0]^p = [T₁^p T₁^p T₁⁻¹T₁₂; 0 0].
+    MatrixXcd P = MatrixXcd::Zero(n, n);
+    const MatrixXcd T1 = T.topLeftCorner(rank, rank);
+    if (rank > 0) {
+      const MatrixXcd P1 = detail::triangular_power(T1, p);
+      P.topLeftCorner(rank, rank) = P1;
+      if (rank < n) {
+        P.topRightCorner(rank, n - rank) = detail::complex_product(
+            P1, detail::solve_triangular(T1, T.topRightCorner(rank, n - rank)));
+      }
+    }
+    return form.assemble(P);
+  };
+  const MatrixXd result = power(f);
+  // A^f A^(1-f) = A holds for the principal power and fails where a defective zero spoils it; in
+  // balanced units, lest large entries hide the small ones.
+  const auto size = [&](const MatrixXd& M) {
+    return detail::norm1(form.d.cwiseInverse().asDiagonal() * M * form.d.asDiagonal());
+  };
+  if (!result.allFinite() ||
+      !(size(detail::product(result, power(1.0 - f)) - A) <= 1e-7 * size(A))) {
+    return tl::unexpected(no_answer(MatrixFunctionError::no_real_power, where,
+                                    "not real: an eigenvalue near zero is defective", smallest)
+                              .hint("round the power to a whole number"));
+  }
+  return lower ? MatrixXd(result.transpose()) : result;
+}
+
+/// A⁻¹, solved in balanced units.
+Expected<MatrixXd> inverse_of(const MatrixRef& A, std::string_view where) {
+  const Eigen::VectorXd d = detail::balance_of(A);
+  const MatrixXd M = d.cwiseInverse().asDiagonal() * A * d.asDiagonal();
+  double rcond = 0.0;
+  const MatrixXd inverse = detail::solve_linear(M, MatrixXd::Identity(A.rows(), A.cols()), &rcond);
+  if (!(rcond > 0.0) || !inverse.allFinite()) {
+    return tl::unexpected(Error(MatrixFunctionError::singular)
+                              .in(std::string(where))
+                              .about("A")
+                              .with("reciprocal condition", rcond));
+  }
+  return MatrixXd(d.asDiagonal() * inverse * d.cwiseInverse().asDiagonal());
+}
+
+}  // namespace
+
+ErrorInfo error_info(MatrixFunctionError code) {
+  constexpr std::string_view family = "matrix_function";
+  switch (code) {
+    case MatrixFunctionError::no_real_logarithm:
+      return {family, "no_real_logarithm", "the matrix has no real principal logarithm",
+              ErrorKind::no_answer};
+    case MatrixFunctionError::no_real_power:
+      return {family, "no_real_power", "the matrix has no real principal power of this exponent",
+              ErrorKind::no_answer};
+    case MatrixFunctionError::singular:
+      return {family, "singular", "a negative power needs a matrix with an inverse",
+              ErrorKind::no_answer};
+    case MatrixFunctionError::overflow:
+      return {family, "overflow", "the answer exceeds the largest double", ErrorKind::no_answer};
+  }
+  return {family, "unknown", "unknown error", ErrorKind::defect};
+}
+
+Expected<MatrixXd> logm(const MatrixRef& A) {
+  constexpr std::string_view where = "logm";
+  if (auto check = check_square(A, where, "A"); !check) {
+    return tl::unexpected(std::move(check).error());
+  }
+  if (auto check = check_finite(A, where, "A"); !check) {
+    return tl::unexpected(std::move(check).error());
+  }
+  // Near the identity A - I has digits that the Schur form of A would round away.
+  const MatrixXd X = A - MatrixXd::Identity(A.rows(), A.cols());
+  if (detail::norm1(X) <= detail::near_identity) {
+    return detail::logarithm_near_identity(X);
+  }
+  const bool lower = is_lower_triangular(A);
+  const Triangularized form = lower ? triangularize(MatrixXd(A.transpose())) : triangularize(A);
+  if (!form.schur.converged) {
+    return tl::unexpected(no_answer(MatrixFunctionError::no_real_logarithm, where,
+                                    "a matrix whose eigenvalues cannot be found", 0.0));
+  }
+  for (const Complex& lambda : form.schur.T.diagonal()) {
+    if (lambda == 0.0 || (lambda.real() <= 0.0 && std::abs(lambda.imag()) <= form.zero)) {
+      const bool zero = std::abs(lambda) <= form.zero;
+      return tl::unexpected(no_answer(MatrixFunctionError::no_real_logarithm, where,
+                                      zero ? "a singular matrix" : "a negative real eigenvalue",
+                                      lambda));
+    }
+  }
+  MatrixXd L = form.assemble(detail::triangular_logarithm(form.schur.T));
+  if (!L.allFinite()) {
+    return tl::unexpected(Error(MatrixFunctionError::overflow).in(std::string(where)));
+  }
+  return lower ? MatrixXd(L.transpose()) : L;
+}
+
+Expected<MatrixXd> powm(const MatrixRef& A, double power) {
+  constexpr std::string_view where = "powm";
+  if (auto check = check_square(A, where, "A"); !check) {
+    return tl::unexpected(std::move(check).error());
+  }
+  if (auto check = check_all(check_finite(A, where, "A"), check_finite(power, where, "power"));
+      !check) {
+    return tl::unexpected(std::move(check).error());
+  }
+  constexpr double largest = 1e9;
+  if (std::abs(power) > largest) {
+    return tl::unexpected(Error(ArgumentError::out_of_range)
+                              .in(std::string(where))
+                              .about("power")
+                              .got(format_number(power))
+                              .expected("at most 1e9 in magnitude"));
+  }
+  // Quotients such as L/T of decimal fractions are seldom whole to the last bit.
+  const double nearest = std::round(power);
+  const bool whole = std::abs(power - nearest) <= 1e-12 * std::max(1.0, std::abs(power));
+  const double magnitude = std::abs(whole ? nearest : power);
+  const double integer = std::floor(magnitude);
+  // A whole negative power is one of the inverse; another one the inverse of the positive power,
+  // because A⁻¹A^{1-p} would lose as many digits as A has, not as A^p has.
+  MatrixXd base = A;
+  if (power < 0.0 && whole && integer > 0.0) {
+    auto inverse = inverse_of(A, where);
+    if (!inverse) {
+      return inverse;
+    }
+    base = *std::move(inverse);
+  }
+  MatrixXd result = whole_power(base, static_cast<long long>(integer));
+  if (!whole) {
+    const auto fraction = fractional_power(A, magnitude - integer, where);
+    if (!fraction) {
+      return tl::unexpected(Error(fraction.error()).about("the power " + format_number(power)));
+    }
+    result = detail::product(result, *fraction);
+    if (power < 0.0 && result.allFinite()) {
+      auto inverse = inverse_of(result, where);
+      if (!inverse) {
+        return inverse;
+      }
+      result = *std::move(inverse);
+    }
+  }
+  if (!result.allFinite()) {
+    return tl::unexpected(Error(MatrixFunctionError::overflow).in(std::string(where)));
+  }
+  return result;
+}
+
+}  // namespace flyball

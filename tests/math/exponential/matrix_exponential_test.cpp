@@ -1,0 +1,164 @@
+#include <flyball/math/exponential/matrix_exponential.hpp>
+
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Dense>
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <flyball/core/random.hpp>
+
+#include "math/matrices_json.hpp"
+#include "support/laws.hpp"
+
+namespace flyball {
+namespace {
+
+using Eigen::MatrixXd;
+
+MatrixXd random_matrix(Random& random, Eigen::Index n) {
+  MatrixXd M(n, n);
+  for (double& entry : M.reshaped()) {
+    entry = random.normal();
+  }
+  return M;
+}
+
+double relative_error(const MatrixXd& got, const MatrixXd& wanted) {
+  return (got - wanted).norm() / wanted.norm();
+}
+
+// exp of a nilpotent matrix is its series: I + A + A²/2.
+TEST(MatrixExponential, NilpotentIsItsSeries) {
+  MatrixXd A(3, 3);
+  A << 0, 2, 5, 0, 0, 3, 0, 0, 0;
+  MatrixXd wanted(3, 3);
+  wanted << 1, 2, 5 + 0.5 * 2 * 3, 0, 1, 3, 0, 0, 1;
+  EXPECT_LT(relative_error(expm(A).value(), wanted), 1e-15);
+  EXPECT_LT(relative_error(expm(A.transpose()).value(), wanted.transpose()), 1e-15);
+}
+
+// [[-1, 1], [0, -2000]]: exp = [[e⁻¹, (e⁻¹ - e⁻²⁰⁰⁰)/1999], [0, e⁻²⁰⁰⁰]]. SciPy 1.10 answers NaN.
+TEST(MatrixExponential, StiffTwoByTwo) {
+  MatrixXd A(2, 2);
+  A << -1, 1, 0, -2000;
+  const MatrixXd E = expm(A).value();
+  EXPECT_DOUBLE_EQ(E(0, 0), std::exp(-1.0));
+  EXPECT_DOUBLE_EQ(E(0, 1), std::exp(-1.0) / 1999.0);
+  EXPECT_EQ(E(1, 0), 0.0);
+  EXPECT_EQ(E(1, 1), 0.0);
+}
+
+// Full stiff 2x2 V diag(-1, -2000) V⁻¹ with V = [[1, 1], [1, 2]]: V⁻¹ = [[2, -1], [-1, 1]].
+TEST(MatrixExponential, StiffFullTwoByTwo) {
+  MatrixXd A(2, 2);
+  A << -2.0 + 2000.0, 1.0 - 2000.0, -2.0 + 4000.0, 1.0 - 4000.0;
+  MatrixXd wanted(2, 2);
+  wanted << 2, -1, 2, -1;
+  wanted *= std::exp(-1.0);
+  EXPECT_LT(relative_error(expm(A).value(), wanted), 1e-12);
+}
+
+// A rotation generator gives the rotation: exp([[0, -θ], [θ, 0]]).
+TEST(MatrixExponential, SkewIsRotation) {
+  for (const double theta : {1e-9, 0.3, 3.0, 1e3}) {
+    MatrixXd A(2, 2);
+    A << 0, -theta, theta, 0;
+    MatrixXd wanted(2, 2);
+    wanted << std::cos(theta), -std::sin(theta), std::sin(theta), std::cos(theta);
+    EXPECT_LT(relative_error(expm(A).value(), wanted), 1e-15) << theta;
+  }
+}
+
+// Golden numbers; see "about" in the file.
+TEST(MatrixExponential, GoldenCases) {
+  for (const auto& c : test::cases_of("expm.json")) {
+    const MatrixXd wanted = test::matrix_from(c.at("expA"));
+    const auto got = expm(test::matrix_from(c.at("A")));
+    ASSERT_TRUE(got.has_value()) << c.at("name");
+    const double limit = std::max(10.0 * c.at("peer_error").get<double>(), 1e-13);
+    EXPECT_LE((*got - wanted).norm(), limit * wanted.norm())
+        << c.at("name") << " error " << relative_error(*got, wanted);
+  }
+}
+
+// exp(A) exp(-A) = I, exp(2A) = exp(A)², det exp(A) = e^(tr A), exp(Aᵀ) = exp(A)ᵀ.
+TEST(MatrixExponential, Laws) {
+  Random random(7);
+  for (int k = 0; k < 500; ++k) {
+    const auto n = static_cast<Eigen::Index>(1 + random.bits() % 8);
+    const MatrixXd A = random_matrix(random, n) * std::pow(10.0, random.uniform(-6, 0.3));
+    const MatrixXd E = expm(A).value();
+    const MatrixXd inverse = expm(-A).value();
+    const double scale = E.norm() * inverse.norm();
+    EXPECT_LT((E * inverse - MatrixXd::Identity(n, n)).norm(), 1e-14 * scale);
+    EXPECT_LT((expm(2.0 * A).value() - E * E).norm(), 3e-14 * scale * E.norm());
+    EXPECT_NEAR(std::log(E.determinant()), A.trace(), 1e-12 * scale);
+    EXPECT_LT((expm(A.transpose()).value() - E.transpose()).norm(), 1e-14 * scale * E.norm());
+  }
+}
+
+// exp(D⁻¹ A D) = D⁻¹ exp(A) D entry by entry, for a bad scaling D that balancing has to undo.
+TEST(MatrixExponential, BadScalingIsUndone) {
+  Random random(11);
+  for (int k = 0; k < 100; ++k) {
+    const Eigen::Index n = 5;
+    const MatrixXd A = random_matrix(random, n);
+    Eigen::VectorXd d(n);
+    for (double& entry : d) {
+      entry = std::ldexp(1.0, static_cast<int>(random.bits() % 60) - 30);
+    }
+    const MatrixXd scaled = d.cwiseInverse().asDiagonal() * A * d.asDiagonal();
+    const MatrixXd back = d.asDiagonal() * expm(scaled).value() * d.cwiseInverse().asDiagonal();
+    EXPECT_LT(relative_error(back, expm(A).value()), 1e-13);
+  }
+}
+
+// Sizes whose quotient is eliminated by panels, whole and not, rows swapped, against the series in
+// 64 bits.
+TEST(MatrixExponential, ManyStates) {
+  Random random(7);
+  for (const int n : {23, 24, 31, 50}) {
+    for (const double norm : {0.01, 5.0, 60.0}) {
+      MatrixXd A = MatrixXd::NullaryExpr(n, n, [&random] { return random.normal(); });
+      A *= norm / A.norm();
+      const test::LongMatrix expected = test::exponential(test::wide(A));
+      const auto E = expm(A);
+      ASSERT_TRUE(E) << n << ' ' << norm;
+      EXPECT_LE((test::wide(*E) - expected).norm(), 1e-15L * (1.0 + norm) * expected.norm())
+          << n << ' ' << norm;
+    }
+  }
+}
+
+TEST(MatrixExponential, RefusesMisuse) {
+  EXPECT_TRUE(expm(MatrixXd::Zero(2, 3)).error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(expm(MatrixXd(0, 0)).error().is(ArgumentError::empty));
+  MatrixXd A = MatrixXd::Identity(3, 3);
+  A(1, 2) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(expm(A).error().is(ArgumentError::not_finite));
+}
+
+TEST(MatrixExponential, OverflowIsAnErrorWithEvidence) {
+  for (const Eigen::Index n : {1, 2, 3, 6}) {
+    const MatrixXd A = 1000.0 * MatrixXd::Ones(n, n);
+    const auto result = expm(A);
+    ASSERT_FALSE(result.has_value());
+    EXPECT_TRUE(result.error().is(MatrixExponentialError::overflow));
+    ASSERT_EQ(result.error().evidence().size(), 1U);
+    EXPECT_NEAR(result.error().evidence()[0].values.at(0), 1000.0 * static_cast<double>(n), 1e-6);
+  }
+}
+
+// Very large norms with a finite answer: every entry stays finite.
+TEST(MatrixExponential, HugeDecayUnderflowsToZero) {
+  for (const double size : {1e4, 1e12, 1e30, 1e100, 1e300}) {
+    MatrixXd A(3, 3);
+    A << -2, 1, 0, 1, -2, 1, 0, 1, -2;  // eigenvalues -2, -2 ± √2: exp(size A) is zero
+    EXPECT_LT(expm(size * A).value().norm(), 1e-300) << size;
+  }
+}
+
+}  // namespace
+}  // namespace flyball

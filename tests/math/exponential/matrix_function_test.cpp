@@ -1,0 +1,209 @@
+#include <flyball/math/exponential/matrix_function.hpp>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include <flyball/core/random.hpp>
+#include <flyball/math/exponential/matrix_exponential.hpp>
+
+#include "math/matrices_json.hpp"
+
+namespace flyball {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+Eigen::MatrixXd normal(Random& random, Eigen::Index n) {
+  return Eigen::MatrixXd::NullaryExpr(n, n, [&] { return random.normal(); });
+}
+
+// [[a, b], [0, d]]^p has (a^p - d^p)/(a - d) b above its diagonal.
+TEST(MatrixPower, TriangularInClosedForm) {
+  Eigen::Matrix2d M;
+  M << 0.9, 0.3, 0.0, 0.2;
+  for (const double p : {0.5, 0.25, 2.5, 7.3}) {
+    Eigen::Matrix2d expected;
+    expected << std::pow(0.9, p), 0.3 * (std::pow(0.9, p) - std::pow(0.2, p)) / 0.7, 0.0,
+        std::pow(0.2, p);
+    EXPECT_LT((powm(M, p).value() - expected).norm(), 1e-14) << p;
+  }
+}
+
+// A Jordan block: [[a, 1], [0, a]]^p = [[a^p, p a^{p-1}], [0, a^p]]; it has no eigenvector basis,
+// where the book's diagonalisation gives up.
+TEST(MatrixPower, DefectiveMatrix) {
+  Eigen::Matrix2d M;
+  M << 0.64, 1.0, 0.0, 0.64;
+  const Eigen::MatrixXd root = powm(M, 0.5).value();
+  EXPECT_NEAR(root(0, 0), 0.8, 1e-14);
+  EXPECT_NEAR(root(0, 1), 0.5 / 0.8, 1e-13);
+  EXPECT_NEAR(root(1, 0), 0.0, 1e-15);
+}
+
+// A rotation by θ to the power p is the rotation by pθ (complex poles).
+TEST(MatrixPower, Rotation) {
+  const double angle = 2.0;
+  Eigen::Matrix2d M;
+  M << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+  const Eigen::MatrixXd third = powm(M, 1.0 / 3.0).value();
+  EXPECT_NEAR(third(0, 0), std::cos(angle / 3.0), 1e-14);
+  EXPECT_NEAR(third(1, 0), std::sin(angle / 3.0), 1e-14);
+}
+
+// M^p M^q = M^{p+q}, and whole powers are products.
+TEST(MatrixPower, AddsExponents) {
+  Random random(6);
+  for (int trial = 0; trial < 30; ++trial) {
+    const Eigen::Index n = 1 + trial % 5;
+    const Eigen::MatrixXd G = Eigen::MatrixXd::NullaryExpr(n, n, [&] { return random.normal(); });
+    // Eigenvalues to the right of the imaginary axis have every principal power.
+    const Eigen::MatrixXd M = G * 0.2 + Eigen::MatrixXd::Identity(n, n);
+    const double p = random.uniform(0.0, 2.0);
+    const double q = random.uniform(0.0, 2.0);
+    const Eigen::MatrixXd sum = powm(M, p + q).value();
+    EXPECT_LT((powm(M, p).value() * powm(M, q).value() - sum).norm(), 1e-12 * (1.0 + sum.norm()));
+    EXPECT_LT((powm(M, 3.0).value() - M * M * M).norm(), 1e-13 * (M * M * M).norm());
+    EXPECT_EQ(powm(M, 0.0).value(), Eigen::MatrixXd::Identity(n, n));
+  }
+}
+
+// A simple eigenvalue zero (a deadbeat pole) is no obstacle; a defective one is.
+TEST(MatrixPower, ZeroEigenvalues) {
+  const Eigen::Matrix2d simple = Eigen::Vector2d(0.25, 0.0).asDiagonal();
+  const Eigen::MatrixXd root = powm(simple, 0.5).value();
+  EXPECT_NEAR(root(0, 0), 0.5, 1e-15);
+  EXPECT_EQ(root(1, 1), 0.0);
+  Eigen::Matrix2d nilpotent;
+  nilpotent << 0.0, 1.0, 0.0, 0.0;
+  EXPECT_TRUE(powm(nilpotent, 0.5).error().is(MatrixFunctionError::no_real_power));
+  EXPECT_TRUE(powm(nilpotent, 2.0).value().isZero(0.0));
+  EXPECT_TRUE(powm(Eigen::Matrix2d::Zero(), 0.5).value().isZero(0.0));
+}
+
+TEST(MatrixPower, NamesTheNegativeEigenvalue) {
+  const Eigen::Matrix2d M = Eigen::Vector2d(0.5, -0.3).asDiagonal();
+  const auto power = powm(M, 1.5);
+  ASSERT_FALSE(power.has_value());
+  EXPECT_TRUE(power.error().is(MatrixFunctionError::no_real_power));
+  EXPECT_EQ(power.error().kind(), ErrorKind::no_answer);
+  EXPECT_NEAR(power.error().evidence().front().values.front(), -0.3, 1e-15);
+  EXPECT_NEAR(powm(M, 3.0).value()(1, 1), -0.027, 1e-17);
+}
+
+// A^-p is the inverse of A^p, exactly so for a diagonal.
+TEST(MatrixPower, NegativePowers) {
+  const Eigen::Matrix2d M = Eigen::Vector2d(4.0, 0.25).asDiagonal();
+  EXPECT_NEAR(powm(M, -0.5).value()(0, 0), 0.5, 1e-16);
+  EXPECT_NEAR(powm(M, -2.0).value()(1, 1), 16.0, 1e-14);
+  const Eigen::Matrix2d singular = Eigen::Vector2d(1.0, 0.0).asDiagonal();
+  EXPECT_TRUE(powm(singular, -1.0).error().is(MatrixFunctionError::singular));
+  EXPECT_TRUE(powm(singular, -0.5).error().is(MatrixFunctionError::singular));
+}
+
+TEST(MatrixPower, Errors) {
+  const Eigen::Matrix2d A = Eigen::Matrix2d::Identity();
+  EXPECT_TRUE(powm(A, 1e10).error().is(ArgumentError::out_of_range));
+  EXPECT_TRUE(powm(A, std::nan("")).error().is(ArgumentError::not_finite));
+  EXPECT_TRUE(powm(Eigen::MatrixXd(0, 0), 1.0).error().is(ArgumentError::empty));
+  EXPECT_TRUE(powm(1e200 * A, 2.0).error().is(MatrixFunctionError::overflow));
+}
+
+// Golden numbers; see "about" in the file.
+TEST(MatrixFunctions, GoldenCases) {
+  for (const auto& c : test::cases_of("matrix_functions.json")) {
+    SCOPED_TRACE(c.at("name").get<std::string>());
+    const Eigen::MatrixXd A = test::matrix_from(c.at("A"));
+    if (c.contains("log")) {
+      const Eigen::MatrixXd X = test::matrix_from(c.at("log"));
+      EXPECT_LE((logm(A).value() - X).norm(), 1e-14 * X.norm());
+    } else {
+      EXPECT_FALSE(logm(A));
+      EXPECT_FALSE(powm(A, 0.5));
+    }
+    for (const auto& power : c.value("powers", nlohmann::json::array())) {
+      const Eigen::MatrixXd X = test::matrix_from(power.at("X"));
+      EXPECT_LE((powm(A, power.at("power")).value() - X).norm(), 1e-14 * X.norm());
+    }
+  }
+}
+
+// exp(log A) = A for 3000 matrices without negative eigenvalues, badly scaled ones among them.
+TEST(MatrixLogarithm, IsTheInverseOfTheExponential) {
+  Random random(11);
+  for (int trial = 0; trial < 3000; ++trial) {
+    const Eigen::Index n = 1 + trial % 8;
+    // Eigenvalues of G/‖G‖ lie in the unit disk, so that its exponential's logarithm is principal.
+    const Eigen::MatrixXd G = normal(random, n);
+    Eigen::MatrixXd X = G * (random.uniform(0.0, 3.0) / G.norm());
+    Eigen::VectorXd d = Eigen::VectorXd::Ones(n);
+    if (trial % 3 == 0) {
+      d = Eigen::VectorXd::NullaryExpr(
+          n, [&] { return std::exp2(std::round(random.uniform(-25.0, 25.0))); });
+    }
+    X = d.asDiagonal() * X * d.cwiseInverse().asDiagonal();
+    const Eigen::MatrixXd A = expm(X).value();
+    const auto L = logm(A);
+    ASSERT_TRUE(L) << to_string(L.error());
+    const Eigen::MatrixXd difference = d.cwiseInverse().asDiagonal() * (*L - X) * d.asDiagonal();
+    EXPECT_LT(difference.norm(), 2e-12) << trial << " n = " << n;
+  }
+}
+
+TEST(MatrixLogarithm, ClosedForms) {
+  Eigen::Matrix2d rotation;
+  const double angle = 3.1;
+  rotation << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+  const Eigen::MatrixXd L = logm(rotation).value();
+  EXPECT_NEAR(L(1, 0), angle, 1e-13);
+  EXPECT_NEAR(L(0, 1), -angle, 1e-13);
+  EXPECT_NEAR(L(0, 0), 0.0, 1e-14);
+
+  Eigen::Matrix3d jordan;
+  jordan << 2.0, 1.0, 0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 2.0;
+  const Eigen::MatrixXd J = logm(jordan).value();
+  EXPECT_NEAR(J(0, 0), std::log(2.0), 1e-16);
+  EXPECT_NEAR(J(0, 1), 0.5, 1e-16);
+  EXPECT_NEAR(J(0, 2), -0.125, 1e-15);
+
+  // Near the identity to full relative accuracy: log(1 + x) = x - x²/2.
+  const Eigen::Matrix2d near = Eigen::Vector2d(1.0 + 1e-10, 1.0).asDiagonal();
+  EXPECT_NEAR(logm(near).value()(0, 0) / std::log1p(near(0, 0) - 1.0), 1.0, 1e-15);
+  // Eigenvalues 600 decades apart.
+  const Eigen::Matrix2d wide = Eigen::Vector2d(1e300, 1e-300).asDiagonal();
+  EXPECT_NEAR(logm(wide).value()(1, 1), -300.0 * std::log(10.0), 1e-12);
+}
+
+TEST(MatrixLogarithm, SaysWhenThereIsNone) {
+  const Eigen::Matrix2d negative = Eigen::Vector2d(1.0, -2.0).asDiagonal();
+  const auto L = logm(negative);
+  ASSERT_FALSE(L);
+  EXPECT_TRUE(L.error().is(MatrixFunctionError::no_real_logarithm));
+  EXPECT_EQ(L.error().evidence().front().values.front(), -2.0);
+  EXPECT_TRUE(logm(Eigen::Matrix2d::Zero()).error().is(MatrixFunctionError::no_real_logarithm));
+  EXPECT_TRUE(
+      logm(-Eigen::Matrix2d::Identity()).error().is(MatrixFunctionError::no_real_logarithm));
+  EXPECT_TRUE(logm(Eigen::MatrixXd(2, 3)).error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(logm(Eigen::MatrixXd(0, 0)).error().is(ArgumentError::empty));
+  const Eigen::Matrix2d bad = Eigen::Matrix2d::Constant(std::nan(""));
+  EXPECT_TRUE(logm(bad).error().is(ArgumentError::not_finite));
+}
+
+// A^p = exp(p log A).
+TEST(MatrixPower, IsTheExponentialOfTheLogarithm) {
+  Random random(12);
+  for (int trial = 0; trial < 500; ++trial) {
+    const Eigen::Index n = 1 + trial % 6;
+    const Eigen::MatrixXd G = normal(random, n);
+    const Eigen::MatrixXd X = G * (random.uniform(0.1, 0.9 * pi) / G.norm());
+    const double p = random.uniform(-3.0, 3.0);
+    const Eigen::MatrixXd expected = expm(p * X).value();
+    const Eigen::MatrixXd got = powm(expm(X).value(), p).value();
+    EXPECT_LT((got - expected).norm(), 1e-11 * expected.norm()) << trial << " p = " << p;
+  }
+}
+
+}  // namespace
+}  // namespace flyball
