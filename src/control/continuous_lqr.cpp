@@ -6,6 +6,7 @@
 #include <flyball/math/riccati/riccati.hpp>
 
 #include "control/weights.hpp"
+#include "core/try.hpp"
 
 namespace flyball {
 
@@ -14,27 +15,14 @@ namespace {
 Expected<LqrDesign<>> solve_continuous(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
                                        const Weight& R, const Eigen::MatrixXd* N) {
   constexpr std::string_view where = "continuous_lqr";
-  if (auto square = check_square(A, where, "A"); !square) {
-    return tl::unexpected(square.error());
-  }
-  if (auto shape = check_shape(B, A.rows(), B.cols(), where, "B", "states x inputs"); !shape) {
-    return tl::unexpected(shape.error());
-  }
-  const auto weight_Q = detail::weight_of(Q, A.rows(), where, "Q", "states x states");
-  if (!weight_Q) {
-    return tl::unexpected(weight_Q.error());
-  }
-  const auto weight_R = detail::weight_of(R, B.cols(), where, "R", "inputs x inputs");
-  if (!weight_R) {
-    return tl::unexpected(weight_R.error());
-  }
+  FLYBALL_CHECK(Checks(where).square(A, "A").shape(B, A.rows(), B.cols(), "B", "states x inputs"));
+  FLYBALL_TRY(const auto weight_Q, detail::weight_of(Q, A.rows(), where, "Q", "states x states"));
+  FLYBALL_TRY(const auto weight_R, detail::weight_of(R, B.cols(), where, "R", "inputs x inputs"));
   if (N != nullptr) {
-    if (auto shape = check_shape(*N, A.rows(), B.cols(), where, "N", "states x inputs"); !shape) {
-      return tl::unexpected(shape.error());
-    }
+    FLYBALL_CHECK(check_shape(*N, A.rows(), B.cols(), where, "N", "states x inputs"));
   }
   auto solution =
-      N == nullptr ? care(A, B, *weight_Q, *weight_R) : care(A, B, *weight_Q, *weight_R, *N);
+      N == nullptr ? care(A, B, weight_Q, weight_R) : care(A, B, weight_Q, weight_R, *N);
   if (!solution) {
     return tl::unexpected(Error(std::move(solution.error()).in(std::string(where))));
   }
@@ -58,9 +46,7 @@ Expected<LqrDesign<>> continuous_lqr(const MatrixRef& A, const MatrixRef& B, con
 Expected<IntegralLqr> continuous_lqi(const ContinuousSystem<>& plant, const Weight& Q,
                                      const Weight& R) {
   constexpr std::string_view where = "continuous_lqi";
-  if (auto checked = check_system(plant, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_system(plant, where));
   return detail::integral_plant(plant.A, plant.B, plant.C, plant.D, 1.0, 0.0, Q, where)
       .and_then([&](const detail::IntegralPlant& augmented) {
         return detail::split_integral(continuous_lqr(augmented.A, augmented.B, Q, R),

@@ -6,6 +6,7 @@
 #include <flyball/math/exponential/matrix_exponential.hpp>
 #include <flyball/math/exponential/matrix_function.hpp>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball {
@@ -14,13 +15,13 @@ namespace {
 
 Expected<void> check_gain(const MatrixRef& K, const MatrixRef& A, const MatrixRef& B,
                           std::string_view where) {
-  if (auto square = check_square(A, where, "A"); !square) {
-    return square;
-  }
-  return check_all(check_shape(B, A.rows(), B.cols(), where, "B", "states x inputs"),
-                   check_shape(K, B.cols(), A.rows(), where, "K", "inputs x states"),
-                   check_finite(A, where, "A"), check_finite(B, where, "B"),
-                   check_finite(K, where, "K"));
+  FLYBALL_CHECK(check_square(A, where, "A"));
+  return Checks(where)
+      .shape(B, A.rows(), B.cols(), "B", "states x inputs")
+      .shape(K, B.cols(), A.rows(), "K", "inputs x states")
+      .finite(A, "A")
+      .finite(B, "B")
+      .finite(K, "K");
 }
 
 }  // namespace
@@ -30,14 +31,10 @@ Expected<std::vector<Eigen::MatrixXd>> latency_gains(const MatrixRef& K, const M
                                                      Time latency) {
   constexpr std::string_view where = "latency_gains";
   constexpr double most_periods = 1e4;
-  if (auto checked = check_gain(K, A, B, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  if (auto checked = check_all(check_positive(period.si(), where, "period", "s"),
-                               check_not_negative(latency.si(), where, "latency", "s"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_gain(K, A, B, where));
+  FLYBALL_CHECK(Checks(where)
+                    .positive(period.si(), "period", "s")
+                    .not_negative(latency.si(), "latency", "s"));
   double periods = latency.si() / period.si();
   // 0.05 s / 0.005 s is ten periods, whatever the division rounds to.
   if (std::abs(periods - std::round(periods)) < 1e-9 * std::max(1.0, periods)) {
@@ -83,24 +80,14 @@ Expected<std::vector<Eigen::MatrixXd>> latency_gains(const MatrixRef& K, const M
 Expected<Eigen::MatrixXd> continuous_latency_gain(const MatrixRef& K, const MatrixRef& A,
                                                   const MatrixRef& B, Time latency, Time elapsed) {
   constexpr std::string_view where = "continuous_latency_gain";
-  if (auto checked = check_gain(K, A, B, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  if (auto checked = check_all(check_not_negative(latency.si(), where, "latency", "s"),
-                               check_not_negative(elapsed.si(), where, "elapsed", "s"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_gain(K, A, B, where));
+  FLYBALL_CHECK(Checks(where)
+                    .not_negative(latency.si(), "latency", "s")
+                    .not_negative(elapsed.si(), "elapsed", "s"));
   const double controlled = std::min(latency.si(), elapsed.si());
-  const auto closed = expm((A - detail::product(B, K)) * controlled);
-  if (!closed) {
-    return tl::unexpected(closed.error());
-  }
-  const auto free = expm(A * (latency.si() - controlled));
-  if (!free) {
-    return tl::unexpected(free.error());
-  }
-  return detail::product(detail::product(K, *closed), *free);
+  FLYBALL_TRY(const auto closed, expm((A - detail::product(B, K)) * controlled));
+  FLYBALL_TRY(const auto free, expm(A * (latency.si() - controlled)));
+  return detail::product(detail::product(K, closed), free);
 }
 
 }  // namespace flyball

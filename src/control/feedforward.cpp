@@ -20,10 +20,13 @@ Expected<SimpleFeedforward> SimpleFeedforward::create(mechanisms::MechanismKind 
                                                       const mechanisms::FeedforwardGains& gains,
                                                       Time period) {
   constexpr std::string_view where = "SimpleFeedforward";
-  return check_all(check_positive(gains.kV, where, "kV"), check_not_negative(gains.kS, where, "kS"),
-                   check_not_negative(gains.kA, where, "kA"), check_finite(gains.kG, where, "kG"),
-                   check_finite(gains.angle_offset, where, "angle_offset"),
-                   check_positive(period.si(), where, "period", "s"))
+  return Checks(where)
+      .positive(gains.kV, "kV")
+      .not_negative(gains.kS, "kS")
+      .not_negative(gains.kA, "kA")
+      .finite(gains.kG, "kG")
+      .finite(gains.angle_offset, "angle_offset")
+      .positive(period.si(), "period", "s")
       .map([&] { return SimpleFeedforward(kind, gains, period); });
 }
 

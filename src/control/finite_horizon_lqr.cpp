@@ -9,6 +9,7 @@
 #include <flyball/math/riccati/riccati.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball {
@@ -32,31 +33,27 @@ Expected<Weights> check_weights(const QuadraticCost& cost, const Weight& termina
   const Eigen::MatrixXd& S = *terminal.get();
   const Eigen::MatrixXd N =
       cost.N.size() == 0 ? Eigen::MatrixXd(Eigen::MatrixXd::Zero(n, m)) : cost.N;
-  if (auto shapes =
-          check_all(check_shape(cost.Q, n, n, where, "Q", "states x states"),
-                    check_shape(cost.R, m, m, where, "R", "inputs x inputs"),
-                    check_shape(N, n, m, where, "N", "states x inputs"),
-                    check_shape(S, n, n, where, "the terminal weight", "states x states"));
-      !shapes) {
-    return tl::unexpected(shapes.error());
-  }
-  if (auto values =
-          check_all(check_finite(cost.Q, where, "Q"), check_finite(cost.R, where, "R"),
-                    check_finite(N, where, "N"), check_finite(S, where, "the terminal weight"),
-                    check_symmetric(cost.Q, where, "Q"), check_symmetric(cost.R, where, "R"),
-                    check_symmetric(S, where, "the terminal weight"));
-      !values) {
-    return tl::unexpected(values.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(cost.Q, n, n, "Q", "states x states")
+                    .shape(cost.R, m, m, "R", "inputs x inputs")
+                    .shape(N, n, m, "N", "states x inputs")
+                    .shape(S, n, n, "the terminal weight", "states x states")
+                    .finite(cost.Q, "Q")
+                    .finite(cost.R, "R")
+                    .finite(N, "N")
+                    .finite(S, "the terminal weight")
+                    .symmetric(cost.Q, "Q")
+                    .symmetric(cost.R, "R")
+                    .symmetric(S, "the terminal weight"));
   return Weights{symmetrized(cost.Q), symmetrized(cost.R), N, symmetrized(S)};
 }
 
 Expected<void> check_plant(const MatrixRef& A, const MatrixRef& B, std::string_view where) {
-  if (auto square = check_square(A, where, "A"); !square) {
-    return square;
-  }
-  return check_all(check_shape(B, A.rows(), B.cols(), where, "B", "states x inputs"),
-                   check_finite(A, where, "A"), check_finite(B, where, "B"));
+  FLYBALL_CHECK(check_square(A, where, "A"));
+  return Checks(where)
+      .shape(B, A.rows(), B.cols(), "B", "states x inputs")
+      .finite(A, "A")
+      .finite(B, "B");
 }
 
 Expected<void> check_steps(std::size_t steps, Eigen::Index n, std::string_view where) {
@@ -146,14 +143,11 @@ Expected<std::optional<Flow>> flow_over(const Eigen::MatrixXd& A, const Eigen::M
   for (double size = detail::norm1(H) * h; size > 0.5; size *= 0.5) {
     ++doublings;
   }
-  const auto exponential = expm(H * std::ldexp(-h, -doublings));
-  if (!exponential) {
-    return tl::unexpected(exponential.error());
-  }
+  FLYBALL_TRY(const auto exponential, expm(H * std::ldexp(-h, -doublings)));
   const Eigen::MatrixXd inverse =
-      detail::solve_linear(exponential->topLeftCorner(n, n), Eigen::MatrixXd::Identity(n, n));
-  Flow flow{inverse, symmetrized(product(inverse, exponential->topRightCorner(n, n))),
-            symmetrized(product(exponential->bottomLeftCorner(n, n), inverse))};
+      detail::solve_linear(exponential.topLeftCorner(n, n), Eigen::MatrixXd::Identity(n, n));
+  Flow flow{inverse, symmetrized(product(inverse, exponential.topRightCorner(n, n))),
+            symmetrized(product(exponential.bottomLeftCorner(n, n), inverse))};
   for (int i = 0; i < doublings; ++i) {
     double rcond = 0.0;
     Eigen::MatrixXd both(n, 2 * n);
@@ -178,13 +172,9 @@ Expected<FiniteHorizonLqr> finite_horizon_lqr(const MatrixRef& A, const MatrixRe
                                               const QuadraticCost& cost, const Weight& S_N,
                                               int steps) {
   constexpr std::string_view where = "finite_horizon_lqr";
-  if (auto plant = check_plant(A, B, where); !plant) {
-    return tl::unexpected(plant.error());
-  }
+  FLYBALL_CHECK(check_plant(A, B, where));
   const auto count = static_cast<std::size_t>(std::max(steps, 0));
-  if (auto checked = check_steps(count, A.rows(), where); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_steps(count, A.rows(), where));
   const DiscretizedMatrices plant{A, B};
   return check_weights(cost, S_N, A.rows(), B.cols(), where).and_then([&](const Weights& weights) {
     return recursion([&](std::size_t) -> const DiscretizedMatrices& { return plant; }, count,
@@ -204,18 +194,12 @@ Expected<FiniteHorizonLqr> finite_horizon_lqr(std::span<const DiscretizedMatrice
   }
   const Eigen::Index n = plants.front().A.rows();
   const Eigen::Index m = plants.front().B.cols();
-  if (auto checked = check_steps(plants.size(), n, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_steps(plants.size(), n, where));
   for (const DiscretizedMatrices& plant : plants) {
-    if (auto checked = check_plant(plant.A, plant.B, where); !checked) {
-      return tl::unexpected(checked.error());
-    }
-    if (auto same = check_all(check_shape(plant.A, n, n, where, "A", "that of the first step"),
-                              check_shape(plant.B, n, m, where, "B", "that of the first step"));
-        !same) {
-      return tl::unexpected(same.error());
-    }
+    FLYBALL_CHECK(check_plant(plant.A, plant.B, where));
+    FLYBALL_CHECK(Checks(where)
+                      .shape(plant.A, n, n, "A", "that of the first step")
+                      .shape(plant.B, n, m, "B", "that of the first step"));
   }
   return check_weights(cost, S_N, n, m, where).and_then([&](const Weights& weights) {
     return recursion([&](std::size_t k) -> const DiscretizedMatrices& { return plants[k]; },
@@ -228,28 +212,21 @@ Expected<FiniteHorizonLqr> continuous_finite_horizon_lqr(const MatrixRef& A, con
                                                          const Weight& S_T, Time horizon,
                                                          int steps) {
   constexpr std::string_view where = "continuous_finite_horizon_lqr";
-  if (auto plant = check_plant(A, B, where); !plant) {
-    return tl::unexpected(plant.error());
-  }
+  FLYBALL_CHECK(check_plant(A, B, where));
   const Eigen::Index n = A.rows();
   const auto count = static_cast<std::size_t>(std::max(steps, 0));
-  if (auto checked = check_all(check_positive(horizon.si(), where, "horizon", "s"),
-                               check_steps(count, n, where));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
-  auto weights = check_weights(cost, S_T, n, B.cols(), where);
-  if (!weights) {
-    return tl::unexpected(weights.error());
-  }
-  if (!detail::cholesky_of(weights->R)) {
+  FLYBALL_CHECK(Checks(where).positive(horizon.si(), "horizon", "s").also([&] {
+    return check_steps(count, n, where);
+  }));
+  FLYBALL_TRY(auto weights, check_weights(cost, S_T, n, B.cols(), where));
+  if (!detail::cholesky_of(weights.R)) {
     return tl::unexpected(not_definite(where, "R", count));
   }
   // The cross weight is a change of the input's origin: A - BR⁻¹Nᵀ, Q - NR⁻¹Nᵀ.
-  const Eigen::MatrixXd R_B = detail::solve_symmetric(weights->R, B.transpose());
-  const Eigen::MatrixXd R_N = detail::solve_symmetric(weights->R, weights->N.transpose());
+  const Eigen::MatrixXd R_B = detail::solve_symmetric(weights.R, B.transpose());
+  const Eigen::MatrixXd R_N = detail::solve_symmetric(weights.R, weights.N.transpose());
   Eigen::MatrixXd G = symmetrized(product(B, R_B));
-  Eigen::MatrixXd Q = symmetrized(weights->Q - product(weights->N, R_N));
+  Eigen::MatrixXd Q = symmetrized(weights.Q - product(weights.N, R_N));
   // S of the size that makes both off-diagonal blocks of the Hamiltonian alike.
   const double sizes = std::sqrt(Q.norm() / G.norm());
   const double unit = std::isfinite(sizes) && sizes > 0.0 ? sizes : 1.0;
@@ -276,7 +253,7 @@ Expected<FiniteHorizonLqr> continuous_finite_horizon_lqr(const MatrixRef& A, con
   FiniteHorizonLqr design;
   design.K.resize(count + 1);
   design.S.resize(count + 1);
-  Eigen::MatrixXd S = weights->S / unit;
+  Eigen::MatrixXd S = weights.S / unit;
   for (std::size_t k = count + 1; k-- > 0;) {
     if (k < count) {
       double rcond = 0.0;

@@ -5,6 +5,7 @@
 #include <flyball/math/riccati/riccati.hpp>
 
 #include "control/placement.hpp"
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball {
@@ -13,19 +14,15 @@ Expected<QuadraticCost> implicit_model_cost(const MatrixRef& A, const MatrixRef&
                                             const MatrixRef& C, const MatrixRef& A_ref,
                                             const Weight& Q, const Weight& R) {
   constexpr std::string_view where = "implicit_model_cost";
-  if (auto square = check_square(A, where, "A"); !square) {
-    return tl::unexpected(square.error());
-  }
-  if (auto checked =
-          check_all(check_shape(B, A.rows(), B.cols(), where, "B", "states x inputs"),
-                    check_shape(C, C.rows(), A.rows(), where, "C", "followed states x states"),
-                    check_shape(A_ref, C.rows(), C.rows(), where, "A_ref",
-                                "followed states x followed states"),
-                    check_finite(A, where, "A"), check_finite(B, where, "B"),
-                    check_finite(C, where, "C"), check_finite(A_ref, where, "A_ref"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .square(A, "A")
+                    .shape(B, A.rows(), B.cols(), "B", "states x inputs")
+                    .shape(C, C.rows(), A.rows(), "C", "followed states x states")
+                    .shape(A_ref, C.rows(), C.rows(), "A_ref", "followed states x followed states")
+                    .finite(A, "A")
+                    .finite(B, "B")
+                    .finite(C, "C")
+                    .finite(A_ref, "A_ref"));
   // y₊ - z₊ = (CA - A_ref C) x + C B u is an output with feedthrough: (B.4) is (B.2) of it.
   auto cost =
       output_cost(detail::product(C, A) - detail::product(A_ref, C), detail::product(C, B), Q, R);
@@ -83,12 +80,9 @@ Expected<Eigen::MatrixXd> following_gain(const MatrixRef& A, const MatrixRef& B,
   const Eigen::MatrixXd basis = seen.Q.leftCols(n);
   const Eigen::MatrixXd Q_seen =
       detail::symmetrized(detail::transposed_product(basis, detail::product(Q_shifted, basis)));
-  const auto part = dare(seen.A.topLeftCorner(n, n).transpose(),
-                         detail::transposed_product(basis, B), Q_seen, cost.R);
-  if (!part) {
-    return tl::unexpected(part.error());
-  }
-  return Eigen::MatrixXd(detail::product_transposed(part->K, basis) + shift);
+  FLYBALL_TRY(const auto part, dare(seen.A.topLeftCorner(n, n).transpose(),
+                                    detail::transposed_product(basis, B), Q_seen, cost.R));
+  return Eigen::MatrixXd(detail::product_transposed(part.K, basis) + shift);
 }
 
 }  // namespace
@@ -98,22 +92,16 @@ Expected<ImplicitModel> implicit_model_following(const MatrixRef& A, const Matri
                                                  const MatrixRef& B_ref, const Weight& Q,
                                                  const Weight& R) {
   constexpr std::string_view where = "implicit_model_following";
-  auto cost = implicit_model_cost(A, B, C, A_ref, Q, R);
-  if (!cost) {
-    return tl::unexpected(cost.error());
-  }
-  if (auto checked = check_all(
-          check_shape(B_ref, C.rows(), B_ref.cols(), where, "B_ref", "followed states x inputs"),
-          check_finite(B_ref, where, "B_ref"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
-  const auto K = following_gain(A, B, C, A_ref, *Q.get(), *R.get(), *cost);
+  FLYBALL_TRY(auto cost, implicit_model_cost(A, B, C, A_ref, Q, R));
+  FLYBALL_CHECK(Checks(where)
+                    .shape(B_ref, C.rows(), B_ref.cols(), "B_ref", "followed states x inputs")
+                    .finite(B_ref, "B_ref"));
+  const auto K = following_gain(A, B, C, A_ref, *Q.get(), *R.get(), cost);
   if (!K) {
     return tl::unexpected(Error(Error(K.error()).in(std::string(where))));
   }
   const Eigen::MatrixXd reach = detail::product(C, B);
-  ImplicitModel model{*K, detail::solve_least_squares(reach, B_ref), std::move(*cost),
+  ImplicitModel model{*K, detail::solve_least_squares(reach, B_ref), std::move(cost),
                       detail::eigenvalues_of(A - detail::product(B, *K)), 0.0};
   model.mismatch =
       (detail::product(C, A) - detail::product(A_ref, C) - detail::product(reach, model.K)).norm();

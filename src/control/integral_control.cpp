@@ -3,6 +3,7 @@
 #include <string>
 
 #include "control/weights.hpp"
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball {
@@ -55,15 +56,10 @@ Expected<IntegralPlant> integral_plant(const MatrixRef& A, const MatrixRef& B, c
   const Eigen::Index n = A.rows();
   const Eigen::Index p = C.rows();
   if (Q.get()) {
-    if (auto shape = check_shape(*Q.get(), n + p, n + p, where, "Q",
-                                 "(states + outputs) x (states + outputs)");
-        !shape) {
-      return tl::unexpected(shape.error());
-    }
+    FLYBALL_CHECK(
+        check_shape(*Q.get(), n + p, n + p, where, "Q", "(states + outputs) x (states + outputs)"));
   }
-  if (auto trackable = check_trackable(A, B, C, D, e, where); !trackable) {
-    return tl::unexpected(trackable.error());
-  }
+  FLYBALL_CHECK(check_trackable(A, B, C, D, e, where));
   IntegralPlant plant{Eigen::MatrixXd::Zero(n + p, n + p), Eigen::MatrixXd::Zero(n + p, B.cols())};
   plant.A.topLeftCorner(n, n) = A;
   plant.A.bottomLeftCorner(p, n) = -h * C;
@@ -101,9 +97,7 @@ ErrorInfo error_info(IntegralControlError code) {
 }
 
 Expected<IntegralLqr> lqi(const DiscreteSystem<>& plant, const Weight& Q, const Weight& R) {
-  if (auto checked = check_system(plant, "lqi"); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_system(plant, "lqi"));
   return detail::integral_plant(plant.A, plant.B, plant.C, plant.D, plant.period.si(), 1.0, Q,
                                 "lqi")
       .and_then([&](const detail::IntegralPlant& augmented) {
@@ -121,12 +115,10 @@ Expected<Eigen::MatrixXd> input_error_gain(const MatrixRef& B, const MatrixRef& 
                               .got("empty")
                               .expected("states x inputs"));
   }
-  if (auto checked = check_all(
-          check_shape(B_error, B.rows(), B_error.cols(), where, "B_error", "states x disturbances"),
-          check_finite(B, where, "B"), check_finite(B_error, where, "B_error"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(B_error, B.rows(), B_error.cols(), "B_error", "states x disturbances")
+                    .finite(B, "B")
+                    .finite(B_error, "B_error"));
   Eigen::MatrixXd gain = detail::solve_least_squares(B, B_error);
   const double left = (detail::product(B, gain) - B_error).norm();
   if (left > negligible * B_error.norm()) {

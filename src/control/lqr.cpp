@@ -5,6 +5,7 @@
 #include <flyball/math/riccati/riccati.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball {
 
@@ -22,19 +23,17 @@ Expected<LqrDesign<>> solve(const MatrixRef& A, const MatrixRef& B, const Weight
   }
   const Eigen::MatrixXd& weight_Q = *Q.get();
   const Eigen::MatrixXd& weight_R = *R.get();
-  if (auto square = check_square(A, where, "A"); !square) {
-    return tl::unexpected(square.error());
-  }
+  FLYBALL_CHECK(check_square(A, where, "A"));
   const Eigen::Index n = A.rows();
   const Eigen::Index m = B.cols();
-  if (auto checked = check_all(
-          check_shape(B, n, m, where, "B", "states x inputs"),
-          check_shape(weight_Q, n, n, where, "Q", "states x states"),
-          check_shape(weight_R, m, m, where, "R", "inputs x inputs"),
-          N == nullptr ? Expected<void>{} : check_shape(*N, n, m, where, "N", "states x inputs"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(B, n, m, "B", "states x inputs")
+                    .shape(weight_Q, n, n, "Q", "states x states")
+                    .shape(weight_R, m, m, "R", "inputs x inputs")
+                    .also([&] {
+                      return N == nullptr ? Expected<void>{}
+                                          : check_shape(*N, n, m, where, "N", "states x inputs");
+                    }));
   auto solution =
       N == nullptr ? dare(A, B, weight_Q, weight_R) : dare(A, B, weight_Q, weight_R, *N);
   if (!solution) {
@@ -55,9 +54,7 @@ Expected<Eigen::MatrixXd> bryson(std::span<const double> tolerances, double rho)
                               .got("empty")
                               .expected("one tolerance a state or input"));
   }
-  if (auto checked = check_positive(rho, name, "rho"); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_positive(rho, name, "rho"));
   const auto n = static_cast<Eigen::Index>(tolerances.size());
   Eigen::MatrixXd weight = Eigen::MatrixXd::Zero(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {

@@ -7,6 +7,7 @@
 
 #include "control/single_loop.hpp"
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball {
 
@@ -109,24 +110,21 @@ Expected<PidGains> raise_kp(Bench& bench, double first, double sign, bool veloci
   PidGains calm{};
   for (int i = 0; i < doublings; ++i) {
     gains.kp = sign * first * std::ldexp(1.0, i);
-    auto step = bench.attempt(gains);
-    if (!step) {
-      return tl::unexpected(step.error());
-    }
-    if (!bench.oscillates(**step)) {
-      (*step)->decided = "increase Kp: nothing oscillates yet";
+    FLYBALL_TRY(auto step, bench.attempt(gains));
+    if (!bench.oscillates(*step)) {
+      step->decided = "increase Kp: nothing oscillates yet";
       calm = gains;
       continue;
     }
-    if (velocity || (*step)->jitter > jittering) {
-      (*step)->decided = detail::format(
+    if (velocity || step->jitter > jittering) {
+      step->decided = detail::format(
           "take Kp back to {}: {}", format_number(calm.kp, 4),
           velocity ? "a velocity controller has no Kd to damp an oscillation (6.10.7)"
                    : "the loop is at the edge of its sample rate");
       return calm;
     }
-    (*step)->decided = detail::format("keep Kp = {}: it starts to oscillate, which Kd is to damp",
-                                      format_number(gains.kp, 4));
+    step->decided = detail::format("keep Kp = {}: it starts to oscillate, which Kd is to damp",
+                                   format_number(gains.kp, 4));
     return gains;
   }
   bench.steps().back().decided = "keep Kp: more of it changes nothing";
@@ -145,25 +143,21 @@ Expected<PidGains> raise_kd(Bench& bench, PidGains gains, double period) {
   double least = cost_of(bench.steps().back());
   for (int i = 0; i < doublings; ++i) {
     gains.kd = gains.kp * period * std::ldexp(0.25, i);
-    auto step = bench.attempt(gains);
-    if (!step) {
-      return tl::unexpected(step.error());
-    }
-    if ((*step)->jitter > jittering) {
-      (*step)->decided =
-          detail::format("take Kd back to {}: it jitters", format_number(best.kd, 4));
+    FLYBALL_TRY(auto step, bench.attempt(gains));
+    if (step->jitter > jittering) {
+      step->decided = detail::format("take Kd back to {}: it jitters", format_number(best.kd, 4));
       break;
     }
-    const double cost = cost_of(**step);
+    const double cost = cost_of(*step);
     if (cost < least) {
-      (*step)->decided = "increase Kd: the oscillation is damped, and nothing jitters";
+      step->decided = "increase Kd: the oscillation is damped, and nothing jitters";
       best = gains;
       least = cost;
-    } else if ((*step)->metrics.overshoot > oscillating) {
-      (*step)->decided = "increase Kd: it still oscillates";
+    } else if (step->metrics.overshoot > oscillating) {
+      step->decided = "increase Kd: it still oscillates";
     } else {
-      (*step)->decided = detail::format("take Kd back to {}: more of it only slows the response",
-                                        format_number(best.kd, 4));
+      step->decided = detail::format("take Kd back to {}: more of it only slows the response",
+                                     format_number(best.kd, 4));
       break;
     }
   }
@@ -177,26 +171,23 @@ Expected<PidGains> raise_ki(Bench& bench, PidGains gains, double duration) {
   double least = std::numeric_limits<double>::infinity();
   for (int i = 0; i < doublings; ++i) {
     gains.ki = gains.kp / duration * std::ldexp(0.5, i);
-    auto step = bench.attempt(gains);
-    if (!step) {
-      return tl::unexpected(step.error());
-    }
-    if (bench.oscillates(**step)) {
-      (*step)->decided = detail::format("take Ki back to {}: it goes too far over the reference",
-                                        format_number(best.ki, 4));
+    FLYBALL_TRY(auto step, bench.attempt(gains));
+    if (bench.oscillates(*step)) {
+      step->decided = detail::format("take Ki back to {}: it goes too far over the reference",
+                                     format_number(best.ki, 4));
       break;
     }
-    const double error = bench.error_of(**step);
+    const double error = bench.error_of(*step);
     if (error < least) {
       least = error;
       best = gains;
     }
-    if (error <= exact && (*step)->metrics.settling_time) {
-      (*step)->decided =
+    if (error <= exact && step->metrics.settling_time) {
+      step->decided =
           detail::format("keep Ki = {}: the error is gone in time", format_number(gains.ki, 4));
       break;
     }
-    (*step)->decided = "increase Ki: an error remains";
+    step->decided = "increase Ki: an error remains";
   }
   return best;
 }
@@ -205,15 +196,10 @@ Expected<PidGains> raise_ki(Bench& bench, PidGains gains, double duration) {
 
 Expected<ManualTuning> tune_manually(const DiscreteSystem<>& plant, const TuningScenario& scenario,
                                      bool velocity) {
-  if (auto checked = detail::check_single_loop(plant, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(detail::check_single_loop(plant, where));
   Bench bench(plant, scenario);
-  auto rest = bench.attempt({});
-  if (!rest) {
-    return tl::unexpected(rest.error());
-  }
-  (*rest)->decided = "start with all gains zero (step 1), then raise Kp (step 2)";
+  FLYBALL_TRY(auto rest, bench.attempt({}));
+  rest->decided = "start with all gains zero (step 1), then raise Kp (step 2)";
   // Which way the input moves the output in the end decides the sign of the gains.
   const auto push = [&]() -> double {
     Eigen::VectorXd x = Eigen::VectorXd::Zero(plant.A.rows());
@@ -243,33 +229,26 @@ Expected<ManualTuning> tune_manually(const DiscreteSystem<>& plant, const Tuning
       return tl::unexpected(gains.error());
     }
   }
-  auto settled = bench.attempt(*gains);
-  if (!settled) {
-    return tl::unexpected(settled.error());
-  }
-  if (bench.error_of(**settled) > exact) {
-    (*settled)->decided =
-        "an error remains: a steady-state feedforward would be better, but raise Ki";
+  FLYBALL_TRY(auto settled, bench.attempt(*gains));
+  if (bench.error_of(*settled) > exact) {
+    settled->decided = "an error remains: a steady-state feedforward would be better, but raise Ki";
     gains = raise_ki(bench, *gains, scenario.duration);
     if (!gains) {
       return tl::unexpected(gains.error());
     }
   } else {
-    (*settled)->decided = "leave Ki at zero: no error remains";
+    settled->decided = "leave Ki at zero: no error remains";
   }
-  auto response = simulate_pid(plant, *gains, scenario);
-  if (!response) {
-    return tl::unexpected(response.error());
-  }
-  if (std::abs(response->metrics.steady_state_error) >= std::abs(scenario.reference)) {
+  FLYBALL_TRY(auto response, simulate_pid(plant, *gains, scenario));
+  if (std::abs(response.metrics.steady_state_error) >= std::abs(scenario.reference)) {
     return tl::unexpected(Error(TuningError::nothing_improves)
                               .in(std::string(where))
                               .about("the loop")
                               .hint("the plant needs more than its limits allow, or another "
                                     "controller: see whether it is controllable")
-                              .with("error that remains", response->metrics.steady_state_error));
+                              .with("error that remains", response.metrics.steady_state_error));
   }
-  return ManualTuning{*gains, std::move(bench.steps()), std::move(*response)};
+  return ManualTuning{*gains, std::move(bench.steps()), std::move(response)};
 }
 
 }  // namespace flyball

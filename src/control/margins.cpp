@@ -8,6 +8,7 @@
 #include "control/delay_margin.hpp"
 #include "control/line_search.hpp"
 #include "control/sampled_loop.hpp"
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball {
@@ -185,35 +186,30 @@ void set_disk_margin(StabilityMargins& margins, const SampledLoop& loop,
 }  // namespace
 
 Expected<StabilityMargins> stability_margins(const PlantInputLoop& loop) {
-  if (auto checked = detail::check_loop(loop, "stability_margins"); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  auto sampled = SampledLoop::create(loop);
-  if (!sampled) {
-    return tl::unexpected(sampled.error());
-  }
+  FLYBALL_CHECK(detail::check_loop(loop, "stability_margins"));
+  FLYBALL_TRY(auto sampled, SampledLoop::create(loop));
   const double period = loop.period.si();
   StabilityMargins margins;
-  margins.spectral_radius = detail::spectral_radius(sampled->closed(1.0));
+  margins.spectral_radius = detail::spectral_radius(sampled.closed(1.0));
   margins.stable = margins.spectral_radius < 1.0;
 
-  const std::vector<Point> points = sample(*sampled);
-  const std::vector<double> gain_crossovers = zeros(*sampled, points, log_gain);
+  const std::vector<Point> points = sample(sampled);
+  const std::vector<double> gain_crossovers = zeros(sampled, points, log_gain);
   for (const double theta : gain_crossovers) {
-    margins.gain_crossovers.push_back(crossover(theta, sampled->response(theta), period));
+    margins.gain_crossovers.push_back(crossover(theta, sampled.response(theta), period));
   }
   // L is real at both ends of the frequencies, too; with an integrator it has no value at zero.
-  const Complex at_zero = sampled->response(0.0);
+  const Complex at_zero = sampled.response(0.0);
   if (std::isfinite(at_zero.real()) && std::abs(at_zero) < 1e12 && at_zero.real() < 0.0) {
     margins.phase_crossovers.push_back(crossover(0.0, at_zero.real(), period));
   }
-  for (const double theta : zeros(*sampled, points, [](const Complex& L) { return L.imag(); })) {
-    const Complex L = sampled->response(theta);
+  for (const double theta : zeros(sampled, points, [](const Complex& L) { return L.imag(); })) {
+    const Complex L = sampled.response(theta);
     if (L.real() < 0.0 && theta < pi) {
       margins.phase_crossovers.push_back(crossover(theta, L.real(), period));
     }
   }
-  const Complex at_nyquist = sampled->response(pi);
+  const Complex at_nyquist = sampled.response(pi);
   if (at_nyquist.real() < 0.0) {
     margins.phase_crossovers.push_back(crossover(pi, at_nyquist.real(), period));
   }
@@ -224,12 +220,12 @@ Expected<StabilityMargins> stability_margins(const PlantInputLoop& loop) {
   set_gain_margins(margins);
   margins.phase_margin = 180.0;
   for (const double theta : gain_crossovers) {
-    const double lag = lag_to_minus_one(sampled->response(theta));
+    const double lag = lag_to_minus_one(sampled.response(theta));
     margins.phase_margin =
         std::min(margins.phase_margin, std::min(lag, 2.0 * pi - lag) * 180.0 / pi);
   }
-  margins.delay_margin = detail::delay_margin(loop, gain_crossovers, *sampled);
-  set_disk_margin(margins, *sampled, points, period);
+  margins.delay_margin = detail::delay_margin(loop, gain_crossovers, sampled);
+  set_disk_margin(margins, sampled, points, period);
   return margins;
 }
 

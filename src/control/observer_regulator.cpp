@@ -1,6 +1,7 @@
 #include <flyball/control/observer_regulator.tpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball {
 
@@ -11,21 +12,18 @@ Expected<void> check_regulator(const MatrixRef& A, const MatrixRef& B, const Mat
                                const MatrixRef& K_e, const MatrixRef& u_min,
                                const MatrixRef& u_max) {
   constexpr std::string_view where = "Lqg";
-  if (auto checked = check_system(A, B, C, D, where); !checked) {
-    return checked;
-  }
+  FLYBALL_CHECK(check_system(A, B, C, D, where));
   const Eigen::Index n = A.rows();
   const Eigen::Index m = B.cols();
   const Eigen::Index p = C.rows();
-  if (auto checked = check_all(check_positive(period.si(), where, "period", "s"),
-                               check_shape(K, m, n, where, "K", "inputs x states"),
-                               check_shape(K_e, n, p, where, "K_e", "states x outputs"),
-                               check_shape(u_min, m, 1, where, "u_min", "inputs x 1"),
-                               check_shape(u_max, m, 1, where, "u_max", "inputs x 1"),
-                               check_finite(K, where, "K"), check_finite(K_e, where, "K_e"));
-      !checked) {
-    return checked;
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .positive(period.si(), "period", "s")
+                    .shape(K, m, n, "K", "inputs x states")
+                    .shape(K_e, n, p, "K_e", "states x outputs")
+                    .shape(u_min, m, 1, "u_min", "inputs x 1")
+                    .shape(u_max, m, 1, "u_max", "inputs x 1")
+                    .finite(K, "K")
+                    .finite(K_e, "K_e"));
   for (Eigen::Index i = 0; i < m; ++i) {
     if (!(u_min(i, 0) < u_max(i, 0))) {
       return tl::unexpected(Error(ArgumentError::out_of_range)

@@ -41,17 +41,17 @@ Expected<void> check_zone(double zone) {
 
 Expected<Pid> Pid::create(const PidSettings& settings) {
   constexpr std::string_view where = "Pid";
-  return check_all(check_positive(settings.period, where, "period", "s"),
-                   check_finite(settings.gains.kp, where, "kp"),
-                   check_finite(settings.gains.ki, where, "ki"),
-                   check_finite(settings.gains.kd, where, "kd"),
-                   check_not_negative(settings.derivative_time_constant, where,
-                                      "derivative_time_constant", "s"),
-                   check_not_negative(settings.tracking_time, where, "tracking_time", "s"),
-                   check_not_negative(settings.turn, where, "turn"),
-                   check_limits(settings.output_min, settings.output_max, "output"),
-                   check_limits(settings.integral_min, settings.integral_max, "integral"),
-                   check_zone(settings.integral_zone))
+  return Checks(where)
+      .positive(settings.period, "period", "s")
+      .finite(settings.gains.kp, "kp")
+      .finite(settings.gains.ki, "ki")
+      .finite(settings.gains.kd, "kd")
+      .not_negative(settings.derivative_time_constant, "derivative_time_constant", "s")
+      .not_negative(settings.tracking_time, "tracking_time", "s")
+      .not_negative(settings.turn, "turn")
+      .also([&] { return check_limits(settings.output_min, settings.output_max, "output"); })
+      .also([&] { return check_limits(settings.integral_min, settings.integral_max, "integral"); })
+      .also([&] { return check_zone(settings.integral_zone); })
       .map([&] { return Pid(settings); });
 }
 

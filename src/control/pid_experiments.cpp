@@ -8,17 +8,17 @@
 
 #include "control/single_loop.hpp"
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball {
 
 namespace detail {
 
 Expected<void> check_single_loop(const DiscreteSystem<>& plant, std::string_view where) {
-  if (auto checked = check_system(plant, where); !checked) {
-    return checked;
-  }
-  return check_all(check_shape(plant.B, plant.A.rows(), 1, where, "B", "one input"),
-                   check_shape(plant.C, 1, plant.A.rows(), where, "C", "one output"));
+  FLYBALL_CHECK(check_system(plant, where));
+  return Checks(where)
+      .shape(plant.B, plant.A.rows(), 1, "B", "one input")
+      .shape(plant.C, 1, plant.A.rows(), "C", "one output");
 }
 
 Expected<int> steps_of(double duration, double period, std::string_view where) {
@@ -56,65 +56,48 @@ ErrorInfo error_info(TuningError code) {
 Expected<PidResponse> simulate_pid(const DiscreteSystem<>& plant, const PidGains& gains,
                                    const TuningScenario& scenario) {
   constexpr std::string_view where = "simulate_pid";
-  if (auto checked = detail::check_single_loop(plant, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  if (auto checked = check_all(check_positive(std::abs(scenario.reference), where, "reference"),
-                               check_positive(scenario.duration, where, "duration", "s"),
-                               check_finite(scenario.disturbance, where, "disturbance"),
-                               check_not_negative(scenario.noise, where, "noise"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(detail::check_single_loop(plant, where));
+  FLYBALL_CHECK(Checks(where)
+                    .positive(std::abs(scenario.reference), "reference")
+                    .positive(scenario.duration, "duration", "s")
+                    .finite(scenario.disturbance, "disturbance")
+                    .not_negative(scenario.noise, "noise"));
   const double T = plant.period.si();
-  const auto steps = detail::steps_of(scenario.duration, T, where);
-  if (!steps) {
-    return tl::unexpected(steps.error());
-  }
+  FLYBALL_TRY(const auto steps, detail::steps_of(scenario.duration, T, where));
   PidSettings settings = scenario.settings;
   settings.gains = gains;
   settings.period = T;
-  auto controller = Pid::create(settings);
-  if (!controller) {
-    return tl::unexpected(controller.error());
-  }
+  FLYBALL_TRY(auto controller, Pid::create(settings));
   // A loop that runs away is judged by what it did until there.
   const double far = 1e6 * std::abs(scenario.reference);
   Random random(1);
   PidResponse response;
   Eigen::VectorXd x = Eigen::VectorXd::Zero(plant.A.rows());
   double u = 0.0;
-  for (int k = 0; k <= *steps; ++k) {
+  for (int k = 0; k <= steps; ++k) {
     const double y = plant.C.row(0).dot(x) + plant.D(0, 0) * u;
     const double measured = scenario.noise > 0.0 ? random.normal(y, scenario.noise) : y;
-    u = controller->calculate(measured, scenario.reference);
+    u = controller.calculate(measured, scenario.reference);
     response.times.push_back(k * T);
     response.output.push_back(std::clamp(y, -far, far));
     response.input.push_back(u);
     x = (plant.A * x + plant.B.col(0) * (u + scenario.disturbance)).eval();
     x = x.cwiseMax(-1e150).cwiseMin(1e150);
   }
-  auto metrics = response_metrics(response.times, response.output, scenario.reference);
-  if (!metrics) {
-    return tl::unexpected(metrics.error());
-  }
-  response.metrics = *metrics;
+  FLYBALL_TRY(auto metrics, response_metrics(response.times, response.output, scenario.reference));
+  response.metrics = metrics;
   return response;
 }
 
 Expected<UltimatePoint> relay_experiment(const DiscreteSystem<>& plant, double height,
                                          double hysteresis, double bias, double duration) {
   constexpr std::string_view where = "relay_experiment";
-  if (auto checked = detail::check_single_loop(plant, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  if (auto checked = check_all(check_positive(height, where, "height"),
-                               check_not_negative(hysteresis, where, "hysteresis"),
-                               check_finite(bias, where, "bias"),
-                               check_positive(duration, where, "duration", "s"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(detail::check_single_loop(plant, where));
+  FLYBALL_CHECK(Checks(where)
+                    .positive(height, "height")
+                    .not_negative(hysteresis, "hysteresis")
+                    .finite(bias, "bias")
+                    .positive(duration, "duration", "s"));
   const double T = plant.period.si();
   const auto steps = detail::steps_of(duration, T, where);
   if (!steps) {
@@ -190,15 +173,9 @@ Expected<ReactionCurve> reaction_curve(std::span<const double> times,
                               .expected("as many as times, at least 10"));
   }
   for (std::size_t k = 0; k < times.size(); ++k) {
-    if (auto checked = check_all(check_finite(times[k], where, "times"),
-                                 check_finite(values[k], where, "values"));
-        !checked) {
-      return tl::unexpected(checked.error());
-    }
+    FLYBALL_CHECK(Checks(where).finite(times[k], "times").finite(values[k], "values"));
   }
-  if (auto checked = check_positive(std::abs(input_step), where, "input_step"); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_positive(std::abs(input_step), where, "input_step"));
   const double start = values.front();
   const double end = values.back();
   const double change = end - start;
@@ -237,17 +214,12 @@ Expected<ReactionCurve> reaction_curve(std::span<const double> times,
 Expected<ReactionCurve> reaction_curve(const DiscreteSystem<>& plant, double input_step,
                                        double duration) {
   constexpr std::string_view where = "reaction_curve";
-  if (auto checked = detail::check_single_loop(plant, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(detail::check_single_loop(plant, where));
   const double T = plant.period.si();
-  const auto steps = detail::steps_of(duration, T, where);
-  if (!steps) {
-    return tl::unexpected(steps.error());
-  }
+  FLYBALL_TRY(const auto steps, detail::steps_of(duration, T, where));
   std::vector<double> times, values;
   Eigen::VectorXd x = Eigen::VectorXd::Zero(plant.A.rows());
-  for (int k = 0; k <= *steps; ++k) {
+  for (int k = 0; k <= steps; ++k) {
     times.push_back(k * T);
     values.push_back(plant.C.row(0).dot(x) + (k > 0 ? plant.D(0, 0) * input_step : 0.0));
     x = (plant.A * x + plant.B.col(0) * input_step).eval();

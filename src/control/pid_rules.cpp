@@ -5,6 +5,8 @@
 
 #include <flyball/control/pid_tuning.hpp>
 
+#include "core/try.hpp"
+
 namespace flyball {
 
 namespace {
@@ -17,14 +19,16 @@ PidGains parallel(double gain, double integral_time, double derivative_time, Pid
 }
 
 Expected<void> check_point(const UltimatePoint& point, std::string_view where) {
-  return check_all(check_positive(std::abs(point.gain), where, "the ultimate gain"),
-                   check_positive(point.period, where, "the ultimate period", "s"));
+  return Checks(where)
+      .positive(std::abs(point.gain), "the ultimate gain")
+      .positive(point.period, "the ultimate period", "s");
 }
 
 Expected<void> check_curve(const ReactionCurve& curve, std::string_view where, bool needs_delay) {
-  if (auto checked = check_all(check_positive(std::abs(curve.gain), where, "the curve's gain"),
-                               check_positive(curve.time_constant, where, "the time constant", "s"),
-                               check_not_negative(curve.delay, where, "the delay", "s"));
+  if (auto checked = Checks(where)
+                         .positive(std::abs(curve.gain), "the curve's gain")
+                         .positive(curve.time_constant, "the time constant", "s")
+                         .not_negative(curve.delay, "the delay", "s");
       !checked || !needs_delay || curve.delay > 0.0) {
     return checked;
   }
@@ -51,8 +55,9 @@ Expected<void> check_shape_of_motion(const MatrixRef& A, const MatrixRef& B,
 
 Expected<void> check_shape_of_loop(double natural_frequency, double damping,
                                    std::string_view where) {
-  return check_all(check_positive(natural_frequency, where, "natural_frequency", "rad/s"),
-                   check_positive(damping, where, "damping"));
+  return Checks(where)
+      .positive(natural_frequency, "natural_frequency", "rad/s")
+      .positive(damping, "damping");
 }
 
 }  // namespace
@@ -125,10 +130,10 @@ Expected<PidGains> cohen_coon(const ReactionCurve& curve, PidForm form) {
 
 Expected<PidGains> simc(const ReactionCurve& curve, double closed_loop_time, PidForm form) {
   constexpr std::string_view where = "simc";
-  return check_all(
-             check_curve(curve, where, false),
-             check_not_negative(closed_loop_time, where, "closed_loop_time", "s"),
-             check_positive(closed_loop_time + curve.delay, where, "closed_loop_time + delay", "s"))
+  return Checks(where)
+      .also([&] { return check_curve(curve, where, false); })
+      .not_negative(closed_loop_time, "closed_loop_time", "s")
+      .positive(closed_loop_time + curve.delay, "closed_loop_time + delay", "s")
       .map([&] {
         const double tau = curve.time_constant;
         const double horizon = closed_loop_time + curve.delay;
@@ -147,11 +152,10 @@ Expected<PidGains> simc(const ReactionCurve& curve, double closed_loop_time, Pid
 Expected<PidGains> pd_by_poles(const ContinuousSystem<2, 1, 1>& plant, double natural_frequency,
                                double damping) {
   constexpr std::string_view where = "pd_by_poles";
-  if (auto checked = check_system(plant, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  return check_all(check_shape_of_motion(plant.A, plant.B, where),
-                   check_shape_of_loop(natural_frequency, damping, where))
+  return Checks(where)
+      .also([&] { return check_system(plant, where); })
+      .also([&] { return check_shape_of_motion(plant.A, plant.B, where); })
+      .also([&] { return check_shape_of_loop(natural_frequency, damping, where); })
       .map([&] {
         // s² - (a₂₂ - b kd) s - (a₂₁ - b kp) = s² + 2ζω s + ω².
         const double b = plant.B(1);
@@ -163,11 +167,10 @@ Expected<PidGains> pd_by_poles(const ContinuousSystem<2, 1, 1>& plant, double na
 Expected<PidGains> pi_by_poles(const ContinuousSystem<1, 1, 1>& plant, double natural_frequency,
                                double damping) {
   constexpr std::string_view where = "pi_by_poles";
-  if (auto checked = check_system(plant, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  return check_all(check_positive(std::abs(plant.B(0)), where, "the input's effect"),
-                   check_shape_of_loop(natural_frequency, damping, where))
+  FLYBALL_CHECK(check_system(plant, where));
+  return Checks(where)
+      .positive(std::abs(plant.B(0)), "the input's effect")
+      .also([&] { return check_shape_of_loop(natural_frequency, damping, where); })
       .map([&] {
         // s² - (a - b kp) s + b ki = s² + 2ζω s + ω².
         return PidGains{(2.0 * damping * natural_frequency + plant.A(0, 0)) / plant.B(0),

@@ -9,6 +9,7 @@
 
 #include "control/placement.hpp"
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball {
 
@@ -252,9 +253,7 @@ Eigen::VectorXd units_with_inputs(const MatrixRef& A, const MatrixRef& B,
 
 Expected<void> check_arguments(const MatrixRef& A, const MatrixRef& B,
                                const Eigen::VectorXcd& poles) {
-  if (auto square = check_square(A, where, "A"); !square) {
-    return square;
-  }
+  FLYBALL_CHECK(check_square(A, where, "A"));
   const Eigen::Index n = A.rows();
   if (B.cols() == 0) {
     return tl::unexpected(Error(ArgumentError::empty)
@@ -263,9 +262,7 @@ Expected<void> check_arguments(const MatrixRef& A, const MatrixRef& B,
                               .got("without columns")
                               .expected("states x inputs with at least one input"));
   }
-  if (auto shape = check_shape(B, n, B.cols(), where, "B", "states x inputs"); !shape) {
-    return shape;
-  }
+  FLYBALL_CHECK(check_shape(B, n, B.cols(), where, "B", "states x inputs"));
   if (poles.size() != n) {
     return tl::unexpected(Error(ArgumentError::wrong_shape)
                               .in(std::string(where))
@@ -273,9 +270,11 @@ Expected<void> check_arguments(const MatrixRef& A, const MatrixRef& B,
                               .got(detail::format("{} numbers", poles.size()))
                               .expected(detail::format("one pole a state ({})", n)));
   }
-  return check_all(check_finite(A, where, "A"), check_finite(B, where, "B"),
-                   check_finite(Eigen::MatrixXd(poles.real()), where, "poles"),
-                   check_finite(Eigen::MatrixXd(poles.imag()), where, "poles"));
+  return Checks(where)
+      .finite(A, "A")
+      .finite(B, "B")
+      .finite(Eigen::MatrixXd(poles.real()), "poles")
+      .finite(Eigen::MatrixXd(poles.imag()), "poles");
 }
 
 }  // namespace
@@ -298,25 +297,20 @@ ErrorInfo error_info(PolePlacementError code) {
 
 Expected<PolePlacement<>> place(const MatrixRef& A, const MatrixRef& B,
                                 const Eigen::VectorXcd& poles) {
-  if (auto checked = check_arguments(A, B, poles); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  auto wanted = paired(poles);
-  if (!wanted) {
-    return tl::unexpected(wanted.error());
-  }
+  FLYBALL_CHECK(check_arguments(A, B, poles));
+  FLYBALL_TRY(auto wanted, paired(poles));
   // Coarse units can hide a coupling, or cost digits: then all states are made of one size. What
   // only inputs scale shows in units that balance them too.
   constexpr double coarse = 1e4;
   const Eigen::VectorXd as_given = Eigen::VectorXd::Ones(A.rows());
   const Eigen::VectorXd balanced = detail::balance_of(A);
   const bool first = balanced.maxCoeff() > coarse * balanced.minCoeff();
-  auto placed = place_in_units(A, B, *wanted, poles, first ? balanced : as_given, balanced);
+  auto placed = place_in_units(A, B, wanted, poles, first ? balanced : as_given, balanced);
   if (!placed) {
     for (const Eigen::VectorXd& units :
          {first ? as_given : balanced, units_with_inputs(A, B, balanced)}) {
       if (units != (first ? balanced : as_given)) {
-        if (auto again = place_in_units(A, B, *wanted, poles, units, balanced)) {
+        if (auto again = place_in_units(A, B, wanted, poles, units, balanced)) {
           return again;
         }
       }

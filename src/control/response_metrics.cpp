@@ -6,6 +6,7 @@
 #include <flyball/core/argument.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball {
 
@@ -22,11 +23,7 @@ Expected<void> check_samples(std::span<const double> times, std::span<const doub
                               .expected("as many as times, at least two"));
   }
   for (std::size_t k = 0; k < times.size(); ++k) {
-    if (auto finite = check_all(check_finite(times[k], where, "times"),
-                                check_finite(values[k], where, "values"));
-        !finite) {
-      return finite;
-    }
+    FLYBALL_CHECK(Checks(where).finite(times[k], "times").finite(values[k], "values"));
     if (k > 0 && !(times[k] > times[k - 1])) {
       return tl::unexpected(
           Error(ArgumentError::out_of_range)
@@ -44,12 +41,10 @@ Expected<void> check_samples(std::span<const double> times, std::span<const doub
 Expected<ResponseMetrics> response_metrics(std::span<const double> times,
                                            std::span<const double> values, double reference,
                                            double tolerance) {
-  if (auto checked =
-          check_all(check_samples(times, values), check_finite(reference, where, "reference"),
-                    check_positive(tolerance, where, "tolerance"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .also([&] { return check_samples(times, values); })
+                    .finite(reference, "reference")
+                    .positive(tolerance, "tolerance"));
   const double start = values.front();
   const double step = reference - start;
   if (step == 0.0 || tolerance >= 1.0) {

@@ -6,6 +6,7 @@
 
 #include "control/sampled_loop.hpp"
 #include "core/format.hpp"
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball {
@@ -56,10 +57,7 @@ Expected<void> check_factors(const std::vector<double>& factors, std::string_vie
                               .expected("at least one factor"));
   }
   for (std::size_t i = 0; i < factors.size(); ++i) {
-    if (auto checked = check_positive(factors[i], where, detail::format("{} factor {}", name, i));
-        !checked) {
-      return checked;
-    }
+    FLYBALL_CHECK(check_positive(factors[i], where, detail::format("{} factor {}", name, i)));
   }
   return {};
 }
@@ -73,18 +71,11 @@ Expected<RobustnessGrid> robustness_grid(const MatrixRef& A, const MatrixRef& B,
   if (auto checked = observer_regulator_loop(A, B, C, model, K, K_e, delay); !checked) {
     return tl::unexpected(Error(std::move(checked.error()).in(std::string(where))));
   }
-  if (auto checked = check_factors(options.inertia, "inertia"); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  if (auto checked = check_factors(options.gain, "gain"); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  const auto B_pinv = pseudoinverse(model.B);
-  if (!B_pinv) {
-    return tl::unexpected(B_pinv.error());
-  }
+  FLYBALL_CHECK(check_factors(options.inertia, "inertia"));
+  FLYBALL_CHECK(check_factors(options.gain, "gain"));
+  FLYBALL_TRY(const auto B_pinv, pseudoinverse(model.B));
   const Eigen::Index n = model.A.rows();
-  const Eigen::MatrixXd F = K + B_pinv->X * (Eigen::MatrixXd::Identity(n, n) - model.A);
+  const Eigen::MatrixXd F = K + B_pinv.X * (Eigen::MatrixXd::Identity(n, n) - model.A);
 
   RobustnessGrid grid;
   grid.all_stable = true;
@@ -94,20 +85,13 @@ Expected<RobustnessGrid> robustness_grid(const MatrixRef& A, const MatrixRef& B,
       Eigen::MatrixXd true_B = B * gain;
       true_A.bottomRows(1) /= inertia;
       true_B.bottomRows(1) /= inertia;
-      auto loop = observer_regulator_loop(true_A, true_B, C, model, K, K_e, delay);
-      if (!loop) {
-        return tl::unexpected(loop.error());
-      }
-      auto sampled = detail::SampledLoop::create(*loop);
-      if (!sampled) {
-        return tl::unexpected(sampled.error());
-      }
+      FLYBALL_TRY(auto loop, observer_regulator_loop(true_A, true_B, C, model, K, K_e, delay));
+      FLYBALL_TRY(auto sampled, detail::SampledLoop::create(loop));
       RobustnessCase result{.inertia = inertia, .gain = gain};
-      result.spectral_radius = detail::spectral_radius(sampled->closed(1.0));
+      result.spectral_radius = detail::spectral_radius(sampled.closed(1.0));
       result.stable = result.spectral_radius < 1.0;
       if (result.stable) {
-        const StepResponse step =
-            step_response(*sampled, C, model, F(0, 0), result.spectral_radius);
+        const StepResponse step = step_response(sampled, C, model, F(0, 0), result.spectral_radius);
         result.overshoot = step.overshoot;
         result.steady_error = step.steady_error;
       } else {

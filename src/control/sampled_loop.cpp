@@ -4,6 +4,7 @@
 #include <flyball/systems/input_delay.hpp>
 
 #include "control/sampled_loop.hpp"
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball {
@@ -15,53 +16,47 @@ double spectral_radius(const Eigen::MatrixXd& M) {
 }
 
 Expected<void> check_loop(const PlantInputLoop& loop, std::string_view where) {
-  if (auto square = check_square(loop.A, where, "A"); !square) {
-    return square;
-  }
+  FLYBALL_CHECK(check_square(loop.A, where, "A"));
   const Eigen::Index n = loop.A.rows();
   const Eigen::Index p = loop.C.rows();
   const Eigen::Index q = loop.A_c.rows();
-  if (auto checked = check_all(check_shape(loop.B, n, 1, where, "B", "states x 1"),
-                               check_shape(loop.C, p, n, where, "C", "outputs x states"),
-                               check_shape(loop.A_c, q, q, where, "A_c"),
-                               check_shape(loop.B_c, q, p, where, "B_c"),
-                               check_shape(loop.C_c, 1, q, where, "C_c"),
-                               check_shape(loop.D_c, 1, p, where, "D_c", "1 x outputs"));
-      !checked) {
-    return checked;
-  }
-  return check_all(check_finite(loop.A, where, "A"), check_finite(loop.B, where, "B"),
-                   check_finite(loop.C, where, "C"), check_finite(loop.A_c, where, "A_c"),
-                   check_finite(loop.B_c, where, "B_c"), check_finite(loop.C_c, where, "C_c"),
-                   check_finite(loop.D_c, where, "D_c"),
-                   check_positive(loop.period.si(), where, "period", "s"),
-                   check_not_negative(loop.delay.si(), where, "delay", "s"));
+  FLYBALL_CHECK(Checks(where)
+                    .shape(loop.B, n, 1, "B", "states x 1")
+                    .shape(loop.C, p, n, "C", "outputs x states")
+                    .shape(loop.A_c, q, q, "A_c")
+                    .shape(loop.B_c, q, p, "B_c")
+                    .shape(loop.C_c, 1, q, "C_c")
+                    .shape(loop.D_c, 1, p, "D_c", "1 x outputs"));
+  return Checks(where)
+      .finite(loop.A, "A")
+      .finite(loop.B, "B")
+      .finite(loop.C, "C")
+      .finite(loop.A_c, "A_c")
+      .finite(loop.B_c, "B_c")
+      .finite(loop.C_c, "C_c")
+      .finite(loop.D_c, "D_c")
+      .positive(loop.period.si(), "period", "s")
+      .not_negative(loop.delay.si(), "delay", "s");
 }
 
 Expected<SampledLoop> SampledLoop::create(const PlantInputLoop& loop, Time further_delay) {
   const Time delay(loop.delay.si() + further_delay.si());
-  auto parts = discretize_delayed_input(loop.A, loop.B, loop.period, delay);
-  if (!parts) {
-    return tl::unexpected(parts.error());
-  }
+  FLYBALL_TRY(auto parts, discretize_delayed_input(loop.A, loop.B, loop.period, delay));
   const Eigen::Index p = loop.C.rows();
   const ContinuousSystem<> plant{loop.A, loop.B, loop.C, Eigen::MatrixXd::Zero(p, 1)};
-  auto delayed = discretize_with_input_delay(plant, loop.period, delay);
-  if (!delayed) {
-    return tl::unexpected(delayed.error());
-  }
+  FLYBALL_TRY(auto delayed, discretize_with_input_delay(plant, loop.period, delay));
   SampledLoop sampled;
-  sampled.A_ = std::move(parts->A);
-  sampled.B_0_ = std::move(parts->B_0);
-  sampled.B_1_ = std::move(parts->B_1);
+  sampled.A_ = std::move(parts.A);
+  sampled.B_0_ = std::move(parts.B_0);
+  sampled.B_1_ = std::move(parts.B_1);
   sampled.C_ = loop.C;
-  sampled.whole_delays_ = parts->whole_periods;
+  sampled.whole_delays_ = parts.whole_periods;
   sampled.A_c_ = loop.A_c;
   sampled.B_c_ = loop.B_c;
   sampled.C_c_ = loop.C_c;
   sampled.D_c_ = loop.D_c;
-  sampled.delayed_A_ = std::move(delayed->A);
-  sampled.delayed_B_ = std::move(delayed->B);
+  sampled.delayed_A_ = std::move(delayed.A);
+  sampled.delayed_B_ = std::move(delayed.B);
   return sampled;
 }
 
@@ -117,9 +112,7 @@ Expected<PlantInputLoop> state_feedback_loop(const MatrixRef& A, const MatrixRef
                       Eigen::MatrixXd(1, 0),
                       K};
   constexpr std::string_view where = "state_feedback_loop";
-  if (auto shape = check_shape(K, 1, n, where, "K", "1 x states"); !shape) {
-    return tl::unexpected(shape.error());
-  }
+  FLYBALL_CHECK(check_shape(K, 1, n, where, "K", "1 x states"));
   return detail::check_loop(loop, where).map([&] { return std::move(loop); });
 }
 
@@ -128,18 +121,14 @@ Expected<PlantInputLoop> observer_regulator_loop(const MatrixRef& A, const Matri
                                                  const MatrixRef& K, const MatrixRef& K_e,
                                                  Time delay) {
   constexpr std::string_view where = "observer_regulator_loop";
-  if (auto checked = check_system(model, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_system(model, where));
   const Eigen::Index n = model.A.rows();
   const Eigen::Index p = model.C.rows();
-  if (auto checked = check_all(check_shape(model.B, n, 1, where, "the model's B", "states x 1"),
-                               check_shape(C, p, A.rows(), where, "C", "outputs x states"),
-                               check_shape(K, 1, n, where, "K", "1 x states"),
-                               check_shape(K_e, n, p, where, "K_e", "states x outputs"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(model.B, n, 1, "the model's B", "states x 1")
+                    .shape(C, p, A.rows(), "C", "outputs x states")
+                    .shape(K, 1, n, "K", "1 x states")
+                    .shape(K_e, n, p, "K_e", "states x outputs"));
   if (!model.D.isZero(0.0)) {
     return tl::unexpected(
         Error(ArgumentError::out_of_range)
@@ -157,14 +146,9 @@ Expected<PlantInputLoop> observer_regulator_loop(const MatrixRef& A, const Matri
 
 Expected<double> closed_loop_radius(const PlantInputLoop& loop, double gain, Time further_delay) {
   constexpr std::string_view where = "closed_loop_radius";
-  if (auto checked = detail::check_loop(loop, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  if (auto checked = check_all(check_finite(gain, where, "gain"),
-                               check_not_negative(further_delay.si(), where, "further_delay", "s"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(detail::check_loop(loop, where));
+  FLYBALL_CHECK(
+      Checks(where).finite(gain, "gain").not_negative(further_delay.si(), "further_delay", "s"));
   return detail::SampledLoop::create(loop, further_delay)
       .map([&](const detail::SampledLoop& sampled) {
         return detail::spectral_radius(sampled.closed(gain));
@@ -173,12 +157,8 @@ Expected<double> closed_loop_radius(const PlantInputLoop& loop, double gain, Tim
 
 Expected<std::complex<double>> loop_response(const PlantInputLoop& loop, double frequency) {
   constexpr std::string_view where = "loop_response";
-  if (auto checked = detail::check_loop(loop, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  if (auto checked = check_not_negative(frequency, where, "frequency", "rad/s"); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(detail::check_loop(loop, where));
+  FLYBALL_CHECK(check_not_negative(frequency, where, "frequency", "rad/s"));
   const double nyquist = std::numbers::pi / loop.period.si();
   if (frequency > nyquist * (1.0 + 1e-12)) {
     return tl::unexpected(

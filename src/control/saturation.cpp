@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball {
@@ -14,11 +15,9 @@ namespace {
 
 Expected<void> check_limits(const Eigen::VectorXd& u_min, const Eigen::VectorXd& u_max,
                             Eigen::Index m, std::string_view where) {
-  if (auto shapes = check_all(check_shape(u_min, m, 1, where, "u_min", "inputs x 1"),
-                              check_shape(u_max, m, 1, where, "u_max", "inputs x 1"));
-      !shapes) {
-    return shapes;
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(u_min, m, 1, "u_min", "inputs x 1")
+                    .shape(u_max, m, 1, "u_max", "inputs x 1"));
   for (Eigen::Index i = 0; i < m; ++i) {
     if (!(u_min(i) < u_max(i))) {
       return tl::unexpected(Error(ArgumentError::out_of_range)
@@ -58,14 +57,13 @@ Expected<SaturationAnalysis> analyze_saturation(const MatrixRef& K, const Eigen:
   constexpr double infinity = std::numeric_limits<double>::infinity();
   const Eigen::Index m = K.rows();
   const Eigen::Index n = K.cols();
-  if (auto checked =
-          check_all(check_shape(error, n, 1, where, "error", "states x 1"),
-                    check_shape(u_ff, m, 1, where, "u_ff", "inputs x 1"),
-                    check_finite(K, where, "K"), check_finite(error, where, "error"),
-                    check_finite(u_ff, where, "u_ff"), check_limits(u_min, u_max, m, where));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(error, n, 1, "error", "states x 1")
+                    .shape(u_ff, m, 1, "u_ff", "inputs x 1")
+                    .finite(K, "K")
+                    .finite(error, "error")
+                    .finite(u_ff, "u_ff")
+                    .also([&] { return check_limits(u_min, u_max, m, where); }));
   SaturationAnalysis analysis;
   const Eigen::VectorXd feedback = K * error;
   analysis.u = feedback + u_ff;
@@ -92,18 +90,15 @@ Expected<SaturatedStep> saturation_of_step(const DiscreteSystem<>& plant, const 
                                            const Eigen::VectorXd& u_max, int steps) {
   constexpr std::string_view where = "saturation_of_step";
   constexpr double near = 0.02;
-  if (auto checked = check_system(plant, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_system(plant, where));
   const Eigen::Index n = plant.A.rows();
   const Eigen::Index m = plant.B.cols();
-  if (auto checked =
-          check_all(check_shape(K, m, n, where, "K", "inputs x states"),
-                    check_finite(K, where, "K"), check_shape(r, n, 1, where, "r", "states x 1"),
-                    check_finite(r, where, "r"), check_limits(u_min, u_max, m, where));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(K, m, n, "K", "inputs x states")
+                    .finite(K, "K")
+                    .shape(r, n, 1, "r", "states x 1")
+                    .finite(r, "r")
+                    .also([&] { return check_limits(u_min, u_max, m, where); }));
   if (steps < 1 || steps > 10'000'000) {
     return tl::unexpected(Error(ArgumentError::out_of_range)
                               .in(std::string(where))

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball {
@@ -71,9 +72,7 @@ Expected<SteadyStateFeedforward<>> steady_state_feedforward_of_pairs(const Matri
                                                                      const MatrixRef& C,
                                                                      const MatrixRef& D,
                                                                      std::span<const int> inputs) {
-  if (auto checked = check_system(A, B, C, D, where); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_system(A, B, C, D, where));
   const Eigen::Index n = A.rows();
   const Eigen::Index m = B.cols();
   const Eigen::Index p = C.rows();
@@ -115,18 +114,14 @@ Expected<Eigen::MatrixXd> qr_weighted_gain(const MatrixRef& B, const Weight& Q, 
   const Eigen::MatrixXd& weight_R = *R.get();
   const Eigen::Index n = B.rows();
   const Eigen::Index m = B.cols();
-  if (auto shapes = check_all(check_shape(weight_Q, n, n, name, "Q", "states x states"),
-                              check_shape(weight_R, m, m, name, "R", "inputs x inputs"));
-      !shapes) {
-    return tl::unexpected(shapes.error());
-  }
-  if (auto values =
-          check_all(check_finite(B, name, "B"), check_finite(weight_Q, name, "Q"),
-                    check_finite(weight_R, name, "R"), check_symmetric(weight_Q, name, "Q"),
-                    check_symmetric(weight_R, name, "R"));
-      !values) {
-    return tl::unexpected(values.error());
-  }
+  FLYBALL_CHECK(Checks(name)
+                    .shape(weight_Q, n, n, "Q", "states x states")
+                    .shape(weight_R, m, m, "R", "inputs x inputs")
+                    .finite(B, "B")
+                    .finite(weight_Q, "Q")
+                    .finite(weight_R, "R")
+                    .symmetric(weight_Q, "Q")
+                    .symmetric(weight_R, "R"));
   const Eigen::MatrixXd Q_B = detail::product(weight_Q, B);
   const Eigen::MatrixXd inner = detail::symmetrized(detail::transposed_product(B, Q_B) + weight_R);
   if (m == 0 || !detail::cholesky_of(inner)) {

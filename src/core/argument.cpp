@@ -129,4 +129,20 @@ Expected<void> check_not_negative(double value, std::string_view where, std::str
                             .expected("zero or greater"));
 }
 
+Expected<void> check_within(double value, double low, double high, std::string_view where,
+                            std::string_view name, std::string_view unit) {
+  if (auto finite = check_finite(value, where, name); !finite) {
+    return finite;
+  }
+  if (value >= low && value <= high) {
+    return {};
+  }
+  return tl::unexpected(
+      Error(ArgumentError::out_of_range)
+          .in(std::string(where))
+          .about(std::string(name))
+          .got(with_unit(value, unit))
+          .expected(detail::format("in [{}, {}]", format_number(low), format_number(high))));
+}
+
 }  // namespace flyball

@@ -3,6 +3,7 @@
 #include <flyball/core/argument.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball {
 
@@ -19,10 +20,7 @@ Expected<Eigen::MatrixXd> standard_deviations(std::span<const double> sigmas) {
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const double sigma = sigmas[static_cast<std::size_t>(i)];
-    if (auto checked = check_not_negative(sigma, where, detail::format("standard deviation {}", i));
-        !checked) {
-      return tl::unexpected(checked.error());
-    }
+    FLYBALL_CHECK(check_not_negative(sigma, where, detail::format("standard deviation {}", i)));
     covariance(i, i) = sigma * sigma;
   }
   return covariance;

@@ -1,5 +1,7 @@
 #include <flyball/estimation/kalman_filter.tpp>
 
+#include "core/try.hpp"
+
 namespace flyball {
 
 namespace detail {
@@ -13,26 +15,24 @@ Expected<void> check_kalman_filter(const MatrixRef& A, const MatrixRef& B, const
       return tl::unexpected(covariance->get().error());
     }
   }
-  if (auto checked = check_system(A, B, C, D, where); !checked) {
-    return checked;
-  }
-  if (auto checked = check_positive(period.si(), where, "period", "s"); !checked) {
-    return checked;
-  }
+  FLYBALL_CHECK(check_system(A, B, C, D, where));
+  FLYBALL_CHECK(check_positive(period.si(), where, "period", "s"));
   const Eigen::Index n = A.rows();
   const Eigen::Index p = C.rows();
   const Eigen::MatrixXd& Q0 = *Q.get();
   const Eigen::MatrixXd& R0 = *R.get();
   const Eigen::MatrixXd& P = *P0.get();
-  if (auto checked = check_all(check_shape(Q0, n, n, where, "Q", "states x states"),
-                               check_shape(R0, p, p, where, "R", "outputs x outputs"),
-                               check_shape(P, n, n, where, "P0", "states x states"));
-      !checked) {
-    return checked;
-  }
-  return check_all(check_finite(Q0, where, "Q"), check_finite(R0, where, "R"),
-                   check_finite(P, where, "P0"), check_symmetric(Q0, where, "Q"),
-                   check_symmetric(R0, where, "R"), check_symmetric(P, where, "P0"));
+  FLYBALL_CHECK(Checks(where)
+                    .shape(Q0, n, n, "Q", "states x states")
+                    .shape(R0, p, p, "R", "outputs x outputs")
+                    .shape(P, n, n, "P0", "states x states"));
+  return Checks(where)
+      .finite(Q0, "Q")
+      .finite(R0, "R")
+      .finite(P, "P0")
+      .symmetric(Q0, "Q")
+      .symmetric(R0, "R")
+      .symmetric(P, "P0");
 }
 
 }  // namespace detail

@@ -6,6 +6,7 @@
 #include <flyball/math/equations/matrix_equation.hpp>
 #include <flyball/math/riccati/riccati.hpp>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/extended/double_double.hpp"
 
@@ -84,17 +85,13 @@ Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const
   }
   const Eigen::MatrixXd& noise_Q = *Q.get();
   const Eigen::MatrixXd& noise_R = *R.get();
-  if (auto square = check_square(A, where, "A"); !square) {
-    return tl::unexpected(square.error());
-  }
+  FLYBALL_CHECK(check_square(A, where, "A"));
   const Eigen::Index n = A.rows();
   const Eigen::Index p = C.rows();
-  if (auto checked = check_all(check_shape(C, p, n, where, "C", "outputs x states"),
-                               check_shape(noise_Q, n, n, where, "Q", "states x states"),
-                               check_shape(noise_R, p, p, where, "R", "outputs x outputs"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(C, p, n, "C", "outputs x states")
+                    .shape(noise_Q, n, n, "Q", "states x states")
+                    .shape(noise_R, p, p, "R", "outputs x outputs"));
 
   auto dual = dare(A.transpose(), C.transpose(), noise_Q, noise_R);
   if (!dual) {

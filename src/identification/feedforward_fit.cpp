@@ -8,6 +8,7 @@
 #include <flyball/core/argument.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 #include "identification/cross_checks.hpp"
 #include "identification/estimates.hpp"
 #include "identification/output_error.hpp"
@@ -231,9 +232,7 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
                               .in(std::string(kWhere))
                               .hint("say which: flywheel, elevator or arm"));
   }
-  if (auto tests = check_tests(prepared); !tests) {
-    return tl::unexpected(std::move(tests).error());
-  }
+  FLYBALL_CHECK(check_tests(prepared));
   if (*prepared.mechanism == MechanismKind::arm && !prepared.has_position) {
     return tl::unexpected(Error(IdentificationError::singular)
                               .in(std::string(kWhere))
@@ -241,10 +240,7 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
                               .got("missing or constant")
                               .expected("the arm's angle, which its gravity depends on"));
   }
-  auto gains = regress_gains(prepared);
-  if (!gains) {
-    return tl::unexpected(std::move(gains).error());
-  }
+  FLYBALL_TRY(auto gains, regress_gains(prepared));
   OutputErrorProblem problem(prepared, options);
   if (problem.residuals() < 10 * static_cast<std::size_t>(problem.parameters())) {
     return tl::unexpected(Error(IdentificationError::too_short)
@@ -252,9 +248,9 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
                               .hint("record longer tests")
                               .with("usable values", static_cast<double>(problem.residuals())));
   }
-  const Bounds bounds = make_bounds(problem, *gains, options);
+  const Bounds bounds = make_bounds(problem, gains, options);
   ChannelScales scales;
-  const RobustFit best = fit_gains(problem, *gains, bounds, options, scales);
+  const RobustFit best = fit_gains(problem, gains, bounds, options, scales);
   const Covariances spread =
       covariances(problem, best.x, problem.free_parameters(), bounds, scales);
 
@@ -268,9 +264,7 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
   fit.averaging_width = best.x[kAveragingWidth];
   fit.velocity_scale = best.x[kVelocityScale];
   add_runs(problem, best.x, fit);
-  if (auto physical = estimate_gains(prepared, best.x, spread, bounds, fit); !physical) {
-    return tl::unexpected(std::move(physical).error());
-  }
+  FLYBALL_CHECK(estimate_gains(prepared, best.x, spread, bounds, fit));
   if (auto one_step = fit_one_step(prepared)) {
     fit.one_step = *std::move(one_step);
   }

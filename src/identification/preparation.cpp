@@ -9,6 +9,7 @@
 #include <flyball/core/argument.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 #include "identification/channels.hpp"
 #include "identification/statistics.hpp"
 #include "identification/trimming.hpp"
@@ -307,9 +308,7 @@ Expected<PreparedRecording> prepare(const Recording& recording, const Preparatio
 
   RowDefects defects;
   for (std::size_t i = 0; i < recording.runs.size(); ++i) {
-    if (auto valid = check_columns(recording.runs[i], i); !valid) {
-      return tl::unexpected(std::move(valid).error());
-    }
+    FLYBALL_CHECK(check_columns(recording.runs[i], i));
     PreparedRun run;
     run.run = recording.runs[i];
     run.source = i;

@@ -13,6 +13,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/try.hpp"
+
 namespace flyball {
 namespace {
 
@@ -157,14 +159,11 @@ Expected<std::string> read_file(const std::string& path, std::size_t max_bytes) 
                               .hint("check its permissions")
                               .with("system", reason(error)));
   }
-  const auto status = status_of(file.get(), path);
-  if (!status) {
-    return tl::unexpected(status.error());
-  }
-  const bool pipe = S_ISFIFO(status->st_mode);
+  FLYBALL_TRY(const auto status, status_of(file.get(), path));
+  const bool pipe = S_ISFIFO(status.st_mode);
   std::string contents;
   // A regular file says its size, which is a hint and not a promise; pipes say 0.
-  const auto announced = static_cast<std::size_t>(std::max<off_t>(status->st_size, 0));
+  const auto announced = static_cast<std::size_t>(std::max<off_t>(status.st_size, 0));
   std::size_t used = 0;
   for (;;) {
     if (used > max_bytes || announced > max_bytes) {

@@ -3,6 +3,8 @@
 #include <flyball/mechanisms/flywheel.hpp>
 #include <flyball/mechanisms/velocity_servo.hpp>
 
+#include "core/try.hpp"
+
 namespace flyball::mechanisms {
 
 namespace {
@@ -18,12 +20,10 @@ Expected<void> check_drive(const DcMotor& motor, double gearing, std::string_vie
                               .got(std::to_string(motor.count))
                               .expected("at least 1"));
   }
-  if (auto checked = check_all(check_positive(motor.R, where, "motor.R", "Ohm"),
-                               check_positive(motor.Kt, where, "motor.Kt", "N m/A"),
-                               check_positive(motor.Kv, where, "motor.Kv", "rad/s/V"));
-      !checked) {
-    return checked;
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .positive(motor.R, "motor.R", "Ohm")
+                    .positive(motor.Kt, "motor.Kt", "N m/A")
+                    .positive(motor.Kv, "motor.Kv", "rad/s/V"));
   if (!(gearing > 0.0) || !std::isfinite(gearing)) {
     return tl::unexpected(
         Error(std::isfinite(gearing) ? ArgumentError::not_positive : ArgumentError::not_finite)
@@ -37,11 +37,14 @@ Expected<void> check_drive(const DcMotor& motor, double gearing, std::string_vie
 
 // Parameters that are numbers can have a model that is none (J = 1e-320): A and B are checked too.
 Expected<void> check_gains(const FeedforwardGains& gains, std::string_view where) {
-  return check_all(
-      check_positive(gains.kV, where, "kV"), check_positive(gains.kA, where, "kA"),
-      check_finite(gains.kV / gains.kA, where, "kV/kA"),
-      check_finite(1.0 / gains.kA, where, "1/kA"), check_not_negative(gains.kS, where, "kS", "V"),
-      check_finite(gains.kG, where, "kG"), check_finite(gains.angle_offset, where, "angle_offset"));
+  return Checks(where)
+      .positive(gains.kV, "kV")
+      .positive(gains.kA, "kA")
+      .finite(gains.kV / gains.kA, "kV/kA")
+      .finite(1.0 / gains.kA, "1/kA")
+      .not_negative(gains.kS, "kS", "V")
+      .finite(gains.kG, "kG")
+      .finite(gains.angle_offset, "angle_offset");
 }
 
 Flywheel velocity_model(const FeedforwardGains& gains, double nominal_voltage) {
@@ -80,11 +83,9 @@ FeedforwardGains rotational_gains(const DcMotor& motor, double G, double J) {
 Expected<Flywheel> flywheel(const FlywheelParameters& parameters) {
   constexpr std::string_view where = "flywheel";
   const auto& [motor, G, J] = parameters;
-  if (auto checked = check_all(check_drive(motor, G, where),
-                               check_positive(J.si(), where, "moment_of_inertia", "kg m^2"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .also([&] { return check_drive(motor, G, where); })
+                    .positive(J.si(), "moment_of_inertia", "kg m^2"));
   const FeedforwardGains gains = rotational_gains(motor, G, J.si());
   return check_gains(gains, where).map([&] {
     return velocity_model(gains, motor.nominal_voltage);
@@ -96,11 +97,10 @@ Expected<Elevator> elevator(const ElevatorParameters& parameters) {
   const auto& [motor, G, mass, drum_radius] = parameters;
   const double m = mass.si();
   const double r = drum_radius.si();
-  if (auto checked = check_all(check_drive(motor, G, where), check_positive(m, where, "mass", "kg"),
-                               check_positive(r, where, "drum_radius", "m"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .also([&] { return check_drive(motor, G, where); })
+                    .positive(m, "mass", "kg")
+                    .positive(r, "drum_radius", "m"));
   const FeedforwardGains gains{.kS = 0.0,
                                .kV = G / (motor.Kv * r),
                                .kA = motor.R * r * m / (G * motor.Kt),
@@ -115,13 +115,11 @@ Expected<Arm> arm(const ArmParameters& parameters) {
   const auto& [motor, G, J, mass, center_of_mass] = parameters;
   const double m = mass.si();
   const double l = center_of_mass.si();
-  if (auto checked = check_all(check_drive(motor, G, where),
-                               check_positive(J.si(), where, "moment_of_inertia", "kg m^2"),
-                               check_not_negative(m, where, "mass", "kg"),
-                               check_not_negative(l, where, "center_of_mass", "m"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .also([&] { return check_drive(motor, G, where); })
+                    .positive(J.si(), "moment_of_inertia", "kg m^2")
+                    .not_negative(m, "mass", "kg")
+                    .not_negative(l, "center_of_mass", "m"));
   FeedforwardGains gains = rotational_gains(motor, G, J.si());
   gains.kG = motor.R * m * standard_gravity * l / (G * motor.Kt);
   return check_gains(gains, where).map([&] {

@@ -10,6 +10,7 @@
 #include <flyball/core/text.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball::mechanisms {
 
@@ -107,16 +108,13 @@ std::span<const MotorTableEntry> motor_table() {
 
 Expected<DcMotor> motor(std::string_view name, const MotorDatasheet& one, int count) {
   constexpr std::string_view where = "motor";
-  if (auto checked =
-          check_all(check_count(count),
-                    check_positive(one.nominal_voltage.si(), where, "nominal_voltage", "V"),
-                    check_positive(one.stall_torque.si(), where, "stall_torque", "N m"),
-                    check_positive(one.stall_current.si(), where, "stall_current", "A"),
-                    check_not_negative(one.free_current.si(), where, "free_current", "A"),
-                    check_positive(one.free_speed.si(), where, "free_speed", "rad/s"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .also([&] { return check_count(count); })
+                    .positive(one.nominal_voltage.si(), "nominal_voltage", "V")
+                    .positive(one.stall_torque.si(), "stall_torque", "N m")
+                    .positive(one.stall_current.si(), "stall_current", "A")
+                    .not_negative(one.free_current.si(), "free_current", "A")
+                    .positive(one.free_speed.si(), "free_speed", "rad/s"));
   if (one.free_current >= one.stall_current) {
     return tl::unexpected(
         Error(ArgumentError::out_of_range)
@@ -127,16 +125,15 @@ Expected<DcMotor> motor(std::string_view name, const MotorDatasheet& one, int co
   }
   DcMotor result = from_datasheet(name, one, count);
   // Numbers can have quotients that are none: 1e300 V / 1e-300 A.
-  return check_all(check_positive(result.R, where, "R", "Ohm"),
-                   check_positive(result.Kt, where, "Kt", "N m/A"),
-                   check_positive(result.Kv, where, "Kv", "rad/s/V"))
+  return Checks(where)
+      .positive(result.R, "R", "Ohm")
+      .positive(result.Kt, "Kt", "N m/A")
+      .positive(result.Kv, "Kv", "rad/s/V")
       .map([&] { return std::move(result); });
 }
 
 Expected<DcMotor> motor(std::string_view name, int count) {
-  if (auto checked = check_count(count); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_count(count));
   const std::string wanted = fold(name);
   std::vector<std::string_view> candidates;
   for (const MotorTableEntry& entry : table) {

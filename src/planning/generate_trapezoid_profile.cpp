@@ -6,6 +6,7 @@
 #include <flyball/core/argument.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball {
 
@@ -14,13 +15,11 @@ Expected<TimeSeries> generate_trapezoid_profile(double max_velocity, Time time_t
   constexpr std::string_view where = "generate_trapezoid_profile";
   const double dt = period.si();
   double ramp = time_to_max_velocity.si();
-  if (auto checked = check_all(check_positive(max_velocity, where, "max_velocity"),
-                               check_positive(ramp, where, "time_to_max_velocity", "s"),
-                               check_positive(dt, where, "period", "s"),
-                               check_not_negative(goal, where, "goal"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .positive(max_velocity, "max_velocity")
+                    .positive(ramp, "time_to_max_velocity", "s")
+                    .positive(dt, "period", "s")
+                    .not_negative(goal, "goal"));
   const double a = max_velocity / ramp;
   const bool reaches = max_velocity * ramp <= goal;
   ramp = reaches ? ramp : std::sqrt(goal / a);

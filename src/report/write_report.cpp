@@ -8,6 +8,7 @@
 #include <flyball/report/generated_header.hpp>
 #include <flyball/study/schema.hpp>
 
+#include "core/try.hpp"
 #include "report/figures.hpp"
 #include "report/files.hpp"
 #include "report/render_html.hpp"
@@ -37,10 +38,7 @@ template <class Result>
 Expected<void> write(const Result& result, std::vector<ReportFile> files, const std::string& folder,
                      Provenance provenance) {
   // Asked for first: drawing is wasted on a folder that cannot be written.
-  auto output = OutputFolder::create(folder);
-  if (!output) {
-    return tl::unexpected(std::move(output).error());
-  }
+  FLYBALL_TRY(auto output, OutputFolder::create(folder));
   const std::vector<RenderedFigure> figures = render(figures_of(result), true);
   for (const RenderedFigure& figure : figures) {
     const std::string stem = "pictures/" + figure.figure.name;
@@ -57,11 +55,9 @@ Expected<void> write(const Result& result, std::vector<ReportFile> files, const 
   }
   files.push_back({"index.html", page_of(result, figures, provenance)});
   for (const ReportFile& file : files) {
-    if (auto written = output->write(file.name, file.contents); !written) {
-      return written;
-    }
+    FLYBALL_CHECK(output.write(file.name, file.contents));
   }
-  return output->commit();
+  return output.commit();
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <flyball/control/observer_regulator.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball {
 
@@ -50,27 +51,27 @@ Expected<void> check_job(const ClosedLoopJob& job) {
   }
   for (std::size_t k = 0; k < job.reference.size(); ++k) {
     const std::string row = detail::format("reference {}", k);
-    if (auto checked = check_all(check_finite(job.reference[k].position, where, row),
-                                 check_finite(job.reference[k].velocity, where, row));
-        !checked) {
-      return checked;
-    }
+    FLYBALL_CHECK(Checks(where)
+                      .finite(job.reference[k].position, row)
+                      .finite(job.reference[k].velocity, row));
   }
   const Battery& battery = job.truth.battery;
-  return check_all(
-      check_positive(regulator.max_voltage, where, "max_voltage", "V"),
-      check_positive(regulator.nominal_voltage, where, "nominal_voltage", "V"),
-      check_finite(job.initial.position, where, "initial position"),
-      check_finite(job.initial.velocity, where, "initial velocity"),
-      check_positive(battery.open_circuit_voltage, where, "open_circuit_voltage", "V"),
-      check_not_negative(battery.resistance, where, "battery resistance", "Ohm"),
-      check_finite(battery.other_current, where, "other_current"),
-      std::isinf(job.truth.motor_resistance)
-          ? Expected<void>{}
-          : check_positive(job.truth.motor_resistance, where, "motor_resistance", "Ohm"),
-      check_not_negative(job.truth.actuation_delay.si(), where, "actuation_delay", "s"),
-      check_not_negative(regulator.measurement_delay.si(), where, "measurement_delay", "s"),
-      check_not_negative(job.truth.voltage_noise, where, "voltage_noise", "V"));
+  return Checks(where)
+      .positive(regulator.max_voltage, "max_voltage", "V")
+      .positive(regulator.nominal_voltage, "nominal_voltage", "V")
+      .finite(job.initial.position, "initial position")
+      .finite(job.initial.velocity, "initial velocity")
+      .positive(battery.open_circuit_voltage, "open_circuit_voltage", "V")
+      .not_negative(battery.resistance, "battery resistance", "Ohm")
+      .finite(battery.other_current, "other_current")
+      .also([&] {
+        return std::isinf(job.truth.motor_resistance)
+                   ? Expected<void>{}
+                   : check_positive(job.truth.motor_resistance, where, "motor_resistance", "Ohm");
+      })
+      .not_negative(job.truth.actuation_delay.si(), "actuation_delay", "s")
+      .not_negative(regulator.measurement_delay.si(), "measurement_delay", "s")
+      .not_negative(job.truth.voltage_noise, "voltage_noise", "V");
 }
 
 // The motor behind its controller and battery.
@@ -149,31 +150,19 @@ struct Columns {
 Expected<ClosedLoopResult> simulate(const ClosedLoopJob& job) {
   const RegulatorDesign& design = job.regulator;
   const PlantTruth& truth = job.truth;
-  auto regulator = Lqg<>::create(design.plant, design.K, design.K_e, scalar(-design.max_voltage),
-                                 scalar(design.max_voltage));
-  if (!regulator) {
-    return tl::unexpected(regulator.error());
-  }
-  if (auto checked = check_job(job); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  auto plant = MechanismPlant::create(design.kind, truth.gains, truth.breakaway);
-  if (!plant) {
-    return tl::unexpected(plant.error());
-  }
-  auto feedforward = SimpleFeedforward::create(design.kind, design.gains, design.plant.period);
-  if (!feedforward) {
-    return tl::unexpected(feedforward.error());
-  }
+  FLYBALL_TRY(auto regulator,
+              Lqg<>::create(design.plant, design.K, design.K_e, scalar(-design.max_voltage),
+                            scalar(design.max_voltage)));
+  FLYBALL_CHECK(check_job(job));
+  FLYBALL_TRY(auto plant, MechanismPlant::create(design.kind, truth.gains, truth.breakaway));
+  FLYBALL_TRY(auto feedforward,
+              SimpleFeedforward::create(design.kind, design.gains, design.plant.period));
   // Truths are recorded each millisecond or finer, for sensors and for the battery.
   const double T = design.plant.period.si();
   const auto records = static_cast<long long>(std::clamp(std::ceil(T / 1e-3), 1.0, 1e4));
   const double h = T / static_cast<double>(records);
   Random random(job.seed);
-  auto sensor = Sensor::create(truth.sensor, Time(h), random.split());
-  if (!sensor) {
-    return tl::unexpected(sensor.error());
-  }
+  FLYBALL_TRY(auto sensor, Sensor::create(truth.sensor, Time(h), random.split()));
 
   const bool flywheel = design.kind == mechanisms::MechanismKind::flywheel;
   const Eigen::Index n = design.plant.A.rows();
@@ -186,25 +175,25 @@ Expected<ClosedLoopResult> simulate(const ClosedLoopJob& job) {
   double squares = 0.0;
   std::size_t saturated = 0;
 
-  regulator->reset(states_of(design.kind, n, state.position, state.velocity));
-  sensor->record(flywheel ? state.velocity : state.position);
+  regulator.reset(states_of(design.kind, n, state.position, state.velocity));
+  sensor.record(flywheel ? state.velocity : state.position);
   for (std::size_t k = 0; k < job.reference.size(); ++k) {
     const MotionState& r = job.reference[k];
     const MotionState& r_next = job.reference[std::min(k + 1, job.reference.size() - 1)];
     const double time = static_cast<double>(k) * T;
 
-    const double reading = sensor->read();
+    const double reading = sensor.read();
     const double rate = flywheel ? (r_next.velocity - r.velocity) / T : r.velocity;
     const double y = reading + design.measurement_delay.si() * rate;
     const double rail = drive.rail(state.velocity);
     const double direction = r.velocity != 0.0 ? r.velocity : r_next.velocity;
-    const double extra = (design.feed_forward_gravity ? feedforward->gravity(r.position) : 0.0) +
-                         (design.feed_forward_friction ? feedforward->friction(direction) : 0.0);
+    const double extra = (design.feed_forward_gravity ? feedforward.gravity(r.position) : 0.0) +
+                         (design.feed_forward_friction ? feedforward.friction(direction) : 0.0);
     const double available =
         design.compensate_voltage ? compensation.rail(rail) : design.nominal_voltage;
-    const double u = regulator->step(states_of(design.kind, n, r.position, r.velocity),
-                                     states_of(design.kind, n, r_next.position, r_next.velocity),
-                                     scalar(y), scalar(extra), available)(0);
+    const double u = regulator.step(states_of(design.kind, n, r.position, r.velocity),
+                                    states_of(design.kind, n, r_next.position, r_next.velocity),
+                                    scalar(y), scalar(extra), available)(0);
     const double command = design.compensate_voltage ? compensation.command(u, rail) : u;
     const double noise = truth.voltage_noise > 0.0 ? random.normal(0.0, truth.voltage_noise) : 0.0;
     on_the_way.push_back({time + truth.actuation_delay.si(), command, noise});
@@ -221,8 +210,8 @@ Expected<ClosedLoopResult> simulate(const ClosedLoopJob& job) {
     columns.position.push_back(state.position);
     columns.velocity.push_back(state.velocity);
     columns.measurement.push_back(reading);
-    columns.estimated_position.push_back(regulator->x_hat()(0));
-    columns.estimated_velocity.push_back(regulator->x_hat()(n - 1));
+    columns.estimated_position.push_back(regulator.x_hat()(0));
+    columns.estimated_velocity.push_back(regulator.x_hat()(n - 1));
     columns.voltage.push_back(u);
     columns.command.push_back(command);
     columns.rail_voltage.push_back(rail);
@@ -234,7 +223,7 @@ Expected<ClosedLoopResult> simulate(const ClosedLoopJob& job) {
       volt_seconds += voltage * duration;
       coulombs += drive.battery_current(state.velocity) * duration;
       result.peak_voltage = std::max(result.peak_voltage, std::abs(voltage));
-      state = plant->step(state, voltage, duration);
+      state = plant.step(state, voltage, duration);
     };
     for (long long i = 0; i < records; ++i) {
       const double from = time + static_cast<double>(i) * h;
@@ -248,7 +237,7 @@ Expected<ClosedLoopResult> simulate(const ClosedLoopJob& job) {
         on_the_way.pop_front();
       }
       advance(h - done);
-      sensor->record(flywheel ? state.velocity : state.position);
+      sensor.record(flywheel ? state.velocity : state.position);
     }
     columns.motor_voltage.push_back(volt_seconds / T);
     columns.current.push_back(coulombs / T);

@@ -5,6 +5,7 @@
 #include <flyball/simulation/closed_loop.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball {
 
@@ -13,45 +14,49 @@ namespace {
 constexpr std::string_view where = "simulate_linear";
 
 Expected<void> check_loop(const LinearLoop& loop, const MatrixRef& r) {
-  if (auto checked = check_system(loop.plant, where); !checked) {
-    return checked;
-  }
+  FLYBALL_CHECK(check_system(loop.plant, where));
   const Eigen::Index n = loop.plant.A.rows();
   const Eigen::Index m = loop.plant.B.cols();
   const Eigen::Index p = loop.plant.C.rows();
-  if (auto checked = check_all(
-          check_shape(loop.K, m, n, where, "K", "inputs x states"),
-          loop.K_e ? check_shape(*loop.K_e, n, p, where, "K_e", "states x outputs")
-                   : Expected<void>{},
-          loop.u_min.size() == 0 ? Expected<void>{}
-                                 : check_shape(loop.u_min, m, 1, where, "u_min", "inputs x 1"),
-          loop.u_max.size() == 0 ? Expected<void>{}
-                                 : check_shape(loop.u_max, m, 1, where, "u_max", "inputs x 1"),
-          loop.x0.size() == 0 ? Expected<void>{}
-                              : check_shape(loop.x0, n, 1, where, "x0", "states x 1"),
-          check_shape(r, n, r.cols(), where, "r", "states x samples"));
-      !checked) {
-    return checked;
-  }
-  return check_all(check_finite(loop.K, where, "K"), check_finite(loop.x0, where, "x0"),
-                   loop.K_e ? check_finite(*loop.K_e, where, "K_e") : Expected<void>{},
-                   check_finite(r, where, "r"));
+  FLYBALL_CHECK(Checks(where)
+                    .shape(loop.K, m, n, "K", "inputs x states")
+                    .also([&] {
+                      return loop.K_e
+                                 ? check_shape(*loop.K_e, n, p, where, "K_e", "states x outputs")
+                                 : Expected<void>{};
+                    })
+                    .also([&] {
+                      return loop.u_min.size() == 0
+                                 ? Expected<void>{}
+                                 : check_shape(loop.u_min, m, 1, where, "u_min", "inputs x 1");
+                    })
+                    .also([&] {
+                      return loop.u_max.size() == 0
+                                 ? Expected<void>{}
+                                 : check_shape(loop.u_max, m, 1, where, "u_max", "inputs x 1");
+                    })
+                    .also([&] {
+                      return loop.x0.size() == 0
+                                 ? Expected<void>{}
+                                 : check_shape(loop.x0, n, 1, where, "x0", "states x 1");
+                    })
+                    .shape(r, n, r.cols(), "r", "states x samples"));
+  return Checks(where)
+      .finite(loop.K, "K")
+      .finite(loop.x0, "x0")
+      .also([&] { return loop.K_e ? check_finite(*loop.K_e, where, "K_e") : Expected<void>{}; })
+      .finite(r, "r");
 }
 
 }  // namespace
 
 Expected<LinearTrajectory> simulate_linear(const LinearLoop& loop, const MatrixRef& r) {
-  if (auto checked = check_loop(loop, r); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_loop(loop, r));
   const auto& [A, B, C, D, period] = loop.plant;
   const Eigen::Index n = A.rows();
   const Eigen::Index m = B.cols();
   const Eigen::Index samples = r.cols();
-  auto inversion = linear_plant_inversion(loop.plant);
-  if (!inversion) {
-    return tl::unexpected(inversion.error());
-  }
+  FLYBALL_TRY(auto inversion, linear_plant_inversion(loop.plant));
   const double infinity = std::numeric_limits<double>::infinity();
   const Eigen::VectorXd u_min =
       loop.u_min.size() == 0 ? Eigen::VectorXd::Constant(m, -infinity).eval() : loop.u_min;
@@ -80,7 +85,7 @@ Expected<LinearTrajectory> simulate_linear(const LinearLoop& loop, const MatrixR
     const Eigen::VectorXd r_next = r.col(std::min(k + 1, samples - 1));
     u = loop.K * (r_now - x_hat);
     if (loop.plant_inversion) {
-      u += inversion->calculate(r_now, r_next);
+      u += inversion.calculate(r_now, r_next);
     }
     u = u.cwiseMax(u_min).cwiseMin(u_max).eval();
     result.time(k) = static_cast<double>(k) * period.si();

@@ -5,20 +5,21 @@
 
 #include <flyball/core/argument.hpp>
 
+#include "core/try.hpp"
+
 namespace flyball {
 
 Expected<MechanismPlant> MechanismPlant::create(mechanisms::MechanismKind kind,
                                                 const mechanisms::FeedforwardGains& gains,
                                                 double breakaway) {
   constexpr std::string_view where = "MechanismPlant";
-  if (auto checked = check_all(
-          check_positive(gains.kV, where, "kV"), check_not_negative(gains.kA, where, "kA"),
-          check_not_negative(gains.kS, where, "kS", "V"), check_finite(gains.kG, where, "kG"),
-          check_finite(gains.angle_offset, where, "angle_offset"),
-          check_finite(breakaway, where, "breakaway"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .positive(gains.kV, "kV")
+                    .not_negative(gains.kA, "kA")
+                    .not_negative(gains.kS, "kS", "V")
+                    .finite(gains.kG, "kG")
+                    .finite(gains.angle_offset, "angle_offset")
+                    .finite(breakaway, "breakaway"));
   if (breakaway < 1.0) {
     return tl::unexpected(Error(ArgumentError::out_of_range)
                               .in(std::string(where))

@@ -9,12 +9,13 @@ namespace flyball {
 
 Expected<Sensor> Sensor::create(const SensorModel& model, Time step, Random random) {
   constexpr std::string_view where = "Sensor";
-  return check_all(check_not_negative(model.resolution, where, "resolution"),
-                   check_not_negative(model.noise, where, "noise"),
-                   check_not_negative(model.delay.si(), where, "delay", "s"),
-                   check_not_negative(model.refresh.si(), where, "refresh", "s"),
-                   check_not_negative(model.moving_average.si(), where, "moving_average", "s"),
-                   check_positive(step.si(), where, "step", "s"))
+  return Checks(where)
+      .not_negative(model.resolution, "resolution")
+      .not_negative(model.noise, "noise")
+      .not_negative(model.delay.si(), "delay", "s")
+      .not_negative(model.refresh.si(), "refresh", "s")
+      .not_negative(model.moving_average.si(), "moving_average", "s")
+      .positive(step.si(), "step", "s")
       .map([&] { return Sensor(model, step, random); });
 }
 

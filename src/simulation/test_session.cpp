@@ -9,6 +9,8 @@
 #include <flyball/core/argument.hpp>
 #include <flyball/core/random.hpp>
 
+#include "core/try.hpp"
+
 namespace flyball::simulation {
 namespace {
 
@@ -22,47 +24,36 @@ constexpr double kStep = 0.25e-3;       // s, gravity and friction are constant 
 constexpr double kSensorMemory = 0.5;   // s of rest before the first row that sensors may look at
 constexpr double kMaxDuration = 120.0;  // s, of one test
 
-Expected<void> check_in(double value, double low, double high, std::string_view name) {
-  if (const auto finite = check_finite(value, kWhere, name); !finite) {
-    return finite;
-  }
-  if (value < low || value > high) {
-    return tl::unexpected(
-        Error(ArgumentError::out_of_range)
-            .in(std::string(kWhere))
-            .about(std::string(name))
-            .expected("in [" + format_number(low) + ", " + format_number(high) + "]")
-            .got(format_number(value)));
-  }
-  return {};
-}
-
 Expected<void> check_options(const TestSessionOptions& options) {
   const bool travels = options.mechanism != MechanismKind::flywheel;
-  return check_all(
-      check_not_negative(options.kS, kWhere, "kS", "V"), check_positive(options.kV, kWhere, "kV"),
-      check_positive(options.kA, kWhere, "kA"), check_finite(options.kG, kWhere, "kG"),
-      check_finite(options.angle_offset, kWhere, "angle_offset"),
-      check_in(options.friction_variation, 0.0, 0.99, "friction_variation"),
-      check_in(options.breakaway, 1.0, 100.0, "breakaway"),
-      check_positive(options.ramp_rate, kWhere, "ramp_rate", "V/s"),
-      check_positive(options.step_voltage, kWhere, "step_voltage", "V"),
-      check_in(options.ramp_limit, 0.0, options.ramp_rate * kMaxDuration, "ramp_limit"),
-      check_in(options.step_duration, 0.0, kMaxDuration, "step_duration"),
-      check_in(options.rest_before, 0.0, 10.0, "rest_before"),
-      check_in(options.coast_after, 0.0, 10.0, "coast_after"),
-      check_in(options.row_period, 1e-3, 1.0, "row_period"),
-      check_in(options.row_jitter, 0.0, options.row_period / 4.0, "row_jitter"),
-      check_in(options.sensor_refresh, 0.0, 1.0, "sensor_refresh"),
-      check_in(options.sensor_delay, 0.0, kSensorMemory / 2.0, "sensor_delay"),
-      check_not_negative(options.resolution, kWhere, "resolution"),
-      check_in(options.velocity_window, 0.0, kSensorMemory / 2.0, "velocity_window"),
-      check_not_negative(options.velocity_noise.value_or(0.0), kWhere, "velocity_noise"),
-      check_not_negative(options.voltage_noise, kWhere, "voltage_noise", "V"),
-      travels
-          ? check_positive(options.travel_high - options.travel_low - 2.0 * options.travel_margin,
-                           kWhere, "travel_high - travel_low - 2 travel_margin")
-          : Expected<void>{});
+  return Checks(kWhere)
+      .not_negative(options.kS, "kS", "V")
+      .positive(options.kV, "kV")
+      .positive(options.kA, "kA")
+      .finite(options.kG, "kG")
+      .finite(options.angle_offset, "angle_offset")
+      .within(options.friction_variation, 0.0, 0.99, "friction_variation")
+      .within(options.breakaway, 1.0, 100.0, "breakaway")
+      .positive(options.ramp_rate, "ramp_rate", "V/s")
+      .positive(options.step_voltage, "step_voltage", "V")
+      .within(options.ramp_limit, 0.0, options.ramp_rate * kMaxDuration, "ramp_limit")
+      .within(options.step_duration, 0.0, kMaxDuration, "step_duration")
+      .within(options.rest_before, 0.0, 10.0, "rest_before")
+      .within(options.coast_after, 0.0, 10.0, "coast_after")
+      .within(options.row_period, 1e-3, 1.0, "row_period")
+      .within(options.row_jitter, 0.0, options.row_period / 4.0, "row_jitter")
+      .within(options.sensor_refresh, 0.0, 1.0, "sensor_refresh")
+      .within(options.sensor_delay, 0.0, kSensorMemory / 2.0, "sensor_delay")
+      .not_negative(options.resolution, "resolution")
+      .within(options.velocity_window, 0.0, kSensorMemory / 2.0, "velocity_window")
+      .not_negative(options.velocity_noise.value_or(0.0), "velocity_noise")
+      .not_negative(options.voltage_noise, "voltage_noise", "V")
+      .also([&] {
+        return travels ? check_positive(
+                             options.travel_high - options.travel_low - 2.0 * options.travel_margin,
+                             kWhere, "travel_high - travel_low - 2 travel_margin")
+                       : Expected<void>{};
+      });
 }
 
 /// kA v̇ = V − kS sgn(v) − kV v − gravity between hard stops.
@@ -260,9 +251,7 @@ TestRun record(const TestSessionOptions& options, TestKind kind, Random random) 
 }  // namespace
 
 Expected<Recording> record_test_session(const TestSessionOptions& options) {
-  if (auto valid = check_options(options); !valid) {
-    return tl::unexpected(std::move(valid).error());
-  }
+  FLYBALL_CHECK(check_options(options));
   Recording recording;
   recording.mechanism = options.mechanism;
   recording.unit = std::string(mechanisms::position_unit(options.mechanism));

@@ -8,6 +8,7 @@
 
 #include <flyball/systems/interconnection.hpp>
 
+#include "core/try.hpp"
 #include "study/linear_response.hpp"
 
 namespace flyball::study {
@@ -56,11 +57,8 @@ Expected<std::vector<StepResponse>> step_responses(const ModelFile& model,
   DiscretizedMatrices sampled{system.A, system.B};
   double step = horizon.step;
   if (model.domain == TimeDomain::continuous) {
-    auto discrete = discretize_zoh(system.A, system.B, Time(step));
-    if (!discrete) {
-      return tl::unexpected(discrete.error());
-    }
-    sampled = *std::move(discrete);
+    FLYBALL_TRY(auto discrete, discretize_zoh(system.A, system.B, Time(step)));
+    sampled = std::move(discrete);
   } else {
     step = model.period->si();
   }
@@ -100,17 +98,11 @@ void complete_names(ModelFile& model) {
 }
 
 Expected<SampledAnalysis> sampled_analysis(const ContinuousSystem<>& system, Time period) {
-  auto discrete = discretize_zoh(system.A, system.B, period);
-  if (!discrete) {
-    return tl::unexpected(std::move(discrete).error());
-  }
-  auto structure = analyze_structure({discrete->A, discrete->B, system.C, system.D},
-                                     TimeDomain::discrete, period);
-  if (!structure) {
-    return tl::unexpected(std::move(structure).error());
-  }
+  FLYBALL_TRY(auto discrete, discretize_zoh(system.A, system.B, period));
+  FLYBALL_TRY(auto structure, analyze_structure({discrete.A, discrete.B, system.C, system.D},
+                                                TimeDomain::discrete, period));
   return analyze_sampling(system, period).map([&](const SamplingAnalysis& sampling) {
-    return SampledAnalysis{*std::move(structure), *std::move(discrete), sampling};
+    return SampledAnalysis{std::move(structure), std::move(discrete), sampling};
   });
 }
 
@@ -137,20 +129,12 @@ void add_gains(ModelAnalysis& analysis) {
 
 Expected<StructureAnalysis> analyze_structure(const ContinuousSystem<>& system, TimeDomain domain,
                                               Time period) {
-  if (auto checked = check_system(system, "analyze"); !checked) {
-    return tl::unexpected(checked.error());
-  }
-  auto modes = analyze_modes(system.A, domain, period);
-  if (!modes) {
-    return tl::unexpected(std::move(modes).error());
-  }
-  auto controllability = analyze_controllability(system.A, system.B, domain);
-  if (!controllability) {
-    return tl::unexpected(std::move(controllability).error());
-  }
+  FLYBALL_CHECK(check_system(system, "analyze"));
+  FLYBALL_TRY(auto modes, analyze_modes(system.A, domain, period));
+  FLYBALL_TRY(auto controllability, analyze_controllability(system.A, system.B, domain));
   return analyze_observability(system.A, system.C, domain)
       .map([&](ObservabilityAnalysis&& observability) {
-        return StructureAnalysis{*std::move(modes), *std::move(controllability),
+        return StructureAnalysis{std::move(modes), std::move(controllability),
                                  std::move(observability)};
       });
 }
@@ -164,11 +148,9 @@ Expected<ModelAnalysis> analyze(const ModelFile& model) {
                               .got("left out")
                               .expected("the sample period of the discrete system"));
   }
-  auto structure = analyze_structure(model.system, model.domain, model.period.value_or(Time(1.0)));
-  if (!structure) {
-    return tl::unexpected(std::move(structure).error());
-  }
-  ModelAnalysis analysis{*std::move(structure), model, {}, {}, {}, {}, {}};
+  FLYBALL_TRY(auto structure,
+              analyze_structure(model.system, model.domain, model.period.value_or(Time(1.0))));
+  ModelAnalysis analysis{std::move(structure), model, {}, {}, {}, {}, {}};
   complete_names(analysis.model);
   if (continuous && model.period) {
     auto sampled = sampled_analysis(model.system, *model.period);
@@ -180,11 +162,8 @@ Expected<ModelAnalysis> analyze(const ModelFile& model) {
           {"not_sampled", Severity::warning, "as sampled: " + to_string(sampled.error())});
     }
   }
-  auto steps = step_responses(model, analysis.modes);
-  if (!steps) {
-    return tl::unexpected(std::move(steps).error());
-  }
-  analysis.steps = *std::move(steps);
+  FLYBALL_TRY(auto steps, step_responses(model, analysis.modes));
+  analysis.steps = std::move(steps);
   add_gains(analysis);
   return analysis;
 }

@@ -9,6 +9,7 @@
 #include <flyball/core/quantity.hpp>
 #include <flyball/core/text.hpp>
 
+#include "core/try.hpp"
 #include "study/channel_names.hpp"
 #include "study/channels.hpp"
 
@@ -233,11 +234,9 @@ std::optional<FoundChannels> one_side(const Log& log, const FoundTests& tests) {
 Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
                                       const LogSelection& selection) {
   FoundChannels channels;
-  auto voltage = choose(log, tests, Quantity::voltage, selection.voltage_channel, nullptr);
-  if (!voltage) {
-    return tl::unexpected(std::move(voltage).error());
-  }
-  channels.voltage = *voltage;
+  FLYBALL_TRY(auto voltage,
+              choose(log, tests, Quantity::voltage, selection.voltage_channel, nullptr));
+  channels.voltage = voltage;
   auto position =
       choose(log, tests, Quantity::position, selection.position_channel, channels.voltage);
   auto velocity =

@@ -10,6 +10,7 @@
 
 #include <flyball/study/simulate.hpp>
 
+#include "core/try.hpp"
 #include "study/design_steps.hpp"
 
 namespace flyball::study {
@@ -23,20 +24,18 @@ constexpr std::string_view where = "design";
 Expected<void> check_job(const DesignJob& job) {
   const mechanisms::FeedforwardGains& gains = job.plant.gains;
   const ControllerOptions& controller = job.controller;
-  if (auto checked = check_all(
-          check_positive(gains.kV, where, "kV"), check_not_negative(gains.kS, where, "kS", "V"),
-          check_finite(gains.kG, where, "kG"),
-          check_finite(gains.angle_offset, where, "angle_offset"),
-          check_positive(controller.period, where, "period", "s"),
-          check_positive(controller.input_tolerance, where, "input_tolerance", "V"),
-          check_positive(controller.max_voltage, where, "max_voltage", "V"),
-          check_not_negative(controller.delay.value_or(0.0), where, "delay", "s"),
-          check_not_negative(job.sensor.resolution, where, "resolution", job.plant.unit),
-          check_positive(job.battery.open_circuit_voltage, where, "open_circuit_voltage", "V"),
-          check_not_negative(job.battery.resistance, where, "battery resistance", "Ohm"));
-      !checked) {
-    return checked;
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .positive(gains.kV, "kV")
+                    .not_negative(gains.kS, "kS", "V")
+                    .finite(gains.kG, "kG")
+                    .finite(gains.angle_offset, "angle_offset")
+                    .positive(controller.period, "period", "s")
+                    .positive(controller.input_tolerance, "input_tolerance", "V")
+                    .positive(controller.max_voltage, "max_voltage", "V")
+                    .not_negative(controller.delay.value_or(0.0), "delay", "s")
+                    .not_negative(job.sensor.resolution, "resolution", job.plant.unit)
+                    .positive(job.battery.open_circuit_voltage, "open_circuit_voltage", "V")
+                    .not_negative(job.battery.resistance, "battery resistance", "Ohm"));
   return job.plant.kA_determined ? check_positive(gains.kA, where, "kA") : Expected<void>{};
 }
 
@@ -157,24 +156,16 @@ ErrorInfo error_info(DesignError code) {
 }
 
 Expected<DesignResult> design(const DesignJob& requested) {
-  if (auto checked = check_job(requested); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_job(requested));
   DesignResult result;
   result.job = requested;
   DesignJob& job = result.job;
   fill_defaults(job, result.diagnostics);
 
-  auto motion = motion_limits(job);
-  if (!motion) {
-    return tl::unexpected(std::move(motion).error());
-  }
-  result.motion = *motion;
+  FLYBALL_TRY(auto motion, motion_limits(job));
+  result.motion = motion;
 
-  auto model = linear_model(job.plant, job.controller.period);
-  if (!model) {
-    return tl::unexpected(std::move(model).error());
-  }
+  FLYBALL_TRY(auto model, linear_model(job.plant, job.controller.period));
   result.velocity_servo = !job.plant.kA_determined;
   if (result.velocity_servo) {
     result.diagnostics.push_back(unknown_kA(job.plant.kind));
@@ -184,8 +175,8 @@ Expected<DesignResult> design(const DesignJob& requested) {
   if (!chosen && result.velocity_servo && job.controller.state_tolerance.size() == 2) {
     job.controller.state_tolerance.resize(1);
   }
-  auto loop = chosen ? search_tolerances(*model, job, result.diagnostics)
-                     : design_loop(*model, job, job.controller.state_tolerance);
+  auto loop = chosen ? search_tolerances(model, job, result.diagnostics)
+                     : design_loop(model, job, job.controller.state_tolerance);
   if (!loop) {
     return tl::unexpected(std::move(loop).error());
   }
@@ -209,12 +200,12 @@ Expected<DesignResult> design(const DesignJob& requested) {
          "which no real fraction of a period exists"});
   }
 
-  result.states = model->states;
-  result.A_continuous = model->A;
-  result.B_continuous = model->B;
-  result.A = model->discrete.A;
-  result.B = model->discrete.B;
-  result.C = model->discrete.C;
+  result.states = model.states;
+  result.A_continuous = model.A;
+  result.B_continuous = model.B;
+  result.A = model.discrete.A;
+  result.B = model.discrete.B;
+  result.C = model.discrete.C;
   result.Q = loop->Q;
   result.R = loop->R;
   result.K = loop->K;

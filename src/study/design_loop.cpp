@@ -17,6 +17,7 @@
 #include <flyball/mechanisms/velocity_servo.hpp>
 #include <flyball/systems/discretize.hpp>
 
+#include "core/try.hpp"
 #include "study/design_steps.hpp"
 
 // The plant, and the loop that a choice of tolerances gives.
@@ -91,26 +92,18 @@ Expected<LinearModel> linear_model(const PlantDescription& plant, double period)
     return model;
   }
   if (flywheel) {
-    auto built = mechanisms::flywheel(plant.gains);
-    if (!built) {
-      return tl::unexpected(std::move(built).error());
-    }
-    take(model, *built);
+    FLYBALL_TRY(auto built, mechanisms::flywheel(plant.gains));
+    take(model, built);
     model.states = {velocity};
   } else {
-    auto built = plant.kind == MechanismKind::elevator ? mechanisms::elevator(plant.gains)
-                                                       : mechanisms::arm(plant.gains);
-    if (!built) {
-      return tl::unexpected(std::move(built).error());
-    }
-    take(model, *built);
+    FLYBALL_TRY(auto built, plant.kind == MechanismKind::elevator
+                                ? mechanisms::elevator(plant.gains)
+                                : mechanisms::arm(plant.gains));
+    take(model, built);
     model.states = {position, velocity};
   }
-  auto discrete = discretize_zoh(model.A, model.B, Time(period));
-  if (!discrete) {
-    return tl::unexpected(std::move(discrete).error());
-  }
-  model.discrete = {discrete->A, discrete->B, model.C, zero, Time(period)};
+  FLYBALL_TRY(auto discrete, discretize_zoh(model.A, model.B, Time(period)));
+  model.discrete = {discrete.A, discrete.B, model.C, zero, Time(period)};
   return model;
 }
 
@@ -156,12 +149,9 @@ Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
   }
   loop.Q = *Q;
   loop.R = *R;
-  auto regulator = lqr(plant, *Q, *R);
-  if (!regulator) {
-    return tl::unexpected(std::move(regulator).error());
-  }
-  loop.K = regulator->K;
-  loop.poles = regulator->poles;
+  FLYBALL_TRY(auto regulator, lqr(plant, *Q, *R));
+  loop.K = regulator.K;
+  loop.poles = regulator.poles;
 
   auto delayed = compensate_latency(loop.K, plant.A, plant.B, plant.period, delay);
   if (!delayed && delayed.error().is(MatrixFunctionError::no_real_power)) {
@@ -176,35 +166,21 @@ Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
   loop.K_delayed = *delayed;
 
   const double sigma = measurement_std(job);
-  auto observer = kalman_gain(plant, process_covariance(model, job), standard_deviations({sigma}));
-  if (!observer) {
-    return tl::unexpected(std::move(observer).error());
-  }
-  loop.kalman_gain = observer->K;
-  loop.estimator_poles = observer->poles;
+  FLYBALL_TRY(auto observer,
+              kalman_gain(plant, process_covariance(model, job), standard_deviations({sigma})));
+  loop.kalman_gain = observer.K;
+  loop.estimator_poles = observer.poles;
 
-  const auto inversion = pseudoinverse(plant.B);
-  if (!inversion) {
-    return tl::unexpected(inversion.error());
-  }
-  loop.inversion = inversion->X;
+  FLYBALL_TRY(const auto inversion, pseudoinverse(plant.B));
+  loop.inversion = inversion.X;
 
-  auto opened = observer_regulator_loop(model.A, model.B, model.C, plant, loop.K_delayed,
-                                        loop.kalman_gain, delay);
-  if (!opened) {
-    return tl::unexpected(std::move(opened).error());
-  }
-  auto margins = stability_margins(*opened);
-  if (!margins) {
-    return tl::unexpected(std::move(margins).error());
-  }
-  loop.margins = *std::move(margins);
-  auto grid =
-      robustness_grid(model.A, model.B, model.C, plant, loop.K_delayed, loop.kalman_gain, delay);
-  if (!grid) {
-    return tl::unexpected(std::move(grid).error());
-  }
-  loop.robustness = *std::move(grid);
+  FLYBALL_TRY(auto opened, observer_regulator_loop(model.A, model.B, model.C, plant, loop.K_delayed,
+                                                   loop.kalman_gain, delay));
+  FLYBALL_TRY(auto margins, stability_margins(opened));
+  loop.margins = std::move(margins);
+  FLYBALL_TRY(auto grid, robustness_grid(model.A, model.B, model.C, plant, loop.K_delayed,
+                                         loop.kalman_gain, delay));
+  loop.robustness = std::move(grid);
   return loop;
 }
 

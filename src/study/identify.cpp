@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "core/try.hpp"
+
 namespace flyball::study {
 
 std::vector<Diagnostic> IdentifyResult::diagnostics() const {
@@ -11,22 +13,17 @@ std::vector<Diagnostic> IdentifyResult::diagnostics() const {
 }
 
 Expected<IdentifyResult> identify(const IdentifyJob& job) {
-  auto source = load_recording(job.log, job.selection);
-  if (!source) {
-    return tl::unexpected(std::move(source).error());
-  }
-  if (source->refusal) {
+  FLYBALL_TRY(auto source, load_recording(job.log, job.selection));
+  if (source.refusal) {
     identification::FitReport refused{
-        .prepared = {}, .diagnostics = {}, .fit = tl::unexpected(*source->refusal)};
-    return IdentifyResult{.source = *std::move(source),
-                          .report = std::move(refused),
-                          .mechanism = {},
-                          .unit = "unit"};
+        .prepared = {}, .diagnostics = {}, .fit = tl::unexpected(*source.refusal)};
+    return IdentifyResult{
+        .source = std::move(source), .report = std::move(refused), .mechanism = {}, .unit = "unit"};
   }
-  const mechanisms::MechanismKind mechanism = *source->recording.mechanism;
-  const std::string unit = source->recording.unit;
-  identification::FitReport report = identification::identify_feedforward(source->recording);
-  return IdentifyResult{.source = *std::move(source),
+  const mechanisms::MechanismKind mechanism = *source.recording.mechanism;
+  const std::string unit = source.recording.unit;
+  identification::FitReport report = identification::identify_feedforward(source.recording);
+  return IdentifyResult{.source = std::move(source),
                         .report = std::move(report),
                         .mechanism = mechanism,
                         .unit = unit};

@@ -5,6 +5,7 @@
 #include <flyball/io/file.hpp>
 #include <flyball/study/analyze.hpp>
 
+#include "core/try.hpp"
 #include "study/design_steps.hpp"
 #include "study/problem_reader.hpp"
 
@@ -45,15 +46,9 @@ Expected<void> check_names(const std::vector<std::string>& names, Eigen::Index c
 }
 
 Expected<ModelFile> parse_matrices(std::string_view text, const std::string& name) {
-  const auto object = parse_object(text, name, "model");
-  if (!object) {
-    return tl::unexpected(object.error());
-  }
-  if (auto known = check_fields(*object, name, "A B", "C D domain T states inputs outputs");
-      !known) {
-    return tl::unexpected(known.error());
-  }
-  ProblemReader reader(*object, name);
+  FLYBALL_TRY(const auto object, parse_object(text, name, "model"));
+  FLYBALL_CHECK(check_fields(object, name, "A B", "C D domain T states inputs outputs"));
+  ProblemReader reader(object, name);
   ModelFile model;
   model.path = name;
   model.system = reader.system();
@@ -77,15 +72,21 @@ Expected<ModelFile> parse_matrices(std::string_view text, const std::string& nam
                               .expected("the sample period of the discrete model in seconds"));
   }
   const ContinuousSystem<>& system = model.system;
-  if (auto checked = check_all(
-          check_system(system, name),
-          check_positive(model.period.value_or(Time(1.0)).si(), name, "T", "s"),
-          check_names(model.states, system.A.rows(), name, "states", "one for each row of A"),
-          check_names(model.inputs, system.B.cols(), name, "inputs", "one for each column of B"),
-          check_names(model.outputs, system.C.rows(), name, "outputs", "one for each row of C"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(name)
+                    .also([&] { return check_system(system, name); })
+                    .positive(model.period.value_or(Time(1.0)).si(), "T", "s")
+                    .also([&] {
+                      return check_names(model.states, system.A.rows(), name, "states",
+                                         "one for each row of A");
+                    })
+                    .also([&] {
+                      return check_names(model.inputs, system.B.cols(), name, "inputs",
+                                         "one for each column of B");
+                    })
+                    .also([&] {
+                      return check_names(model.outputs, system.C.rows(), name, "outputs",
+                                         "one for each row of C");
+                    }));
   return model;
 }
 
@@ -149,20 +150,17 @@ Expected<ModelFile> model_of(const Project& project) {
   }
   const PlantDescription& plant = project.job.plant;
   const double period = project.job.controller.period;
-  auto linear = linear_model(plant, period);
-  if (!linear) {
-    return tl::unexpected(std::move(linear).error());
-  }
+  FLYBALL_TRY(auto linear, linear_model(plant, period));
   ModelFile model;
   model.path = project.path;
   model.period = Time(period);
-  model.states = linear->states;
+  model.states = linear.states;
   model.inputs = {"voltage (V)"};
   model.outputs = {model.states.front()};
   model.plant = plant;
-  const DiscreteSystem<>& discrete = linear->discrete;
+  const DiscreteSystem<>& discrete = linear.discrete;
   if (plant.kA_determined || plant.kind != MechanismKind::flywheel) {
-    model.system = {linear->A, linear->B, linear->C, discrete.D};
+    model.system = {linear.A, linear.B, linear.C, discrete.D};
   } else {
     // What happens within the period is not known.
     model.domain = TimeDomain::discrete;
@@ -177,11 +175,8 @@ Expected<ModelFile> model_of(const Project& project) {
 
 Expected<ModelFile> read_model(const std::string& path) {
   const bool standard_input = path == "-";
-  const auto text = read_file(standard_input ? "/dev/stdin" : path, largest_model);
-  if (!text) {
-    return tl::unexpected(text.error());
-  }
-  return parse_model(*text, standard_input ? "standard input" : path);
+  FLYBALL_TRY(const auto text, read_file(standard_input ? "/dev/stdin" : path, largest_model));
+  return parse_model(text, standard_input ? "standard input" : path);
 }
 
 }  // namespace flyball::study

@@ -11,6 +11,7 @@
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/mechanisms/flywheel.hpp>
 
+#include "core/try.hpp"
 #include "study/toml_reader.hpp"
 
 namespace flyball::study {
@@ -336,11 +337,8 @@ Expected<Project> parse_project(std::string_view text, const std::string& name) 
 
 Expected<Project> read_project(const std::string& path) {
   constexpr std::size_t largest = 1 << 20;
-  auto text = read_file(path, largest);
-  if (!text) {
-    return tl::unexpected(std::move(text).error());
-  }
-  return parse_project(*text, path);
+  FLYBALL_TRY(auto text, read_file(path, largest));
+  return parse_project(text, path);
 }
 
 }  // namespace flyball::study

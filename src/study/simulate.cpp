@@ -5,6 +5,8 @@
 
 #include <flyball/core/argument.hpp>
 
+#include "core/try.hpp"
+
 namespace flyball::study {
 
 namespace {
@@ -54,13 +56,10 @@ std::vector<MotionState> reference_of(const DesignResult& design) {
 
 Expected<ClosedLoopResult> simulate(const DesignResult& design, const SimulateJob& job) {
   constexpr std::string_view where = "simulate";
-  if (auto checked =
-          check_all(check_positive(job.inertia_factor, where, "inertia_factor"),
-                    check_positive(job.gain_factor, where, "gain_factor"),
-                    check_not_negative(job.measurement_noise, where, "measurement_noise"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .positive(job.inertia_factor, "inertia_factor")
+                    .positive(job.gain_factor, "gain_factor")
+                    .not_negative(job.measurement_noise, "measurement_noise"));
   const DesignJob& designed = design.job;
   ClosedLoopJob loop;
   loop.regulator = regulator_of(design);

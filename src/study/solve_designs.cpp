@@ -5,6 +5,7 @@
 #include <flyball/math/riccati/riccati.hpp>
 #include <flyball/systems/discretize.hpp>
 
+#include "core/try.hpp"
 #include "study/solve_kernels.hpp"
 
 // Designs: gains of controllers and observers.
@@ -32,12 +33,9 @@ Outcome solve_lqr(ProblemReader& problem, AnswerWriter& answer) {
     if (!problem.status()) {
       return problem.status();
     }
-    auto sampled = discretize_zoh(A, B, Time(period));
-    if (!sampled) {
-      return tl::unexpected(sampled.error());
-    }
-    A = std::move(sampled->A);
-    B = std::move(sampled->B);
+    FLYBALL_TRY(auto sampled, discretize_zoh(A, B, Time(period)));
+    A = std::move(sampled.A);
+    B = std::move(sampled.B);
     discrete = true;
   }
   const auto solution = discrete ? dare(A, B, Q, R, N) : care(A, B, Q, R, N);
@@ -59,13 +57,10 @@ Outcome solve_place(ProblemReader& problem, AnswerWriter& answer) {
   if (!problem.status()) {
     return problem.status();
   }
-  const auto placed = place(A, B, poles);
-  if (!placed) {
-    return tl::unexpected(placed.error());
-  }
-  answer.add("K", placed->K);
-  answer.add("poles", Eigen::VectorXcd(placed->poles));
-  answer.add("condition", placed->condition);
+  FLYBALL_TRY(const auto placed, place(A, B, poles));
+  answer.add("K", placed.K);
+  answer.add("poles", Eigen::VectorXcd(placed.poles));
+  answer.add("condition", placed.condition);
   return {};
 }
 
@@ -77,17 +72,14 @@ Outcome solve_kalman(ProblemReader& problem, AnswerWriter& answer) {
   if (!problem.status()) {
     return problem.status();
   }
-  const auto gain = kalman_gain(A, C, Q, R);
-  if (!gain) {
-    return tl::unexpected(gain.error());
-  }
-  answer.add("K", gain->K);
-  answer.add("P", gain->P_prior);
-  answer.add("poles", Eigen::VectorXcd(gain->poles));
-  answer.add("P_posterior", gain->P_posterior);
-  answer.add("L", gain->L);
-  answer.add("residual", gain->residual);
-  answer.add("condition", gain->condition);
+  FLYBALL_TRY(const auto gain, kalman_gain(A, C, Q, R));
+  answer.add("K", gain.K);
+  answer.add("P", gain.P_prior);
+  answer.add("poles", Eigen::VectorXcd(gain.poles));
+  answer.add("P_posterior", gain.P_posterior);
+  answer.add("L", gain.L);
+  answer.add("residual", gain.residual);
+  answer.add("condition", gain.condition);
   return {};
 }
 

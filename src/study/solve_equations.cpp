@@ -5,6 +5,7 @@
 #include <flyball/math/exponential/matrix_function.hpp>
 #include <flyball/math/riccati/riccati.hpp>
 
+#include "core/try.hpp"
 #include "study/solve_kernels.hpp"
 
 // Matrix equations and functions.
@@ -26,16 +27,13 @@ Outcome riccati(bool continuous, ProblemReader& problem, AnswerWriter& answer) {
   if (!problem.status()) {
     return problem.status();
   }
-  const auto solution = continuous ? (N ? care(A, B, Q, R, *N) : care(A, B, Q, R))
-                                   : (N ? dare(A, B, Q, R, *N) : dare(A, B, Q, R));
-  if (!solution) {
-    return tl::unexpected(solution.error());
-  }
-  answer.add("X", solution->X);
-  answer.add("K", solution->K);
-  answer.add("poles", solution->poles);
-  answer.add("residual", solution->residual);
-  answer.add("condition", solution->condition);
+  FLYBALL_TRY(const auto solution, continuous ? (N ? care(A, B, Q, R, *N) : care(A, B, Q, R))
+                                              : (N ? dare(A, B, Q, R, *N) : dare(A, B, Q, R)));
+  answer.add("X", solution.X);
+  answer.add("K", solution.K);
+  answer.add("poles", solution.poles);
+  answer.add("residual", solution.residual);
+  answer.add("condition", solution.condition);
   return {};
 }
 

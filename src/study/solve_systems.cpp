@@ -5,6 +5,7 @@
 #include <flyball/systems/discretize.hpp>
 #include <flyball/systems/gramian.hpp>
 
+#include "core/try.hpp"
 #include "study/analysis_json.hpp"
 #include "study/linear_response.hpp"
 #include "study/solve_kernels.hpp"
@@ -31,11 +32,8 @@ Expected<Conversion> read_conversion(ProblemReader& problem) {
     if (!problem.status()) {
       return tl::unexpected(problem.status().error());
     }
-    auto method = parse_conversion_method(name);
-    if (!method) {
-      return tl::unexpected(method.error());
-    }
-    conversion.method = *method;
+    FLYBALL_TRY(auto method, parse_conversion_method(name));
+    conversion.method = method;
   }
   if (!problem.status()) {
     return tl::unexpected(problem.status().error());
@@ -56,37 +54,25 @@ void write_system(const System& system, AnswerWriter& answer) {
 Outcome solve_c2d(ProblemReader& problem, AnswerWriter& answer) {
   const ContinuousSystem<> system = problem.system();
   const Time period(problem.number("T"));
-  const auto conversion = read_conversion(problem);
-  if (!conversion) {
-    return tl::unexpected(conversion.error());
-  }
-  const auto discrete =
-      convert_to_discrete(system, period, conversion->method, conversion->prewarp);
-  if (!discrete) {
-    return tl::unexpected(discrete.error());
-  }
-  write_system(*discrete, answer);
+  FLYBALL_TRY(const auto conversion, read_conversion(problem));
+  FLYBALL_TRY(const auto discrete,
+              convert_to_discrete(system, period, conversion.method, conversion.prewarp));
+  write_system(discrete, answer);
   if (problem.has("Q")) {
     const MatrixXd Q = problem.matrix("Q");
     if (!problem.status()) {
       return problem.status();
     }
-    const auto noise = discretize(system.A, ProcessDensity{Q}, period);
-    if (!noise) {
-      return tl::unexpected(noise.error());
-    }
-    answer.add("Q", *noise);
+    FLYBALL_TRY(const auto noise, discretize(system.A, ProcessDensity{Q}, period));
+    answer.add("Q", noise);
   }
   if (problem.has("R")) {
     const MatrixXd R = problem.matrix("R");
     if (!problem.status()) {
       return problem.status();
     }
-    const auto noise = discretize(MeasurementDensity{R}, period);
-    if (!noise) {
-      return tl::unexpected(noise.error());
-    }
-    answer.add("R", *noise);
+    FLYBALL_TRY(const auto noise, discretize(MeasurementDensity{R}, period));
+    answer.add("R", noise);
   }
   return {};
 }
@@ -94,17 +80,11 @@ Outcome solve_c2d(ProblemReader& problem, AnswerWriter& answer) {
 Outcome solve_d2c(ProblemReader& problem, AnswerWriter& answer) {
   const ContinuousSystem<> matrices = problem.system();
   const Time period(problem.number("T"));
-  const auto conversion = read_conversion(problem);
-  if (!conversion) {
-    return tl::unexpected(conversion.error());
-  }
-  const auto continuous =
-      convert_to_continuous({matrices.A, matrices.B, matrices.C, matrices.D, period},
-                            conversion->method, conversion->prewarp);
-  if (!continuous) {
-    return tl::unexpected(continuous.error());
-  }
-  write_system(*continuous, answer);
+  FLYBALL_TRY(const auto conversion, read_conversion(problem));
+  FLYBALL_TRY(const auto continuous,
+              convert_to_continuous({matrices.A, matrices.B, matrices.C, matrices.D, period},
+                                    conversion.method, conversion.prewarp));
+  write_system(continuous, answer);
   return {};
 }
 
@@ -114,18 +94,12 @@ Outcome solve_gramians(ProblemReader& problem, AnswerWriter& answer) {
   if (!problem.status()) {
     return problem.status();
   }
-  const auto controllability = controllability_gramian(system.A, system.B, domain);
-  if (!controllability) {
-    return tl::unexpected(controllability.error());
-  }
-  const auto observability = observability_gramian(system.A, system.C, domain);
-  if (!observability) {
-    return tl::unexpected(observability.error());
-  }
-  answer.add("Wc", controllability->W);
-  answer.add("Wo", observability->W);
-  answer.add("stable", controllability->is_energy);
-  if (controllability->is_energy) {
+  FLYBALL_TRY(const auto controllability, controllability_gramian(system.A, system.B, domain));
+  FLYBALL_TRY(const auto observability, observability_gramian(system.A, system.C, domain));
+  answer.add("Wc", controllability.W);
+  answer.add("Wo", observability.W);
+  answer.add("stable", controllability.is_energy);
+  if (controllability.is_energy) {
     const auto hankel = domain == TimeDomain::continuous
                             ? hankel_singular_values(system)
                             : hankel_singular_values(DiscreteSystem<>{system.A, system.B, system.C,
@@ -134,8 +108,8 @@ Outcome solve_gramians(ProblemReader& problem, AnswerWriter& answer) {
       answer.add_list("hankel_singular_values", *hankel);
     }
   }
-  answer.add("residual", std::max(controllability->residual, observability->residual));
-  answer.add("condition", std::max(controllability->condition, observability->condition));
+  answer.add("residual", std::max(controllability.residual, observability.residual));
+  answer.add("condition", std::max(controllability.condition, observability.condition));
   return {};
 }
 
@@ -146,11 +120,8 @@ Outcome solve_analyze(ProblemReader& problem, AnswerWriter& answer) {
   if (!problem.status()) {
     return problem.status();
   }
-  const auto structure = analyze_structure(system, domain, period);
-  if (!structure) {
-    return tl::unexpected(structure.error());
-  }
-  write_structure(*structure, {}, answer);
+  FLYBALL_TRY(const auto structure, analyze_structure(system, domain, period));
+  write_structure(structure, {}, answer);
   return {};
 }
 
@@ -166,16 +137,12 @@ Outcome solve_simulate(ProblemReader& problem, AnswerWriter& answer) {
   if (!problem.status()) {
     return problem.status();
   }
-  if (auto checked = check_system(system, where); !checked) {
-    return checked;
-  }
-  if (auto checked =
-          check_all(check_shape(u, u.rows(), system.B.cols(), where, "u", "samples x inputs"),
-                    check_shape(x0, n, 1, where, "x0", "states x 1"), check_finite(u, where, "u"),
-                    check_finite(x0, where, "x0"));
-      !checked) {
-    return checked;
-  }
+  FLYBALL_CHECK(check_system(system, where));
+  FLYBALL_CHECK(Checks(where)
+                    .shape(u, u.rows(), system.B.cols(), "u", "samples x inputs")
+                    .shape(x0, n, 1, "x0", "states x 1")
+                    .finite(u, "u")
+                    .finite(x0, "x0"));
   DiscretizedMatrices model{system.A, system.B};
   if (domain == TimeDomain::continuous) {
     if (!problem.has("T")) {
@@ -185,16 +152,11 @@ Outcome solve_simulate(ProblemReader& problem, AnswerWriter& answer) {
                                 .got("left out")
                                 .expected("the time between the rows of u in seconds"));
     }
-    auto sampled = discretize_zoh(system.A, system.B, Time(period));
-    if (!sampled) {
-      return tl::unexpected(sampled.error());
-    }
-    model = *std::move(sampled);
+    FLYBALL_TRY(auto sampled, discretize_zoh(system.A, system.B, Time(period)));
+    model = std::move(sampled);
   }
   const LinearResponse response = linear_response(model, system.C, system.D, u, x0);
-  if (auto finite = check_finite(response.x, where, "x"); !finite) {
-    return finite;
-  }
+  FLYBALL_CHECK(check_finite(response.x, where, "x"));
   answer.add("x", response.x);
   answer.add("y", response.y);
   return {};

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/try.hpp"
+
 namespace flyball::study {
 
 PlantDescription plant_from_fit(const identification::FeedforwardFit& fit) {
@@ -24,11 +26,8 @@ PlantDescription plant_from_fit(const identification::FeedforwardFit& fit) {
 }
 
 Expected<TuneResult> tune(const TuneJob& job) {
-  auto identified = identify(job.identification);
-  if (!identified) {
-    return tl::unexpected(std::move(identified).error());
-  }
-  TuneResult result{.identification = *std::move(identified), .design = std::nullopt};
+  FLYBALL_TRY(auto identified, identify(job.identification));
+  TuneResult result{.identification = std::move(identified), .design = std::nullopt};
   if (!result.identification.report.fit) {
     return result;
   }

@@ -8,6 +8,7 @@
 #include <flyball/math/equations/matrix_equation.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "systems/balance.hpp"
 #include "systems/modes.hpp"
@@ -31,11 +32,7 @@ double excess(Complex lambda, TimeDomain domain) {
 Expected<Equilibrium> rest(const MatrixXd& balance, const ContinuousSystem<>& system,
                            const Eigen::VectorXd& u) {
   constexpr std::string_view where = "equilibrium";
-  if (auto checked = check_all(check_shape(u, system.B.cols(), 1, where, "u", "inputs x 1"),
-                               check_finite(u, where, "u"));
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(Checks(where).shape(u, system.B.cols(), 1, "u", "inputs x 1").finite(u, "u"));
   // balance x = B u, in units in which the states are of like size.
   const detail::SystemScaling scaling = detail::scaling_of(balance, system.B, system.C);
   const MatrixXd M = detail::scaled_state_matrix(balance, scaling);
@@ -171,16 +168,11 @@ std::string_view to_string(Stability stability) {
 
 Expected<ModalAnalysis> analyze_modes(const MatrixRef& A, TimeDomain domain, Time period) {
   constexpr std::string_view where = "analyze_modes";
-  if (auto square = check_square(A, where, "A"); !square) {
-    return tl::unexpected(std::move(square).error());
-  }
+  FLYBALL_CHECK(check_square(A, where, "A"));
   const bool discrete = domain == TimeDomain::discrete;
-  if (auto checked = check_all(
-          check_finite(A, where, "A"),
-          discrete ? check_positive(period.si(), where, "period", "s") : Expected<void>());
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(Checks(where).finite(A, "A").also([&] {
+    return discrete ? check_positive(period.si(), where, "period", "s") : Expected<void>();
+  }));
   const detail::JudgedEigenvalues judged = detail::judged_eigenvalues(A, domain);
   if (!judged.converged) {
     return tl::unexpected(Error(SystemError::no_convergence)
@@ -249,16 +241,12 @@ std::string describe(const ModalAnalysis& analysis) {
 }
 
 Expected<Equilibrium> equilibrium(const ContinuousSystem<>& system, const Eigen::VectorXd& u) {
-  if (auto checked = check_system(system, "equilibrium"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, "equilibrium"));
   return rest(-system.A, system, u);
 }
 
 Expected<Equilibrium> equilibrium(const DiscreteSystem<>& system, const Eigen::VectorXd& u) {
-  if (auto checked = check_system(system, "equilibrium"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, "equilibrium"));
   const Index n = system.A.rows();
   return rest(MatrixXd::Identity(n, n) - system.A, {system.A, system.B, system.C, system.D}, u);
 }
@@ -266,18 +254,12 @@ Expected<Equilibrium> equilibrium(const DiscreteSystem<>& system, const Eigen::V
 Expected<LyapunovCertificate> lyapunov_certificate(const MatrixRef& A, const MatrixRef& Q,
                                                    TimeDomain domain) {
   constexpr std::string_view where = "lyapunov_certificate";
-  if (auto square = check_square(A, where, "A"); !square) {
-    return tl::unexpected(std::move(square).error());
-  }
-  if (auto checked = check_all(check_finite(A, where, "A"),
-                               check_shape(Q, A.rows(), A.rows(), where, "Q", "states x states"),
-                               check_finite(Q, where, "Q"));
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
-  if (auto symmetric = check_symmetric(Q, where, "Q"); !symmetric) {
-    return tl::unexpected(std::move(symmetric).error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .square(A, "A")
+                    .finite(A, "A")
+                    .shape(Q, A.rows(), A.rows(), "Q", "states x states")
+                    .finite(Q, "Q")
+                    .symmetric(Q, "Q"));
   const MatrixXd weight = detail::symmetrized(Q);
   if (!detail::cholesky_of(weight)) {
     return tl::unexpected(
@@ -288,14 +270,12 @@ Expected<LyapunovCertificate> lyapunov_certificate(const MatrixRef& A, const Mat
             .expected("positive definite: V has to fall wherever x is not zero")
             .with("smallest eigenvalue", detail::symmetric_eigensystem_of(weight).values(0)));
   }
-  auto solution = domain == TimeDomain::continuous ? lyapunov(A.transpose(), weight)
-                                                   : discrete_lyapunov(A.transpose(), weight);
-  if (!solution) {
-    return tl::unexpected(std::move(solution).error());
-  }
+  FLYBALL_TRY(auto solution, domain == TimeDomain::continuous
+                                 ? lyapunov(A.transpose(), weight)
+                                 : discrete_lyapunov(A.transpose(), weight));
   LyapunovCertificate certificate;
-  certificate.P = detail::symmetrized(solution->X);
-  certificate.residual = solution->residual;
+  certificate.P = detail::symmetrized(solution.X);
+  certificate.residual = solution.residual;
   certificate.eigenvalues = detail::symmetric_eigensystem_of(certificate.P).values;
   // Definiteness does not depend on the states' units; rounding does.
   const Eigen::VectorXd scale = certificate.P.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt();

@@ -1,5 +1,7 @@
 #include <flyball/systems/augment.hpp>
 
+#include "core/try.hpp"
+
 namespace flyball {
 
 namespace {
@@ -11,20 +13,16 @@ using Eigen::MatrixXd;
 Expected<ContinuousSystem<>> biased(const ContinuousSystem<>& plant, const MatrixRef& B_bias,
                                     const MatrixRef& C_bias, double keep) {
   constexpr std::string_view where = "augment_bias";
-  if (auto checked = check_system(plant, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(plant, where));
   const Index n = plant.A.rows();
   const Index m = plant.B.cols();
   const Index p = plant.C.rows();
   const Index k = B_bias.cols();
-  if (auto checked =
-          check_all(check_shape(B_bias, n, k, where, "B_bias", "states x constants"),
-                    check_shape(C_bias, p, k, where, "C_bias", "outputs x constants"),
-                    check_finite(B_bias, where, "B_bias"), check_finite(C_bias, where, "C_bias"));
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(B_bias, n, k, "B_bias", "states x constants")
+                    .shape(C_bias, p, k, "C_bias", "outputs x constants")
+                    .finite(B_bias, "B_bias")
+                    .finite(C_bias, "C_bias"));
   ContinuousSystem<> augmented;
   augmented.A.resize(n + k, n + k);
   augmented.A << plant.A, B_bias, MatrixXd::Zero(k, n), keep * MatrixXd::Identity(k, k);
@@ -39,17 +37,13 @@ Expected<ContinuousSystem<>> biased(const ContinuousSystem<>& plant, const Matri
 Expected<ContinuousSystem<>> with_outputs(const ContinuousSystem<>& plant, const MatrixRef& C_more,
                                           const MatrixRef& D_more) {
   constexpr std::string_view where = "augment_output";
-  if (auto checked = check_system(plant, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(plant, where));
   const Index k = C_more.rows();
-  if (auto checked =
-          check_all(check_shape(C_more, k, plant.A.rows(), where, "C_more", "new outputs x states"),
-                    check_shape(D_more, k, plant.B.cols(), where, "D_more", "new outputs x inputs"),
-                    check_finite(C_more, where, "C_more"), check_finite(D_more, where, "D_more"));
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(C_more, k, plant.A.rows(), "C_more", "new outputs x states")
+                    .shape(D_more, k, plant.B.cols(), "D_more", "new outputs x inputs")
+                    .finite(C_more, "C_more")
+                    .finite(D_more, "D_more"));
   ContinuousSystem<> augmented{plant.A, plant.B, {}, {}};
   augmented.C.resize(plant.C.rows() + k, plant.A.rows());
   augmented.C << plant.C, C_more;
@@ -68,18 +62,14 @@ Expected<DiscreteSystem<>> timed(Expected<ContinuousSystem<>> augmented, Time pe
   if (!augmented) {
     return tl::unexpected(std::move(augmented).error());
   }
-  if (auto positive = check_positive(period.si(), where, "period", "s"); !positive) {
-    return tl::unexpected(std::move(positive).error());
-  }
+  FLYBALL_CHECK(check_positive(period.si(), where, "period", "s"));
   return DiscreteSystem<>{augmented->A, augmented->B, augmented->C, augmented->D, period};
 }
 
 }  // namespace
 
 Expected<ContinuousSystem<>> augment_integral(const ContinuousSystem<>& plant) {
-  if (auto checked = check_system(plant, "augment_integral"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(plant, "augment_integral"));
   const Index n = plant.A.rows();
   const Index m = plant.B.cols();
   const Index p = plant.C.rows();
@@ -113,12 +103,10 @@ Expected<ContinuousSystem<>> augment_integral_reference(const ContinuousSystem<>
 
 Expected<MatrixXd> augment_gain(const MatrixRef& K, const MatrixRef& K_I) {
   constexpr std::string_view where = "augment_gain";
-  if (auto checked =
-          check_all(check_shape(K_I, K.rows(), K_I.cols(), where, "K_I", "inputs x integrals"),
-                    check_finite(K, where, "K"), check_finite(K_I, where, "K_I"));
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(K_I, K.rows(), K_I.cols(), "K_I", "inputs x integrals")
+                    .finite(K, "K")
+                    .finite(K_I, "K_I"));
   MatrixXd gain(K.rows(), K.cols() + K_I.cols());
   gain << K, K_I;
   return gain;

@@ -7,6 +7,7 @@
 #include <flyball/math/equations/matrix_equation.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/dense_reduction.hpp"
 #include "systems/balance.hpp"
@@ -214,30 +215,21 @@ Expected<Verdict> analyze(const MatrixRef& A_given, const MatrixRef& B_given, Ti
 
 Expected<void> check_pair(const MatrixRef& A, const MatrixRef& B, Index rows, Index columns,
                           std::string_view name, std::string_view meaning, std::string_view where) {
-  if (auto square = check_square(A, where, "A"); !square) {
-    return square;
-  }
-  return check_all(check_shape(B, rows, columns, where, name, meaning), check_finite(A, where, "A"),
-                   check_finite(B, where, name));
+  FLYBALL_CHECK(check_square(A, where, "A"));
+  return Checks(where).shape(B, rows, columns, name, meaning).finite(A, "A").finite(B, name);
 }
 
 }  // namespace
 
 Expected<MatrixXd> controllability_matrix(const MatrixRef& A, const MatrixRef& B) {
-  if (auto checked =
-          check_pair(A, B, A.rows(), B.cols(), "B", "states x inputs", "controllability_matrix");
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(
+      check_pair(A, B, A.rows(), B.cols(), "B", "states x inputs", "controllability_matrix"));
   return krylov(A, B);
 }
 
 Expected<MatrixXd> observability_matrix(const MatrixRef& A, const MatrixRef& C) {
-  if (auto checked =
-          check_pair(A, C, C.rows(), A.rows(), "C", "outputs x states", "observability_matrix");
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(
+      check_pair(A, C, C.rows(), A.rows(), "C", "outputs x states", "observability_matrix"));
   const MatrixXd columns = krylov(A.transpose(), C.transpose());
   return MatrixXd(columns.transpose());
 }
@@ -245,10 +237,7 @@ Expected<MatrixXd> observability_matrix(const MatrixRef& A, const MatrixRef& C) 
 Expected<ControllabilityAnalysis> analyze_controllability(const MatrixRef& A, const MatrixRef& B,
                                                           TimeDomain domain) {
   constexpr std::string_view where = "analyze_controllability";
-  if (auto checked = check_pair(A, B, A.rows(), B.cols(), "B", "states x inputs", where);
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_pair(A, B, A.rows(), B.cols(), "B", "states x inputs", where));
   return analyze(A, B, domain, where).map([](Verdict&& verdict) {
     ControllabilityAnalysis analysis{std::move(verdict.reach)};
     analysis.controllable = analysis.rank == analysis.order;
@@ -260,10 +249,7 @@ Expected<ControllabilityAnalysis> analyze_controllability(const MatrixRef& A, co
 Expected<ObservabilityAnalysis> analyze_observability(const MatrixRef& A, const MatrixRef& C,
                                                       TimeDomain domain) {
   constexpr std::string_view where = "analyze_observability";
-  if (auto checked = check_pair(A, C, C.rows(), A.rows(), "C", "outputs x states", where);
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_pair(A, C, C.rows(), A.rows(), "C", "outputs x states", where));
   const MatrixXd A_transposed = A.transpose();
   const MatrixXd C_transposed = C.transpose();
   return analyze(A_transposed, C_transposed, domain, where).map([](Verdict&& verdict) {

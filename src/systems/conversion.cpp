@@ -13,6 +13,7 @@
 #include <flyball/math/exponential/matrix_function.hpp>
 #include <flyball/systems/discretize.hpp>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "systems/matched_poles.hpp"
 
@@ -90,11 +91,9 @@ double warped(double T, double omega) {
 
 Expected<void> check_arguments(Time period, ConversionMethod method, AngularVelocity prewarp,
                                std::string_view where) {
-  if (auto checked = check_all(check_positive(period.si(), where, "period", "s"),
-                               check_not_negative(prewarp.si(), where, "prewarp", "rad/s"));
-      !checked) {
-    return checked;
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .positive(period.si(), "period", "s")
+                    .not_negative(prewarp.si(), "prewarp", "rad/s"));
   if (prewarp.si() == 0.0) {
     return {};
   }
@@ -135,12 +134,9 @@ Expected<Holds> holds(const MatrixXd& A, const MatrixXd& B, double T) {
   block.topLeftCorner(n, n) = A * T;
   block.block(0, n, n, m) = (B * scale) * T;
   block.block(n, n + m, m, m).setIdentity();
-  auto exponential = expm(block);
-  if (!exponential) {
-    return tl::unexpected(std::move(exponential).error());
-  }
-  return Holds{exponential->topLeftCorner(n, n), exponential->block(0, n, n, m) / scale,
-               exponential->block(0, n + m, n, m) / scale};
+  FLYBALL_TRY(auto exponential, expm(block));
+  return Holds{exponential.topLeftCorner(n, n), exponential.block(0, n, n, m) / scale,
+               exponential.block(0, n + m, n, m) / scale};
 }
 
 /// A of the continuous system under zero- or first-order hold.
@@ -172,12 +168,8 @@ Expected<ConversionMethod> parse_conversion_method(std::string_view name) {
 Expected<DiscreteSystem<>> convert_to_discrete(const ContinuousSystem<>& system, Time period,
                                                ConversionMethod method, AngularVelocity prewarp) {
   constexpr std::string_view where = "discretize";
-  if (auto checked = check_system(system, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
-  if (auto checked = check_arguments(period, method, prewarp, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, where));
+  FLYBALL_CHECK(check_arguments(period, method, prewarp, where));
   const auto& [A, B, C, D] = system;
   const Index n = A.rows();
   const double T =
@@ -185,22 +177,16 @@ Expected<DiscreteSystem<>> convert_to_discrete(const ContinuousSystem<>& system,
   DiscreteSystem<> discrete{A, B, C, D, period};
   switch (method) {
     case ConversionMethod::zoh: {
-      auto held = discretize_zoh(A, B, period);
-      if (!held) {
-        return tl::unexpected(std::move(held).error());
-      }
-      discrete.A = std::move(held->A);
-      discrete.B = std::move(held->B);
+      FLYBALL_TRY(auto held, discretize_zoh(A, B, period));
+      discrete.A = std::move(held.A);
+      discrete.B = std::move(held.B);
       break;
     }
     case ConversionMethod::foh: {
-      const auto parts = holds(A, B, T);
-      if (!parts) {
-        return tl::unexpected(parts.error());
-      }
-      discrete.A = parts->A;
-      discrete.B = parts->one - parts->two + product(parts->A, parts->two);
-      discrete.D = D + product(C, parts->two);
+      FLYBALL_TRY(const auto parts, holds(A, B, T));
+      discrete.A = parts.A;
+      discrete.B = parts.one - parts.two + product(parts.A, parts.two);
+      discrete.D = D + product(C, parts.two);
       break;
     }
     case ConversionMethod::tustin:
@@ -208,9 +194,7 @@ Expected<DiscreteSystem<>> convert_to_discrete(const ContinuousSystem<>& system,
       // θ = 1/2 or 1: A_d = (I - θTA)⁻¹(I + (1 - θ)TA).
       const double theta = method == ConversionMethod::tustin ? 0.5 : 1.0;
       const Shifted shifted(A, 1.0, -theta * T);
-      if (auto checked = shifted.check(1.0 / (theta * T), where, to_string(method)); !checked) {
-        return tl::unexpected(std::move(checked).error());
-      }
+      FLYBALL_CHECK(shifted.check(1.0 / (theta * T), where, to_string(method)));
       discrete.A = shifted.solve(MatrixXd::Identity(n, n) + (1.0 - theta) * T * A);
       discrete.B = shifted.solve(T * B);
       discrete.C = shifted.solve_right(C);
@@ -231,12 +215,8 @@ Expected<ContinuousSystem<>> convert_to_continuous(const DiscreteSystem<>& syste
                                                    ConversionMethod method,
                                                    AngularVelocity prewarp) {
   constexpr std::string_view where = "undiscretize";
-  if (auto checked = check_system(system, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
-  if (auto checked = check_arguments(system.period, method, prewarp, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, where));
+  FLYBALL_CHECK(check_arguments(system.period, method, prewarp, where));
   const auto& [A, B, C, D, period] = system;
   const Index n = A.rows();
   const MatrixXd I = MatrixXd::Identity(n, n);
@@ -249,30 +229,22 @@ Expected<ContinuousSystem<>> convert_to_continuous(const DiscreteSystem<>& syste
       // In balanced units d, because φ₁ is inverted beside I.
       const Eigen::VectorXd d = detail::balance_of(A);
       const Eigen::VectorXd d_inverse = d.cwiseInverse();
-      const auto found = logarithm(d_inverse.asDiagonal() * A * d.asDiagonal(), T);
-      if (!found) {
-        return tl::unexpected(found.error());
-      }
-      continuous.A = d.asDiagonal() * *found * d_inverse.asDiagonal();
+      FLYBALL_TRY(const auto found, logarithm(d_inverse.asDiagonal() * A * d.asDiagonal(), T));
+      continuous.A = d.asDiagonal() * found * d_inverse.asDiagonal();
       // B_d = T φ₁(AT) B, or T φ₁(AT)² B: φ₁ - φ₂ + eˣφ₂ = φ₁². The principal logarithm keeps φ₁
       // regular.
-      const auto parts = holds(*found, I, T);
-      if (!parts) {
-        return tl::unexpected(parts.error());
-      }
-      MatrixXd balanced = detail::solve_linear(parts->one, d_inverse.asDiagonal() * B);
+      FLYBALL_TRY(const auto parts, holds(found, I, T));
+      MatrixXd balanced = detail::solve_linear(parts.one, d_inverse.asDiagonal() * B);
       if (method == ConversionMethod::foh) {
-        balanced = T * detail::solve_linear(parts->one, balanced);
-        continuous.D = D - product(C * d.asDiagonal(), product(parts->two, balanced));
+        balanced = T * detail::solve_linear(parts.one, balanced);
+        continuous.D = D - product(C * d.asDiagonal(), product(parts.two, balanced));
       }
       continuous.B = d.asDiagonal() * balanced;
       break;
     }
     case ConversionMethod::tustin: {
       const Shifted shifted(A, 1.0, 1.0);
-      if (auto checked = shifted.check(-1.0, where, "tustin"); !checked) {
-        return tl::unexpected(std::move(checked).error());
-      }
+      FLYBALL_CHECK(shifted.check(-1.0, where, "tustin"));
       continuous.A = (2.0 / T) * shifted.solve(A - I);
       continuous.B = (2.0 / T) * shifted.solve(B);
       continuous.C = 2.0 * shifted.solve_right(C);
@@ -285,9 +257,7 @@ Expected<ContinuousSystem<>> convert_to_continuous(const DiscreteSystem<>& syste
       break;
     case ConversionMethod::backward_euler: {
       const Shifted shifted(A, 0.0, 1.0);
-      if (auto checked = shifted.check(0.0, where, "backward-euler"); !checked) {
-        return tl::unexpected(std::move(checked).error());
-      }
+      FLYBALL_CHECK(shifted.check(0.0, where, "backward-euler"));
       continuous.A = shifted.solve(A - I) / T;
       continuous.B = shifted.solve(B) / T;
       continuous.C = shifted.solve_right(C);

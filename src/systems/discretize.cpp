@@ -5,23 +5,21 @@
 #include <flyball/math/exponential/matrix_exponential.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 #include "systems/quadratic_integral.hpp"
 
 namespace flyball {
 
 Expected<DiscretizedMatrices> discretize_zoh(const MatrixRef& A, const MatrixRef& B, Time period) {
   constexpr std::string_view where = "discretize";
-  if (auto square = check_square(A, where, "A"); !square) {
-    return tl::unexpected(square.error());
-  }
+  FLYBALL_CHECK(check_square(A, where, "A"));
   const Eigen::Index n = A.rows();
   const Eigen::Index m = B.cols();
-  if (auto checked = check_all(check_shape(B, n, m, where, "B", "states x inputs"),
-                               check_finite(A, where, "A"), check_finite(B, where, "B"),
-                               check_positive(period.si(), where, "period", "s"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(B, n, m, "B", "states x inputs")
+                    .finite(A, "A")
+                    .finite(B, "B")
+                    .positive(period.si(), "period", "s"));
   // exp([A B; 0 0] T) depends on the scale of B only through its upper right block, which is linear
   // in B: with B scaled to A's size, B cannot force squarings that A does not need.
   const double T = period.si();
@@ -33,31 +31,23 @@ Expected<DiscretizedMatrices> discretize_zoh(const MatrixRef& A, const MatrixRef
   Eigen::MatrixXd block = Eigen::MatrixXd::Zero(n + m, n + m);
   block.topLeftCorner(n, n) = A * T;
   block.topRightCorner(n, m) = (B * scale) * T;
-  auto exponential = expm(block);
-  if (!exponential) {
-    return tl::unexpected(exponential.error());
-  }
-  return DiscretizedMatrices{exponential->topLeftCorner(n, n),
-                             exponential->topRightCorner(n, m) / scale};
+  FLYBALL_TRY(auto exponential, expm(block));
+  return DiscretizedMatrices{exponential.topLeftCorner(n, n),
+                             exponential.topRightCorner(n, m) / scale};
 }
 
 Expected<Eigen::MatrixXd> discretize(const MatrixRef& A, const ProcessDensity& density,
                                      Time period) {
   constexpr std::string_view where = "discretize";
   const Eigen::MatrixXd& Q = density.Q;
-  if (auto square = check_square(A, where, "A"); !square) {
-    return tl::unexpected(square.error());
-  }
+  FLYBALL_CHECK(check_square(A, where, "A"));
   const Eigen::Index n = A.rows();
-  if (auto shape = check_shape(Q, n, n, where, "Q", "states x states"); !shape) {
-    return tl::unexpected(shape.error());
-  }
-  if (auto checked = check_all(check_finite(A, where, "A"), check_finite(Q, where, "Q"),
-                               check_symmetric(Q, where, "Q"),
-                               check_positive(period.si(), where, "period", "s"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(Q, n, n, "Q", "states x states")
+                    .finite(A, "A")
+                    .finite(Q, "Q")
+                    .symmetric(Q, "Q")
+                    .positive(period.si(), "period", "s"));
 
   const double T = period.si();
   auto Q_d = detail::quadratic_integral(A, Q, T);
@@ -78,14 +68,10 @@ Expected<Eigen::MatrixXd> discretize(const MatrixRef& A, const ProcessDensity& d
 
 Expected<Eigen::MatrixXd> discretize(const MeasurementDensity& density, Time period) {
   constexpr std::string_view where = "discretize";
-  if (auto symmetric = check_symmetric(density.R, where, "R"); !symmetric) {
-    return tl::unexpected(symmetric.error());
-  }
-  if (auto checked = check_all(check_finite(density.R, where, "R"),
-                               check_positive(period.si(), where, "period", "s"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .symmetric(density.R, "R")
+                    .finite(density.R, "R")
+                    .positive(period.si(), "period", "s"));
   return density.R / period.si();
 }
 

@@ -7,6 +7,7 @@
 
 #include <flyball/math/equations/matrix_equation.hpp>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/dense_reduction.hpp"
 #include "systems/balance.hpp"
@@ -48,9 +49,7 @@ Expected<void> check_stable(const MatrixRef& A, TimeDomain domain, std::string_v
 
 Expected<MatrixXd> gramian_factor(const MatrixRef& A, const MatrixRef& B, TimeDomain domain,
                                   std::string_view where) {
-  if (auto stable = check_stable(A, domain, where); !stable) {
-    return tl::unexpected(std::move(stable).error());
-  }
+  FLYBALL_CHECK(check_stable(A, domain, where));
   const Index n = A.rows();
   MatrixXd power = A;
   MatrixXd L = B;
@@ -102,15 +101,9 @@ Expected<GramianFactors> gramian_factors(const ContinuousSystem<>& system, TimeD
   const MatrixXd A = scaled_state_matrix(system.A, scaling);
   const MatrixXd B = scaling.states.cwiseInverse().asDiagonal() * system.B;
   const MatrixXd C = system.C * scaling.states.asDiagonal();
-  auto reach = gramian_factor(A, B, domain, where);
-  if (!reach) {
-    return tl::unexpected(std::move(reach).error());
-  }
-  auto sight = gramian_factor(A.transpose(), C.transpose(), domain, where);
-  if (!sight) {
-    return tl::unexpected(std::move(sight).error());
-  }
-  return GramianFactors{scaling.states, std::move(*reach), std::move(*sight)};
+  FLYBALL_TRY(auto reach, gramian_factor(A, B, domain, where));
+  FLYBALL_TRY(auto sight, gramian_factor(A.transpose(), C.transpose(), domain, where));
+  return GramianFactors{scaling.states, std::move(reach), std::move(sight)};
 }
 
 }  // namespace detail
@@ -121,27 +114,22 @@ using Eigen::MatrixXd;
 
 Expected<Gramian> gramian(const MatrixRef& A, const MatrixRef& B, TimeDomain domain) {
   const MatrixXd BB = detail::product_transposed(B, B);
-  auto solution = domain == TimeDomain::continuous ? lyapunov(A, BB) : discrete_lyapunov(A, BB);
-  if (!solution) {
-    return tl::unexpected(std::move(solution).error());
-  }
+  FLYBALL_TRY(auto solution,
+              domain == TimeDomain::continuous ? lyapunov(A, BB) : discrete_lyapunov(A, BB));
   Gramian found;
-  found.W = detail::symmetrized(solution->X);
+  found.W = detail::symmetrized(solution.X);
   found.eigenvalues = detail::symmetric_eigensystem_of(found.W).values;
   found.is_energy = detail::judged_eigenvalues(A, domain).stability == Stability::stable;
-  found.residual = solution->residual;
-  found.condition = solution->condition;
+  found.residual = solution.residual;
+  found.condition = solution.condition;
   return found;
 }
 
 Expected<void> check_gramian(const MatrixRef& A, const MatrixRef& B, Eigen::Index rows,
                              Eigen::Index columns, std::string_view name, std::string_view meaning,
                              std::string_view where) {
-  if (auto square = check_square(A, where, "A"); !square) {
-    return square;
-  }
-  return check_all(check_shape(B, rows, columns, where, name, meaning), check_finite(A, where, "A"),
-                   check_finite(B, where, name));
+  FLYBALL_CHECK(check_square(A, where, "A"));
+  return Checks(where).shape(B, rows, columns, name, meaning).finite(A, "A").finite(B, name);
 }
 
 Expected<Eigen::VectorXd> hankel(const ContinuousSystem<>& system, TimeDomain domain) {
@@ -156,34 +144,24 @@ Expected<Eigen::VectorXd> hankel(const ContinuousSystem<>& system, TimeDomain do
 
 Expected<Gramian> controllability_gramian(const MatrixRef& A, const MatrixRef& B,
                                           TimeDomain domain) {
-  if (auto checked = check_gramian(A, B, A.rows(), B.cols(), "B", "states x inputs",
-                                   "controllability_gramian");
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(
+      check_gramian(A, B, A.rows(), B.cols(), "B", "states x inputs", "controllability_gramian"));
   return gramian(A, B, domain);
 }
 
 Expected<Gramian> observability_gramian(const MatrixRef& A, const MatrixRef& C, TimeDomain domain) {
-  if (auto checked =
-          check_gramian(A, C, C.rows(), A.rows(), "C", "outputs x states", "observability_gramian");
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(
+      check_gramian(A, C, C.rows(), A.rows(), "C", "outputs x states", "observability_gramian"));
   return gramian(A.transpose(), C.transpose(), domain);
 }
 
 Expected<Eigen::VectorXd> hankel_singular_values(const ContinuousSystem<>& system) {
-  if (auto checked = check_system(system, "hankel_singular_values"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, "hankel_singular_values"));
   return hankel(system, TimeDomain::continuous);
 }
 
 Expected<Eigen::VectorXd> hankel_singular_values(const DiscreteSystem<>& system) {
-  if (auto checked = check_system(system, "hankel_singular_values"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, "hankel_singular_values"));
   return hankel({system.A, system.B, system.C, system.D}, TimeDomain::discrete);
 }
 

@@ -5,16 +5,15 @@
 #include <flyball/math/exponential/matrix_exponential.hpp>
 #include <flyball/systems/discretize.hpp>
 
+#include "core/try.hpp"
+
 namespace flyball {
 
 Expected<DelayedInputMatrices> discretize_delayed_input(const MatrixRef& A, const MatrixRef& B,
                                                         Time period, Time delay) {
   constexpr std::string_view where = "discretize_delayed_input";
-  if (auto checked = check_all(check_positive(period.si(), where, "period", "s"),
-                               check_not_negative(delay.si(), where, "delay", "s"));
-      !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(
+      Checks(where).positive(period.si(), "period", "s").not_negative(delay.si(), "delay", "s"));
   const double T = period.si();
   const double periods = delay.si() / T;
   constexpr double most_periods = 1e4;
@@ -39,23 +38,15 @@ Expected<DelayedInputMatrices> discretize_delayed_input(const MatrixRef& A, cons
                                   static_cast<int>(whole)};
     });
   }
-  auto newer = discretize_zoh(A, B, Time(T - f));
-  if (!newer) {
-    return tl::unexpected(newer.error());
-  }
-  auto older = discretize_zoh(A, B, Time(f));
-  if (!older) {
-    return tl::unexpected(older.error());
-  }
-  return DelayedInputMatrices{newer->A * older->A, newer->B, newer->A * older->B,
+  FLYBALL_TRY(auto newer, discretize_zoh(A, B, Time(T - f)));
+  FLYBALL_TRY(auto older, discretize_zoh(A, B, Time(f)));
+  return DelayedInputMatrices{newer.A * older.A, newer.B, newer.A * older.B,
                               static_cast<int>(whole)};
 }
 
 Expected<DiscreteSystem<>> discretize_with_input_delay(const ContinuousSystem<>& system,
                                                        Time period, Time delay) {
-  if (auto checked = check_system(system, "discretize_with_input_delay"); !checked) {
-    return tl::unexpected(checked.error());
-  }
+  FLYBALL_CHECK(check_system(system, "discretize_with_input_delay"));
   auto discrete = discretize_delayed_input(system.A, system.B, period, delay);
   if (!discrete) {
     return tl::unexpected(discrete.error());

@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "systems/balance.hpp"
 
@@ -49,14 +50,9 @@ Expected<void> check_count(Index got, Index expected, std::string_view where,
 
 Expected<Continuous> connect_series(const Continuous& first, const Continuous& second) {
   constexpr std::string_view where = "series";
-  if (auto checked = check_both(first, second, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
-  if (auto fits = check_count(second.B.cols(), first.C.rows(), where,
-                              "the number of the second system's inputs", "the first's outputs");
-      !fits) {
-    return tl::unexpected(std::move(fits).error());
-  }
+  FLYBALL_CHECK(check_both(first, second, where));
+  FLYBALL_CHECK(check_count(second.B.cols(), first.C.rows(), where,
+                            "the number of the second system's inputs", "the first's outputs"));
   const Index n = first.A.rows();
   const Index k = second.A.rows();
   Continuous both;
@@ -72,19 +68,11 @@ Expected<Continuous> connect_series(const Continuous& first, const Continuous& s
 
 Expected<Continuous> connect_parallel(const Continuous& first, const Continuous& second) {
   constexpr std::string_view where = "parallel";
-  if (auto checked = check_both(first, second, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
-  if (auto fits = check_count(second.B.cols(), first.B.cols(), where,
-                              "the number of the second system's inputs", "as the first has");
-      !fits) {
-    return tl::unexpected(std::move(fits).error());
-  }
-  if (auto fits = check_count(second.C.rows(), first.C.rows(), where,
-                              "the number of the second system's outputs", "as the first has");
-      !fits) {
-    return tl::unexpected(std::move(fits).error());
-  }
+  FLYBALL_CHECK(check_both(first, second, where));
+  FLYBALL_CHECK(check_count(second.B.cols(), first.B.cols(), where,
+                            "the number of the second system's inputs", "as the first has"));
+  FLYBALL_CHECK(check_count(second.C.rows(), first.C.rows(), where,
+                            "the number of the second system's outputs", "as the first has"));
   Continuous both;
   both.A = diagonal(first.A, second.A);
   both.B.resize(both.A.rows(), first.B.cols());
@@ -96,9 +84,7 @@ Expected<Continuous> connect_parallel(const Continuous& first, const Continuous&
 }
 
 Expected<Continuous> connect_append(const Continuous& first, const Continuous& second) {
-  if (auto checked = check_both(first, second, "append"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_both(first, second, "append"));
   return Continuous{diagonal(first.A, second.A), diagonal(first.B, second.B),
                     diagonal(first.C, second.C), diagonal(first.D, second.D)};
 }
@@ -106,16 +92,10 @@ Expected<Continuous> connect_append(const Continuous& first, const Continuous& s
 Expected<Continuous> connect_feedback(const Continuous& forward, const Continuous& back,
                                       FeedbackSign sign) {
   constexpr std::string_view where = "feedback";
-  if (auto fits = check_count(back.B.cols(), forward.C.rows(), where,
-                              "the number of the feedback path's inputs", "the forward's outputs");
-      !fits) {
-    return tl::unexpected(std::move(fits).error());
-  }
-  if (auto fits = check_count(back.C.rows(), forward.B.cols(), where,
-                              "the number of the feedback path's outputs", "the forward's inputs");
-      !fits) {
-    return tl::unexpected(std::move(fits).error());
-  }
+  FLYBALL_CHECK(check_count(back.B.cols(), forward.C.rows(), where,
+                            "the number of the feedback path's inputs", "the forward's outputs"));
+  FLYBALL_CHECK(check_count(back.C.rows(), forward.B.cols(), where,
+                            "the number of the feedback path's outputs", "the forward's inputs"));
   const double s = sign == FeedbackSign::negative ? 1.0 : -1.0;
   const Index n = forward.A.rows();
   const Index k = back.A.rows();
@@ -155,9 +135,7 @@ template <class Connect>
 Expected<Discrete> discrete(const Discrete& first, const Discrete& second, std::string_view where,
                             Connect&& connect) {
   for (const Discrete* system : {&first, &second}) {
-    if (auto checked = check_system(*system, where); !checked) {
-      return tl::unexpected(std::move(checked).error());
-    }
+    FLYBALL_CHECK(check_system(*system, where));
   }
   const double T = first.period.si();
   if (!(std::abs(second.period.si() - T) <= 1e-12 * T)) {
@@ -175,33 +153,22 @@ Expected<Discrete> discrete(const Discrete& first, const Discrete& second, std::
 
 Expected<Continuous> checked_feedback(const Continuous& forward, const Continuous& back,
                                       FeedbackSign sign) {
-  if (auto checked = check_both(forward, back, "feedback"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_both(forward, back, "feedback"));
   return connect_feedback(forward, back, sign);
 }
 
 Expected<Continuous> unity_feedback(const Continuous& forward, FeedbackSign sign) {
-  if (auto checked = check_system(forward, "feedback"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(forward, "feedback"));
   const Index p = forward.C.rows();
-  if (auto fits = check_count(p, forward.B.cols(), "feedback", "the number of outputs",
-                              "as there are inputs");
-      !fits) {
-    return tl::unexpected(std::move(fits).error());
-  }
+  FLYBALL_CHECK(
+      check_count(p, forward.B.cols(), "feedback", "the number of outputs", "as there are inputs"));
   return connect_feedback(
       forward, {MatrixXd(0, 0), MatrixXd(0, p), MatrixXd(p, 0), MatrixXd::Identity(p, p)}, sign);
 }
 
 Expected<Eigen::MatrixXcd> evaluate(const Continuous& system, std::complex<double> point) {
   constexpr std::string_view where = "transfer_at";
-  if (auto checked = check_all(check_finite(point.real(), where, "the point"),
-                               check_finite(point.imag(), where, "the point"));
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(Checks(where).finite(point.real(), "the point").finite(point.imag(), "the point"));
   const detail::SystemScaling scaling = detail::scaling_of(system.A, system.B, system.C);
   Eigen::MatrixXcd shifted =
       -detail::scaled_state_matrix(system.A, scaling).cast<std::complex<double>>();
@@ -259,24 +226,18 @@ Expected<Continuous> feedback(const Continuous& forward, FeedbackSign sign) {
   return unity_feedback(forward, sign);
 }
 Expected<Discrete> feedback(const Discrete& forward, FeedbackSign sign) {
-  if (auto checked = check_system(forward, "feedback"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(forward, "feedback"));
   return unity_feedback(bare(forward), sign).map([&](const Continuous& loop) {
     return Discrete{loop.A, loop.B, loop.C, loop.D, forward.period};
   });
 }
 
 Expected<Eigen::MatrixXcd> transfer_at(const Continuous& system, std::complex<double> s) {
-  if (auto checked = check_system(system, "transfer_at"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, "transfer_at"));
   return evaluate(system, s);
 }
 Expected<Eigen::MatrixXcd> transfer_at(const Discrete& system, std::complex<double> z) {
-  if (auto checked = check_system(system, "transfer_at"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, "transfer_at"));
   return evaluate(bare(system), z);
 }
 

@@ -8,6 +8,7 @@
 #include <flyball/core/text.hpp>
 #include <flyball/systems/system_error.hpp>
 
+#include "core/try.hpp"
 #include "systems/matched_poles.hpp"
 #include "systems/zero_pole_gain.hpp"
 
@@ -51,9 +52,7 @@ Complex phi(Complex x) {
 
 Expected<DiscreteSystem<>> match_to_discrete(const ContinuousSystem<>& system, Time period) {
   constexpr std::string_view where = "discretize";
-  if (auto single = check_single(system.D, where); !single) {
-    return tl::unexpected(std::move(single).error());
-  }
+  FLYBALL_CHECK(check_single(system.D, where));
   const auto zpk = zero_pole_gain(system);
   if (!zpk) {
     return tl::unexpected(Error(SystemError::zero_transfer)
@@ -97,9 +96,7 @@ Expected<DiscreteSystem<>> match_to_discrete(const ContinuousSystem<>& system, T
 
 Expected<ContinuousSystem<>> match_to_continuous(const DiscreteSystem<>& system) {
   constexpr std::string_view where = "undiscretize";
-  if (auto single = check_single(system.D, where); !single) {
-    return tl::unexpected(std::move(single).error());
-  }
+  FLYBALL_CHECK(check_single(system.D, where));
   auto zpk = zero_pole_gain({system.A, system.B, system.C, system.D});
   if (!zpk) {
     return tl::unexpected(
@@ -137,12 +134,8 @@ Expected<ContinuousSystem<>> match_to_continuous(const DiscreteSystem<>& system)
     }
     return {};
   };
-  if (auto mapped = map(zpk->poles, image.poles, "pole", true); !mapped) {
-    return tl::unexpected(std::move(mapped).error());
-  }
-  if (auto mapped = map(zeros, image.zeros, "zero", false); !mapped) {
-    return tl::unexpected(std::move(mapped).error());
-  }
+  FLYBALL_CHECK(map(zpk->poles, image.poles, "pole", true));
+  FLYBALL_CHECK(map(zeros, image.zeros, "zero", false));
   image.gain = gain.real();
   ContinuousSystem<> continuous = series_of_sections(image);
   return check_system(continuous, where).map([&] { return continuous; });

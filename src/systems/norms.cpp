@@ -8,6 +8,7 @@
 
 #include <flyball/systems/conversion.hpp>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/dense_reduction.hpp"
 #include "systems/balance.hpp"
@@ -283,11 +284,8 @@ Expected<HInfinityNorm> largest_gain(const ContinuousSystem<>& system, std::stri
 
 Expected<double> root_of_power(const ContinuousSystem<>& system, TimeDomain domain) {
   const ContinuousSystem<> s = scaled(system);
-  auto L = detail::gramian_factor(s.A, s.B, domain, "h2_norm");
-  if (!L) {
-    return tl::unexpected(std::move(L).error());
-  }
-  const double energy = product(s.C, *L).norm();
+  FLYBALL_TRY(auto L, detail::gramian_factor(s.A, s.B, domain, "h2_norm"));
+  const double energy = product(s.C, L).norm();
   return domain == TimeDomain::continuous ? energy : std::hypot(energy, system.D.norm());
 }
 
@@ -295,9 +293,7 @@ Expected<double> root_of_power(const ContinuousSystem<>& system, TimeDomain doma
 
 Expected<double> h2_norm(const ContinuousSystem<>& system) {
   constexpr std::string_view where = "h2_norm";
-  if (auto checked = check_system(system, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, where));
   if (!system.D.isZero(0.0)) {
     return tl::unexpected(Error(SystemError::infinite_norm)
                               .in(std::string(where))
@@ -310,38 +306,26 @@ Expected<double> h2_norm(const ContinuousSystem<>& system) {
 }
 
 Expected<double> h2_norm(const DiscreteSystem<>& system) {
-  if (auto checked = check_system(system, "h2_norm"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, "h2_norm"));
   return root_of_power({system.A, system.B, system.C, system.D}, TimeDomain::discrete);
 }
 
 Expected<HInfinityNorm> h_infinity_norm(const ContinuousSystem<>& system) {
   constexpr std::string_view where = "h_infinity_norm";
-  if (auto checked = check_system(system, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
-  if (auto stable = detail::check_stable(system.A, TimeDomain::continuous, where); !stable) {
-    return tl::unexpected(std::move(stable).error());
-  }
+  FLYBALL_CHECK(check_system(system, where));
+  FLYBALL_CHECK(detail::check_stable(system.A, TimeDomain::continuous, where));
   return largest_gain(scaled(system), where);
 }
 
 Expected<HInfinityNorm> h_infinity_norm(const DiscreteSystem<>& system) {
   constexpr std::string_view where = "h_infinity_norm";
-  if (auto checked = check_system(system, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
-  if (auto stable = detail::check_stable(system.A, TimeDomain::discrete, where); !stable) {
-    return tl::unexpected(std::move(stable).error());
-  }
+  FLYBALL_CHECK(check_system(system, where));
+  FLYBALL_CHECK(detail::check_stable(system.A, TimeDomain::discrete, where));
   // With T = 2, s = (z - 1)/(z + 1) = j tan(ωT/2).
-  auto mapped = convert_to_continuous({system.A, system.B, system.C, system.D, Time(2.0)},
-                                      ConversionMethod::tustin);
-  if (!mapped) {
-    return tl::unexpected(std::move(mapped).error());
-  }
-  auto norm = largest_gain(scaled(*mapped), where);
+  FLYBALL_TRY(auto mapped,
+              convert_to_continuous({system.A, system.B, system.C, system.D, Time(2.0)},
+                                    ConversionMethod::tustin));
+  auto norm = largest_gain(scaled(mapped), where);
   if (norm) {
     norm->frequency = 2.0 * std::atan(norm->frequency) / system.period.si();
   }

@@ -2,6 +2,7 @@
 
 #include <flyball/math/exponential/matrix_exponential.hpp>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "systems/quadratic_integral.hpp"
 
@@ -26,14 +27,11 @@ Expected<MatrixXd> quadratic_integral(const MatrixRef& F, const MatrixRef& W, do
     term = (h / j) * (once + once.transpose());
     sum += term;
   }
-  auto Phi = expm(G * h);
-  if (!Phi) {
-    return tl::unexpected(std::move(Phi).error());
-  }
+  FLYBALL_TRY(auto Phi, expm(G * h));
   for (int k = 0; k < doublings; ++k) {
-    sum += product_transposed(product(*Phi, sum), *Phi);
+    sum += product_transposed(product(Phi, sum), Phi);
     sum = symmetrized(sum);
-    *Phi = product(*Phi, *Phi);
+    Phi = product(Phi, Phi);
   }
   return MatrixXd(d.asDiagonal() * sum * d.asDiagonal());
 }

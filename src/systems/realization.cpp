@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "systems/balance.hpp"
 #include "systems/gramian_factor.hpp"
@@ -33,11 +34,7 @@ Discrete timed(const Continuous& s, Time period) {
 Expected<Continuous> transform(const Continuous& system, const MatrixRef& T) {
   constexpr std::string_view where = "similarity_transform";
   const Index n = system.A.rows();
-  if (auto checked = check_all(check_shape(T, n, n, where, "T", "states x states"),
-                               check_finite(T, where, "T"));
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(Checks(where).shape(T, n, n, "T", "states x states").finite(T, "T"));
   // Rows and columns of T are units, old and new; they do not make it singular.
   Eigen::VectorXd rows(n);
   Eigen::VectorXd columns(n);
@@ -140,9 +137,7 @@ Expected<Continuous> companion(const Continuous& given, SystemError failure,
     form.C.col(k) *= size_B * unit / rate;
   }
   form.B(n - 1, 0) = 1.0;
-  if (auto checked = check_system(form, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(form, where));
   return form;
 }
 
@@ -153,17 +148,12 @@ Continuous dual(const Continuous& s) {
 template <class System>
 Expected<BalancedRealization<Continuous>> truncate(const System& given, TimeDomain domain,
                                                    Index order, bool all, std::string_view where) {
-  if (auto checked = check_system(given, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(given, where));
   const Continuous system{given.A, given.B, given.C, given.D};
   const Index n = system.A.rows();
-  auto factors = detail::gramian_factors(system, domain, where);
-  if (!factors) {
-    return tl::unexpected(std::move(factors).error());
-  }
+  FLYBALL_TRY(auto factors, detail::gramian_factors(system, domain, where));
   const detail::SingularValues svd =
-      detail::svd_of(detail::transposed_product(factors->observability, factors->controllability));
+      detail::svd_of(detail::transposed_product(factors.observability, factors.controllability));
   const double floor = static_cast<double>(n) * epsilon * svd.values(0);
   const Index present = (svd.values.array() > floor).count();
   if (all && present < n) {
@@ -188,11 +178,11 @@ Expected<BalancedRealization<Continuous>> truncate(const System& given, TimeDoma
   // x = L_c V σ^{-1/2} x', x' = σ^{-1/2} Uᵀ L_oᵀ x.
   const Eigen::VectorXd root = svd.values.head(r).cwiseSqrt().cwiseInverse();
   BalancedRealization<Continuous> found;
-  found.T = factors->states.asDiagonal() * product(factors->controllability, svd.V.leftCols(r)) *
+  found.T = factors.states.asDiagonal() * product(factors.controllability, svd.V.leftCols(r)) *
             root.asDiagonal();
   found.T_inverse = root.asDiagonal() *
-                    product(svd.U.leftCols(r).transpose(), factors->observability.transpose()) *
-                    factors->states.cwiseInverse().asDiagonal();
+                    product(svd.U.leftCols(r).transpose(), factors.observability.transpose()) *
+                    factors.states.cwiseInverse().asDiagonal();
   found.hankel = svd.values;
   found.error_bound = 2.0 * svd.values.tail(n - r).sum();
   found.system = {product(found.T_inverse, product(system.A, found.T)),
@@ -210,9 +200,7 @@ Expected<BalancedRealization<Discrete>> timed(Expected<BalancedRealization<Conti
 
 Expected<MinimalRealization<Continuous>> minimal(const Continuous& system, double tolerance) {
   constexpr std::string_view where = "minimal_realization";
-  if (auto checked = check_not_negative(tolerance, where, "tolerance"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_not_negative(tolerance, where, "tolerance"));
   if (tolerance >= 1.0) {
     return tl::unexpected(Error(ArgumentError::out_of_range)
                               .in(std::string(where))
@@ -253,15 +241,11 @@ Expected<MinimalRealization<Continuous>> minimal(const Continuous& system, doubl
 }  // namespace
 
 Expected<Continuous> similarity_transform(const Continuous& system, const MatrixRef& T) {
-  if (auto checked = check_system(system, "similarity_transform"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, "similarity_transform"));
   return transform(system, T);
 }
 Expected<Discrete> similarity_transform(const Discrete& system, const MatrixRef& T) {
-  if (auto checked = check_system(system, "similarity_transform"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, "similarity_transform"));
   return transform(bare(system), T).map([&](const Continuous& s) {
     return timed(s, system.period);
   });
@@ -269,34 +253,26 @@ Expected<Discrete> similarity_transform(const Discrete& system, const MatrixRef&
 
 Expected<Continuous> controllable_canonical_form(const Continuous& system) {
   constexpr std::string_view where = "controllable_canonical_form";
-  if (auto checked = check_system(system, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, where));
   return companion(system, SystemError::not_controllable, where);
 }
 Expected<Discrete> controllable_canonical_form(const Discrete& system) {
   constexpr std::string_view where = "controllable_canonical_form";
-  if (auto checked = check_system(system, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, where));
   return companion(bare(system), SystemError::not_controllable, where)
       .map([&](const Continuous& s) { return timed(s, system.period); });
 }
 
 Expected<Continuous> observable_canonical_form(const Continuous& system) {
   constexpr std::string_view where = "observable_canonical_form";
-  if (auto checked = check_system(system, where); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, where));
   if (system.C.rows() == 0) {
     return tl::unexpected(Error(SystemError::not_observable).in(std::string(where)));
   }
   return companion(dual(system), SystemError::not_observable, where).map(dual);
 }
 Expected<Discrete> observable_canonical_form(const Discrete& system) {
-  if (auto checked = check_system(system, "observable_canonical_form"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, "observable_canonical_form"));
   return observable_canonical_form(bare(system)).map([&](const Continuous& s) {
     return timed(s, system.period);
   });
@@ -321,16 +297,12 @@ Expected<BalancedRealization<Discrete>> balanced_truncation(const Discrete& syst
 
 Expected<MinimalRealization<Continuous>> minimal_realization(const Continuous& system,
                                                              double tolerance) {
-  if (auto checked = check_system(system, "minimal_realization"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, "minimal_realization"));
   return minimal(system, tolerance);
 }
 Expected<MinimalRealization<Discrete>> minimal_realization(const Discrete& system,
                                                            double tolerance) {
-  if (auto checked = check_system(system, "minimal_realization"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_system(system, "minimal_realization"));
   return minimal(bare(system), tolerance).map([&](MinimalRealization<Continuous>&& s) {
     return MinimalRealization<Discrete>{timed(s.system, system.period), s.unreached, s.unseen,
                                         std::move(s.T)};

@@ -4,6 +4,7 @@
 
 #include <flyball/systems/discretize.hpp>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "systems/quadratic_integral.hpp"
 
@@ -15,29 +16,23 @@ using Eigen::MatrixXd;
 Expected<SampledCost> sampled_cost(const MatrixRef& A, const MatrixRef& B, const MatrixRef& Q,
                                    const MatrixRef& R, const MatrixRef& N, Time period) {
   constexpr std::string_view where = "sampled_cost";
-  if (auto square = check_square(A, where, "A"); !square) {
-    return tl::unexpected(std::move(square).error());
-  }
+  FLYBALL_CHECK(check_square(A, where, "A"));
   const Index n = A.rows();
   const Index m = B.cols();
-  if (auto shapes = check_all(
-          check_shape(B, n, m, where, "B", "states x inputs"),
-          check_shape(Q, n, n, where, "Q", "states x states"),
-          check_shape(R, m, m, where, "R", "inputs x inputs"),
-          check_shape(N, n, m, where, "N", "states x inputs"), check_finite(A, where, "A"),
-          check_finite(B, where, "B"), check_finite(Q, where, "Q"), check_finite(R, where, "R"),
-          check_finite(N, where, "N"), check_positive(period.si(), where, "period", "s"));
-      !shapes) {
-    return tl::unexpected(std::move(shapes).error());
-  }
-  if (auto symmetric = check_all(check_symmetric(Q, where, "Q"), check_symmetric(R, where, "R"));
-      !symmetric) {
-    return tl::unexpected(std::move(symmetric).error());
-  }
-  auto held = discretize_zoh(A, B, period);
-  if (!held) {
-    return tl::unexpected(std::move(held).error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(B, n, m, "B", "states x inputs")
+                    .shape(Q, n, n, "Q", "states x states")
+                    .shape(R, m, m, "R", "inputs x inputs")
+                    .shape(N, n, m, "N", "states x inputs")
+                    .finite(A, "A")
+                    .finite(B, "B")
+                    .finite(Q, "Q")
+                    .finite(R, "R")
+                    .finite(N, "N")
+                    .positive(period.si(), "period", "s")
+                    .symmetric(Q, "Q")
+                    .symmetric(R, "R"));
+  FLYBALL_TRY(auto held, discretize_zoh(A, B, period));
   // Fᵀ of F = [A B; 0 0], with u in a unit in which B is of A's size.
   const double T = period.si();
   const double size_B = detail::norm1(B);
@@ -59,7 +54,7 @@ Expected<SampledCost> sampled_cost(const MatrixRef& A, const MatrixRef& B, const
                               .got("too large for a double")
                               .hint("shorten the period"));
   }
-  return SampledCost{std::move(held->A), std::move(held->B), integral->topLeftCorner(n, n),
+  return SampledCost{std::move(held.A), std::move(held.B), integral->topLeftCorner(n, n),
                      integral->bottomRightCorner(m, m) / (unit * unit),
                      integral->topRightCorner(n, m) / unit};
 }

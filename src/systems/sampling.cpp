@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include "core/try.hpp"
+
 namespace flyball {
 
 namespace {
@@ -14,14 +16,14 @@ constexpr double pi = std::numbers::pi;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 Expected<void> check(double frequency, Time period, std::string_view where) {
-  return check_all(check_positive(period.si(), where, "period", "s"),
-                   check_finite(frequency, where, "frequency"));
+  return Checks(where).positive(period.si(), "period", "s").finite(frequency, "frequency");
 }
 
 Expected<void> check(Complex pole, Time period, std::string_view where) {
-  return check_all(check_positive(period.si(), where, "period", "s"),
-                   check_finite(pole.real(), where, "pole"),
-                   check_finite(pole.imag(), where, "pole"));
+  return Checks(where)
+      .positive(period.si(), "period", "s")
+      .finite(pole.real(), "pole")
+      .finite(pole.imag(), "pole");
 }
 
 }  // namespace
@@ -40,8 +42,9 @@ Expected<double> alias_frequency(double frequency, Time period) {
 
 Expected<double> sample_delay_phase_loss(double frequency, Time period) {
   constexpr std::string_view where = "sample_delay_phase_loss";
-  return check_all(check_positive(period.si(), where, "period", "s"),
-                   check_not_negative(frequency, where, "frequency", "rad/s"))
+  return Checks(where)
+      .positive(period.si(), "period", "s")
+      .not_negative(frequency, "frequency", "rad/s")
       .map([&] { return 0.5 * frequency * period.si(); });
 }
 
@@ -58,31 +61,26 @@ Expected<Complex> continuous_pole(Complex z, Time period) {
 Expected<SamplingAnalysis> analyze_sampling(const ContinuousSystem<>& plant, Time period,
                                             double crossover) {
   constexpr std::string_view where = "analyze_sampling";
-  if (auto checked =
-          check_all(check_system(plant, where), check_positive(period.si(), where, "period", "s"),
-                    check_not_negative(crossover, where, "crossover", "rad/s"));
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
-  const auto found = poles(plant);
-  if (!found) {
-    return tl::unexpected(found.error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .also([&] { return check_system(plant, where); })
+                    .positive(period.si(), "period", "s")
+                    .not_negative(crossover, "crossover", "rad/s"));
+  FLYBALL_TRY(const auto found, poles(plant));
   const double T = period.si();
   SamplingAnalysis analysis;
   analysis.nyquist_frequency = pi / T;
-  analysis.fastest_frequency = found->imag().cwiseAbs().maxCoeff();
-  analysis.fastest_rate = found->cwiseAbs().maxCoeff();
+  analysis.fastest_frequency = found.imag().cwiseAbs().maxCoeff();
+  analysis.fastest_rate = found.cwiseAbs().maxCoeff();
   analysis.samples_per_radian = 1.0 / (T * analysis.fastest_rate);
   analysis.sample_delay = 0.5 * T;
   analysis.phase_loss = 0.5 * crossover * T;
   analysis.aliases = analysis.fastest_frequency >= analysis.nyquist_frequency * (1.0 - 1e-12);
   constexpr double close = 1e-9;
-  for (Eigen::Index i = 0; i < found->size(); ++i) {
+  for (Eigen::Index i = 0; i < found.size(); ++i) {
     for (Eigen::Index j = 0; j < i; ++j) {
-      const Complex difference = (*found)(i) - (*found)(j);
+      const Complex difference = found(i) - found(j);
       const double turns = difference.imag() * T / (2.0 * pi);
-      const double size = std::max(std::abs((*found)(i)), std::abs((*found)(j)));
+      const double size = std::max(std::abs(found(i)), std::abs(found(j)));
       analysis.loses_controllability =
           analysis.loses_controllability ||
           (std::abs(difference.real()) <= close * size && std::abs(std::round(turns)) >= 1.0 &&

@@ -3,21 +3,18 @@
 #include <complex>
 #include <string>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball {
 
 Expected<void> check_system(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
                             const MatrixRef& D, std::string_view where) {
-  if (auto square = check_square(A, where, "A"); !square) {
-    return square;
-  }
+  FLYBALL_CHECK(check_square(A, where, "A"));
   const Eigen::Index n = A.rows();
   const Eigen::Index m = B.cols();
   const Eigen::Index p = C.rows();
-  if (auto shape = check_shape(B, n, m, where, "B", "states x inputs"); !shape) {
-    return shape;
-  }
+  FLYBALL_CHECK(check_shape(B, n, m, where, "B", "states x inputs"));
   if (m == 0) {
     return tl::unexpected(Error(ArgumentError::empty)
                               .in(std::string(where))
@@ -25,28 +22,18 @@ Expected<void> check_system(const MatrixRef& A, const MatrixRef& B, const Matrix
                               .got("without columns")
                               .expected("states x inputs with at least one input"));
   }
-  if (auto shape = check_shape(C, p, n, where, "C", "outputs x states"); !shape) {
-    return shape;
-  }
-  if (auto shape = check_shape(D, p, m, where, "D", "outputs x inputs"); !shape) {
-    return shape;
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .shape(C, p, n, "C", "outputs x states")
+                    .shape(D, p, m, "D", "outputs x inputs"));
   for (const auto& [matrix, name] :
        {std::pair<const MatrixRef&, const char*>{A, "A"}, {B, "B"}, {C, "C"}, {D, "D"}}) {
-    if (auto finite = check_finite(matrix, where, name); !finite) {
-      return finite;
-    }
+    FLYBALL_CHECK(check_finite(matrix, where, name));
   }
   return {};
 }
 
 Expected<Eigen::VectorXcd> poles(const MatrixRef& A) {
-  if (auto square = check_square(A, "poles", "A"); !square) {
-    return tl::unexpected(square.error());
-  }
-  if (auto finite = check_finite(A, "poles", "A"); !finite) {
-    return tl::unexpected(finite.error());
-  }
+  FLYBALL_CHECK(Checks("poles").square(A, "A").finite(A, "A"));
   Eigen::VectorXcd eigenvalues = detail::eigenvalues_of(A);
   if (!eigenvalues.allFinite()) {
     return tl::unexpected(Error(ArgumentError::malformed)

@@ -109,14 +109,44 @@ TEST(CheckNotNegative, AcceptsZero) {
   EXPECT_TRUE(check_not_negative(nan, "f", "delay").error().is(ArgumentError::not_finite));
 }
 
-TEST(CheckAll, AnswersTheFirstError) {
-  EXPECT_TRUE(check_all().has_value());
-  EXPECT_TRUE(check_all(check_finite(1.0, "f", "a"), check_positive(1.0, "f", "b")).has_value());
-  const auto result = check_all(check_finite(1.0, "f", "a"), check_positive(0.0, "f", "b"),
-                                check_finite(nan, "f", "c"));
+TEST(CheckWithin, HoldsTheBounds) {
+  EXPECT_TRUE(check_within(1.0, 1.0, 2.0, "f", "share").has_value());
+  EXPECT_TRUE(check_within(2.0, 1.0, 2.0, "f", "share").has_value());
+  expect_error(check_within(2.5, 1.0, 2.0, "f", "rate", "V/s"), ArgumentError::out_of_range,
+               "f: rate is 2.5 V/s; it must be in [1, 2]");
+  EXPECT_TRUE(check_within(nan, 1.0, 2.0, "f", "share").error().is(ArgumentError::not_finite));
+}
+
+TEST(Checks, AnswerTheFirstErrorAndMakeNoCheckAfterIt) {
+  EXPECT_TRUE(Checks("f"));
+  EXPECT_TRUE(Checks("f").finite(1.0, "a").positive(1.0, "b"));
+  int made = 0;
+  const auto count = [&] {
+    ++made;
+    return Expected<void>{};
+  };
+  const Expected<void> result = Checks("f")
+                                    .finite(1.0, "a")
+                                    .also(count)
+                                    .positive(0.0, "b", "kg")
+                                    .also(count)
+                                    .finite(nan, "c");
   ASSERT_FALSE(result.has_value());
-  EXPECT_TRUE(result.error().is(ArgumentError::not_positive));
-  EXPECT_EQ(result.error().subject(), "b");
+  EXPECT_EQ(to_string(result.error()), "f: b is 0 kg; it must be greater than zero");
+  EXPECT_EQ(made, 1);
+}
+
+TEST(Checks, EachChecksWhatItsNameSays) {
+  const Eigen::MatrixXd A = Eigen::MatrixXd::Ones(2, 3);
+  const Eigen::MatrixXd S{{1.0, 2.0}, {3.0, 4.0}};
+  EXPECT_TRUE(Checks("f").square(A, "A").error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(Checks("f").shape(A, 2, 2, "A").error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(Checks("f").finite(A * nan, "A").error().is(ArgumentError::not_finite));
+  EXPECT_TRUE(Checks("f").symmetric(S, "S").error().is(ArgumentError::not_symmetric));
+  EXPECT_TRUE(Checks("f").not_negative(-1.0, "x").error().is(ArgumentError::out_of_range));
+  EXPECT_TRUE(Checks("f").within(3.0, 0.0, 1.0, "x").error().is(ArgumentError::out_of_range));
+  EXPECT_EQ(Checks("f").square(S, "S").map([] { return 3; }).value(), 3);
+  EXPECT_FALSE(Checks("f").square(A, "A").map([] { return 3; }).has_value());
 }
 
 TEST(FormatNumber, KeepsTheDigitsAskedFor) {

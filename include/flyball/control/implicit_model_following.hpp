@@ -42,14 +42,16 @@ template <int States, int Inputs, int Outputs, int Outputs2>
 [[nodiscard]] Expected<ImplicitModel> implicit_model_following(
     const DiscreteSystem<States, Inputs, Outputs>& plant,
     const DiscreteSystem<States, Inputs, Outputs2>& reference, const Weight& Q, const Weight& R) {
-  if (auto checked = check_all(check_system(plant, "implicit_model_following"),
-                               check_system(reference, "implicit_model_following"));
-      !checked) {
-    return tl::unexpected(checked.error());
+  constexpr std::string_view where = "implicit_model_following";
+  const Checks checks = Checks(where).also([&] { return check_system(plant, where); }).also([&] {
+    return check_system(reference, where);
+  });
+  if (!checks) {
+    return tl::unexpected(checks.error());
   }
   if (plant.period.si() != reference.period.si()) {
     return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in("implicit_model_following")
+                              .in(std::string(where))
                               .about("the reference model's period")
                               .got(format_number(reference.period.si()) + " s")
                               .expected("the plant's, " + format_number(plant.period.si()) + " s"));

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string_view>
+#include <utility>
 
 #include <Eigen/Core>
 
@@ -45,11 +46,17 @@ using MatrixRef = Eigen::Ref<const Eigen::MatrixXd>;
 [[nodiscard]] Expected<void> check_not_negative(double value, std::string_view where,
                                                 std::string_view name, std::string_view unit = {});
 
+/// Finite and in [low, high]. @errors ArgumentError::not_finite, out_of_range.
+[[nodiscard]] Expected<void> check_within(double value, double low, double high,
+                                          std::string_view where, std::string_view name,
+                                          std::string_view unit = {});
+
 /// The checks of one function's arguments, which say its name once. After the first error no other
 /// check is made, so a later one may rely on the earlier ones.
 ///
 /// ```
-/// FLYBALL_CHECK(Checks("lqr").square(A, "A").shape(B, A.rows(), B.cols(), "B").positive(T, "T", "s"));
+/// FLYBALL_CHECK(Checks("lqr").square(A, "A").shape(B, A.rows(), B.cols(), "B").positive(T, "T",
+/// "s"));
 /// ```
 class Checks {
  public:
@@ -78,6 +85,10 @@ class Checks {
   Checks& not_negative(double value, std::string_view name, std::string_view unit = {}) {
     return also([&] { return check_not_negative(value, where_, name, unit); });
   }
+  Checks& within(double value, double low, double high, std::string_view name,
+                 std::string_view unit = {}) {
+    return also([&] { return check_within(value, low, high, where_, name, unit); });
+  }
   /// Any other check, made only if those before it passed.
   /// @param check  Answers an Expected<void>.
   template <class Check>
@@ -87,6 +98,12 @@ class Checks {
       result_ = check();
     }
     return *this;
+  }
+
+  /// What `make` gives if every check passed. @param make  Answers the function's result.
+  template <class Make>
+  [[nodiscard]] auto map(Make&& make) const {
+    return result_.map(std::forward<Make>(make));
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return result_.has_value(); }

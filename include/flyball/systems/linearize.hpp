@@ -34,9 +34,8 @@ template <class F, class H, class State, class Input>
   constexpr int P = decltype(jacobians(h, x, u).by_x)::RowsAtCompileTime;
   using System = ContinuousSystem<N, M, P>;
 
-  if (auto check = check_all(check_finite(x, "linearize", "x"), check_finite(u, "linearize", "u"));
-      !check) {
-    return Expected<System>(tl::unexpected(std::move(check).error()));
+  if (const auto checks = Checks("linearize").finite(x, "x").finite(u, "u"); !checks) {
+    return Expected<System>(tl::unexpected(checks.error()));
   }
   const auto of_f = jacobians(f, x, u);
   const auto of_h = jacobians(h, x, u);

@@ -6,12 +6,12 @@
 #include <limits>
 
 #include "math/equations/lyapunov_kernel.hpp"
+#include "math/equations/sylvester_kernel.hpp"
 #include "math/exponential/matrix_exponential_kernel.hpp"
 #include "math/riccati/riccati_kernel.hpp"
-#include "math/equations/sylvester_kernel.hpp"
 
 #define FLYBALL_VARIANT baseline
 #include "math/equations/lyapunov_kernel_body.hpp"
+#include "math/equations/sylvester_kernel_body.hpp"
 #include "math/exponential/matrix_exponential_kernel_body.hpp"
 #include "math/riccati/riccati_kernel_body.hpp"
-#include "math/equations/sylvester_kernel_body.hpp"

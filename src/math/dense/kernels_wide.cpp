@@ -6,9 +6,9 @@
 #include <limits>
 
 #include "math/equations/lyapunov_kernel.hpp"
+#include "math/equations/sylvester_kernel.hpp"
 #include "math/exponential/matrix_exponential_kernel.hpp"
 #include "math/riccati/riccati_kernel.hpp"
-#include "math/equations/sylvester_kernel.hpp"
 
 // The same source for processors with 256-bit vectors and fused multiply-add, which
 // instruction_set.hpp asks for when running. Only functions of this variant's namespace are
@@ -22,9 +22,9 @@
 #pragma GCC target("avx2,fma")
 #endif
 #include "math/equations/lyapunov_kernel_body.hpp"
+#include "math/equations/sylvester_kernel_body.hpp"
 #include "math/exponential/matrix_exponential_kernel_body.hpp"
 #include "math/riccati/riccati_kernel_body.hpp"
-#include "math/equations/sylvester_kernel_body.hpp"
 #ifdef __clang__
 #pragma clang attribute pop
 #else

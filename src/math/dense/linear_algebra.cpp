@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball {
@@ -17,10 +18,8 @@ using Eigen::MatrixXd;
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 Expected<void> check_symmetric_matrix(const MatrixRef& S, std::string_view where) {
-  if (auto square = check_square(S, where, "S"); !square) {
-    return square;
-  }
-  return check_all(check_finite(S, where, "S"), check_symmetric(S, where, "S"));
+  FLYBALL_CHECK(check_square(S, where, "S"));
+  return Checks(where).finite(S, "S").symmetric(S, "S");
 }
 
 }  // namespace
@@ -31,11 +30,7 @@ Expected<Pseudoinverse> pseudoinverse(const MatrixRef& A, double tolerance) {
     return tl::unexpected(
         Error(ArgumentError::empty).in(std::string(where)).about("A").got("empty"));
   }
-  if (auto checked =
-          check_all(check_finite(A, where, "A"), check_not_negative(tolerance, where, "tolerance"));
-      !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(Checks(where).finite(A, "A").not_negative(tolerance, "tolerance"));
   if (tolerance >= 1.0) {
     return tl::unexpected(Error(ArgumentError::out_of_range)
                               .in(std::string(where))
@@ -75,9 +70,7 @@ std::string_view to_string(Definiteness definiteness) {
 }
 
 Expected<DefinitenessTest> test_definiteness(const MatrixRef& S) {
-  if (auto checked = check_symmetric_matrix(S, "test_definiteness"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_symmetric_matrix(S, "test_definiteness"));
   DefinitenessTest test;
   test.eigenvalues = detail::symmetric_eigensystem_of(detail::symmetrized(S)).values;
   const double least = test.eigenvalues(0);
@@ -99,9 +92,7 @@ Expected<DefinitenessTest> test_definiteness(const MatrixRef& S) {
 }
 
 Expected<bool> is_positive_definite(const MatrixRef& S) {
-  if (auto checked = check_symmetric_matrix(S, "is_positive_definite"); !checked) {
-    return tl::unexpected(std::move(checked).error());
-  }
+  FLYBALL_CHECK(check_symmetric_matrix(S, "is_positive_definite"));
   if (!(S.diagonal().array() > 0.0).all()) {
     return false;
   }

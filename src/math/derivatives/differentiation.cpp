@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/try.hpp"
+
 namespace flyball {
 
 namespace {
@@ -28,7 +30,7 @@ Error not_finite(std::string_view where, Index variable, const VectorXd& x) {
 
 Expected<void> check_point(const Eigen::Ref<const VectorXd>& x, double step,
                            std::string_view where) {
-  return check_all(check_finite(x, where, "x"), check_not_negative(step, where, "step"));
+  return Checks(where).finite(x, "x").not_negative(step, "step");
 }
 
 /// (f(x + h e_j) - f(x - h e_j)) / 2h.
@@ -88,9 +90,7 @@ ErrorInfo error_info(DifferentiationError code) {
 Expected<MatrixXd> numerical_jacobian(VectorFunction f, const Eigen::Ref<const VectorXd>& x,
                                       Index outputs, const DifferenceOptions& options) {
   constexpr std::string_view where = "numerical_jacobian";
-  if (auto check = check_point(x, options.step, where); !check) {
-    return tl::unexpected(std::move(check).error());
-  }
+  FLYBALL_CHECK(check_point(x, options.step, where));
   const bool is_central = options.scheme == DifferenceScheme::central;
   MatrixXd J(outputs, x.size());
   for (Index j = 0; j < x.size(); ++j) {
@@ -117,9 +117,7 @@ Expected<VectorXd> numerical_gradient(ScalarFunction f, const Eigen::Ref<const V
 Expected<MatrixXd> numerical_hessian(ScalarFunction f, const Eigen::Ref<const VectorXd>& x,
                                      double step) {
   constexpr std::string_view where = "numerical_hessian";
-  if (auto check = check_point(x, step, where); !check) {
-    return tl::unexpected(std::move(check).error());
-  }
+  FLYBALL_CHECK(check_point(x, step, where));
   const Index n = x.size();
   const auto h = [&](Index j) {
     return step > 0.0 ? step : std::pow(epsilon, 0.25) * std::max(1.0, std::abs(x(j)));

@@ -3,8 +3,8 @@
 // The kernel of lyapunov_kernel.hpp for one instruction set; see riccati_kernel_body.hpp.
 
 #include "math/dense/balance_small.hpp"
-#include "math/riccati/riccati_closed_loop.hpp"
 #include "math/dense/small_matrix.hpp"
+#include "math/riccati/riccati_closed_loop.hpp"
 
 namespace flyball::detail::FLYBALL_VARIANT {
 

@@ -5,10 +5,11 @@
 #include <limits>
 #include <vector>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
-#include "math/extended/double_double.hpp"
 #include "math/equations/lyapunov_kernel.hpp"
 #include "math/equations/sylvester_kernel.hpp"
+#include "math/extended/double_double.hpp"
 
 namespace flyball {
 
@@ -204,9 +205,7 @@ class Equation {
 
 Expected<LinearMatrixSolution> solve(const Equation& equation, const MatrixXd& F, bool symmetric,
                                      std::string_view where) {
-  if (auto check = equation.check(where); !check) {
-    return tl::unexpected(std::move(check).error());
-  }
+  FLYBALL_CHECK(equation.check(where));
   LinearMatrixSolution solution;
   MatrixXd& X = solution.X;
   X = equation.solve(F);
@@ -268,14 +267,11 @@ bool solve_quickly(Domain domain, const MatrixRef& A, const MatrixRef* B, const 
 
 Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A, const MatrixRef& Q,
                                               std::string_view where) {
-  if (auto check = check_square(A, where, "A"); !check) {
-    return tl::unexpected(std::move(check).error());
-  }
-  if (auto check = check_all(check_shape(Q, A.rows(), A.rows(), where, "Q", "states x states"),
-                             check_finite(A, where, "A"), check_finite(Q, where, "Q"));
-      !check) {
-    return tl::unexpected(std::move(check).error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .square(A, "A")
+                    .shape(Q, A.rows(), A.rows(), "Q", "states x states")
+                    .finite(A, "A")
+                    .finite(Q, "Q"));
   const bool symmetric = Q == Q.transpose();
   LinearMatrixSolution solution;
   if (is_symmetric_but_for_rounding(Q) && A.outerStride() == A.rows() &&
@@ -300,18 +296,13 @@ Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A,
 Expected<LinearMatrixSolution> solve_sylvester(Domain domain, const MatrixRef& A,
                                                const MatrixRef& B, const MatrixRef& C,
                                                std::string_view where) {
-  if (auto check = check_square(A, where, "A"); !check) {
-    return tl::unexpected(std::move(check).error());
-  }
-  if (auto check = check_square(B, where, "B"); !check) {
-    return tl::unexpected(std::move(check).error());
-  }
-  if (auto check = check_all(
-          check_shape(C, A.rows(), B.rows(), where, "C", "rows of A x columns of B"),
-          check_finite(A, where, "A"), check_finite(B, where, "B"), check_finite(C, where, "C"));
-      !check) {
-    return tl::unexpected(std::move(check).error());
-  }
+  FLYBALL_CHECK(Checks(where)
+                    .square(A, "A")
+                    .square(B, "B")
+                    .shape(C, A.rows(), B.rows(), "C", "rows of A x columns of B")
+                    .finite(A, "A")
+                    .finite(B, "B")
+                    .finite(C, "C"));
   const double sign = domain == Domain::continuous ? 1.0 : -1.0;
   const MatrixXd F = sign * C;
   LinearMatrixSolution solution;

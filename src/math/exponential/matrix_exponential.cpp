@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/instruction_set.hpp"
 #include "math/exponential/matrix_exponential_kernel.hpp"
@@ -39,9 +40,7 @@ Expected<MatrixXd> expm(const MatrixRef& A) {
   if (A.rows() == 0 || A.rows() != A.cols()) {
     return tl::unexpected(check_square(A, "expm", "A").error());
   }
-  if (auto check = check_finite(A, "expm", "A"); !check) {
-    return tl::unexpected(std::move(check).error());
-  }
+  FLYBALL_CHECK(check_finite(A, "expm", "A"));
   if (A.outerStride() != A.rows()) {
     return expm(MatrixXd(A));
   }

@@ -3,9 +3,9 @@
 // The kernel of matrix_exponential_kernel.hpp for one instruction set; see riccati_kernel_body.hpp.
 
 #include "math/dense/balance_small.hpp"
-#include "math/exponential/exponential_2x2.hpp"
 #include "math/dense/gauss_jordan.hpp"
 #include "math/dense/small_matrix.hpp"
+#include "math/exponential/exponential_2x2.hpp"
 
 namespace flyball::detail::FLYBALL_VARIANT {
 

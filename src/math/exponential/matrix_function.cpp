@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/exponential/triangular_function.hpp"
 
@@ -176,12 +177,7 @@ ErrorInfo error_info(MatrixFunctionError code) {
 
 Expected<MatrixXd> logm(const MatrixRef& A) {
   constexpr std::string_view where = "logm";
-  if (auto check = check_square(A, where, "A"); !check) {
-    return tl::unexpected(std::move(check).error());
-  }
-  if (auto check = check_finite(A, where, "A"); !check) {
-    return tl::unexpected(std::move(check).error());
-  }
+  FLYBALL_CHECK(Checks(where).square(A, "A").finite(A, "A"));
   // Near the identity A - I has digits that the Schur form of A would round away.
   const MatrixXd X = A - MatrixXd::Identity(A.rows(), A.cols());
   if (detail::norm1(X) <= detail::near_identity) {
@@ -210,13 +206,7 @@ Expected<MatrixXd> logm(const MatrixRef& A) {
 
 Expected<MatrixXd> powm(const MatrixRef& A, double power) {
   constexpr std::string_view where = "powm";
-  if (auto check = check_square(A, where, "A"); !check) {
-    return tl::unexpected(std::move(check).error());
-  }
-  if (auto check = check_all(check_finite(A, where, "A"), check_finite(power, where, "power"));
-      !check) {
-    return tl::unexpected(std::move(check).error());
-  }
+  FLYBALL_CHECK(Checks(where).square(A, "A").finite(A, "A").finite(power, "power"));
   constexpr double largest = 1e9;
   if (std::abs(power) > largest) {
     return tl::unexpected(Error(ArgumentError::out_of_range)

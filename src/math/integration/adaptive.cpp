@@ -7,6 +7,7 @@
 
 #include <flyball/core/argument.hpp>
 
+#include "core/try.hpp"
 #include "math/integration/ode_steppers.hpp"
 
 namespace flyball {
@@ -32,14 +33,11 @@ Expected<VectorXd> tolerances_of(const IntegrationOptions& options, Index states
       return VectorXd(VectorXd::Constant(states, options.absolute_tolerance));
     });
   }
-  if (auto check = check_all(
-          check_shape(options.absolute_tolerances, states, 1, where, "absolute_tolerances",
-                      "states x 1"),
-          check_finite(options.absolute_tolerances, where, "absolute_tolerances"),
-          check_positive(options.absolute_tolerances.minCoeff(), where, "absolute_tolerances"));
-      !check) {
-    return tl::unexpected(std::move(check).error());
-  }
+  FLYBALL_CHECK(
+      Checks(where)
+          .shape(options.absolute_tolerances, states, 1, "absolute_tolerances", "states x 1")
+          .finite(options.absolute_tolerances, "absolute_tolerances")
+          .positive(options.absolute_tolerances.minCoeff(), "absolute_tolerances"));
   return options.absolute_tolerances;
 }
 
@@ -54,9 +52,8 @@ Expected<void> check_arguments(double t0, const Eigen::Ref<const VectorXd>& x0, 
                               .about("max_step")
                               .got(format_number(options.max_step)));
   }
-  return check_all(check_finite(t0, where, "t0"), check_finite(t1, where, "t1"),
-                   check_finite(x0, where, "x0"),
-                   check_not_negative(options.initial_step, where, "initial_step", "s"));
+  return Checks(where).finite(t0, "t0").finite(t1, "t1").finite(x0, "x0").not_negative(
+      options.initial_step, "initial_step", "s");
 }
 
 Error not_finite(std::string about, double t, const VectorXd& x) {
@@ -178,17 +175,11 @@ class OdeIntegrator {
     bool stiff = options.method == IntegrationMethod::radau;
     problem_.statistics.stiff_from = stiff ? t0 : problem_.statistics.stiff_from;
     while (state.t != problem_.t_end && !solution.ended_by_event_) {
-      const auto stepped =
-          stiff ? radau_.step(problem_, state) : dormand_prince_.step(problem_, state);
-      if (!stepped) {
-        return tl::unexpected(stepped.error());
-      }
+      FLYBALL_CHECK(stiff ? radau_.step(problem_, state) : dormand_prince_.step(problem_, state));
       solution.segments_.push_back(state.segment);
       solution.times_.push_back(state.t);
       solution.states_.push_back(state.x);
-      if (auto searched = search_events(solution, state); !searched) {
-        return tl::unexpected(std::move(searched).error());
-      }
+      FLYBALL_CHECK(search_events(solution, state));
       if (!stiff && options.method == IntegrationMethod::automatic && dormand_prince_.stiff()) {
         stiff = true;
         problem_.statistics.stiff_from = state.t;
@@ -250,19 +241,14 @@ Expected<OdeSolution> integrate_ode(OdeFunction f, const OdeJacobian* jacobian, 
                                     const Eigen::Ref<const VectorXd>& x0, double t1,
                                     const IntegrationOptions& options, const EventRef* events,
                                     std::size_t event_count) {
-  if (auto check = check_arguments(t0, x0, t1, options); !check) {
-    return tl::unexpected(std::move(check).error());
-  }
-  auto tolerances = tolerances_of(options, x0.size());
-  if (!tolerances) {
-    return tl::unexpected(std::move(tolerances).error());
-  }
+  FLYBALL_CHECK(check_arguments(t0, x0, t1, options));
+  FLYBALL_TRY(auto tolerances, tolerances_of(options, x0.size()));
   OdeIntegrator integrator({.f = f,
                             .jacobian = jacobian,
                             .t_end = t1,
                             .direction = t1 < t0 ? -1.0 : 1.0,
                             .relative_tolerance = options.relative_tolerance,
-                            .absolute_tolerance = *std::move(tolerances),
+                            .absolute_tolerance = std::move(tolerances),
                             .max_step = options.max_step,
                             .max_steps = options.max_steps},
                            {events, event_count});

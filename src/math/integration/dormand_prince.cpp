@@ -4,6 +4,7 @@
 
 #include <flyball/math/integration/butcher_tableau.hpp>
 
+#include "core/try.hpp"
 #include "math/integration/ode_steppers.hpp"
 
 namespace flyball::detail {
@@ -99,9 +100,7 @@ Expected<void> DormandPrinceStepper::step(OdeProblem& problem, OdeState& state) 
   std::array<VectorXd, 7> k;
   k[0] = state.f;
   while (true) {
-    if (auto check = check_step(problem, state, was_not_finite); !check) {
-      return check;
-    }
+    FLYBALL_CHECK(check_step(problem, state, was_not_finite));
     const double left = std::abs(problem.t_end - state.t);
     const bool last = state.step >= left;
     const double t_next = last ? problem.t_end : state.t + problem.direction * state.step;

@@ -2,6 +2,7 @@
 
 #include <flyball/math/exponential/matrix_exponential.hpp>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball {
@@ -15,25 +16,25 @@ using Eigen::VectorXd;
 Expected<void> check_linear(const MatrixRef& A, const MatrixRef& B, const MatrixRef& x,
                             const MatrixRef& u, const MatrixRef& u_next, double dt) {
   constexpr std::string_view where = "integrate_linear";
-  if (auto check = check_square(A, where, "A"); !check) {
-    return check;
-  }
-  return check_all(check_shape(B, A.rows(), B.cols(), where, "B", "states x inputs"),
-                   check_shape(x, A.rows(), 1, where, "x", "states x 1"),
-                   check_shape(u, B.cols(), 1, where, "u", "inputs x 1"),
-                   check_shape(u_next, B.cols(), 1, where, "u_next", "inputs x 1"),
-                   check_finite(A, where, "A"), check_finite(B, where, "B"),
-                   check_finite(x, where, "x"), check_finite(u, where, "u"),
-                   check_finite(u_next, where, "u_next"), check_finite(dt, where, "dt"));
+  FLYBALL_CHECK(check_square(A, where, "A"));
+  return Checks(where)
+      .shape(B, A.rows(), B.cols(), "B", "states x inputs")
+      .shape(x, A.rows(), 1, "x", "states x 1")
+      .shape(u, B.cols(), 1, "u", "inputs x 1")
+      .shape(u_next, B.cols(), 1, "u_next", "inputs x 1")
+      .finite(A, "A")
+      .finite(B, "B")
+      .finite(x, "x")
+      .finite(u, "u")
+      .finite(u_next, "u_next")
+      .finite(dt, "dt");
 }
 
 }  // namespace
 
 Expected<VectorXd> integrate_linear(const MatrixRef& A, const MatrixRef& B, const MatrixRef& x,
                                     const MatrixRef& u, double dt) {
-  if (auto check = check_linear(A, B, x, u, u, dt); !check) {
-    return tl::unexpected(std::move(check).error());
-  }
+  FLYBALL_CHECK(check_linear(A, B, x, u, u, dt));
   const Index n = A.rows();
   // d[x; 1]/dt = [A Bu; 0 0][x; 1]
   MatrixXd M = MatrixXd::Zero(n + 1, n + 1);
@@ -46,9 +47,7 @@ Expected<VectorXd> integrate_linear(const MatrixRef& A, const MatrixRef& B, cons
 
 Expected<VectorXd> integrate_linear(const MatrixRef& A, const MatrixRef& B, const MatrixRef& x,
                                     const MatrixRef& u, const MatrixRef& u_next, double dt) {
-  if (auto check = check_linear(A, B, x, u, u_next, dt); !check) {
-    return tl::unexpected(std::move(check).error());
-  }
+  FLYBALL_CHECK(check_linear(A, B, x, u, u_next, dt));
   const Index n = A.rows();
   // d[x; s; 1]/dt with s = t/dt: [A B(u_next - u) Bu; 0 0 1/dt; 0 0 0]
   MatrixXd M = MatrixXd::Zero(n + 2, n + 2);

@@ -6,6 +6,7 @@
 
 #include <flyball/core/argument.hpp>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/integration/ode_steppers.hpp"
 
@@ -34,11 +35,7 @@ Expected<VectorXd> implicit_step(const ButcherTableauView& tableau, OdeFunction 
   if (x.size() == 0) {
     return tl::unexpected(Error(ArgumentError::empty).in(std::string(where)).about("x"));
   }
-  if (auto check = check_all(check_finite(t, where, "t"), check_finite(x, where, "x"),
-                             check_finite(dt, where, "dt"));
-      !check) {
-    return tl::unexpected(std::move(check).error());
-  }
+  FLYBALL_CHECK(Checks(where).finite(t, "t").finite(x, "x").finite(dt, "dt"));
   const Index n = x.size();
   const auto stages = static_cast<Index>(tableau.stages);
   const auto a = [&](Index i, Index j) {

@@ -4,6 +4,7 @@
 
 #include <flyball/math/integration/butcher_tableau.hpp>
 
+#include "core/try.hpp"
 #include "math/integration/ode_steppers.hpp"
 
 namespace flyball::detail {
@@ -216,9 +217,7 @@ Expected<void> RadauStepper::step(OdeProblem& problem, OdeState& state) {
   bool rejected = false;
   bool was_not_finite = !J_->allFinite();
   while (true) {
-    if (auto check = check_step(problem, state, was_not_finite); !check) {
-      return check;
-    }
+    FLYBALL_CHECK(check_step(problem, state, was_not_finite));
     const double left = std::abs(problem.t_end - state.t);
     const bool last = state.step >= left;
     const double t_next = last ? problem.t_end : state.t + problem.direction * state.step;

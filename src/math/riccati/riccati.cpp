@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/riccati/riccati_kernel.hpp"
 #include "math/riccati/riccati_robust.hpp"
@@ -22,9 +23,7 @@ Expected<void> check_shapes(const MatrixRef& A, const MatrixRef& B, const Matrix
   if (right) {
     return {};
   }
-  if (auto check = check_square(A, where, "A"); !check) {
-    return check;
-  }
+  FLYBALL_CHECK(check_square(A, where, "A"));
   if (m == 0) {
     return tl::unexpected(Error(ArgumentError::empty)
                               .in(std::string(where))
@@ -32,21 +31,18 @@ Expected<void> check_shapes(const MatrixRef& A, const MatrixRef& B, const Matrix
                               .got("without columns")
                               .expected("states x inputs with at least one input"));
   }
-  auto shapes = check_all(check_shape(B, n, m, where, "B", "states x inputs"),
-                          check_shape(Q, n, n, where, "Q", "states x states"),
-                          check_shape(R, m, m, where, "R", "inputs x inputs"));
+  auto shapes = Checks(where)
+                    .shape(B, n, m, "B", "states x inputs")
+                    .shape(Q, n, n, "Q", "states x states")
+                    .shape(R, m, m, "R", "inputs x inputs");
   return shapes && N != nullptr ? check_shape(*N, n, m, where, "N", "states x inputs") : shapes;
 }
 
 Expected<void> check_values(const MatrixRef& A, const MatrixRef& B, const MatrixRef& Q,
                             const MatrixRef& R, const MatrixRef& N, std::string_view where) {
-  if (auto finite = check_all(check_finite(A, where, "A"), check_finite(B, where, "B"),
-                              check_finite(Q, where, "Q"), check_finite(R, where, "R"),
-                              check_finite(N, where, "N"));
-      !finite) {
-    return finite;
-  }
-  return check_all(check_symmetric(Q, where, "Q"), check_symmetric(R, where, "R"));
+  FLYBALL_CHECK(
+      Checks(where).finite(A, "A").finite(B, "B").finite(Q, "Q").finite(R, "R").finite(N, "N"));
+  return Checks(where).symmetric(Q, "Q").symmetric(R, "R");
 }
 
 /// The same answers as check_finite and check_symmetric without their messages.
@@ -107,20 +103,15 @@ Expected<void> solve_riccati(const RiccatiData& data, RiccatiAnswer& answer) {
   const ConstMap R(data.R, m, m);
   const Eigen::MatrixXd N = data.N == nullptr ? Eigen::MatrixXd(Eigen::MatrixXd::Zero(n, m))
                                               : Eigen::MatrixXd(ConstMap(data.N, n, m));
-  if (auto check = check_values(A, B, Q, R, N, data.continuous ? "care" : "dare"); !check) {
-    return check;
-  }
-  auto solution =
-      solve_riccati_robustly({A, B, symmetrized(Q), symmetrized(R), N, data.continuous});
-  if (!solution) {
-    return tl::unexpected(std::move(solution).error());
-  }
-  Eigen::Map<Eigen::MatrixXd>(answer.X, n, n) = solution->X;
-  Eigen::Map<Eigen::MatrixXd>(answer.K, m, n) = solution->K;
-  Eigen::Map<Eigen::VectorXcd>(answer.poles, n) = solution->poles;
-  answer.residual = solution->residual;
-  answer.condition = solution->condition;
-  answer.iterations = solution->iterations;
+  FLYBALL_CHECK(check_values(A, B, Q, R, N, data.continuous ? "care" : "dare"));
+  FLYBALL_TRY(auto solution,
+              solve_riccati_robustly({A, B, symmetrized(Q), symmetrized(R), N, data.continuous}));
+  Eigen::Map<Eigen::MatrixXd>(answer.X, n, n) = solution.X;
+  Eigen::Map<Eigen::MatrixXd>(answer.K, m, n) = solution.K;
+  Eigen::Map<Eigen::VectorXcd>(answer.poles, n) = solution.poles;
+  answer.residual = solution.residual;
+  answer.condition = solution.condition;
+  answer.iterations = solution.iterations;
   return {};
 }
 
@@ -132,9 +123,7 @@ Expected<RiccatiSolution> solve(bool continuous, const MatrixRef& A, const Matri
                                 const MatrixRef& Q, const MatrixRef& R, const MatrixRef* N) {
   const Eigen::Index n = A.rows();
   const Eigen::Index m = B.cols();
-  if (auto check = check_shapes(A, B, Q, R, N, continuous ? "care" : "dare"); !check) {
-    return tl::unexpected(std::move(check).error());
-  }
+  FLYBALL_CHECK(check_shapes(A, B, Q, R, N, continuous ? "care" : "dare"));
   if (A.outerStride() != n || B.outerStride() != n || Q.outerStride() != n ||
       R.outerStride() != m || (N != nullptr && N->outerStride() != n)) {
     // Blocks of larger matrices: copied, because the kernels take columns without gaps.
@@ -150,13 +139,10 @@ Expected<RiccatiSolution> solve(bool continuous, const MatrixRef& A, const Matri
   solution->K.resize(m, n);
   solution->poles.resize(n);
   detail::RiccatiAnswer answer{solution->X.data(), solution->K.data(), solution->poles.data()};
-  auto solved =
+  FLYBALL_CHECK(
       detail::solve_riccati({static_cast<int>(n), static_cast<int>(m), A.data(), B.data(), Q.data(),
                              R.data(), N == nullptr ? nullptr : N->data(), continuous},
-                            answer);
-  if (!solved) {
-    return tl::unexpected(std::move(solved).error());
-  }
+                            answer));
   solution->residual = answer.residual;
   solution->condition = answer.condition;
   solution->iterations = answer.iterations;

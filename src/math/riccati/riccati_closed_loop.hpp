@@ -4,8 +4,8 @@
 // operator of a closed loop, by which the kernel judges and corrects what it found.
 
 #include "math/dense/gauss_jordan.hpp"
-#include "math/riccati/riccati_two_states.hpp"
 #include "math/dense/small_matrix.hpp"
+#include "math/riccati/riccati_two_states.hpp"
 
 namespace flyball::detail::FLYBALL_VARIANT {
 

@@ -5,9 +5,9 @@
 
 #include "math/dense/gauss_jordan.hpp"
 #include "math/dense/hessenberg_eigenvalues.hpp"
+#include "math/dense/small_matrix.hpp"
 #include "math/riccati/riccati_closed_loop.hpp"
 #include "math/riccati/riccati_two_states.hpp"
-#include "math/dense/small_matrix.hpp"
 
 namespace flyball::detail::FLYBALL_VARIANT {
 

@@ -3,8 +3,8 @@
 #include <Eigen/Core>
 
 #include <flyball/core/expected.hpp>
-#include <flyball/math/integration/butcher_tableau.hpp>
 #include <flyball/math/integration/adaptive.hpp>
+#include <flyball/math/integration/butcher_tableau.hpp>
 
 /// Single steps of implicit Runge-Kutta methods, of a length of one's own choice.
 namespace flyball {
