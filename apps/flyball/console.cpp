@@ -72,7 +72,7 @@ void add_common_options(CLI::App& command, CommonOptions& options, const std::st
 }
 
 void add_log_options(CLI::App& command, LogOptions& options) {
-  study::LogSelection& selection = options.selection;
+  recording::LogSelection& selection = options.selection;
   command
       .add_option("--mechanism", options.mechanism,
                   "What the log is of: flywheel, elevator or arm (if it does not say)")
@@ -96,8 +96,8 @@ void add_log_options(CLI::App& command, LogOptions& options) {
       ->type_name("CHANNEL");
 }
 
-Expected<study::LogSelection> selection_of(const LogOptions& options) {
-  study::LogSelection selection = options.selection;
+Expected<recording::LogSelection> selection_of(const LogOptions& options) {
+  recording::LogSelection selection = options.selection;
   if (!options.mechanism.empty()) {
     auto kind = mechanisms::parse_mechanism_kind(options.mechanism);
     if (!kind) {

@@ -7,8 +7,8 @@
 #include <CLI/CLI.hpp>
 
 #include <flyball/core/expected.hpp>
+#include <flyball/recording/load_recording.hpp>
 #include <flyball/report/terminal.hpp>
-#include <flyball/study/recording.hpp>
 
 /// What every command of the program shares: where text goes and how it ends.
 namespace flyball::app {
@@ -37,11 +37,11 @@ void add_common_options(CLI::App& command, CommonOptions& options, const std::st
 /// What a person may say about a log.
 struct LogOptions {
   std::string mechanism;
-  study::LogSelection selection;
+  recording::LogSelection selection;
 };
 void add_log_options(CLI::App& command, LogOptions& options);
 /// @errors ArgumentError::unknown_name for the mechanism.
-[[nodiscard]] Expected<study::LogSelection> selection_of(const LogOptions& options);
+[[nodiscard]] Expected<recording::LogSelection> selection_of(const LogOptions& options);
 
 /// Colours when standard output is a terminal and NO_COLOR is not set.
 [[nodiscard]] report::TerminalStyle terminal_style();

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include <flyball/study/solve.hpp>
+#include <flyball/solve/solver.hpp>
 
 #include "commands.hpp"
 #include "console.hpp"
@@ -16,7 +16,7 @@ namespace {
 
 std::string list_of_kinds() {
   std::string text = "Kinds, what a problem has [and may have], and what is answered:\n";
-  for (const study::SolveKind& kind : study::solve_kinds()) {
+  for (const solve::SolveKind& kind : study::solve_kinds()) {
     text +=
         fmt::format("  {:<20}{}{}  ->  {}\n", kind.name, kind.fields,
                     kind.optional.empty() ? "" : fmt::format(" [{}]", kind.optional), kind.answer);
@@ -31,13 +31,13 @@ bool is_blank(const std::string& line) {
 /// Answers problem after problem; the status is the worst that any of them asks for.
 class Stream {
  public:
-  explicit Stream(const study::Solver& solver) : solver_(solver) {}
+  explicit Stream(const solve::Solver& solver) : solver_(solver) {}
 
   void answer(const std::string& problem) {
     if (is_blank(problem)) {
       return;
     }
-    study::SolveAnswer answer = solver_.solve(problem);
+    solve::SolveAnswer answer = solver_.solve(problem);
     answer.json += '\n';
     std::fwrite(answer.json.data(), 1, answer.json.size(), stdout);
     ++count_;
@@ -50,7 +50,7 @@ class Stream {
   [[nodiscard]] bool empty() const { return count_ == 0; }
 
  private:
-  const study::Solver& solver_;
+  const solve::Solver& solver_;
   int status_ = success;
   long count_ = 0;
 };
@@ -68,7 +68,7 @@ void for_each_line(const std::string& text, const F& f) {
 /// Whether a text whose first line is not whole is one object over several lines, be it broken: the
 /// other lines go on as such an object does, and none is a problem of its own.
 bool is_one_object(const std::string& text) {
-  if (study::Solver::is_complete(text)) {
+  if (solve::Solver::is_complete(text)) {
     return true;
   }
   bool one = text.starts_with('{');
@@ -83,10 +83,10 @@ bool is_one_object(const std::string& text) {
 }
 
 int run(const std::string& kind) {
-  const auto solver = study::Solver::create(kind);
+  const auto solver = solve::Solver::create(kind);
   if (!solver) {
     tell(solver.error());
-    print(study::Solver::error_json(solver.error()));
+    print(solve::Solver::error_json(solver.error()));
     return bad_input;
   }
   std::ios::sync_with_stdio(false);
@@ -94,7 +94,7 @@ int run(const std::string& kind) {
   std::string line;
   while (std::getline(std::cin, line) && is_blank(line)) {
   }
-  if (!is_blank(line) && !study::Solver::is_complete(line)) {
+  if (!is_blank(line) && !solve::Solver::is_complete(line)) {
     line += '\n';
     line.append(std::istreambuf_iterator<char>(std::cin), {});
     if (is_one_object(line)) {

@@ -9,7 +9,7 @@
 #include <flyball/systems/interconnection.hpp>
 
 #include "core/try.hpp"
-#include "study/linear_response.hpp"
+#include "solve/linear_response.hpp"
 
 namespace flyball::study {
 
@@ -71,7 +71,7 @@ Expected<std::vector<StepResponse>> step_responses(const ModelFile& model,
     u.col(input).setOnes();
     responses.push_back(
         {Eigen::VectorXd::LinSpaced(samples, 0.0, step * static_cast<double>(samples - 1)),
-         linear_response(sampled, system.C, system.D, u, at_rest).y});
+         solve::linear_response(sampled, system.C, system.D, u, at_rest).y});
   }
   return responses;
 }
@@ -126,18 +126,6 @@ void add_gains(ModelAnalysis& analysis) {
 }
 
 }  // namespace
-
-Expected<StructureAnalysis> analyze_structure(const ContinuousSystem<>& system, TimeDomain domain,
-                                              Time period) {
-  FLYBALL_CHECK(check_system(system, "analyze"));
-  FLYBALL_TRY(auto modes, analyze_modes(system.A, domain, period));
-  FLYBALL_TRY(auto controllability, analyze_controllability(system.A, system.B, domain));
-  return analyze_observability(system.A, system.C, domain)
-      .map([&](ObservabilityAnalysis&& observability) {
-        return StructureAnalysis{std::move(modes), std::move(controllability),
-                                 std::move(observability)};
-      });
-}
 
 Expected<ModelAnalysis> analyze(const ModelFile& model) {
   const bool continuous = model.domain == TimeDomain::continuous;

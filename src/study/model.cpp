@@ -6,14 +6,17 @@
 #include <flyball/study/analyze.hpp>
 
 #include "core/try.hpp"
+#include "solve/problem_reader.hpp"
 #include "study/design_steps.hpp"
-#include "study/problem_reader.hpp"
 
 namespace flyball::study {
 
 namespace {
 
 using mechanisms::MechanismKind;
+using solve::check_fields;
+using solve::parse_object;
+using solve::ProblemReader;
 
 constexpr std::size_t largest_model = std::size_t{64} << 20;
 

@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "study/json.hpp"
+#include "io/json.hpp"
 
 namespace flyball::study {
 
@@ -61,7 +61,7 @@ Json one_step_json(const identification::OneStepFit& fit, bool gravity) {
   return json;
 }
 
-Json source_json(const LoadedRecording& source) {
+Json source_json(const recording::LoadedRecording& source) {
   std::size_t rows = 0;
   Json runs = Json::array();
   for (const identification::TestRun& run : source.recording.runs) {

@@ -66,7 +66,7 @@ inline simulation::TestSessionOptions session(MechanismKind kind) {
 inline study::IdentifyResult identify_result(const identification::Recording& recording,
                                              const std::string& path = "logs/lift.wpilog",
                                              const std::string& subject = "lift") {
-  study::LoadedRecording source;
+  recording::LoadedRecording source;
   source.path = path;
   source.format = "WPILOG";
   source.subject = subject;

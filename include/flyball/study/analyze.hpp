@@ -6,10 +6,10 @@
 #include <vector>
 
 #include <flyball/study/project.hpp>
-#include <flyball/systems/controllability.hpp>
 #include <flyball/systems/discretize.hpp>
 #include <flyball/systems/norms.hpp>
 #include <flyball/systems/sampling.hpp>
+#include <flyball/systems/structure.hpp>
 
 namespace flyball::study {
 
@@ -46,19 +46,6 @@ struct ModelFile {
 
 /// Reads a model. @param path  "-" is standard input. @errors FileError, and as `parse_model`.
 [[nodiscard]] Expected<ModelFile> read_model(const std::string& path);
-
-/// Poles, and what of a system can be moved and seen.
-struct StructureAnalysis {
-  ModalAnalysis modes;
-  ControllabilityAnalysis controllability;
-  ObservabilityAnalysis observability;
-};
-/// @param system  Of a discrete system its matrices too. @param period  T, s, of a discrete system.
-/// @errors ArgumentError for the system; those of analyze_modes, analyze_controllability and
-///         analyze_observability.
-[[nodiscard]] Expected<StructureAnalysis> analyze_structure(const ContinuousSystem<>& system,
-                                                            TimeDomain domain,
-                                                            Time period = Time(1.0));
 
 /// A continuous system as a loop of a certain period meets it.
 struct SampledAnalysis : StructureAnalysis {

@@ -3,19 +3,19 @@
 #include <string>
 
 #include <flyball/identification/feedforward_fit.hpp>
-#include <flyball/study/recording.hpp>
+#include <flyball/recording/load_recording.hpp>
 
 namespace flyball::study {
 
 /// Identify a mechanism from a log.
 struct IdentifyJob {
   std::string log{};  ///< Path.
-  LogSelection selection;
+  recording::LogSelection selection;
 };
 
 /// A log, read and fitted. A refused fit still carries everything that can be shown of the log.
 struct IdentifyResult {
-  LoadedRecording source;
+  recording::LoadedRecording source;
   identification::FitReport
       report;  ///< `report.fit` is the gains or the reason why there are none.
   mechanisms::MechanismKind mechanism{};
@@ -27,7 +27,7 @@ struct IdentifyResult {
 
 /// Runs the job. An error means that the log could not be read as a recording at all; a fit that
 /// was refused is in `report.fit`.
-/// @errors as `load_recording`.
+/// @errors as `recording::load_recording`.
 [[nodiscard]] Expected<IdentifyResult> identify(const IdentifyJob& job);
 
 }  // namespace flyball::study

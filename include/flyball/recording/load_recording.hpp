@@ -1,0 +1,61 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <flyball/core/diagnostic.hpp>
+#include <flyball/core/expected.hpp>
+#include <flyball/identification/recording.hpp>
+
+namespace flyball {
+struct Log;
+}
+
+namespace flyball::recording {
+
+/// What a person may say about a log beyond what it says itself. Empty fields are detected.
+struct LogSelection {
+  std::optional<mechanisms::MechanismKind> mechanism{};
+  std::string state_channel{};    ///< The channel with the name of the running test.
+  std::string voltage_channel{};  ///< Channel names as the log has them.
+  std::string position_channel{};
+  std::string velocity_channel{};
+  std::string unit{};  ///< Unit of the position channel: "rotations", "m", "deg", …
+  double scale = 1.0;  ///< Multiplies position and velocity: output units a recorded unit.
+};
+
+/// Why a log cannot be turned into a recording.
+enum class RecordingError {
+  drivetrain,         ///< A drivetrain log: two sides; not supported yet (no_answer).
+  mechanism_unknown,  ///< The log leaves the kind open; the person has to say it.
+  no_test_state,      ///< No channel tells which test runs.
+  no_channel,         ///< Voltage, or both of position and velocity, are missing.
+  ambiguous_channel,  ///< Several mechanisms were recorded; the person has to choose.
+  unit_mismatch,      ///< The unit cannot be one of that mechanism.
+  no_tests,           ///< A test state channel without a test.
+};
+[[nodiscard]] ErrorInfo error_info(RecordingError code);
+
+/// A log, read as the characterisation tests of one mechanism.
+struct LoadedRecording {
+  std::string path{};
+  std::string format{};   ///< "SysId JSON", "WPILOG", "CSV".
+  std::string subject{};  ///< The mechanism's name in the log, or empty.
+  identification::Recording recording;
+  std::vector<Diagnostic> diagnostics{};  ///< What was found; assumptions have the code "assumed".
+  /// Why the recording can be shown but not identified: a drivetrain's.
+  std::optional<Error> refusal{};
+};
+
+/// Reads a log and finds the tests in it: channels by name, type and unit; runs by the test state;
+/// channels are joined by time onto the voltage's clock.
+/// @errors LogError, FileError, RecordingError.
+[[nodiscard]] Expected<LoadedRecording> load_recording(const std::string& path,
+                                                       const LogSelection& selection = {});
+
+/// The same from a log in memory.
+[[nodiscard]] Expected<LoadedRecording> recording_from_log(const Log& log,
+                                                           const LogSelection& selection = {});
+
+}  // namespace flyball::recording

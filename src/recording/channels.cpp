@@ -1,0 +1,301 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <flyball/core/quantity.hpp>
+#include <flyball/core/text.hpp>
+
+#include "core/try.hpp"
+#include "recording/channel_names.hpp"
+#include "recording/channels.hpp"
+
+namespace flyball::recording {
+
+namespace {
+
+using identification::TestRun;
+
+constexpr std::array<std::string_view, 2> voltage_words{"volt", "appliedv"};
+constexpr std::array<std::string_view, 4> position_words{"position", "angle", "distance", "pos"};
+constexpr std::array<std::string_view, 4> velocity_words{"velocity", "speed", "rate", "vel"};
+// Channels of these names are not what was applied to the mechanism, or where it was.
+constexpr std::array<std::string_view, 8> other_words{"battery", "bus",       "target",  "setpoint",
+                                                      "goal",    "reference", "desired", "error"};
+
+enum class Quantity { voltage, position, velocity };
+
+bool fits(const Signal& signal, Quantity quantity) {
+  const std::string name = lower(signal.name);
+  if (contains_any(name, other_words)) {
+    return false;
+  }
+  const auto unit = signal.unit.empty() ? Expected<Unit>(Unit{}) : parse_unit(signal.unit);
+  const bool known = !signal.unit.empty() && unit.has_value();
+  const Dimension dimension = known ? unit->dimension : Dimension::dimensionless;
+  switch (quantity) {
+    case Quantity::voltage:
+      return contains_any(name, voltage_words) && (!known || dimension == Dimension::voltage);
+    case Quantity::position:
+      return contains_any(name, position_words) && !contains_any(name, velocity_words) &&
+             (!known || dimension == Dimension::length || dimension == Dimension::angle);
+    case Quantity::velocity:
+      return contains_any(name, velocity_words) && (!known || dimension == Dimension::velocity ||
+                                                    dimension == Dimension::angular_velocity);
+  }
+  return false;
+}
+
+struct Candidates {
+  std::vector<const Signal*> signals;
+};
+
+Candidates candidates_for(const Log& log, const FoundTests& tests, Quantity quantity) {
+  Candidates all;
+  Candidates of_subject;
+  for (const Signal& signal : log.signals) {
+    if (!fits(signal, quantity) || samples_in(signal, tests.windows) < 2) {
+      continue;
+    }
+    all.signals.push_back(&signal);
+    if (!tests.subject.empty() && signal.name.ends_with("-" + tests.subject)) {
+      of_subject.signals.push_back(&signal);
+    }
+  }
+  return of_subject.signals.empty() ? all : of_subject;
+}
+
+std::string quantity_name(Quantity quantity) {
+  switch (quantity) {
+    case Quantity::voltage:
+      return "voltage";
+    case Quantity::position:
+      return "position";
+    case Quantity::velocity:
+      return "velocity";
+  }
+  return "";
+}
+
+Expected<const Signal*> named_channel(const Log& log, const std::string& name, Quantity quantity) {
+  if (const Signal* signal = log.find_signal(name)) {
+    return signal;
+  }
+  std::vector<std::string_view> names;
+  names.reserve(log.signals.size());
+  for (const Signal& signal : log.signals) {
+    names.push_back(signal.name);
+  }
+  const std::string nearest = nearest_name(name, names);
+  return tl::unexpected(Error(RecordingError::no_channel)
+                            .about(quantity_name(quantity) + " channel")
+                            .got(fmt::format("\"{}\", which the log does not have", name))
+                            .hint(nearest.empty() ? std::string("flyball lists the channels when "
+                                                                "it cannot choose")
+                                                  : fmt::format("did you mean \"{}\"?", nearest)));
+}
+
+Expected<const Signal*> choose(const Log& log, const FoundTests& tests, Quantity quantity,
+                               const std::string& said, const Signal* voltage) {
+  if (!said.empty()) {
+    return named_channel(log, said, quantity);
+  }
+  Candidates candidates = candidates_for(log, tests, quantity);
+  if (candidates.signals.size() > 1 && voltage != nullptr) {
+    // The voltage's namesake: "position-wrist-Coral" beside "voltage-wrist-Coral".
+    std::string wanted = lower(voltage->name);
+    const std::size_t at = wanted.find("voltage");
+    if (at != std::string::npos) {
+      wanted.replace(at, std::string_view("voltage").size(), quantity_name(quantity));
+      for (const Signal* signal : candidates.signals) {
+        if (lower(signal->name) == wanted) {
+          return signal;
+        }
+      }
+    }
+    const Side side = side_of(voltage->name);
+    if (side != Side::none) {
+      std::erase_if(candidates.signals, [&](const Signal* s) { return side_of(s->name) != side; });
+    }
+  }
+  if (candidates.signals.size() == 1) {
+    return candidates.signals.front();
+  }
+  if (candidates.signals.empty()) {
+    return nullptr;
+  }
+  std::vector<std::string> names;
+  for (const Signal* signal : candidates.signals) {
+    if (names.size() < 12) {
+      names.push_back("\"" + signal->name + "\"");
+    }
+  }
+  return tl::unexpected(
+      Error(RecordingError::ambiguous_channel)
+          .about(quantity_name(quantity) + " channel")
+          .got(fmt::format("one of {}: {}{}", candidates.signals.size(), fmt::join(names, ", "),
+                           candidates.signals.size() > names.size() ? ", …" : ""))
+          .hint(fmt::format("choose one with --{}", quantity_name(quantity))));
+}
+
+// Linear interpolation in a sorted signal; `cursor` only moves forward.
+double interpolate(const Signal& signal, double t, std::size_t& cursor) {
+  while (cursor + 1 < signal.time.size() && signal.time[cursor + 1] <= t) {
+    ++cursor;
+  }
+  if (cursor + 1 >= signal.time.size() || t <= signal.time[cursor]) {
+    return signal.value[cursor];
+  }
+  const double span = signal.time[cursor + 1] - signal.time[cursor];
+  const double share = span > 0.0 ? (t - signal.time[cursor]) / span : 0.0;
+  return signal.value[cursor] + share * (signal.value[cursor + 1] - signal.value[cursor]);
+}
+
+double hold(const Signal& signal, double t, std::size_t& cursor) {
+  // Loggers stamp the channels of one loop a few microseconds apart, in any order.
+  constexpr double same_loop = 1e-3;
+  while (cursor + 1 < signal.time.size() && signal.time[cursor + 1] <= t + same_loop) {
+    ++cursor;
+  }
+  return signal.value[cursor];
+}
+
+// The channels with the most samples in the tests, for a person to choose from.
+std::string fullest_channels(const Log& log, const FoundTests& tests) {
+  constexpr std::size_t shown = 12;
+  std::vector<std::pair<std::size_t, const Signal*>> all;
+  for (const Signal& signal : log.signals) {
+    if (const std::size_t samples = samples_in(signal, tests.windows); samples >= 2) {
+      all.emplace_back(samples, &signal);
+    }
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < std::min(shown, all.size()); ++i) {
+    names.push_back("\"" + all[i].second->name + "\"");
+  }
+  if (names.empty()) {
+    return ", none of which has two samples in the tests";
+  }
+  return fmt::format(", such as {}{}", fmt::join(names, ", "), all.size() > shown ? ", …" : "");
+}
+
+constexpr std::array every_quantity{Quantity::voltage, Quantity::position, Quantity::velocity};
+
+}  // namespace
+
+std::string drivetrain_reason(const Log& log, const FoundTests& tests,
+                              const LogSelection& selection) {
+  const bool said = selection.mechanism || !selection.voltage_channel.empty() ||
+                    !selection.position_channel.empty() || !selection.velocity_channel.empty();
+  // An elevator lifted by a left and a right motor is an elevator.
+  if (said || kind_from_name(tests.state_name)) {
+    return {};
+  }
+  if (names_drivetrain(tests.state_name)) {
+    return fmt::format("\"{}\" names it one", tests.state_name);
+  }
+  for (const Quantity quantity : every_quantity) {
+    const Signal* left = nullptr;
+    const Signal* right = nullptr;
+    for (const Signal* signal : candidates_for(log, tests, quantity).signals) {
+      const Side side = side_of(signal->name);
+      left = side == Side::left && left == nullptr ? signal : left;
+      right = side == Side::right && right == nullptr ? signal : right;
+    }
+    if (left != nullptr && right != nullptr) {
+      return fmt::format("\"{}\" and \"{}\" are a left and a right side", left->name, right->name);
+    }
+  }
+  return {};
+}
+
+std::optional<FoundChannels> one_side(const Log& log, const FoundTests& tests) {
+  std::array<const Signal*, 3> chosen{};
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    const Candidates candidates = candidates_for(log, tests, every_quantity[i]);
+    for (const Signal* signal : candidates.signals) {
+      const bool better = chosen[i] != nullptr && side_of(chosen[i]->name) != Side::left &&
+                          side_of(signal->name) == Side::left;
+      chosen[i] = chosen[i] == nullptr || better ? signal : chosen[i];
+    }
+  }
+  const auto [voltage, position, velocity] = chosen;
+  if (voltage == nullptr || (position == nullptr && velocity == nullptr)) {
+    return std::nullopt;
+  }
+  return FoundChannels{voltage, position, velocity};
+}
+
+Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
+                                      const LogSelection& selection) {
+  FoundChannels channels;
+  FLYBALL_TRY(auto voltage,
+              choose(log, tests, Quantity::voltage, selection.voltage_channel, nullptr));
+  channels.voltage = voltage;
+  auto position =
+      choose(log, tests, Quantity::position, selection.position_channel, channels.voltage);
+  auto velocity =
+      choose(log, tests, Quantity::velocity, selection.velocity_channel, channels.voltage);
+  if (!position) {
+    return tl::unexpected(std::move(position).error());
+  }
+  if (!velocity) {
+    return tl::unexpected(std::move(velocity).error());
+  }
+  channels.position = *position;
+  channels.velocity = *velocity;
+  if (channels.voltage == nullptr ||
+      (channels.position == nullptr && channels.velocity == nullptr)) {
+    return tl::unexpected(
+        Error(RecordingError::no_channel)
+            .about(channels.voltage == nullptr ? "voltage channel" : "position or velocity channel")
+            .got(fmt::format("not found by name among {} numeric channels{}", log.signals.size(),
+                             fullest_channels(log, tests)))
+            .hint(channels.voltage == nullptr
+                      ? "name the channel of the applied volts with --voltage"
+                      : "name them with --position and --velocity"));
+  }
+  return channels;
+}
+
+std::vector<TestRun> join_channels(const FoundChannels& channels,
+                                   const std::vector<CharacterizationWindow>& windows) {
+  const Signal* clock = channels.voltage;
+  for (const Signal* signal : {channels.position, channels.velocity}) {
+    if (signal != nullptr && samples_in(*signal, windows) > samples_in(*clock, windows)) {
+      clock = signal;
+    }
+  }
+  std::vector<TestRun> runs;
+  for (const CharacterizationWindow& window : windows) {
+    TestRun run;
+    run.kind = window.kind;
+    std::size_t voltage_at = 0;
+    std::size_t position_at = 0;
+    std::size_t velocity_at = 0;
+    for (const double t : clock->time) {
+      if (t < window.begin || t >= window.end) {
+        continue;
+      }
+      run.time.push_back(t);
+      run.voltage.push_back(hold(*channels.voltage, t, voltage_at));
+      if (channels.position != nullptr) {
+        run.position.push_back(interpolate(*channels.position, t, position_at));
+      }
+      if (channels.velocity != nullptr) {
+        run.velocity.push_back(interpolate(*channels.velocity, t, velocity_at));
+      }
+    }
+    if (run.time.size() >= 2) {
+      runs.push_back(std::move(run));
+    }
+  }
+  return runs;
+}
+
+}  // namespace flyball::recording
