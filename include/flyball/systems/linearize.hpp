@@ -1,6 +1,7 @@
 #pragma once
 
 #include <flyball/math/derivatives/differentiation.hpp>
+#include <flyball/systems/model.hpp>
 #include <flyball/systems/system.hpp>
 
 namespace flyball {
@@ -49,6 +50,46 @@ template <class F, class H, class State, class Input>
     return Expected<System>(tl::unexpected(std::move(check).error()));
   }
   return Expected<System>(std::move(system));
+}
+
+/// The same of a model: f is its derivative, h its output.
+///
+/// @param model  A model over a generic scalar, or one with its own `jacobians`, as AnyModel.
+/// @param x  n x 1. @param u  m x 1; fixed or dynamic.
+/// @return   Of the sizes of the model. @errors  As `check_model`; ArgumentError::not_finite for a
+///           derivative, naming the matrix.
+template <class M, class State, class Input>
+  requires Model<M>
+[[nodiscard]] auto linearize(M&& model, const Eigen::MatrixBase<State>& x,
+                             const Eigen::MatrixBase<Input>& u) {
+  using X = StateOf<M>;
+  using U = InputOf<M>;
+  using Y = decltype(output_of(model, std::declval<const X&>(), std::declval<const U&>()));
+  using System = ContinuousSystem<X::RowsAtCompileTime, U::RowsAtCompileTime, Y::RowsAtCompileTime>;
+  return check_model(model, x, u, "linearize").and_then([&]() -> Expected<System> {
+    System system;
+    if constexpr (requires { model.jacobians(x, u, system.A, system.B); }) {
+      system.A.resize(model.states(), model.states());
+      system.B.resize(model.states(), model.inputs());
+      model.jacobians(x, u, system.A, system.B);
+    } else {
+      const auto of_f = jacobians(
+          [&](const auto& at, const auto& in) { return model.derivative(at, in); }, X(x), U(u));
+      system.A = of_f.by_x;
+      system.B = of_f.by_u;
+    }
+    if constexpr (requires { model.output_jacobians(x, u, system.C, system.D); }) {
+      system.C.resize(output_count(model), model.states());
+      system.D.resize(output_count(model), model.inputs());
+      model.output_jacobians(x, u, system.C, system.D);
+    } else {
+      const auto of_h = jacobians(
+          [&](const auto& at, const auto& in) { return output_of(model, at, in); }, X(x), U(u));
+      system.C = of_h.by_x;
+      system.D = of_h.by_u;
+    }
+    return check_system(system, "linearize").map([&] { return std::move(system); });
+  });
 }
 
 /// The same with the state as output: C = I, D = 0.

@@ -9,13 +9,35 @@ namespace flyball {
 
 /// A continuous linear time-invariant system, sized at compile time or dynamic.
 ///
-/// dx/dt = A x + B u, y = C x + D u (Definition 6.3.1).
+/// dx/dt = A x + B u, y = C x + D u (Definition 6.3.1). It is a model (`model.hpp`).
 template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic, int Outputs = Eigen::Dynamic>
 struct ContinuousSystem {
   Eigen::Matrix<double, States, States> A;   ///< States x states, system matrix.
   Eigen::Matrix<double, States, Inputs> B;   ///< States x inputs, input matrix.
   Eigen::Matrix<double, Outputs, States> C;  ///< Outputs x states, output matrix.
   Eigen::Matrix<double, Outputs, Inputs> D;  ///< Outputs x inputs, feedthrough matrix.
+
+  /// The sizes, constants where the type fixes them.
+  ///@{
+  // clang-format off
+  static constexpr int states() requires(States != Eigen::Dynamic) { return States; }
+  Eigen::Index states() const requires(States == Eigen::Dynamic) { return A.rows(); }
+  static constexpr int inputs() requires(Inputs != Eigen::Dynamic) { return Inputs; }
+  Eigen::Index inputs() const requires(Inputs == Eigen::Dynamic) { return B.cols(); }
+  static constexpr int outputs() requires(Outputs != Eigen::Dynamic) { return Outputs; }
+  Eigen::Index outputs() const requires(Outputs == Eigen::Dynamic) { return C.rows(); }
+  // clang-format on
+  ///@}
+  /// A x + B u, over a generic scalar. @param x  n x 1. @param u  m x 1.
+  template <class X, class U>
+  [[nodiscard]] auto derivative(const X& x, const U& u) const {
+    return (A * x + B * u).eval();
+  }
+  /// C x + D u, over a generic scalar.
+  template <class X, class U>
+  [[nodiscard]] auto output(const X& x, const U& u) const {
+    return (C * x + D * u).eval();
+  }
 };
 
 /// A discrete linear time-invariant system; it carries its sample period, and is a type of its own
