@@ -16,7 +16,7 @@ namespace {
 
 std::string list_of_kinds() {
   std::string text = "Kinds, what a problem has [and may have], and what is answered:\n";
-  for (const solve::SolveKind& kind : study::solve_kinds()) {
+  for (const solve::SolveKind& kind : solve::solve_kinds()) {
     text +=
         fmt::format("  {:<20}{}{}  ->  {}\n", kind.name, kind.fields,
                     kind.optional.empty() ? "" : fmt::format(" [{}]", kind.optional), kind.answer);
