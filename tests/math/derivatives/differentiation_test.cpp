@@ -4,6 +4,8 @@
 #include <limits>
 #include <vector>
 
+#include <flyball/core/random.hpp>
+
 #include "support/allocation_count.hpp"
 
 namespace flyball {
@@ -332,6 +334,84 @@ TEST(Differentiation, EigenExpressionsOfDuals) {
       gradient([](const auto&) { return Dual<Eigen::Dynamic>(3.0); }, VectorXd(x)).isZero(0.0));
   EXPECT_TRUE(hessian([](const auto&) { return Dual<Eigen::Dynamic, 2>(3.0); }, VectorXd(x))
                   .hessian.isZero(0.0));
+}
+
+// Theorems 5.12.1, 5.12.2 and Corollary 5.12.3 of the book, and 9.6.1 and 9.6.2 of the entries of a
+// matrix, over random ones.
+TEST(Differentiation, TheBooksMatrixIdentities) {
+  Random random(5);
+  const auto any = [&] { return Eigen::Matrix3d::NullaryExpr([&] { return random.normal(); }); };
+  for (int trial = 0; trial < 20; ++trial) {
+    const Eigen::Matrix3d A = any();
+    const Eigen::Matrix3d C = any();
+    const Eigen::Matrix3d D = any();
+    const Eigen::Matrix3d S = C + C.transpose();
+    const Vector3d b = any().col(0);
+    const Vector3d e = any().col(0);
+    const Vector3d x = any().col(0);
+    // (A x + b)ᵀ W (F x + g)
+    const auto form = [](const auto& A_, const auto& b_, const auto& W, const auto& F,
+                         const auto& g) {
+      return [&](const auto& at) {
+        using Scalar = typename std::decay_t<decltype(at)>::Scalar;
+        const Eigen::Vector<Scalar, 3> left = A_ * at + b_.template cast<Scalar>();
+        const Eigen::Vector<Scalar, 3> right = F * at + g.template cast<Scalar>();
+        return Scalar(left.dot(W * right));
+      };
+    };
+    const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+    const Vector3d zero = Vector3d::Zero();
+    EXPECT_TRUE(gradient(form(I, zero, S, I, zero), x).isApprox(2.0 * S * x, 1e-14));
+    EXPECT_TRUE(
+        gradient(form(A, b, C, D, e), x)
+            .isApprox(A.transpose() * C * (D * x + e) + D.transpose() * C.transpose() * (A * x + b),
+                      1e-14));
+    EXPECT_TRUE(
+        gradient(form(A, b, S, A, b), x).isApprox(2.0 * A.transpose() * S * (A * x + b), 1e-14));
+
+    const auto trace_of_square = [&](const auto& at) {
+      using Scalar = typename std::decay_t<decltype(at)>::Scalar;
+      const Eigen::Matrix<Scalar, 3, 3> M = at.reshaped(3, 3);
+      return Scalar((M * S.cast<Scalar>() * M.transpose()).trace());
+    };
+    const auto trace_of_product = [&](const auto& at) {
+      using Scalar = typename std::decay_t<decltype(at)>::Scalar;
+      const Eigen::Matrix<Scalar, 3, 3> M = at.reshaped(3, 3);
+      return Scalar((M * C.cast<Scalar>()).trace());
+    };
+    const Eigen::Vector<double, 9> entries = A.reshaped();
+    EXPECT_TRUE(gradient(trace_of_square, entries).reshaped(3, 3).isApprox(2.0 * A * S, 1e-14));
+    EXPECT_TRUE(gradient(trace_of_product, entries).reshaped(3, 3).isApprox(C.transpose(), 1e-15));
+  }
+}
+
+// Each row of the book's Table 4.2, at points on both sides of 1: the integral's derivative is f,
+// and that of f is f'.
+TEST(Differentiation, TheBooksTableOfDerivatives) {
+  using D = Dual<1>;
+  const auto row = [](auto integral, auto f, auto slope) {
+    for (const double x : {0.3, 1.7}) {
+      EXPECT_NEAR(integral(D::variable(x, 0)).gradient(0), f(x), 1e-15 * std::abs(f(x)));
+      EXPECT_NEAR(f(D::variable(x, 0)).gradient(0), slope(x), 1e-15 * std::abs(slope(x)));
+    }
+  };
+  using std::cos, std::exp, std::pow, std::sin;
+  constexpr double a = 2.5;
+  row([](auto x) { return a * x; }, [](auto x) { return 0.0 * x + a; }, [](double) { return 0.0; });
+  row([](auto x) { return 0.5 * a * x * x; }, [](auto x) { return a * x; },
+      [](double) { return a; });
+  row([](auto x) { return pow(x, a + 1.0) / (a + 1.0); }, [](auto x) { return pow(x, a); },
+      [](double x) { return a * pow(x, a - 1.0); });
+  row([](auto x) { return exp(a * x) / a; }, [](auto x) { return exp(a * x); },
+      [](double x) { return a * exp(a * x); });
+  row([](auto x) { return -cos(x); }, [](auto x) { return sin(x); },
+      [](double x) { return cos(x); });
+  row([](auto x) { return sin(x); }, [](auto x) { return cos(x); },
+      [](double x) { return -sin(x); });
+  row([](auto x) { return cos(x); }, [](auto x) { return -sin(x); },
+      [](double x) { return -cos(x); });
+  row([](auto x) { return -sin(x); }, [](auto x) { return -cos(x); },
+      [](double x) { return sin(x); });
 }
 
 TEST(Differentiation, FixedSizesDoNotAllocate) {
