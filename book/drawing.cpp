@@ -37,6 +37,28 @@ Plot response_plot(const FigureResult& figure, const std::vector<ResponsePanel>&
   return plot;
 }
 
+std::vector<ResponsePanel> add_states(FigureResult& figure, const std::vector<StateLabel>& states,
+                                      const Eigen::MatrixXd& r, const Eigen::MatrixXd& x) {
+  std::vector<ResponsePanel> panels;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    const auto& [name, unit, label] = states[i];
+    const auto row = static_cast<Eigen::Index>(i);
+    figure.columns.push_back({"reference_" + name, unit, values(r.row(row))});
+    figure.columns.push_back({name, unit, values(x.row(row))});
+    panels.push_back({label + " (" + unit + ")", name});
+  }
+  return panels;
+}
+
+std::string gain_name(const std::vector<StateLabel>& states, std::size_t state) {
+  return states.size() == 1 ? "K" : state == 0 ? "K_p" : "K_d";
+}
+
+std::string gain_unit(const StateLabel& state) {
+  const bool quotient = state.unit.find('/') != std::string::npos;
+  return quotient ? "V/(" + state.unit + ")" : "V/" + state.unit;
+}
+
 Plot line_plot(const FigureResult& figure, const std::string& y_label,
                const std::vector<PlotColumn>& columns) {
   PlotPanel panel{.y_label = y_label};

@@ -38,6 +38,26 @@ struct ResponsePanel {
 [[nodiscard]] Plot response_plot(const FigureResult& figure,
                                  const std::vector<ResponsePanel>& panels);
 
+/// A state of a plant as a figure shows it.
+struct StateLabel {
+  std::string name;   ///< Of its column: "velocity".
+  std::string unit;   ///< "m/s"
+  std::string label;  ///< Of its axis: "Velocity".
+};
+
+/// Appends the columns "reference_<name>" and "<name>" of each state.
+/// @param r, x  States x samples. @return A panel for each state.
+[[nodiscard]] std::vector<ResponsePanel> add_states(FigureResult& figure,
+                                                    const std::vector<StateLabel>& states,
+                                                    const Eigen::MatrixXd& r,
+                                                    const Eigen::MatrixXd& x);
+
+/// "K" of a single state; "K_p" and "K_d" of a position and its velocity.
+[[nodiscard]] std::string gain_name(const std::vector<StateLabel>& states, std::size_t state);
+
+/// Volts for each unit of a state: "V/m", "V/(m/s)".
+[[nodiscard]] std::string gain_unit(const StateLabel& state);
+
 /// A column, what it is called in the legend, and how it is drawn.
 struct PlotColumn {
   std::string column;

@@ -4,12 +4,10 @@
 #include <flyball/control/feedforward.hpp>
 #include <flyball/control/latency.hpp>
 #include <flyball/control/lqr.hpp>
-#include <flyball/mechanisms/elevator.hpp>
-#include <flyball/mechanisms/flywheel.hpp>
 #include <flyball/systems/discretize.hpp>
 
-#include "book/drawing.hpp"
 #include "book/figure_functions.hpp"
+#include "book/mechanism_case_study.hpp"
 
 namespace flyball::book {
 
@@ -26,9 +24,7 @@ struct DelayStudy {
   Time delay;
   double height = 0.0;  ///< Of the step in the first state.
   bool compensated = false;
-  std::vector<std::string> names;   ///< Of the states: "velocity".
-  std::vector<std::string> units;   ///< "m/s"
-  std::vector<std::string> labels;  ///< "Velocity"
+  std::vector<StateLabel> states;
 };
 
 /// A loop whose input reaches the plant later, by a whole number of periods. The recorded voltage
@@ -63,18 +59,13 @@ FigureResult delayed_loop(const DelayStudy& study) {
 
   FigureResult figure{.id = study.id, .title = study.title};
   figure.columns.push_back({"time", "s", time});
-  std::vector<ResponsePanel> panels;
-  for (std::size_t i = 0; i < study.names.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    figure.columns.push_back({"reference_" + study.names[i], study.units[i], values(r.row(row))});
-    figure.columns.push_back({study.names[i], study.units[i], values(states.row(row))});
-    const std::string gain = study.names.size() == 1 ? "K" : i == 0 ? "K_p" : "K_d";
-    // "V/m", "V/(m/s)"
-    const bool quotient = study.units[i].find('/') != std::string::npos;
-    const std::string unit = quotient ? "V/(" + study.units[i] + ")" : "V/" + study.units[i];
-    figure.numbers.push_back({gain, unit, K(row)});
-    panels.push_back({study.labels[i] + " (" + study.units[i] + ")", study.names[i],
-                      "State (" + gain + " = " + format_number(K(row), 5) + " " + unit + ")"});
+  auto panels = add_states(figure, study.states, r, states);
+  for (std::size_t i = 0; i < panels.size(); ++i) {
+    const std::string gain = gain_name(study.states, i);
+    const std::string unit = gain_unit(study.states[i]);
+    const double value = K(static_cast<Eigen::Index>(i));
+    figure.numbers.push_back({gain, unit, value});
+    panels[i].label = "State (" + gain + " = " + format_number(value, 5) + " " + unit + ")";
   }
   figure.columns.push_back({"voltage", "V", voltage});
   panels.push_back({"Voltage (V)", "voltage", "Input, as it arrives"});
@@ -83,12 +74,7 @@ FigureResult delayed_loop(const DelayStudy& study) {
 }
 
 FigureResult elevator_delay(std::string id, std::string title, bool compensated) {
-  const auto elevator = mechanisms::elevator({.motor = mechanisms::cim(2),
-                                              .gearing = 42.0 / 12.0 * 40.0 / 14.0,
-                                              .mass = 6.803886_kg,
-                                              .drum_radius = 0.02762679089_m})
-                            .value();
-  const auto plant = discretize(elevator, 5_ms).value();
+  const auto plant = discretize(case_study_elevator(), 5_ms).value();
   return delayed_loop({.id = std::move(id),
                        .title = std::move(title),
                        .plant = {plant.A, plant.B, plant.C, plant.D, plant.period},
@@ -96,9 +82,7 @@ FigureResult elevator_delay(std::string id, std::string title, bool compensated)
                        .delay = 50_ms,
                        .height = 1.524,
                        .compensated = compensated,
-                       .names = {"position", "velocity"},
-                       .units = {"m", "m/s"},
-                       .labels = {"Position", "Velocity"}});
+                       .states = {{"position", "m", "Position"}, {"velocity", "m/s", "Velocity"}}});
 }
 
 /// A mechanism from identified gains, dv/dt = -kV/kA v + 1/kA u (Theorem 14.3.1).
@@ -114,9 +98,7 @@ FigureResult velocity_delay(std::string id, std::string title, double kV, double
                        .delay = delay,
                        .height = height,
                        .compensated = compensated,
-                       .names = {"velocity"},
-                       .units = {std::move(unit)},
-                       .labels = {std::move(label)}});
+                       .states = {{"velocity", std::move(unit), std::move(label)}}});
 }
 
 FigureResult drivetrain_delay(std::string id, std::string title, bool compensated) {

@@ -1,11 +1,10 @@
 #include <algorithm>
 
 #include <flyball/control/lqr.hpp>
-#include <flyball/mechanisms/flywheel.hpp>
 #include <flyball/systems/discretize.hpp>
 
-#include "book/drawing.hpp"
 #include "book/figure_functions.hpp"
+#include "book/mechanism_case_study.hpp"
 
 namespace flyball::book {
 
@@ -17,12 +16,8 @@ namespace {
 /// (Definition 2.3.1).
 /// @param K_i  V/rad; 0: proportional alone.
 FigureResult flywheel_pi(std::string id, std::string title, double K_i) {
-  const auto flywheel = mechanisms::flywheel({.motor = mechanisms::vex_775pro(),
-                                              .gearing = 12.0 / 18.0,
-                                              .moment_of_inertia = 0.00032_kg_m2})
-                            .value();
   const Time period = 5_ms;
-  const auto plant = discretize(flywheel, period).value();
+  const auto plant = discretize(case_study_flywheel(), period).value();
 
   // A proportional gain by what is tolerable: 200 rad/s, 12 V.
   const double K_p = lqr(plant, bryson({200.0}), bryson({12.0})).value().K(0);

@@ -5,12 +5,11 @@
 #include <string>
 #include <utility>
 
-#include <flyball/mechanisms/elevator.hpp>
 #include <flyball/systems/conversion.hpp>
 #include <flyball/systems/discretize.hpp>
 
-#include "book/drawing.hpp"
 #include "book/figure_functions.hpp"
+#include "book/mechanism_case_study.hpp"
 
 namespace flyball::book {
 
@@ -75,11 +74,7 @@ FigureResult table_7_1() {
 /// Table 7.2: discretisation methods, on the elevator at three sample periods (section 7.3.1):
 /// forward Euler is unstable at each of the longer ones.
 FigureResult table_7_2() {
-  const auto elevator = mechanisms::elevator({.motor = mechanisms::cim(2),
-                                              .gearing = 42.0 / 12.0 * 40.0 / 14.0,
-                                              .mass = 6.803886_kg,
-                                              .drum_radius = 0.02762679089_m})
-                            .value();
+  const auto elevator = case_study_elevator();
   FigureResult figure{.id = "table 7.2", .title = "Discretisation methods"};
   figure.columns = {{"period", "s", {0.1, 0.05, 0.01}}};
   Plot plot{.title = figure.title, .x_label = "Sample period (s)"};
