@@ -1,12 +1,15 @@
-# cmake -D OUTPUT=<file.cpp> -D REFERENCES=<a.json|b.json…> -P embed_references.cmake
+# cmake -D OUTPUT=<file.cpp> -D ITEMS=<items.csv> -D REFERENCES=<a.json|b.json…> -P
+# embed_references.cmake
 #
-# Puts the reference files into a source, so that the library finds them wherever it runs.
+# Puts the list of the book's items and the reference files into a source, so that the library finds
+# them wherever it runs.
 string(REPLACE "|" ";" REFERENCES "${REFERENCES}")
 set(literals "")
 foreach(file IN LISTS REFERENCES)
   file(READ "${file}" json)
   string(APPEND literals "    R\"reference(${json})reference\",\n")
 endforeach()
+file(READ "${ITEMS}" items)
 file(
   WRITE "${OUTPUT}"
   "#include <array>
@@ -24,6 +27,10 @@ ${literals}});
 
 std::span<const std::string_view> embedded_references() {
   return references;
+}
+
+std::string_view book_items() {
+  return R\"items(${items})items\";
 }
 
 }  // namespace flyball::book

@@ -2,7 +2,8 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
-#include <limits>
+#include <optional>
+#include <ranges>
 
 #include <fmt/format.h>
 
@@ -11,6 +12,7 @@
 
 #include "book/figure_functions.hpp"
 #include "book/figures.hpp"
+#include "book/reference.hpp"
 
 namespace flyball::book {
 
@@ -63,31 +65,15 @@ constexpr std::array table{
     FigureEntry{"B.5", "Flywheel with a delay of 80 ms", "B.4.2", compute<figure_B_5>},
     FigureEntry{"B.6", "Flywheel with a delay of 80 ms, compensated", "B.4.2", compute<figure_B_6>},
     FigureEntry{"C.1", "Second-order CIM motor response with plant inversion, weighted and not",
-                "C.1", compute<figure_C_1>},
-    FigureEntry{"C.2", "Second-order CIM motor response with various feedforwards", "C.2",
+                "C.1.2", compute<figure_C_1>},
+    FigureEntry{"C.2", "Second-order CIM motor response with various feedforwards", "C.2.3",
                 compute<figure_C_2>},
-    FigureEntry{"C.3", "Second-order CIM motor response with plant inversions", "C.2",
+    FigureEntry{"C.3", "Second-order CIM motor response with plant inversions", "C.2.3",
                 compute<figure_C_3>},
     FigureEntry{"table 7.1", "Mapping from the s-plane to the z-plane", "7.1", compute<table_7_1>},
     FigureEntry{"table 7.2", "Discretisation methods", "7.3.1", compute<table_7_2>},
     FigureEntry{"table 7.3", "Taylor series of the discretisation methods", "7.3.1",
                 compute<table_7_3>},
-};
-
-/// Drawings of the chapters above, which show no numbers.
-struct Drawing {
-  std::string_view id;
-  std::string_view what;
-};
-constexpr std::array drawings{
-    Drawing{"2.1", "the block diagram of a P controller"},
-    Drawing{"2.2", "the block diagram of a PD controller"},
-    Drawing{"2.4", "the block diagram of a PI controller"},
-    Drawing{"2.8", "the block diagram of a PID controller"},
-    Drawing{"6.2", "the sketch of an elevator"},
-    Drawing{"6.4", "the sketch of a flywheel"},
-    Drawing{"6.8", "the sketch of a single-jointed arm"},
-    Drawing{"7.9", "the block diagram of plant inversion"},
 };
 
 /// "6.3" of "Figure 6.3", "fig. 6.3" or " 6.3 ", "TABLE7.1" of "table 7.1"; figures of the
@@ -109,17 +95,42 @@ std::string bare_id(std::string_view text) {
 
 /// The figures whose numbers differ the least from one that is not there.
 std::string nearest_ids(std::string_view id) {
-  std::size_t least = std::numeric_limits<std::size_t>::max();
-  for (const FigureEntry& entry : table) {
-    least = std::min(least, edit_distance(id, entry.id));
-  }
+  const auto distance = [&](const FigureEntry& entry) {
+    return edit_distance(id, bare_id(entry.id));
+  };
+  const std::size_t least = std::ranges::min(table | std::views::transform(distance));
   std::string listed;
   for (const FigureEntry& entry : table) {
-    if (edit_distance(id, entry.id) == least) {
+    if (distance(entry) == least) {
       listed += fmt::format("{}{}", listed.empty() ? "" : ", ", entry.id);
     }
   }
   return listed;
+}
+
+/// A figure or table of the book, computed here or not.
+struct BookItem {
+  std::string_view section;
+  bool drawing = false;
+  std::string_view topic;
+};
+
+/// Its row of book/items.csv; none for a number that the book does not have.
+std::optional<BookItem> find_item(std::string_view id) {
+  constexpr std::string_view word = "TABLE";
+  const bool is_table = id.starts_with(word);
+  const std::string name =
+      fmt::format("\n{} {},", is_table ? "Table" : "Figure", id.substr(is_table ? word.size() : 0));
+  std::string_view row = book_items();
+  const std::size_t place = row.find(name);
+  if (place == std::string_view::npos) {
+    return std::nullopt;
+  }
+  row.remove_prefix(place + name.size());
+  row = row.substr(0, row.find('\n'));
+  const std::size_t first = row.find(',');
+  const std::size_t last = row.rfind(',');
+  return BookItem{row.substr(0, first), last > first + 1, row.substr(last + 1)};
 }
 
 }  // namespace
@@ -135,22 +146,19 @@ Expected<const FigureEntry*> find_figure(std::string_view id) {
   if (found != table.end()) {
     return found;
   }
-  const auto* drawing = std::ranges::find(drawings, wanted, &Drawing::id);
-  if (drawing != drawings.end()) {
-    return tl::unexpected(
-        Error(ArgumentError::unknown_name)
-            .in("book")
-            .about("figure")
-            .got(fmt::format("\"{}\", {}", id, drawing->what))
-            .expected("a figure that is computed: this one is a drawing, without numbers")
-            .hint(fmt::format("the nearest: {}; `flyball book --list` shows all",
-                              nearest_ids(wanted))));
+  std::string got = fmt::format("\"{}\"", id);
+  std::string expected = "a figure or table of the book";
+  if (const auto item = find_item(wanted)) {
+    got += fmt::format(", {}", item->topic);
+    expected = "a figure that is computed: this one ";
+    expected += item->drawing ? "is a drawing, without numbers"
+                              : fmt::format("of section {} is not computed yet", item->section);
   }
   return tl::unexpected(Error(ArgumentError::unknown_name)
                             .in("book")
                             .about("figure")
-                            .got(fmt::format("\"{}\"", id))
-                            .expected("a figure that is there")
+                            .got(std::move(got))
+                            .expected(std::move(expected))
                             .hint(fmt::format("the nearest: {}; `flyball book --list` shows all",
                                               nearest_ids(wanted))));
 }

@@ -47,6 +47,9 @@ struct FigureReference {
 /// The files of book/reference, as the build put them into the library.
 [[nodiscard]] std::span<const std::string_view> embedded_references();
 
+/// book/items.csv, every numbered item of the book, as the build put it into the library.
+[[nodiscard]] std::string_view book_items();
+
 /// Compares what was computed with a reference: one check a number and a series.
 [[nodiscard]] std::vector<FigureCheck> compare(const FigureResult& figure,
                                                const FigureReference& reference);

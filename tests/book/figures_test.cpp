@@ -70,9 +70,14 @@ TEST(Figures, AreFoundAsPeopleWriteThem) {
 TEST(Figures, AnUnknownOneIsAnsweredWithTheNearest) {
   for (const auto& [text, nearest] : std::vector<std::pair<std::string, std::string>>{
            {"6.4", "a drawing, without numbers"},
-           {"Figure 7.9", "the block diagram of plant inversion"},
-           {"6.14", "the nearest: 6.1;"},
-           {"8.10", "the nearest: 7.10;"},
+           {"Figure 7.9", "block diagram of plant inversion"},
+           {"figure a.10", "a drawing, without numbers"},
+           {"6.14", "a figure or table of the book; the nearest: 6.1;"},
+           {"8.10", "this one of section 8.8.2 is not computed yet; the nearest: 7.10;"},
+           {"table e.3", "series of the discretisation methods of scalars"},
+           {"table 5.1", "the nearest: table 7.1;"},
+           {"9.9", "variance of the robot"},
+           {"theorem 6.9.1", "a figure or table of the book"},
            {"figure 2.4", "the nearest: 2.3, 2.5, 2.6, 2.7, 2.9, 7.4, B.4;"},
            {"", "the nearest: 2.3, 2.5,"}}) {
     const auto entry = find_figure(text);
