@@ -216,7 +216,7 @@ std::string message(std::string_view text, Dimension dimension, std::string_view
   return to_string(parse_quantity(text, dimension, name).error());
 }
 
-TEST(ParseQuantity, MessagesNameTheThingAndTheMend) {
+TEST(ParseQuantity, MessagesNameTheThingAndWhatToDo) {
   EXPECT_EQ(message("8 m", Dimension::mass, "mass"),
             "mass is \"8 m\", a length; it must be a mass such as \"8 kg\" or \"18 lb\"");
   EXPECT_EQ(message("20", Dimension::time, "period"),

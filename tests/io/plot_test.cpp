@@ -249,7 +249,7 @@ class WithPath {
   std::string before_;
 };
 
-TEST(Plot, AMissingGnuplotIsToldWithTheMend) {
+TEST(Plot, AMissingGnuplotIsToldWithWhatToDo) {
   const TemporaryFolder folder;
   const WithPath empty(folder.file("."));
   const Expected<std::string> svg = render_svg(example(3));

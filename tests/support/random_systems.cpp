@@ -144,7 +144,7 @@ void RandomSystems::move_poles(MatrixXd& A, bool stable) {
     const double radius = poles.cwiseAbs().maxCoeff();
     const double wanted =
         stable ? 1.0 - std::pow(10.0, random_.uniform(-3.0, -0.1)) : random_.uniform(1.01, 2.0);
-    // Of a matrix that is nilpotent but for rounding the norm, lest it be blown up.
+    // Of a matrix that is nilpotent but for rounding the norm, so that it is not blown up.
     if (A.norm() > 0.0) {
       A *= wanted / (radius > 1e-3 * A.norm() ? radius : A.norm());
     }
