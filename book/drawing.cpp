@@ -1,5 +1,7 @@
 #include <algorithm>
 
+#include <flyball/systems/response.hpp>
+
 #include "book/drawing.hpp"
 
 namespace flyball::book {
@@ -75,13 +77,7 @@ Plot line_plot(const FigureResult& figure, const std::string& y_label,
 }
 
 Eigen::VectorXd step_response(const DiscreteSystem<>& system, Eigen::Index samples) {
-  Eigen::VectorXd x = Eigen::VectorXd::Zero(system.A.rows());
-  Eigen::VectorXd y(samples);
-  for (Eigen::Index k = 0; k < samples; ++k) {
-    y(k) = system.C.row(0).dot(x) + system.D(0, 0);
-    x = system.A * x + system.B.col(0);
-  }
-  return y;
+  return flyball::step_response(system, 0, ResponseTimes{system.period, samples}).value().y.col(0);
 }
 
 Eigen::MatrixXd pulse_reference(double height, Eigen::Index states, Time period) {

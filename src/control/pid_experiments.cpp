@@ -5,6 +5,7 @@
 
 #include <flyball/control/pid_tuning.hpp>
 #include <flyball/core/random.hpp>
+#include <flyball/systems/response.hpp>
 
 #include "control/single_loop.hpp"
 #include "core/format.hpp"
@@ -99,10 +100,7 @@ Expected<UltimatePoint> relay_experiment(const DiscreteSystem<>& plant, double h
                     .finite(bias, "bias")
                     .positive(duration, "duration", "s"));
   const double T = plant.period.si();
-  const auto steps = detail::steps_of(duration, T, where);
-  if (!steps) {
-    return tl::unexpected(steps.error());
-  }
+  FLYBALL_TRY(const auto steps, detail::steps_of(duration, T, where));
   Eigen::VectorXd x = Eigen::VectorXd::Zero(plant.A.rows());
   int side = 1;
   std::vector<double> upward;  // Times at which the relay switched on.
@@ -111,7 +109,7 @@ Expected<UltimatePoint> relay_experiment(const DiscreteSystem<>& plant, double h
   double low = 0.0;
   int switches = 0;
   double before = 0.0;
-  for (int k = 0; k <= *steps && x.allFinite(); ++k) {
+  for (int k = 0; k <= steps && x.allFinite(); ++k) {
     const double u_before = bias + side * height;
     const double y = plant.C.row(0).dot(x) + plant.D(0, 0) * u_before;
     high = std::max(high, y);
@@ -217,14 +215,12 @@ Expected<ReactionCurve> reaction_curve(const DiscreteSystem<>& plant, double inp
   FLYBALL_CHECK(detail::check_single_loop(plant, where));
   const double T = plant.period.si();
   FLYBALL_TRY(const auto steps, detail::steps_of(duration, T, where));
-  std::vector<double> times, values;
-  Eigen::VectorXd x = Eigen::VectorXd::Zero(plant.A.rows());
-  for (int k = 0; k <= steps; ++k) {
-    times.push_back(k * T);
-    values.push_back(plant.C.row(0).dot(x) + (k > 0 ? plant.D(0, 0) * input_step : 0.0));
-    x = (plant.A * x + plant.B.col(0) * input_step).eval();
-  }
-  return reaction_curve(times, values, input_step);
+  FLYBALL_TRY(auto step, forced_response(plant, Eigen::VectorXd::Constant(steps + 1, input_step),
+                                         Eigen::VectorXd::Zero(plant.A.rows())));
+  step.y(0, 0) = 0.0;  // Before the step.
+  const auto count = static_cast<std::size_t>(steps) + 1;
+  return reaction_curve(std::span(step.time.data(), count), std::span(step.y.data(), count),
+                        input_step);
 }
 
 }  // namespace flyball

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include <flyball/control/margins.hpp>
+#include <flyball/systems/response.hpp>
 
 #include "control/sampled_loop.hpp"
 #include "core/format.hpp"
@@ -15,37 +16,32 @@ namespace {
 
 constexpr std::string_view where = "robustness_grid";
 
-struct StepResponse {
-  double overshoot;
-  double steady_error;
-};
-
-// The response to a unit step of the first reference. The reference enters the input through
-// F = K + B⁺(I - A), and the observer through the input.
-StepResponse step_response(const detail::SampledLoop& loop, const Eigen::MatrixXd& C,
-                           const DiscreteSystem<>& model, double feedforward, double radius) {
+// Overshoot and steady error of the step response to the first reference, which enters the input
+// through F = K + B⁺(I - A), and the observer through the input.
+Expected<void> judge_step(const detail::SampledLoop& loop, const Eigen::MatrixXd& C,
+                          const DiscreteSystem<>& model, double feedforward,
+                          RobustnessCase& result) {
   const Eigen::MatrixXd M = loop.closed(1.0);
-  Eigen::VectorXd drive = Eigen::VectorXd::Zero(M.rows());
-  drive.head(loop.delayed_states()) = loop.delayed_B() * feedforward;
-  drive.tail(model.A.rows()) = model.B * feedforward;
-  const Eigen::RowVectorXd output = C.row(0);
+  Eigen::MatrixXd drive = Eigen::MatrixXd::Zero(M.rows(), 1);
+  drive.topRows(loop.delayed_states()) = loop.delayed_B() * feedforward;
+  drive.bottomRows(model.A.rows()) = model.B * feedforward;
+  Eigen::MatrixXd output = Eigen::MatrixXd::Zero(1, M.rows());
+  output.leftCols(loop.plant_states()) = C.row(0);
 
-  const Eigen::Index n = loop.plant_states();
   const Eigen::MatrixXd I_M = Eigen::MatrixXd::Identity(M.rows(), M.cols()) - M;
-  const Eigen::VectorXd settled = detail::solve_linear(I_M, drive);
-  const double final_value = output.dot(settled.head(n));
+  const double final_value = output.row(0).dot(detail::solve_linear(I_M, drive).col(0));
 
   // Until what is left of the transient is below 1e-9, within reason.
   constexpr double most_samples = 20000.0;
-  const double decay = std::log(std::clamp(radius, 1e-3, 1.0 - 1e-12));
-  const auto samples = static_cast<int>(std::min(std::log(1e-9) / decay + 10.0, most_samples));
-  Eigen::VectorXd x = Eigen::VectorXd::Zero(M.rows());
-  double peak = 0.0;
-  for (int k = 0; k < samples; ++k) {
-    x = (M * x + drive).eval();
-    peak = std::max(peak, output.dot(x.head(n)) / final_value);
-  }
-  return {std::max(0.0, peak - 1.0), final_value - 1.0};
+  const double decay = std::log(std::clamp(result.spectral_radius, 1e-3, 1.0 - 1e-12));
+  const auto steps =
+      static_cast<Eigen::Index>(std::min(std::log(1e-9) / decay + 10.0, most_samples));
+  FLYBALL_TRY(const auto response,
+              step_response({M, drive, output, Eigen::MatrixXd::Zero(1, 1), model.period}, 0,
+                            ResponseTimes{model.period, steps + 1}));
+  result.overshoot = std::max(0.0, (response.y / final_value).maxCoeff() - 1.0);
+  result.steady_error = final_value - 1.0;
+  return {};
 }
 
 Expected<void> check_factors(const std::vector<double>& factors, std::string_view name) {
@@ -91,9 +87,7 @@ Expected<RobustnessGrid> robustness_grid(const MatrixRef& A, const MatrixRef& B,
       result.spectral_radius = detail::spectral_radius(sampled.closed(1.0));
       result.stable = result.spectral_radius < 1.0;
       if (result.stable) {
-        const StepResponse step = step_response(sampled, C, model, F(0, 0), result.spectral_radius);
-        result.overshoot = step.overshoot;
-        result.steady_error = step.steady_error;
+        FLYBALL_CHECK(judge_step(sampled, C, model, F(0, 0), result));
       } else {
         result.overshoot = std::numeric_limits<double>::infinity();
         result.steady_error = std::numeric_limits<double>::infinity();

@@ -4,10 +4,10 @@
 #include <flyball/systems/conversion.hpp>
 #include <flyball/systems/discretize.hpp>
 #include <flyball/systems/gramian.hpp>
+#include <flyball/systems/response.hpp>
 
 #include "core/try.hpp"
 #include "solve/kernels.hpp"
-#include "solve/linear_response.hpp"
 #include "solve/structure_answer.hpp"
 
 // Systems: conversions, what they are like, what they do.
@@ -127,36 +127,27 @@ Outcome solve_analyze(ProblemReader& problem, AnswerWriter& answer) {
 
 /// x and y at the samples of u, exactly, the input held between them.
 Outcome solve_simulate(ProblemReader& problem, AnswerWriter& answer) {
-  constexpr std::string_view where = "simulate";
   const ContinuousSystem<> system = problem.system();
   const TimeDomain domain = problem.domain();
   const MatrixXd u = problem.columns("u");
   const Eigen::Index n = system.A.rows();
   const MatrixXd x0 = problem.has("x0") ? problem.columns("x0") : MatrixXd(MatrixXd::Zero(n, 1));
-  const double period = problem.has("T") ? problem.number("T") : 1.0;
+  const Time period(problem.has("T") ? problem.number("T") : 1.0);
   if (!problem.status()) {
     return problem.status();
   }
-  FLYBALL_CHECK(check_system(system, where));
-  FLYBALL_CHECK(Checks(where)
-                    .shape(u, u.rows(), system.B.cols(), "u", "samples x inputs")
-                    .shape(x0, n, 1, "x0", "states x 1")
-                    .finite(u, "u")
-                    .finite(x0, "x0"));
-  DiscretizedMatrices model{system.A, system.B};
-  if (domain == TimeDomain::continuous) {
-    if (!problem.has("T")) {
-      return tl::unexpected(Error(ArgumentError::malformed)
-                                .in(std::string(where))
-                                .about("T")
-                                .got("left out")
-                                .expected("the time between the rows of u in seconds"));
-    }
-    FLYBALL_TRY(auto sampled, discretize_zoh(system.A, system.B, Time(period)));
-    model = std::move(sampled);
+  if (domain == TimeDomain::continuous && !problem.has("T")) {
+    return tl::unexpected(Error(ArgumentError::malformed)
+                              .in("simulate")
+                              .about("T")
+                              .got("left out")
+                              .expected("the time between the rows of u in seconds"));
   }
-  const LinearResponse response = linear_response(model, system.C, system.D, u, x0);
-  FLYBALL_CHECK(check_finite(response.x, where, "x"));
+  const auto answered =
+      domain == TimeDomain::continuous
+          ? forced_response(system, u, x0, period)
+          : forced_response({system.A, system.B, system.C, system.D, period}, u, x0);
+  FLYBALL_TRY(const auto response, answered);
   answer.add("x", response.x);
   answer.add("y", response.y);
   return {};

@@ -1,77 +1,32 @@
 #include <flyball/study/analyze.hpp>
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 #include <fmt/format.h>
 
 #include <flyball/systems/interconnection.hpp>
 
 #include "core/try.hpp"
-#include "solve/linear_response.hpp"
 
 namespace flyball::study {
 
 namespace {
 
-using Eigen::MatrixXd;
-
 constexpr Eigen::Index most_steps = 16;  ///< Inputs whose step responses can still be looked at.
-
-/// Until the slowest mode has settled, and fine enough for the fastest; a growing mode is shown for
-/// a few of its time constants.
-struct Horizon {
-  double end = 1.0;
-  double step = 0.01;
-};
-
-Horizon horizon_of(const ModalAnalysis& analysis) {
-  double slowest = 0.0;
-  double fastest = 0.0;
-  double growing = std::numeric_limits<double>::infinity();
-  for (const Mode& mode : analysis.modes) {
-    const double tau = std::abs(mode.time_constant);
-    if (std::isfinite(tau) && tau > 0.0 && mode.stability != Stability::marginal) {
-      slowest = std::max(slowest, tau);
-      growing = mode.stability == Stability::unstable ? std::min(growing, tau) : growing;
-    }
-    if (std::isfinite(mode.natural_frequency)) {
-      fastest = std::max(fastest, mode.natural_frequency);
-    }
-  }
-  Horizon horizon;
-  if (slowest > 0.0) {
-    horizon.end = std::min(6.0 * slowest, 5.0 * growing);
-  } else if (fastest > 0.0) {
-    horizon.end = 40.0 / fastest;  // about six turns of an undamped oscillation
-  }
-  horizon.step = horizon.end / 600.0;
-  return horizon;
-}
 
 Expected<std::vector<StepResponse>> step_responses(const ModelFile& model,
                                                    const ModalAnalysis& modes) {
-  const ContinuousSystem<>& system = model.system;
-  const Horizon horizon = horizon_of(modes);
-  DiscretizedMatrices sampled{system.A, system.B};
-  double step = horizon.step;
-  if (model.domain == TimeDomain::continuous) {
-    FLYBALL_TRY(auto discrete, discretize_zoh(system.A, system.B, Time(step)));
-    sampled = std::move(discrete);
-  } else {
-    step = model.period->si();
+  const auto& [A, B, C, D] = model.system;
+  const bool continuous = model.domain == TimeDomain::continuous;
+  const ResponseTimes times = response_times(modes, continuous ? std::nullopt : model.period);
+  DiscreteSystem<> sampled{A, B, C, D, times.step};
+  if (continuous) {
+    FLYBALL_TRY(sampled, discretize(model.system, times.step));
   }
-  const auto samples =
-      static_cast<Eigen::Index>(std::clamp(std::ceil(horizon.end / step), 10.0, 2000.0) + 1.0);
-  const Eigen::VectorXd at_rest = Eigen::VectorXd::Zero(system.A.rows());
   std::vector<StepResponse> responses;
-  for (Eigen::Index input = 0; input < std::min(system.B.cols(), most_steps); ++input) {
-    MatrixXd u = MatrixXd::Zero(samples, system.B.cols());
-    u.col(input).setOnes();
-    responses.push_back(
-        {Eigen::VectorXd::LinSpaced(samples, 0.0, step * static_cast<double>(samples - 1)),
-         solve::linear_response(sampled, system.C, system.D, u, at_rest).y});
+  for (Eigen::Index input = 0; input < std::min(B.cols(), most_steps); ++input) {
+    FLYBALL_TRY(auto response, step_response(sampled, input, times));
+    responses.push_back(std::move(response));
   }
   return responses;
 }

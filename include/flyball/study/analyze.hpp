@@ -8,6 +8,7 @@
 #include <flyball/study/project.hpp>
 #include <flyball/systems/discretize.hpp>
 #include <flyball/systems/norms.hpp>
+#include <flyball/systems/response.hpp>
 #include <flyball/systems/sampling.hpp>
 #include <flyball/systems/structure.hpp>
 
@@ -54,10 +55,7 @@ struct SampledAnalysis : StructureAnalysis {
 };
 
 /// The outputs after a unit step of one input, from rest.
-struct StepResponse {
-  Eigen::VectorXd time;  ///< s.
-  Eigen::MatrixXd y;     ///< samples x outputs.
-};
+using StepResponse = LinearResponse;
 
 /// What a linear system is like.
 struct ModelAnalysis : StructureAnalysis {

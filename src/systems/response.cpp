@@ -1,0 +1,196 @@
+#include <flyball/systems/response.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <flyball/systems/discretize.hpp>
+
+#include "core/format.hpp"
+#include "core/try.hpp"
+
+namespace flyball {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index most_samples = 10'000'000;
+
+Expected<void> check_times(const ResponseTimes& times, std::string_view where) {
+  return Checks(where)
+      .positive(times.step.si(), "step", "s")
+      .within(static_cast<double>(times.samples), 1.0, static_cast<double>(most_samples),
+              "samples");
+}
+
+Expected<void> check_input(Index input, Index inputs, std::string_view where) {
+  if (input >= 0 && input < inputs) {
+    return {};
+  }
+  return tl::unexpected(Error(ArgumentError::out_of_range)
+                            .in(std::string(where))
+                            .about("input")
+                            .got(detail::format("{}", input))
+                            .expected(detail::format("from 0 to {}: B has {} column{}", inputs - 1,
+                                                     inputs, inputs == 1 ? "" : "s")));
+}
+
+Expected<LinearResponse> respond(const DiscreteSystem<>& system, const MatrixRef& u,
+                                 const MatrixRef& x0, std::string_view where) {
+  FLYBALL_CHECK(check_system(system, where));
+  const auto& [A, B, C, D, period] = system;
+  const Index samples = u.rows();
+  FLYBALL_CHECK(Checks(where)
+                    .shape(u, samples, B.cols(), "u", "samples x inputs")
+                    .shape(x0, A.rows(), 1, "x0", "states x 1")
+                    .finite(u, "u")
+                    .finite(x0, "x0"));
+  LinearResponse response{
+      VectorXd::LinSpaced(samples, 0.0, period.si() * static_cast<double>(samples - 1)),
+      MatrixXd(samples + 1, A.rows()), MatrixXd(samples, C.rows())};
+  VectorXd x = x0;
+  VectorXd x_next(x.size());
+  response.x.row(0) = x.transpose();
+  for (Index k = 0; k < samples; ++k) {
+    const auto u_k = u.row(k).transpose();
+    response.y.row(k).transpose().noalias() = C * x;
+    response.y.row(k).transpose().noalias() += D * u_k;
+    x_next.noalias() = A * x;
+    x_next.noalias() += B * u_k;
+    x.swap(x_next);
+    response.x.row(k + 1) = x.transpose();
+  }
+  FLYBALL_CHECK(Checks(where).finite(response.x, "x").finite(response.y, "y"));
+  return response;
+}
+
+/// The instants that were asked for, or those that the poles ask for.
+Expected<ResponseTimes> chosen(const ContinuousSystem<>& system,
+                               const std::optional<ResponseTimes>& times, std::string_view where) {
+  FLYBALL_CHECK(check_system(system, where));
+  if (times) {
+    return check_times(*times, where).map([&] { return *times; });
+  }
+  return analyze_modes(system).map(
+      [](const ModalAnalysis& modes) { return response_times(modes); });
+}
+
+Expected<ResponseTimes> chosen(const DiscreteSystem<>& system,
+                               const std::optional<ResponseTimes>& times, std::string_view where) {
+  FLYBALL_CHECK(check_system(system, where));
+  if (!times) {
+    return analyze_modes(system).map(
+        [&](const ModalAnalysis& modes) { return response_times(modes, system.period); });
+  }
+  FLYBALL_CHECK(check_times(*times, where));
+  if (times->step.si() != system.period.si()) {
+    return tl::unexpected(
+        Error(ArgumentError::out_of_range)
+            .in(std::string(where))
+            .about("step")
+            .got(detail::format("{} s", times->step.si()))
+            .expected(detail::format("the system's period, {} s", system.period.si())));
+  }
+  return *times;
+}
+
+/// One input is 1 in its first `length` samples.
+MatrixXd pulse(Index samples, Index inputs, Index input, Index length) {
+  MatrixXd u = MatrixXd::Zero(samples, inputs);
+  u.col(input).head(length).setOnes();
+  return u;
+}
+
+}  // namespace
+
+ResponseTimes response_times(const ModalAnalysis& modes, std::optional<Time> period) {
+  double slowest = 0.0;
+  double fastest = 0.0;
+  double growing = std::numeric_limits<double>::infinity();
+  for (const Mode& mode : modes.modes) {
+    const double tau = std::abs(mode.time_constant);
+    if (std::isfinite(tau) && tau > 0.0 && mode.stability != Stability::marginal) {
+      slowest = std::max(slowest, tau);
+      growing = mode.stability == Stability::unstable ? std::min(growing, tau) : growing;
+    }
+    if (std::isfinite(mode.natural_frequency)) {
+      fastest = std::max(fastest, mode.natural_frequency);
+    }
+  }
+  double end = 1.0;
+  if (slowest > 0.0) {
+    end = std::min(6.0 * slowest, 5.0 * growing);
+  } else if (fastest > 0.0) {
+    end = 40.0 / fastest;  // about six turns of an undamped oscillation
+  }
+  const double step = period ? period->si() : end / 600.0;
+  // Ten samples of a mode that grows a thousandfold in each would overflow.
+  const double most = std::max(1.0, std::min(2000.0, std::floor(500.0 * growing / step)));
+  const double steps = std::clamp(std::ceil(end / step), std::min(10.0, most), most);
+  return {Time(step), static_cast<Index>(steps) + 1};
+}
+
+Expected<LinearResponse> forced_response(const DiscreteSystem<>& system, const MatrixRef& u,
+                                         const MatrixRef& x0) {
+  return respond(system, u, x0, "forced_response");
+}
+
+Expected<LinearResponse> forced_response(const ContinuousSystem<>& system, const MatrixRef& u,
+                                         const MatrixRef& x0, Time step) {
+  FLYBALL_CHECK(check_system(system, "forced_response"));
+  FLYBALL_TRY(const auto held, discretize(system, step));
+  return respond(held, u, x0, "forced_response");
+}
+
+Expected<LinearResponse> initial_response(const DiscreteSystem<>& system, const MatrixRef& x0,
+                                          const std::optional<ResponseTimes>& times) {
+  constexpr std::string_view where = "initial_response";
+  FLYBALL_TRY(const auto at, chosen(system, times, where));
+  return respond(system, MatrixXd::Zero(at.samples, system.B.cols()), x0, where);
+}
+
+Expected<LinearResponse> initial_response(const ContinuousSystem<>& system, const MatrixRef& x0,
+                                          const std::optional<ResponseTimes>& times) {
+  FLYBALL_TRY(const auto at, chosen(system, times, "initial_response"));
+  FLYBALL_TRY(const auto held, discretize(system, at.step));
+  return initial_response(held, x0, at);
+}
+
+Expected<LinearResponse> step_response(const DiscreteSystem<>& system, Index input,
+                                       const std::optional<ResponseTimes>& times) {
+  constexpr std::string_view where = "step_response";
+  FLYBALL_TRY(const auto at, chosen(system, times, where));
+  FLYBALL_CHECK(check_input(input, system.B.cols(), where));
+  return respond(system, pulse(at.samples, system.B.cols(), input, at.samples),
+                 VectorXd::Zero(system.A.rows()), where);
+}
+
+Expected<LinearResponse> step_response(const ContinuousSystem<>& system, Index input,
+                                       const std::optional<ResponseTimes>& times) {
+  FLYBALL_TRY(const auto at, chosen(system, times, "step_response"));
+  FLYBALL_TRY(const auto held, discretize(system, at.step));
+  return step_response(held, input, at);
+}
+
+Expected<LinearResponse> impulse_response(const DiscreteSystem<>& system, Index input,
+                                          const std::optional<ResponseTimes>& times) {
+  constexpr std::string_view where = "impulse_response";
+  FLYBALL_TRY(const auto at, chosen(system, times, where));
+  FLYBALL_CHECK(check_input(input, system.B.cols(), where));
+  return respond(system, pulse(at.samples, system.B.cols(), input, 1),
+                 VectorXd::Zero(system.A.rows()), where);
+}
+
+Expected<LinearResponse> impulse_response(const ContinuousSystem<>& system, Index input,
+                                          const std::optional<ResponseTimes>& times) {
+  constexpr std::string_view where = "impulse_response";
+  FLYBALL_TRY(const auto at, chosen(system, times, where));
+  FLYBALL_CHECK(check_input(input, system.B.cols(), where));
+  FLYBALL_TRY(const auto held, discretize(system, at.step));
+  return respond(held, MatrixXd::Zero(at.samples, system.B.cols()), system.B.col(input), where);
+}
+
+}  // namespace flyball
