@@ -23,16 +23,16 @@ struct Symbol {
 
 // The symbols to print a dimension with, if one fits; and those that are read beside `parse_unit`.
 constexpr std::array printed{
-    Symbol{"N", {1, 1, -2}},       Symbol{"N m", {1, 2, -2}},      Symbol{"W", {1, 2, -3}},
-    Symbol{"V", {1, 2, -3, -1}},   Symbol{"Ohm", {1, 2, -3, -2}},  Symbol{"N m/A", {1, 2, -2, -1}},
-    Symbol{"H", {1, 2, -2, -2}},   Symbol{"F", {-1, -2, 4, 2}},    Symbol{"N s/m", {1, 0, -1}},
+    Symbol{"N", {1, 1, -2}},     Symbol{"N m", {1, 2, -2}},     Symbol{"W", {1, 2, -3}},
+    Symbol{"V", {1, 2, -3, -1}}, Symbol{"Ohm", {1, 2, -3, -2}}, Symbol{"N m/A", {1, 2, -2, -1}},
+    Symbol{"H", {1, 2, -2, -2}}, Symbol{"F", {-1, -2, 4, 2}},   Symbol{"N s/m", {1, 0, -1}},
     Symbol{"N m s", {1, 2, -1}},
 };
 constexpr std::array read{
-    Symbol{"J", {1, 2, -2}},        Symbol{"W", {1, 2, -3}},       Symbol{"C", {0, 0, 1, 1}},
-    Symbol{"F", {-1, -2, 4, 2}},    Symbol{"H", {1, 2, -2, -2}},   Symbol{"T", {1, 0, -2, -1}},
-    Symbol{"Wb", {1, 2, -2, -1}},   Symbol{"Pa", {1, -1, -2}},     Symbol{"K", {0, 0, 0, 0, 1}},
-    Symbol{"S", {-1, -2, 3, 2}},    Symbol{"h", {0, 0, 1}, 3600},  Symbol{"L", {0, 3}, 1e-3},
+    Symbol{"J", {1, 2, -2}},         Symbol{"W", {1, 2, -3}},      Symbol{"C", {0, 0, 1, 1}},
+    Symbol{"F", {-1, -2, 4, 2}},     Symbol{"H", {1, 2, -2, -2}},  Symbol{"T", {1, 0, -2, -1}},
+    Symbol{"Wb", {1, 2, -2, -1}},    Symbol{"Pa", {1, -1, -2}},    Symbol{"K", {0, 0, 0, 0, 1}},
+    Symbol{"S", {-1, -2, 3, 2}},     Symbol{"h", {0, 0, 1}, 3600}, Symbol{"L", {0, 3}, 1e-3},
     Symbol{"bar", {1, -1, -2}, 1e5}, Symbol{"joule", {1, 2, -2}},  Symbol{"watt", {1, 2, -3}},
 };
 
@@ -45,8 +45,8 @@ constexpr std::array prefixes{
     Prefix{"m", 1e-3},  Prefix{"c", 1e-2}, Prefix{"k", 1e3},  Prefix{"M", 1e6},  Prefix{"G", 1e9},
 };
 // What takes a prefix: "kV" is a unit, "kin" and "Mmin" are mistakes.
-constexpr std::array<std::string_view, 12> prefixed{"g", "m",  "s", "N", "V", "A",
-                                                   "Hz", "Ohm", "Ω", "rad", "L", "bar"};
+constexpr std::array<std::string_view, 12> prefixed{"g",  "m",   "s", "N",   "V", "A",
+                                                    "Hz", "Ohm", "Ω", "rad", "L", "bar"};
 
 std::optional<SiUnit> known(std::string_view text) {
   const auto symbol = std::find_if(read.begin(), read.end(),
@@ -69,9 +69,11 @@ std::optional<SiUnit> atom(std::string_view text) {
       continue;
     }
     const std::string_view rest = text.substr(prefix.text.size());
-    const bool takes = std::find(prefixed.begin(), prefixed.end(), rest) != prefixed.end() ||
-                       (rest.size() <= 2 && std::any_of(read.begin(), read.end() - 2,
-                                                        [&](const Symbol& s) { return s.text == rest && rest != "h"; }));
+    const bool takes =
+        std::find(prefixed.begin(), prefixed.end(), rest) != prefixed.end() ||
+        (rest.size() <= 2 && std::any_of(read.begin(), read.end() - 2, [&](const Symbol& s) {
+           return s.text == rest && rest != "h";
+         }));
     if (takes) {
       SiUnit unit = *known(rest);
       unit.factor *= prefix.factor;
@@ -163,9 +165,7 @@ class Reader {
           return malformed(detail::format("\"{}\" where a unit belongs", text_.substr(at_, 1)));
         }
         ++at_;
-        return digit(at_)
-                   ? Expected<SiUnit>(malformed("a number where a unit belongs"))
-                   : unit;
+        return digit(at_) ? Expected<SiUnit>(malformed("a number where a unit belongs")) : unit;
       } else if (const auto found = atom(name)) {
         unit = *found;
       } else {
@@ -336,7 +336,8 @@ std::string to_text(const SiDimension& dimension) {
 }
 
 Expected<SiUnit> parse_si_unit(std::string_view text) {
-  // As a whole first: "in lb" is a torque by custom, though its parts would be a mass times a length.
+  // As a whole first: "in lb" is a torque by custom, though its parts would be a mass times a
+  // length.
   if (const auto unit = parse_unit(text)) {
     return SiUnit{si_dimension(unit->dimension), unit->factor};
   }

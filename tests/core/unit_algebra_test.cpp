@@ -74,8 +74,8 @@ TEST(UnitAlgebra, ReadsProductsOfUnits) {
 }
 
 TEST(UnitAlgebra, WhatItPrintsItReads) {
-  for (const char* text : {"kg m^2", "V s/rad", "m^(1/2)", "N m/A", "kg/(m s^2)", "K/s", "1/(A s)",
-                           "rad/s^2", "1"}) {
+  for (const char* text :
+       {"kg m^2", "V s/rad", "m^(1/2)", "N m/A", "kg/(m s^2)", "K/s", "1/(A s)", "rad/s^2", "1"}) {
     const auto unit = parse_si_unit(text);
     ASSERT_TRUE(unit) << text;
     const auto again = parse_si_unit(to_text(unit->dimension));
@@ -103,10 +103,12 @@ TEST(UnitAlgebra, AnglesFitPlainNumbers) {
 }
 
 TEST(UnitAlgebra, RefusesWhatItCannotRead) {
-  for (const char* text : {"furlong", "kg furlong", "kg m/s/zz", "10 kg", "11", "2 m", "kin", "hh"}) {
+  for (const char* text :
+       {"furlong", "kg furlong", "kg m/s/zz", "10 kg", "11", "2 m", "kin", "hh"}) {
     EXPECT_FALSE(parse_si_unit(text)) << text;
   }
-  for (const char* text : {"m/", "/", "m//s", "(m", "m)", "m^", "m^x", "m^(1/0)", "m^1000", "m^nan"}) {
+  for (const char* text :
+       {"m/", "/", "m//s", "(m", "m)", "m^", "m^x", "m^(1/0)", "m^1000", "m^nan"}) {
     const auto unit = parse_si_unit(text);
     ASSERT_FALSE(unit) << text;
     EXPECT_TRUE(unit.error().is(ArgumentError::malformed)) << text;

@@ -8,7 +8,8 @@
 #include <flyball/core/expected.hpp>
 #include <flyball/core/quantity.hpp>
 
-/// Any product of powers of SI units, for formulas: `Dimension` names only what interfaces speak of.
+/// Any product of powers of SI units, for formulas: `Dimension` names only what interfaces speak
+/// of.
 namespace flyball {
 
 /// The exponents of the SI base units in a unit: a joule is kg¹ m² s⁻². Exponents need not be whole

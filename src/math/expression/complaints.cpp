@@ -1,9 +1,8 @@
-#include "math/expression/complaints.hpp"
-
 #include <algorithm>
 #include <utility>
 
 #include "core/format.hpp"
+#include "math/expression/complaints.hpp"
 
 namespace flyball::expression {
 
@@ -42,7 +41,7 @@ Character character_at(std::string_view text, std::size_t at) noexcept {
   }
   const bool overlong = (length == 3 && code < 0x800) || (length == 4 && code < 0x10000);
   return overlong || code > 0x10FFFF || (code >= 0xD800 && code < 0xE000) ? invalid
-                                                                         : Character{code, length};
+                                                                          : Character{code, length};
 }
 
 void Complaints::add(Error error, Place place) {

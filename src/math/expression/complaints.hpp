@@ -17,9 +17,7 @@ struct Place {
 
   [[nodiscard]] std::size_t end() const noexcept { return offset + length; }
   /// From the start of one to the end of the other.
-  [[nodiscard]] Place to(const Place& last) const noexcept {
-    return {offset, last.end() - offset};
-  }
+  [[nodiscard]] Place to(const Place& last) const noexcept { return {offset, last.end() - offset}; }
 };
 
 /// The errors of one formula on their way to those of the set.
@@ -49,8 +47,8 @@ class Complaints {
   bool stopped_ = false;
 };
 
-/// How many bytes the character at a place has, and which it is; one byte and U+FFFD where the text is
-/// no UTF-8.
+/// How many bytes the character at a place has, and which it is; one byte and U+FFFD where the text
+/// is no UTF-8.
 struct Character {
   char32_t code = 0;
   std::size_t length = 1;

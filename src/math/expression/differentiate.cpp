@@ -199,8 +199,7 @@ Derivatives differentiate(const Tape& tape, Accumulation how) {
 }
 
 void Derivatives::evaluate(std::span<const double> inputs, std::span<double> y,
-                           Eigen::Ref<Eigen::MatrixXd> J,
-                           std::span<double> values) const noexcept {
+                           Eigen::Ref<Eigen::MatrixXd> J, std::span<double> values) const noexcept {
   const std::span<double> out = values.subspan(tape.size(), tape.outputs());
   tape.evaluate<double>(inputs, out, values);
   std::copy_n(out.begin(), rows, y.begin());

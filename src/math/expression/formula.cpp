@@ -234,6 +234,8 @@ ErrorInfo error_info(ExpressionError code) {
       return {family, "unknown_unit", "the unit cannot be read"};
     case not_finite:
       return {family, "not_finite", "NaN or infinity"};
+    case no_counterpart:
+      return {family, "no_counterpart", "the language has no such operation"};
   }
   return {family, "unknown", "unknown error", ErrorKind::defect};
 }

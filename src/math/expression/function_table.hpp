@@ -10,9 +10,9 @@ namespace flyball::expression {
 
 /// What a function or an operator asks of its operands' units, and makes of them.
 enum class UnitRule : std::uint8_t {
-  same,      ///< All equal; the result's too.
-  compare,   ///< All equal; the result is a truth.
-  logic,     ///< Truths.
+  same,     ///< All equal; the result's too.
+  compare,  ///< All equal; the result is a truth.
+  logic,    ///< Truths.
   product,
   quotient,
   power,
@@ -34,8 +34,8 @@ struct Function {
   UnitRule rule;
 };
 
-/// Functions by name, those with several names several times. `clamp` and `if` are written with their
-/// own operands in mind: min(max(x, low), high), and a choice.
+/// Functions by name, those with several names several times. `clamp` and `if` are written with
+/// their own operands in mind: min(max(x, low), high), and a choice.
 inline constexpr std::array functions{
     Function{"sin", Operation::sin, 1, 1, UnitRule::plain},
     Function{"cos", Operation::cos, 1, 1, UnitRule::plain},
@@ -75,8 +75,8 @@ inline constexpr std::array functions{
     Function{"if", Operation::select, 3, 3, UnitRule::choice},
 };
 
-/// The operators, found by their operation and number of operands. `>` and `>=` are `<` and `<=` with
-/// their operands exchanged.
+/// The operators, found by their operation and number of operands. `>` and `>=` are `<` and `<=`
+/// with their operands exchanged.
 inline constexpr std::array operators{
     Function{"-", Operation::negate, 1, 1, UnitRule::same},
     Function{"not", Operation::logical_not, 1, 1, UnitRule::logic},

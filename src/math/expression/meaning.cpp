@@ -17,10 +17,10 @@ std::string words(const Meaning& meaning) {
   if (meaning.truth) {
     return "a comparison";
   }
-  return !meaning.dimension ? "a number" : meaning.dimension->fits({}) &&
-                                              to_text(*meaning.dimension) == "1"
-                                  ? "a plain number"
-                                  : to_text(*meaning.dimension);
+  return !meaning.dimension ? "a number"
+         : meaning.dimension->fits({}) && to_text(*meaning.dimension) == "1"
+             ? "a plain number"
+             : to_text(*meaning.dimension);
 }
 
 /// The meaning of each node from those of its operands.
@@ -41,7 +41,8 @@ class Checker {
   Meaning meaning_of(const SyntaxNode& node) {
     switch (node.kind) {
       case SyntaxNode::Kind::number:
-        return {.truth = false, .certain = true, .dimension = SiDimension{}, .constant = node.number};
+        return {
+            .truth = false, .certain = true, .dimension = SiDimension{}, .constant = node.number};
       case SyntaxNode::Kind::symbol:
         return symbols_[node.symbol].meaning;
       case SyntaxNode::Kind::call: {
@@ -181,17 +182,18 @@ class Checker {
       std::swap(one, other);
     }
     const Operation operation = node.function->operation;
-    const bool binary = find_operator(operation) != nullptr && node.function == find_operator(operation);
+    const bool binary =
+        find_operator(operation) != nullptr && node.function == find_operator(operation);
     const std::string_view between = operation == Operation::add        ? "plus"
                                      : operation == Operation::subtract ? "minus"
                                      : binary && node.count == 2        ? "compared with"
                                                                         : "beside";
-    complaints_.add(Error(ExpressionError::unit_mismatch)
-                        .about(complaints_.quote(node.place))
-                        .got(detail::format("{} {} {}", words(of(node, one)), between,
-                                            words(of(node, other))))
-                        .expected("in one unit"),
-                    binary && node.count == 2 ? node.mark : place(node, other));
+    complaints_.add(
+        Error(ExpressionError::unit_mismatch)
+            .about(complaints_.quote(node.place))
+            .got(detail::format("{} {} {}", words(of(node, one)), between, words(of(node, other))))
+            .expected("in one unit"),
+        binary && node.count == 2 ? node.mark : place(node, other));
   }
 
   std::optional<SiDimension> raised(const SyntaxNode& node) {
@@ -224,9 +226,8 @@ class Checker {
     if (then.truth || otherwise.truth) {
       return {.truth = true, .certain = true};
     }
-    return {.truth = false,
-            .certain = then.certain || otherwise.certain,
-            .dimension = common(node, 1)};
+    return {
+        .truth = false, .certain = then.certain || otherwise.certain, .dimension = common(node, 1)};
   }
 
   const SyntaxTree& tree_;

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/format.hpp"
+#include "math/expression/infix.hpp"
 #include "math/expression/syntax.hpp"
 #include "math/expression/token.hpp"
 
@@ -12,80 +13,22 @@ namespace {
 
 constexpr int deepest = 200;
 
-/// How tightly an operator binds.
-enum Precedence : int {
-  choice = 1,
-  disjunction,
-  conjunction,
-  negation,
-  comparison,
-  sum,
-  product,
-  sign,
-  exponentiation,
-};
-
-struct Infix {
-  Precedence precedence;
-  Operation operation;
-  bool exchanged = false;
-};
-
-/// What a token means between two values; side by side they are taken for a product.
-std::optional<Infix> infix_of(TokenKind kind) {
-  using enum TokenKind;
-  switch (kind) {
-    case plus:
-      return Infix{sum, Operation::add};
-    case minus:
-      return Infix{sum, Operation::subtract};
-    case times:
-    case number:
-    case name:
-    case open:
-    case logical_not:
-      return Infix{product, Operation::multiply};
-    case divide:
-      return Infix{product, Operation::divide};
-    case power:
-    case squared:
-    case cubed:
-      return Infix{exponentiation, Operation::power};
-    case less:
-      return Infix{comparison, Operation::less};
-    case less_equal:
-      return Infix{comparison, Operation::less_equal};
-    case greater:
-      return Infix{comparison, Operation::less, true};
-    case greater_equal:
-      return Infix{comparison, Operation::less_equal, true};
-    case equal:
-    case assign:
-      return Infix{comparison, Operation::equal};
-    case not_equal:
-      return Infix{comparison, Operation::not_equal};
-    case logical_and:
-      return Infix{conjunction, Operation::logical_and};
-    case logical_or:
-      return Infix{disjunction, Operation::logical_or};
-    case question:
-      return Infix{choice, Operation::select};
-    default:
-      return std::nullopt;
-  }
-}
-
-/// Precedence climbing over the tokens. Every way down goes through `expression`, which counts levels.
+/// Precedence climbing over the tokens. Every way down goes through `expression`, which counts
+/// levels.
 class Parser {
  public:
   Parser(std::string_view text, const SymbolTable& symbols, Complaints& complaints)
-      : text_(text), symbols_(symbols), complaints_(complaints), tokens_(tokens_of(text, complaints)) {}
+      : text_(text),
+        symbols_(symbols),
+        complaints_(complaints),
+        tokens_(tokens_of(text, complaints)) {}
 
   SyntaxTree run() {
     if (here().kind == TokenKind::end) {
       if (!complaints_.any()) {
-        complaints_.add(Error(ExpressionError::empty_formula).hint("write a number if it is constant"),
-                        here().place);
+        complaints_.add(
+            Error(ExpressionError::empty_formula).hint("write a number if it is constant"),
+            here().place);
       }
       mistake(here().place);
       return std::move(tree_);
@@ -221,9 +164,9 @@ class Parser {
       const bool doubtful =
           side_by_side || (compares && compared) || token.kind == TokenKind::assign;
       if (compares && compared) {
-        complaints_.add(Error(ExpressionError::chained_comparison)
-                            .hint("write a < b and b < c for a < b < c"),
-                        token.place);
+        complaints_.add(
+            Error(ExpressionError::chained_comparison).hint("write a < b and b < c for a < b < c"),
+            token.place);
       }
       if (token.kind == TokenKind::assign) {
         complaints_.add(Error(ExpressionError::assignment)
@@ -277,8 +220,8 @@ class Parser {
             .got("two values without an operator between them")
             .hint(word == "if" || word == "else"
                       ? std::string("write if(condition, a, b) or condition ? a : b")
-                      : detail::format("write \"{}*{}\" for the product",
-                                       shortened(before.place), shortened(token.place))),
+                      : detail::format("write \"{}*{}\" for the product", shortened(before.place),
+                                       shortened(token.place))),
         token.place);
   }
   [[nodiscard]] std::string shortened(Place place) const {
@@ -335,8 +278,8 @@ class Parser {
     if (here().kind == TokenKind::close) {
       take();
     } else {
-      complaints_.add(Error(ExpressionError::unclosed_parenthesis).hint("write the ) that closes it"),
-                      open);
+      complaints_.add(
+          Error(ExpressionError::unclosed_parenthesis).hint("write the ) that closes it"), open);
     }
   }
 

@@ -1,6 +1,6 @@
-#include "math/expression/slopes.hpp"
-
 #include <numbers>
+
+#include "math/expression/slopes.hpp"
 
 namespace flyball::expression {
 

@@ -17,8 +17,8 @@ namespace flyball::expression {
 
 /// What is known of a value without computing it.
 struct Meaning {
-  bool truth = false;                   ///< A comparison, rather than a number.
-  bool certain = false;                 ///< Whether it is known which of the two.
+  bool truth = false;                      ///< A comparison, rather than a number.
+  bool certain = false;                    ///< Whether it is known which of the two.
   std::optional<SiDimension> dimension{};  ///< Of a number; nothing: not known.
   std::optional<double> constant{};        ///< Its value, if the formula alone gives it.
 
@@ -77,8 +77,8 @@ struct SyntaxTree {
   std::vector<std::uint32_t> operands;
 };
 
-/// Takes a formula apart. Where it has mistakes they are reported, and the tree has what could be made
-/// of the rest.
+/// Takes a formula apart. Where it has mistakes they are reported, and the tree has what could be
+/// made of the rest.
 [[nodiscard]] SyntaxTree parse(std::string_view text, const SymbolTable& symbols,
                                Complaints& complaints);
 

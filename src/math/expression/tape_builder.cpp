@@ -49,7 +49,9 @@ std::optional<double> TapeBuilder::constant_value(Slot slot) const {
   return node.operation == Operation::constant ? std::optional(node.value()) : std::nullopt;
 }
 
-Slot TapeBuilder::constant(double value) { return intern(Node::constant(value)); }
+Slot TapeBuilder::constant(double value) {
+  return intern(Node::constant(value));
+}
 
 Slot TapeBuilder::parameter(std::size_t number) {
   parameters_ = std::max(parameters_, number + 1);
@@ -184,8 +186,9 @@ Slot TapeBuilder::select(Slot condition, Slot then, Slot otherwise) {
   if (const auto value = constant_value(condition)) {
     return *value == 0.0 ? otherwise : then;
   }
-  return then == otherwise ? then
-                           : intern({Operation::select, condition.index, then.index, otherwise.index});
+  return then == otherwise
+             ? then
+             : intern({Operation::select, condition.index, then.index, otherwise.index});
 }
 
 Slot TapeBuilder::node(const Node& node) {

@@ -1,5 +1,3 @@
-#include "math/expression/token.hpp"
-
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <system_error>
 
 #include "core/format.hpp"
+#include "math/expression/token.hpp"
 
 namespace flyball::expression {
 
@@ -48,7 +47,9 @@ constexpr std::array<std::array<std::string_view, 2>, 8> elsewhere{{
     {";", "write one formula, without an end mark"},
 }};
 
-bool is_digit(char32_t c) { return c >= U'0' && c <= U'9'; }
+bool is_digit(char32_t c) {
+  return c >= U'0' && c <= U'9';
+}
 
 /// Letters of Unicode by block: Latin, Greek, Cyrillic and what follows but punctuation, arrows,
 /// operators, private use and invalid codes; combining marks and subscripts go with letters.
@@ -84,7 +85,8 @@ class Lexer {
   std::vector<Token> run() {
     while (at_ < text_.size()) {
       const Character c = character_at(text_, at_);
-      if (c.code == U' ' || c.code == U'\t' || c.code == U'\r' || c.code == U'\n' || c.code == 0xA0) {
+      if (c.code == U' ' || c.code == U'\t' || c.code == U'\r' || c.code == U'\n' ||
+          c.code == 0xA0) {
         at_ += c.length;
       } else if (is_digit(c.code) || (c.code == U'.' && digit(at_ + 1))) {
         number();

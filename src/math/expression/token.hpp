@@ -42,7 +42,8 @@ struct Token {
   double value = 0.0;  ///< Of a number.
 };
 
-/// The tokens of a formula, the last of kind `end`. Characters that are none are reported and left out.
+/// The tokens of a formula, the last of kind `end`. Characters that are none are reported and left
+/// out.
 [[nodiscard]] std::vector<Token> tokens_of(std::string_view text, Complaints& complaints);
 
 /// Whether a text is one name: a letter or underscore, then letters, digits and underscores, where

@@ -1,8 +1,8 @@
-#include <flyball/math/expression/formula.hpp>
-
 #include <limits>
 #include <random>
 #include <string>
+
+#include <flyball/math/expression/formula.hpp>
 
 #include "math/expression/formula_text.hpp"
 
@@ -28,8 +28,9 @@ TEST(FormulaErrors, OfGrammarWithTheirPlace) {
          {"2(x)", "missing_operator@1"},
          {"x(y + 1)", "missing_operator@1"},
          {"(x)(y)", "missing_operator@3"},
-         {"x if y > 0 else 2", "missing_operator@2 wrong_arity@2 missing_operator@5 "
-                               "missing_operator@11 unknown_name@11 missing_operator@16"},
+         {"x if y > 0 else 2",
+          "missing_operator@2 wrong_arity@2 missing_operator@5 "
+          "missing_operator@11 unknown_name@11 missing_operator@16"},
          {"x +", "missing_operand@3"},
          {"* x", "missing_operand@0"},
          {"x + * y", "missing_operand@4"},
@@ -89,18 +90,21 @@ TEST(FormulaErrors, SayTheWholeSentence) {
     const auto errors = errors_of(text);
     return errors.size() == 1 ? to_string(errors[0]) : codes(errors);
   };
-  EXPECT_EQ(sentence("sin(x, y)"),
-            "f: \"sin\" is given 2 arguments; it must be given 1 argument (offset = 0, length = 9)");
-  EXPECT_EQ(sentence("2*thete"),
-            "f: \"thete\" is not known; it must be a variable, a parameter or a definition; did you "
-            "mean \"theta\"? (offset = 2, length = 5)");
+  EXPECT_EQ(
+      sentence("sin(x, y)"),
+      "f: \"sin\" is given 2 arguments; it must be given 1 argument (offset = 0, length = 9)");
+  EXPECT_EQ(
+      sentence("2*thete"),
+      "f: \"thete\" is not known; it must be a variable, a parameter or a definition; did you "
+      "mean \"theta\"? (offset = 2, length = 5)");
   EXPECT_EQ(sentence("2x"),
             "f: \"2x\" is two values without an operator between them; write \"2*x\" for the "
             "product (offset = 1, length = 1)");
   EXPECT_EQ(sentence("arctan(x)"),
             "f: \"arctan\" is not a function; did you mean \"atan\"? (offset = 0, length = 6)");
-  EXPECT_EQ(sentence("(x"),
-            "f: this parenthesis is not closed; write the ) that closes it (offset = 0, length = 1)");
+  EXPECT_EQ(
+      sentence("(x"),
+      "f: this parenthesis is not closed; write the ) that closes it (offset = 0, length = 1)");
 }
 
 TEST(FormulaErrors, CaretsStandUnderThePlace) {
@@ -120,10 +124,11 @@ TEST(FormulaErrors, CaretsStandUnderThePlace) {
   for (int i = 0; i < 50; ++i) {
     sum += " + x";
   }
-  EXPECT_EQ(carets(sum + " + foo" + sum),
-            "...x + x + x + x + x + x + x + x + x + x + x + x + x + x + x + foox + x + x + x + x + x + "
-            "x + x + x + x...\n"
-            "                                                               ^~~~ this name is not known");
+  EXPECT_EQ(
+      carets(sum + " + foo" + sum),
+      "...x + x + x + x + x + x + x + x + x + x + x + x + x + x + x + foox + x + x + x + x + x + "
+      "x + x + x + x...\n"
+      "                                                               ^~~~ this name is not known");
   EXPECT_EQ(caret_lines("x", Error(ExpressionError::not_finite)), "");
 }
 
@@ -172,9 +177,10 @@ TEST(FormulaErrors, HostileTextIsRefusedWithoutHarm) {
 
 // Every mixture of tokens is answered, and each error has a place that a caret can show.
 TEST(FormulaErrors, RandomTextIsAnswered) {
-  const char* const pieces[] = {"x", "y ", "2", ".5", "(", ")", ",", "+", "-", "*", "/", "^", "<",
-                                "==", "=", "and ", "or ", "not ", "?", ":", "sin", "if", "min(",
-                                "\xff", "²", "π", "!", "foo", "1e5", "..", "\n"};
+  const char* const pieces[] = {"x",   "y ",   "2", ".5",  "(",   ")",  ",",    "+",
+                                "-",   "*",    "/", "^",   "<",   "==", "=",    "and ",
+                                "or ", "not ", "?", ":",   "sin", "if", "min(", "\xff",
+                                "²",   "π",    "!", "foo", "1e5", "..", "\n"};
   std::mt19937_64 random(1);
   int good = 0;
   for (int k = 0; k < 20'000; ++k) {

@@ -94,8 +94,9 @@ TEST(FormulaUnits, SayTheWholeSentence) {
   EXPECT_EQ(sentence("sin(u)", ""),
             "f: \"u\" is in N m; it must be a plain number or an angle, which sin takes "
             "(offset = 4, length = 1)");
-  EXPECT_EQ(sentence("l + 1", ""),
-            "f: \"l + 1\" is m plus a plain number; it must be in one unit (offset = 2, length = 1)");
+  EXPECT_EQ(
+      sentence("l + 1", ""),
+      "f: \"l + 1\" is m plus a plain number; it must be in one unit (offset = 2, length = 1)");
 }
 
 TEST(FormulaUnits, OfDefinitionsAreCarriedOn) {

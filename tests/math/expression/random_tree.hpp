@@ -10,8 +10,8 @@
 
 namespace flyball::expression {
 
-/// A random formula as a tree that evaluates itself by recursion, knowing nothing of tapes: what the
-/// parser and the tape are compared with.
+/// A random formula as a tree that evaluates itself by recursion, knowing nothing of tapes: what
+/// the parser and the tape are compared with.
 struct RandomTree {
   enum class Kind { number, variable, unary, binary, choice };
 
@@ -20,12 +20,12 @@ struct RandomTree {
   std::size_t which = 0;
   std::vector<RandomTree> parts{};
 
-  static constexpr const char* unary_names[] = {"-",   "sin",  "cos",  "tan",  "atan", "tanh", "exp", "asinh",
-                                                "abs", "sqrt", "log",  "cbrt", "erf",  "sign", "floor",
-                                                "asin", "acos", "acosh", "atanh", "sinh", "cosh",
-                                                "expm1", "log1p", "log2", "log10", "round", "ceil"};
-  static constexpr const char* binary_names[] = {"+", "-", "*", "/", "pow", "atan2", "hypot", "min",
-                                                 "max", "mod", "remainder"};
+  static constexpr const char* unary_names[] = {
+      "-",     "sin",  "cos",  "tan",   "atan",  "tanh",  "exp",   "asinh", "abs",
+      "sqrt",  "log",  "cbrt", "erf",   "sign",  "floor", "asin",  "acos",  "acosh",
+      "atanh", "sinh", "cosh", "expm1", "log1p", "log2",  "log10", "round", "ceil"};
+  static constexpr const char* binary_names[] = {"+",     "-",   "*",   "/",   "pow",      "atan2",
+                                                 "hypot", "min", "max", "mod", "remainder"};
 
   static RandomTree make(std::mt19937_64& random, std::size_t variables, int depth) {
     RandomTree tree;
@@ -63,7 +63,8 @@ struct RandomTree {
                          : binary_names[which] + ("(" + part(0) + ", " + part(1) + ")");
       case Kind::choice: {
         constexpr const char* comparisons[] = {" < ", " <= ", " > ", " != "};
-        return "if(" + part(0) + comparisons[which] + part(1) + ", " + part(2) + ", " + part(3) + ")";
+        return "if(" + part(0) + comparisons[which] + part(1) + ", " + part(2) + ", " + part(3) +
+               ")";
       }
     }
     return "";
@@ -71,10 +72,10 @@ struct RandomTree {
 
   template <class T>
   [[nodiscard]] T evaluate(std::span<const T> x) const {
-    using std::sin, std::cos, std::tan, std::atan, std::tanh, std::exp, std::asinh, std::abs, std::sqrt,
-        std::log, std::cbrt, std::erf, std::floor, std::pow, std::atan2, std::hypot, std::remainder,
-        std::asin, std::acos, std::acosh, std::atanh, std::sinh, std::cosh, std::expm1, std::log1p,
-        std::log2, std::log10, std::round, std::ceil;
+    using std::sin, std::cos, std::tan, std::atan, std::tanh, std::exp, std::asinh, std::abs,
+        std::sqrt, std::log, std::cbrt, std::erf, std::floor, std::pow, std::atan2, std::hypot,
+        std::remainder, std::asin, std::acos, std::acosh, std::atanh, std::sinh, std::cosh,
+        std::expm1, std::log1p, std::log2, std::log10, std::round, std::ceil;
     if (kind == Kind::number) {
       return T(number);
     }

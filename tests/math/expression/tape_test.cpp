@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include <flyball/math/derivatives/dual.hpp>
 #include <flyball/math/expression/differentiate.hpp>
 #include <flyball/math/expression/formula.hpp>
 #include <flyball/math/expression/tape_builder.hpp>
@@ -104,7 +103,9 @@ TEST(Tape, EvaluatesWithoutAllocation) {
 }
 
 // -0 and 0 are one: x + 0 is simplified to x.
-bool same(double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); }
+bool same(double a, double b) {
+  return a == b || (std::isnan(a) && std::isnan(b));
+}
 
 /// Random formulas, evaluated by the tape and by the tree that wrote their text.
 TEST(Tape, OfARandomFormulaComputesWhatTheFormulaSays) {
@@ -125,107 +126,11 @@ TEST(Tape, OfARandomFormulaComputesWhatTheFormulaSays) {
       finite += std::isfinite(wanted) ? 1 : 0;
       // Whole and half exponents take another form; see WholePowersAreProducts.
       const bool powers = tree.text(names).find("pow") != std::string::npos;
-      ASSERT_TRUE(same(y, wanted) || powers) << tree.text(names) << " at " << x[0] << ", " << x[1] << ", " << x[2] << ": " << y << " for " << wanted;
+      ASSERT_TRUE(same(y, wanted) || powers) << tree.text(names) << " at " << x[0] << ", " << x[1]
+                                             << ", " << x[2] << ": " << y << " for " << wanted;
     }
   }
   EXPECT_GT(finite, 4000);
-}
-
-/// Finite entries within a tolerance of the largest.
-void expect_near(const Eigen::RowVectorXd& J, const Eigen::RowVectorXd& wanted, double tolerance,
-                 const std::string& text) {
-  double largest = 1.0;  // what cancels to less leaves the rounding of its terms
-  for (Eigen::Index i = 0; i < wanted.size(); ++i) {
-    largest = std::isfinite(wanted(i)) ? std::max(largest, std::abs(wanted(i))) : largest;
-  }
-  for (Eigen::Index i = 0; i < wanted.size(); ++i) {
-    if (std::isfinite(wanted(i))) {
-      EXPECT_NEAR(J(i), wanted(i), tolerance * largest) << text << ", column " << i;
-    }
-  }
-}
-
-/// Forward and reverse against dual numbers, which share no line with them.
-TEST(Differentiate, AgreesWithDualNumbers) {
-  std::mt19937_64 random(7);
-  std::uniform_real_distribution<double> point(-3.0, 3.0);
-  const std::vector<std::string> names{"x", "y", "z"};
-  int compared = 0;
-  int singular = 0;  // in reverse ∞ - ∞
-  for (int k = 0; k < 3000; ++k) {
-    const RandomTree tree = RandomTree::make(random, 3, 5);
-    const std::string text = tree.text(names);
-    const Tape tape = tape_of(text);
-    std::array<Dual<3>, 3> x;
-    std::array<double, 3> at{};
-    for (std::size_t i = 0; i < 3; ++i) {
-      at[i] = point(random);
-      x[i] = Dual<3>::variable(at[i], static_cast<Eigen::Index>(i));
-    }
-    const Dual<3> wanted = tree.evaluate<Dual<3>>(x);
-    if (!std::isfinite(wanted.value) || !wanted.gradient.allFinite()) {
-      continue;
-    }
-    ++compared;
-    // The tape over duals.
-    std::vector<Dual<3>> duals(tape.size());
-    tape.prepare<Dual<3>>({}, duals);
-    Dual<3> y;
-    tape.evaluate<Dual<3>>(x, {&y, 1}, duals);
-    expect_near(y.gradient.transpose(), wanted.gradient.transpose(), 1e-12, text);
-    // The tape's derivative tapes.
-    for (const Accumulation how : {Accumulation::forward, Accumulation::reverse}) {
-      const Derivatives derivatives = differentiate(tape, how);
-      std::vector<double> values(derivatives.workspace_size());
-      derivatives.tape.prepare<double>({}, values);
-      double value = 0.0;
-      Eigen::MatrixXd J(1, 3);
-      derivatives.evaluate(at, {&value, 1}, J, values);
-      if (how == Accumulation::reverse && !J.allFinite()) {
-        ++singular;
-        continue;
-      }
-      EXPECT_TRUE(J.allFinite()) << text;
-      expect_near(J.row(0), wanted.gradient.transpose(), 1e-12, text);
-    }
-  }
-  EXPECT_GT(compared, 1500);
-  EXPECT_LT(singular, compared / 50);
-}
-
-TEST(Differentiate, TwiceGivesTheHessianOfHyperDualNumbers) {
-  std::mt19937_64 random(11);
-  std::uniform_real_distribution<double> point(0.2, 0.9);
-  const std::vector<std::string> names{"x", "y", "z"};
-  int compared = 0;
-  for (int k = 0; k < 500; ++k) {
-    const RandomTree tree = RandomTree::make(random, 3, 4);
-    const Tape tape = tape_of(tree.text(names));
-    std::array<Dual<3, 2>, 3> x;
-    std::array<double, 3> at{};
-    for (std::size_t i = 0; i < 3; ++i) {
-      at[i] = point(random);
-      x[i] = Dual<3, 2>::variable(at[i], static_cast<Eigen::Index>(i));
-    }
-    const Dual<3, 2> wanted = tree.evaluate<Dual<3, 2>>(x);
-    if (!std::isfinite(wanted.value) || !wanted.gradient.allFinite() ||
-        !wanted.hessian.allFinite()) {
-      continue;
-    }
-    ++compared;
-    const Derivatives first = differentiate(tape, Accumulation::reverse);
-    const Derivatives second = differentiate(first.tape, Accumulation::forward);
-    std::vector<double> values(second.workspace_size());
-    second.tape.prepare<double>({}, values);
-    std::vector<double> y(second.rows);
-    Eigen::MatrixXd H(static_cast<Eigen::Index>(second.rows), 3);
-    second.evaluate(at, y, H, values);
-    for (std::size_t e = 0; e < first.entries.size(); ++e) {
-      expect_near(H.row(static_cast<Eigen::Index>(e) + 1),
-                  wanted.hessian.row(first.entries[e].column), 1e-11, tree.text(names));
-    }
-  }
-  EXPECT_GT(compared, 300);
 }
 
 }  // namespace

@@ -28,8 +28,8 @@ enum class Accumulation {
 struct Derivatives {
   /// The outputs of the function, then a number for each entry.
   Tape tape;
-  std::size_t rows = 0;      ///< Outputs of the function.
-  std::size_t columns = 0;   ///< Variables.
+  std::size_t rows = 0;        ///< Outputs of the function.
+  std::size_t columns = 0;     ///< Variables.
   std::vector<Entry> entries;  ///< By column where collected forward, by row in reverse.
 
   /// Value and Jacobian at a point.
@@ -48,8 +48,8 @@ struct Derivatives {
 ///
 /// Where a function has a kink (abs, min, max, select) the derivative is that of the branch taken,
 /// abs at 0 taking that of x; sign, floor, ceil, round and comparisons have derivative 0. Where it
-/// has no derivative (sqrt at 0) it is infinite or NaN, except with respect to variables that do not
-/// move the argument. All as `Dual` has it; in reverse, where a slope on the way is infinite, a
+/// has no derivative (sqrt at 0) it is infinite or NaN, except with respect to variables that do
+/// not move the argument. All as `Dual` has it; in reverse, where a slope on the way is infinite, a
 /// derivative can be NaN that is finite forward (∞ - ∞ in place of 0 · ∞).
 ///
 /// @param variables  Slots of the tape's inputs and parameters; the columns in this order.
@@ -59,7 +59,6 @@ struct Derivatives {
                                         Accumulation how = Accumulation::forward);
 
 /// With respect to all inputs.
-[[nodiscard]] Derivatives differentiate(const Tape& tape,
-                                        Accumulation how = Accumulation::forward);
+[[nodiscard]] Derivatives differentiate(const Tape& tape, Accumulation how = Accumulation::forward);
 
 }  // namespace flyball::expression

@@ -96,8 +96,8 @@ enum class Operation : std::uint32_t {
 }
 
 /// The result of an operation over a generic scalar: double, or a number that carries derivatives.
-/// Operands that the operation does not have are not looked at; at constants, parameters and inputs,
-/// whose value is not computed, the answer is `a`.
+/// Operands that the operation does not have are not looked at; at constants, parameters and
+/// inputs, whose value is not computed, the answer is `a`.
 template <class T>
 [[nodiscard]] inline T apply(Operation operation, const T& a, const T& b, const T& c) {
   using std::sin, std::cos, std::tan, std::asin, std::acos, std::atan, std::sinh, std::cosh,

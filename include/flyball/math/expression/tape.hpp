@@ -16,8 +16,8 @@ struct Slot {
   friend bool operator==(Slot, Slot) = default;
 };
 
-/// One operation and where its operands stand, all before the node itself. A constant keeps its bits
-/// in a and b, a parameter and an input their number in a.
+/// One operation and where its operands stand, all before the node itself. A constant keeps its
+/// bits in a and b, a parameter and an input their number in a.
 struct Node {
   Operation operation = Operation::constant;
   std::uint32_t a = 0;
@@ -48,8 +48,8 @@ struct Node {
 /// tape.evaluate<double>(x, y, values);  // as often as wanted
 /// ```
 ///
-/// Over `Dual` a tape yields derivatives as any function over a generic scalar does; `differentiate`
-/// makes a tape of them, which is faster.
+/// Over `Dual` a tape yields derivatives as any function over a generic scalar does;
+/// `differentiate` makes a tape of them, which is faster.
 class Tape {
  public:
   /// An empty tape: a function of nothing.

@@ -13,8 +13,8 @@ namespace flyball::expression {
 /// Writes a tape node by node. What was written already is not written again (x·y and y·x are one),
 /// operations on constants are computed at once, and x + 0, x - 0, 1 x, x/1, -(-x), whole powers up
 /// to 16 and square roots take their simpler form. Results are those of the operations as written,
-/// but for the sign of a zero, a whole power's last digits, and (-∞)^0.5, which is NaN. Work that no
-/// output needs is left out by `finish`.
+/// but for the sign of a zero, a whole power's last digits, and (-∞)^0.5, which is NaN. Work that
+/// no output needs is left out by `finish`.
 ///
 /// ```
 /// TapeBuilder tape;
