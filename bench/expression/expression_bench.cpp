@@ -10,8 +10,9 @@
 
 #include "timing.hpp"
 
-// A model by formula beside the same model compiled: the cart-pole's derivative, its Jacobian beside dual
-// numbers, and what compiling the formulas costs. Budget: 3 times the compiled model a step.
+// A model by formula beside the same model compiled: the cart-pole's derivative, its Jacobian
+// beside dual numbers, and what compiling the formulas costs. Budget: 3 times the compiled model a
+// step.
 namespace {
 
 using namespace flyball;
@@ -90,13 +91,14 @@ int main() {
     y(3) = J(3, 1);
     next();
   });
-  const double compiling = best(100, [&] { sum += static_cast<double>(expression::compile(formulas)->tape.size()); });
+  const double compiling =
+      best(100, [&] { sum += static_cast<double>(expression::compile(formulas)->tape.size()); });
 
   std::printf("cart-pole                compiled    by formula   ratio\n");
-  std::printf("derivative             %7.1f ns    %7.1f ns   %5.2f   (%zu nodes)\n", by_code, by_formula,
-              by_formula / by_code, compiled.tape.size());
-  std::printf("derivative, Jacobian   %7.1f ns    %7.1f ns   %5.2f   (%zu nodes)\n", by_dual, by_tape,
-              by_tape / by_dual, derivatives.tape.size());
+  std::printf("derivative             %7.1f ns    %7.1f ns   %5.2f   (%zu nodes)\n", by_code,
+              by_formula, by_formula / by_code, compiled.tape.size());
+  std::printf("derivative, Jacobian   %7.1f ns    %7.1f ns   %5.2f   (%zu nodes)\n", by_dual,
+              by_tape, by_tape / by_dual, derivatives.tape.size());
   std::printf("reading the formulas               %7.1f us\n", compiling / 1000.0);
   return std::isfinite(sum) ? 0 : 1;
 }

@@ -29,9 +29,8 @@ struct Copy {
     function_size = builder.size();
   }
 
-  Derivative product(Derivative factor, Derivative slope) {
-    return factor && slope ? Derivative(builder.binary(Operation::chain, *factor, *slope))
-                           : std::nullopt;
+  Derivative product(Derivative factor, Derivative slope, Operation how = Operation::chain) {
+    return factor && slope ? Derivative(builder.binary(how, *factor, *slope)) : std::nullopt;
   }
   Derivative sum(Derivative a, Derivative b) {
     return a && b ? Derivative(builder.binary(Operation::add, *a, *b)) : a ? a : b;
@@ -128,8 +127,10 @@ class Collector {
                           tangents[branch->otherwise.index]);
     }
     const Slopes slope = slopes(builder, y, a.has_value(), b.has_value());
-    const Derivative by_a = copy_.product(a, slope.by_a);
-    return copy_.sum(by_a, copy_.product(b, slope.by_b));
+    const Operation how =
+        has_finite_slopes(node.operation) ? Operation::multiply : Operation::chain;
+    const Derivative by_a = copy_.product(a, slope.by_a, how);
+    return copy_.sum(by_a, copy_.product(b, slope.by_b, how));
   }
 
   /// ā += ȳ ∂y/∂a, b̄ += ȳ ∂y/∂b.

@@ -124,6 +124,25 @@ Slopes slopes(TapeBuilder& t, Slot y, bool by_a, bool by_b) {
   }
 }
 
+bool has_finite_slopes(Operation operation) noexcept {
+  switch (operation) {
+    case add:
+    case subtract:
+    case multiply:
+    case negate:
+    case Operation::sin:
+    case Operation::cos:
+    case Operation::atan:
+    case Operation::tanh:
+    case Operation::asinh:
+    case Operation::erf:
+    case Operation::abs:
+      return true;
+    default:
+      return false;
+  }
+}
+
 std::optional<Branch> branch_of(TapeBuilder& t, Slot y) {
   const Node node = t[y];
   switch (node.operation) {

@@ -16,6 +16,10 @@ struct Slopes {
 /// For `minimum`, `maximum` and `select`, whose untaken branch may be infinite, see `branch_of`.
 [[nodiscard]] Slopes slopes(TapeBuilder& tape, Slot y, bool by_a, bool by_b);
 
+/// Whether the slopes of an operation are finite wherever its operands are; those of `chain` count
+/// on operands that are not.
+[[nodiscard]] bool has_finite_slopes(Operation operation) noexcept;
+
 /// A choice between two operands: condition ≠ 0 ? then : otherwise.
 struct Branch {
   Slot condition;

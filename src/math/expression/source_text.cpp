@@ -82,7 +82,8 @@ class Writer {
       const Node& node = tape_.nodes()[i];
       texts_[i] = write(node);
       const bool computed = operand_count(node.operation) > 0;
-      if (computed && (uses_[i] > 1 || named_[i] || (inner_[i] && texts_[i].text.size() > longest))) {
+      if (computed &&
+          (uses_[i] > 1 || named_[i] || (inner_[i] && texts_[i].text.size() > longest))) {
         const std::string name = detail::format("{}{}", prefix_, result_.definitions.size() + 1);
         result_.definitions.push_back({name, std::move(texts_[i].text), is_truth(node.operation)});
         texts_[i] = {name, whole};
@@ -145,8 +146,9 @@ class Writer {
                             : language_ == Language::c
                                 ? Text{"INFINITY"}
                                 : Text{"std::numeric_limits<double>::infinity()"};
-      return value > 0.0 ? infinite
-                         : Text{"-" + infinite.text, infinite.strength == whole ? minus_sign : product};
+      return value > 0.0
+                 ? infinite
+                 : Text{"-" + infinite.text, infinite.strength == whole ? minus_sign : product};
     }
     std::string digits = detail::format("{}", value);
     if (!own() && digits.find_first_of(".e") == std::string::npos) {

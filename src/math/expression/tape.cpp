@@ -3,7 +3,7 @@
 namespace flyball::expression {
 
 template <>
-void Tape::compute(std::size_t first, std::size_t last, double* values) const {
+void Tape::compute(std::size_t first, std::size_t last, double* values) const noexcept {
   const Node* const nodes = nodes_.data();
   for (std::size_t i = first; i < last; ++i) {
     const Node& node = nodes[i];

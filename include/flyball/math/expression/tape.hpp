@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include <flyball/math/expression/operation.hpp>
@@ -74,7 +75,8 @@ class Tape {
   /// Fills the values that do not depend on inputs.
   /// @param parameters  parameters() numbers. @param values  size() entries, kept by the caller.
   template <class T>
-  void prepare(std::span<const T> parameters, std::span<T> values) const {
+  void prepare(std::span<const T> parameters, std::span<T> values) const
+      noexcept(std::is_floating_point_v<T>) {
     for (std::size_t i = 0; i < constants_; ++i) {
       values[i] = T(nodes_[i].value());
     }
@@ -87,9 +89,10 @@ class Tape {
   /// The outputs at a point.
   /// @param inputs  inputs() numbers. @param outputs  outputs() entries, may overlap with `inputs`.
   /// @param values  as `prepare` left them, for the parameters of its call; the rest is scratch.
-  /// Cost: one pass over the nodes; no allocation, and noexcept, where T's arithmetic is.
+  /// Cost: one pass over the nodes; no allocation where T's arithmetic has none.
   template <class T>
-  void evaluate(std::span<const T> inputs, std::span<T> outputs, std::span<T> values) const {
+  void evaluate(std::span<const T> inputs, std::span<T> outputs, std::span<T> values) const
+      noexcept(std::is_floating_point_v<T>) {
     for (std::size_t k = 0; k < inputs_; ++k) {
       values[first_input_ + k] = inputs[k];
     }
@@ -103,7 +106,8 @@ class Tape {
   friend class TapeBuilder;
 
   template <class T>
-  void compute(std::size_t first, std::size_t last, T* values) const {
+  void compute(std::size_t first, std::size_t last, T* values) const
+      noexcept(std::is_floating_point_v<T>) {
     const Node* const nodes = nodes_.data();
     for (std::size_t i = first; i < last; ++i) {
       const Node node = nodes[i];
@@ -121,6 +125,6 @@ class Tape {
 
 /// Doubles run through a loop compiled once. @private
 template <>
-void Tape::compute(std::size_t first, std::size_t last, double* values) const;
+void Tape::compute(std::size_t first, std::size_t last, double* values) const noexcept;
 
 }  // namespace flyball::expression
