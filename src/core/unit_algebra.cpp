@@ -344,4 +344,29 @@ Expected<SiUnit> parse_si_unit(std::string_view text) {
   return Reader(text).read_all();
 }
 
+Expected<QuantityText> split_quantity(std::string_view text, std::string_view name) {
+  constexpr std::string_view blanks = " \t\r\n";
+  const std::size_t first = std::min(text.find_first_not_of(blanks), text.size());
+  const std::size_t sign = first < text.size() && text[first] == '+' ? 1 : 0;
+  const char* const digits = text.data() + first + sign;
+  double number = 0.0;
+  const auto [end, status] = std::from_chars(digits, text.data() + text.size(), number);
+  const auto refuse = [&](ArgumentError code, std::string_view expected) {
+    return tl::unexpected(Error(code)
+                              .about(std::string(name))
+                              .got(detail::format("\"{}\"", text))
+                              .expected(std::string(expected)));
+  };
+  if (status == std::errc::result_out_of_range || !std::isfinite(number)) {
+    return refuse(ArgumentError::not_finite, "a finite number with its unit");
+  }
+  if (status != std::errc{} || (sign == 1 && *digits == '-')) {
+    return refuse(ArgumentError::malformed, "a number with its unit, such as \"2.5 kg m^2\"");
+  }
+  std::string_view unit = text.substr(static_cast<std::size_t>(end - text.data()));
+  unit.remove_prefix(std::min(unit.find_first_not_of(blanks), unit.size()));
+  unit = unit.substr(0, unit.find_last_not_of(blanks) + 1);
+  return QuantityText{number, unit};
+}
+
 }  // namespace flyball

@@ -118,5 +118,29 @@ TEST(UnitAlgebra, RefusesWhatItCannotRead) {
             "unit is \"fot\", which is not known; did you mean \"ft\"?");
 }
 
+TEST(UnitAlgebra, TakesQuantitiesApart) {
+  const Case cases[] = {{"2.5 kg m^2", 2.5, "kg m^2"},
+                        {" -1e3V ", -1000.0, "V"},
+                        {"+.5", 0.5, ""},
+                        {"3", 3.0, ""},
+                        {"12\tN·m/A\n", 12.0, "N·m/A"}};
+  for (const Case& each : cases) {
+    const auto quantity = split_quantity(each.text, "k");
+    ASSERT_TRUE(quantity) << each.text;
+    EXPECT_EQ(quantity->number, each.factor) << each.text;
+    EXPECT_EQ(quantity->unit, each.dimension) << each.text;
+  }
+  for (const char* text : {"", "  ", "kg", "+-1 kg", "--1", "+"}) {
+    const auto quantity = split_quantity(text, "k");
+    ASSERT_FALSE(quantity) << text;
+    EXPECT_TRUE(quantity.error().is(ArgumentError::malformed)) << text;
+  }
+  for (const char* text : {"inf kg", "nan", "1e999 m"}) {
+    const auto quantity = split_quantity(text, "k");
+    ASSERT_FALSE(quantity) << text;
+    EXPECT_TRUE(quantity.error().is(ArgumentError::not_finite)) << text;
+  }
+}
+
 }  // namespace
 }  // namespace flyball

@@ -52,4 +52,14 @@ struct SiUnit {
 ///         malformed for a parenthesis or an exponent that cannot be read.
 [[nodiscard]] Expected<SiUnit> parse_si_unit(std::string_view text);
 
+/// A quantity's text in its two parts.
+struct QuantityText {
+  double number = 0.0;
+  std::string_view unit;  ///< A part of the text, without blanks around it; may be empty.
+};
+
+/// Takes "2.5 kg m^2" apart into 2.5 and "kg m^2". @param name  The thing's name, for the message.
+/// @errors ArgumentError::malformed where there is no number in front, not_finite.
+[[nodiscard]] Expected<QuantityText> split_quantity(std::string_view text, std::string_view name);
+
 }  // namespace flyball
