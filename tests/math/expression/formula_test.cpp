@@ -13,7 +13,7 @@ struct Case {
   double value;
 };
 
-// Each value computed by hand, or by the function of <cmath> that the formula names.
+// Each value computed by hand, or by the function of cmath that the formula names.
 void check(std::initializer_list<Case> cases) {
   for (const Case& each : cases) {
     EXPECT_DOUBLE_EQ(

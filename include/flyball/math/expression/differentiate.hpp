@@ -34,8 +34,8 @@ struct Derivatives {
 
   /// Value and Jacobian at a point.
   /// @param inputs  tape.inputs() numbers. @param y  rows entries, the function's outputs.
-  /// @param J  rows x columns. @param values  as Tape::prepare left them, with
-  /// entries.size() + rows more entries behind for scratch: `workspace_size()` in all.
+  /// @param J  rows x columns. @param values  workspace_size() entries: the first tape.size() as
+  /// Tape::prepare left them, the rest scratch.
   /// Cost: one pass over the tape; no allocation.
   void evaluate(std::span<const double> inputs, std::span<double> y, Eigen::Ref<Eigen::MatrixXd> J,
                 std::span<double> values) const noexcept;

@@ -13,8 +13,8 @@ namespace flyball::expression {
 /// What a tape can be written in.
 enum class Language : std::uint8_t {
   formula,  ///< Flyball's own, which `compile` reads.
-  c,        ///< With <math.h>.
-  cpp,      ///< With <cmath>, <algorithm> and <limits>.
+  c,        ///< With the math.h header.
+  cpp,      ///< With the headers cmath, algorithm and limits.
   java,
 };
 

@@ -26,6 +26,7 @@ struct Node {
   std::uint32_t c = 0;
   friend bool operator==(const Node&, const Node&) = default;
 
+  /// The node of a constant.
   [[nodiscard]] static constexpr Node constant(double value) noexcept {
     const auto bits = std::bit_cast<std::uint64_t>(value);
     return {Operation::constant, static_cast<std::uint32_t>(bits),
@@ -64,10 +65,11 @@ class Tape {
 
   [[nodiscard]] std::span<const Node> nodes() const noexcept { return nodes_; }
   [[nodiscard]] std::span<const Slot> output_slots() const noexcept { return outputs_; }
-  /// Where an input or a parameter stands.
+  /// Where an input stands.
   [[nodiscard]] Slot input_slot(std::size_t number) const noexcept {
     return {static_cast<std::uint32_t>(first_input_ + number)};
   }
+  /// Where a parameter stands.
   [[nodiscard]] Slot parameter_slot(std::size_t number) const noexcept {
     return {static_cast<std::uint32_t>(constants_ + number)};
   }
