@@ -70,8 +70,7 @@ class Dual {
   [[nodiscard]] static Dual variable(double value, Eigen::Index number,
                                      Eigen::Index variables = N) {
     Dual x(value);
-    x.gradient.setZero(variables);
-    x.gradient(number) = 1.0;
+    x.gradient = Gradient::Unit(variables, number);
     if constexpr (Order == 2) {
       x.hessian.setZero(variables, variables);
     }
