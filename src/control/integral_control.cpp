@@ -3,6 +3,7 @@
 #include <string>
 
 #include "control/weights.hpp"
+#include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
@@ -84,16 +85,11 @@ Expected<IntegralLqr> split_integral(Expected<LqrDesign<>>&& design, Eigen::Inde
 }  // namespace detail
 
 ErrorInfo error_info(IntegralControlError code) {
-  constexpr std::string_view family = "integral_control";
-  switch (code) {
-    case IntegralControlError::not_trackable:
-      return {family, "not_trackable", "no constant input holds the outputs at every value",
-              ErrorKind::no_answer};
-    case IntegralControlError::not_matched:
-      return {family, "not_matched", "no combination of inputs acts like the disturbance",
-              ErrorKind::no_answer};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"not_trackable", "no constant input holds the outputs at every value", ErrorKind::no_answer},
+      {"not_matched", "no combination of inputs acts like the disturbance", ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "integral_control", rows);
 }
 
 Expected<IntegralLqr> lqi(const DiscreteSystem<>& plant, const Weight& Q, const Weight& R) {

@@ -96,12 +96,17 @@ Expected<LqrDesign<>> lqr(const MatrixRef& A, const MatrixRef& B, const Weight& 
   return solve(A, B, Q, R, &cross);
 }
 
-FLYBALL_LQR(, 1, 1, 1);
-FLYBALL_LQR(, 2, 1, 1);
-FLYBALL_LQR(, 2, 1, 2);
-FLYBALL_LQR(, 2, 2, 2);
-FLYBALL_LQR(, 3, 1, 1);
-FLYBALL_LQR(, 3, 1, 2);
-FLYBALL_LQR(, Eigen::Dynamic, Eigen::Dynamic, Eigen::Dynamic);
+#define FLYBALL_LQR(States, Inputs, Outputs)                                                       \
+  template Expected<LqrDesign<States, Inputs>> lqr(const DiscreteSystem<States, Inputs, Outputs>&, \
+                                                   const Weight&, const Weight&);                  \
+  template Expected<LqrDesign<States, Inputs>> lqr(const DiscreteSystem<States, Inputs, Outputs>&, \
+                                                   const Weight&, const Weight&, const MatrixRef&)
+FLYBALL_LQR(1, 1, 1);
+FLYBALL_LQR(2, 1, 1);
+FLYBALL_LQR(2, 1, 2);
+FLYBALL_LQR(2, 2, 2);
+FLYBALL_LQR(3, 1, 1);
+FLYBALL_LQR(3, 1, 2);
+FLYBALL_LQR(Eigen::Dynamic, Eigen::Dynamic, Eigen::Dynamic);
 
 }  // namespace flyball

@@ -8,6 +8,7 @@
 #include <flyball/systems/response.hpp>
 
 #include "control/single_loop.hpp"
+#include "core/error_rows.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -39,19 +40,14 @@ Expected<int> steps_of(double duration, double period, std::string_view where) {
 }  // namespace detail
 
 ErrorInfo error_info(TuningError code) {
-  constexpr std::string_view family = "tuning";
-  switch (code) {
-    case TuningError::no_oscillation:
-      return {family, "no_oscillation", "the relay does not make the plant oscillate",
-              ErrorKind::no_answer};
-    case TuningError::no_reaction:
-      return {family, "no_reaction", "the output does not answer the step, or does not settle",
-              ErrorKind::no_answer};
-    case TuningError::nothing_improves:
-      return {family, "nothing_improves", "no proportional gain brings the output to the reference",
-              ErrorKind::no_answer};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"no_oscillation", "the relay does not make the plant oscillate", ErrorKind::no_answer},
+      {"no_reaction", "the output does not answer the step, or does not settle",
+       ErrorKind::no_answer},
+      {"nothing_improves", "no proportional gain brings the output to the reference",
+       ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "tuning", rows);
 }
 
 Expected<PidResponse> simulate_pid(const DiscreteSystem<>& plant, const PidGains& gains,

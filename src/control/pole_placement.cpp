@@ -8,6 +8,7 @@
 #include <flyball/core/random.hpp>
 
 #include "control/placement.hpp"
+#include "core/error_rows.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -280,19 +281,12 @@ Expected<void> check_arguments(const MatrixRef& A, const MatrixRef& B,
 }  // namespace
 
 ErrorInfo error_info(PolePlacementError code) {
-  constexpr std::string_view family = "pole_placement";
-  switch (code) {
-    case PolePlacementError::not_conjugate:
-      return {family, "not_conjugate", "a complex pole is without its conjugate",
-              ErrorKind::misuse};
-    case PolePlacementError::not_controllable:
-      return {family, "not_controllable", "a mode that no input reaches would have to move",
-              ErrorKind::no_answer};
-    case PolePlacementError::not_reached:
-      return {family, "not_reached", "no gain was found that places the poles well enough",
-              ErrorKind::no_answer};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"not_conjugate", "a complex pole is without its conjugate", ErrorKind::misuse},
+      {"not_controllable", "a mode that no input reaches would have to move", ErrorKind::no_answer},
+      {"not_reached", "no gain was found that places the poles well enough", ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "pole_placement", rows);
 }
 
 Expected<PolePlacement<>> place(const MatrixRef& A, const MatrixRef& B,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 
+#include "core/error_rows.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -50,15 +51,12 @@ Expected<SteadyStateFeedforward<>> solve(const MatrixRef& A, const MatrixRef& B,
 }  // namespace
 
 ErrorInfo error_info(FeedforwardError code) {
-  constexpr std::string_view family = "feedforward";
-  switch (code) {
-    case FeedforwardError::no_steady_state:
-      return {family, "no_steady_state", "no constant input holds the output at every value",
-              ErrorKind::no_answer};
-    case FeedforwardError::singular:
-      return {family, "singular", "B'QB + R is not positive definite", ErrorKind::no_answer};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"no_steady_state", "no constant input holds the output at every value",
+       ErrorKind::no_answer},
+      {"singular", "B'QB + R is not positive definite", ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "feedforward", rows);
 }
 
 Expected<SteadyStateFeedforward<>> steady_state_feedforward(const MatrixRef& A, const MatrixRef& B,

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "core/error_rows.hpp"
 #include "core/format.hpp"
 
 namespace flyball {
@@ -103,30 +104,19 @@ std::string to_string(const Error& error) {
 }
 
 ErrorInfo error_info(ArgumentError code) {
-  constexpr std::string_view family = "argument";
-  switch (code) {
-    case ArgumentError::wrong_shape:
-      return {family, "wrong_shape", "the shape does not fit", ErrorKind::misuse};
-    case ArgumentError::not_finite:
-      return {family, "not_finite", "NaN or infinity", ErrorKind::misuse};
-    case ArgumentError::not_symmetric:
-      return {family, "not_symmetric", "the matrix is not symmetric", ErrorKind::misuse};
-    case ArgumentError::not_positive:
-      return {family, "not_positive", "the value is not positive", ErrorKind::misuse};
-    case ArgumentError::out_of_range:
-      return {family, "out_of_range", "the value is out of range", ErrorKind::misuse};
-    case ArgumentError::empty:
-      return {family, "empty", "nothing is given", ErrorKind::misuse};
-    case ArgumentError::wrong_unit:
-      return {family, "wrong_unit", "the unit does not fit", ErrorKind::misuse};
-    case ArgumentError::unknown_name:
-      return {family, "unknown_name", "the name is not known", ErrorKind::misuse};
-    case ArgumentError::ambiguous_name:
-      return {family, "ambiguous_name", "the name fits several", ErrorKind::misuse};
-    case ArgumentError::malformed:
-      return {family, "malformed", "the text cannot be read", ErrorKind::misuse};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"wrong_shape", "the shape does not fit", ErrorKind::misuse},
+      {"not_finite", "NaN or infinity", ErrorKind::misuse},
+      {"not_symmetric", "the matrix is not symmetric", ErrorKind::misuse},
+      {"not_positive", "the value is not positive", ErrorKind::misuse},
+      {"out_of_range", "the value is out of range", ErrorKind::misuse},
+      {"empty", "nothing is given", ErrorKind::misuse},
+      {"wrong_unit", "the unit does not fit", ErrorKind::misuse},
+      {"unknown_name", "the name is not known", ErrorKind::misuse},
+      {"ambiguous_name", "the name fits several", ErrorKind::misuse},
+      {"malformed", "the text cannot be read", ErrorKind::misuse},
+  };
+  return detail::info_of(code, "argument", rows);
 }
 
 }  // namespace flyball

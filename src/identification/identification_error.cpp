@@ -1,30 +1,22 @@
 #include <flyball/identification/identification_error.hpp>
 
+#include "core/error_rows.hpp"
+
 namespace flyball::identification {
 
 ErrorInfo error_info(IdentificationError code) {
-  constexpr std::string_view family = "identification";
-  constexpr ErrorKind kind = ErrorKind::no_answer;
-  switch (code) {
-    case IdentificationError::unknown_mechanism:
-      return {family, "unknown_mechanism", "the log does not say what kind of mechanism it is",
-              kind};
-    case IdentificationError::no_data:
-      return {family, "no_data", "there is no usable row", kind};
-    case IdentificationError::no_motion:
-      return {family, "no_motion", "the mechanism does not move in any test", kind};
-    case IdentificationError::missing_tests:
-      return {family, "missing_tests", "the tests do not determine the gains together", kind};
-    case IdentificationError::too_short:
-      return {family, "too_short", "the usable part of the tests is too short", kind};
-    case IdentificationError::singular:
-      return {family, "singular", "the data do not tell the gains apart", kind};
-    case IdentificationError::no_convergence:
-      return {family, "no_convergence", "the fit does not settle", kind};
-    case IdentificationError::unphysical_gains:
-      return {family, "unphysical_gains", "no such mechanism has the gains that fit best", kind};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"unknown_mechanism", "the log does not say what kind of mechanism it is",
+       ErrorKind::no_answer},
+      {"no_data", "there is no usable row", ErrorKind::no_answer},
+      {"no_motion", "the mechanism does not move in any test", ErrorKind::no_answer},
+      {"missing_tests", "the tests do not determine the gains together", ErrorKind::no_answer},
+      {"too_short", "the usable part of the tests is too short", ErrorKind::no_answer},
+      {"singular", "the data do not tell the gains apart", ErrorKind::no_answer},
+      {"no_convergence", "the fit does not settle", ErrorKind::no_answer},
+      {"unphysical_gains", "no such mechanism has the gains that fit best", ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "identification", rows);
 }
 
 }  // namespace flyball::identification

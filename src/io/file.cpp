@@ -13,6 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/error_rows.hpp"
 #include "core/try.hpp"
 
 namespace flyball {
@@ -120,26 +121,17 @@ Expected<struct stat> status_of(int fd, const std::string& path) {
 }  // namespace
 
 ErrorInfo error_info(FileError code) {
-  constexpr std::string_view family = "file";
-  switch (code) {
-    case FileError::not_found:
-      return {family, "not_found", "there is no such file", ErrorKind::environment};
-    case FileError::is_a_folder:
-      return {family, "is_a_folder", "the path is a folder", ErrorKind::misuse};
-    case FileError::not_a_folder:
-      return {family, "not_a_folder", "the path is not a folder", ErrorKind::misuse};
-    case FileError::not_a_file:
-      return {family, "not_a_file", "the path is not a file", ErrorKind::misuse};
-    case FileError::not_readable:
-      return {family, "not_readable", "the file cannot be read", ErrorKind::environment};
-    case FileError::not_writable:
-      return {family, "not_writable", "the path cannot be written", ErrorKind::environment};
-    case FileError::too_large:
-      return {family, "too_large", "the file is too large", ErrorKind::misuse};
-    case FileError::folder_in_use:
-      return {family, "folder_in_use", "the folder holds something else", ErrorKind::misuse};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"not_found", "there is no such file", ErrorKind::environment},
+      {"is_a_folder", "the path is a folder", ErrorKind::misuse},
+      {"not_a_folder", "the path is not a folder", ErrorKind::misuse},
+      {"not_a_file", "the path is not a file", ErrorKind::misuse},
+      {"not_readable", "the file cannot be read", ErrorKind::environment},
+      {"not_writable", "the path cannot be written", ErrorKind::environment},
+      {"too_large", "the file is too large", ErrorKind::misuse},
+      {"folder_in_use", "the folder holds something else", ErrorKind::misuse},
+  };
+  return detail::info_of(code, "file", rows);
 }
 
 Expected<std::string> read_file(const std::string& path, std::size_t max_bytes) {

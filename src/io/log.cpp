@@ -10,6 +10,7 @@
 #include <flyball/io/file.hpp>
 #include <flyball/io/wpilog.hpp>
 
+#include "core/error_rows.hpp"
 #include "io/text.hpp"
 
 namespace flyball {
@@ -58,24 +59,16 @@ Error not_a_log(const std::string& source, std::string got, std::string mend) {
 }  // namespace
 
 ErrorInfo error_info(LogError code) {
-  constexpr std::string_view family = "log";
-  switch (code) {
-    case LogError::empty:
-      return {family, "empty", "the file is empty", ErrorKind::misuse};
-    case LogError::not_a_log:
-      return {family, "not_a_log", "the file is not a log that Flyball reads", ErrorKind::misuse};
-    case LogError::wrong_magic:
-      return {family, "wrong_magic", "the file does not begin as a WPILOG", ErrorKind::misuse};
-    case LogError::wrong_version:
-      return {family, "wrong_version", "the WPILOG has an unknown version", ErrorKind::misuse};
-    case LogError::malformed:
-      return {family, "malformed", "the log breaks the rules of its format", ErrorKind::misuse};
-    case LogError::no_data:
-      return {family, "no_data", "the log holds no usable sample", ErrorKind::misuse};
-    case LogError::no_time:
-      return {family, "no_time", "the table has no column of time", ErrorKind::misuse};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"empty", "the file is empty", ErrorKind::misuse},
+      {"not_a_log", "the file is not a log that Flyball reads", ErrorKind::misuse},
+      {"wrong_magic", "the file does not begin as a WPILOG", ErrorKind::misuse},
+      {"wrong_version", "the WPILOG has an unknown version", ErrorKind::misuse},
+      {"malformed", "the log breaks the rules of its format", ErrorKind::misuse},
+      {"no_data", "the log holds no usable sample", ErrorKind::misuse},
+      {"no_time", "the table has no column of time", ErrorKind::misuse},
+  };
+  return detail::info_of(code, "log", rows);
 }
 
 const Signal* Log::find_signal(std::string_view name) const noexcept {

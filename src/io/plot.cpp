@@ -6,6 +6,7 @@
 
 #include <flyball/io/file.hpp>
 
+#include "core/error_rows.hpp"
 #include "io/plot_script.hpp"
 #include "io/process.hpp"
 #include "io/text.hpp"
@@ -111,16 +112,12 @@ Expected<void> save(const std::string& path, const Expected<std::string>& pictur
 }  // namespace
 
 ErrorInfo error_info(PlotError code) {
-  constexpr std::string_view family = "plot";
-  switch (code) {
-    case PlotError::gnuplot_missing:
-      return {family, "gnuplot_missing", "gnuplot is not installed", ErrorKind::environment};
-    case PlotError::gnuplot_failed:
-      return {family, "gnuplot_failed", "gnuplot did not draw the picture", ErrorKind::environment};
-    case PlotError::timed_out:
-      return {family, "timed_out", "gnuplot did not finish within 30 s", ErrorKind::environment};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"gnuplot_missing", "gnuplot is not installed", ErrorKind::environment},
+      {"gnuplot_failed", "gnuplot did not draw the picture", ErrorKind::environment},
+      {"timed_out", "gnuplot did not finish within 30 s", ErrorKind::environment},
+  };
+  return detail::info_of(code, "plot", rows);
 }
 
 Plot pole_plot(std::string title, const std::vector<PolePlotGroup>& groups, bool discrete) {

@@ -11,6 +11,7 @@
 #include <flyball/core/text.hpp>
 #include <flyball/io/log.hpp>
 
+#include "core/error_rows.hpp"
 #include "recording/channel_names.hpp"
 #include "recording/channels.hpp"
 #include "recording/characterization_windows.hpp"
@@ -266,24 +267,16 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
 }  // namespace
 
 ErrorInfo error_info(RecordingError code) {
-  constexpr std::string_view family = "recording";
-  switch (code) {
-    case RecordingError::drivetrain:
-      return {family, "drivetrain", "this is a drivetrain's log", ErrorKind::no_answer};
-    case RecordingError::mechanism_unknown:
-      return {family, "mechanism_unknown", "the kind of mechanism is not known", ErrorKind::misuse};
-    case RecordingError::no_test_state:
-      return {family, "no_test_state", "no channel names the running test", ErrorKind::misuse};
-    case RecordingError::no_channel:
-      return {family, "no_channel", "a channel is missing", ErrorKind::misuse};
-    case RecordingError::ambiguous_channel:
-      return {family, "ambiguous_channel", "several channels fit", ErrorKind::misuse};
-    case RecordingError::unit_mismatch:
-      return {family, "unit_mismatch", "the unit does not fit the mechanism", ErrorKind::misuse};
-    case RecordingError::no_tests:
-      return {family, "no_tests", "the log holds no test", ErrorKind::no_answer};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"drivetrain", "this is a drivetrain's log", ErrorKind::no_answer},
+      {"mechanism_unknown", "the kind of mechanism is not known", ErrorKind::misuse},
+      {"no_test_state", "no channel names the running test", ErrorKind::misuse},
+      {"no_channel", "a channel is missing", ErrorKind::misuse},
+      {"ambiguous_channel", "several channels fit", ErrorKind::misuse},
+      {"unit_mismatch", "the unit does not fit the mechanism", ErrorKind::misuse},
+      {"no_tests", "the log holds no test", ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "recording", rows);
 }
 
 Expected<LoadedRecording> recording_from_log(const Log& log, const LogSelection& selection) {

@@ -10,6 +10,7 @@
 
 #include <flyball/study/simulate.hpp>
 
+#include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "study/design_steps.hpp"
 
@@ -141,18 +142,12 @@ void simulate_response(DesignResult& result) {
 }  // namespace
 
 ErrorInfo error_info(DesignError code) {
-  constexpr std::string_view family = "design";
-  switch (code) {
-    case DesignError::gravity_too_strong:
-      return {family, "gravity_too_strong", "the motor cannot hold the mechanism",
-              ErrorKind::no_answer};
-    case DesignError::no_motion_possible:
-      return {family, "no_motion_possible", "the motor cannot move the mechanism",
-              ErrorKind::no_answer};
-    case DesignError::margins_lost:
-      return {family, "margins_lost", "the loop cannot be made robust", ErrorKind::no_answer};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"gravity_too_strong", "the motor cannot hold the mechanism", ErrorKind::no_answer},
+      {"no_motion_possible", "the motor cannot move the mechanism", ErrorKind::no_answer},
+      {"margins_lost", "the loop cannot be made robust", ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "design", rows);
 }
 
 Expected<DesignResult> design(const DesignJob& requested) {

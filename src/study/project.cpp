@@ -11,6 +11,7 @@
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/mechanisms/flywheel.hpp>
 
+#include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "study/toml_reader.hpp"
 
@@ -259,20 +260,14 @@ void read_surroundings(TomlReader& top, const std::string& file, MechanismKind k
 }  // namespace
 
 ErrorInfo error_info(ProjectError code) {
-  constexpr std::string_view family = "project";
-  switch (code) {
-    case ProjectError::syntax:
-      return {family, "syntax", "the file is not TOML", ErrorKind::misuse};
-    case ProjectError::unknown_key:
-      return {family, "unknown_key", "the key is not known", ErrorKind::misuse};
-    case ProjectError::missing_key:
-      return {family, "missing_key", "a key is missing", ErrorKind::misuse};
-    case ProjectError::wrong_type:
-      return {family, "wrong_type", "the value has the wrong type", ErrorKind::misuse};
-    case ProjectError::wrong_value:
-      return {family, "wrong_value", "the value cannot be", ErrorKind::misuse};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"syntax", "the file is not TOML", ErrorKind::misuse},
+      {"unknown_key", "the key is not known", ErrorKind::misuse},
+      {"missing_key", "a key is missing", ErrorKind::misuse},
+      {"wrong_type", "the value has the wrong type", ErrorKind::misuse},
+      {"wrong_value", "the value cannot be", ErrorKind::misuse},
+  };
+  return detail::info_of(code, "project", rows);
 }
 
 Expected<Project> parse_project(std::string_view text, const std::string& name) {

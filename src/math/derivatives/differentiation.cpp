@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/error_rows.hpp"
 #include "core/try.hpp"
 
 namespace flyball {
@@ -78,13 +79,10 @@ VectorXd richardson(const VectorFunction& f, const Eigen::Ref<const VectorXd>& x
 }  // namespace
 
 ErrorInfo error_info(DifferentiationError code) {
-  constexpr std::string_view family = "differentiation";
-  switch (code) {
-    case DifferentiationError::not_finite:
-      return {family, "not_finite", "the function is not finite where it is differenced",
-              ErrorKind::no_answer};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"not_finite", "the function is not finite where it is differenced", ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "differentiation", rows);
 }
 
 Expected<MatrixXd> numerical_jacobian(VectorFunction f, const Eigen::Ref<const VectorXd>& x,

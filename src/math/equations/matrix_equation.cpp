@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/equations/lyapunov_kernel.hpp"
@@ -315,18 +316,12 @@ Expected<LinearMatrixSolution> solve_sylvester(Domain domain, const MatrixRef& A
 }  // namespace
 
 ErrorInfo error_info(MatrixEquationError code) {
-  constexpr std::string_view family = "matrix_equation";
-  switch (code) {
-    case MatrixEquationError::no_unique_solution:
-      return {family, "no_unique_solution", "the equation has no unique solution",
-              ErrorKind::no_answer};
-    case MatrixEquationError::no_convergence:
-      return {family, "no_convergence", "the eigenvalues could not be computed",
-              ErrorKind::no_answer};
-    case MatrixEquationError::overflow:
-      return {family, "overflow", "the solution exceeds the largest double", ErrorKind::no_answer};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"no_unique_solution", "the equation has no unique solution", ErrorKind::no_answer},
+      {"no_convergence", "the eigenvalues could not be computed", ErrorKind::no_answer},
+      {"overflow", "the solution exceeds the largest double", ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "matrix_equation", rows);
 }
 
 Expected<LinearMatrixSolution> lyapunov(const MatrixRef& A, const MatrixRef& Q) {

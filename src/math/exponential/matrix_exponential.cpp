@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/instruction_set.hpp"
@@ -28,12 +29,10 @@ void exponential(int n, const double* A, double* E, double* memory) {
 }  // namespace detail
 
 ErrorInfo error_info(MatrixExponentialError code) {
-  constexpr std::string_view family = "matrix_exponential";
-  switch (code) {
-    case MatrixExponentialError::overflow:
-      return {family, "overflow", "exp(A) exceeds the largest double", ErrorKind::no_answer};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"overflow", "exp(A) exceeds the largest double", ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "matrix_exponential", rows);
 }
 
 Expected<MatrixXd> expm(const MatrixRef& A) {

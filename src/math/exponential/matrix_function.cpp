@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/exponential/triangular_function.hpp"
@@ -158,21 +159,14 @@ Expected<MatrixXd> inverse_of(const MatrixRef& A, std::string_view where) {
 }  // namespace
 
 ErrorInfo error_info(MatrixFunctionError code) {
-  constexpr std::string_view family = "matrix_function";
-  switch (code) {
-    case MatrixFunctionError::no_real_logarithm:
-      return {family, "no_real_logarithm", "the matrix has no real principal logarithm",
-              ErrorKind::no_answer};
-    case MatrixFunctionError::no_real_power:
-      return {family, "no_real_power", "the matrix has no real principal power of this exponent",
-              ErrorKind::no_answer};
-    case MatrixFunctionError::singular:
-      return {family, "singular", "a negative power needs a matrix with an inverse",
-              ErrorKind::no_answer};
-    case MatrixFunctionError::overflow:
-      return {family, "overflow", "the answer exceeds the largest double", ErrorKind::no_answer};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"no_real_logarithm", "the matrix has no real principal logarithm", ErrorKind::no_answer},
+      {"no_real_power", "the matrix has no real principal power of this exponent",
+       ErrorKind::no_answer},
+      {"singular", "a negative power needs a matrix with an inverse", ErrorKind::no_answer},
+      {"overflow", "the answer exceeds the largest double", ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "matrix_function", rows);
 }
 
 Expected<MatrixXd> logm(const MatrixRef& A) {

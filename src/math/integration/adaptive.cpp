@@ -7,6 +7,7 @@
 
 #include <flyball/core/argument.hpp>
 
+#include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/integration/ode_steppers.hpp"
 
@@ -103,21 +104,13 @@ double find_zero(const EventRef& event, const OdeSolution::Segment& segment, dou
 }  // namespace
 
 ErrorInfo error_info(IntegrationError code) {
-  constexpr std::string_view family = "integration";
-  switch (code) {
-    case IntegrationError::not_finite:
-      return {family, "not_finite", "the derivative is not finite", ErrorKind::no_answer};
-    case IntegrationError::step_underflow:
-      return {family, "step_underflow", "the step became too small to move the time",
-              ErrorKind::no_answer};
-    case IntegrationError::too_many_steps:
-      return {family, "too_many_steps", "the time is not reached in the steps allowed",
-              ErrorKind::no_answer};
-    case IntegrationError::no_convergence:
-      return {family, "no_convergence", "the stages of an implicit step were not found",
-              ErrorKind::no_answer};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"not_finite", "the derivative is not finite", ErrorKind::no_answer},
+      {"step_underflow", "the step became too small to move the time", ErrorKind::no_answer},
+      {"too_many_steps", "the time is not reached in the steps allowed", ErrorKind::no_answer},
+      {"no_convergence", "the stages of an implicit step were not found", ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "integration", rows);
 }
 
 VectorXd OdeSolution::Segment::at(double s) const {

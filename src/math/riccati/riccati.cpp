@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/riccati/riccati_kernel.hpp"
@@ -69,21 +70,14 @@ bool symmetric(const double* S, int n) {
 }  // namespace
 
 ErrorInfo error_info(RiccatiError code) {
-  constexpr std::string_view family = "riccati";
-  switch (code) {
-    case RiccatiError::not_stabilizable:
-      return {family, "not_stabilizable", "a mode that is not stable is reached by no input",
-              ErrorKind::no_answer};
-    case RiccatiError::no_stabilizing_solution:
-      return {family, "no_stabilizing_solution", "no stabilising solution exists",
-              ErrorKind::no_answer};
-    case RiccatiError::singular:
-      return {family, "singular", "R + B'XB has no inverse", ErrorKind::no_answer};
-    case RiccatiError::no_convergence:
-      return {family, "no_convergence", "no solution was found that could be verified",
-              ErrorKind::no_answer};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"not_stabilizable", "a mode that is not stable is reached by no input",
+       ErrorKind::no_answer},
+      {"no_stabilizing_solution", "no stabilising solution exists", ErrorKind::no_answer},
+      {"singular", "R + B'XB has no inverse", ErrorKind::no_answer},
+      {"no_convergence", "no solution was found that could be verified", ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "riccati", rows);
 }
 
 namespace detail {
