@@ -4,8 +4,9 @@
 #include <numbers>
 #include <optional>
 
+#include <flyball/math/search/roots.hpp>
+
 #include "control/delay_margin.hpp"
-#include "control/line_search.hpp"
 
 namespace flyball::detail {
 
@@ -22,9 +23,8 @@ std::optional<double> follow_crossover(const SampledLoop& loop, double theta) {
   for (double reach = 1e-3; reach < 0.5; reach *= 2.0) {
     for (const double other : {theta * (1.0 + reach), theta * (1.0 - reach)}) {
       const double end = std::min(other, pi);
-      const double f_1 = at(end);
-      if ((f_0 > 0.0) != (f_1 > 0.0)) {
-        return find_root(at, theta, end, f_0, f_1);
+      if (const auto root = find_root(at, theta, end, f_0, at(end))) {
+        return root->x;
       }
     }
   }

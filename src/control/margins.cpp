@@ -5,8 +5,10 @@
 #include <numbers>
 #include <optional>
 
+#include <flyball/math/search/minimum.hpp>
+#include <flyball/math/search/roots.hpp>
+
 #include "control/delay_margin.hpp"
-#include "control/line_search.hpp"
 #include "control/sampled_loop.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -16,8 +18,6 @@ namespace flyball {
 namespace {
 
 using Complex = std::complex<double>;
-using detail::find_minimum;
-using detail::find_root;
 using detail::lag_to_minus_one;
 using detail::log_gain;
 using detail::SampledLoop;
@@ -103,7 +103,9 @@ std::vector<double> zeros(const SampledLoop& loop, const std::vector<Point>& poi
   const auto at = [&](double theta) { return f(loop.response(theta)); };
   const auto add = [&](double a, double b, double f_a, double f_b) {
     if ((f_a > 0.0) != (f_b > 0.0)) {
-      found.push_back(find_root(at, a, b, f_a, f_b));
+      if (const auto root = find_root(at, a, b, f_a, f_b)) {
+        found.push_back(root->x);
+      }
     }
   };
   for (std::size_t i = 1; i < points.size(); ++i) {
@@ -119,12 +121,12 @@ std::vector<double> zeros(const SampledLoop& loop, const std::vector<Point>& poi
     // Between points the gain and the phase move by at most the grid's turn.
     if (dips && std::abs(b) < 0.2 * std::max(1.0, std::abs(points[i].L))) {
       const double sign = b > 0.0 ? 1.0 : -1.0;
-      const double lowest = find_minimum([&](double theta) { return sign * at(theta); },
-                                         points[i - 1].theta, points[i + 1].theta);
-      const double value = at(lowest);
-      if (sign * value < 0.0) {
-        add(points[i - 1].theta, lowest, a, value);
-        add(lowest, points[i + 1].theta, value, c);
+      const auto lowest = find_minimum([&](double theta) { return sign * at(theta); },
+                                       points[i - 1].theta, points[i + 1].theta);
+      if (lowest && lowest->value < 0.0) {
+        const double value = sign * lowest->value;
+        add(points[i - 1].theta, lowest->x, a, value);
+        add(lowest->x, points[i + 1].theta, value, c);
       }
     }
   }
@@ -170,9 +172,10 @@ void set_disk_margin(StabilityMargins& margins, const SampledLoop& loop,
     const double here = size(points[i].L);
     // The grid turns 1 + L by little, so a maximum between points is not much above them.
     if (here >= size(points[i - 1].L) && here >= size(points[i + 1].L) && here > 0.8 * highest) {
-      const double place = find_minimum([&](double t) { return -size(loop.response(t)); },
-                                        points[i - 1].theta, points[i + 1].theta);
-      consider(size(loop.response(place)), place);
+      if (const auto top = find_minimum([&](double t) { return -size(loop.response(t)); },
+                                        points[i - 1].theta, points[i + 1].theta)) {
+        consider(-top->value, top->x);
+      }
     }
   }
   const double alpha = 2.0 / peak;

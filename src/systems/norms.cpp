@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include <flyball/math/search/minimum.hpp>
 #include <flyball/systems/conversion.hpp>
 
 #include "core/try.hpp"
@@ -152,32 +153,6 @@ std::vector<double> crossings(const ContinuousSystem<>& s, double gamma) {
   return found;
 }
 
-/// A maximum of the gain near `omega`, by golden section over [low, high].
-double climb(const Gain& gains, double low, double high, double& gain) {
-  constexpr double golden = 0.6180339887498949;
-  double a = high - golden * (high - low);
-  double b = low + golden * (high - low);
-  double at_a = gains.at(a);
-  double at_b = gains.at(b);
-  for (int k = 0; k < 90 && high - low > 1e-15 * high; ++k) {
-    if (at_a >= at_b) {
-      high = b;
-      b = a;
-      at_b = at_a;
-      a = high - golden * (high - low);
-      at_a = gains.at(a);
-    } else {
-      low = a;
-      a = b;
-      at_a = at_b;
-      b = low + golden * (high - low);
-      at_b = gains.at(b);
-    }
-  }
-  gain = std::max(at_a, at_b);
-  return at_a >= at_b ? a : b;
-}
-
 /// G(1/s): what lies at infinity comes to the origin. A is stable, so it has an inverse.
 ContinuousSystem<> inverted(const ContinuousSystem<>& s) {
   const Index n = s.A.rows();
@@ -259,13 +234,12 @@ Expected<HInfinityNorm> largest_gain(const ContinuousSystem<>& system, std::stri
     if (found.empty() || best.norm <= before * (1.0 + relative_accuracy)) {
       // Eigenvalues that the search cannot tell from crossings: the peak itself.
       if (std::isfinite(best.frequency) && best.frequency > 0.0) {
-        double gain = 0.0;
-        const double omega =
-            climb(gains, best.frequency * (1.0 - 1e-3), best.frequency * (1.0 + 1e-3), gain);
-        if (gain > best.norm) {
-          const bool grew = gain > best.norm * (1.0 + 0.5 * relative_accuracy);
-          best.norm = gain;
-          best.frequency = omega;
+        const auto top = find_minimum([&](double omega) { return -gains.at(omega); },
+                                      best.frequency * (1.0 - 1e-3), best.frequency * (1.0 + 1e-3));
+        if (top && -top->value > best.norm) {
+          const bool grew = -top->value > best.norm * (1.0 + 0.5 * relative_accuracy);
+          best.norm = -top->value;
+          best.frequency = top->x;
           if (grew) {
             continue;
           }

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <string>
 
 #include <flyball/core/argument.hpp>
+#include <flyball/math/search/roots.hpp>
 
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
@@ -71,34 +73,6 @@ bool crosses(double before, double after, EventDirection direction) {
   const bool falls = before > 0.0 && after <= 0.0;
   return (rises && direction != EventDirection::falling) ||
          (falls && direction != EventDirection::rising);
-}
-
-/// The zero of g between two places in a step where its signs differ, by the Illinois method kept
-/// in its bracket by bisection.
-double find_zero(const EventRef& event, const OdeSolution::Segment& segment, double low,
-                 double high, double at_low, double at_high) {
-  const auto g = [&](double s) { return event.function(segment.t + s * segment.h, segment.at(s)); };
-  const double resolution =
-      2.0 * std::numeric_limits<double>::epsilon() * std::max(1.0, std::abs(segment.t / segment.h));
-  double weight_low = at_low;
-  double weight_high = at_high;
-  for (int i = 0; i < 200 && high - low > resolution && at_high != 0.0; ++i) {
-    double middle = high - weight_high * (high - low) / (weight_high - weight_low);
-    if (i % 3 == 2 || !(middle > low && middle < high)) {
-      middle = 0.5 * (low + high);
-    }
-    const double value = g(middle);
-    if (value != 0.0 && (value < 0.0) == (at_low < 0.0)) {
-      low = middle;
-      at_low = weight_low = value;
-      weight_high *= 0.5;
-    } else {
-      high = middle;
-      at_high = weight_high = value;
-      weight_low *= 0.5;
-    }
-  }
-  return std::abs(at_low) < std::abs(at_high) ? low : high;
 }
 
 }  // namespace
@@ -192,6 +166,8 @@ class OdeIntegrator {
     };
     std::vector<Found> found;
     const OdeSolution::Segment& segment = state.segment;
+    const double resolution = 2.0 * std::numeric_limits<double>::epsilon() *
+                              std::max(1.0, std::abs(segment.t / segment.h));
     for (std::size_t i = 0; i < events_.size(); ++i) {
       double before = values_[i];
       for (int part = 1; part <= parts; ++part) {
@@ -203,7 +179,12 @@ class OdeIntegrator {
           return tl::unexpected(not_finite("event " + std::to_string(i), t, x));
         }
         if (crosses(before, after, events_[i].direction)) {
-          found.push_back({find_zero(events_[i], segment, s - 1.0 / parts, s, before, after), i});
+          const auto event = [&](double place) {
+            return events_[i].function(segment.t + place * segment.h, segment.at(place));
+          };
+          FLYBALL_TRY(const auto root, find_root(event, s - 1.0 / parts, s, before, after,
+                                                 {.absolute_tolerance = resolution}));
+          found.push_back({root.x, i});
         }
         before = after;
       }
