@@ -14,4 +14,4 @@
 #include "math/equations/lyapunov_kernel_body.hpp"
 #include "math/equations/sylvester_kernel_body.hpp"
 #include "math/exponential/matrix_exponential_kernel_body.hpp"
-#include "math/riccati/riccati_kernel_body.hpp"
+#include "math/riccati/riccati_kernel_closing.hpp"

@@ -24,7 +24,7 @@
 #include "math/equations/lyapunov_kernel_body.hpp"
 #include "math/equations/sylvester_kernel_body.hpp"
 #include "math/exponential/matrix_exponential_kernel_body.hpp"
-#include "math/riccati/riccati_kernel_body.hpp"
+#include "math/riccati/riccati_kernel_closing.hpp"
 #ifdef __clang__
 #pragma clang attribute pop
 #else
