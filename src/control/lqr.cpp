@@ -15,14 +15,8 @@ constexpr std::string_view where = "lqr";
 
 Expected<LqrDesign<>> solve(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
                             const Weight& R, const Eigen::MatrixXd* N) {
-  if (!Q.get()) {
-    return tl::unexpected(Q.get().error());
-  }
-  if (!R.get()) {
-    return tl::unexpected(R.get().error());
-  }
-  const Eigen::MatrixXd& weight_Q = *Q.get();
-  const Eigen::MatrixXd& weight_R = *R.get();
+  FLYBALL_TRY(const auto weight_Q, Q.get());
+  FLYBALL_TRY(const auto weight_R, R.get());
   FLYBALL_CHECK(check_square(A, where, "A"));
   const Eigen::Index n = A.rows();
   const Eigen::Index m = B.cols();

@@ -211,11 +211,8 @@ Expected<ManualTuning> tune_manually(const DiscreteSystem<>& plant, const Tuning
     }
     return y < 0.0 ? -1.0 : 1.0;
   };
-  auto gains = raise_kp(bench, first_gain(scenario), push(), velocity);
-  if (!gains) {
-    return tl::unexpected(gains.error());
-  }
-  if (gains->kp == 0.0) {
+  FLYBALL_TRY(auto gains, raise_kp(bench, first_gain(scenario), push(), velocity));
+  if (gains.kp == 0.0) {
     return tl::unexpected(Error(TuningError::nothing_improves)
                               .in(std::string(where))
                               .about("Kp")
@@ -224,22 +221,16 @@ Expected<ManualTuning> tune_manually(const DiscreteSystem<>& plant, const Tuning
                               .with("smallest Kp tried", first_gain(scenario)));
   }
   if (!velocity) {
-    gains = raise_kd(bench, *gains, plant.period.si());
-    if (!gains) {
-      return tl::unexpected(gains.error());
-    }
+    FLYBALL_TRY(gains, raise_kd(bench, gains, plant.period.si()));
   }
-  FLYBALL_TRY(auto settled, bench.attempt(*gains));
+  FLYBALL_TRY(auto settled, bench.attempt(gains));
   if (bench.error_of(*settled) > exact) {
     settled->decided = "an error remains: a steady-state feedforward would be better, but raise Ki";
-    gains = raise_ki(bench, *gains, scenario.duration);
-    if (!gains) {
-      return tl::unexpected(gains.error());
-    }
+    FLYBALL_TRY(gains, raise_ki(bench, gains, scenario.duration));
   } else {
     settled->decided = "leave Ki at zero: no error remains";
   }
-  FLYBALL_TRY(auto response, simulate_pid(plant, *gains, scenario));
+  FLYBALL_TRY(auto response, simulate_pid(plant, gains, scenario));
   if (std::abs(response.metrics.steady_state_error) >= std::abs(scenario.reference)) {
     return tl::unexpected(Error(TuningError::nothing_improves)
                               .in(std::string(where))
@@ -248,7 +239,7 @@ Expected<ManualTuning> tune_manually(const DiscreteSystem<>& plant, const Tuning
                                     "controller: see whether it is controllable")
                               .with("error that remains", response.metrics.steady_state_error));
   }
-  return ManualTuning{*gains, std::move(bench.steps()), std::move(response)};
+  return ManualTuning{gains, std::move(bench.steps()), std::move(response)};
 }
 
 }  // namespace flyball

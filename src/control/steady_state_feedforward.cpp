@@ -92,24 +92,18 @@ Expected<SteadyStateFeedforward<>> steady_state_feedforward_of_pairs(const Matri
                                 .got(detail::format("{}", input))
                                 .expected(detail::format("from 0 to {}", m - 1)));
     }
-    auto pair = solve(A, B.col(input), C.row(j), D.block(j, input, 1, 1), j);
-    if (!pair) {
-      return pair;
-    }
-    sum.N_x.col(j) = pair->N_x;
-    sum.N_u(input, j) += pair->N_u(0, 0);
-    sum.K_ff.row(input) += pair->K_ff;
+    FLYBALL_TRY(const auto pair, solve(A, B.col(input), C.row(j), D.block(j, input, 1, 1), j));
+    sum.N_x.col(j) = pair.N_x;
+    sum.N_u(input, j) += pair.N_u(0, 0);
+    sum.K_ff.row(input) += pair.K_ff;
   }
   return sum;
 }
 
 Expected<Eigen::MatrixXd> qr_weighted_gain(const MatrixRef& B, const Weight& Q, const Weight& R) {
   constexpr std::string_view name = "qr_weighted_gain";
-  if (!Q.get() || !R.get()) {
-    return tl::unexpected(Q.get() ? R.get().error() : Q.get().error());
-  }
-  const Eigen::MatrixXd& weight_Q = *Q.get();
-  const Eigen::MatrixXd& weight_R = *R.get();
+  FLYBALL_TRY(const auto weight_Q, Q.get());
+  FLYBALL_TRY(const auto weight_R, R.get());
   const Eigen::Index n = B.rows();
   const Eigen::Index m = B.cols();
   FLYBALL_CHECK(Checks(name)

@@ -77,14 +77,8 @@ std::optional<Filter> corrected(const MatrixRef& A, const MatrixRef& C, const Ei
 Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const Covariance& Q,
                                    const Covariance& R) {
   constexpr std::string_view where = "kalman_gain";
-  if (!Q.get()) {
-    return tl::unexpected(Q.get().error());
-  }
-  if (!R.get()) {
-    return tl::unexpected(R.get().error());
-  }
-  const Eigen::MatrixXd& noise_Q = *Q.get();
-  const Eigen::MatrixXd& noise_R = *R.get();
+  FLYBALL_TRY(const auto noise_Q, Q.get());
+  FLYBALL_TRY(const auto noise_R, R.get());
   FLYBALL_CHECK(check_square(A, where, "A"));
   const Eigen::Index n = A.rows();
   const Eigen::Index p = C.rows();

@@ -59,11 +59,9 @@ ContinuousSystem<> bare(const DiscreteSystem<>& s) {
 /// The period is checked after the rest: both are needed.
 Expected<DiscreteSystem<>> timed(Expected<ContinuousSystem<>> augmented, Time period,
                                  std::string_view where) {
-  if (!augmented) {
-    return tl::unexpected(std::move(augmented).error());
-  }
+  FLYBALL_TRY(auto system, std::move(augmented));
   FLYBALL_CHECK(check_positive(period.si(), where, "period", "s"));
-  return DiscreteSystem<>{augmented->A, augmented->B, augmented->C, augmented->D, period};
+  return DiscreteSystem<>{system.A, system.B, system.C, system.D, period};
 }
 
 }  // namespace

@@ -50,11 +50,8 @@ Expected<Eigen::MatrixXd> discretize(const MatrixRef& A, const ProcessDensity& d
                     .positive(period.si(), "period", "s"));
 
   const double T = period.si();
-  auto Q_d = detail::quadratic_integral(A, Q, T);
-  if (!Q_d) {
-    return tl::unexpected(std::move(Q_d).error());
-  }
-  if (!Q_d->allFinite()) {
+  FLYBALL_TRY(auto Q_d, detail::quadratic_integral(A, Q, T));
+  if (!Q_d.allFinite()) {
     return tl::unexpected(
         Error(ArgumentError::not_finite)
             .in(std::string(where))

@@ -47,14 +47,11 @@ Expected<DelayedInputMatrices> discretize_delayed_input(const MatrixRef& A, cons
 Expected<DiscreteSystem<>> discretize_with_input_delay(const ContinuousSystem<>& system,
                                                        Time period, Time delay) {
   FLYBALL_CHECK(check_system(system, "discretize_with_input_delay"));
-  auto discrete = discretize_delayed_input(system.A, system.B, period, delay);
-  if (!discrete) {
-    return tl::unexpected(discrete.error());
-  }
+  FLYBALL_TRY(const auto discrete, discretize_delayed_input(system.A, system.B, period, delay));
   const Eigen::Index n = system.A.rows();
   const Eigen::Index m = system.B.cols();
-  const Eigen::Index d = discrete->whole_periods;
-  const bool fraction = !discrete->B_1.isZero(0.0);
+  const Eigen::Index d = discrete.whole_periods;
+  const bool fraction = !discrete.B_1.isZero(0.0);
   const Eigen::Index stored = d + (fraction ? 1 : 0);
 
   DiscreteSystem<> delayed;
@@ -63,18 +60,18 @@ Expected<DiscreteSystem<>> discretize_with_input_delay(const ContinuousSystem<>&
   delayed.B.setZero(n + m * stored, m);
   delayed.C.setZero(system.C.rows(), n + m * stored);
   delayed.C.leftCols(n) = system.C;
-  delayed.A.topLeftCorner(n, n) = discrete->A;
+  delayed.A.topLeftCorner(n, n) = discrete.A;
   // The states after the plant's are u_{k-1}, u_{k-2}, …
   const auto past = [&](Eigen::Index steps) {
     return delayed.A.block(0, n + m * (steps - 1), n, m);
   };
   if (d == 0) {
-    delayed.B.topRows(n) = discrete->B_0;
+    delayed.B.topRows(n) = discrete.B_0;
   } else {
-    past(d) = discrete->B_0;
+    past(d) = discrete.B_0;
   }
   if (fraction) {
-    past(d + 1) = discrete->B_1;
+    past(d + 1) = discrete.B_1;
   }
   if (stored > 0) {
     delayed.B.middleRows(n, m).setIdentity();

@@ -43,20 +43,17 @@ Expected<SampledCost> sampled_cost(const MatrixRef& A, const MatrixRef& B, const
   F_transposed.bottomLeftCorner(m, n) = unit * B.transpose();
   MatrixXd W(n + m, n + m);
   W << Q, unit * N, unit * N.transpose(), unit * unit * R;
-  auto integral = detail::quadratic_integral(F_transposed, W, T);
-  if (!integral) {
-    return tl::unexpected(std::move(integral).error());
-  }
-  if (!integral->allFinite()) {
+  FLYBALL_TRY(const auto integral, detail::quadratic_integral(F_transposed, W, T));
+  if (!integral.allFinite()) {
     return tl::unexpected(Error(ArgumentError::not_finite)
                               .in(std::string(where))
                               .about("the sampled cost")
                               .got("too large for a double")
                               .hint("shorten the period"));
   }
-  return SampledCost{std::move(held.A), std::move(held.B), integral->topLeftCorner(n, n),
-                     integral->bottomRightCorner(m, m) / (unit * unit),
-                     integral->topRightCorner(n, m) / unit};
+  return SampledCost{std::move(held.A), std::move(held.B), integral.topLeftCorner(n, n),
+                     integral.bottomRightCorner(m, m) / (unit * unit),
+                     integral.topRightCorner(n, m) / unit};
 }
 
 Expected<SampledCost> sampled_cost(const MatrixRef& A, const MatrixRef& B, const MatrixRef& Q,

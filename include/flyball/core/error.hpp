@@ -38,7 +38,7 @@ struct Evidence {
   std::string text;
 };
 
-/// The one error type: a code of some family, and what a person needs to mend it.
+/// The one error type: a code of some family, and what a person needs to correct it.
 ///
 /// Every part but the code is optional; `to_string` puts together what is there:
 /// "lqr: R is 2x2; it must be inputs x inputs (1x1) because B has 1 column".

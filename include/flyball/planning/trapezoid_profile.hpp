@@ -25,7 +25,7 @@ struct MotionLimits {
 /// Source: book, section 15.1.3.
 class TrapezoidProfile {
  public:
-  /// @param start  Where it is (its acceleration is ignored). @param goal  Where it shall be.
+  /// @param start  Where it is (its acceleration is ignored). @param goal  Where it is to be.
   TrapezoidProfile(const MotionLimits& limits, const MotionState& start,
                    const MotionState& goal) noexcept;
 

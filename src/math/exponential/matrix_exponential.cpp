@@ -36,10 +36,7 @@ ErrorInfo error_info(MatrixExponentialError code) {
 }
 
 Expected<MatrixXd> expm(const MatrixRef& A) {
-  if (A.rows() == 0 || A.rows() != A.cols()) {
-    return tl::unexpected(check_square(A, "expm", "A").error());
-  }
-  FLYBALL_CHECK(check_finite(A, "expm", "A"));
+  FLYBALL_CHECK(Checks("expm").square(A, "A").finite(A, "A"));
   if (A.outerStride() != A.rows()) {
     return expm(MatrixXd(A));
   }

@@ -218,11 +218,7 @@ Expected<MatrixXd> powm(const MatrixRef& A, double power) {
   // because A⁻¹A^{1-p} would lose as many digits as A has, not as A^p has.
   MatrixXd base = A;
   if (power < 0.0 && whole && integer > 0.0) {
-    auto inverse = inverse_of(A, where);
-    if (!inverse) {
-      return inverse;
-    }
-    base = *std::move(inverse);
+    FLYBALL_TRY(base, inverse_of(A, where));
   }
   MatrixXd result = whole_power(base, static_cast<long long>(integer));
   if (!whole) {
@@ -232,11 +228,7 @@ Expected<MatrixXd> powm(const MatrixRef& A, double power) {
     }
     result = detail::product(result, *fraction);
     if (power < 0.0 && result.allFinite()) {
-      auto inverse = inverse_of(result, where);
-      if (!inverse) {
-        return inverse;
-      }
-      result = *std::move(inverse);
+      FLYBALL_TRY(result, inverse_of(result, where));
     }
   }
   if (!result.allFinite()) {
