@@ -16,6 +16,7 @@ install(
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
   FILES_MATCHING
   PATTERN "*.hpp"
+  PATTERN "*.inc"
   PATTERN "*.tpp")
 if(TARGET flyball_command)
   install(TARGETS flyball_command RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})

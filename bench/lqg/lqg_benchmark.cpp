@@ -1,7 +1,7 @@
 #include <benchmark/benchmark.h>
 
+#include <flyball/control/lqg.hpp>
 #include <flyball/control/lqr.hpp>
-#include <flyball/control/observer_regulator.hpp>
 #include <flyball/estimation/kalman_filter.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/systems/discretize.hpp>

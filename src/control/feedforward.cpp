@@ -30,10 +30,7 @@ Expected<SimpleFeedforward> SimpleFeedforward::create(mechanisms::MechanismKind 
       .map([&] { return SimpleFeedforward(kind, gains, period); });
 }
 
-template class LinearPlantInversion<1, 1>;
-template class LinearPlantInversion<2, 1>;
-template class LinearPlantInversion<2, 2>;
-template class LinearPlantInversion<3, 1>;
-template class LinearPlantInversion<Eigen::Dynamic, Eigen::Dynamic>;
+#define FLYBALL_STATES_INPUTS(States, Inputs) template class LinearPlantInversion<States, Inputs>;
+#include <flyball/core/instantiated_sizes.inc>
 
 }  // namespace flyball

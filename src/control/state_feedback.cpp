@@ -2,10 +2,7 @@
 
 namespace flyball {
 
-template class StateFeedback<1, 1>;
-template class StateFeedback<2, 1>;
-template class StateFeedback<2, 2>;
-template class StateFeedback<3, 1>;
-template class StateFeedback<Eigen::Dynamic, Eigen::Dynamic>;
+#define FLYBALL_STATES_INPUTS(States, Inputs) template class StateFeedback<States, Inputs>;
+#include <flyball/core/instantiated_sizes.inc>
 
 }  // namespace flyball

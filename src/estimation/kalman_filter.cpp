@@ -37,12 +37,8 @@ Expected<void> check_kalman_filter(const MatrixRef& A, const MatrixRef& B, const
 
 }  // namespace detail
 
-template class KalmanFilter<1, 1, 1>;
-template class KalmanFilter<2, 1, 1>;
-template class KalmanFilter<2, 1, 2>;
-template class KalmanFilter<2, 2, 2>;
-template class KalmanFilter<3, 1, 1>;
-template class KalmanFilter<3, 1, 2>;
-template class KalmanFilter<Eigen::Dynamic, Eigen::Dynamic, Eigen::Dynamic>;
+#define FLYBALL_STATES_INPUTS_OUTPUTS(States, Inputs, Outputs) \
+  template class KalmanFilter<States, Inputs, Outputs>;
+#include <flyball/core/instantiated_sizes.inc>
 
 }  // namespace flyball

@@ -2,12 +2,8 @@
 
 namespace flyball {
 
-template class Observer<1, 1, 1>;
-template class Observer<2, 1, 1>;
-template class Observer<2, 1, 2>;
-template class Observer<2, 2, 2>;
-template class Observer<3, 1, 1>;
-template class Observer<3, 1, 2>;
-template class Observer<Eigen::Dynamic, Eigen::Dynamic, Eigen::Dynamic>;
+#define FLYBALL_STATES_INPUTS_OUTPUTS(States, Inputs, Outputs) \
+  template class Observer<States, Inputs, Outputs>;
+#include <flyball/core/instantiated_sizes.inc>
 
 }  // namespace flyball

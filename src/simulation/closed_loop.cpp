@@ -5,7 +5,7 @@
 #include <deque>
 #include <string>
 
-#include <flyball/control/observer_regulator.hpp>
+#include <flyball/control/lqg.hpp>
 
 #include "core/format.hpp"
 #include "core/try.hpp"

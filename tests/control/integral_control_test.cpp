@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include <flyball/control/observer_regulator.hpp>
+#include <flyball/control/lqg.hpp>
 #include <flyball/core/random.hpp>
 #include <flyball/estimation/kalman_gain.hpp>
 #include <flyball/mechanisms/elevator.hpp>

@@ -44,8 +44,8 @@ TEST(StateFeedback, KeepsTheLimits) {
 // From 3.0 rad to -3.0 rad is 0.283 rad forwards, not 6 rad back.
 TEST(StateFeedback, WrapsAnAngle) {
   auto arm = feedback();
-  arm.make_continuous(0, 2.0 * std::numbers::pi);
-  arm.make_continuous(7, 1.0);
+  arm.set_angle(0, 2.0 * std::numbers::pi);
+  arm.set_angle(7, 1.0);
   const auto u = arm.calculate(Eigen::Vector2d(3.0, 0.0), Eigen::Vector2d(-3.0, 0.0));
   EXPECT_NEAR(u(0), 10.0 * (2.0 * std::numbers::pi - 6.0), 1e-13);
 }

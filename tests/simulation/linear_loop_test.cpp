@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <flyball/control/lqg.hpp>
 #include <flyball/control/lqr.hpp>
-#include <flyball/control/observer_regulator.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/planning/generate_trapezoid_profile.hpp>
 #include <flyball/simulation/closed_loop.hpp>

@@ -100,10 +100,8 @@ class SimpleFeedforward {
   double gain_;       ///< A_d/B_d, V·s/unit
 };
 
-extern template class LinearPlantInversion<1, 1>;
-extern template class LinearPlantInversion<2, 1>;
-extern template class LinearPlantInversion<2, 2>;
-extern template class LinearPlantInversion<3, 1>;
-extern template class LinearPlantInversion<Eigen::Dynamic, Eigen::Dynamic>;
+#define FLYBALL_STATES_INPUTS(States, Inputs) \
+  extern template class LinearPlantInversion<States, Inputs>;
+#include <flyball/core/instantiated_sizes.inc>
 
 }  // namespace flyball

@@ -3,7 +3,7 @@
 #include <complex>
 #include <vector>
 
-#include <flyball/control/observer_regulator.hpp>
+#include <flyball/control/lqg.hpp>
 #include <flyball/mechanisms/mechanism.hpp>
 
 namespace flyball {

@@ -20,7 +20,7 @@ class StateFeedback {
 
   /// Declares a state to be an angle that wraps: its error is taken to within half a turn.
   /// @param state  Its index; out of range is ignored. @param turn  Usually 2π rad.
-  void make_continuous(int state, double turn) noexcept {
+  void set_angle(int state, double turn) noexcept {
     if (state >= 0 && state < modulus_.size()) {
       modulus_(state) = turn;
     }
@@ -82,10 +82,7 @@ class VoltageCompensation {
   double nominal_;
 };
 
-extern template class StateFeedback<1, 1>;
-extern template class StateFeedback<2, 1>;
-extern template class StateFeedback<2, 2>;
-extern template class StateFeedback<3, 1>;
-extern template class StateFeedback<Eigen::Dynamic, Eigen::Dynamic>;
+#define FLYBALL_STATES_INPUTS(States, Inputs) extern template class StateFeedback<States, Inputs>;
+#include <flyball/core/instantiated_sizes.inc>
 
 }  // namespace flyball

@@ -79,12 +79,8 @@ template <int States, int Inputs, int Outputs>
   return KalmanFilter<States, Inputs, Outputs>::steady_state(plant, Q, R);
 }
 
-extern template class KalmanFilter<1, 1, 1>;
-extern template class KalmanFilter<2, 1, 1>;
-extern template class KalmanFilter<2, 1, 2>;
-extern template class KalmanFilter<2, 2, 2>;
-extern template class KalmanFilter<3, 1, 1>;
-extern template class KalmanFilter<3, 1, 2>;
-extern template class KalmanFilter<Eigen::Dynamic, Eigen::Dynamic, Eigen::Dynamic>;
+#define FLYBALL_STATES_INPUTS_OUTPUTS(States, Inputs, Outputs) \
+  extern template class KalmanFilter<States, Inputs, Outputs>;
+#include <flyball/core/instantiated_sizes.inc>
 
 }  // namespace flyball

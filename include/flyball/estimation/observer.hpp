@@ -38,12 +38,8 @@ class Observer {
   StateVector x_hat_;
 };
 
-extern template class Observer<1, 1, 1>;
-extern template class Observer<2, 1, 1>;
-extern template class Observer<2, 1, 2>;
-extern template class Observer<2, 2, 2>;
-extern template class Observer<3, 1, 1>;
-extern template class Observer<3, 1, 2>;
-extern template class Observer<Eigen::Dynamic, Eigen::Dynamic, Eigen::Dynamic>;
+#define FLYBALL_STATES_INPUTS_OUTPUTS(States, Inputs, Outputs) \
+  extern template class Observer<States, Inputs, Outputs>;
+#include <flyball/core/instantiated_sizes.inc>
 
 }  // namespace flyball

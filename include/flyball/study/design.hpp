@@ -118,7 +118,7 @@ struct PasteGains {
 /// flywheel's velocity follows within one period. The input is always a voltage: the part of it
 /// that the linear model sees, to which kS sgn(v) and gravity are added.
 ///
-/// The loop, each period (Lqg of control/observer_regulator.hpp): the measurement, which is `delay`
+/// The loop, each period (Lqg of control/lqg.hpp): the measurement, which is `delay`
 /// old, is moved along the reference to now, y + delay dr/dt, so that a moving reference causes no
 /// error; the observer predicts and corrects; u = K_delayed (r - x_hat) + B⁺ (r' - A r) + kS + kG.
 struct DesignResult {

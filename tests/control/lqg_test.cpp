@@ -1,4 +1,4 @@
-#include <flyball/control/observer_regulator.hpp>
+#include <flyball/control/lqg.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -55,7 +55,7 @@ class Lqg {
                                  double rail_voltage) noexcept;
 
   /// Declares a state to be an angle that wraps, see StateFeedback.
-  void make_continuous(int state, double turn) noexcept { feedback_.make_continuous(state, turn); }
+  void set_angle(int state, double turn) noexcept { feedback_.set_angle(state, turn); }
 
   /// Starts again at an estimate, as after a time without control: the next step predicts from it.
   void reset(const StateVector& x_hat) noexcept {
@@ -96,12 +96,8 @@ template <int States, int Inputs, int Outputs>
   return Lqg<States, Inputs, Outputs>::create(plant, K, K_e, -limit, limit);
 }
 
-extern template class Lqg<1, 1, 1>;
-extern template class Lqg<2, 1, 1>;
-extern template class Lqg<2, 1, 2>;
-extern template class Lqg<2, 2, 2>;
-extern template class Lqg<3, 1, 1>;
-extern template class Lqg<3, 1, 2>;
-extern template class Lqg<Eigen::Dynamic, Eigen::Dynamic, Eigen::Dynamic>;
+#define FLYBALL_STATES_INPUTS_OUTPUTS(States, Inputs, Outputs) \
+  extern template class Lqg<States, Inputs, Outputs>;
+#include <flyball/core/instantiated_sizes.inc>
 
 }  // namespace flyball

@@ -1,4 +1,4 @@
-#include <flyball/control/observer_regulator.tpp>
+#include <flyball/control/lqg.tpp>
 
 #include "core/format.hpp"
 #include "core/try.hpp"
@@ -7,10 +7,9 @@ namespace flyball {
 
 namespace detail {
 
-Expected<void> check_regulator(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
-                               const MatrixRef& D, Time period, const MatrixRef& K,
-                               const MatrixRef& K_e, const MatrixRef& u_min,
-                               const MatrixRef& u_max) {
+Expected<void> check_lqg(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
+                         const MatrixRef& D, Time period, const MatrixRef& K, const MatrixRef& K_e,
+                         const MatrixRef& u_min, const MatrixRef& u_max) {
   constexpr std::string_view where = "Lqg";
   FLYBALL_CHECK(check_system(A, B, C, D, where));
   const Eigen::Index n = A.rows();
@@ -39,12 +38,8 @@ Expected<void> check_regulator(const MatrixRef& A, const MatrixRef& B, const Mat
 
 }  // namespace detail
 
-template class Lqg<1, 1, 1>;
-template class Lqg<2, 1, 1>;
-template class Lqg<2, 1, 2>;
-template class Lqg<2, 2, 2>;
-template class Lqg<3, 1, 1>;
-template class Lqg<3, 1, 2>;
-template class Lqg<Eigen::Dynamic, Eigen::Dynamic, Eigen::Dynamic>;
+#define FLYBALL_STATES_INPUTS_OUTPUTS(States, Inputs, Outputs) \
+  template class Lqg<States, Inputs, Outputs>;
+#include <flyball/core/instantiated_sizes.inc>
 
 }  // namespace flyball

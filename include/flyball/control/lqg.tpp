@@ -5,7 +5,7 @@
 #include <utility>
 
 #include <flyball/control/feedforward.tpp>
-#include <flyball/control/observer_regulator.hpp>
+#include <flyball/control/lqg.hpp>
 #include <flyball/control/state_feedback.tpp>
 #include <flyball/estimation/observer.tpp>
 
@@ -14,10 +14,10 @@ namespace flyball {
 namespace detail {
 
 /// What Lqg::create asks of its arguments.
-[[nodiscard]] Expected<void> check_regulator(const MatrixRef& A, const MatrixRef& B,
-                                             const MatrixRef& C, const MatrixRef& D, Time period,
-                                             const MatrixRef& K, const MatrixRef& K_e,
-                                             const MatrixRef& u_min, const MatrixRef& u_max);
+[[nodiscard]] Expected<void> check_lqg(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
+                                       const MatrixRef& D, Time period, const MatrixRef& K,
+                                       const MatrixRef& K_e, const MatrixRef& u_min,
+                                       const MatrixRef& u_max);
 
 }  // namespace detail
 
@@ -35,8 +35,8 @@ template <int States, int Inputs, int Outputs>
 auto Lqg<States, Inputs, Outputs>::create(const Plant& plant, const FeedbackGain& K,
                                           const EstimatorGain& K_e, const InputVector& u_min,
                                           const InputVector& u_max) -> Expected<Lqg> {
-  if (auto checked = detail::check_regulator(plant.A, plant.B, plant.C, plant.D, plant.period, K,
-                                             K_e, u_min, u_max);
+  if (auto checked =
+          detail::check_lqg(plant.A, plant.B, plant.C, plant.D, plant.period, K, K_e, u_min, u_max);
       !checked) {
     return tl::unexpected(checked.error());
   }
