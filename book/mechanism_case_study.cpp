@@ -1,7 +1,7 @@
 #include <flyball/control/feedforward.hpp>
 #include <flyball/control/lqr.hpp>
 #include <flyball/estimation/kalman_gain.hpp>
-#include <flyball/simulation/closed_loop.hpp>
+#include <flyball/simulation/linear_loop.hpp>
 #include <flyball/systems/discretize.hpp>
 
 #include "book/mechanism_case_study.hpp"

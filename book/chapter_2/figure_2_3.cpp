@@ -1,6 +1,6 @@
 #include <flyball/control/lqr.hpp>
 #include <flyball/planning/generate_trapezoid_profile.hpp>
-#include <flyball/simulation/closed_loop.hpp>
+#include <flyball/simulation/linear_loop.hpp>
 #include <flyball/systems/discretize.hpp>
 
 #include "book/figure_functions.hpp"

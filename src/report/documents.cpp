@@ -4,7 +4,8 @@
 
 #include <fmt/format.h>
 
-#include <flyball/report/constants.hpp>
+#include <flyball/export/constants.hpp>
+#include <flyball/study/design_exports.hpp>
 
 #include "report/format.hpp"
 #include "report/sections.hpp"
@@ -63,7 +64,7 @@ std::string title_of(const std::string& kind, const std::string& subject, const 
 
 Section constants_section(const study::DesignResult& result, const std::string& reason) {
   Section section{"constants", "Constants to paste", {}};
-  for (const PasteText& paste : paste_constants(result, reason)) {
+  for (const auto& paste : exports::paste_constants(study::constants_of(result, reason))) {
     section.blocks.emplace_back(Code{paste.title, paste.text, paste.file});
   }
   return section;

@@ -3,10 +3,12 @@
 #include <utility>
 #include <vector>
 
+#include <flyball/export/constants.hpp>
+#include <flyball/export/generated_header.hpp>
 #include <flyball/io/file.hpp>
-#include <flyball/report/constants.hpp>
-#include <flyball/report/generated_header.hpp>
+#include <flyball/study/design_exports.hpp>
 #include <flyball/study/schema.hpp>
+#include <flyball/study/simulate_design.hpp>
 
 #include "core/try.hpp"
 #include "report/figures.hpp"
@@ -23,14 +25,18 @@ void append(std::vector<ReportFile>& files, std::vector<ReportFile> more) {
   }
 }
 
-void add_design_files(std::vector<ReportFile>& files, const study::DesignResult& result,
-                      const std::string& kA_reason) {
-  const std::string name = header_class_name(result);
-  files.push_back({name + ".hpp", generate_header(result, name)});
-  for (const PasteText& paste : paste_constants(result, kA_reason)) {
+Expected<void> add_design_files(std::vector<ReportFile>& files, const study::DesignResult& result,
+                                const std::string& kA_reason) {
+  const study::PlantDescription& plant = result.job.plant;
+  const std::string name = exports::header_class_name(plant.kind);
+  FLYBALL_TRY(auto header,
+              exports::generate_header(study::controller_of(result), name, plant.unit));
+  files.push_back({name + ".hpp", std::move(header)});
+  for (const auto& paste : exports::paste_constants(study::constants_of(result, kA_reason))) {
     files.push_back({paste.file, paste.text});
   }
   append(files, data_files(result));
+  return {};
 }
 
 /// Adds the pictures and the page, which links to everything, and writes all of it.
@@ -76,7 +82,7 @@ Expected<void> write_design_report(const study::DesignResult& result, const std:
                                    const Provenance& provenance) {
   std::vector<ReportFile> files{{"result.json", study::to_json(result) + "\n"},
                                 {"gains.toml", gains_toml(result, nullptr)}};
-  add_design_files(files, result, "");
+  FLYBALL_CHECK(add_design_files(files, result, ""));
   return write(result, std::move(files), folder, provenance);
 }
 
@@ -89,10 +95,10 @@ Expected<void> write_tune_report(const study::TuneResult& result, const std::str
   if (designed) {
     files.push_back({"gains.toml",
                      gains_toml(**result.design, fitted ? &*identification.report.fit : nullptr)});
-    add_design_files(files, **result.design,
-                     fitted && !identification.report.fit->kA.determined
-                         ? identification.report.fit->kA.reason
-                         : "");
+    FLYBALL_CHECK(add_design_files(files, **result.design,
+                                   fitted && !identification.report.fit->kA.determined
+                                       ? identification.report.fit->kA.reason
+                                       : ""));
   } else if (fitted) {
     files.push_back({"gains.toml", gains_toml(identification)});
   }

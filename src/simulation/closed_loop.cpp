@@ -3,253 +3,332 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <limits>
 #include <string>
-
-#include <flyball/control/lqg.hpp>
 
 #include "core/format.hpp"
 #include "core/try.hpp"
 
 namespace flyball {
 
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
 namespace {
 
-constexpr std::string_view where = "simulate";
+constexpr std::string_view where = "simulate_closed_loop";
 
-Eigen::VectorXd scalar(double value) {
-  return Eigen::VectorXd::Constant(1, value);
+Index size_of(const std::vector<Coordinate>& coordinates) {
+  return static_cast<Index>(coordinates.size());
 }
 
-// The reference or the truth in the coordinates of the model's states.
-Eigen::VectorXd states_of(mechanisms::MechanismKind kind, Eigen::Index n, double position,
-                          double velocity) {
-  if (kind == mechanisms::MechanismKind::flywheel) {
-    return scalar(velocity);
-  }
-  return n == 1 ? scalar(position) : Eigen::VectorXd(Eigen::Vector2d(position, velocity));
+const std::vector<Coordinate>& referred(const ModelDescription& plant, const ClosedLoop& loop) {
+  return loop.reference_of == ReferenceOf::states ? plant.states : plant.outputs;
 }
 
-Expected<void> check_job(const ClosedLoopJob& job) {
-  const RegulatorDesign& regulator = job.regulator;
-  const Eigen::Index n = regulator.plant.A.rows();
-  const bool flywheel = regulator.kind == mechanisms::MechanismKind::flywheel;
-  if (n != 1 && (flywheel || n != 2)) {
-    return tl::unexpected(Error(ArgumentError::wrong_shape)
-                              .in(std::string(where))
-                              .about("the regulator's plant")
-                              .got(detail::format("of {} states", n))
-                              .expected(flywheel ? "of one state, the velocity"
-                                                 : "of one state, the position, or of two, "
-                                                   "position and velocity"));
+Expected<void> check_count(std::size_t count, std::size_t most, std::string_view name,
+                           std::string_view of) {
+  return count <= most ? Expected<void>{}
+                       : tl::unexpected(Error(ArgumentError::wrong_shape)
+                                            .in(std::string(where))
+                                            .about(std::string(name))
+                                            .got(detail::format("{}", count))
+                                            .expected(detail::format("at most one for each {}, {}",
+                                                                     of, most)));
+}
+
+Expected<void> check_actuator(const ActuatorModel& actuator, const Coordinate& input) {
+  if (!(actuator.min < actuator.max)) {
+    return tl::unexpected(
+        Error(ArgumentError::out_of_range)
+            .in(std::string(where))
+            .about("the lower limit of " + input.name)
+            .got(format_number(actuator.min))
+            .expected("below the upper, which is " + format_number(actuator.max)));
   }
-  if (job.reference.empty()) {
+  return Checks(where)
+      .not_negative(actuator.delay.si(), "the delay of " + input.name, "s")
+      .not_negative(actuator.noise, "the noise of " + input.name, input.unit);
+}
+
+Expected<void> check_loop(const ModelDescription& plant, const ClosedLoop& loop) {
+  const MatrixXd& r = loop.reference;
+  FLYBALL_CHECK(check_count(loop.sensors.size(), plant.outputs.size(), "sensors", "output"));
+  FLYBALL_CHECK(check_count(loop.actuators.size(), plant.inputs.size(), "actuators", "input"));
+  FLYBALL_CHECK(Checks(where)
+                    .positive(loop.period.si(), "period", "s")
+                    .positive(loop.record_step.si(), "record_step", "s"));
+  if (r.cols() == 0) {
     return tl::unexpected(Error(ArgumentError::empty)
                               .in(std::string(where))
                               .about("the reference")
                               .got("empty")
-                              .expected("one row a period"));
+                              .expected("one column a period"));
   }
-  for (std::size_t k = 0; k < job.reference.size(); ++k) {
-    const std::string row = detail::format("reference {}", k);
+  if (r.rows() > 0) {
+    const bool states = loop.reference_of == ReferenceOf::states;
     FLYBALL_CHECK(Checks(where)
-                      .finite(job.reference[k].position, row)
-                      .finite(job.reference[k].velocity, row));
+                      .shape(r, size_of(referred(plant, loop)), r.cols(), "the reference",
+                             states ? "states x periods" : "outputs x periods")
+                      .finite(r, "the reference"));
   }
-  const Battery& battery = job.truth.battery;
-  return Checks(where)
-      .positive(regulator.max_voltage, "max_voltage", "V")
-      .positive(regulator.nominal_voltage, "nominal_voltage", "V")
-      .finite(job.initial.position, "initial position")
-      .finite(job.initial.velocity, "initial velocity")
-      .positive(battery.open_circuit_voltage, "open_circuit_voltage", "V")
-      .not_negative(battery.resistance, "battery resistance", "Ohm")
-      .finite(battery.other_current, "other_current")
-      .also([&] {
-        return std::isinf(job.truth.motor_resistance)
-                   ? Expected<void>{}
-                   : check_positive(job.truth.motor_resistance, where, "motor_resistance", "Ohm");
-      })
-      .not_negative(job.truth.actuation_delay.si(), "actuation_delay", "s")
-      .not_negative(regulator.measurement_delay.si(), "measurement_delay", "s")
-      .not_negative(job.truth.voltage_noise, "voltage_noise", "V");
+  for (std::size_t i = 0; i < loop.actuators.size(); ++i) {
+    FLYBALL_CHECK(check_actuator(loop.actuators[i], plant.inputs[i]));
+  }
+  return {};
 }
 
-// The motor behind its controller and battery.
-class Drive {
- public:
-  Drive(const PlantTruth& truth, double nominal_voltage)
-      : truth_(truth), nominal_voltage_(nominal_voltage) {}
+Expected<void> check_command(const LoopCommand& command, const ModelDescription& plant,
+                             double time) {
+  const auto refuse = [&](ArgumentError code, std::string about, std::string got,
+                          std::string expected) {
+    return tl::unexpected(
+        Error(code)
+            .in(std::string(where))
+            .about(std::move(about))
+            .got(std::move(got) + detail::format(" at t = {} s", format_number(time)))
+            .expected(std::move(expected))
+            .with("t", time));
+  };
+  const Index m = size_of(plant.inputs);
+  const Index n = size_of(plant.states);
+  if (command.u.size() != m) {
+    return refuse(ArgumentError::wrong_shape, "the controller's answer",
+                  detail::format("{} values", command.u.size()),
+                  detail::format("one for each input, {}", m));
+  }
+  if (command.x_hat.size() != 0 && command.x_hat.size() != n) {
+    return refuse(ArgumentError::wrong_shape, "the controller's estimate",
+                  detail::format("{} values", command.x_hat.size()),
+                  detail::format("one for each state, {}, or none", n));
+  }
+  for (Index i = 0; i < m; ++i) {
+    if (!std::isfinite(command.u(i))) {
+      return refuse(ArgumentError::not_finite,
+                    "the controller's " + plant.inputs[static_cast<std::size_t>(i)].name,
+                    format_number(command.u(i)), "a finite number");
+    }
+  }
+  return {};
+}
 
-  void set(double command, double noise) noexcept {
-    duty_ = std::clamp(command / nominal_voltage_, -1.0, 1.0);
-    noise_ = noise;
+/// The inputs on their way to the plant.
+class Actuators {
+ public:
+  Actuators(std::vector<ActuatorModel> models, Index inputs, Random& random)
+      : models_(std::move(models)),
+        on_the_way_(static_cast<std::size_t>(inputs)),
+        random_(random),
+        applied_(VectorXd::Zero(inputs)) {
+    models_.resize(on_the_way_.size());
   }
-  [[nodiscard]] double rail(double velocity) const noexcept {
-    return truth_.battery.rail_voltage(duty_, truth_.gains.kV * velocity, truth_.motor_resistance);
+
+  void send(double time, const VectorXd& u) {
+    for (std::size_t i = 0; i < models_.size(); ++i) {
+      const ActuatorModel& model = models_[i];
+      const double noise = model.noise > 0.0 ? random_.normal(0.0, model.noise) : 0.0;
+      on_the_way_[i].push_back(
+          {time + model.delay.si(),
+           std::clamp(u(static_cast<Index>(i)), model.min, model.max) + noise});
+    }
   }
-  [[nodiscard]] double motor_voltage(double velocity) const noexcept {
-    return duty_ * rail(velocity) + noise_;
+
+  /// When the next input changes, s; infinite if none is on its way.
+  [[nodiscard]] double next_change() const {
+    double next = std::numeric_limits<double>::infinity();
+    for (const auto& queue : on_the_way_) {
+      next = queue.empty() ? next : std::min(next, queue.front().time);
+    }
+    return next;
   }
-  [[nodiscard]] double battery_current(double velocity) const noexcept {
-    return duty_ * (duty_ * rail(velocity) - truth_.gains.kV * velocity) / truth_.motor_resistance +
-           truth_.battery.other_current;
+
+  /// What changes at or before a time.
+  void change(double time) {
+    for (std::size_t i = 0; i < on_the_way_.size(); ++i) {
+      while (!on_the_way_[i].empty() && on_the_way_[i].front().time <= time) {
+        applied_(static_cast<Index>(i)) = on_the_way_[i].front().value;
+        on_the_way_[i].pop_front();
+      }
+    }
+  }
+
+  [[nodiscard]] const VectorXd& applied() const noexcept { return applied_; }
+
+  /// Whether a command is at a limit or beyond.
+  [[nodiscard]] bool saturates(Index i, double command) const {
+    const ActuatorModel& model = models_[static_cast<std::size_t>(i)];
+    return command <= model.min || command >= model.max;
   }
 
  private:
-  const PlantTruth& truth_;
-  double nominal_voltage_;
-  double duty_ = 0.0;
-  double noise_ = 0.0;
+  struct Change {
+    double time;
+    double value;
+  };
+
+  std::vector<ActuatorModel> models_;
+  std::vector<std::deque<Change>> on_the_way_;
+  Random& random_;
+  VectorXd applied_;
 };
 
-struct Command {
-  double time;
-  double value;
-  double noise;
+/// One column a period of everything that is recorded.
+struct Record {
+  Record(const ModelDescription& plant, Index periods)
+      : x(size_of(plant.states), periods),
+        x_hat(size_of(plant.states), 0),
+        y(size_of(plant.outputs), periods),
+        measured(y.rows(), periods),
+        commanded(size_of(plant.inputs), periods),
+        applied(commanded.rows(), periods) {}
+
+  MatrixXd x, x_hat, y, measured, commanded, applied;
 };
 
-struct Columns {
-  std::vector<double> time, reference_position, reference_velocity, position, velocity, measurement,
-      estimated_position, estimated_velocity, voltage, command, motor_voltage, rail_voltage,
-      current;
-
-  [[nodiscard]] Expected<TimeSeries> take(mechanisms::MechanismKind kind, bool has_position,
-                                          bool has_velocity) {
-    const std::string unit(mechanisms::position_unit(kind));
-    const std::string rate = unit + "/s";
-    const bool flywheel = kind == mechanisms::MechanismKind::flywheel;
-    TimeSeries series(std::move(time));
-    Expected<void> added{};
-    const auto add = [&](const char* name, const std::string& of, std::vector<double>& values) {
-      if (added) {
-        added = series.add(name, of, std::move(values));
-      }
-    };
-    add("reference_position", unit, reference_position);
-    add("reference_velocity", rate, reference_velocity);
-    add("position", unit, position);
-    add("velocity", rate, velocity);
-    add("measurement", flywheel ? rate : unit, measurement);
-    if (has_position) {
-      add("estimated_position", unit, estimated_position);
-    }
-    if (has_velocity) {
-      add("estimated_velocity", rate, estimated_velocity);
-    }
-    add("voltage", "V", voltage);
-    add("command", "V", command);
-    add("motor_voltage", "V", motor_voltage);
-    add("rail_voltage", "V", rail_voltage);
-    add("current", "A", current);
-    return added.map([&] { return std::move(series); });
+Expected<TimeSeries> series_of(const Record& record, const ModelDescription& plant,
+                               const ClosedLoop& loop) {
+  const Index periods = loop.reference.cols();
+  std::vector<double> time(static_cast<std::size_t>(periods));
+  for (std::size_t k = 0; k < time.size(); ++k) {
+    time[k] = static_cast<double>(k) * loop.period.si();
   }
-};
+  TimeSeries series(std::move(time));
+  const auto add = [&](std::string_view prefix, const MatrixXd& rows,
+                       const std::vector<Coordinate>& coordinates) -> Expected<void> {
+    for (Index i = 0; rows.cols() > 0 && i < rows.rows(); ++i) {
+      const Coordinate& coordinate = coordinates[static_cast<std::size_t>(i)];
+      std::vector<double> values(static_cast<std::size_t>(periods));
+      VectorXd::Map(values.data(), periods) = rows.row(i);
+      FLYBALL_CHECK(
+          series.add(std::string(prefix) + coordinate.name, coordinate.unit, std::move(values)));
+    }
+    return {};
+  };
+  FLYBALL_CHECK(add("reference_", loop.reference, referred(plant, loop)));
+  FLYBALL_CHECK(add("", record.x, plant.states));
+  FLYBALL_CHECK(add("output_", record.y, plant.outputs));
+  FLYBALL_CHECK(add("measured_", record.measured, plant.outputs));
+  FLYBALL_CHECK(add("estimated_", record.x_hat, plant.states));
+  FLYBALL_CHECK(add("commanded_", record.commanded, plant.inputs));
+  FLYBALL_CHECK(add("applied_", record.applied, plant.inputs));
+  return series;
+}
+
+std::vector<TrackingError> tracking_of(const Record& record, const ModelDescription& plant,
+                                       const ClosedLoop& loop) {
+  const MatrixXd& truth = loop.reference_of == ReferenceOf::states ? record.x : record.y;
+  std::vector<TrackingError> all(static_cast<std::size_t>(loop.reference.rows()));
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    double squares = 0.0;
+    for (Index k = 0; k < loop.reference.cols(); ++k) {
+      double error = loop.reference(static_cast<Index>(i), k) - truth(static_cast<Index>(i), k);
+      if (referred(plant, loop)[i].is_angle) {
+        error = angle_difference(error, 0.0);
+      }
+      squares += error * error;
+      all[i].max = std::max(all[i].max, std::abs(error));
+      all[i].final = error;
+    }
+    all[i].rms = std::sqrt(squares / static_cast<double>(loop.reference.cols()));
+  }
+  return all;
+}
 
 }  // namespace
 
-Expected<ClosedLoopResult> simulate(const ClosedLoopJob& job) {
-  const RegulatorDesign& design = job.regulator;
-  const PlantTruth& truth = job.truth;
-  FLYBALL_TRY(auto regulator,
-              Lqg<>::create(design.plant, design.K, design.K_e, scalar(-design.max_voltage),
-                            scalar(design.max_voltage)));
-  FLYBALL_CHECK(check_job(job));
-  FLYBALL_TRY(auto plant, MechanismPlant::create(design.kind, truth.gains, truth.breakaway));
-  FLYBALL_TRY(auto feedforward,
-              SimpleFeedforward::create(design.kind, design.gains, design.plant.period));
-  // Truths are recorded each millisecond or finer, for sensors and for the battery.
-  const double T = design.plant.period.si();
-  const auto records = static_cast<long long>(std::clamp(std::ceil(T / 1e-3), 1.0, 1e4));
+Expected<ClosedLoopResult> simulate_closed_loop(SimulatedPlant& plant, ControlLaw controller,
+                                                const ClosedLoop& loop) {
+  const ModelDescription& description = plant.description();
+  FLYBALL_CHECK(check_loop(description, loop));
+  const double T = loop.period.si();
+  const auto records =
+      static_cast<long long>(std::clamp(std::ceil(T / loop.record_step.si()), 1.0, 1e4));
   const double h = T / static_cast<double>(records);
-  Random random(job.seed);
-  FLYBALL_TRY(auto sensor, Sensor::create(truth.sensor, Time(h), random.split()));
+  Random random(loop.seed);
+  std::vector<Sensor> sensors;
+  for (const SensorModel& model : loop.sensors) {
+    FLYBALL_TRY(auto sensor, Sensor::create(model, Time(h), random.split()));
+    sensors.push_back(std::move(sensor));
+  }
+  Actuators actuators(loop.actuators, size_of(description.inputs), random);
 
-  const bool flywheel = design.kind == mechanisms::MechanismKind::flywheel;
-  const Eigen::Index n = design.plant.A.rows();
-  const VoltageCompensation compensation(design.nominal_voltage);
-  MechanismState state = job.initial;
-  Drive drive(truth, design.nominal_voltage);
-  std::deque<Command> on_the_way;
-  Columns columns;
+  VectorXd y(size_of(description.outputs));
+  const auto measure = [&] {
+    plant.output(actuators.applied(), y);
+    for (std::size_t i = 0; i < sensors.size(); ++i) {
+      sensors[i].record(y(static_cast<Index>(i)));
+    }
+  };
+
+  const Index periods = loop.reference.cols();
+  Record record(description, periods);
   ClosedLoopResult result;
-  double squares = 0.0;
-  std::size_t saturated = 0;
+  result.inputs.resize(description.inputs.size());
+  VectorXd saturated = VectorXd::Zero(size_of(description.inputs));
+  const auto advance = [&](double time, double duration) {
+    for (std::size_t i = 0; i < result.inputs.size(); ++i) {
+      const double size = std::abs(actuators.applied()(static_cast<Index>(i)));
+      result.inputs[i].peak = std::max(result.inputs[i].peak, size);
+    }
+    return plant.advance(time, actuators.applied(), duration);
+  };
 
-  regulator.reset(states_of(design.kind, n, state.position, state.velocity));
-  sensor.record(flywheel ? state.velocity : state.position);
-  for (std::size_t k = 0; k < job.reference.size(); ++k) {
-    const MotionState& r = job.reference[k];
-    const MotionState& r_next = job.reference[std::min(k + 1, job.reference.size() - 1)];
+  measure();
+  VectorXd measured(y.size());
+  for (Index k = 0; k < periods; ++k) {
     const double time = static_cast<double>(k) * T;
+    plant.output(actuators.applied(), y);
+    measured = y;
+    for (std::size_t i = 0; i < sensors.size(); ++i) {
+      measured(static_cast<Index>(i)) = sensors[i].read();
+    }
+    const VectorXd r = loop.reference.col(k);
+    const VectorXd r_next = loop.reference.col(std::min(k + 1, periods - 1));
+    const LoopCommand command =
+        controller({time, static_cast<std::size_t>(k), measured, r, r_next, plant.state()});
+    FLYBALL_CHECK(check_command(command, description, time));
 
-    const double reading = sensor.read();
-    const double rate = flywheel ? (r_next.velocity - r.velocity) / T : r.velocity;
-    const double y = reading + design.measurement_delay.si() * rate;
-    const double rail = drive.rail(state.velocity);
-    const double direction = r.velocity != 0.0 ? r.velocity : r_next.velocity;
-    const double extra = (design.feed_forward_gravity ? feedforward.gravity(r.position) : 0.0) +
-                         (design.feed_forward_friction ? feedforward.friction(direction) : 0.0);
-    const double available =
-        design.compensate_voltage ? compensation.rail(rail) : design.nominal_voltage;
-    const double u = regulator.step(states_of(design.kind, n, r.position, r.velocity),
-                                    states_of(design.kind, n, r_next.position, r_next.velocity),
-                                    scalar(y), scalar(extra), available)(0);
-    const double command = design.compensate_voltage ? compensation.command(u, rail) : u;
-    const double noise = truth.voltage_noise > 0.0 ? random.normal(0.0, truth.voltage_noise) : 0.0;
-    on_the_way.push_back({time + truth.actuation_delay.si(), command, noise});
+    record.x.col(k) = plant.state();
+    record.y.col(k) = y;
+    record.measured.col(k) = measured;
+    record.commanded.col(k) = command.u;
+    record.applied.col(k) = actuators.applied();
+    if (command.x_hat.size() > 0) {
+      if (record.x_hat.cols() == 0) {
+        record.x_hat.setConstant(command.x_hat.size(), periods,
+                                 std::numeric_limits<double>::quiet_NaN());
+      }
+      record.x_hat.col(k) = command.x_hat;
+    }
+    for (Index i = 0; i < command.u.size(); ++i) {
+      saturated(i) += actuators.saturates(i, command.u(i)) ? 1.0 : 0.0;
+    }
+    actuators.send(time, command.u);
 
-    const double error = flywheel ? r.velocity - state.velocity : r.position - state.position;
-    squares += error * error;
-    result.max_error = std::max(result.max_error, std::abs(error));
-    result.final_error = error;
-    saturated += std::abs(u) >= std::min(design.max_voltage, available) * (1.0 - 1e-12) ? 1 : 0;
-
-    columns.time.push_back(time);
-    columns.reference_position.push_back(r.position);
-    columns.reference_velocity.push_back(r.velocity);
-    columns.position.push_back(state.position);
-    columns.velocity.push_back(state.velocity);
-    columns.measurement.push_back(reading);
-    columns.estimated_position.push_back(regulator.x_hat()(0));
-    columns.estimated_velocity.push_back(regulator.x_hat()(n - 1));
-    columns.voltage.push_back(u);
-    columns.command.push_back(command);
-    columns.rail_voltage.push_back(rail);
-
-    double volt_seconds = 0.0;
-    double coulombs = 0.0;
-    const auto advance = [&](double duration) {
-      const double voltage = drive.motor_voltage(state.velocity);
-      volt_seconds += voltage * duration;
-      coulombs += drive.battery_current(state.velocity) * duration;
-      result.peak_voltage = std::max(result.peak_voltage, std::abs(voltage));
-      state = plant.step(state, voltage, duration);
-    };
     for (long long i = 0; i < records; ++i) {
       const double from = time + static_cast<double>(i) * h;
       double done = 0.0;
       constexpr double rounding = 1e-12;
-      while (!on_the_way.empty() && on_the_way.front().time < from + h - rounding) {
-        const double until = std::clamp(on_the_way.front().time - from, done, h);
-        advance(until - done);
+      for (double change = actuators.next_change(); change < from + h - rounding;
+           change = actuators.next_change()) {
+        const double until = std::clamp(change - from, done, h);
+        FLYBALL_CHECK(advance(from + done, until - done));
         done = until;
-        drive.set(on_the_way.front().value, on_the_way.front().noise);
-        on_the_way.pop_front();
+        actuators.change(change);
       }
-      advance(h - done);
-      sensor.record(flywheel ? state.velocity : state.position);
+      FLYBALL_CHECK(advance(from + done, h - done));
+      measure();
     }
-    columns.motor_voltage.push_back(volt_seconds / T);
-    columns.current.push_back(coulombs / T);
   }
-
-  const auto rows = static_cast<double>(job.reference.size());
-  result.rms_error = std::sqrt(squares / rows);
-  result.saturated_fraction = static_cast<double>(saturated) / rows;
-  return columns.take(design.kind, !flywheel, flywheel || n == 2).map([&](TimeSeries series) {
-    result.series = std::move(series);
-    return std::move(result);
-  });
+  for (std::size_t i = 0; i < result.inputs.size(); ++i) {
+    result.inputs[i].saturated_fraction =
+        saturated(static_cast<Index>(i)) / static_cast<double>(periods);
+  }
+  result.tracking = tracking_of(record, description, loop);
+  FLYBALL_TRY(auto series, series_of(record, description, loop));
+  result.series = std::move(series);
+  return result;
 }
 
 }  // namespace flyball

@@ -1,8 +1,9 @@
+#include <flyball/simulation/linear_loop.hpp>
+
 #include <algorithm>
 #include <limits>
 
 #include <flyball/control/feedforward.hpp>
-#include <flyball/simulation/closed_loop.hpp>
 
 #include "core/format.hpp"
 #include "core/try.hpp"

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <flyball/study/simulate.hpp>
+#include <flyball/study/simulate_design.hpp>
 
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
@@ -128,8 +128,9 @@ void add_margin_warnings(const LoopDesign& loop, const DesignJob& job,
 }
 
 void simulate_response(DesignResult& result) {
-  auto simulated = simulate(result, {.measurement_noise = *result.job.estimator.measurement_std,
-                                     .seed = result.job.seed});
+  auto simulated = simulate_design(
+      result,
+      {.measurement_noise = *result.job.estimator.measurement_std, .seed = result.job.seed});
   if (!simulated) {
     result.diagnostics.push_back({"not_simulated", Severity::error, to_string(simulated.error())});
     return;

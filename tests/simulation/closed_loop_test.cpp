@@ -1,64 +1,57 @@
 #include <flyball/simulation/closed_loop.hpp>
 
+#include <algorithm>
 #include <cmath>
-#include <string>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
+#include <flyball/control/lqg.hpp>
 #include <flyball/control/lqr.hpp>
-#include <flyball/estimation/kalman_gain.hpp>
-#include <flyball/mechanisms/arm.hpp>
-#include <flyball/mechanisms/elevator.hpp>
-#include <flyball/mechanisms/flywheel.hpp>
+#include <flyball/control/pid.hpp>
 #include <flyball/systems/discretize.hpp>
+#include <flyball/systems/linearize.hpp>
 
 namespace flyball {
 namespace {
 
 using namespace flyball::literals;
-using mechanisms::FeedforwardGains;
-using mechanisms::MechanismKind;
+using Eigen::MatrixXd;
+using Eigen::Vector2d;
+using Eigen::VectorXd;
 
-constexpr FeedforwardGains elevator_gains{.kS = 0.15, .kV = 4.0, .kA = 0.3, .kG = 0.6};
-constexpr FeedforwardGains flywheel_gains{.kS = 0.2, .kV = 0.02, .kA = 0.004};
-
-RegulatorDesign regulator(MechanismKind kind, const FeedforwardGains& gains,
-                          const ContinuousSystem<>& model, std::initializer_list<double> tolerance,
-                          std::initializer_list<double> sigmas, double measurement) {
-  RegulatorDesign design;
-  design.kind = kind;
-  design.gains = gains;
-  design.plant = discretize(model, 20_ms).value();
-  design.K = lqr(design.plant, bryson(tolerance), bryson({12.0})).value().K;
-  design.K_e =
-      kalman_gain(design.plant, standard_deviations(sigmas), standard_deviations({measurement}))
-          .value()
-          .K;
-  return design;
-}
-
-template <int States>
-ContinuousSystem<> dynamic(const ContinuousSystem<States, 1, 1>& system) {
-  return {system.A, system.B, system.C, system.D};
-}
-
-std::vector<MotionState> trapezoid(double goal, const MotionLimits& limits, double seconds) {
-  const TrapezoidProfile profile(limits, {}, {goal, 0.0});
-  std::vector<MotionState> reference;
-  for (int k = 0; k * 0.02 < seconds; ++k) {
-    reference.push_back(profile.sample(k * 0.02));
+// A pendulum of 1 m with a torque per inertia, which names what it has.
+struct Pendulum {
+  static constexpr int states() { return 2; }
+  static constexpr int inputs() { return 1; }
+  template <class X, class U>
+  auto derivative(const X& x, const U& u) const {
+    using std::sin;
+    return Eigen::Vector<ScalarOf<X, U>, 2>{x(1), -9.81 * sin(x(0)) + u(0)};
   }
-  return reference;
+  template <class X, class U>
+  auto output(const X& x, const U&) const {
+    return Eigen::Vector<ScalarOf<X>, 1>{x(0)};
+  }
+  static ModelDescription description() {
+    return {.name = "pendulum",
+            .states = {{"theta", "rad", true}, {"omega", "rad/s"}},
+            .inputs = {{"torque", "rad/s²"}},
+            .outputs = {{"theta", "rad", true}}};
+  }
+};
+
+// Two integrators, each with its input.
+ContinuousSystem<> integrators() {
+  return {MatrixXd::Zero(2, 2), MatrixXd::Identity(2, 2), MatrixXd::Identity(2, 2),
+          MatrixXd::Zero(2, 2)};
 }
 
-ClosedLoopJob elevator_job() {
-  ClosedLoopJob job;
-  job.regulator = regulator(MechanismKind::elevator, elevator_gains,
-                            dynamic<2>(mechanisms::elevator(elevator_gains).value()), {0.02, 0.4},
-                            {1e-3, 0.05}, 1e-3);
-  job.truth.gains = elevator_gains;
-  job.reference = trapezoid(1.0, {1.0, 3.0}, 2.0);
-  return job;
+ClosedLoop periods(Eigen::Index count, Time period = 20_ms) {
+  ClosedLoop loop;
+  loop.period = period;
+  loop.reference = MatrixXd::Zero(0, count);
+  return loop;
 }
 
 const std::vector<double>& column(const ClosedLoopResult& result, const char* name) {
@@ -67,172 +60,259 @@ const std::vector<double>& column(const ClosedLoopResult& result, const char* na
   return *values;
 }
 
-// A perfect model, without friction: gravity is held by the feedforward, and a trapezoid, which a
-// voltage held for a period can only follow at the samples, is followed closely. The estimate is
-// the truth, because the observer is told what the linear model saw.
-TEST(Simulate, FollowsATrapezoid) {
-  ClosedLoopJob job = elevator_job();
-  job.regulator.gains.kS = 0.0;
-  job.truth.gains.kS = 0.0;
-  const auto result = simulate(job).value();
-  EXPECT_LT(result.max_error, 2e-3);
-  EXPECT_NEAR(result.final_error, 0.0, 1e-6);
-  EXPECT_EQ(result.saturated_fraction, 0.0);
-  const auto& truth = column(result, "position");
-  const auto& estimate = column(result, "estimated_position");
-  // The first estimate predicts one period of nothing, during which gravity would have pulled.
-  for (std::size_t k = 0; k < truth.size(); ++k) {
-    ASSERT_NEAR(estimate[k], truth[k], 1e-9) << k;
-  }
+LoopCommand nothing(const LoopSample&) {
+  return VectorXd::Zero(1);
 }
 
-// A wrong voltage of the model is seen: gravity that is not fed forward leaves the elevator below.
-TEST(Simulate, NeedsTheGravityFeedforward) {
-  ClosedLoopJob job = elevator_job();
-  job.regulator.feed_forward_gravity = false;
-  EXPECT_GT(std::abs(simulate(job).value().final_error), 5e-4);
-  EXPECT_LT(std::abs(simulate(elevator_job()).value().final_error), 5e-4);
-}
-
-TEST(Simulate, FlywheelReachesItsSpeed) {
-  ClosedLoopJob job;
-  job.regulator =
-      regulator(MechanismKind::flywheel, flywheel_gains,
-                dynamic<1>(mechanisms::flywheel(flywheel_gains).value()), {10.0}, {3.0}, 1.0);
-  job.truth.gains = flywheel_gains;
-  job.reference.assign(200, {0.0, 300.0, 0.0});
-  const auto result = simulate(job).value();
-  EXPECT_NEAR(result.final_error, 0.0, 1e-6);
-  EXPECT_GT(result.saturated_fraction, 0.0);
-  EXPECT_EQ(result.series.find("estimated_position"), nullptr);
-  EXPECT_EQ(result.series.rows(), 200u);
-  // Holding takes kS + kV v = 6.2 V.
-  EXPECT_NEAR(column(result, "voltage").back(), 6.2, 1e-6);
-}
-
-TEST(Simulate, ArmHoldsAgainstGravity) {
-  const FeedforwardGains gains{.kS = 0.0, .kV = 1.2, .kA = 0.15, .kG = 0.65, .angle_offset = 0.2};
-  ClosedLoopJob job;
-  job.regulator = regulator(MechanismKind::arm, gains, dynamic<2>(mechanisms::arm(gains).value()),
-                            {0.02, 0.2}, {1e-3, 0.05}, 1e-3);
-  job.truth.gains = gains;
-  job.reference = trapezoid(0.8, {2.0, 6.0}, 2.0);
-  const auto result = simulate(job).value();
-  EXPECT_LT(result.max_error, 0.01);
-  EXPECT_NEAR(result.final_error, 0.0, 1e-5);
-  EXPECT_NEAR(column(result, "voltage").back(), 0.65 * std::cos(1.0), 1e-3);
-}
-
-// Theorem 14.3.2: a mechanism without inertia, driven in volts as dx/dt = u/kV.
-TEST(Simulate, PositionOnlyModel) {
-  const FeedforwardGains gains{.kS = 0.1, .kV = 2.0};
-  ContinuousSystem<> model{Eigen::MatrixXd::Zero(1, 1), Eigen::MatrixXd::Constant(1, 1, 0.5),
-                           Eigen::MatrixXd::Ones(1, 1), Eigen::MatrixXd::Zero(1, 1)};
-  ClosedLoopJob job;
-  job.regulator = regulator(MechanismKind::elevator, gains, model, {0.02}, {1e-3}, 1e-3);
-  job.truth.gains = gains;
-  job.reference = trapezoid(0.5, {1.0, 4.0}, 2.0);
-  const auto result = simulate(job).value();
-  EXPECT_LT(result.max_error, 0.01);
-  EXPECT_LT(std::abs(result.final_error), 2e-3);
-  EXPECT_EQ(result.series.find("estimated_velocity"), nullptr);
-}
-
-// 12.6 V behind 20 mΩ and a motor of 30 mΩ: it sags, the motor never sees more than the rail, and
-// with compensation the motor sees what was asked for wherever the rail allows.
-TEST(Simulate, BatterySagsAndIsCompensated) {
-  ClosedLoopJob job = elevator_job();
-  job.truth.battery = {.open_circuit_voltage = 12.6, .resistance = 0.02};
-  job.truth.motor_resistance = 0.03;
-  job.reference = trapezoid(1.0, {1.5, 8.0}, 2.0);
-  const auto result = simulate(job).value();
-  const auto& rail = column(result, "rail_voltage");
-  const auto& motor = column(result, "motor_voltage");
-  double lowest = rail[0];
-  for (std::size_t k = 0; k < rail.size(); ++k) {
-    lowest = std::min(lowest, rail[k]);
-    EXPECT_LE(std::abs(motor[k]), 12.6 + 1e-9);
-  }
-  EXPECT_LT(lowest, 12.0);
-  EXPECT_LT(std::abs(result.final_error), 2e-3);
-  // Compensation makes the error smaller.
-  job.regulator.compensate_voltage = false;
-  job.truth.battery.open_circuit_voltage = 10.0;
-  const double without = simulate(job).value().rms_error;
-  job.regulator.compensate_voltage = true;
-  EXPECT_LT(simulate(job).value().rms_error, 0.7 * without);
-}
-
-// The voltage changes `actuation_delay` after its sample: in the first period only from then on.
-TEST(Simulate, DelaysTheVoltage) {
-  ClosedLoopJob job = elevator_job();
-  job.reference.assign(50, {0.1, 0.0, 0.0});
-  job.truth.actuation_delay = Time(0.0125);
-  const auto result = simulate(job).value();
-  const double u = column(result, "command")[0];
-  EXPECT_NEAR(column(result, "motor_voltage")[0], u * (0.0075 / 0.02), 1e-9);
-  job.truth.actuation_delay = Time(0.04);
-  const auto late = simulate(job).value();
-  EXPECT_EQ(column(late, "motor_voltage")[0], 0.0);
-  EXPECT_EQ(column(late, "motor_voltage")[1], 0.0);
-  EXPECT_NEAR(column(late, "motor_voltage")[2], column(late, "command")[0], 1e-9);
-}
-
-TEST(Simulate, IsDeterministic) {
-  ClosedLoopJob job = elevator_job();
-  job.truth.sensor = {.resolution = 1e-4, .noise = 1e-3, .delay = 10_ms, .refresh = 20_ms};
-  job.truth.voltage_noise = 0.05;
-  const auto first = simulate(job).value();
-  EXPECT_EQ(column(first, "voltage"), column(simulate(job).value(), "voltage"));
-  job.seed = 2;
-  EXPECT_NE(column(first, "voltage"), column(simulate(job).value(), "voltage"));
-  EXPECT_LT(first.max_error, 0.05);
-}
-
-// Too late a voltage is unstable, and the numbers say so without becoming infinite.
-TEST(Simulate, UnstableLoopStaysFinite) {
-  ClosedLoopJob job = elevator_job();
-  job.truth.actuation_delay = Time(0.2);
-  job.reference.assign(2000, {0.1, 0.0, 0.0});
-  const auto result = simulate(job).value();
-  EXPECT_GT(result.max_error, 0.1);
-  for (const auto& values : result.series.columns()) {
-    for (const double value : values.values) {
-      ASSERT_TRUE(std::isfinite(value)) << values.name;
+// A sampled state feedback of a linear plant is x <- (A_d - B_d K) x, with the exact
+// discretisation.
+TEST(SimulateClosedLoop, OfALinearPlantIsItsDiscreteLoop) {
+  ContinuousSystem<2, 1, 1> plant;
+  plant.A << 0.0, 1.0, 2.0, -1.0;
+  plant.B << 0.0, 1.0;
+  plant.C << 1.0, 0.0;
+  plant.D << 0.0;
+  const auto discrete = discretize(plant, 20_ms).value();
+  const Eigen::RowVector2d K = lqr(discrete, bryson({0.1, 1.0}), bryson({10.0})).value().K;
+  ClosedLoop loop = periods(100);
+  loop.reference = Vector2d(0.3, 0.0).replicate(1, 100);
+  for (const double accuracy : {0.0, 1e-12}) {
+    Vector2d x(1.0, -2.0);
+    auto simulated = ModelPlant::create(plant, x, {.accuracy = accuracy}).value();
+    const auto result =
+        simulate_closed_loop(
+            simulated, [&](const LoopSample& s) -> LoopCommand { return {K * (s.r - s.x)}; }, loop)
+            .value();
+    double squares = 0.0;
+    double fastest = 0.0;
+    for (std::size_t k = 0; k < 100; ++k) {
+      fastest = std::max(fastest, std::abs(x(1)));
+      ASSERT_NEAR(column(result, "x1")[k], x(0), 1e-10) << k;
+      ASSERT_NEAR(column(result, "x2")[k], x(1), 1e-10) << k;
+      const double u = (K * (Vector2d(0.3, 0.0) - x))(0);
+      ASSERT_NEAR(column(result, "commanded_u1")[k], u, 1e-8);
+      squares += (0.3 - x(0)) * (0.3 - x(0));
+      x = discrete.A * x + discrete.B * u;
     }
+    EXPECT_LT((simulated.state() - x).norm(), 1e-10);
+    EXPECT_NEAR(result.tracking[0].rms, std::sqrt(squares / 100.0), 1e-9);
+    EXPECT_NEAR(result.tracking[0].max, 0.7, 1e-12);
+    EXPECT_NEAR(result.tracking[1].max, fastest, 1e-9);
+    EXPECT_EQ(result.series.time()[99], 99 * 0.02);
   }
 }
 
-TEST(Simulate, Errors) {
-  const auto with = [](auto change) {
-    ClosedLoopJob job = elevator_job();
-    change(job);
-    return simulate(job).error();
+// Inputs change one delay after their sample, each by its own, within its limits:
+// ∫u from 0 to 50 ms is 3 (50 - 5) ms for 5 V limited to 3 V, and 2 (50 - 30) ms.
+TEST(SimulateClosedLoop, DelaysAndLimitsEachInput) {
+  auto plant = ModelPlant::create(integrators(), Vector2d::Zero()).value();
+  ClosedLoop loop = periods(6, 10_ms);
+  loop.actuators = {{.min = -1.0, .max = 3.0, .delay = 5_ms}, {.delay = 30_ms}};
+  const auto result =
+      simulate_closed_loop(
+          plant, [](const LoopSample&) -> LoopCommand { return Vector2d(5.0, 2.0); }, loop)
+          .value();
+  EXPECT_NEAR(column(result, "x1")[5], 3.0 * 0.045, 1e-12);
+  EXPECT_NEAR(column(result, "x2")[5], 2.0 * 0.020, 1e-12);
+  EXPECT_EQ(column(result, "commanded_u1")[0], 5.0);
+  EXPECT_EQ(column(result, "applied_u1")[1], 3.0);
+  EXPECT_EQ(column(result, "applied_u2")[2], 0.0);
+  EXPECT_EQ(result.inputs[0].saturated_fraction, 1.0);
+  EXPECT_EQ(result.inputs[1].saturated_fraction, 0.0);
+  EXPECT_EQ(result.inputs[0].peak, 3.0);
+}
+
+// The pendulum upright by LQG of its linearisation: angles are followed the shorter way round, so
+// that upright seen from below is no error of a whole turn.
+TEST(SimulateClosedLoop, BalancesAPendulumByLqg) {
+  const Vector2d upright(std::numbers::pi, 0.0);
+  const auto linear = linearize(Pendulum{}, upright, Eigen::Vector<double, 1>(0.0)).value();
+  const auto discrete =
+      discretize(ContinuousSystem<2, 1, 1>{linear.A, linear.B, linear.C, linear.D}, 20_ms).value();
+  const Eigen::RowVector2d K = lqr(discrete, bryson({0.1, 1.0}), bryson({10.0})).value().K;
+  const Vector2d K_e =
+      kalman_gain(discrete, standard_deviations({0.01, 0.1}), standard_deviations({0.01}))
+          .value()
+          .K;
+  auto regulator = lqg(discrete, K, K_e, 30.0).value();
+  ClosedLoop loop = periods(200);
+  loop.reference = Vector2d(-std::numbers::pi, 0.0).replicate(1, 200);
+  loop.sensors = {{.resolution = 1e-3, .noise = 1e-3}};
+  loop.actuators = {{.min = -30.0, .max = 30.0}};
+  const auto run = [&] {
+    auto plant = ModelPlant::create(Pendulum{}, upright + Vector2d(0.2, 0.0)).value();
+    regulator.reset(Vector2d::Zero());
+    return simulate_closed_loop(
+               plant,
+               [&](const LoopSample& s) -> LoopCommand {
+                 const Vector2d r = Vector2d::Zero();
+                 const auto u =
+                     regulator.step(r, r, Eigen::Vector<double, 1>(s.y(0) - std::numbers::pi));
+                 return {u, regulator.x_hat() + upright};
+               },
+               loop)
+        .value();
   };
-  EXPECT_TRUE(with([](auto& j) { j.reference.clear(); }).is(ArgumentError::empty));
+  const auto result = run();
+  EXPECT_LT(std::abs(result.tracking[0].final), 0.01);
+  EXPECT_NEAR(result.tracking[0].max, 0.2, 0.05);
+  EXPECT_EQ(column(result, "theta")[0], std::numbers::pi + 0.2);
+  EXPECT_NEAR(column(result, "estimated_theta").back(), column(result, "theta").back(), 0.02);
+  const double reading = column(result, "measured_theta")[5] / 1e-3;
+  EXPECT_NEAR(reading, std::round(reading), 1e-9);
+  // Named and in units as the model says.
+  std::string names;
+  for (const auto& each : result.series.columns()) {
+    names += each.name + " [" + each.unit + "] ";
+  }
+  EXPECT_EQ(names,
+            "reference_theta [rad] reference_omega [rad/s] theta [rad] omega [rad/s] "
+            "output_theta [rad] measured_theta [rad] estimated_theta [rad] estimated_omega [rad/s] "
+            "commanded_torque [rad/s²] applied_torque [rad/s²] ");
+  // Deterministic, and of the seed.
+  EXPECT_EQ(column(result, "omega"), column(run(), "omega"));
+  loop.seed = 2;
+  EXPECT_NE(column(result, "omega"), column(run(), "omega"));
+}
+
+// A PI controller reads the output and its reference; its plant is an integrator, so that the
+// slower pole of s² + 5 s + 2 is -0.44/s.
+TEST(SimulateClosedLoop, RunsAPid) {
+  auto pid = Pid::create({.gains = {.kp = 5.0, .ki = 2.0}, .period = 0.01}).value();
+  auto plant =
+      ModelPlant::create(ContinuousSystem<1, 1, 1>{MatrixXd::Zero(1, 1), MatrixXd::Ones(1, 1),
+                                                   MatrixXd::Ones(1, 1), MatrixXd::Zero(1, 1)},
+                         MatrixXd::Zero(1, 1))
+          .value();
+  ClosedLoop loop = periods(2000, 10_ms);
+  loop.reference = MatrixXd::Ones(1, 2000);
+  loop.reference_of = ReferenceOf::outputs;
+  const auto result = simulate_closed_loop(
+                          plant,
+                          [&](const LoopSample& s) -> LoopCommand {
+                            return VectorXd::Constant(1, pid.calculate(s.y(0), s.r(0)));
+                          },
+                          loop)
+                          .value();
+  EXPECT_LT(std::abs(result.tracking[0].final), 1e-3);
+  EXPECT_EQ(result.tracking[0].max, 1.0);
+}
+
+// Without control it keeps its energy; both ways to integrate agree.
+TEST(SimulateClosedLoop, IntegratesStiffModelsToAnAccuracy) {
+  const ContinuousSystem<1, 1, 1> stiff{MatrixXd::Constant(1, 1, -1e6),
+                                        MatrixXd::Constant(1, 1, 1e6), MatrixXd::Ones(1, 1),
+                                        MatrixXd::Zero(1, 1)};
+  auto plant = ModelPlant::create(stiff, MatrixXd::Ones(1, 1), {.accuracy = 1e-8}).value();
+  const auto follow = [](const LoopSample&) -> LoopCommand { return VectorXd::Constant(1, 0.5); };
+  const auto result = simulate_closed_loop(plant, follow, periods(3)).value();
+  EXPECT_NEAR(column(result, "x1")[2], 0.5, 1e-6);
+
+  // Steps of 1 ms are far too long for it, and the message says so.
+  auto coarse = ModelPlant::create(stiff, MatrixXd::Ones(1, 1)).value();
+  const auto error = simulate_closed_loop(coarse, follow, periods(100)).error();
+  EXPECT_TRUE(error.is(ArgumentError::not_finite));
+  EXPECT_NE(to_string(error).find("x1"), std::string::npos) << to_string(error);
+  EXPECT_NE(to_string(error).find("max_step"), std::string::npos) << to_string(error);
+
+  const Vector2d start(3.0, 0.0);
+  auto coarse_pendulum = ModelPlant::create(Pendulum{}, start).value();
+  auto fine_pendulum = ModelPlant::create(Pendulum{}, start, {.accuracy = 1e-12}).value();
+  (void)simulate_closed_loop(coarse_pendulum, nothing, periods(250)).value();
+  (void)simulate_closed_loop(fine_pendulum, nothing, periods(250)).value();
+  EXPECT_LT((coarse_pendulum.state() - fine_pendulum.state()).norm(), 1e-8);
+  const VectorXd& x = fine_pendulum.state();
+  EXPECT_NEAR(0.5 * x(1) * x(1) - 9.81 * std::cos(x(0)), -9.81 * std::cos(3.0), 1e-9);
+}
+
+// A model that is fine where it starts and has no derivative from x = 1 on.
+struct Cliff {
+  static constexpr int states() { return 1; }
+  static constexpr int inputs() { return 1; }
+  template <class X, class U>
+  auto derivative(const X& x, const U& u) const {
+    using std::sqrt;
+    return Eigen::Vector<ScalarOf<X, U>, 1>{sqrt(1.0 - x(0)) + u(0)};
+  }
+  static ModelDescription description() { return {.states = {{"height", "m"}}}; }
+};
+
+// A model whose derivative has one entry too many.
+struct Misshapen {
+  static constexpr int states() { return 1; }
+  static constexpr int inputs() { return 1; }
+  template <class X, class U>
+  auto derivative(const X& x, const U& u) const {
+    return Eigen::Vector<ScalarOf<X, U>, 2>{x(0), u(0)};
+  }
+};
+
+TEST(SimulateClosedLoop, RefusesModelsThatGiveNoNumber) {
+  const auto at_once = ModelPlant::create(Cliff{}, MatrixXd::Constant(1, 1, 2.0)).error();
+  EXPECT_TRUE(at_once.is(ArgumentError::not_finite));
+  EXPECT_NE(to_string(at_once).find("height"), std::string::npos) << to_string(at_once);
   EXPECT_TRUE(
-      with([](auto& j) { j.reference[3].position = std::nan(""); }).is(ArgumentError::not_finite));
-  EXPECT_TRUE(with([](auto& j) {
-                j.regulator.kind = MechanismKind::flywheel;
+      ModelPlant::create(Misshapen{}, MatrixXd::Zero(1, 1)).error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(ModelPlant::create(Cliff{}, Vector2d::Zero()).error().is(ArgumentError::wrong_shape));
+
+  // dx/dt = √(1 - x) + 1 passes 1 before 1 s.
+  auto plant = ModelPlant::create(Cliff{}, MatrixXd::Zero(1, 1)).value();
+  const auto later =
+      simulate_closed_loop(
+          plant, [](const LoopSample&) -> LoopCommand { return VectorXd::Ones(1); }, periods(100))
+          .error();
+  EXPECT_TRUE(later.is(ArgumentError::not_finite));
+  EXPECT_NE(to_string(later).find("height"), std::string::npos) << to_string(later);
+  EXPECT_NE(to_string(later).find("t = 0.6"), std::string::npos) << to_string(later);
+}
+
+TEST(SimulateClosedLoop, Errors) {
+  const auto refused = [](auto change, auto law) {
+    auto plant = ModelPlant::create(integrators(), Vector2d::Zero()).value();
+    ClosedLoop loop = periods(5);
+    change(loop);
+    return simulate_closed_loop(plant, law, loop).error();
+  };
+  const auto still = [](const LoopSample&) -> LoopCommand { return Vector2d(0.0, 0.0); };
+  const auto with = [&](auto change) { return refused(change, still); };
+  const auto same = [](ClosedLoop&) {};
+  EXPECT_TRUE(with([](auto& l) { l.period = Time(0.0); }).is(ArgumentError::not_positive));
+  EXPECT_TRUE(with([](auto& l) { l.record_step = Time(-1.0); }).is(ArgumentError::not_positive));
+  EXPECT_TRUE(with([](auto& l) { l.reference.resize(0, 0); }).is(ArgumentError::empty));
+  EXPECT_TRUE(
+      with([](auto& l) { l.reference = MatrixXd::Zero(3, 5); }).is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(with([](auto& l) {
+                l.reference = MatrixXd::Constant(2, 5, std::nan(""));
+              }).is(ArgumentError::not_finite));
+  EXPECT_TRUE(with([](auto& l) { l.sensors.resize(3); }).is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(with([](auto& l) { l.actuators.resize(3); }).is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(with([](auto& l) { l.sensors = {{.noise = -1.0}}; }).is(ArgumentError::out_of_range));
+  EXPECT_TRUE(with([](auto& l) {
+                l.actuators = {{.min = 1.0, .max = 1.0}};
+              }).is(ArgumentError::out_of_range));
+  EXPECT_TRUE(
+      with([](auto& l) { l.actuators = {{.delay = Time(-1.0)}}; }).is(ArgumentError::out_of_range));
+  EXPECT_TRUE(
+      with([](auto& l) { l.actuators = {{.noise = -1.0}}; }).is(ArgumentError::out_of_range));
+
+  EXPECT_TRUE(refused(same, [](const LoopSample&) -> LoopCommand {
+                return VectorXd::Zero(1);
               }).is(ArgumentError::wrong_shape));
-  EXPECT_TRUE(with([](auto& j) {
-                j.regulator.K = Eigen::MatrixXd::Zero(1, 1);
+  EXPECT_TRUE(refused(same, [](const LoopSample&) -> LoopCommand {
+                return {VectorXd::Zero(2), VectorXd::Zero(1)};
               }).is(ArgumentError::wrong_shape));
-  EXPECT_TRUE(with([](auto& j) { j.regulator.max_voltage = 0.0; }).is(ArgumentError::out_of_range));
-  EXPECT_TRUE(
-      with([](auto& j) { j.regulator.nominal_voltage = 0.0; }).is(ArgumentError::not_positive));
-  EXPECT_TRUE(with([](auto& j) { j.truth.gains.kV = 0.0; }).is(ArgumentError::not_positive));
-  EXPECT_TRUE(with([](auto& j) { j.truth.breakaway = 0.5; }).is(ArgumentError::out_of_range));
-  EXPECT_TRUE(
-      with([](auto& j) { j.truth.battery.resistance = -1.0; }).is(ArgumentError::out_of_range));
-  EXPECT_TRUE(
-      with([](auto& j) { j.truth.motor_resistance = 0.0; }).is(ArgumentError::not_positive));
-  EXPECT_TRUE(
-      with([](auto& j) { j.truth.actuation_delay = Time(-1.0); }).is(ArgumentError::out_of_range));
-  EXPECT_TRUE(with([](auto& j) { j.truth.sensor.noise = -1.0; }).is(ArgumentError::out_of_range));
-  EXPECT_TRUE(with([](auto& j) { j.truth.voltage_noise = -1.0; }).is(ArgumentError::out_of_range));
-  EXPECT_TRUE(
-      with([](auto& j) { j.initial.velocity = std::nan(""); }).is(ArgumentError::not_finite));
+  const auto error = refused(same, [](const LoopSample& s) -> LoopCommand {
+    return Vector2d(0.0, s.index == 3 ? std::nan("") : 0.0);
+  });
+  EXPECT_EQ(to_string(error),
+            "simulate_closed_loop: the controller's u2 is nan at t = 0.06 s; it must be a finite "
+            "number (t = 0.06)");
+  EXPECT_TRUE(ModelPlant::create(integrators(), Vector2d::Zero(), {.max_step = Time(0.0)})
+                  .error()
+                  .is(ArgumentError::not_positive));
+  EXPECT_TRUE(ModelPlant::create(integrators(), Vector2d::Zero(), {.accuracy = -1.0})
+                  .error()
+                  .is(ArgumentError::out_of_range));
 }
 
 }  // namespace

@@ -1,3 +1,5 @@
+#include <flyball/simulation/linear_loop.hpp>
+
 #include <array>
 #include <cmath>
 #include <limits>
@@ -8,7 +10,6 @@
 #include <flyball/control/lqr.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/planning/generate_trapezoid_profile.hpp>
-#include <flyball/simulation/closed_loop.hpp>
 #include <flyball/systems/discretize.hpp>
 
 namespace flyball {

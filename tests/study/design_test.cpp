@@ -5,7 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include <flyball/study/simulate.hpp>
+#include <flyball/study/design_exports.hpp>
+#include <flyball/study/simulate_design.hpp>
 
 #include "support/oracle.hpp"
 
@@ -178,19 +179,35 @@ TEST(Design, PastesTheSameGainsInOtherUnits) {
   EXPECT_DOUBLE_EQ(result->paste[1].kG, 0.65);
 }
 
-TEST(Simulate, IsDeterministicAndSeeded) {
+// What is exported is what was designed: the delayed gain, the inversion, the gains in every unit.
+TEST(Design, ExportsItsLoopAndItsConstants) {
   const auto result = design(arm_job());
   ASSERT_TRUE(result) << to_string(result.error());
-  const SimulateJob job{.measurement_noise = 0.01, .seed = 7};
-  const auto a = simulate(*result, job);
-  const auto b = simulate(*result, job);
+  const MechanismControllerDesign loop = controller_of(*result);
+  EXPECT_EQ(loop.K, result->K_delayed);
+  EXPECT_EQ(loop.measurement_delay.si(), 0.020);
+  EXPECT_EQ(MechanismController<>::create(loop).value().B_pinv(), result->inversion);
+  const exports::MechanismConstants constants = constants_of(*result, "no reason");
+  ASSERT_EQ(constants.gains.size(), 3u);
+  EXPECT_EQ(constants.gains[1].kP, result->paste[1].kP);
+  EXPECT_EQ(constants.angle_offset, 0.2);
+  EXPECT_EQ(constants.kA_reason, "no reason");
+  EXPECT_EQ(exports::paste_constants(constants).size(), 6u);
+}
+
+TEST(SimulateDesign, IsDeterministicAndSeeded) {
+  const auto result = design(arm_job());
+  ASSERT_TRUE(result) << to_string(result.error());
+  const DesignTrial job{.measurement_noise = 0.01, .seed = 7};
+  const auto a = simulate_design(*result, job);
+  const auto b = simulate_design(*result, job);
   ASSERT_TRUE(a);
   ASSERT_TRUE(b);
   EXPECT_EQ(*a->series.find("position"), *b->series.find("position"));
-  const auto c = simulate(*result, {.measurement_noise = 0.01, .seed = 8});
+  const auto c = simulate_design(*result, {.measurement_noise = 0.01, .seed = 8});
   ASSERT_TRUE(c);
   EXPECT_NE(*a->series.find("position"), *c->series.find("position"));
-  EXPECT_FALSE(simulate(*result, {.inertia_factor = 0.0}));
+  EXPECT_FALSE(simulate_design(*result, {.inertia_factor = 0.0}));
 }
 
 }  // namespace

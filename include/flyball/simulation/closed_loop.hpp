@@ -2,104 +2,107 @@
 
 #include <cstdint>
 #include <limits>
-#include <optional>
+#include <utility>
 #include <vector>
 
+#include <flyball/core/function_ref.hpp>
 #include <flyball/core/time_series.hpp>
-#include <flyball/mechanisms/mechanism.hpp>
-#include <flyball/planning/trapezoid_profile.hpp>
-#include <flyball/simulation/battery.hpp>
-#include <flyball/simulation/mechanism_plant.hpp>
+#include <flyball/simulation/plant.hpp>
 #include <flyball/simulation/sensor.hpp>
 
 namespace flyball {
 
-/// What a robot runs: the observer-based regulator with the feedforward of what is not linear.
-struct RegulatorDesign {
-  mechanisms::MechanismKind kind = mechanisms::MechanismKind::flywheel;
-  /// Believed gains; kS and gravity are fed forward.
-  mechanisms::FeedforwardGains gains{};
-  /// Discrete model in volts: states [velocity] (flywheel), [position, velocity], or [position] for
-  /// a mechanism that is faster than the period.
-  DiscreteSystem<> plant{};
-  Eigen::MatrixXd K;    ///< 1 x n
-  Eigen::MatrixXd K_e;  ///< n x 1, filter form.
-  double max_voltage = 12.0;
-  double nominal_voltage = 12.0;
-  bool feed_forward_gravity = true;
-  bool feed_forward_friction = true;
-  bool compensate_voltage = true;  ///< (6.23) with the rail voltage measured at each sample.
-  /// Age of a measurement, s. It is moved along the reference to now, y + delay dr/dt, so that a
-  /// late sensor causes no error while the reference moves; the loop itself is not changed.
-  Time measurement_delay{};
+/// What is between a command and a plant's input; the defaults make a perfect actuator.
+struct ActuatorModel {
+  double min = -std::numeric_limits<double>::infinity();  ///< In the input's unit.
+  double max = std::numeric_limits<double>::infinity();
+  Time delay{};        ///< From the sample to the change of the input, s.
+  double noise = 0.0;  ///< Standard deviation of what is added for a period, after the limits.
 };
 
-/// What the regulator meets.
-struct PlantTruth {
-  mechanisms::FeedforwardGains gains{};  ///< True gains.
-  double breakaway = 1.0;                ///< Static over sliding friction.
-  double motor_resistance = std::numeric_limits<double>::infinity();  ///< Ω, for the battery.
-  Battery battery{};
-  SensorModel sensor{};        ///< Of the velocity (flywheel), else of the position.
-  Time actuation_delay{};      ///< From the sample to the change of the voltage, s.
-  double voltage_noise = 0.0;  ///< V, standard deviation of the applied voltage of each period.
+/// What a controller is given at a sample.
+struct LoopSample {
+  double time = 0.0;              ///< s
+  std::size_t index = 0;          ///< Periods since the start.
+  const Eigen::VectorXd& y;       ///< p x 1, the outputs as the sensors read them.
+  const Eigen::VectorXd& r;       ///< The reference now.
+  const Eigen::VectorXd& r_next;  ///< One period later; the last one stays.
+  const Eigen::VectorXd& x;       ///< n x 1, the truth, for feedback of the state itself.
 };
 
-/// A closed loop to simulate.
-struct ClosedLoopJob {
-  RegulatorDesign regulator{};
-  PlantTruth truth{};
-  std::vector<MotionState> reference{};  ///< One a period; a flywheel's is its velocity.
-  MechanismState initial{};
+/// What a controller answers: its inputs to the plant and, for the record, its estimate.
+struct LoopCommand {
+  /// @param inputs  m x 1. @param estimate  n x 1, or empty for none.
+  template <class Derived>
+  // NOLINTNEXTLINE(google-explicit-constructor): an answer is the inputs.
+  LoopCommand(const Eigen::MatrixBase<Derived>& inputs, Eigen::VectorXd estimate = {})
+      : u(inputs), x_hat(std::move(estimate)) {}
+
+  Eigen::VectorXd u;      ///< m x 1.
+  Eigen::VectorXd x_hat;  ///< n x 1, or empty for none.
+};
+
+/// A controller, once a period: anything that can be called, such as
+/// `[&](const LoopSample& s) -> LoopCommand { return {K * (s.r - s.x)}; }`.
+using ControlLaw = FunctionRef<LoopCommand(const LoopSample&)>;
+
+/// What a reference's rows are references of, for the errors that a result states.
+enum class ReferenceOf { states, outputs };
+
+/// How a loop is closed.
+struct ClosedLoop {
+  Time period{};
+  /// One column a period, as many as are simulated; its rows are the states' or the outputs'
+  /// references, or there are none.
+  Eigen::MatrixXd reference{};
+  ReferenceOf reference_of = ReferenceOf::states;
+  std::vector<SensorModel> sensors{};  ///< Of the first outputs; the others are read as they are.
+  std::vector<ActuatorModel> actuators{};  ///< Of the first inputs; the others are perfect.
+  /// s; truths are recorded at least that often, for sensors between samples, and the plant moves
+  /// on in pieces of at most that.
+  Time record_step{1e-3};
   std::uint64_t seed = 1;
 };
 
-/// What it answered.
+/// How well a row of the reference was followed, in its unit, over all samples.
+struct TrackingError {
+  double rms = 0.0;
+  double max = 0.0;    ///< Largest magnitude.
+  double final = 0.0;  ///< Reference less truth at the last sample.
+};
+
+/// How an input was used.
+struct InputUse {
+  double peak = 0.0;                ///< Largest magnitude that was applied, in its unit.
+  double saturated_fraction = 0.0;  ///< Share of the samples that asked for the limit or more.
+};
+
+/// What a closed loop did.
 struct ClosedLoopResult {
-  /// One row a period; columns (with units): "reference_position", "reference_velocity",
-  /// "position", "velocity" (the truth), "measurement", "estimated_position",
-  /// "estimated_velocity" (those that the model has), "voltage" (asked for), "command" (sent),
-  /// "motor_voltage" (seen by the motor, mean of the period), "rail_voltage", "current" (A of the
-  /// battery, 0 without a motor resistance).
+  /// One row a period; columns, with the plant's units: "reference_NAME" of each row, each state,
+  /// "output_NAME", "measured_NAME" of each output, "estimated_NAME" of each state if the
+  /// controller told it, "commanded_NAME" (asked for) and "applied_NAME" (at the sample, which with
+  /// a delay is still an earlier command) of each input.
   TimeSeries series{};
-  double rms_error = 0.0;           ///< Of the controlled quantity, over all rows.
-  double max_error = 0.0;           ///< Its largest magnitude.
-  double final_error = 0.0;         ///< Reference less truth at the last row.
-  double peak_voltage = 0.0;        ///< Largest |motor voltage|, V.
-  double saturated_fraction = 0.0;  ///< Share of the periods in which the limit was reached.
+  std::vector<TrackingError> tracking{};  ///< One a row of the reference.
+  std::vector<InputUse> inputs{};         ///< One an input.
 };
 
-/// Closes the loop over a mechanism that is not linear, with what sensors, delay and battery do.
-/// Deterministic: the same job gives the same numbers.
-/// @errors ArgumentError for shapes, entries, an empty reference.
-[[nodiscard]] Expected<ClosedLoopResult> simulate(const ClosedLoopJob& job);
-
-/// A linear loop without noise, as the book's figures close it.
-struct LinearLoop {
-  DiscreteSystem<> plant{};              ///< Truth and model.
-  Eigen::MatrixXd K;                     ///< m x n
-  std::optional<Eigen::MatrixXd> K_e{};  ///< n x p, filter form; none feeds the true state back.
-  bool plant_inversion = true;
-  Eigen::VectorXd u_min{};
-  Eigen::VectorXd u_max{};
-  Eigen::VectorXd x0{};  ///< n; empty is zero.
-};
-
-/// Trajectories, one column a row of the reference.
-struct LinearTrajectory {
-  Eigen::VectorXd time{};   ///< s
-  Eigen::MatrixXd x;        ///< n x samples
-  Eigen::MatrixXd x_hat{};  ///< n x samples; x without an observer.
-  Eigen::MatrixXd y;        ///< p x samples
-  Eigen::MatrixXd u;        ///< m x samples
-};
-
-/// Each sample: x = A x + B u_previous; the observer predicts with u_previous and corrects with
-/// y = C x + D u_previous; u = clamp(B⁺ (r_next - A r) + K (r - x_hat)). At the last sample the
-/// next reference is the last one.
-/// @param r  n x samples, the references.
-/// @errors ArgumentError for shapes and entries.
-[[nodiscard]] Expected<LinearTrajectory> simulate_linear(const LinearLoop& loop,
-                                                         const MatrixRef& r);
+/// Closes a sampled loop around a plant.
+///
+/// At each sample the sensors are read, the controller answers, and each input changes to its
+/// answer, limited, after its delay, until when the earlier one is held; before the first it is
+/// zero. Deterministic: the same loop gives the same numbers.
+///
+/// @param plant       Where it is; it is left where the simulation ends.
+/// @param controller  Called once a period, in order.
+/// @errors ArgumentError for a reference, sensors or actuators that do not fit the plant;
+/// not_finite
+///         and wrong_shape for an answer of the controller, naming input and time; what the plant
+///         says.
+/// Cost: that of the plant's steps, of which there are at least period/record_step a period.
+[[nodiscard]] Expected<ClosedLoopResult> simulate_closed_loop(SimulatedPlant& plant,
+                                                              ControlLaw controller,
+                                                              const ClosedLoop& loop);
 
 }  // namespace flyball

@@ -9,6 +9,7 @@
 #include <flyball/core/diagnostic.hpp>
 #include <flyball/core/expected.hpp>
 #include <flyball/core/time_series.hpp>
+#include <flyball/export/constants.hpp>
 #include <flyball/mechanisms/mechanism.hpp>
 #include <flyball/mechanisms/motor.hpp>
 
@@ -100,16 +101,8 @@ struct MotionLimits {
   double voltage_reserve = 0.0;   ///< V kept back for feedback.
 };
 
-/// Gains in the unit that other tools want, per output unit named by `per`.
-struct PasteGains {
-  std::string per{};  ///< "rad", "m", "rotation", "RPM", …
-  double kP = 0.0;    ///< V/unit (position) or V/(unit/s) (flywheel).
-  double kD = 0.0;    ///< V/(unit/s)
-  double kS = 0.0;    ///< V
-  double kV = 0.0;    ///< V/(unit/s)
-  double kA = 0.0;    ///< V/(unit/s²)
-  double kG = 0.0;    ///< V
-};
+/// Gains in the unit that other tools want.
+using PasteGains = exports::UnitGains;
 
 /// A designed loop: what to implement, how well it holds, how it behaves.
 ///
@@ -118,7 +111,7 @@ struct PasteGains {
 /// flywheel's velocity follows within one period. The input is always a voltage: the part of it
 /// that the linear model sees, to which kS sgn(v) and gravity are added.
 ///
-/// The loop, each period (Lqg of control/lqg.hpp): the measurement, which is `delay`
+/// The loop, each period (MechanismController): the measurement, which is `delay`
 /// old, is moved along the reference to now, y + delay dr/dt, so that a moving reference causes no
 /// error; the observer predicts and corrects; u = K_delayed (r - x_hat) + B⁺ (r' - A r) + kS + kG.
 struct DesignResult {
@@ -142,7 +135,7 @@ struct DesignResult {
   double worst_overshoot = 0.0;
 
   MotionLimits motion;
-  TimeSeries response{};  ///< The simulated closed loop: columns in the order of `simulate_loop`.
+  TimeSeries response{};  ///< The simulated closed loop: columns as `MechanismResponse`.
   double tracking_error_rms =
       0.0;  ///< unit, of the true position (velocity) against the reference.
   double tracking_error_max = 0.0;

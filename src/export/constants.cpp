@@ -1,4 +1,4 @@
-#include <flyball/report/constants.hpp>
+#include <flyball/export/constants.hpp>
 
 #include <algorithm>
 #include <array>
@@ -6,30 +6,23 @@
 
 #include <fmt/format.h>
 
-#include "report/format.hpp"
-#include "report/sections.hpp"
+#include <flyball/core/argument.hpp>
 
-namespace flyball::report {
+#include "export/text.hpp"
+
+namespace flyball::exports {
 
 namespace {
 
 using mechanisms::MechanismKind;
-using study::DesignResult;
-using study::PasteGains;
 
-const PasteGains* gains_per(const DesignResult& design, std::string_view per) {
-  const auto found = std::find_if(design.paste.begin(), design.paste.end(),
-                                  [&](const PasteGains& gains) { return gains.per == per; });
-  return found == design.paste.end() ? nullptr : &*found;
-}
+/// Finer than any gain is known.
+constexpr int digits = 6;
 
-/// Six significant digits: finer than any gain is known, with a decimal point for both languages.
-std::string literal(double value) {
-  std::string text = fmt::format("{:.6g}", value);
-  if (text.find_first_of(".en") == std::string::npos) {
-    text += ".0";
-  }
-  return text;
+const UnitGains* gains_per(const MechanismConstants& of, std::string_view per) {
+  const auto found = std::find_if(of.gains.begin(), of.gains.end(),
+                                  [&](const UnitGains& gains) { return gains.per == per; });
+  return found == of.gains.end() ? nullptr : &*found;
 }
 
 struct Constant {
@@ -38,37 +31,24 @@ struct Constant {
   std::string comment;  ///< Unit first.
 };
 
-/// One line for a comment: a log's reason must not end it.
-std::string comment_text(std::string_view text) {
-  std::string line = printable(text);
-  std::replace(line.begin(), line.end(), '\n', ' ');
-  for (std::size_t at = 0; (at = line.find('\\', at)) != std::string::npos;) {
-    line[at] = '/';  // a backslash at the end of a comment would continue it
-  }
-  return line;
-}
-
-std::string kA_comment(const DesignResult& design, const PasteGains& gains, std::string_view unit,
-                       std::string_view reason) {
-  const study::PlantDescription& plant = design.job.plant;
-  if (plant.kA_determined) {
+std::string kA_comment(const MechanismConstants& of, const UnitGains& gains,
+                       std::string_view unit) {
+  if (of.kA_determined) {
     return std::string(unit);
   }
   // The bound per another unit scales as kV does.
-  const double scale = plant.gains.kV > 0.0 ? gains.kV / plant.gains.kV : 1.0;
-  std::string text =
-      fmt::format("{}; not determined, below {}", unit, number(plant.kA_upper_bound * scale, 3));
-  if (!reason.empty()) {
-    text += fmt::format(": {}", comment_text(reason));
-  }
-  return text;
+  const UnitGains* own = gains_per(of, of.unit);
+  const double scale = own != nullptr && own->kV > 0.0 ? gains.kV / own->kV : 1.0;
+  return fmt::format("{}; not determined, below {}{}{}", unit,
+                     format_number(of.kA_upper_bound * scale, 3), of.kA_reason.empty() ? "" : ": ",
+                     comment_text(of.kA_reason));
 }
 
 /// The gains of one unit as constants, each with its unit.
-std::vector<Constant> constants_of(const DesignResult& design, const PasteGains& gains,
+std::vector<Constant> constants_of(const MechanismConstants& of, const UnitGains& gains,
                                    const std::string& position, const std::string& per_velocity,
-                                   const std::string& per_acceleration, std::string_view reason) {
-  const MechanismKind kind = design.job.plant.kind;
+                                   const std::string& per_acceleration) {
+  const MechanismKind kind = of.kind;
   const bool flywheel = kind == MechanismKind::flywheel;
   std::vector<Constant> all{{"kS", gains.kS, "V, static friction"}};
   if (!flywheel) {
@@ -77,7 +57,7 @@ std::vector<Constant> constants_of(const DesignResult& design, const PasteGains&
          kind == MechanismKind::arm ? "V, gravity with the arm horizontal" : "V, gravity"});
   }
   all.push_back({"kV", gains.kV, per_velocity});
-  all.push_back({"kA", gains.kA, kA_comment(design, gains, per_acceleration, reason)});
+  all.push_back({"kA", gains.kA, kA_comment(of, gains, per_acceleration)});
   all.push_back({"kP", gains.kP, flywheel ? per_velocity : "V/" + position});
   all.push_back({"kD", gains.kD, flywheel ? per_acceleration : per_velocity});
   return all;
@@ -88,53 +68,51 @@ std::string assignments(const std::vector<Constant>& constants, std::string_view
                         std::string_view assign = " = ", std::string_view end = ";") {
   std::size_t width = 0;
   for (const Constant& constant : constants) {
-    width = std::max(width, constant.name.size() + literal(constant.value).size());
+    width = std::max(width, constant.name.size() + literal(constant.value, digits).size());
   }
   std::string text;
   for (const Constant& constant : constants) {
-    const std::string value = literal(constant.value);
+    const std::string value = literal(constant.value, digits);
     text += fmt::format("{}{}{}{}{}{:{}}  // {}\n", prefix, constant.name, assign, value, end, "",
                         width - constant.name.size() - value.size(), constant.comment);
   }
   return text;
 }
 
-std::string heading(const DesignResult& design, std::string_view library) {
-  return fmt::format("// {}, for {}.\n// Loop period {}; volts are at the motor.\n",
-                     capitalized(design.job.plant.kind), library,
-                     seconds(design.job.controller.period));
+std::string heading(const MechanismConstants& of, std::string_view library) {
+  return fmt::format("// {}, for {}.\n// Loop period {} ms; volts are at the motor.\n",
+                     capitalized(of.kind), library, format_number(1e3 * of.period, 4));
 }
 
-std::string offset_note(const DesignResult& design, std::string_view how) {
-  const double offset = design.job.plant.gains.angle_offset;
-  if (design.job.plant.kind != MechanismKind::arm || offset == 0.0) {
+std::string offset_note(const MechanismConstants& of, std::string_view how) {
+  const double offset = of.angle_offset;
+  if (of.kind != MechanismKind::arm || offset == 0.0) {
     return "";
   }
   return fmt::format("// The sensor's zero is {} rad ({} rotations) from horizontal: {}\n",
-                     literal(offset), literal(offset / (2.0 * std::numbers::pi)), how);
+                     literal(offset, digits), literal(offset / (2.0 * std::numbers::pi), digits),
+                     how);
 }
 
 }  // namespace
 
-std::string wpilib_constants(const DesignResult& design, Language language,
-                             std::string_view kA_reason) {
-  const study::PlantDescription& plant = design.job.plant;
-  const PasteGains* gains = gains_per(design, plant.unit);
+std::string wpilib_constants(const MechanismConstants& of, Language language) {
+  const UnitGains* gains = gains_per(of, of.unit);
   if (gains == nullptr) {
     return "";
   }
   const bool cpp = language == Language::cpp;
-  const std::string name = capitalized(plant.kind) + "Constants";
-  const std::vector<Constant> constants = constants_of(
-      design, *gains, plant.unit, "V·s/" + plant.unit, "V·s²/" + plant.unit, kA_reason);
-  const double period = design.job.controller.period;
-  const std::string unit_velocity = plant.unit == "m" ? "1_mps" : "1_rad_per_s";
-  const bool flywheel = plant.kind == MechanismKind::flywheel;
-  const std::string type = flywheel                                ? "SimpleMotorFeedforward"
-                           : plant.kind == MechanismKind::elevator ? "ElevatorFeedforward"
-                                                                   : "ArmFeedforward";
-  std::string text = heading(design, "WPILib 2025") +
-                     offset_note(design, "give ArmFeedforward the measured angle plus that.");
+  const std::string name = capitalized(of.kind) + "Constants";
+  const std::vector<Constant> constants =
+      constants_of(of, *gains, of.unit, "V·s/" + of.unit, "V·s²/" + of.unit);
+  const double period = of.period;
+  const std::string unit_velocity = of.unit == "m" ? "1_mps" : "1_rad_per_s";
+  const bool flywheel = of.kind == MechanismKind::flywheel;
+  const std::string type = flywheel                             ? "SimpleMotorFeedforward"
+                           : of.kind == MechanismKind::elevator ? "ElevatorFeedforward"
+                                                                : "ArmFeedforward";
+  std::string text = heading(of, "WPILib 2025") +
+                     offset_note(of, "give ArmFeedforward the measured angle plus that.");
   if (cpp) {
     text += fmt::format("namespace {} {{\n", name);
     text += assignments(constants, "inline constexpr double ");
@@ -145,42 +123,40 @@ std::string wpilib_constants(const DesignResult& design, Language language,
                     unit_velocity, unit_velocity);
     text += fmt::format(
         "// frc::PIDController feedback{{kP, 0.0, kD, {} * 1_s}};  // answers in volts\n",
-        literal(period));
+        literal(period, digits));
   } else {
     text += fmt::format("public final class {} {{\n", name);
     text += assignments(constants, "  public static final double ");
     text += fmt::format("\n  private {}() {{}}\n}}\n\n", name);
     text += fmt::format("// {0} feedforward = new {0}(kS, {1}kV, kA, {2});\n", type,
-                        flywheel ? "" : "kG, ", literal(period));
+                        flywheel ? "" : "kG, ", literal(period, digits));
     text += fmt::format(
         "// PIDController feedback = new PIDController(kP, 0.0, kD, {});  // answers in volts\n",
-        literal(period));
+        literal(period, digits));
   }
   return text;
 }
 
-std::string phoenix_constants(const DesignResult& design, Language language,
-                              std::string_view kA_reason) {
-  const study::PlantDescription& plant = design.job.plant;
-  const PasteGains* gains = gains_per(design, "rotation");
+std::string phoenix_constants(const MechanismConstants& of, Language language) {
+  const UnitGains* gains = gains_per(of, "rotation");
   if (gains == nullptr) {
     return "";
   }
   const bool cpp = language == Language::cpp;
-  const bool flywheel = plant.kind == MechanismKind::flywheel;
+  const bool flywheel = of.kind == MechanismKind::flywheel;
   std::vector<Constant> constants =
-      constants_of(design, *gains, "rotation", "V·s/rotation", "V·s²/rotation", kA_reason);
+      constants_of(of, *gains, "rotation", "V·s/rotation", "V·s²/rotation");
   for (Constant& constant : constants) {
     constant.name = (cpp ? ".WithK" : ".withK") + constant.name.substr(1);
   }
-  std::string text = heading(design, "CTRE Phoenix 6, per rotation of the mechanism");
+  std::string text = heading(of, "CTRE Phoenix 6, per rotation of the mechanism");
   text += fmt::format(
       "// For voltage requests ({}).\n"
       "// Set Feedback.SensorToMechanismRatio to the gearing{}: one rotation is one of the {}.\n",
       flywheel ? "VelocityVoltage" : "PositionVoltage, MotionMagicVoltage",
-      plant.gearing != 1.0 ? " (" + number(plant.gearing) + ")" : "",
-      plant.kind == MechanismKind::elevator ? "drum" : "output");
-  text += offset_note(design,
+      of.gearing != 1.0 ? " (" + format_number(of.gearing) + ")" : "",
+      of.kind == MechanismKind::elevator ? "drum" : "output");
+  text += offset_note(of,
                       "Arm_Cosine\n// needs 0 where the arm is horizontal, so set the sensor's "
                       "offset accordingly.");
   text += cpp ? "ctre::phoenix6::configs::Slot0Configs slot0 =\n"
@@ -190,7 +166,7 @@ std::string phoenix_constants(const DesignResult& design, Language language,
     const std::string scope =
         cpp ? "ctre::phoenix6::signals::GravityTypeValue::" : "GravityTypeValue.";
     text += fmt::format("        .{}ithGravityType({}{})\n", cpp ? "W" : "w", scope,
-                        plant.kind == MechanismKind::arm ? "Arm_Cosine" : "Elevator_Static");
+                        of.kind == MechanismKind::arm ? "Arm_Cosine" : "Elevator_Static");
   }
   text += assignments(constants, "        ", "(", ")");
   // The semicolon belongs to the last call, before its comment.
@@ -199,25 +175,23 @@ std::string phoenix_constants(const DesignResult& design, Language language,
   return text;
 }
 
-std::string rev_constants(const DesignResult& design, Language language,
-                          std::string_view kA_reason) {
-  const study::PlantDescription& plant = design.job.plant;
-  const PasteGains* gains = gains_per(design, "RPM");
+std::string rev_constants(const MechanismConstants& of, Language language) {
+  const UnitGains* gains = gains_per(of, "RPM");
   if (gains == nullptr) {
     return "";
   }
   const bool cpp = language == Language::cpp;
-  const bool flywheel = plant.kind == MechanismKind::flywheel;
-  const std::string name = capitalized(plant.kind) + "SparkConstants";
+  const bool flywheel = of.kind == MechanismKind::flywheel;
+  const std::string name = capitalized(of.kind) + "SparkConstants";
   const std::vector<Constant> constants =
-      constants_of(design, *gains, "rotation", "V/RPM", "V/(RPM/s)", kA_reason);
-  const std::string nominal = literal(plant.nominal_voltage);
+      constants_of(of, *gains, "rotation", "V/RPM", "V/(RPM/s)");
+  const std::string nominal = literal(of.nominal_voltage, digits);
 
-  std::string text = heading(design, "REVLib, per rotation and RPM of the mechanism");
+  std::string text = heading(of, "REVLib, per rotation and RPM of the mechanism");
   text +=
       fmt::format("// Set the encoder's position and velocity conversion factors to 1/gearing{}.\n",
-                  plant.gearing != 1.0 ? " = " + literal(1.0 / plant.gearing) : "");
-  text += offset_note(design, "add it before the cosine.");
+                  of.gearing != 1.0 ? " = " + literal(1.0 / of.gearing, digits) : "");
+  text += offset_note(of, "add it before the cosine.");
   if (cpp) {
     text += fmt::format("namespace {} {{\n", name);
     text += assignments(constants, "inline constexpr double ");
@@ -237,9 +211,9 @@ std::string rev_constants(const DesignResult& design, Language language,
                         cpp ? "config.closedLoop.D" : "config.closedLoop.d", nominal,
                         "  // per change of rotations in a SPARK's 1 ms loop");
   }
-  const std::string gravity = plant.kind == MechanismKind::arm        ? ".kCos(kG)"
-                              : plant.kind == MechanismKind::elevator ? ".kG(kG)"
-                                                                      : "";
+  const std::string gravity = of.kind == MechanismKind::arm        ? ".kCos(kG)"
+                              : of.kind == MechanismKind::elevator ? ".kG(kG)"
+                                                                   : "";
   text += fmt::format(
       "// REVLib 2026 takes the feedforward in volts:\n"
       "//   config.closedLoop.feedForward.kS(kS).kV(kV).kA(kA){};\n"
@@ -250,11 +224,11 @@ std::string rev_constants(const DesignResult& design, Language language,
   return text;
 }
 
-std::vector<PasteText> paste_constants(const DesignResult& design, std::string_view kA_reason) {
+std::vector<PasteText> paste_constants(const MechanismConstants& of) {
   struct Library {
     std::string title;
     std::string file;
-    std::string (*text)(const DesignResult&, Language, std::string_view);
+    std::string (*text)(const MechanismConstants&, Language);
   };
   const std::array libraries{
       Library{"WPILib", "wpilib", &wpilib_constants},
@@ -264,7 +238,7 @@ std::vector<PasteText> paste_constants(const DesignResult& design, std::string_v
   for (const Library& library : libraries) {
     for (const Language language : {Language::cpp, Language::java}) {
       const bool cpp = language == Language::cpp;
-      std::string text = library.text(design, language, kA_reason);
+      std::string text = library.text(of, language);
       if (!text.empty()) {
         all.push_back({library.title + (cpp ? ", C++" : ", Java"),
                        fmt::format("constants/{}_{}.txt", library.file, cpp ? "cpp" : "java"),
@@ -275,4 +249,4 @@ std::vector<PasteText> paste_constants(const DesignResult& design, std::string_v
   return all;
 }
 
-}  // namespace flyball::report
+}  // namespace flyball::exports

@@ -1,4 +1,4 @@
-#include <flyball/study/simulate.hpp>
+#include <flyball/study/simulate_design.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -9,25 +9,22 @@
 
 namespace flyball::study {
 
-namespace {
-
 using mechanisms::MechanismKind;
 
-}  // namespace
-
-RegulatorDesign regulator_of(const DesignResult& design) {
+MechanismControllerDesign controller_of(const DesignResult& design) {
   const DesignJob& job = design.job;
-  RegulatorDesign regulator;
-  regulator.kind = job.plant.kind;
-  regulator.gains = job.plant.gains;
-  regulator.plant = {design.A, design.B, design.C, Eigen::MatrixXd::Zero(1, 1),
-                     Time(job.controller.period)};
-  regulator.K = design.K_delayed;
-  regulator.K_e = design.kalman_gain;
-  regulator.max_voltage = job.controller.max_voltage;
-  regulator.nominal_voltage = job.plant.nominal_voltage;
-  regulator.measurement_delay = Time(job.controller.delay.value_or(0.0));
-  return regulator;
+  MechanismControllerDesign controller;
+  controller.kind = job.plant.kind;
+  controller.gains = job.plant.gains;
+  controller.gains.kA = job.plant.kA_determined ? job.plant.gains.kA : 0.0;
+  controller.plant = {design.A, design.B, design.C, Eigen::MatrixXd::Zero(1, 1),
+                      Time(job.controller.period)};
+  controller.K = design.K_delayed;
+  controller.K_e = design.kalman_gain;
+  controller.max_voltage = job.controller.max_voltage;
+  controller.nominal_voltage = job.plant.nominal_voltage;
+  controller.measurement_delay = Time(job.controller.delay.value_or(0.0));
+  return controller;
 }
 
 std::vector<MotionState> reference_of(const DesignResult& design) {
@@ -54,30 +51,30 @@ std::vector<MotionState> reference_of(const DesignResult& design) {
   return reference;
 }
 
-Expected<ClosedLoopResult> simulate(const DesignResult& design, const SimulateJob& job) {
-  constexpr std::string_view where = "simulate";
+Expected<MechanismResponse> simulate_design(const DesignResult& design, const DesignTrial& trial) {
+  constexpr std::string_view where = "simulate_design";
   FLYBALL_CHECK(Checks(where)
-                    .positive(job.inertia_factor, "inertia_factor")
-                    .positive(job.gain_factor, "gain_factor")
-                    .not_negative(job.measurement_noise, "measurement_noise"));
+                    .positive(trial.inertia_factor, "inertia_factor")
+                    .positive(trial.gain_factor, "gain_factor")
+                    .not_negative(trial.measurement_noise, "measurement_noise"));
   const DesignJob& designed = design.job;
-  ClosedLoopJob loop;
-  loop.regulator = regulator_of(design);
+  MechanismLoop loop;
+  loop.controller = controller_of(design);
   loop.truth.gains = designed.plant.gains;
   // A larger inertia needs more volts to accelerate; a larger gain fewer volts for everything.
-  loop.truth.gains.kA *= job.inertia_factor / job.gain_factor;
-  loop.truth.gains.kV /= job.gain_factor;
+  loop.truth.gains.kA *= trial.inertia_factor / trial.gain_factor;
+  loop.truth.gains.kV /= trial.gain_factor;
   loop.truth.battery.open_circuit_voltage = designed.battery.open_circuit_voltage;
   loop.truth.battery.resistance = designed.battery.resistance;
   if (designed.plant.motor) {
     loop.truth.motor_resistance = designed.plant.motor->R;
   }
   loop.truth.sensor.resolution = designed.sensor.resolution;
-  loop.truth.sensor.noise = job.measurement_noise;
+  loop.truth.sensor.noise = trial.measurement_noise;
   loop.truth.sensor.delay = Time(designed.controller.delay.value_or(0.0));
   loop.reference = reference_of(design);
-  loop.seed = job.seed;
-  return flyball::simulate(loop);
+  loop.seed = trial.seed;
+  return simulate_mechanism(loop);
 }
 
 }  // namespace flyball::study

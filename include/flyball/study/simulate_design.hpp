@@ -1,27 +1,27 @@
 #pragma once
 
-#include <flyball/simulation/closed_loop.hpp>
+#include <flyball/simulation/mechanism_loop.hpp>
 #include <flyball/study/design.hpp>
 
 namespace flyball::study {
 
-/// Run a designed loop on a mechanism that may differ from its model.
-struct SimulateJob {
+/// The mechanism that a designed loop is tried on, as it differs from the model.
+struct DesignTrial {
   double inertia_factor = 1.0;     ///< True inertia over the model's.
   double gain_factor = 1.0;        ///< True actuator gain over the model's.
   double measurement_noise = 0.0;  ///< Standard deviation of a reading, unit (unit/s: flywheel).
   unsigned long long seed = 1;
 };
 
-/// The controller of a design, as robot code and simulations run it.
-[[nodiscard]] RegulatorDesign regulator_of(const DesignResult& design);
+/// The controller of a design, as robot code, simulations and generated code run it.
+[[nodiscard]] MechanismControllerDesign controller_of(const DesignResult& design);
 
 /// The design's reference: the trapezoid to its goal, one row a period, held for half a second.
 [[nodiscard]] std::vector<MotionState> reference_of(const DesignResult& design);
 
 /// Simulates the design's trapezoid with its delay, quantisation, noise and battery.
 /// @errors ArgumentError for factors that are not positive and noise that is negative.
-[[nodiscard]] Expected<ClosedLoopResult> simulate(const DesignResult& design,
-                                                  const SimulateJob& job);
+[[nodiscard]] Expected<MechanismResponse> simulate_design(const DesignResult& design,
+                                                          const DesignTrial& trial);
 
 }  // namespace flyball::study

@@ -1,0 +1,181 @@
+#include <flyball/control/mechanism_controller.hpp>
+
+#include <cmath>
+
+#include "core/format.hpp"
+#include "core/try.hpp"
+
+namespace flyball {
+
+namespace {
+
+constexpr std::string_view where = "MechanismController";
+
+// @param wanted  The states of the class that is asked; two when it was not said.
+Expected<void> check_states(const MechanismControllerDesign& design, Eigen::Index wanted) {
+  const bool flywheel = design.kind == mechanisms::MechanismKind::flywheel;
+  const Eigen::Index n = design.plant.A.rows();
+  if (n == wanted && !(flywheel && n == 2)) {
+    return {};
+  }
+  return tl::unexpected(
+      Error(ArgumentError::wrong_shape)
+          .in(std::string(where))
+          .about("the plant")
+          .got(n == 1 ? std::string("of one state") : detail::format("of {} states", n))
+          .expected(flywheel      ? "of one state, the velocity"
+                    : wanted == 1 ? "of one state, the position"
+                    : n == 1      ? "of two states, position and velocity"
+                             : "of one state, the position, or of two, position and velocity"));
+}
+
+// The measurement is of the first state: what the plant's C and D have to say.
+Expected<void> check_output(const DiscreteSystem<>& plant) {
+  const Eigen::RowVectorXd first = Eigen::RowVectorXd::Unit(plant.A.rows(), 0);
+  if (plant.C == first && plant.D.isZero(0.0)) {
+    return {};
+  }
+  return tl::unexpected(Error(ArgumentError::out_of_range)
+                            .in(std::string(where))
+                            .about("the plant's output")
+                            .got("a mixture of its states and input")
+                            .expected("its first state: C = [1 0], D = 0"));
+}
+
+}  // namespace
+
+mechanisms::FeedforwardGains MechanismControllerDesign::fed_forward() const noexcept {
+  mechanisms::FeedforwardGains fed = gains;
+  fed.kG = feed_forward_gravity ? gains.kG : 0.0;
+  fed.kS = feed_forward_friction ? gains.kS : 0.0;
+  return fed;
+}
+
+template <int States>
+MechanismController<States>::MechanismController(const MechanismControllerDesign& design,
+                                                 const Lqg<States, 1, 1>& regulator,
+                                                 const SimpleFeedforward& feedforward) noexcept
+    : regulator_(regulator),
+      feedforward_(feedforward),
+      compensation_(design.nominal_voltage),
+      max_voltage_(design.max_voltage),
+      delay_(design.measurement_delay.si()),
+      compensates_(design.compensate_voltage) {}
+
+template <int States>
+auto MechanismController<States>::create(const MechanismControllerDesign& design)
+    -> Expected<MechanismController> {
+  const DiscreteSystem<>& plant = design.plant;
+  FLYBALL_CHECK(check_states(design, States));
+  FLYBALL_CHECK(check_system(plant, where));
+  FLYBALL_CHECK(Checks(where)
+                    .shape(plant.B, States, 1, "the plant's B", "states x 1 input")
+                    .shape(plant.C, 1, States, "the plant's C", "1 output x states")
+                    .also([&] { return check_output(plant); })
+                    .shape(design.K, 1, States, "K", "1 input x states")
+                    .shape(design.K_e, States, 1, "K_e", "states x 1 output")
+                    .positive(design.max_voltage, "max_voltage", "V")
+                    .positive(design.nominal_voltage, "nominal_voltage", "V")
+                    .not_negative(design.measurement_delay.si(), "measurement_delay", "s"));
+  using Regulator = Lqg<States, 1, 1>;
+  using Limit = typename Regulator::InputVector;
+  FLYBALL_TRY(auto regulator,
+              Regulator::create({plant.A, plant.B, plant.C, plant.D, plant.period}, design.K,
+                                design.K_e, Limit(-design.max_voltage), Limit(design.max_voltage)));
+  FLYBALL_TRY(auto feedforward,
+              SimpleFeedforward::create(design.kind, design.fed_forward(), plant.period));
+  return MechanismController(design, regulator, feedforward);
+}
+
+template <int States>
+auto MechanismController<States>::states_of(const MotionState& motion) const noexcept
+    -> StateVector {
+  if constexpr (States == 1) {
+    return StateVector(feedforward_.kind() == mechanisms::MechanismKind::flywheel
+                           ? motion.velocity
+                           : motion.position);
+  } else {
+    return StateVector(motion.position, motion.velocity);
+  }
+}
+
+template <int States>
+double MechanismController<States>::update(double measurement, const MotionState& r,
+                                           const MotionState& r_next,
+                                           double rail_voltage) noexcept {
+  using Scalar = Eigen::Matrix<double, 1, 1>;
+  const bool flywheel = feedforward_.kind() == mechanisms::MechanismKind::flywheel;
+  const double rate =
+      flywheel ? (r_next.velocity - r.velocity) / regulator_.plant().period.si() : r.velocity;
+  const double y = measurement + delay_ * rate;
+  const double direction = r.velocity != 0.0 ? r.velocity : r_next.velocity;
+  const double extra = feedforward_.disturbance(r.position, direction);
+  const double rail =
+      compensates_ ? compensation_.rail(rail_voltage) : compensation_.nominal_voltage();
+  voltage_ = regulator_.step(states_of(r), states_of(r_next), Scalar(y), Scalar(extra), rail)(0);
+  command_ = compensates_ ? compensation_.command(voltage_, rail) : voltage_;
+  limit_ = max_voltage_ < rail ? max_voltage_ : rail;
+  return voltage_;
+}
+
+template <int States>
+void MechanismController<States>::reset(const MotionState& state) noexcept {
+  regulator_.reset(states_of(state));
+  voltage_ = 0.0;
+  command_ = 0.0;
+}
+
+template class MechanismController<1>;
+template class MechanismController<2>;
+
+auto MechanismController<Eigen::Dynamic>::create(const MechanismControllerDesign& design)
+    -> Expected<MechanismController> {
+  if (design.plant.A.rows() == 1) {
+    return MechanismController<1>::create(design).map(
+        [](const auto& sized) { return MechanismController(sized); });
+  }
+  return MechanismController<2>::create(design).map(
+      [](const auto& sized) { return MechanismController(sized); });
+}
+
+double MechanismController<Eigen::Dynamic>::update(double measurement, const MotionState& r,
+                                                   const MotionState& r_next,
+                                                   double rail_voltage) noexcept {
+  return std::visit([&](auto& sized) { return sized.update(measurement, r, r_next, rail_voltage); },
+                    sized_);
+}
+
+void MechanismController<Eigen::Dynamic>::reset(const MotionState& state) noexcept {
+  std::visit([&](auto& sized) { sized.reset(state); }, sized_);
+}
+
+double MechanismController<Eigen::Dynamic>::voltage() const noexcept {
+  return std::visit([](const auto& sized) { return sized.voltage(); }, sized_);
+}
+
+double MechanismController<Eigen::Dynamic>::command() const noexcept {
+  return std::visit([](const auto& sized) { return sized.command(); }, sized_);
+}
+
+double MechanismController<Eigen::Dynamic>::limit() const noexcept {
+  return std::visit([](const auto& sized) { return sized.limit(); }, sized_);
+}
+
+Eigen::Map<const Eigen::VectorXd> MechanismController<Eigen::Dynamic>::x_hat() const noexcept {
+  return std::visit(
+      [](const auto& sized) {
+        return Eigen::Map<const Eigen::VectorXd>(sized.x_hat().data(), sized.x_hat().size());
+      },
+      sized_);
+}
+
+Eigen::Map<const Eigen::RowVectorXd> MechanismController<Eigen::Dynamic>::B_pinv() const noexcept {
+  return std::visit(
+      [](const auto& sized) {
+        const auto& B_pinv = sized.regulator().feedforward().B_pinv();
+        return Eigen::Map<const Eigen::RowVectorXd>(B_pinv.data(), B_pinv.size());
+      },
+      sized_);
+}
+
+}  // namespace flyball

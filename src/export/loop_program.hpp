@@ -1,0 +1,56 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <flyball/control/mechanism_controller.hpp>
+
+/// A mechanism's loop as data, from which each language's source is written: its constants and its
+/// arithmetic, in the order in which MechanismController computes. Expressions are sums and
+/// products of indexed names, which C++, Java and Python write the same way.
+namespace flyball::exports {
+
+/// A number, a vector of n or a matrix of n x n.
+struct LoopConstant {
+  enum class Shape { number, vector, matrix };
+  std::string name;
+  Shape shape;
+  Eigen::MatrixXd value;
+  std::string comment;  ///< Unit first.
+};
+
+struct LoopProgram {
+  mechanisms::MechanismKind kind{};
+  mechanisms::FeedforwardGains gains{};
+  Eigen::Index states = 1;
+  std::string unit{};                      ///< Of the position.
+  std::vector<std::string> state_names{};  ///< "position (m)", …
+  std::string measured{};                  ///< "position" or "velocity".
+  std::string measured_unit{};
+  bool moves_measurement = false;  ///< A measurement is late.
+  bool gravity = false;            ///< Gravity is fed forward, of an arm with its cosine.
+  bool friction = false;
+  bool compensates = false;  ///< The battery's voltage is compensated and limits the answer.
+
+  std::vector<LoopConstant> constants{};
+
+  /// With the names of `constants`, measurement, r, r_next, x_hat_, u_model_, x, demand and error:
+  std::string rate{};                     ///< dr/dt.
+  std::string speed{};                    ///< The index of the velocity in a reference, "[1]".
+  std::vector<std::string> prediction{};  ///< x of x_hat_ and u_model_.
+  std::vector<std::string> demand{};      ///< Of r and r_next.
+  std::vector<std::string> error{};       ///< Of r and x_hat_.
+  std::string inversion{};                ///< Of demand.
+  std::string feedback{};                 ///< Of error.
+
+  [[nodiscard]] bool flywheel() const { return kind == mechanisms::MechanismKind::flywheel; }
+  [[nodiscard]] bool arm() const { return kind == mechanisms::MechanismKind::arm; }
+  [[nodiscard]] double period() const { return constants.front().value(0, 0); }
+};
+
+/// @errors Those of MechanismController::create.
+[[nodiscard]] Expected<LoopProgram> loop_program(const MechanismControllerDesign& design,
+                                                 std::string_view unit);
+
+}  // namespace flyball::exports

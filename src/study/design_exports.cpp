@@ -1,0 +1,19 @@
+#include <flyball/study/design_exports.hpp>
+
+namespace flyball::study {
+
+exports::MechanismConstants constants_of(const DesignResult& design, std::string_view kA_reason) {
+  const PlantDescription& plant = design.job.plant;
+  return {.kind = plant.kind,
+          .unit = plant.unit,
+          .gains = design.paste,
+          .period = design.job.controller.period,
+          .nominal_voltage = plant.nominal_voltage,
+          .gearing = plant.gearing,
+          .angle_offset = plant.gains.angle_offset,
+          .kA_determined = plant.kA_determined,
+          .kA_upper_bound = plant.kA_upper_bound,
+          .kA_reason = std::string(kA_reason)};
+}
+
+}  // namespace flyball::study
