@@ -13,6 +13,7 @@
 #include <flyball/core/quantity.hpp>
 #include <flyball/io/file.hpp>
 
+#include "core/try.hpp"
 #include "io/csv_table.hpp"
 #include "io/signals.hpp"
 #include "io/text.hpp"
@@ -74,13 +75,11 @@ class Reader {
   }
 
   Expected<Log> read() {
-    if (Expected<void> ok = read_header(); !ok) {
-      return tl::unexpected(std::move(ok).error());
-    }
+    FLYBALL_CHECK(read_header());
     if (is_list()) {
       read_list();
-    } else if (Expected<void> ok = read_table(); !ok) {
-      return tl::unexpected(std::move(ok).error());
+    } else {
+      FLYBALL_CHECK(read_table());
     }
     if (bad_times_ > 0) {
       log_.diagnostics.push_back(
@@ -193,11 +192,7 @@ class Reader {
   }
 
   Expected<void> read_table() {
-    const Expected<std::size_t> found = time_column();
-    if (!found) {
-      return tl::unexpected(found.error());
-    }
-    const std::size_t clock = *found;
+    FLYBALL_TRY(const std::size_t clock, time_column());
     const double scale = time_scale(headers_[clock]);
     std::vector<std::optional<double>> time(table_.rows.size());
     for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {

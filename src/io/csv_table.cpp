@@ -5,6 +5,7 @@
 
 #include <flyball/io/log_error.hpp>
 
+#include "core/try.hpp"
 #include "io/csv_table.hpp"
 #include "io/text.hpp"
 
@@ -42,9 +43,7 @@ class Splitter {
         table_.delimiter = tell_delimiter(text_.substr(at_, line_end - at_));
         first = false;
       }
-      if (Expected<void> ok = read_row(); !ok) {
-        return tl::unexpected(std::move(ok).error());
-      }
+      FLYBALL_CHECK(read_row());
     }
     return std::move(table_);
   }

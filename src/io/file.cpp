@@ -88,13 +88,13 @@ std::string temporary_beside(const std::string& path) {
       .string();
 }
 
-Error not_a_file(const std::string& path, std::string what, std::string mend) {
+Error not_a_file(const std::string& path, std::string what, std::string hint) {
   return Error(FileError::not_a_file)
       .in(path)
       .about("the path")
       .got(std::move(what))
       .expected("a file, or a pipe that something writes to")
-      .hint(std::move(mend));
+      .hint(std::move(hint));
 }
 
 /// Of what may be read; a device may wait for ever or never end.

@@ -11,6 +11,7 @@
 #include <flyball/io/wpilog.hpp>
 
 #include "core/error_rows.hpp"
+#include "core/try.hpp"
 #include "io/text.hpp"
 
 namespace flyball {
@@ -24,7 +25,7 @@ constexpr std::string_view what_is_read = "a SysId JSON, a WPILOG or a CSV";
 struct Signature {
   std::string_view bytes;
   std::string_view name;
-  std::string_view mend;
+  std::string_view hint;
 };
 constexpr std::array signatures = {
     Signature{"\x89MCAP0\r\n"sv, "an MCAP recording", "export it as CSV or WPILOG"},
@@ -47,13 +48,13 @@ bool looks_binary(std::string_view bytes) {
   });
 }
 
-Error not_a_log(const std::string& source, std::string got, std::string mend) {
+Error not_a_log(const std::string& source, std::string got, std::string hint) {
   return Error(LogError::not_a_log)
       .in(source)
       .about("the file")
       .got(std::move(got))
       .expected(std::string(what_is_read))
-      .hint(std::move(mend));
+      .hint(std::move(hint));
 }
 
 }  // namespace
@@ -99,7 +100,7 @@ Expected<Log> parse_log(std::string_view bytes, const std::string& source) {
   for (const Signature& signature : signatures) {
     if (bytes.starts_with(signature.bytes)) {
       return tl::unexpected(
-          not_a_log(source, std::string(signature.name), std::string(signature.mend)));
+          not_a_log(source, std::string(signature.name), std::string(signature.hint)));
     }
   }
   std::string_view text = bytes;
@@ -108,15 +109,12 @@ Expected<Log> parse_log(std::string_view bytes, const std::string& source) {
   }
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   if (first != std::string_view::npos && (text[first] == '{' || text[first] == '[')) {
-    Expected<SysIdJson> sysid = parse_sysid_json(bytes, source);
-    if (!sysid) {
-      return tl::unexpected(std::move(sysid).error());
-    }
+    FLYBALL_TRY(SysIdJson sysid, parse_sysid_json(bytes, source));
     Log log;
     log.source = source;
     log.format = "SysId JSON";
-    log.diagnostics = sysid->diagnostics;
-    log.sysid = std::move(*sysid);
+    log.diagnostics = sysid.diagnostics;
+    log.sysid = std::move(sysid);
     return log;
   }
   if (looks_binary(bytes)) {

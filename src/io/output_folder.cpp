@@ -9,6 +9,8 @@
 
 #include <flyball/io/file.hpp>
 
+#include "core/try.hpp"
+
 namespace flyball {
 namespace {
 
@@ -72,9 +74,7 @@ Expected<OutputFolder> OutputFolder::create(const std::string& path) {
   }
   OutputFolder folder;
   folder.destination_ = target.string();
-  if (Expected<void> ok = check_destination(folder.destination_); !ok) {
-    return tl::unexpected(std::move(ok).error());
-  }
+  FLYBALL_CHECK(check_destination(folder.destination_));
   std::vector<fs::path> missing;
   for (fs::path parent = target.parent_path(); !fs::exists(parent, error) && !error;
        parent = parent.parent_path()) {

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "core/try.hpp"
 #include "io/plot_data.hpp"
 #include "io/plot_legend.hpp"
 #include "io/plot_script.hpp"
@@ -382,9 +383,7 @@ class Script {
 }  // namespace
 
 Expected<std::string> gnuplot_script(const Plot& plot, PictureFormat format) {
-  if (Expected<void> ok = check(plot); !ok) {
-    return tl::unexpected(std::move(ok).error());
-  }
+  FLYBALL_CHECK(check(plot));
   return Script(plot).build(format);
 }
 

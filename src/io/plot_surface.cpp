@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "core/try.hpp"
 #include "io/plot_data.hpp"
 #include "io/plot_script.hpp"
 
@@ -247,9 +248,7 @@ Expected<std::string> gnuplot_script(const SurfacePlot& plot, PictureFormat form
       z.include(other.z);
     }
   }
-  if (!ok) {
-    return tl::unexpected(std::move(ok).error());
-  }
+  FLYBALL_CHECK(std::move(ok));
   if (z.empty()) {
     return tl::unexpected(
         Error(ArgumentError::empty).in("plot").about("z").got("without a finite value"));

@@ -180,7 +180,7 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
             .about("the JSON")
             .got("broken")
             .expected("valid JSON")
-            .hint("copy the file again, or mend that place")
+            .hint("copy the file again, or repair that place")
             .with("parser",
                   io::printable(detail == std::string::npos
                                     ? std::string_view(handler.error_text)

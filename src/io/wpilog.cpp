@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "core/try.hpp"
 #include "io/signals.hpp"
 #include "io/text.hpp"
 
@@ -126,9 +127,7 @@ class Reader {
   }
 
   Expected<Log> read() {
-    if (Expected<void> header = read_header(); !header) {
-      return tl::unexpected(std::move(header).error());
-    }
+    FLYBALL_CHECK(read_header());
     while (at_ < bytes_.size() && read_record()) {
     }
     return finish();

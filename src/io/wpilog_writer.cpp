@@ -10,6 +10,8 @@
 #include <flyball/io/file.hpp>
 #include <flyball/io/wpilog.hpp>
 
+#include "core/try.hpp"
+
 namespace flyball {
 namespace {
 
@@ -148,21 +150,15 @@ Expected<std::string> to_wpilog(const Log& log) {
   std::vector<Sample> samples;
   for (std::size_t c = 0; c < log.signals.size(); ++c) {
     const Signal& signal = log.signals[c];
-    if (Expected<void> ok = check_channel(signal.name, signal.time, signal.value.size()); !ok) {
-      return tl::unexpected(std::move(ok).error());
-    }
+    FLYBALL_CHECK(check_channel(signal.name, signal.time, signal.value.size()));
     for (std::size_t i = 0; i < signal.time.size(); ++i) {
-      if (Expected<void> ok = check_finite(signal.value[i], "to_wpilog", signal.name); !ok) {
-        return tl::unexpected(std::move(ok).error());
-      }
+      FLYBALL_CHECK(check_finite(signal.value[i], "to_wpilog", signal.name));
       samples.push_back({signal.time[i], false, c, i});
     }
   }
   for (std::size_t c = 0; c < log.texts.size(); ++c) {
     const TextSignal& text = log.texts[c];
-    if (Expected<void> ok = check_channel(text.name, text.time, text.value.size()); !ok) {
-      return tl::unexpected(std::move(ok).error());
-    }
+    FLYBALL_CHECK(check_channel(text.name, text.time, text.value.size()));
     for (std::size_t i = 0; i < text.time.size(); ++i) {
       samples.push_back({text.time[i], true, c, i});
     }

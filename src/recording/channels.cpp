@@ -234,21 +234,12 @@ std::optional<FoundChannels> one_side(const Log& log, const FoundTests& tests) {
 Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
                                       const LogSelection& selection) {
   FoundChannels channels;
-  FLYBALL_TRY(auto voltage,
+  FLYBALL_TRY(channels.voltage,
               choose(log, tests, Quantity::voltage, selection.voltage_channel, nullptr));
-  channels.voltage = voltage;
-  auto position =
-      choose(log, tests, Quantity::position, selection.position_channel, channels.voltage);
-  auto velocity =
-      choose(log, tests, Quantity::velocity, selection.velocity_channel, channels.voltage);
-  if (!position) {
-    return tl::unexpected(std::move(position).error());
-  }
-  if (!velocity) {
-    return tl::unexpected(std::move(velocity).error());
-  }
-  channels.position = *position;
-  channels.velocity = *velocity;
+  FLYBALL_TRY(channels.position,
+              choose(log, tests, Quantity::position, selection.position_channel, channels.voltage));
+  FLYBALL_TRY(channels.velocity,
+              choose(log, tests, Quantity::velocity, selection.velocity_channel, channels.voltage));
   if (channels.voltage == nullptr ||
       (channels.position == nullptr && channels.velocity == nullptr)) {
     return tl::unexpected(
