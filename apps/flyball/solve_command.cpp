@@ -3,8 +3,7 @@
 #include <memory>
 #include <string>
 
-#include <fmt/format.h>
-
+#include <flyball/solve/documentation.hpp>
 #include <flyball/solve/solver.hpp>
 
 #include "commands.hpp"
@@ -13,16 +12,6 @@
 namespace flyball::app {
 
 namespace {
-
-std::string list_of_kinds() {
-  std::string text = "Kinds, what a problem has [and may have], and what is answered:\n";
-  for (const solve::SolveKind& kind : solve::solve_kinds()) {
-    text +=
-        fmt::format("  {:<20}{}{}  ->  {}\n", kind.name, kind.fields,
-                    kind.optional.empty() ? "" : fmt::format(" [{}]", kind.optional), kind.answer);
-  }
-  return text;
-}
 
 bool is_blank(const std::string& line) {
   return line.find_first_not_of(" \t\r\n") == std::string::npos;
@@ -37,7 +26,7 @@ class Stream {
     if (is_blank(problem)) {
       return;
     }
-    solve::SolveAnswer answer = solver_.solve(problem);
+    solve::Answer answer = solver_.solve(problem);
     answer.json += '\n';
     std::fwrite(answer.json.data(), 1, answer.json.size(), stdout);
     ++count_;
@@ -65,8 +54,8 @@ void for_each_line(const std::string& text, const F& f) {
   }
 }
 
-/// Whether a text whose first line is not whole is one object over several lines, be it broken: the
-/// other lines go on as such an object does, and none is a problem of its own.
+/// Whether a text whose first line is not whole is one object over several lines, even a broken
+/// one: the other lines continue as such an object does, and none is a problem of its own.
 bool is_one_object(const std::string& text) {
   if (solve::Solver::is_complete(text)) {
     return true;
@@ -82,7 +71,8 @@ bool is_one_object(const std::string& text) {
   return one;
 }
 
-int run(const std::string& kind) {
+/// Answers what stands on standard input.
+int answer_all(const std::string& kind) {
   const auto solver = solve::Solver::create(kind);
   if (!solver) {
     tell(solver.error());
@@ -118,23 +108,67 @@ int run(const std::string& kind) {
   return stream.status();
 }
 
+struct Options {
+  std::string kind;
+  bool help = false;
+  bool list = false;
+  bool markdown = false;
+  bool schema = false;
+};
+
+int run(const Options& options, const CLI::App& command) {
+  if (options.list || options.markdown || options.schema) {
+    print(options.list       ? solve::list_of_kinds()
+          : options.markdown ? solve::markdown()
+                             : solve::json_schema());
+    return success;
+  }
+  if (options.help && options.kind.empty()) {
+    print(command.help());
+    return success;
+  }
+  if (options.help) {
+    if (const auto kind = solve::find_kind(options.kind)) {
+      print(solve::help_of(**kind));
+      return success;
+    }
+  }
+  if (options.kind.empty()) {
+    tell(Error(ArgumentError::empty)
+             .in("solve")
+             .about("KIND")
+             .got("left out")
+             .expected("a kind of problem")
+             .hint("flyball solve --list lists them"));
+    return bad_input;
+  }
+  return answer_all(options.kind);
+}
+
 }  // namespace
 
 void add_solve_command(CLI::App& program, Invocation& invocation) {
   CLI::App* command = program.add_subcommand(
       "solve", "Solve a control equation: JSON in, JSON out, one problem a line");
-  command->footer(list_of_kinds() +
-                  "\nMatrices are lists of rows, complex numbers [re, im], infinities \"inf\" and "
-                  "\"-inf\"; a field id is echoed.\n"
-                  "domain is \"continuous\" or \"discrete\"; method is zoh, foh, tustin, "
-                  "forward-euler, backward-euler or matched.\n"
-                  "Exit status: 0 all solved, 1 some problem has no solution, 2 some line was no "
-                  "problem.\n"
-                  "\n  echo '{\"A\": [[1]], \"B\": [[1]], \"Q\": [[1]], \"R\": [[1]]}' | flyball "
-                  "solve dare");
-  auto kind = std::make_shared<std::string>();
-  command->add_option("KIND", *kind, "Which equation")->required();
-  command->callback([kind, &invocation] { invocation.status = run(*kind); });
+  command->footer(
+      "Matrices are lists of rows, complex numbers [re, im], infinities \"inf\" and \"-inf\"; a "
+      "field\n"
+      "id is echoed.\n"
+      "Exit status: 0 all solved, 1 some problem has no solution, 2 some line was no problem.\n"
+      "\n  flyball solve --list         every kind of problem\n"
+      "  flyball solve dare --help    the fields of one, with an example\n"
+      "\n  echo '{\"A\": [[1]], \"B\": [[1]], \"Q\": [[1]], \"R\": [[1]]}' | flyball solve dare");
+  auto options = std::make_shared<Options>();
+  // The help of a kind is its row's, so that the option is an ordinary one.
+  command->set_help_flag();
+  command->add_flag("-h,--help", options->help, "Print this help, or with KIND that of the kind");
+  command->add_flag("--list", options->list, "Print every kind of problem and what it solves");
+  command->add_flag("--schema", options->schema,
+                    "Print the JSON Schema of all problems and answers");
+  command->add_flag("--markdown", options->markdown, "Print docs/solve.md")->group("");
+  command->add_option("KIND", options->kind, "Which kind of problem");
+  command->callback(
+      [options, command, &invocation] { invocation.status = run(*options, *command); });
 }
 
 }  // namespace flyball::app

@@ -38,8 +38,7 @@ void AnswerWriter::number(double value) {
   }
 }
 
-void AnswerWriter::add(std::string_view name, const Eigen::MatrixXd& M) {
-  key(name);
+void AnswerWriter::matrix(const Eigen::MatrixXd& M) {
   text_ += '[';
   for (Eigen::Index i = 0; i < M.rows(); ++i) {
     text_ += i == 0 ? "[" : ",[";
@@ -50,6 +49,21 @@ void AnswerWriter::add(std::string_view name, const Eigen::MatrixXd& M) {
       number(M(i, j));
     }
     text_ += ']';
+  }
+  text_ += ']';
+}
+
+void AnswerWriter::add(std::string_view name, const Eigen::MatrixXd& M) {
+  key(name);
+  matrix(M);
+}
+
+void AnswerWriter::add_list(std::string_view name, const std::vector<Eigen::MatrixXd>& matrices) {
+  key(name);
+  text_ += '[';
+  for (std::size_t k = 0; k < matrices.size(); ++k) {
+    text_ += k == 0 ? "" : ",";
+    matrix(matrices[k]);
   }
   text_ += ']';
 }

@@ -2,6 +2,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
@@ -17,6 +18,7 @@ class AnswerWriter {
   void add(std::string_view name, const Eigen::MatrixXd& M);
   void add(std::string_view name, const Eigen::VectorXcd& values);
   void add_list(std::string_view name, const Eigen::VectorXd& values);
+  void add_list(std::string_view name, const std::vector<Eigen::MatrixXd>& matrices);
   void add(std::string_view name, double value);
   void add(std::string_view name, bool value);
   void add_text(std::string_view name, std::string_view text);
@@ -28,6 +30,7 @@ class AnswerWriter {
  private:
   void key(std::string_view name);
   void number(double value);
+  void matrix(const Eigen::MatrixXd& M);
 
   std::string text_;
   bool empty_ = true;

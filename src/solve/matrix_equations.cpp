@@ -1,4 +1,4 @@
-#include <optional>
+#include <utility>
 
 #include <flyball/math/equations/matrix_equation.hpp>
 #include <flyball/math/exponential/matrix_exponential.hpp>
@@ -6,29 +6,17 @@
 #include <flyball/math/riccati/riccati.hpp>
 
 #include "core/try.hpp"
-#include "solve/kernels.hpp"
+#include "solve/row.hpp"
 
-// Matrix equations and functions.
+// Matrix equations and functions of matrices.
 namespace flyball::solve {
 
 using Eigen::MatrixXd;
 
 namespace {
 
-Outcome riccati(bool continuous, ProblemReader& problem, AnswerWriter& answer) {
-  const MatrixXd A = problem.matrix("A");
-  const MatrixXd B = problem.matrix("B");
-  const MatrixXd Q = problem.matrix("Q");
-  const MatrixXd R = problem.matrix("R");
-  std::optional<MatrixXd> N;
-  if (problem.has("N")) {
-    N = problem.matrix("N");
-  }
-  if (!problem.status()) {
-    return problem.status();
-  }
-  FLYBALL_TRY(const auto solution, continuous ? (N ? care(A, B, Q, R, *N) : care(A, B, Q, R))
-                                              : (N ? dare(A, B, Q, R, *N) : dare(A, B, Q, R)));
+Outcome write_riccati(Expected<RiccatiSolution> solved, AnswerWriter& answer) {
+  FLYBALL_TRY(const RiccatiSolution& solution, std::move(solved));
   answer.add("X", solution.X);
   answer.add("K", solution.K);
   answer.add("poles", solution.poles);
@@ -37,83 +25,106 @@ Outcome riccati(bool continuous, ProblemReader& problem, AnswerWriter& answer) {
   return {};
 }
 
-Outcome write_linear(const Expected<LinearMatrixSolution>& solution, AnswerWriter& answer) {
-  if (!solution) {
-    return tl::unexpected(solution.error());
-  }
-  answer.add("X", solution->X);
-  answer.add("residual", solution->residual);
-  answer.add("condition", solution->condition);
+Outcome solve_dare(const Problem& problem, AnswerWriter& answer) {
+  const MatrixXd& A = problem.matrix("A");
+  const MatrixXd& B = problem.matrix("B");
+  const MatrixXd& Q = problem.matrix("Q");
+  const MatrixXd& R = problem.matrix("R");
+  return write_riccati(problem.has("N") ? dare(A, B, Q, R, problem.matrix("N")) : dare(A, B, Q, R),
+                       answer);
+}
+
+Outcome solve_care(const Problem& problem, AnswerWriter& answer) {
+  const MatrixXd& A = problem.matrix("A");
+  const MatrixXd& B = problem.matrix("B");
+  const MatrixXd& Q = problem.matrix("Q");
+  const MatrixXd& R = problem.matrix("R");
+  return write_riccati(problem.has("N") ? care(A, B, Q, R, problem.matrix("N")) : care(A, B, Q, R),
+                       answer);
+}
+
+Outcome write_linear(Expected<LinearMatrixSolution> solved, AnswerWriter& answer) {
+  FLYBALL_TRY(const LinearMatrixSolution& solution, std::move(solved));
+  answer.add("X", solution.X);
+  answer.add("residual", solution.residual);
+  answer.add("condition", solution.condition);
   return {};
 }
 
 template <auto Function>
-Outcome lyapunov_kernel(ProblemReader& problem, AnswerWriter& answer) {
-  const MatrixXd A = problem.matrix("A");
-  const MatrixXd Q = problem.matrix("Q");
-  return problem.status() ? write_linear(Function(A, Q), answer) : problem.status();
+Outcome solve_lyapunov(const Problem& problem, AnswerWriter& answer) {
+  return write_linear(Function(problem.matrix("A"), problem.matrix("Q")), answer);
 }
 
 template <auto Function>
-Outcome sylvester_kernel(ProblemReader& problem, AnswerWriter& answer) {
-  const MatrixXd A = problem.matrix("A");
-  const MatrixXd B = problem.matrix("B");
-  const MatrixXd C = problem.matrix("C");
-  return problem.status() ? write_linear(Function(A, B, C), answer) : problem.status();
+Outcome solve_sylvester(const Problem& problem, AnswerWriter& answer) {
+  return write_linear(Function(problem.matrix("A"), problem.matrix("B"), problem.matrix("C")),
+                      answer);
 }
 
-Outcome write_matrix(const Expected<MatrixXd>& X, AnswerWriter& answer) {
-  if (!X) {
-    return tl::unexpected(X.error());
-  }
-  answer.add("X", *X);
+Outcome write_matrix(Expected<MatrixXd> solved, AnswerWriter& answer) {
+  FLYBALL_TRY(const MatrixXd& X, std::move(solved));
+  answer.add("X", X);
   return {};
 }
 
 template <auto Function>
-Outcome function_kernel(ProblemReader& problem, AnswerWriter& answer) {
-  const MatrixXd A = problem.matrix("A");
-  return problem.status() ? write_matrix(Function(A), answer) : problem.status();
+Outcome solve_function(const Problem& problem, AnswerWriter& answer) {
+  return write_matrix(Function(problem.matrix("A")), answer);
+}
+
+Outcome solve_powm(const Problem& problem, AnswerWriter& answer) {
+  return write_matrix(powm(problem.matrix("A"), problem.number("power")), answer);
 }
 
 }  // namespace
 
-Outcome solve_dare(ProblemReader& problem, AnswerWriter& answer) {
-  return riccati(false, problem, answer);
-}
-
-Outcome solve_care(ProblemReader& problem, AnswerWriter& answer) {
-  return riccati(true, problem, answer);
-}
-
-Outcome solve_lyapunov(ProblemReader& problem, AnswerWriter& answer) {
-  return lyapunov_kernel<lyapunov>(problem, answer);
-}
-
-Outcome solve_discrete_lyapunov(ProblemReader& problem, AnswerWriter& answer) {
-  return lyapunov_kernel<discrete_lyapunov>(problem, answer);
-}
-
-Outcome solve_sylvester(ProblemReader& problem, AnswerWriter& answer) {
-  return sylvester_kernel<sylvester>(problem, answer);
-}
-
-Outcome solve_discrete_sylvester(ProblemReader& problem, AnswerWriter& answer) {
-  return sylvester_kernel<discrete_sylvester>(problem, answer);
-}
-
-Outcome solve_expm(ProblemReader& problem, AnswerWriter& answer) {
-  return function_kernel<expm>(problem, answer);
-}
-
-Outcome solve_logm(ProblemReader& problem, AnswerWriter& answer) {
-  return function_kernel<logm>(problem, answer);
-}
-
-Outcome solve_powm(ProblemReader& problem, AnswerWriter& answer) {
-  const MatrixXd A = problem.matrix("A");
-  const double power = problem.number("power");
-  return problem.status() ? write_matrix(powm(A, power), answer) : problem.status();
+std::vector<Kind> matrix_equation_kinds() {
+  const std::vector<Field> riccati{field::A, field::B, field::Q, field::R, field::N};
+  const std::vector<Field> riccati_answer{
+      matrix("X", "n", "n", "the stabilizing solution, symmetric"),
+      matrix("K", "m", "n", "the gain of u = -Kx that belongs to it"),
+      complex_list("poles", "n", "eigenvalues of A - BK"), field::residual, field::condition};
+  const std::vector<Field> lyapunov_fields{matrix("A", "n", "n", "square"),
+                                           matrix("Q", "n", "n", "symmetric")};
+  const std::vector<Field> sylvester_fields{matrix("A", "a", "a", "square"),
+                                            matrix("B", "b", "b", "square"),
+                                            matrix("C", "a", "b", "the right-hand side")};
+  const std::vector<Field> linear_answer{matrix("X", "n", "n", "the solution"), field::residual,
+                                         field::condition};
+  const std::vector<Field> sylvester_answer{matrix("X", "a", "b", "the solution"), field::residual,
+                                            field::condition};
+  const std::vector<Field> square{matrix("A", "n", "n", "square")};
+  const std::vector<Field> function_answer{matrix("X", "n", "n", "the function of A")};
+  return {
+      {"dare", "AᵀXA - X - (AᵀXB + N)(R + BᵀXB)⁻¹(BᵀXA + Nᵀ) + Q = 0 for X", riccati,
+       riccati_answer,
+       R"({"A": [[1, 0.1], [0, 1]], "B": [[0.005], [0.1]], "Q": [[1, 0], [0, 1]], "R": [[1]]})",
+       &solve_dare},
+      {"care", "AᵀX + XA - (XB + N)R⁻¹(BᵀX + Nᵀ) + Q = 0 for X (5.1)", riccati, riccati_answer,
+       R"({"A": [[0, 1], [0, 0]], "B": [[0], [1]], "Q": [[1, 0], [0, 2]], "R": [[1]]})",
+       &solve_care},
+      {"lyapunov", "AX + XAᵀ + Q = 0 for X (5.3)", lyapunov_fields, linear_answer,
+       R"({"A": [[-1, 1], [0, -2]], "Q": [[1, 0], [0, 1]]})", &solve_lyapunov<lyapunov>},
+      {"discrete-lyapunov", "AXAᵀ - X + Q = 0 for X (5.4)", lyapunov_fields, linear_answer,
+       R"({"A": [[0.9, 0.1], [0, 0.5]], "Q": [[1, 0], [0, 1]]})",
+       &solve_lyapunov<discrete_lyapunov>},
+      {"sylvester", "AX + XB = C for X", sylvester_fields, sylvester_answer,
+       R"({"A": [[1, 1], [0, 2]], "B": [[3]], "C": [[4], [5]]})", &solve_sylvester<sylvester>},
+      {"discrete-sylvester", "AXB - X + C = 0 for X", sylvester_fields, sylvester_answer,
+       R"({"A": [[0.5, 1], [0, 0.25]], "B": [[0.5]], "C": [[3], [7]]})",
+       &solve_sylvester<discrete_sylvester>},
+      {"expm", "the exponential e^A", square, function_answer, R"({"A": [[0, 1], [-1, 0]]})",
+       &solve_function<expm>},
+      {"logm", "the principal logarithm: e^X = A", square, function_answer,
+       R"({"A": [[2, 1], [0, 2]]})", &solve_function<logm>},
+      {"powm",
+       "the principal power A^power",
+       {square[0], number("power", "", "the exponent, any real number")},
+       function_answer,
+       R"({"A": [[4, 1], [0, 9]], "power": 0.5})",
+       &solve_powm},
+  };
 }
 
 }  // namespace flyball::solve

@@ -53,4 +53,30 @@ void write_structure(const StructureAnalysis& structure, std::span<const std::st
                                describe(structure.observability, states));
 }
 
+std::vector<Field> structure_fields() {
+  const auto reach = [](std::string_view hidden, std::string_view hidden_help,
+                        std::string_view rank, std::string_view condition, std::string_view modes,
+                        std::string_view distances) {
+    return std::vector{
+        complex_list(hidden, "h", hidden_help), integer(rank, "how many dimensions that is"),
+        number(condition, "", "condition of the book's matrix (6.37 or 6.41), in the given units"),
+        complex_list(modes, "n", "every mode, the hidden ones first, then by increasing distance"),
+        list(distances, "n", "",
+             "the relative change of the matrices that would cut off each of these modes")};
+  };
+  return std::vector{flag("controllable", "whether the inputs move every mode"),
+                     flag("observable", "whether the outputs show every mode"),
+                     flag("stabilizable", "whether every mode that no input moves decays"),
+                     flag("detectable", "whether every mode that no output shows decays"),
+                     text("stability", "\"stable\", \"marginally stable\" or \"unstable\""),
+                     complex_list("poles", "n", "the slowest or most unstable first"),
+                     list("damping_ratios", "n", "", "of these poles"),
+                     list("natural_frequencies", "n", "rad/s", "of these poles")} +
+         reach("uncontrollable_modes", "modes that no input moves", "controllability_rank",
+               "controllability_condition", "controllability_modes", "controllability_distances") +
+         reach("unobservable_modes", "modes that no output shows", "observability_rank",
+               "observability_condition", "observability_modes", "observability_distances") +
+         std::vector{text("words", "all of it for people")};
+}
+
 }  // namespace flyball::solve

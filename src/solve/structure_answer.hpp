@@ -5,12 +5,15 @@
 
 #include <flyball/systems/structure.hpp>
 
-#include "io/answer_writer.hpp"
+#include "solve/row.hpp"
 
 namespace flyball::solve {
 
 /// The fields that `solve analyze` answers and `analyze --json` too.
 void write_structure(const StructureAnalysis& structure, std::span<const std::string> states,
                      AnswerWriter& answer);
+
+/// What it writes, as fields of an answer.
+[[nodiscard]] std::vector<Field> structure_fields();
 
 }  // namespace flyball::solve

@@ -6,7 +6,8 @@
 #include <flyball/study/analyze.hpp>
 
 #include "core/try.hpp"
-#include "solve/problem_reader.hpp"
+#include "solve/json_object.hpp"
+#include "solve/row.hpp"
 #include "study/design_steps.hpp"
 
 namespace flyball::study {
@@ -14,9 +15,6 @@ namespace flyball::study {
 namespace {
 
 using mechanisms::MechanismKind;
-using solve::check_fields;
-using solve::parse_object;
-using solve::ProblemReader;
 
 constexpr std::size_t largest_model = std::size_t{64} << 20;
 
@@ -48,25 +46,35 @@ Expected<void> check_names(const std::vector<std::string>& names, Eigen::Index c
                             .expected(fmt::format("{}, {} names", meaning, count)));
 }
 
+/// What a model in JSON has.
+std::span<const solve::Field> model_fields() {
+  namespace field = solve::field;
+  static const std::vector<solve::Field> fields{
+      field::A,
+      field::B,
+      field::C,
+      field::D,
+      solve::or_first(field::domain),
+      solve::optional(solve::number("T", "s", "sample period")),
+      solve::optional(solve::texts("states", "n", "names")),
+      solve::optional(solve::texts("inputs", "m", "names")),
+      solve::optional(solve::texts("outputs", "p", "names"))};
+  return fields;
+}
+
 Expected<ModelFile> parse_matrices(std::string_view text, const std::string& name) {
-  FLYBALL_TRY(const auto object, parse_object(text, name, "model"));
-  FLYBALL_CHECK(check_fields(object, name, "A B", "C D domain T states inputs outputs"));
-  ProblemReader reader(object, name);
+  FLYBALL_TRY(const auto object, solve::parse_object(text, name, "model"));
+  FLYBALL_TRY(const auto fields, solve::Problem::read(object, model_fields(), name));
   ModelFile model;
   model.path = name;
-  model.system = reader.system();
-  if (reader.has("domain")) {
-    model.domain = reader.domain();
+  model.system = fields.system();
+  model.domain = fields.domain();
+  if (fields.has("T")) {
+    model.period = Time(fields.number("T"));
   }
-  if (reader.has("T")) {
-    model.period = Time(reader.number("T"));
-  }
-  model.states = reader.names("states");
-  model.inputs = reader.names("inputs");
-  model.outputs = reader.names("outputs");
-  if (!reader.status()) {
-    return tl::unexpected(reader.status().error());
-  }
+  model.states = fields.texts("states");
+  model.inputs = fields.texts("inputs");
+  model.outputs = fields.texts("outputs");
   if (model.domain == TimeDomain::discrete && !model.period) {
     return tl::unexpected(Error(ArgumentError::malformed)
                               .in(name)

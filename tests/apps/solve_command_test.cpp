@@ -130,7 +130,39 @@ TEST_F(SolveCommand, ExitStatus) {
   EXPECT_TRUE(holds(kind.err, "did you mean \"dare\"?")) << kind.err;
   EXPECT_EQ(Json::parse(kind.out).at("error").at("code"), "unknown_name");
   EXPECT_EQ(run("solve dare").status, 2) << "nothing on standard input";
-  EXPECT_EQ(run("solve", "problems").status, 2);
+  const Answer none = run("solve", "problems");
+  EXPECT_EQ(none.status, 2);
+  EXPECT_TRUE(holds(none.err, "KIND is left out")) << none.err;
+}
+
+// What is told of the kinds comes from their rows; the problem that a kind's help shows has an
+// answer.
+TEST_F(SolveCommand, ListAndHelp) {
+  const Answer list = run("solve --list");
+  EXPECT_EQ(list.status, 0);
+  for (const char* kind : {"dare", "hinf-norm", "feedback", "lqi", "pid-reaction", "kalman"}) {
+    EXPECT_TRUE(holds(list.out, std::string("\n  ") + kind + " ")) << kind;
+    const Answer help = run(std::string("solve ") + kind + " --help");
+    EXPECT_EQ(help.status, 0);
+    EXPECT_TRUE(help.err.empty()) << help.err;
+    const std::size_t from = help.out.find("echo '") + 6;
+    const std::string example = help.out.substr(from, help.out.find('\'', from) - from);
+    EXPECT_EQ(solve(kind, example + "\n", 0).size(), 1U) << help.out;
+  }
+  const std::string dare = run("solve dare --help").out;
+  for (const char* line : {"flyball solve dare: AᵀXA - X", "A problem has A B Q R [N]", "n x m",
+                           "[1/state²]", "the stabilizing solution"}) {
+    EXPECT_TRUE(holds(dare, line)) << line << "\n" << dare;
+  }
+  EXPECT_EQ(dare, run("solve --help dare").out);
+  const Answer general = run("solve --help");
+  EXPECT_EQ(general.status, 0);
+  EXPECT_TRUE(holds(general.out, "flyball solve --list")) << general.out;
+  const Answer unknown = run("solve dear --help");
+  EXPECT_EQ(unknown.status, 2);
+  EXPECT_TRUE(holds(unknown.err, "did you mean \"dare\"?")) << unknown.err;
+  const Json schema = Json::parse(run("solve --schema").out);
+  EXPECT_TRUE(schema.at("$defs").contains("dare.problem"));
 }
 
 // One object over several lines is one problem, also when it is broken.

@@ -1,0 +1,84 @@
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "solve/json_object.hpp"
+#include "solve/json_value.hpp"
+
+namespace flyball::solve {
+
+using Json = nlohmann::json;
+
+namespace {
+
+/// Brackets of a text that are open at once, strings left out. Writing a value (an id) recurses.
+int depth_of(std::string_view text) {
+  int depth = 0;
+  int deepest = 0;
+  bool quoted = false;
+  for (std::size_t k = 0; k < text.size(); ++k) {
+    const char c = text[k];
+    if (quoted) {
+      if (c == '\\') {
+        ++k;
+      } else if (c == '"') {
+        quoted = false;
+      }
+    } else if (c == '"') {
+      quoted = true;
+    } else if (c == '[' || c == '{') {
+      deepest = std::max(deepest, ++depth);
+    } else if (c == ']' || c == '}') {
+      --depth;
+    }
+  }
+  return deepest;
+}
+
+Error malformed(std::string_view where, std::string_view what, std::string got,
+                std::string expected) {
+  return Error(ArgumentError::malformed)
+      .in(std::string(where))
+      .about("the " + std::string(what))
+      .got(std::move(got))
+      .expected(std::move(expected));
+}
+
+/// What is wrong at a byte, counted from 1 and one past the end for a text that ends too soon.
+std::string complaint(std::string_view text, std::size_t byte) {
+  if (byte > text.size()) {
+    return text.find_first_not_of(" \t\r\n") == std::string_view::npos ? "empty" : "cut off";
+  }
+  const std::string_view before = text.substr(0, byte - 1);
+  const auto line = std::count(before.begin(), before.end(), '\n') + 1;
+  const std::size_t column = before.size() - (before.rfind('\n') + 1) + 1;
+  return line == 1 ? fmt::format("not JSON from character {} on", column)
+                   : fmt::format("not JSON from line {}, character {} on", line, column);
+}
+
+}  // namespace
+
+Expected<Json> parse_object(std::string_view text, std::string_view where, std::string_view what) {
+  constexpr int deepest = 64;
+  if (const int depth = depth_of(text); depth > deepest) {
+    return tl::unexpected(malformed(where, what,
+                                    fmt::format("{} brackets within each other", depth),
+                                    fmt::format("at most {}", deepest)));
+  }
+  constexpr const char* example = "one JSON object, such as {\"A\": [[0, 1], [0, -2]], …}";
+  try {
+    Json object = Json::parse(text);
+    if (!object.is_object()) {
+      return tl::unexpected(malformed(where, what, kind_of(object), example));
+    }
+    return object;
+  } catch (const Json::parse_error& problem) {
+    return tl::unexpected(malformed(where, what, complaint(text, problem.byte), example));
+  } catch (const Json::exception&) {
+    return tl::unexpected(malformed(where, what, "not to be read: a number is beyond 1.8e308",
+                                    "numbers that a double holds"));
+  }
+}
+
+}  // namespace flyball::solve

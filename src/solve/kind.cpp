@@ -1,0 +1,68 @@
+#include <flyball/solve/kind.hpp>
+
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <flyball/core/text.hpp>
+
+#include "solve/row.hpp"
+
+namespace flyball::solve {
+
+std::vector<Field> operator+(std::vector<Field> some, const std::vector<Field>& more) {
+  some.insert(some.end(), more.begin(), more.end());
+  return some;
+}
+
+std::vector<Field> answered_system(std::string_view states, std::string_view inputs,
+                                   std::string_view outputs) {
+  return {matrix("A", states, states, "how the states move by themselves"),
+          matrix("B", states, inputs, "how the inputs move the states"),
+          matrix("C", outputs, states, "how the outputs see the states"),
+          matrix("D", outputs, inputs, "how the inputs reach the outputs")};
+}
+
+std::span<const Kind> kinds() {
+  static const std::vector<Kind> all = [] {
+    std::vector<Kind> table;
+    const auto add = [&](std::string_view section, std::vector<Kind> rows) {
+      for (Kind& kind : rows) {
+        kind.section = section;
+        table.push_back(std::move(kind));
+      }
+    };
+    add("Matrix equations and functions", matrix_equation_kinds());
+    add("Systems", system_kinds());
+    add("Responses", response_kinds());
+    add("Realizations", realization_kinds());
+    add("Interconnections", interconnection_kinds());
+    add("Regulators", regulator_kinds());
+    add("Feedforward, delay and margins", feedforward_kinds());
+    add("PID", pid_kinds());
+    add("Observers", estimator_kinds());
+    return table;
+  }();
+  return all;
+}
+
+Expected<const Kind*> find_kind(std::string_view name) {
+  std::vector<std::string_view> names;
+  for (const Kind& kind : kinds()) {
+    if (kind.name == name) {
+      return &kind;
+    }
+    names.push_back(kind.name);
+  }
+  const std::string nearest = nearest_name(name, names);
+  return tl::unexpected(Error(ArgumentError::unknown_name)
+                            .in("solve")
+                            .about("kind of problem")
+                            .got("\"" + std::string(name.substr(0, 40)) + "\"")
+                            .expected(fmt::format("one of {}", fmt::join(names, ", ")))
+                            .hint(nearest.empty() ? "" : "did you mean \"" + nearest + "\"?"));
+}
+
+}  // namespace flyball::solve

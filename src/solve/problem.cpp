@@ -1,0 +1,282 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/core/text.hpp>
+
+#include "core/try.hpp"
+#include "solve/json_value.hpp"
+#include "solve/problem.hpp"
+#include "solve/shape.hpp"
+
+namespace flyball::solve {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Json = nlohmann::json;
+
+namespace {
+
+constexpr std::array<Field, 4> fields_of_system(const Field& system) {
+  const auto matrix = [](std::string_view name, std::string_view rows, std::string_view columns,
+                         Absent absent) {
+    return Field{.name = name,
+                 .type = FieldType::matrix,
+                 .rows = rows,
+                 .columns = columns,
+                 .absent = absent};
+  };
+  return {matrix("A", system.rows, system.rows, Absent::refused),
+          matrix("B", system.rows, system.columns, Absent::refused),
+          matrix("C", system.outputs, system.rows, Absent::identity),
+          matrix("D", system.outputs, system.columns, Absent::zero)};
+}
+
+std::string in_quotes(std::string_view text) {
+  return fmt::format("\"{}\"", text.substr(0, 40));
+}
+
+}  // namespace
+
+/// Reads one object, field after field.
+class ProblemReader {
+ public:
+  ProblemReader(const Json& object, std::string_view where, std::string_view prefix, Sizes& sizes)
+      : object_(object), where_(where), prefix_(prefix), sizes_(sizes) {}
+
+  [[nodiscard]] Expected<void> check_names(std::span<const Field> fields) const;
+  [[nodiscard]] Expected<void> read(std::span<const Field> fields, Problem& problem);
+
+ private:
+  using Value = Problem::Value;
+
+  [[nodiscard]] std::string full(std::string_view name) const {
+    return std::string(prefix_).append(name);
+  }
+  [[nodiscard]] Error malformed(const Field& field, std::string got, std::string expected) const {
+    return Error(ArgumentError::malformed)
+        .in(std::string(where_))
+        .about(full(field.name))
+        .got(std::move(got))
+        .expected(std::move(expected));
+  }
+
+  [[nodiscard]] const Json* find(std::string_view name) const {
+    const auto found = object_.find(name);
+    return found == object_.end() || found->is_null() ? nullptr : &*found;
+  }
+  [[nodiscard]] Expected<void> read_value(const Field& field, const Json& json, Value& value);
+  [[nodiscard]] Expected<void> set_default(const Field& field, Value& value);
+  [[nodiscard]] Expected<double> number(const Field& field, const Json& json) const;
+  [[nodiscard]] Expected<std::string_view> choice(const Field& field, const Json& json) const;
+  [[nodiscard]] Expected<void> matrix(const Field& field, const Json& json, MatrixXd& M);
+  [[nodiscard]] Expected<ContinuousSystem<>> system(const Field& field, const Json& json);
+  [[nodiscard]] Expected<void> refused_if(const Verdict& verdict, const Field& field) const {
+    if (verdict) {
+      return tl::unexpected(malformed(field, verdict->got, verdict->expected));
+    }
+    return {};
+  }
+
+  const Json& object_;
+  std::string_view where_;
+  std::string_view prefix_;  ///< "first." within the object of that name.
+  Sizes& sizes_;
+};
+
+Expected<void> ProblemReader::check_names(std::span<const Field> fields) const {
+  const auto names_of = [&](bool all) {
+    std::vector<std::string_view> names;
+    for (const Field& field : fields) {
+      if (all || field.absent == Absent::refused) {
+        names.push_back(field.name);
+      }
+    }
+    return names;
+  };
+  for (const auto& [name, value] : object_.items()) {
+    const bool known = std::any_of(fields.begin(), fields.end(),
+                                   [&](const Field& field) { return field.name == name; });
+    if (known || (name == "id" && prefix_.empty())) {
+      continue;
+    }
+    const std::vector<std::string_view> names = names_of(true);
+    const std::string nearest = nearest_name(name, names);
+    return tl::unexpected(
+        Error(ArgumentError::unknown_name)
+            .in(std::string(where_))
+            .about(prefix_.empty()
+                       ? std::string("field")
+                       : fmt::format("field of {}", prefix_.substr(0, prefix_.size() - 1)))
+            .got(in_quotes(name))
+            .expected(fmt::format("one of {}", fmt::join(names, ", ")))
+            .hint(nearest.empty() ? "take it out" : "did you mean " + in_quotes(nearest) + "?"));
+  }
+  for (const Field& field : fields) {
+    if (field.absent == Absent::refused && find(field.name) == nullptr) {
+      return tl::unexpected(
+          malformed(field, "left out",
+                    fmt::format("there, as are all of {}", fmt::join(names_of(false), ", "))));
+    }
+  }
+  return {};
+}
+
+Expected<void> ProblemReader::read(std::span<const Field> fields, Problem& problem) {
+  FLYBALL_CHECK(check_names(fields));
+  problem.fields_ = fields;
+  problem.values_.resize(fields.size() + 1);
+  for (std::size_t k = 0; k < fields.size(); ++k) {
+    const Json* json = find(fields[k].name);
+    problem.given_ |= std::uint64_t{json != nullptr} << k;
+    FLYBALL_CHECK(json != nullptr ? read_value(fields[k], *json, problem.values_[k])
+                                  : set_default(fields[k], problem.values_[k]));
+  }
+  return {};
+}
+
+Expected<void> ProblemReader::read_value(const Field& field, const Json& json, Value& value) {
+  switch (field.type) {
+    case FieldType::number:
+    case FieldType::integer: {
+      FLYBALL_TRY(value, number(field, json));
+      return {};
+    }
+    case FieldType::choice: {
+      FLYBALL_TRY(value, choice(field, json));
+      return {};
+    }
+    case FieldType::matrix:
+    case FieldType::samples:
+    case FieldType::list:
+      return matrix(field, json, value.emplace<MatrixXd>());
+    case FieldType::complex_list:
+      return refused_if(read_complex_list(json, value.emplace<Eigen::VectorXcd>()), field);
+    case FieldType::texts:
+      return refused_if(read_texts(json, value.emplace<std::vector<std::string>>()), field);
+    case FieldType::system: {
+      FLYBALL_TRY(value, system(field, json));
+      return {};
+    }
+    case FieldType::flag:
+    case FieldType::text:
+    case FieldType::matrices:
+      break;  // of answers alone
+  }
+  return {};
+}
+
+Expected<void> ProblemReader::set_default(const Field& field, Value& value) {
+  switch (field.absent) {
+    case Absent::zero: {
+      const Index rows = sizes_.bind(field.rows, 0);
+      value = MatrixXd(MatrixXd::Zero(rows, sizes_.bind(field.columns, 0)));
+      break;
+    }
+    case Absent::identity: {
+      const Index columns = sizes_.bind(field.columns, 0);
+      if (const Index rows = sizes_.bind(field.rows, columns); rows != columns) {
+        return tl::unexpected(malformed(
+            field, "left out",
+            fmt::format("there: the identity stands for it, which has not {} rows", rows)));
+      }
+      value = MatrixXd(MatrixXd::Identity(columns, columns));
+      break;
+    }
+    case Absent::number:
+      value = field.otherwise;
+      break;
+    case Absent::first_choice:
+      value = field.choices.substr(0, field.choices.find(' '));
+      break;
+    case Absent::refused:
+    case Absent::nothing:
+      break;
+  }
+  return {};
+}
+
+Expected<double> ProblemReader::number(const Field& field, const Json& json) const {
+  double value = 0.0;
+  if (!read_number(json, value)) {
+    return tl::unexpected(malformed(field, kind_of(json), "a number"));
+  }
+  FLYBALL_CHECK(check_finite(value, where_, full(field.name)));
+  if (field.type == FieldType::integer && (value != std::floor(value) || std::abs(value) > 1e9)) {
+    return tl::unexpected(malformed(field, format_number(value), "a whole number"));
+  }
+  return value;
+}
+
+Expected<std::string_view> ProblemReader::choice(const Field& field, const Json& json) const {
+  if (!json.is_string()) {
+    return tl::unexpected(malformed(field, kind_of(json), "a text"));
+  }
+  const std::string& text = json.get_ref<const std::string&>();
+  const std::vector<std::string_view> choices = words_of_choice(field.choices);
+  const auto found = std::find(choices.begin(), choices.end(), text);
+  if (found != choices.end()) {
+    return *found;
+  }
+  std::vector<std::string> listed;
+  for (const std::string_view choice : choices) {
+    listed.push_back(in_quotes(choice));
+  }
+  const std::string last = listed.back();
+  listed.pop_back();
+  const std::string nearest = nearest_name(text, choices);
+  return tl::unexpected(
+      Error(ArgumentError::unknown_name)
+          .in(std::string(where_))
+          .about(full(field.name))
+          .got(in_quotes(text))
+          .expected(fmt::format("{} or {}", fmt::join(listed, ", "), last))
+          .hint(nearest.empty() ? "" : "did you mean " + in_quotes(nearest) + "?"));
+}
+
+Expected<void> ProblemReader::matrix(const Field& field, const Json& json, MatrixXd& M) {
+  // Samples are a list of rows, or of the numbers of the one column.
+  const bool flat = json.is_array() && !json.empty() && !json.front().is_array();
+  const bool column = field.type == FieldType::list || (field.type == FieldType::samples && flat);
+  FLYBALL_CHECK(refused_if(column ? read_column(json, M) : read_rows(json, M), field));
+  return check_shape_of(M, field, sizes_, where_, full(field.name));
+}
+
+Expected<ContinuousSystem<>> ProblemReader::system(const Field& field, const Json& json) {
+  if (!json.is_object()) {
+    return tl::unexpected(
+        malformed(field, kind_of(json), "a system, such as {\"A\": [[-1]], \"B\": [[1]]}"));
+  }
+  const std::array<Field, 4> fields = fields_of_system(field);
+  const std::string prefix = full(field.name) + '.';
+  Problem inner;
+  FLYBALL_CHECK(ProblemReader(json, where_, prefix, sizes_).read(fields, inner));
+  return inner.system();
+}
+
+Expected<Problem> Problem::read(const Json& object, std::span<const Field> fields,
+                                std::string_view where) {
+  Problem problem;
+  Sizes sizes;
+  FLYBALL_CHECK(ProblemReader(object, where, "", sizes).read(fields, problem));
+  return problem;
+}
+
+std::size_t Problem::index_of(std::string_view name) const {
+  std::size_t k = 0;
+  while (k < fields_.size() && fields_[k].name != name) {
+    ++k;
+  }
+  return k;
+}
+
+bool Problem::has(std::string_view name) const {
+  return (given_ >> index_of(name) & 1U) != 0;
+}
+
+}  // namespace flyball::solve

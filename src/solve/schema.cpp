@@ -1,0 +1,123 @@
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <flyball/solve/documentation.hpp>
+
+#include "solve/shape.hpp"
+
+namespace flyball::solve {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json reference(std::string_view name) {
+  return {{"$ref", fmt::format("#/$defs/{}", name)}};
+}
+
+Json list_of(Json items) {
+  return {{"type", "array"}, {"items", std::move(items)}};
+}
+
+Json any_of(Json one, Json other) {
+  return {{"anyOf", Json::array({std::move(one), std::move(other)})}};
+}
+
+/// @param problem  Whether short forms that problems may use are allowed.
+Json type_of(const Field& field, bool problem) {
+  switch (field.type) {
+    case FieldType::number:
+      return reference("number");
+    case FieldType::integer:
+      return {{"type", "integer"}};
+    case FieldType::flag:
+      return {{"type", "boolean"}};
+    case FieldType::text:
+      return {{"type", "string"}};
+    case FieldType::texts:
+      return list_of({{"type", "string"}});
+    case FieldType::choice:
+      return {{"enum", words_of_choice(field.choices)}};
+    case FieldType::matrix:
+      return problem ? any_of(reference("matrix"), reference("number")) : reference("matrix");
+    case FieldType::samples:
+      return any_of(reference("matrix"), list_of(reference("number")));
+    case FieldType::list:
+      return list_of(reference("number"));
+    case FieldType::complex_list:
+      return list_of(problem ? any_of(reference("complex"), reference("number"))
+                             : reference("complex"));
+    case FieldType::matrices:
+      return list_of(reference("matrix"));
+    case FieldType::system:
+      return reference("system");
+  }
+  return {};
+}
+
+std::string description_of(const Field& field) {
+  const std::string shape = shape_of(field);
+  return fmt::format("{}{}{}", field.help, shape.empty() ? "" : fmt::format(" ({})", shape),
+                     field.unit.empty() ? "" : fmt::format(" [{}]", field.unit));
+}
+
+Json object_of(const std::vector<Field>& fields, bool problem) {
+  Json properties = {{"id", true}};
+  Json required = Json::array();
+  for (const Field& field : fields) {
+    Json property = type_of(field, problem);
+    property["description"] = description_of(field);
+    if (problem && field.absent == Absent::number) {
+      property["default"] = field.otherwise;
+    } else if (problem && field.absent == Absent::first_choice) {
+      property["default"] = words_of_choice(field.choices).front();
+    }
+    properties[std::string(field.name)] = std::move(property);
+    if (field.absent == Absent::refused) {
+      required.emplace_back(field.name);
+    }
+  }
+  return {{"type", "object"},
+          {"properties", std::move(properties)},
+          {"required", std::move(required)},
+          {"additionalProperties", false}};
+}
+
+}  // namespace
+
+std::string json_schema() {
+  const Json matrix = any_of(reference("matrix"), reference("number"));
+  Json system = {{"type", "object"},
+                 {"properties", {{"A", matrix}, {"B", matrix}, {"C", matrix}, {"D", matrix}}},
+                 {"required", Json::array({"A", "B"})},
+                 {"additionalProperties", false}};
+  Json definitions = {
+      {"number", any_of({{"type", "number"}}, {{"enum", Json::array({"inf", "-inf", nullptr})}})},
+      {"complex",
+       {{"type", "array"}, {"items", reference("number")}, {"minItems", 2}, {"maxItems", 2}}},
+      {"matrix", list_of(list_of(reference("number")))},
+      {"system", std::move(system)},
+      {"refusal",
+       {{"type", "object"},
+        {"properties",
+         {{"id", true},
+          {"error",
+           {{"type", "object"},
+            {"properties", {{"code", {{"type", "string"}}}, {"message", {{"type", "string"}}}}},
+            {"required", Json::array({"code", "message"})}}}}},
+        {"required", Json::array({"error"})},
+        {"additionalProperties", false}}}};
+  for (const Kind& kind : kinds()) {
+    Json problem = object_of(kind.fields, true);
+    problem["description"] = kind.help;
+    problem["examples"] = Json::array({Json::parse(kind.example)});
+    definitions[fmt::format("{}.problem", kind.name)] = std::move(problem);
+    definitions[fmt::format("{}.answer", kind.name)] = object_of(kind.answer, false);
+  }
+  const Json schema = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
+                       {"title", "Problems and answers of flyball solve"},
+                       {"$defs", std::move(definitions)}};
+  return schema.dump(1) + '\n';
+}
+
+}  // namespace flyball::solve

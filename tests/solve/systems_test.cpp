@@ -1,0 +1,214 @@
+#include <cmath>
+
+#include "answers.hpp"
+
+namespace flyball::solve {
+namespace {
+
+// 1/(s + 1): ∫e^{-2t} dt = 1/2. 4/(s² + 2s + 4): ω/(4ζ) = 1. x⁺ = x/2 + u: Σ 4^{-k} = 4/3.
+TEST(SolveSystems, H2Norm) {
+  EXPECT_NEAR(number(answer("h2-norm", R"({"A":[[-1]],"B":[[1]]})"), "norm"), std::sqrt(0.5),
+              1e-15);
+  EXPECT_NEAR(
+      number(answer("h2-norm", R"({"A":[[0,1],[-4,-2]],"B":[[0],[4]],"C":[[1,0]]})"), "norm"), 1.0,
+      1e-14);
+  EXPECT_NEAR(number(answer("h2-norm", R"({"A":[[0.5]],"B":[[1]],"domain":"discrete"})"), "norm"),
+              std::sqrt(4.0 / 3.0), 1e-14);
+  EXPECT_EQ(refusal("h2-norm", R"({"A":[[1]],"B":[[1]]})"), "not_stable");
+  EXPECT_EQ(refusal("h2-norm", R"({"A":[[-1]],"B":[[1]],"D":[[1]]})"), "infinite_norm");
+  EXPECT_EQ(refusal("h2-norm", R"({"A":[[0.5]],"B":[[1]],"domain":"discrete","T":0})"),
+            "not_positive");
+}
+
+// A CIM motor's speed: 80-digit Lyapunov solutions (tests/data has the same motor).
+TEST(SolveSystems, H2NormAndGramiansOfAMotor) {
+  const std::string motor =
+      R"({"A":[[-1.0865134431916739,5606.492380126379],[-78.69565217391305,-392.17391304347825]],)"
+      R"("B":[[0],[4347.826086956522]],"C":[[1,0]],"domain":"continuous"})";
+  EXPECT_NEAR(number(answer("h2-norm", motor), "norm"), 1307.9094561502739, 1e-9);
+  const Json gramians = answer("gramians", motor);
+  EXPECT_NEAR(entry(gramians, "Wc"), 1710627.1454873052, 1e-6);
+  EXPECT_NEAR(gramians.at("hankel_singular_values").at(1).get<double>(), 34.835900389443196, 1e-11);
+}
+
+// 4/(s² + 0.4 s + 4), ζ = 0.1: the peak 1/(2ζ√(1 - ζ²)) at ω√(1 - 2ζ²).
+TEST(SolveSystems, HInfinityNorm) {
+  const Json peak = answer("hinf-norm", R"({"A":[[0,1],[-4,-0.4]],"B":[[0],[4]],"C":[[1,0]]})");
+  EXPECT_NEAR(number(peak, "norm"), 1.0 / (0.2 * std::sqrt(0.99)), 1e-9);
+  EXPECT_NEAR(number(peak, "frequency"), 2.0 * std::sqrt(0.98), 1e-5);
+  EXPECT_GE(number(peak, "upper_bound"), number(peak, "norm"));
+  // A discrete one's frequency is in rad/s: 1/(z + 0.5) is largest at z = -1, π/T.
+  const Json alternating =
+      answer("hinf-norm", R"({"A":[[-0.5]],"B":[[1]],"domain":"discrete","T":0.1})");
+  EXPECT_NEAR(number(alternating, "norm"), 2.0, 1e-9);
+  EXPECT_NEAR(number(alternating, "frequency"), std::acos(-1.0) / 0.1, 1e-6);
+  EXPECT_EQ(refusal("hinf-norm", R"({"A":[[0]],"B":[[1]]})"), "not_stable");
+}
+
+// dx/dt = u, x(t) = x + tu: ∫x² + r u² = T x² + T² x u + (T³/3 + rT) u².
+TEST(SolveSystems, SampledCost) {
+  const Json cost = answer("sampled-cost", R"({"A":[[0]],"B":[[1]],"Q":[[1]],"R":[[2]],"T":0.1})");
+  EXPECT_NEAR(entry(cost, "B"), 0.1, 1e-16);
+  EXPECT_NEAR(entry(cost, "Q"), 0.1, 1e-16);
+  EXPECT_NEAR(entry(cost, "N"), 0.005, 1e-16);
+  EXPECT_NEAR(entry(cost, "R"), 0.2 + 1e-3 / 3.0, 1e-15);
+  EXPECT_EQ(refusal("sampled-cost", R"({"A":[[0]],"B":[[1]],"Q":[[1]],"R":[[2]],"T":0})"),
+            "not_positive");
+  EXPECT_EQ(refusal("sampled-cost",
+                    R"({"A":[[0,1],[0,0]],"B":[[0],[1]],"Q":[[1,1],[0,1]],"R":[[2]],"T":1})"),
+            "not_symmetric");
+}
+
+// dx/dt = u, half a period late: x⁺ = x + T/2 (u_k + u_{k-1}).
+TEST(SolveSystems, InputDelay) {
+  const std::string integrator = R"({"A":[[0]],"B":[[1]],"T":0.1,"delay":)";
+  const Json delayed = answer("input-delay", integrator + "0.05}");
+  expect_matrix(delayed, "A", {{1.0, 0.05}, {0.0, 0.0}});
+  expect_matrix(delayed, "B", {{0.05}, {1.0}});
+  expect_matrix(delayed, "C", {{1.0, 0.0}});
+  EXPECT_EQ(refusal("input-delay", integrator + "-0.05}"), "out_of_range");
+  EXPECT_EQ(refusal("input-delay", integrator + "\"inf\"}"), "not_finite");
+}
+
+// 1/(s + 1): 1 - e^{-t} and e^{-t}. x⁺ = x/2 + u: 2 - 2^{1-k} and 2^{1-k}, k >= 1.
+TEST(SolveSystems, Responses) {
+  const std::string lag = R"({"A":[[-1]],"B":[[1]],"T":0.5,"samples":3)";
+  const Json step = answer("step-response", lag + "}");
+  EXPECT_EQ(step.at("time"), Json({0.0, 0.5, 1.0}));
+  expect_matrix(step, "y", {{0.0}, {1.0 - std::exp(-0.5)}, {1.0 - std::exp(-1.0)}});
+  expect_matrix(answer("impulse-response", lag + "}"), "y",
+                {{1.0}, {std::exp(-0.5)}, {std::exp(-1.0)}});
+  expect_matrix(answer("initial-response", lag + R"(,"x0":[2]})"), "y",
+                {{2.0}, {2.0 * std::exp(-0.5)}, {2.0 * std::exp(-1.0)}});
+  const std::string discrete = R"({"A":[[0.5]],"B":[[1]],"domain":"discrete","samples":3)";
+  expect_matrix(answer("step-response", discrete + "}"), "y", {{0.0}, {1.0}, {1.5}});
+  expect_matrix(answer("impulse-response", discrete + "}"), "y", {{0.0}, {1.0}, {0.5}});
+  // Six time constants where nothing is said.
+  const Json chosen = answer("step-response", R"({"A":[[-2]],"B":[[1]]})");
+  EXPECT_NEAR(chosen.at("time").back().get<double>(), 3.0, 1e-12);
+  EXPECT_EQ(refusal("step-response", R"({"A":[[-2]],"B":[[1]],"T":1})"), "malformed");
+  EXPECT_EQ(refusal("step-response", R"({"A":[[-2]],"B":[[1]],"samples":3})"), "malformed");
+  EXPECT_EQ(refusal("step-response", lag + R"(,"input":1})"), "out_of_range");
+  EXPECT_EQ(refusal("impulse-response", lag + R"(,"input":-1})"), "out_of_range");
+  EXPECT_EQ(refusal("initial-response", lag + R"(,"x0":[1,2]})"), "wrong_shape");
+  EXPECT_EQ(refusal("step-response", R"({"A":[[-2]],"B":[[1]],"T":1,"samples":0})"),
+            "out_of_range");
+  EXPECT_EQ(refusal("step-response", R"({"A":[[-2]],"B":[[1]],"T":0,"samples":2})"),
+            "not_positive");
+}
+
+// Two poles, one of which no input moves: 1/(s + 1).
+TEST(SolveSystems, MinimalRealization) {
+  const Json minimal =
+      answer("minimal-realization", R"({"A":[[-1,0],[0,-2]],"B":[[1],[0]],"C":[[1,1]]})");
+  expect_matrix(minimal, "A", {{-1.0}});
+  EXPECT_NEAR(entry(minimal, "B") * entry(minimal, "C"), 1.0, 1e-14);
+  EXPECT_EQ(number(minimal, "unreached"), 1.0);
+  EXPECT_EQ(number(minimal, "unseen"), 0.0);
+  EXPECT_EQ(refusal("minimal-realization", R"({"A":[[-1]],"B":[[1]],"tolerance":1})"),
+            "out_of_range");
+}
+
+// A symmetric system, W_c = W_o = [1/2 1/11; 1/11 1/20], whose eigenvalues are the Hankel values.
+TEST(SolveSystems, BalancedRealization) {
+  const std::string system = R"({"A":[[-1,0],[0,-10]],"B":[[1],[1]],"C":[[1,1]])";
+  const double root = std::sqrt(0.55 * 0.55 / 4.0 - (0.025 - 1.0 / 121.0));
+  const Json balanced = answer("balanced-realization", system + "}");
+  const Json& hankel = balanced.at("hankel_singular_values");
+  EXPECT_NEAR(hankel.at(0).get<double>(), 0.275 + root, 1e-15);
+  EXPECT_NEAR(hankel.at(1).get<double>(), 0.275 - root, 1e-15);
+  EXPECT_EQ(number(balanced, "error_bound"), 0.0);
+  // Its Gramians are diag(σ).
+  const Json gramians = answer("gramians", Json{{"A", balanced.at("A")},
+                                                {"B", balanced.at("B")},
+                                                {"C", balanced.at("C")},
+                                                {"domain", "continuous"}}
+                                               .dump());
+  for (const char* name : {"Wc", "Wo"}) {
+    expect_matrix(gramians, name,
+                  {{hankel.at(0).get<double>(), 0.0}, {0.0, hankel.at(1).get<double>()}});
+  }
+  const Json reduced = answer("balanced-realization", system + R"(,"order":1})");
+  EXPECT_EQ(reduced.at("A").size(), 1U);
+  EXPECT_NEAR(number(reduced, "error_bound"), 2.0 * (0.275 - root), 1e-15);
+  EXPECT_EQ(refusal("balanced-realization", system + R"(,"order":3})"), "out_of_range");
+  EXPECT_EQ(refusal("balanced-realization", system + R"(,"order":1.5})"), "malformed");
+  EXPECT_EQ(refusal("balanced-realization", system + R"(,"order":1e10})"), "malformed");
+  EXPECT_EQ(refusal("balanced-realization", R"({"A":[[1]],"B":[[1]]})"), "not_stable");
+  EXPECT_EQ(refusal("balanced-realization", R"({"A":[[-1]],"B":[[0]]})"), "not_controllable");
+}
+
+// 1/((s + 1)(s + 2)) = 1/(s² + 3s + 2).
+TEST(SolveSystems, CanonicalForms) {
+  const std::string system = R"({"A":[[-1,1],[0,-2]],"B":[[0],[1]],"C":[[1,0]])";
+  const Json controllable = answer("canonical-form", system + "}");
+  expect_matrix(controllable, "A", {{0.0, 1.0}, {-2.0, -3.0}});
+  expect_matrix(controllable, "C", {{1.0, 0.0}});
+  const Json observable = answer("canonical-form", system + R"(,"form":"observable"})");
+  expect_matrix(observable, "A", {{0.0, -2.0}, {1.0, -3.0}});
+  expect_matrix(observable, "C", {{0.0, 1.0}});
+  EXPECT_EQ(refusal("canonical-form", system + R"(,"form":"modal"})"), "unknown_name");
+  EXPECT_EQ(refusal("canonical-form", R"({"A":[[-1]],"B":[[0]]})"), "not_controllable");
+  EXPECT_EQ(refusal("canonical-form", R"({"A":[[-1]],"B":[[1]],"C":[[0]],"form":"observable"})"),
+            "not_observable");
+  EXPECT_EQ(refusal("canonical-form", R"({"A":[[-1]],"B":[[1,1]]})"), "wrong_shape");
+}
+
+// Companion matrix to modes: T⁻¹ = [2 1; -1 -1].
+TEST(SolveSystems, SimilarityTransform) {
+  const std::string system = R"({"A":[[0,1],[-2,-3]],"B":[[0],[1]],"transform":)";
+  const Json modal = answer("similarity-transform", system + "[[1,1],[-1,-2]]}");
+  expect_matrix(modal, "A", {{-1.0, 0.0}, {0.0, -2.0}});
+  expect_matrix(modal, "B", {{1.0}, {-1.0}});
+  EXPECT_EQ(refusal("similarity-transform", system + "[[1,1],[1,1]]}"), "singular_transform");
+  EXPECT_EQ(refusal("similarity-transform", system + "[[1]]}"), "wrong_shape");
+}
+
+// 1/(s + 1) and 2/(s + 2), by the block matrices of the book's appendix A in state space.
+TEST(SolveSystems, Interconnections) {
+  const std::string both = R"({"first":{"A":[[-1]],"B":[[1]]},"second":{"A":[[-2]],"B":[[2]]}})";
+  const Json series = answer("series", both);
+  expect_matrix(series, "A", {{-1.0, 0.0}, {2.0, -2.0}});
+  expect_matrix(series, "B", {{1.0}, {0.0}});
+  expect_matrix(series, "C", {{0.0, 1.0}});
+  const Json parallel = answer("parallel", both);
+  expect_matrix(parallel, "A", {{-1.0, 0.0}, {0.0, -2.0}});
+  expect_matrix(parallel, "B", {{1.0}, {2.0}});
+  expect_matrix(parallel, "C", {{1.0, 1.0}});
+  const Json append = answer("append", both);
+  expect_matrix(append, "B", {{1.0, 0.0}, {0.0, 2.0}});
+  expect_matrix(append, "D", {{0.0, 0.0}, {0.0, 0.0}});
+  const std::string loop = R"({"forward":{"A":[[-1]],"B":[[1]]},"back":{"A":[[-2]],"B":[[2]]})";
+  expect_matrix(answer("feedback", loop + "}"), "A", {{-1.0, -1.0}, {2.0, -2.0}});
+  expect_matrix(answer("feedback", loop + R"(,"sign":"positive"})"), "A",
+                {{-1.0, 1.0}, {2.0, -2.0}});
+  const std::string unity = R"({"forward":{"A":[[0.5]],"B":[[0.2]]},"domain":"discrete","T":0.1})";
+  expect_matrix(answer("feedback", unity), "A", {{0.3}});
+}
+
+TEST(SolveSystems, InterconnectionsAreRefused) {
+  // Two outputs into one input.
+  const Json shapes = answer("series", R"({"first":{"A":[[-1,0],[0,-1]],"B":[[1],[1]]},)"
+                                       R"("second":{"A":[[-2]],"B":[[2]]}})");
+  EXPECT_EQ(shapes.at("error").at("code"), "wrong_shape");
+  EXPECT_EQ(shapes.at("error").at("message"), "series: second.B is 1x1; it must be 1x2");
+  EXPECT_EQ(refusal("parallel", R"({"first":{"A":[[-1]],"B":[[1,1]]},)"
+                                R"("second":{"A":[[-2]],"B":[[2]]}})"),
+            "wrong_shape");
+  EXPECT_EQ(refusal("series", R"({"first":{"A":[[-1]],"b":[[1]]},"second":1})"), "unknown_name");
+  EXPECT_EQ(refusal("series", R"({"first":{"A":[[-1]]},"second":1})"), "malformed");
+  EXPECT_EQ(refusal("series", R"({"first":{"A":[[-1]],"B":[[1]]},"second":1})"), "malformed");
+  EXPECT_EQ(
+      refusal("append", R"({"first":{"A":[[-1]],"B":[[1]]},"second":{"A":[["nan"]],"B":[[1]]}})"),
+      "not_finite");
+  // y = u + y.
+  EXPECT_EQ(refusal("feedback", R"({"forward":{"A":[[-1]],"B":[[1]],"D":[[1]]},)"
+                                R"("back":{"A":[[-1]],"B":[[1]],"D":[[-1]]}})"),
+            "algebraic_loop");
+  EXPECT_EQ(
+      refusal("feedback", R"({"forward":{"A":[[0.5]],"B":[[1]]},"domain":"discrete","T":-1})"),
+      "not_positive");
+}
+
+}  // namespace
+}  // namespace flyball::solve
