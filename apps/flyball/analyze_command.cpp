@@ -15,10 +15,15 @@ constexpr const char* schema = "flyball.analyze/1";
 struct Options {
   CommonOptions common;
   std::string model;
+  std::vector<study::Override> given;
 };
 
 int run(const Options& options) {
-  const auto analysis = study::read_model(options.model).and_then(&study::analyze);
+  const auto model = study::read_model(options.model, options.given);
+  if (!model) {
+    return fail(model.error(), options.common, schema);
+  }
+  const auto analysis = study::analyze(*model);
   if (!analysis) {
     return fail(analysis.error(), options.common, schema);
   }
@@ -41,6 +46,7 @@ void add_analyze_command(CLI::App& program, Invocation& invocation) {
   auto options = std::make_shared<Options>();
   options->common.typed = invocation.typed;
   command->add_option("MODEL", options->model, "The model; - is standard input")->required();
+  add_field_options(*command, study::JobKind::analyze, options->given);
   add_common_options(*command, options->common,
                      "Write the report into this folder: pole map, step responses, their data");
   command->callback([options, &invocation] { invocation.status = run(*options); });

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <cstdlib>
 
@@ -32,9 +31,10 @@ std::string quoted_for_shell(std::string_view word) {
 
 // Channels have names such as "/Arm/AppliedVolts", which are no paths.
 bool takes_channel(std::string_view option) {
-  constexpr std::array<std::string_view, 4> options{"--state", "--voltage", "--position",
-                                                    "--velocity"};
-  return std::find(options.begin(), options.end(), option) != options.end();
+  const auto fields = study::fields_of(study::JobKind::identify);
+  return std::any_of(fields.begin(), fields.end(), [&](const study::FieldInfo& field) {
+    return field.option == option && field.value == "CHANNEL";
+  });
 }
 
 }  // namespace
@@ -71,41 +71,19 @@ void add_common_options(CLI::App& command, CommonOptions& options, const std::st
       });
 }
 
-void add_log_options(CLI::App& command, LogOptions& options) {
-  recording::LogSelection& selection = options.selection;
-  command
-      .add_option("--mechanism", options.mechanism,
-                  "What the log is of: flywheel, elevator or arm (if it does not say)")
-      ->type_name("KIND");
-  command
-      .add_option("--unit", selection.unit,
-                  "Unit of the recorded position: rotations, rad, deg, m, in, …")
-      ->type_name("UNIT");
-  command
-      .add_option("--scale", selection.scale,
-                  "Multiplies recorded positions and velocities; 1/gearing for a motor's encoder, "
-                  "metres per rotation for an elevator recorded in rotations")
-      ->type_name("NUMBER");
-  command.add_option("--state", selection.state_channel, "Channel that names the running test")
-      ->type_name("CHANNEL");
-  command.add_option("--voltage", selection.voltage_channel, "Channel of the applied voltage")
-      ->type_name("CHANNEL");
-  command.add_option("--position", selection.position_channel, "Channel of the position")
-      ->type_name("CHANNEL");
-  command.add_option("--velocity", selection.velocity_channel, "Channel of the velocity")
-      ->type_name("CHANNEL");
-}
-
-Expected<recording::LogSelection> selection_of(const LogOptions& options) {
-  recording::LogSelection selection = options.selection;
-  if (!options.mechanism.empty()) {
-    auto kind = mechanisms::parse_mechanism_kind(options.mechanism);
-    if (!kind) {
-      return tl::unexpected(std::move(kind).error().in("--mechanism"));
-    }
-    selection.mechanism = *kind;
+void add_field_options(CLI::App& command, study::JobKind job, std::vector<study::Override>& given) {
+  for (const study::FieldInfo& field : study::fields_of(job)) {
+    const std::string absent = field.absent.empty() ? "" : "; if absent: " + field.absent;
+    command
+        .add_option_function<std::string>(
+            field.option,
+            [&given, option = field.option](const std::string& text) {
+              given.push_back({option, text});
+            },
+            field.help + absent)
+        ->type_name(field.value)
+        ->group("[" + field.section + "]");
   }
-  return selection;
 }
 
 report::TerminalStyle terminal_style() {
@@ -121,12 +99,17 @@ void print(const std::string& text) {
   }
 }
 
-int fail(const Error& error, const CommonOptions& options, const std::string& schema) {
+int fail(const Errors& errors, const CommonOptions& options, const std::string& schema) {
   if (options.json) {
-    print(study::to_json(error, schema));
+    print(study::to_json(errors, schema));
   }
-  tell(error);
-  return exit_status(error);
+  for (const QuotedError& error : errors.all()) {
+    tell(error);
+    if (!error.excerpt.empty()) {
+      std::fprintf(stderr, "%s\n", error.excerpt.c_str());
+    }
+  }
+  return exit_status(errors);
 }
 
 void tell(const Error& error) {

@@ -3,12 +3,13 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
-#include <flyball/core/expected.hpp>
-#include <flyball/recording/load_recording.hpp>
+#include <flyball/core/errors.hpp>
 #include <flyball/report/terminal.hpp>
+#include <flyball/study/project.hpp>
 
 /// What every command of the program shares: where text goes and how it ends.
 namespace flyball::app {
@@ -23,7 +24,6 @@ struct CommonOptions {
   bool json = false;
   std::string out;
   std::string typed;  ///< The command line, for the report.
-  unsigned long long seed = 1;
 };
 
 /// The command line for a report: "flyball" and what was typed, quoted for a shell where it must
@@ -34,14 +34,8 @@ struct CommonOptions {
 /// Adds --json and --out. @param report  What --out writes, for the help.
 void add_common_options(CLI::App& command, CommonOptions& options, const std::string& report);
 
-/// What a person may say about a log.
-struct LogOptions {
-  std::string mechanism;
-  recording::LogSelection selection;
-};
-void add_log_options(CLI::App& command, LogOptions& options);
-/// @errors ArgumentError::unknown_name for the mechanism.
-[[nodiscard]] Expected<recording::LogSelection> selection_of(const LogOptions& options);
+/// Adds the options of a job's fields, by its table. @param given  What is typed goes there.
+void add_field_options(CLI::App& command, study::JobKind job, std::vector<study::Override>& given);
 
 /// Colours when standard output is a terminal and NO_COLOR is not set.
 [[nodiscard]] report::TerminalStyle terminal_style();
@@ -49,9 +43,9 @@ void add_log_options(CLI::App& command, LogOptions& options);
 /// Prints a result on standard output.
 void print(const std::string& text);
 
-/// Tells an error: its words on standard error and, with --json, an object on standard output.
-/// @return The exit status.
-int fail(const Error& error, const CommonOptions& options, const std::string& schema);
+/// Tells what is wrong: words on standard error and, with --json, an object on standard output.
+/// @return The exit status, of the first error.
+int fail(const Errors& errors, const CommonOptions& options, const std::string& schema);
 
 /// Where a report goes: --out, or `flyball-report` unless --json was asked for.
 [[nodiscard]] std::optional<std::string> report_folder(const CommonOptions& options,

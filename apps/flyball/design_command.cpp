@@ -1,13 +1,10 @@
 #include <memory>
-#include <string_view>
 
-#include <flyball/core/quantity.hpp>
 #include <flyball/study/project.hpp>
 
 #include "answer.hpp"
 #include "commands.hpp"
 #include "console.hpp"
-#include "design_options.hpp"
 
 namespace flyball::app {
 
@@ -17,42 +14,16 @@ constexpr const char* schema = "flyball.design/1";
 
 struct Options {
   CommonOptions common;
-  DesignOptions design;
   std::string project;
+  std::vector<study::Override> given;
 };
 
-Expected<double> option_quantity(const std::string& text, Dimension dimension, const char* option,
-                                 bool zero_allowed) {
-  auto value = parse_quantity(text, dimension, option);
-  if (value && !(*value > 0.0 || (zero_allowed && *value == 0.0))) {
-    return tl::unexpected(Error(ArgumentError::not_positive)
-                              .about(option)
-                              .got(text)
-                              .expected(zero_allowed ? "zero or greater" : "greater than zero"));
-  }
-  return value;
-}
-
 int run(const Options& options) {
-  auto project = study::read_project(options.project);
-  if (!project) {
-    const std::string_view path = options.project;
-    const bool log = path.ends_with(".json") || path.ends_with(".wpilog") || path.ends_with(".csv");
-    Error error = std::move(project).error();
-    if (log && error.is(study::ProjectError::syntax)) {
-      constexpr const char* mend =
-          "a log goes to `flyball tune`, a linear model to `flyball analyze`";
-      return fail(std::move(error).hint(mend), options.common, schema);
-    }
-    return fail(error, options.common, schema);
+  const auto job = study::design_job(options.project, options.given);
+  if (!job) {
+    return fail(job.error(), options.common, schema);
   }
-  if (project->plant_error) {
-    return fail(*project->plant_error, options.common, schema);
-  }
-  if (auto applied = apply(options.design, project->job); !applied) {
-    return fail(applied.error(), options.common, schema);
-  }
-  auto result = study::design(project->job);
+  const auto result = study::design(*job);
   if (!result) {
     return fail(result.error(), options.common, schema);
   }
@@ -60,44 +31,6 @@ int run(const Options& options) {
 }
 
 }  // namespace
-
-void add_design_options(CLI::App& command, DesignOptions& options) {
-  command.add_option("--period", options.period, "Period of the control loop, such as 20ms")
-      ->type_name("TIME");
-  command
-      .add_option("--delay", options.delay,
-                  "Delay from sensing to acting, such as 15ms (from the log if absent)")
-      ->type_name("TIME");
-  command.add_option("--max-voltage", options.max_voltage, "Largest voltage, such as 12V")
-      ->type_name("VOLTAGE");
-  command.add_option("--seed", options.seed, "Seed of the simulation's noise")->type_name("N");
-}
-
-Expected<void> apply(const DesignOptions& options, study::DesignJob& job) {
-  const auto set = [](const std::string& text, Dimension dimension, const char* option,
-                      auto&& assign, bool zero_allowed = false) -> Expected<void> {
-    if (text.empty()) {
-      return {};
-    }
-    return option_quantity(text, dimension, option, zero_allowed).map(assign);
-  };
-  if (auto period = set(options.period, Dimension::time, "--period",
-                        [&](double value) { job.controller.period = value; });
-      !period) {
-    return period;
-  }
-  if (auto delay = set(
-          options.delay, Dimension::time, "--delay",
-          [&](double value) { job.controller.delay = value; }, true);
-      !delay) {
-    return delay;
-  }
-  if (options.seed != 0) {
-    job.seed = options.seed;
-  }
-  return set(options.max_voltage, Dimension::voltage, "--max-voltage",
-             [&](double value) { job.controller.max_voltage = value; });
-}
 
 void add_design_command(CLI::App& program, Invocation& invocation) {
   CLI::App* command = program.add_subcommand(
@@ -118,9 +51,20 @@ void add_design_command(CLI::App& program, Invocation& invocation) {
   auto options = std::make_shared<Options>();
   options->common.typed = invocation.typed;
   command->add_option("PROJECT", options->project, "The project file")->required();
-  add_design_options(*command, options->design);
+  add_field_options(*command, study::JobKind::design, options->given);
   add_common_options(*command, options->common,
                      "Write the report into this folder (flyball-report if absent)");
+  const auto tell = [&](const char* option, std::string (*text)(), const char* help) {
+    command->add_flag_callback(
+        option,
+        [text] {
+          print(text());
+          throw CLI::Success();
+        },
+        help);
+  };
+  tell("--fields", &study::project_markdown, "Print all that a project file may say, and stop");
+  tell("--schema", &study::project_schema, "Print its JSON Schema, and stop");
   command->callback([options, &invocation] { invocation.status = run(*options); });
 }
 

@@ -12,16 +12,16 @@ constexpr const char* schema = "flyball.identify/1";
 
 struct Options {
   CommonOptions common;
-  LogOptions log;
   std::string path;
+  std::vector<study::Override> given;
 };
 
 int run(const Options& options) {
-  auto selection = selection_of(options.log);
-  if (!selection) {
-    return fail(selection.error(), options.common, schema);
+  const auto job = study::identify_job(options.path, options.given);
+  if (!job) {
+    return fail(job.error(), options.common, schema);
   }
-  auto result = study::identify({.log = options.path, .selection = *selection});
+  const auto result = study::identify(*job);
   if (!result) {
     return fail(result.error(), options.common, schema);
   }
@@ -40,7 +40,7 @@ void add_identify_command(CLI::App& program, Invocation& invocation) {
   auto options = std::make_shared<Options>();
   options->common.typed = invocation.typed;
   command->add_option("LOG", options->path, "The log")->required();
-  add_log_options(*command, options->log);
+  add_field_options(*command, study::JobKind::identify, options->given);
   add_common_options(*command, options->common, "Write the report into this folder");
   command->callback([options, &invocation] { invocation.status = run(*options); });
 }

@@ -6,7 +6,6 @@
 #include "answer.hpp"
 #include "commands.hpp"
 #include "console.hpp"
-#include "design_options.hpp"
 
 namespace flyball::app {
 
@@ -16,10 +15,9 @@ constexpr const char* schema = "flyball.tune/1";
 
 struct Options {
   CommonOptions common;
-  LogOptions log;
-  DesignOptions design;
   std::string path;
   std::string project;
+  std::vector<study::Override> given;
 };
 
 // The error that a tuning ended with, if it did.
@@ -31,27 +29,11 @@ const Error* refusal_of(const study::TuneResult& result) {
 }
 
 int run(const Options& options) {
-  study::TuneJob job;
-  job.identification.log = options.path;
-  auto selection = selection_of(options.log);
-  if (!selection) {
-    return fail(selection.error(), options.common, schema);
+  const auto job = study::tune_job(options.path, options.project, options.given);
+  if (!job) {
+    return fail(job.error(), options.common, schema);
   }
-  job.identification.selection = *selection;
-  if (!options.project.empty()) {
-    auto project = study::read_project(options.project);
-    if (!project) {
-      return fail(project.error(), options.common, schema);
-    }
-    job.design = project->job;
-    if (!job.identification.selection.mechanism) {
-      job.identification.selection.mechanism = project->mechanism;
-    }
-  }
-  if (auto applied = apply(options.design, job.design); !applied) {
-    return fail(applied.error(), options.common, schema);
-  }
-  auto result = study::tune(job);
+  auto result = study::tune(*job);
   if (!result) {
     return fail(result.error(), options.common, schema);
   }
@@ -66,14 +48,13 @@ void add_tune_command(CLI::App& program, Invocation& invocation) {
       "tune", "From a log to a proven controller: identify, design, simulate, report, C++");
   command->footer(
       "LOG is a SysId JSON, a WPILOG or a CSV with the four characterisation tests.\n"
-      "PROJECT.toml may set [controller], [estimator], [sensor], [battery], [profile], and the\n"
-      "motor in [mechanism] so that current and battery sag are simulated.");
+      "PROJECT.toml may set [log], [controller], [estimator], [sensor], [battery], [profile], and\n"
+      "the motor in [mechanism] so that current and battery sag are simulated.");
   auto options = std::make_shared<Options>();
   options->common.typed = invocation.typed;
   command->add_option("LOG", options->path, "The log")->required();
   command->add_option("PROJECT", options->project, "A project file (TOML)");
-  add_log_options(*command, options->log);
-  add_design_options(*command, options->design);
+  add_field_options(*command, study::JobKind::tune, options->given);
   add_common_options(*command, options->common,
                      "Write the report into this folder (flyball-report if absent)");
   command->callback([options, &invocation] { invocation.status = run(*options); });

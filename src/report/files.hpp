@@ -23,12 +23,4 @@ struct ReportFile {
 /// The step responses as CSV.
 [[nodiscard]] std::vector<ReportFile> data_files(const study::ModelAnalysis& result);
 
-/// The gains as a project file, intervals as comments; `flyball design` reads it. Without gains
-/// (a refused fit) empty.
-[[nodiscard]] std::string gains_toml(const study::IdentifyResult& result);
-/// The gains with the controller's options.
-/// @param fit  For the intervals; may be null.
-[[nodiscard]] std::string gains_toml(const study::DesignResult& result,
-                                     const identification::FeedforwardFit* fit);
-
 }  // namespace flyball::report

@@ -7,6 +7,7 @@
 #include <flyball/export/generated_header.hpp>
 #include <flyball/io/file.hpp>
 #include <flyball/study/design_exports.hpp>
+#include <flyball/study/project.hpp>
 #include <flyball/study/schema.hpp>
 #include <flyball/study/simulate_design.hpp>
 
@@ -72,7 +73,7 @@ Expected<void> write_identify_report(const study::IdentifyResult& result, const 
                                      const Provenance& provenance) {
   std::vector<ReportFile> files{{"result.json", study::to_json(result) + "\n"}};
   if (result.report.fit) {
-    files.push_back({"gains.toml", gains_toml(result)});
+    files.push_back({"gains.toml", study::gains_toml(result)});
   }
   append(files, data_files(result));
   return write(result, std::move(files), folder, provenance);
@@ -81,7 +82,7 @@ Expected<void> write_identify_report(const study::IdentifyResult& result, const 
 Expected<void> write_design_report(const study::DesignResult& result, const std::string& folder,
                                    const Provenance& provenance) {
   std::vector<ReportFile> files{{"result.json", study::to_json(result) + "\n"},
-                                {"gains.toml", gains_toml(result, nullptr)}};
+                                {"gains.toml", study::gains_toml(result, nullptr)}};
   FLYBALL_CHECK(add_design_files(files, result, ""));
   return write(result, std::move(files), folder, provenance);
 }
@@ -94,13 +95,13 @@ Expected<void> write_tune_report(const study::TuneResult& result, const std::str
   const bool designed = result.design && result.design->has_value();
   if (designed) {
     files.push_back({"gains.toml",
-                     gains_toml(**result.design, fitted ? &*identification.report.fit : nullptr)});
+                     study::gains_toml(**result.design, fitted ? &*identification.report.fit : nullptr)});
     FLYBALL_CHECK(add_design_files(files, **result.design,
                                    fitted && !identification.report.fit->kA.determined
                                        ? identification.report.fit->kA.reason
                                        : ""));
   } else if (fitted) {
-    files.push_back({"gains.toml", gains_toml(identification)});
+    files.push_back({"gains.toml", study::gains_toml(identification)});
   }
   append(files, data_files(identification));
   return write(result, std::move(files), folder, provenance);

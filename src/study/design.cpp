@@ -8,11 +8,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <flyball/study/project.hpp>
 #include <flyball/study/simulate_design.hpp>
 
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "study/design_steps.hpp"
+#include "study/field.hpp"
 
 namespace flyball::study {
 
@@ -21,24 +23,6 @@ namespace {
 using mechanisms::MechanismKind;
 
 constexpr std::string_view where = "design";
-
-Expected<void> check_job(const DesignJob& job) {
-  const mechanisms::FeedforwardGains& gains = job.plant.gains;
-  const ControllerOptions& controller = job.controller;
-  FLYBALL_CHECK(Checks(where)
-                    .positive(gains.kV, "kV")
-                    .not_negative(gains.kS, "kS", "V")
-                    .finite(gains.kG, "kG")
-                    .finite(gains.angle_offset, "angle_offset")
-                    .positive(controller.period, "period", "s")
-                    .positive(controller.input_tolerance, "input_tolerance", "V")
-                    .positive(controller.max_voltage, "max_voltage", "V")
-                    .not_negative(controller.delay.value_or(0.0), "delay", "s")
-                    .not_negative(job.sensor.resolution, "resolution", job.plant.unit)
-                    .positive(job.battery.open_circuit_voltage, "open_circuit_voltage", "V")
-                    .not_negative(job.battery.resistance, "battery resistance", "Ohm"));
-  return job.plant.kA_determined ? check_positive(gains.kA, where, "kA") : Expected<void>{};
-}
 
 void fill_defaults(DesignJob& job, std::vector<Diagnostic>& diagnostics) {
   if (!job.controller.delay) {
@@ -152,7 +136,7 @@ ErrorInfo error_info(DesignError code) {
 }
 
 Expected<DesignResult> design(const DesignJob& requested) {
-  FLYBALL_CHECK(check_job(requested));
+  FLYBALL_CHECK(check_ranges(project_of(requested), where));
   DesignResult result;
   result.job = requested;
   DesignJob& job = result.job;

@@ -140,7 +140,8 @@ bool is_json(std::string_view text, std::string_view name) {
 
 }  // namespace
 
-Expected<ModelFile> parse_model(std::string_view text, const std::string& name) {
+ExpectedAll<ModelFile> parse_model(std::string_view text, const std::string& name,
+                                   std::span<const Override> overrides) {
   const bool blank = text.find_first_not_of(" \t\r\n") == std::string_view::npos;
   if (blank || is_binary(text)) {
     return tl::unexpected(Error(blank ? ArgumentError::empty : ArgumentError::malformed)
@@ -149,13 +150,19 @@ Expected<ModelFile> parse_model(std::string_view text, const std::string& name) 
                               .got(blank ? "empty" : "binary")
                               .expected("a JSON object with A and B, or a project file (TOML)"));
   }
-  if (is_json(text, name)) {
-    return parse_matrices(text, name);
+  if (!is_json(text, name)) {
+    return parse_project(text, name, overrides).and_then(&model_of);
   }
-  return parse_project(text, name).and_then(&model_of);
+  if (!overrides.empty()) {
+    return tl::unexpected(Error(ArgumentError::unknown_name)
+                              .about(overrides.front().option)
+                              .got("given with matrices")
+                              .hint("it is for a project file"));
+  }
+  return parse_matrices(text, name);
 }
 
-Expected<ModelFile> model_of(const Project& project) {
+ExpectedAll<ModelFile> model_of(const Project& project) {
   if (project.plant_error) {
     return tl::unexpected(*project.plant_error);
   }
@@ -184,10 +191,10 @@ Expected<ModelFile> model_of(const Project& project) {
   return model;
 }
 
-Expected<ModelFile> read_model(const std::string& path) {
+ExpectedAll<ModelFile> read_model(const std::string& path, std::span<const Override> overrides) {
   const bool standard_input = path == "-";
   FLYBALL_TRY(const auto text, read_file(standard_input ? "/dev/stdin" : path, largest_model));
-  return parse_model(text, standard_input ? "standard input" : path);
+  return parse_model(text, standard_input ? "standard input" : path, overrides);
 }
 
 }  // namespace flyball::study

@@ -218,8 +218,15 @@ std::string to_json(const TuneResult& result) {
   return dump(json);
 }
 
-std::string to_json(const Error& error, const std::string& schema) {
-  return dump({{"schema", schema}, {"error", json_of(error)}, {"diagnostics", Json::array()}});
+std::string to_json(const Errors& errors, const std::string& schema) {
+  Json json = {{"schema", schema}, {"error", json_of(errors)}};
+  if (errors.all().size() > 1) {
+    for (const QuotedError& error : errors.all()) {
+      json["errors"].push_back(json_of(error));
+    }
+  }
+  json["diagnostics"] = Json::array();
+  return dump(json);
 }
 
 }  // namespace flyball::study

@@ -187,6 +187,31 @@ TEST_F(BadInput, ProjectFiles) {
   expect("design project.toml", 2, "project.toml");
 }
 
+// All that is wrong, in one run; with --json as a list, too.
+TEST_F(BadInput, SeveralErrorsAtOnce) {
+  project(with(with(good_elevator, "gearing", "gearng"), "8 kg", "8 m"));
+  const Answer answer = run("design project.toml --period 0ms --json");
+  EXPECT_EQ(answer.status, 2);
+  EXPECT_EQ(
+      answer.err,
+      "flyball: --period is 0 s; it must be greater than zero\n"
+      "flyball: project.toml:5:1: mechanism.gearng is not a key of [mechanism]; did you mean "
+      "\"gearing\"?\n"
+      "    5 | gearng = 10.0\n"
+      "      | ^^^^^^\n"
+      "flyball: project.toml:6:1: mechanism.mass is \"8 m\", a length; it must be a mass such "
+      "as \"8 kg\" or \"18 lb\"\n"
+      "    6 | mass = \"8 m\"\n"
+      "      |        ^^^^^\n");
+  const Json json = Json::parse(answer.out);
+  EXPECT_EQ(json.at("error").at("code"), "not_positive");
+  ASSERT_EQ(json.at("errors").size(), 3U);
+  EXPECT_EQ(json.at("errors")[0], json.at("error"));
+  EXPECT_EQ(json.at("errors")[2].at("code"), "wrong_unit");
+  project("type = \"arm\"\n");
+  EXPECT_EQ(Json::parse(run("design project.toml --json").out).at("errors").size(), 5U);
+}
+
 TEST_F(BadInput, OptionsOfTheCommandLine) {
   project(good_elevator);
   expect("design project.toml --period 0ms", 2, "--period");
@@ -195,6 +220,13 @@ TEST_F(BadInput, OptionsOfTheCommandLine) {
   expect("design project.toml --max-voltage -3V", 2, "--max-voltage");
   expect("design project.toml --delay -3ms", 2, "--delay");
   expect("design project.toml --seed banana", 2, "--seed");
+  expect("design project.toml --state-tolerance 2cm", 2, "--state-tolerance is 1 values long");
+  expect("design project.toml --goal 2V", 2, "--goal is \"2V\", a voltage");
+  expect("analyze project.toml --mass 0kg", 2, "mass is 0 kg");
+  expect("analyze model.json --mass 1kg", 2, "model.json");
+  write("model.json", R"({"A":[[-1]],"B":[[1]]})");
+  expect("analyze model.json --mass 1kg", 2, "--mass is given with matrices");
+  expect("tune " + example("logs/elevator.json") + " --mechanism arm --mass 1", 2, "--mass");
   expect("identify " + example("logs/elevator.json") + " --mechanism turret", 2, "turret");
   expect("identify " + example("logs/elevator.json") + " --unit parsnips", 2, "parsnips");
   expect("identify " + example("logs/elevator.json") + " --scale 0", 2, "scale");

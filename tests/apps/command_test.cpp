@@ -29,6 +29,32 @@ TEST_F(Command, MistypedCommandsAndOptions) {
   EXPECT_EQ(run("tune log.json --perod 20ms").status, 2);
 }
 
+// The command's options are the fields of a project file.
+TEST_F(Command, OptionsStandInPlaceOfTheFile) {
+  const Answer help = run("design --help");
+  EXPECT_TRUE(holds(help.out, "[controller]")) << help.out;
+  EXPECT_TRUE(holds(help.out, "--max-voltage VOLTAGE")) << help.out;
+  EXPECT_TRUE(holds(help.out, "Period of the control loop; if absent: 20 ms")) << help.out;
+  const std::string design = "design " + example("elevator.toml") + " --json ";
+  const Answer answer = run(design + "--period 10ms --state-tolerance 1cm,0.5m/s --goal=-40cm");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  const Json json = Json::parse(answer.out);
+  EXPECT_EQ(json.at("period"), 0.01);
+  EXPECT_EQ(json.at("weights").at("Q")[0][0], 10000.0);
+  EXPECT_EQ(json.at("motion").at("goal"), -0.4);
+  EXPECT_NE(Json::parse(run(design + "--mass 4kg").out).at("feedforward"),
+            Json::parse(run(design).out).at("feedforward"));
+}
+
+TEST_F(Command, TellsWhatAProjectFileMaySay) {
+  const Answer fields = run("design --fields");
+  EXPECT_EQ(fields.status, 0) << fields.err;
+  EXPECT_TRUE(holds(fields.out, "| `max_voltage` |"));
+  const Answer schema = run("design --schema");
+  EXPECT_EQ(schema.status, 0) << schema.err;
+  EXPECT_TRUE(Json::parse(schema.out).at("properties").contains("controller"));
+}
+
 TEST_F(Command, IdentifyAnswersOneObject) {
   const Answer answer = run("identify " + example("logs/elevator.json") + " --json");
   ASSERT_EQ(answer.status, 0) << answer.err;

@@ -1,5 +1,7 @@
 #include <flyball/study/project.hpp>
 
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include <flyball/mechanisms/elevator.hpp>
@@ -85,6 +87,7 @@ TEST(Project, RefusesMeaninglessValues) {
   refused("\"NEO\"", "\"NE0\"", error_info(ArgumentError::unknown_name));
   refused("\"NEO\"", "\"Kraken\"", error_info(ArgumentError::ambiguous_name));
   refused("motor_count = 2", "motor_count = 0", error_info(ProjectError::wrong_value));
+  refused("motor_count = 2", "motor_count = 4294967297", error_info(ProjectError::wrong_value));
   refused("motor_count = 2", "motor_count = 1.5", error_info(ProjectError::wrong_type));
   refused("\"20 ms\"", "\"0 ms\"", error_info(ArgumentError::not_positive));
   refused("[\"2 cm\", \"0.4 m/s\"]", "[\"2 cm\"]", error_info(ArgumentError::wrong_shape));
@@ -93,12 +96,188 @@ TEST(Project, RefusesMeaninglessValues) {
   refused("[mechanism]", "[mechanism", error_info(ProjectError::syntax));
 }
 
-TEST(Project, SaysWhatIsMissingForAMechanism) {
-  const auto project = parse_project(replaced(elevator_text, "mass = \"8 kg\"\n", ""), "p.toml");
+std::vector<std::string> messages(const Errors& errors) {
+  std::vector<std::string> all;
+  for (const QuotedError& error : errors.all()) {
+    all.push_back(to_string(error));
+  }
+  return all;
+}
+
+TEST(Project, TellsEveryErrorOfAFileInItsOrder) {
+  const auto project = parse_project(R"([mechanism]
+type = "elevator"
+motor = "NEP"
+gearng = 10.0
+mass = "8 m"
+
+[mechanism.motors]
+[controler]
+period = "20 ms"
+[controller]
+period = "0 ms"
+state_tolerance = ["2 cm", "0.4 m"]
+delay = 10
+[profile]
+goal = true
+seed = "one"
+)",
+                                     "p.toml");
+  ASSERT_FALSE(project);
+  EXPECT_EQ(
+      messages(project.error()),
+      (std::vector<std::string>{
+          "p.toml:3:1: motor is \"NEP\", which is not in the table; did you mean "
+          "\"NEO\"?",
+          "p.toml:4:1: mechanism.gearng is not a key of [mechanism]; did you mean "
+          "\"gearing\"?",
+          "p.toml:5:1: mechanism.mass is \"8 m\", a length; it must be a mass such as \"8 "
+          "kg\" or \"18 lb\"",
+          "p.toml:7:12: mechanism.motors is not a key of [mechanism]; did you mean "
+          "\"motor\"?",
+          "p.toml:8:2: controler is not a section that is known; did you mean "
+          "\"controller\"?",
+          "p.toml:11:1: controller.period is 0 s; it must be greater than zero",
+          "p.toml:12:1: controller.state_tolerance is \"0.4 m\", a length; it must be a "
+          "velocity such as \"1.5 m/s\"",
+          "p.toml:13:1: controller.delay is 10, without a unit; it must be a text with number "
+          "and unit, such as \"10 s\"",
+          "p.toml:15:1: profile.goal is true; it must be a text with number and unit, such as "
+          "\"1 m\"",
+          "p.toml:16:1: profile.seed is \"one\"; it must be a whole number, 0 or greater"}));
+  // As an error it is the first of them.
+  EXPECT_EQ(to_string(project.error()), to_string(project.error().all().front()));
+  EXPECT_EQ(project.error().all()[2].excerpt, "    5 | mass = \"8 m\"\n      |        ^^^^^");
+  EXPECT_EQ(project.error().all()[1].excerpt, "    4 | gearng = 10.0\n      | ^^^^^^");
+}
+
+TEST(Project, ShowsALongLineAboutThePlaceAndNothingThatATerminalObeys) {
+  const std::string spaces(300, ' ');
+  const auto project =
+      parse_project("[mechanism]\ntype =" + spaces + "\"tür\u202e\" # \xe2\x82\xac \t and so on " +
+                        spaces + "x\n",
+                    "p.toml");
+  ASSERT_FALSE(project);
+  const std::string excerpt = project.error().all().front().excerpt;
+  EXPECT_LT(excerpt.size(), 260u) << excerpt;
+  EXPECT_NE(excerpt.find("\"tür"), std::string::npos) << excerpt;
+  EXPECT_NE(excerpt.find("^^^"), std::string::npos) << excerpt;
+  const auto bell = parse_project("[mechanism]\n\ttyp = 1 # \x1b[2J\n", "p.toml");
+  ASSERT_FALSE(bell);
+  EXPECT_EQ(bell.error().all().front().excerpt.find('\x1b'), std::string::npos);
+}
+
+TEST(Project, CountsTheErrorsThatItDoesNotTell) {
+  std::string text = "[mechanism]\ntype = \"arm\"\n";
+  for (int i = 0; i < 100; ++i) {
+    text += "key_" + std::to_string(i) + " = 1\n";
+  }
+  const auto project = parse_project(text, "p.toml");
+  ASSERT_FALSE(project);
+  ASSERT_EQ(project.error().all().size(), 21u);
+  EXPECT_EQ(to_string(project.error().all().back()), "p.toml: there are more errors (number = 80)");
+}
+
+TEST(Project, SaysEverythingThatIsMissingForAMechanism) {
+  std::string text = replaced(elevator_text, "mass = \"8 kg\"\n", "");
+  text = replaced(text, "gearing = 10.0            # motor turns per drum turn\n", "");
+  const auto project = parse_project(text, "p.toml");
   ASSERT_TRUE(project) << to_string(project.error());
   ASSERT_TRUE(project->plant_error);
   EXPECT_TRUE(project->plant_error->is(ProjectError::missing_key));
-  EXPECT_NE(to_string(*project->plant_error).find("mechanism.mass is missing"), std::string::npos);
+  EXPECT_EQ(messages(*project->plant_error),
+            (std::vector<std::string>{
+                "p.toml:1:1: mechanism.gearing is missing; an elevator needs it, for example "
+                "gearing = 10.0",
+                "p.toml:1:1: mechanism.mass is missing; an elevator needs it, for example mass = "
+                "\"8 kg\""}));
+}
+
+TEST(Project, OptionsStandInPlaceOfTheFile) {
+  const std::vector<Override> given{
+      {"--period", "5ms"},    {"--state-tolerance", "1cm, 0.5 m/s"}, {"--mass", "10 lb"},
+      {"--motor-count", "3"}, {"--battery-resistance", "15 mOhm"},   {"--goal", "40 cm"},
+      {"--seed", "7"}};
+  const auto project = parse_project(elevator_text, "p.toml", given);
+  ASSERT_TRUE(project) << to_string(project.error());
+  EXPECT_EQ(project->job.controller.period, 0.005);
+  EXPECT_EQ(project->job.controller.state_tolerance, (std::vector<double>{0.01, 0.5}));
+  EXPECT_EQ(project->parts.mass, Mass(10 * 0.45359237));
+  EXPECT_EQ(project->job.plant.motor->count, 3);
+  EXPECT_EQ(project->job.battery.resistance, 0.015);
+  EXPECT_EQ(project->job.profile.goal, 0.4);
+  EXPECT_EQ(project->job.seed, 7u);
+}
+
+TEST(Project, AWrongOptionIsNamed) {
+  const std::vector<Override> given{{"--period", "0ms"},
+                                    {"--delay", "20"},
+                                    {"--seed", "banana"},
+                                    {"--motor", "NEP"},
+                                    {"--state-tolerance", "1cm"}};
+  const auto project = parse_project(replaced(elevator_text, "8 kg", "8 m"), "p.toml", given);
+  ASSERT_FALSE(project);
+  EXPECT_EQ(messages(project.error()),
+            (std::vector<std::string>{
+                "--motor: motor is \"NEP\", which is not in the table; did you mean "
+                "\"NEO\"?",
+                "--period is 0 s; it must be greater than zero",
+                "--state-tolerance is 1 values long; it must be one value a state (2)",
+                "--delay is \"20\", without a unit; it must be a time such as \"20 ms\"",
+                "--seed is \"banana\"; it must be a whole number, 0 or greater",
+                "p.toml:6:1: mechanism.mass is \"8 m\", a length; it must be a mass such as \"8 "
+                "kg\" or \"18 lb\""}));
+}
+
+TEST(Project, AJobWithoutAFileTakesItsOptions) {
+  const std::vector<Override> given{
+      {"--mechanism", "arm"}, {"--unit", "rotations"}, {"--state-tolerance", "2deg,1rad/s"}};
+  const auto job = tune_job("arm.json", "", given);
+  ASSERT_TRUE(job) << to_string(job.error());
+  EXPECT_EQ(job->identification.log, "arm.json");
+  EXPECT_EQ(job->identification.selection.mechanism, mechanisms::MechanismKind::arm);
+  EXPECT_EQ(job->identification.selection.unit, "rotations");
+  EXPECT_EQ(job->design.controller.state_tolerance.size(), 2u);
+  // What no log says.
+  const auto motor =
+      tune_job("arm.json", "", std::vector<Override>{{"--motor", "NEO"}, {"--gearing", "50"}});
+  ASSERT_TRUE(motor) << to_string(motor.error());
+  EXPECT_EQ(motor->design.plant.motor->name, "NEO");
+  EXPECT_EQ(motor->design.plant.gearing, 50.0);
+  // Which unit is right, only the mechanism says.
+  const auto unknown = tune_job("arm.json", "", std::span(given).last(1));
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(to_string(unknown.error()),
+            "--state-tolerance is in a unit that the mechanism decides, which is not known; say "
+            "which with --mechanism");
+  const auto turret = identify_job("a.json", std::vector<Override>{{"--mechanism", "turret"}});
+  ASSERT_FALSE(turret);
+  EXPECT_EQ(turret.error().where(), "--mechanism");
+}
+
+TEST(Project, TheLogIsOfTheMechanismOfTheFile) {
+  const std::string text = std::string(elevator_text) + "[log]\nscale = 0.5\n";
+  const auto same =
+      parse_project(text, "p.toml", std::vector<Override>{{"--mechanism", "Elevator"}});
+  ASSERT_TRUE(same) << to_string(same.error());
+  EXPECT_EQ(same->log.scale, 0.5);
+  const auto other = parse_project(text, "p.toml", std::vector<Override>{{"--mechanism", "arm"}});
+  ASSERT_FALSE(other);
+  EXPECT_EQ(to_string(other.error()),
+            "--mechanism is arm; it must be the type in [mechanism], elevator");
+}
+
+TEST(Project, AGainThatIsKnownStandsBesideTheParts) {
+  const auto project = parse_project(std::string(elevator_text) + "[gains]\nkS = 0.3\n", "p.toml");
+  ASSERT_TRUE(project) << to_string(project.error());
+  const auto model = mechanisms::elevator({.motor = mechanisms::neo(2),
+                                           .gearing = 10.0,
+                                           .mass = Mass(8.0),
+                                           .drum_radius = Length(0.0254)});
+  EXPECT_FALSE(project->plant_error);
+  EXPECT_EQ(project->job.plant.gains.kS, 0.3);
+  EXPECT_EQ(project->job.plant.gains.kV, model->gains.kV);
+  EXPECT_TRUE(project->job.plant.kA_determined);
 }
 
 TEST(Project, TakesACustomMotorByItsFiveNumbers) {
@@ -150,6 +329,7 @@ TEST(Project, AFileWithoutAMechanismIsRefused) {
   const auto project = parse_project("", "empty.toml");
   ASSERT_FALSE(project);
   EXPECT_TRUE(project.error().is(ProjectError::missing_key));
+  EXPECT_FALSE(parse_project("", "empty.toml", std::vector<Override>{{"--mass", "3 kg"}}));
 }
 
 }  // namespace

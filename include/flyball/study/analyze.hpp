@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -37,16 +38,19 @@ struct ModelFile {
 /// project file (TOML) of a mechanism: its linear model with the voltage as input, and the
 /// controller's period as T.
 /// @param name  What the text is called in messages; one that ends in .json or .toml decides.
+/// @param overrides  Of a project file's values.
 /// @errors ArgumentError for text that is no such object, unknown fields, shapes and entries;
 ///         ProjectError and those of `parse_project` for a project, also for one that does not say
 ///         what its mechanism is made of.
-[[nodiscard]] Expected<ModelFile> parse_model(std::string_view text, const std::string& name);
+[[nodiscard]] ExpectedAll<ModelFile> parse_model(std::string_view text, const std::string& name,
+                                                 std::span<const Override> overrides = {});
 
 /// The model of a project's mechanism. @errors Project::plant_error; those of the mechanism.
-[[nodiscard]] Expected<ModelFile> model_of(const Project& project);
+[[nodiscard]] ExpectedAll<ModelFile> model_of(const Project& project);
 
 /// Reads a model. @param path  "-" is standard input. @errors FileError, and as `parse_model`.
-[[nodiscard]] Expected<ModelFile> read_model(const std::string& path);
+[[nodiscard]] ExpectedAll<ModelFile> read_model(const std::string& path,
+                                                std::span<const Override> overrides = {});
 
 /// A continuous system as a loop of a certain period meets it.
 struct SampledAnalysis : StructureAnalysis {

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include <flyball/core/errors.hpp>
 #include <flyball/study/analyze.hpp>
 #include <flyball/study/design.hpp>
 #include <flyball/study/identify.hpp>
@@ -17,7 +18,8 @@ namespace flyball::study {
 [[nodiscard]] std::string to_json(const TuneResult& result);
 /// Schema "flyball.analyze/1".
 [[nodiscard]] std::string to_json(const ModelAnalysis& analysis);
-/// A refusal: {"schema": …, "error": {"code", "message", …evidence}, "diagnostics": […]}.
-[[nodiscard]] std::string to_json(const Error& error, const std::string& schema);
+/// A refusal: {"schema": …, "error": {"code", "message", …evidence}, "diagnostics": […]}, and
+/// `errors` with all of them where there are several.
+[[nodiscard]] std::string to_json(const Errors& errors, const std::string& schema);
 
 }  // namespace flyball::study

@@ -1,0 +1,142 @@
+// Results as project files.
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/core/version.hpp>
+#include <flyball/study/project.hpp>
+
+namespace flyball::study {
+
+namespace {
+
+using identification::FeedforwardFit;
+using identification::GainEstimate;
+using mechanisms::MechanismKind;
+
+const std::string& heading() {
+  static const std::string text = fmt::format(
+      "A Flyball {} project: `flyball design` reads this file as it is.\n"
+      "Gains in V, V·s/unit and V·s²/unit with the unit of the mechanism (m or rad).",
+      version);
+  return text;
+}
+
+/// The plant's gains, and the parts that a loop around known gains still needs.
+void describe(const PlantDescription& plant, Project& project) {
+  const mechanisms::FeedforwardGains& gains = plant.gains;
+  project.parts.type = plant.kind;
+  project.gains.kS = gains.kS;
+  project.gains.kV = gains.kV;
+  if (plant.kA_determined) {
+    project.gains.kA = gains.kA;
+  }
+  if (plant.kind != MechanismKind::flywheel) {
+    project.gains.kG = gains.kG;
+  }
+  if (plant.kind == MechanismKind::arm) {
+    project.gains.angle_offset = Angle(gains.angle_offset);
+  }
+  if (!plant.motor) {
+    return;
+  }
+  const mechanisms::DcMotor& motor = *plant.motor;
+  const auto known = mechanisms::motor(motor.name, motor.count);
+  project.parts.motor_count = motor.count;
+  project.parts.gearing = plant.gearing;
+  if (plant.drum_radius > 0.0) {
+    project.parts.drum_radius = Length(plant.drum_radius);
+  }
+  if (known && known->R == motor.R && known->Kt == motor.Kt && known->Kv == motor.Kv) {
+    project.parts.motor = motor.name;
+  } else {
+    project.parts.custom_motor =
+        CustomMotor{.nominal_voltage = Voltage(motor.nominal_voltage),
+                    .stall_torque = Torque(motor.stall_torque / motor.count),
+                    .stall_current = Current(motor.stall_current / motor.count),
+                    .free_current = Current(motor.free_current / motor.count),
+                    .free_speed = AngularVelocity(motor.free_speed)};
+  }
+}
+
+std::string one_line(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(),
+      [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, ' ');
+  return text;
+}
+
+std::vector<KeyComment> comments(const PlantDescription& plant, const FeedforwardFit* fit) {
+  const auto within = [](const GainEstimate* gain) {
+    return gain == nullptr || !gain->determined
+               ? std::string()
+               : fmt::format(", 95 % within {} to {}", format_number(gain->interval[0], 5),
+                             format_number(gain->interval[1], 5));
+  };
+  const auto of = [&](const GainEstimate FeedforwardFit::* gain) {
+    return within(fit == nullptr ? nullptr : &(fit->*gain));
+  };
+  const auto of_some = [&](const std::optional<GainEstimate> FeedforwardFit::* gain) {
+    return within(fit == nullptr || !(fit->*gain) ? nullptr : &*(fit->*gain));
+  };
+  const std::string kA =
+      plant.kA_determined
+          ? fmt::format("V·s²/{}{}", plant.unit, of(&FeedforwardFit::kA))
+          : fmt::format(
+                "is not determined, below {} V·s²/{}{}", format_number(plant.kA_upper_bound),
+                plant.unit,
+                fit != nullptr && !fit->kA.reason.empty() ? ": " + one_line(fit->kA.reason) : "");
+  return {{"gains.kS", "V" + of(&FeedforwardFit::kS)},
+          {"gains.kV", fmt::format("V·s/{}{}", plant.unit, of(&FeedforwardFit::kV))},
+          {"gains.kA", kA},
+          {"gains.kG", "V" + of_some(&FeedforwardFit::kG)},
+          {"gains.angle_offset", "true angle from horizontal less the measured one" +
+                                     of_some(&FeedforwardFit::angle_offset)}};
+}
+
+}  // namespace
+
+Project project_of(const DesignJob& job) {
+  Project project;
+  project.job = job;
+  describe(job.plant, project);
+  return project;
+}
+
+std::string gains_toml(const IdentifyResult& result) {
+  if (!result.report.fit) {
+    return "";
+  }
+  const FeedforwardFit& fit = *result.report.fit;
+  PlantDescription plant = plant_from_fit(fit);
+  // Gains as they were found, also those that a design would take for zero.
+  plant.gains.kS = fit.kS.value;
+  plant.gains.kG = fit.kG ? fit.kG->value : 0.0;
+  plant.gains.angle_offset = fit.angle_offset ? fit.angle_offset->value : 0.0;
+  Project project;
+  describe(plant, project);
+  constexpr std::array<std::string_view, 2> sections{"mechanism", "gains"};
+  return write_project(project, heading(), sections, comments(plant, &fit));
+}
+
+std::string gains_toml(const DesignResult& result, const FeedforwardFit* fit) {
+  Project project = project_of(result.job);
+  DesignJob& job = project.job;
+  std::vector<KeyComment> beside = comments(job.plant, fit);
+  std::vector<double>& tolerances = job.controller.state_tolerance;
+  if (result.velocity_servo && job.plant.kind != MechanismKind::flywheel &&
+      tolerances.size() == 1) {
+    // A project gives a position and a velocity; the plant without kA has the first alone.
+    tolerances.push_back(job.plant.nominal_voltage / job.plant.gains.kV);
+    beside.push_back({"controller.state_tolerance", "without kA the velocity's is not used"});
+  }
+  if (result.velocity_servo) {
+    job.estimator.model_std.clear();
+  }
+  job.profile.goal = result.motion.goal;
+  return write_project(project, heading(), {}, beside);
+}
+
+}  // namespace flyball::study

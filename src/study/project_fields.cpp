@@ -1,0 +1,224 @@
+// The project file, row by row.
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+
+#include <flyball/study/project.hpp>
+
+#include "study/field.hpp"
+#include "study/mechanism_parts.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+using enum Dimension;
+using enum Range;
+using Of = FieldDimension;
+using recording::LogSelection;
+
+Expected<void> check_kind(const std::string& text) {
+  return mechanisms::parse_mechanism_kind(text).map([](auto) {});
+}
+
+Expected<void> check_motor(const std::string& text) {
+  return mechanisms::motor(text).map([](const auto&) {});
+}
+
+constexpr std::string_view kinds = "elevator, arm, flywheel";
+
+constexpr std::array mechanism_fields{
+    text("type", at<&MechanismParts::type>(), "\"elevator\"", "What it is")
+        .one_of(kinds)
+        .checked(check_kind)
+        .must()
+        .no_option(),
+    text("motor", at<&MechanismParts::motor>(), "\"NEO\"",
+         "A motor's name, see `flyball motors`, or a table of datasheet numbers")
+        .checked(check_motor)
+        .takes("NAME"),
+    whole("motor_count", at<&MechanismParts::motor_count>(), 1, 100, "2",
+          "Identical motors in one gearbox"),
+    quantity("gearing", at<&MechanismParts::gearing>(), dimensionless, positive, "10.0",
+             "Motor turns per output turn, > 1 is a reduction"),
+    quantity("mass", at<&MechanismParts::mass>(), mass, not_negative, "\"8 kg\"",
+             "What gravity pulls"),
+    quantity("drum_radius", at<&MechanismParts::drum_radius>(), length, positive, "\"1 in\"",
+             "Radius at which the drum moves the carriage"),
+    quantity("moment_of_inertia", at<&MechanismParts::moment_of_inertia>(), moment_of_inertia,
+             positive, "\"0.003 kg m^2\"", "Inertia at the output, about its axis")
+        .takes("INERTIA"),
+    quantity("center_of_mass", at<&MechanismParts::center_of_mass>(), length, not_negative,
+             "\"0.4 m\"", "Distance of the centre of mass from the joint")};
+
+constexpr std::array motor_fields{
+    quantity("nominal_voltage", at<&CustomMotor::nominal_voltage>(), voltage, positive, "\"12 V\"",
+             "Voltage at which the others were measured")
+        .no_option(),
+    quantity("stall_torque", at<&CustomMotor::stall_torque>(), torque, positive, "\"2.6 N m\"",
+             "Torque of one motor that is held still")
+        .must()
+        .no_option(),
+    quantity("stall_current", at<&CustomMotor::stall_current>(), current, positive, "\"105 A\"",
+             "Current of one motor that is held still")
+        .must()
+        .no_option(),
+    quantity("free_current", at<&CustomMotor::free_current>(), current, not_negative, "\"1.8 A\"",
+             "Current of one motor without load")
+        .must()
+        .no_option(),
+    quantity("free_speed", at<&CustomMotor::free_speed>(), angular_velocity, positive,
+             "\"5676 rpm\"", "Speed without load")
+        .must()
+        .no_option()};
+
+constexpr std::array gains_fields{
+    quantity("kS", at<&KnownGains::kS>(), dimensionless, not_negative, "0.1",
+             "Against static friction, in V")
+        .without("none"),
+    quantity("kV", at<&KnownGains::kV>(), dimensionless, positive, "1.2",
+             "To hold a velocity, in V·s per rad or m")
+        .without("of the parts"),
+    quantity("kA", at<&KnownGains::kA>(), dimensionless, positive, "0.15",
+             "To hold an acceleration, in V·s² per rad or m")
+        .without("not known if kV is given, else of the parts"),
+    quantity("kG", at<&KnownGains::kG>(), dimensionless, any, "0.65",
+             "To hold against gravity, in V (an arm: when horizontal)")
+        .without("none if kV is given, else of the parts"),
+    quantity("angle_offset", at<&KnownGains::angle_offset>(), angle, any, "\"10 deg\"",
+             "Of an arm: its true angle from horizontal where the sensor reads zero")
+        .without("none")};
+
+constexpr std::array log_fields{
+    text("mechanism", at<&LogSelection::mechanism>(), "\"arm\"", "What the log is of")
+        .one_of(kinds)
+        .checked(check_kind)
+        .without("the type in [mechanism], else what the log says")
+        .takes("KIND"),
+    text("unit", at<&LogSelection::unit>(), "\"rotations\"",
+         "Unit of the recorded position: rotations, rad, deg, m, in, …")
+        .without("what the log says")
+        .takes("UNIT"),
+    quantity("scale", at<&LogSelection::scale>(), dimensionless, any, "0.1",
+             "Multiplies recorded positions and velocities; 1/gearing for a motor's encoder, "
+             "metres per rotation for an elevator recorded in rotations")
+        .takes("NUMBER"),
+    text("state", at<&LogSelection::state_channel>(), "\"/SysIdState\"",
+         "Channel that names the running test")
+        .without("found by its values")
+        .takes("CHANNEL"),
+    text("voltage", at<&LogSelection::voltage_channel>(), "\"/Arm/AppliedVolts\"",
+         "Channel of the applied voltage")
+        .without("found by its name")
+        .takes("CHANNEL"),
+    text("position", at<&LogSelection::position_channel>(), "\"/Arm/Position\"",
+         "Channel of the position")
+        .without("found by its name")
+        .takes("CHANNEL"),
+    text("velocity", at<&LogSelection::velocity_channel>(), "\"/Arm/Velocity\"",
+         "Channel of the velocity")
+        .without("found by its name")
+        .takes("CHANNEL")};
+
+constexpr std::array controller_fields{
+    quantity("period", at<&ControllerOptions::period>(), time, positive, "\"20 ms\"",
+             "Period of the control loop"),
+    list("state_tolerance", at<&ControllerOptions::state_tolerance>(), Of::states, positive,
+         "[\"2 cm\", \"0.4 m/s\"]", "Largest acceptable error of each state (Bryson's rule)")
+        .without("as tight as leaves a gain margin of 2, a phase margin of 45° and ±20 % of "
+                 "inertia and gain"),
+    quantity("input_tolerance", at<&ControllerOptions::input_tolerance>(), voltage, positive,
+             "\"12 V\"", "Largest acceptable voltage (Bryson's rule)"),
+    quantity("max_voltage", at<&ControllerOptions::max_voltage>(), voltage, positive, "\"12 V\"",
+             "Limit of the voltage"),
+    quantity("delay", at<&ControllerOptions::delay>(), time, not_negative, "\"10 ms\"",
+             "Delay from sensing to acting")
+        .without("what the log shows, else none")};
+
+constexpr std::array estimator_fields{
+    quantity("measurement_std", at<&EstimatorOptions::measurement_std>(), Of::output, positive,
+             "\"0.5 mm\"", "Standard deviation of one reading")
+        .without("what the log shows, else from the resolution"),
+    list("model_std", at<&EstimatorOptions::model_std>(), Of::states, not_negative,
+         "[\"0.1 mm\", \"0.02 m/s\"]", "Standard deviation, per sample, by which each state errs")
+        .without("a voltage that errs by 0.5 V")};
+
+constexpr std::array sensor_fields{quantity("resolution", at<&SensorOptions::resolution>(),
+                                            Of::output, not_negative, "\"0.1 mm\"",
+                                            "Smallest step of a reading")
+                                       .without("what the log shows, else none")};
+
+constexpr std::array battery_fields{
+    quantity("open_circuit_voltage", at<&BatteryOptions::open_circuit_voltage>(), voltage, positive,
+             "\"12.5 V\"", "Voltage of the battery without load"),
+    quantity("resistance", at<&BatteryOptions::resistance>(), resistance, not_negative,
+             "\"20 mOhm\"", "Resistance of the battery and its wires")
+        .called("battery-resistance")};
+
+// The goal and the limits are the profile's, the seed is the job's.
+constexpr std::array profile_fields{
+    quantity("goal", at<&DesignJob::profile, &ProfileOptions::goal>(), Of::output, any, "\"0.8 m\"",
+             "Where the simulated motion ends")
+        .without("1 m, 90°, or three quarters of top speed"),
+    quantity("max_velocity", at<&DesignJob::profile, &ProfileOptions::max_velocity>(), Of::rate,
+             positive, "\"1.5 m/s\"", "Limit of the trapezoid's velocity")
+        .without("the fastest that the motor can follow"),
+    quantity("max_acceleration", at<&DesignJob::profile, &ProfileOptions::max_acceleration>(),
+             Of::acceleration, positive, "\"4 m/s^2\"", "Limit of the trapezoid's acceleration")
+        .without("the fastest that the motor can follow"),
+    whole("seed", at<&DesignJob::seed>(), 0, largest_whole, "1", "Seed of the simulation's noise")};
+
+constexpr std::array sections{
+    Section{"mechanism", mechanism_fields, &within<&Project::parts>,
+            "What the mechanism is, and the parts it is made of.", "every mechanism"},
+    Section{"mechanism.motor", motor_fields,
+            &within<&Project::parts, &MechanismParts::custom_motor>,
+            "In place of a motor's name, its numbers.", "a custom motor"},
+    Section{"gains", gains_fields, &within<&Project::gains>,
+            "Feedforward gains that are known, in place of those that follow from the parts. With "
+            "kV no part is needed."},
+    Section{"log", log_fields, &within<&Project::log>,
+            "What `flyball identify` and `flyball tune` cannot find out from the log."},
+    Section{"controller", controller_fields, &within<&Project::job, &DesignJob::controller>,
+            "What the loop has to do."},
+    Section{"estimator", estimator_fields, &within<&Project::job, &DesignJob::estimator>,
+            "How far the sensor and the model are trusted."},
+    Section{"sensor", sensor_fields, &within<&Project::job, &DesignJob::sensor>,
+            "The sensor of the simulation."},
+    Section{"battery", battery_fields, &within<&Project::job, &DesignJob::battery>,
+            "The battery whose voltage sags in the simulation; needs a motor."},
+    Section{"profile", profile_fields, &within<&Project::job>, "The motion that is simulated."}};
+
+std::optional<SignalDimensions> signals(const void* document) {
+  const auto& project = *static_cast<const Project*>(document);
+  const auto kind = project.parts.type ? project.parts.type : project.log.mechanism;
+  return kind ? std::optional(mechanism_row(*kind).signals) : std::nullopt;
+}
+
+}  // namespace
+
+const Document& project_document() {
+  static constexpr Document document{sections, &signals};
+  return document;
+}
+
+const Section& section_of(std::string_view name) {
+  return *std::find_if(sections.begin(), sections.end(),
+                       [&](const Section& section) { return section.name == name; });
+}
+
+std::string name_of(std::string_view section, std::string_view key) {
+  return section.empty() ? std::string(key) : fmt::format("{}.{}", section, key);
+}
+
+std::string option_of(const Field& field) {
+  if (field.option == "-") {
+    return "";
+  }
+  std::string option = "--" + std::string(field.option.empty() ? field.key : field.option);
+  std::replace(option.begin(), option.end(), '_', '-');
+  return option;
+}
+
+}  // namespace flyball::study

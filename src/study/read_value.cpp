@@ -1,0 +1,223 @@
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/study/project.hpp>
+
+#include "core/try.hpp"
+#include "study/read_value.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+/// What a node is, for a sentence: "… is a list".
+std::string description(const toml::node& node) {
+  switch (node.type()) {
+    case toml::node_type::string:
+      return fmt::format("\"{}\"", *node.value<std::string_view>());
+    case toml::node_type::integer:
+    case toml::node_type::floating_point:
+      return fmt::format("{}", *node.value<double>());
+    case toml::node_type::boolean:
+      return *node.value<bool>() ? "true" : "false";
+    case toml::node_type::array:
+      return "a list";
+    case toml::node_type::table:
+      return "a table";
+    default:
+      return "a date or time";
+  }
+}
+
+tl::unexpected<Error> wrong_type(const toml::node& node, const std::string& name,
+                                 std::string expected) {
+  return tl::unexpected(Error(ProjectError::wrong_type)
+                            .about(name)
+                            .got(description(node))
+                            .expected(std::move(expected)));
+}
+
+Expected<double> in_range(double value, Range range, Dimension dimension, const std::string& name) {
+  if (!std::isfinite(value)) {
+    return tl::unexpected(Error(ArgumentError::not_finite)
+                              .about(name)
+                              .got(format_number(value))
+                              .expected("a finite number"));
+  }
+  if (range == Range::any || value > 0.0 || (range == Range::not_negative && value == 0.0)) {
+    return value;
+  }
+  const bool zero = range == Range::not_negative;
+  return tl::unexpected(Error(zero ? ArgumentError::out_of_range : ArgumentError::not_positive)
+                            .about(name)
+                            .got(to_text(value, dimension))
+                            .expected(zero ? "zero or greater" : "greater than zero"));
+}
+
+Expected<double> quantity(const toml::node& node, Range range, Dimension dimension,
+                          const std::string& name) {
+  const auto number = node.value_exact<double>();
+  const auto whole = node.value_exact<long long>();
+  if (node.is_string()) {
+    FLYBALL_TRY(const double value,
+                parse_quantity(*node.value<std::string_view>(), dimension, name));
+    return in_range(value, range, dimension, name);
+  }
+  if (dimension == Dimension::dimensionless) {
+    return number || whole ? in_range(*node.value<double>(), range, dimension, name)
+                           : wrong_type(node, name, "a plain number");
+  }
+  const std::string unit(si_unit(dimension));
+  if (number || whole) {
+    return tl::unexpected(
+        Error(ArgumentError::wrong_unit)
+            .about(name)
+            .got(description(node) + ", without a unit")
+            .expected(fmt::format("a text with number and unit, such as \"{} {}\"",
+                                  description(node), unit)));
+  }
+  return wrong_type(node, name, fmt::format("a text with number and unit, such as \"1 {}\"", unit));
+}
+
+Expected<FieldValue> list(const toml::node& node, Range range,
+                          std::span<const Dimension> dimensions, const std::string& name) {
+  const toml::array* array = node.as_array();
+  if (array == nullptr && dimensions.size() != 1) {
+    return wrong_type(node, name,
+                      fmt::format("a list of {} texts, one a state", dimensions.size()));
+  }
+  if (array != nullptr && array->size() != dimensions.size()) {
+    return tl::unexpected(Error(ArgumentError::wrong_shape)
+                              .about(name)
+                              .got(fmt::format("{} values long", array->size()))
+                              .expected(fmt::format("one value a state ({})", dimensions.size())));
+  }
+  std::vector<double> values;
+  for (std::size_t i = 0; i < dimensions.size(); ++i) {
+    FLYBALL_TRY(const double value,
+                quantity(array != nullptr ? (*array)[i] : node, range, dimensions[i], name));
+    values.push_back(value);
+  }
+  return values;
+}
+
+std::optional<long long> whole_number(std::string_view text) {
+  long long value = 0;
+  const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return status == std::errc{} && end == text.data() + text.size() ? std::optional(value)
+                                                                   : std::nullopt;
+}
+
+}  // namespace
+
+Expected<FieldValue> read_value(const Field& field, const toml::node& node,
+                                std::span<const Dimension> dimensions, const std::string& name) {
+  switch (field.type) {
+    case FieldType::quantity:
+      return quantity(node, field.range, dimensions.front(), name);
+    case FieldType::list:
+      return list(node, field.range, dimensions, name);
+    case FieldType::text: {
+      const auto text = node.value_exact<std::string>();
+      if (!text) {
+        return wrong_type(node, name, "a text in quotes");
+      }
+      if (text->empty()) {
+        return tl::unexpected(Error(ArgumentError::empty).about(name).got("empty"));
+      }
+      if (field.check != nullptr) {
+        FLYBALL_CHECK(field.check(*text));
+      }
+      return *text;
+    }
+    case FieldType::whole: {
+      const auto value = node.value_exact<long long>();
+      if (value && *value >= field.least && *value <= field.most) {
+        return *value;
+      }
+      return tl::unexpected(
+          Error(value ? ProjectError::wrong_value : ProjectError::wrong_type)
+              .about(name)
+              .got(description(node))
+              .expected(fmt::format("a whole number, {} or greater", field.least)));
+    }
+    case FieldType::flag: {
+      const auto value = node.value_exact<bool>();
+      return value ? Expected<FieldValue>(*value) : wrong_type(node, name, "true or false");
+    }
+  }
+  return FieldValue{};
+}
+
+void insert_text(toml::table& table, const Field& field, std::string_view text) {
+  if (field.type == FieldType::list) {
+    toml::array values;
+    for (std::size_t start = 0; start <= text.size();) {
+      const std::size_t end = std::min(text.find(',', start), text.size());
+      values.push_back(std::string(text.substr(start, end - start)));
+      start = end + 1;
+    }
+    table.insert_or_assign(field.key, std::move(values));
+  } else if (const auto number = whole_number(text); field.type == FieldType::whole && number) {
+    table.insert_or_assign(field.key, *number);
+  } else if (field.type == FieldType::flag && (text == "true" || text == "false")) {
+    table.insert_or_assign(field.key, text == "true");
+  } else {
+    table.insert_or_assign(field.key, std::string(text));
+  }
+}
+
+Expected<void> check_ranges(const Project& project, std::string_view where) {
+  const Document& document = project_document();
+  const auto signals = document.signals(&project);
+  for (const Section& section : document.sections) {
+    const void* object = find(section, &project);
+    for (const Field& field : object == nullptr ? std::span<const Field>() : section.fields) {
+      const FieldValue value = field.access.get(object);
+      const std::vector<Dimension> dimensions = dimensions_of(field, signals);
+      std::vector<double> numbers;
+      if (const auto* list = std::get_if<std::vector<double>>(&value)) {
+        numbers = *list;
+      } else if (const auto* number = std::get_if<double>(&value)) {
+        numbers = {*number};
+      }
+      for (std::size_t i = 0; i < numbers.size(); ++i) {
+        const Dimension dimension =
+            i < dimensions.size() ? dimensions[i] : Dimension::dimensionless;
+        if (auto ok =
+                in_range(numbers[i], field.range, dimension, name_of(section.name, field.key));
+            !ok) {
+          return tl::unexpected(std::move(ok).error().in(std::string(where)));
+        }
+      }
+    }
+  }
+  return {};
+}
+
+std::vector<Dimension> dimensions_of(const Field& field,
+                                     const std::optional<SignalDimensions>& signals) {
+  using Of = FieldDimension;
+  if (field.dimension.of == Of::fixed) {
+    return {field.dimension.dimension};
+  }
+  if (!signals) {
+    return {};
+  }
+  switch (field.dimension.of) {
+    case Of::states:
+      return {signals->states.begin(), signals->states.end()};
+    case Of::output:
+      return {signals->output};
+    case Of::rate:
+      return {signals->rate};
+    default:
+      return {signals->acceleration};
+  }
+}
+
+}  // namespace flyball::study

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include <toml++/toml.h>
+
+#include "study/field.hpp"
+
+namespace flyball::study {
+
+/// A field's value from the node of a file.
+/// @param dimensions  One; of a list one for each state. @param name  The field's, for messages.
+/// @errors ProjectError and ArgumentError, without a place.
+[[nodiscard]] Expected<FieldValue> read_value(const Field& field, const toml::node& node,
+                                              std::span<const Dimension> dimensions,
+                                              const std::string& name);
+
+/// The node that a text of the command line stands for.
+void insert_text(toml::table& table, const Field& field, std::string_view text);
+
+/// The dimensions of a field; none if the mechanism decides them and is not known.
+[[nodiscard]] std::vector<Dimension> dimensions_of(const Field& field,
+                                                   const std::optional<SignalDimensions>& signals);
+
+}  // namespace flyball::study

@@ -1,0 +1,276 @@
+#include <algorithm>
+#include <tuple>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <flyball/core/text.hpp>
+
+#include "study/read_value.hpp"
+#include "study/toml_document.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+constexpr std::size_t most_errors = 20;
+
+struct Split {
+  std::string_view parent;  // empty for a section of the root
+  std::string_view name;
+};
+
+Split split(std::string_view section) {
+  const std::size_t dot = section.rfind('.');
+  return dot == std::string_view::npos ? Split{"", section}
+                                       : Split{section.substr(0, dot), section.substr(dot + 1)};
+}
+
+// The characters of a line, each with all its bytes; what is no text is a question mark, so that a
+// file cannot write on the terminal what it likes.
+std::vector<std::string> characters(std::string_view line) {
+  std::vector<std::string> all;
+  for (const char c : line) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (!all.empty() && byte >= 0x80 && byte < 0xc0) {
+      all.back() += c;
+    } else {
+      all.emplace_back(1, byte == '\t' ? ' ' : byte < 0x20 || byte == 0x7f ? '?' : c);
+    }
+  }
+  return all;
+}
+
+std::string joined(std::span<const std::string> parts) {
+  return fmt::format("{}", fmt::join(parts, ""));
+}
+
+}  // namespace
+
+TomlDocument::TomlDocument(std::string_view text, std::string file)
+    : text_(text), file_(std::move(file)) {
+  try {
+    root_ = toml::parse(text, file_);
+  } catch (const toml::parse_error& problem) {
+    is_toml_ = false;
+    found_.push_back({problem.source(), Error(ProjectError::syntax)
+                                            .in(place(problem.source()))
+                                            .hint(std::string(problem.description()))});
+  }
+}
+
+void TomlDocument::apply(std::span<const Override> overrides, std::span<const Section> sections) {
+  for (const auto& [option, text] : overrides) {
+    for (const Section& section : sections) {
+      for (const Field& field : section.fields) {
+        if (option_of(field) != option || !is_toml_) {
+          continue;
+        }
+        // No section of a section has options.
+        const auto [place, inserted] = root_.insert(section.name, toml::table{});
+        if (toml::table* keys = place->second.as_table()) {
+          insert_text(*keys, field, text);
+          options_[name_of(section.name, field.key)] = option;
+        }
+      }
+    }
+  }
+}
+
+void TomlDocument::read(const Document& document, void* into) {
+  if (!is_toml_) {
+    return;
+  }
+  std::vector<std::string_view> names;
+  for (const Section& section : document.sections) {
+    if (split(section.name).parent.empty()) {
+      names.push_back(section.name);
+    }
+  }
+  check_names(root_, "", names);
+  for (const Section& section : document.sections) {
+    const auto [parent, key] = split(section.name);
+    if (const toml::table* keys = table(section.name)) {
+      read_section(section, *keys, document, into);
+    } else if (const toml::node* other = node(parent, key); other != nullptr && parent.empty()) {
+      // Where a section of a section may be a key as well, the key's row reads it.
+      refuse(parent, key,
+             Error(ProjectError::wrong_type)
+                 .about(std::string(key))
+                 .got("no section")
+                 .expected(fmt::format("a section, written [{}]", section.name)));
+    }
+  }
+}
+
+void TomlDocument::read_section(const Section& section, const toml::table& keys,
+                                const Document& document, void* into) {
+  std::vector<std::string_view> known;
+  for (const Field& field : section.fields) {
+    known.push_back(field.key);
+  }
+  check_names(keys, section.name, known);
+  void* object = section.within(into, true);
+  for (const Field& field : section.fields) {
+    const toml::node* value = keys.get(field.key);
+    if (value == nullptr) {
+      if (field.required && writes(section.name)) {
+        miss(section.name, field.key,
+             fmt::format("{} needs it, for example {} = {}", section.needed_for, field.key,
+                         field.example));
+      }
+      continue;
+    }
+    const bool is_section = std::any_of(
+        document.sections.begin(), document.sections.end(),
+        [&](const Section& other) { return other.name == name_of(section.name, field.key); });
+    if (value->is_table() && is_section) {
+      continue;
+    }
+    const std::vector<Dimension> dimensions = dimensions_of(field, document.signals(into));
+    const std::string called = name(section.name, field.key);
+    if (dimensions.empty()) {
+      if (found_.empty()) {
+        refuse(section.name, field.key,
+               Error(ProjectError::missing_key)
+                   .about(called)
+                   .got("in a unit that the mechanism decides, which is not known")
+                   .hint("say which with --mechanism"));
+      }
+      continue;
+    }
+    if (auto read = read_value(field, *value, dimensions, called)) {
+      field.access.set(object, *read);
+    } else {
+      refuse(section.name, field.key, std::move(read).error());
+    }
+  }
+}
+
+void TomlDocument::check_names(const toml::table& names, std::string_view section,
+                               std::span<const std::string_view> known) {
+  for (const auto& [key, value] : names) {
+    const std::string_view text = key.str();
+    if (std::find(known.begin(), known.end(), text) != known.end()) {
+      continue;
+    }
+    const std::string nearest = nearest_name(text, known);
+    found_.push_back(
+        {key.source(),
+         Error(ProjectError::unknown_key)
+             .in(place(key.source()))
+             .about(name(section, text))
+             .got(section.empty() ? "not a section that is known"
+                                  : fmt::format("not a key of [{}]", section))
+             .hint(nearest.empty() ? fmt::format("known are {}", fmt::join(known, ", "))
+                                   : fmt::format("did you mean \"{}\"?", nearest))});
+  }
+}
+
+void TomlDocument::refuse(std::string_view section, std::string_view key, Error error) {
+  const toml::table* keys = table(section);
+  toml::source_region source = source_of(section);
+  std::string where = place(source);
+  if (const auto option = options_.find(name_of(section, key)); option != options_.end()) {
+    where = option->second == error.subject() ? "" : option->second;
+    source = {};
+  } else if (keys != nullptr && keys->contains(key)) {
+    where = place(keys->find(key)->first.source());
+    source = keys->get(key)->source();
+  }
+  found_.push_back({source, std::move(error).in(std::move(where))});
+}
+
+Error TomlDocument::missing(std::string_view section, std::string_view key,
+                            std::string hint) const {
+  return Error(ProjectError::missing_key)
+      .in(place(source_of(section)))
+      .about(name(section, key))
+      .got("missing")
+      .hint(std::move(hint));
+}
+
+void TomlDocument::miss(std::string_view section, std::string_view key, std::string hint) {
+  found_.push_back({source_of(section), missing(section, key, std::move(hint)), false});
+}
+
+std::optional<Errors> TomlDocument::errors() const {
+  if (found_.empty()) {
+    return std::nullopt;
+  }
+  std::vector<const Found*> sorted;
+  for (const Found& found : found_) {
+    sorted.push_back(&found);
+  }
+  std::stable_sort(sorted.begin(), sorted.end(), [](const Found* a, const Found* b) {
+    return std::tie(a->source.begin.line, a->source.begin.column) <
+           std::tie(b->source.begin.line, b->source.begin.column);
+  });
+  std::vector<QuotedError> all;
+  for (const Found* found : sorted) {
+    if (all.size() == most_errors) {
+      all.push_back({Error(ProjectError::more_errors)
+                         .in(file_)
+                         .with("number", static_cast<double>(sorted.size() - most_errors)),
+                     {}});
+      break;
+    }
+    all.push_back({found->error, found->quote ? excerpt(found->source) : ""});
+  }
+  return Errors(std::move(all));
+}
+
+const toml::table* TomlDocument::table(std::string_view section) const {
+  if (section.empty()) {
+    return &root_;
+  }
+  const auto [parent, name] = split(section);
+  const toml::node* found = node(parent, name);
+  return found == nullptr ? nullptr : found->as_table();
+}
+
+const toml::node* TomlDocument::node(std::string_view section, std::string_view key) const {
+  const toml::table* keys = table(section);
+  return keys == nullptr ? nullptr : keys->get(key);
+}
+
+toml::source_region TomlDocument::source_of(std::string_view section) const {
+  const toml::table* keys = table(section);
+  return keys == nullptr ? root_.source() : keys->source();
+}
+
+std::string TomlDocument::place(const toml::source_region& source) const {
+  return source.begin.line == 0
+             ? file_
+             : fmt::format("{}:{}:{}", file_, source.begin.line, source.begin.column);
+}
+
+std::string TomlDocument::name(std::string_view section, std::string_view key) const {
+  std::string full = name_of(section, key);
+  const auto option = options_.find(full);
+  return option == options_.end() ? full : option->second;
+}
+
+std::string TomlDocument::excerpt(const toml::source_region& source) const {
+  if (source.begin.line == 0) {
+    return "";
+  }
+  std::string_view rest = text_;
+  for (toml::source_index line = 1; line < source.begin.line; ++line) {
+    rest.remove_prefix(std::min(rest.find('\n'), rest.size() - 1) + 1);
+  }
+  const std::vector<std::string> line = characters(rest.substr(0, rest.find_first_of("\r\n")));
+  // Of a long line, what stands about the place.
+  constexpr std::size_t widest = 100;
+  const std::size_t at = std::min<std::size_t>(source.begin.column - 1, line.size());
+  const std::size_t first = line.size() > widest && at > widest / 2 ? at - widest / 2 : 0;
+  const std::span<const std::string> shown =
+      std::span(line).subspan(first, std::min(widest, line.size() - first));
+  const bool one_line = source.end.line == source.begin.line && source.end.column > at + 1;
+  const std::size_t length = one_line ? source.end.column - 1 - at : 1;
+  return fmt::format("{:>5} | {}\n{:>5} | {}{}", source.begin.line, joined(shown), "",
+                     std::string(at - first, ' '),
+                     std::string(std::clamp<std::size_t>(length, 1, widest), '^'));
+}
+
+}  // namespace flyball::study

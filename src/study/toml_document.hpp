@@ -1,0 +1,81 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <toml++/toml.h>
+
+#include <flyball/core/errors.hpp>
+#include <flyball/study/project.hpp>
+
+#include "study/field.hpp"
+
+namespace flyball::study {
+
+/// A TOML file with the command line's values in place of its own, and what is wrong with both.
+///
+/// Nothing stops at an error: each is kept, so that one run tells all of them.
+class TomlDocument {
+ public:
+  /// Takes the text apart. What is no TOML is an error and an empty document.
+  TomlDocument(std::string_view text, std::string file);
+
+  /// Puts options into the place of the file's values.
+  void apply(std::span<const Override> overrides, std::span<const Section> sections);
+
+  /// Reads all sections into the document's struct.
+  void read(const Document& document, void* into);
+
+  [[nodiscard]] bool is_toml() const { return is_toml_; }
+  /// Whether the file has a section, not only the command line.
+  [[nodiscard]] bool writes(std::string_view section) const {
+    return table(section) != nullptr && source_of(section).begin.line != 0;
+  }
+  [[nodiscard]] bool has(std::string_view section, std::string_view key) const {
+    return node(section, key) != nullptr;
+  }
+
+  /// "controller.period", or "--period" if the value is the command line's.
+  [[nodiscard]] std::string name(std::string_view section, std::string_view key) const;
+
+  /// Keeps an error about a key, with its place in the file or its option.
+  void refuse(std::string_view section, std::string_view key, Error error);
+  /// An error about a key that should be there, with the section's place.
+  [[nodiscard]] Error missing(std::string_view section, std::string_view key,
+                              std::string hint) const;
+  /// The same, kept.
+  void miss(std::string_view section, std::string_view key, std::string hint);
+
+  /// Nothing if all is well; else the errors in the order of the file, the first twenty of them.
+  [[nodiscard]] std::optional<Errors> errors() const;
+
+ private:
+  struct Found {
+    toml::source_region source;
+    Error error;
+    bool quote = true;
+  };
+
+  [[nodiscard]] const toml::table* table(std::string_view section) const;
+  [[nodiscard]] const toml::node* node(std::string_view section, std::string_view key) const;
+  [[nodiscard]] toml::source_region source_of(std::string_view section) const;
+  [[nodiscard]] std::string place(const toml::source_region& source) const;
+  [[nodiscard]] std::string excerpt(const toml::source_region& source) const;
+  void check_names(const toml::table& names, std::string_view section,
+                   std::span<const std::string_view> known);
+  void read_section(const Section& section, const toml::table& keys, const Document& document,
+                    void* into);
+
+  std::string_view text_;
+  std::string file_;
+  toml::table root_;
+  bool is_toml_ = true;
+  std::map<std::string, std::string, std::less<>> options_;  // of overridden keys, by their names
+  std::vector<Found> found_;
+};
+
+}  // namespace flyball::study

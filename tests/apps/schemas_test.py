@@ -1,0 +1,129 @@
+#!/usr/bin/env python3
+"""Validates what the command answers against docs/schemas: every kind of answer and of refusal, and
+the project files that it reads and writes. Proves for each that the schema can say no.
+
+usage: schemas_test.py COMMAND SCHEMAS EXAMPLES
+"""
+
+import copy
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import tomllib
+import warnings
+
+warnings.simplefilter("ignore", DeprecationWarning)  # RefResolver, which Debian's jsonschema has
+import jsonschema
+
+command, schemas, examples = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
+failures = []
+
+
+def validator(name):
+    schema = json.loads((schemas / f"{name}.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    resolver = jsonschema.RefResolver(f"file://{schemas}/", schema)
+    return jsonschema.Draft202012Validator(schema, resolver=resolver)
+
+
+def check(name, document, what):
+    for error in validator(name).iter_errors(document):
+        failures.append(f"{what}: {error.json_path}: {error.message}")
+
+
+def check_says_no(name, document, what):
+    if validator(name).is_valid(document):
+        failures.append(f"{what}: accepted by {name}.schema.json")
+
+
+def answer(arguments, status, folder):
+    done = subprocess.run([command, *arguments, "--json"], cwd=folder, capture_output=True, text=True)
+    if done.returncode != status:
+        failures.append(f"{arguments}: exit status {done.returncode}: {done.stderr}")
+    return json.loads(done.stdout)
+
+
+def check_answer(arguments, status, folder):
+    """The answer is as its schema says, and no member of it may be left out or be of another type."""
+    name = arguments[0]
+    document = answer(arguments, status, folder)
+    what = " ".join(map(str, arguments))
+    check(name, document, what)
+    for key in document:
+        wrong = copy.deepcopy(document)
+        wrong[key] = {"not": "this"} if not isinstance(wrong[key], dict) else "text"
+        check_says_no(name, wrong, f"{what} with a wrong {key}")
+    return document
+
+
+PARTS = {
+    "flywheel": 'moment_of_inertia = "0.003 kg m^2"',
+    "elevator": 'mass = "8 kg"\ndrum_radius = "1 in"',
+    "arm": 'moment_of_inertia = "1.1 kg m^2"\nmass = "3 kg"\ncenter_of_mass = "0.4 m"',
+}
+
+
+def check_answers(folder):
+    log = examples / "logs/elevator.json"
+    check_answer(["identify", log], 0, folder)
+    check_answer(["tune", log, "--out", "tuned"], 0, folder)
+    check("project", tomllib.loads((folder / "tuned/gains.toml").read_text()), "gains.toml")
+    for kind, parts in PARTS.items():
+        project = folder / f"{kind}.toml"
+        project.write_text(f'[mechanism]\ntype = "{kind}"\nmotor = "NEO"\ngearing = 20.0\n{parts}\n')
+        check("project", tomllib.loads(project.read_text()), project.name)
+        check_answer(["design", project, "--out", kind], 0, folder)
+        check_answer(["analyze", project], 0, folder)
+        check("project", tomllib.loads((folder / kind / "gains.toml").read_text()), f"{kind} gains")
+    # Without kA: a velocity is the input.
+    servo = folder / "servo.toml"
+    servo.write_text('[mechanism]\ntype = "elevator"\n[gains]\nkV = 4.0\n')
+    check_answer(["design", servo], 0, folder)
+    (folder / "discrete.json").write_text('{"A":[[0.5]],"B":[[1]],"domain":"discrete","T":0.02}')
+    check_answer(["analyze", "discrete.json"], 0, folder)
+
+
+def check_refusals(folder):
+    wrong = folder / "wrong.toml"
+    wrong.write_text('[mechanism]\ntype = "elevator"\nmass = 8\ngearng = 2\n')
+    for name in ("design", "analyze"):
+        document = check_answer([name, wrong], 2, folder)
+        if len(document.get("errors", [])) != 2:
+            failures.append(f"{name}: two errors are not told: {document}")
+    check_says_no("project", tomllib.loads(wrong.read_text()), "wrong.toml")
+    still = json.loads((examples / "logs/elevator.json").read_text())
+    for test in ("slow-forward", "slow-backward", "fast-forward", "fast-backward"):
+        for row in still[test]:
+            row[2:4] = [0.25, 0.0]
+    (folder / "still.json").write_text(json.dumps(still))
+    for name in ("identify", "tune"):
+        check_answer([name, "still.json"], 1, folder)
+        check_answer([name, "nowhere.json"], 2, folder)
+    heavy = folder / "heavy.toml"
+    heavy.write_text((examples / "elevator.toml").read_text().replace("8 kg", "80000 kg"))
+    check_answer(["design", heavy], 1, folder)
+
+
+def check_project_schema():
+    good = tomllib.loads((examples / "elevator.toml").read_text())
+    check("project", good, "elevator.toml")
+    for section, key, value in [
+        ("mechanism", "type", "escalator"), ("mechanism", "gearing", 0), ("mechanism", "mass", 8),
+        ("mechanism", "mass", "-8 kg"), ("mechanism", "motor", {"stall_torque": "1 N m"}),
+        ("mechanism", "motor_count", 0), ("controller", "period", 0.02), ("controller", "perod", "1 s"),
+        ("controller", "state_tolerance", [1, 2]), ("profile", "seed", 1.5), ("controler", "period", "1 s"),
+    ]:
+        wrong = copy.deepcopy(good)
+        wrong.setdefault(section, {})[key] = value
+        check_says_no("project", wrong, f"{section}.{key} = {value}")
+
+
+with tempfile.TemporaryDirectory() as name:
+    check_answers(pathlib.Path(name))
+    check_refusals(pathlib.Path(name))
+check_project_schema()
+for failure in failures[:20]:
+    print(failure, file=sys.stderr)
+sys.exit(1 if failures else 0)

@@ -1,0 +1,179 @@
+// The table of fields: whatever it says can be written, read, typed and looked up.
+#include <cmath>
+#include <set>
+
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <flyball/io/file.hpp>
+#include <flyball/study/project.hpp>
+
+#include "study/field.hpp"
+#include "study/mechanism_parts.hpp"
+#include "study/read_value.hpp"
+
+namespace flyball::study {
+namespace {
+
+double any_number() {
+  const auto mantissa = *rc::gen::inRange<long long>(1LL << 52, 1LL << 53);
+  return std::ldexp(static_cast<double>(mantissa), *rc::gen::inRange(-60, -45));
+}
+
+double number_in(Range range) {
+  if (range == Range::not_negative && *rc::gen::inRange(0, 4) == 0) {
+    return 0.0;
+  }
+  return range == Range::any && *rc::gen::arbitrary<bool>() ? -any_number() : any_number();
+}
+
+std::string any_text() {
+  return *rc::gen::nonEmpty(rc::gen::container<std::string>(
+      rc::gen::oneOf(rc::gen::inRange<char>(1, 127), rc::gen::elementOf(std::string("\"\\\n")))));
+}
+
+FieldValue any_value(const Field& field, std::size_t states) {
+  switch (field.type) {
+    case FieldType::quantity:
+      return number_in(field.range);
+    case FieldType::list: {
+      std::vector<double> values(states);
+      for (double& value : values) {
+        value = number_in(field.range);
+      }
+      return values;
+    }
+    case FieldType::text:
+      return field.key == "motor" ? std::string("Kraken X60 FOC") : any_text();
+    case FieldType::whole:
+      return *rc::gen::inRange<long long>(field.least, 1LL << 62);
+    case FieldType::flag:
+      return *rc::gen::arbitrary<bool>();
+  }
+  return {};
+}
+
+/// Any values in any fields, as far as they make a mechanism.
+Project any_project(mechanisms::MechanismKind kind) {
+  Project project;
+  const std::size_t states = mechanism_row(kind).signals.states.size();
+  const bool custom = *rc::gen::arbitrary<bool>();
+  for (const Section& section : project_document().sections) {
+    if (section.name == "mechanism.motor" && !custom) {
+      continue;
+    }
+    void* object = section.within(&project, true);
+    for (const Field& field : section.fields) {
+      const bool is_kind = !field.choices.empty();
+      const bool motor_name = field.key == "motor" && custom;
+      if (!motor_name && !is_kind && (field.required || *rc::gen::arbitrary<bool>())) {
+        field.access.set(object, any_value(field, states));
+      }
+    }
+  }
+  project.parts.type = kind;
+  project.parts.motor_count = *rc::gen::inRange(1, 5);
+  if (project.parts.mass == Mass(0.0)) {
+    project.parts.mass.reset();  // of an arm alone
+  }
+  if (custom) {
+    project.parts.custom_motor->free_current =
+        Current(0.1 * project.parts.custom_motor->stall_current.si());
+  }
+  return project;
+}
+
+TEST(Fields, WhatIsWrittenReadsBackAsItWas) {
+  for (const MechanismRow& row : mechanism_rows()) {
+    rc::check([&] {
+      const Project project = any_project(row.kind);
+      const std::string text = write_project(project, "A heading\nof two lines");
+      const auto read = parse_project(text, "p.toml");
+      ASSERT_TRUE(read) << to_string(read.error()) << "\n" << text;
+      for (const Section& section : project_document().sections) {
+        const void* before = find(section, &project);
+        const void* after = find(section, &*read);
+        ASSERT_EQ(before == nullptr, after == nullptr) << section.name;
+        for (const Field& field : before == nullptr ? std::span<const Field>() : section.fields) {
+          EXPECT_TRUE(field.access.get(before) == field.access.get(after))
+              << name_of(section.name, field.key) << "\n"
+              << text;
+        }
+      }
+      EXPECT_EQ(write_project(*read, "A heading\nof two lines"), text);
+    });
+  }
+}
+
+TEST(Fields, CommentsStandBesideTheirKeys) {
+  Project project;
+  project.parts.type = mechanisms::MechanismKind::elevator;
+  project.gains.kV = 4.0;
+  const std::string_view sections[] = {"mechanism", "gains"};
+  const std::vector<KeyComment> comments{{"gains.kV", "V·s/m"}, {"gains.kA", "is not determined"}};
+  EXPECT_EQ(write_project(project, "Two\nlines", sections, comments),
+            "# Two\n# lines\n\n[mechanism]\ntype = \"elevator\"\nmotor_count = 1\n\n[gains]\n"
+            "kV = 4.0  # V·s/m\n# kA is not determined\n");
+}
+
+TEST(Fields, EveryExampleIsWhatTheFieldTakes) {
+  for (const Section& section : project_document().sections) {
+    EXPECT_FALSE(section.summary.empty()) << section.name;
+    for (const Field& field : section.fields) {
+      const std::string name = name_of(section.name, field.key);
+      EXPECT_FALSE(field.help.empty() || field.example.empty()) << name;
+      const auto keys = toml::parse(std::string(field.key) + " = " + std::string(field.example));
+      // The examples are an elevator's.
+      const auto dimensions =
+          dimensions_of(field, mechanism_row(mechanisms::MechanismKind::elevator).signals);
+      const auto value = read_value(field, *keys.get(field.key), dimensions, name);
+      EXPECT_TRUE(value) << (value ? "" : to_string(value.error()));
+    }
+  }
+}
+
+TEST(Fields, EveryOptionOfAJobIsItsOwnAndSaysWhatItTakes) {
+  for (const JobKind job : {JobKind::identify, JobKind::design, JobKind::tune, JobKind::analyze}) {
+    std::set<std::string> options;
+    for (const FieldInfo& field : fields_of(job)) {
+      EXPECT_TRUE(options.insert(field.option).second) << field.option;
+      EXPECT_TRUE(field.option.starts_with("--") && !field.value.empty() && !field.help.empty());
+      EXPECT_EQ(field.option.find('_'), std::string::npos);
+    }
+    EXPECT_FALSE(options.empty());
+  }
+  const auto design = fields_of(JobKind::design);
+  const auto period = std::find_if(design.begin(), design.end(), [](const FieldInfo& field) {
+    return field.option == "--period";
+  });
+  ASSERT_NE(period, design.end());
+  EXPECT_EQ(period->section, "controller");
+  EXPECT_EQ(period->value, "TIME");
+  EXPECT_EQ(period->absent, "20 ms");  // ControllerOptions{}.period
+}
+
+TEST(Fields, EveryKindOfMechanismNeedsKeysThatThereAre) {
+  for (const MechanismRow& row : mechanism_rows()) {
+    for (const std::string_view key : row.needs) {
+      const auto& fields = section_of("mechanism").fields;
+      EXPECT_TRUE(std::any_of(fields.begin(), fields.end(), [&](const Field& field) {
+        return field.key == key;
+      })) << key;
+    }
+  }
+}
+
+std::string page(const std::string& name) {
+  return read_file(FLYBALL_DOCS "/" + name, 1 << 20).value();
+}
+
+// If one of these fails, run scripts/write-docs.
+TEST(Fields, TheDocsPageIsTheTable) {
+  EXPECT_NE(page("project-file.md").find(project_markdown()), std::string::npos);
+}
+TEST(Fields, TheSchemaIsTheTable) {
+  EXPECT_EQ(page("schemas/project.schema.json"), project_schema());
+}
+
+}  // namespace
+}  // namespace flyball::study
