@@ -73,7 +73,7 @@ void add_common_options(CLI::App& command, CommonOptions& options, const std::st
 
 void add_field_options(CLI::App& command, study::JobKind job, std::vector<study::Override>& given) {
   for (const study::FieldInfo& field : study::fields_of(job)) {
-    const std::string absent = field.absent.empty() ? "" : "; if absent: " + field.absent;
+    const std::string absent = field.absent.empty() ? "" : " [" + field.absent + "]";
     command
         .add_option_function<std::string>(
             field.option,

@@ -145,10 +145,9 @@ Json schema_of(const Section& section) {
   Json required = Json::array();
   for (const Field& field : section.fields) {
     const std::string absent = if_absent(section, field);
-    properties[field.key] =
-        schema_of(field, absent.empty() || field.required
-                             ? std::string(field.help)
-                             : fmt::format("{}; if absent: {}", field.help, absent));
+    properties[field.key] = schema_of(field, absent.empty() || field.required
+                                                 ? std::string(field.help)
+                                                 : fmt::format("{} [{}]", field.help, absent));
     if (field.required) {
       required.push_back(field.key);
     }
