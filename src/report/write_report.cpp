@@ -94,8 +94,9 @@ Expected<void> write_tune_report(const study::TuneResult& result, const std::str
   const bool fitted = identification.report.fit.has_value();
   const bool designed = result.design && result.design->has_value();
   if (designed) {
-    files.push_back({"gains.toml",
-                     study::gains_toml(**result.design, fitted ? &*identification.report.fit : nullptr)});
+    files.push_back(
+        {"gains.toml",
+         study::gains_toml(**result.design, fitted ? &*identification.report.fit : nullptr)});
     FLYBALL_CHECK(add_design_files(files, **result.design,
                                    fitted && !identification.report.fit->kA.determined
                                        ? identification.report.fit->kA.reason
