@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/error_rows.hpp"
 #include "core/format.hpp"
 #include "math/expression/syntax.hpp"
 #include "math/expression/token.hpp"
@@ -189,55 +190,31 @@ tl::expected<CompiledFormulas, std::vector<Error>> compile(const FormulaSet& set
 }
 
 ErrorInfo error_info(ExpressionError code) {
-  using enum ExpressionError;
-  constexpr std::string_view family = "expression";
-  switch (code) {
-    case empty_formula:
-      return {family, "empty_formula", "the formula is empty"};
-    case too_large:
-      return {family, "too_large", "the formula is too large"};
-    case too_deep:
-      return {family, "too_deep", "the formula is nested too deeply here"};
-    case stray_character:
-      return {family, "stray_character", "this character means nothing here"};
-    case malformed_number:
-      return {family, "malformed_number", "this number cannot be read"};
-    case missing_operand:
-      return {family, "missing_operand", "a value is missing here"};
-    case missing_operator:
-      return {family, "missing_operator", "an operator is missing here"};
-    case unclosed_parenthesis:
-      return {family, "unclosed_parenthesis", "this parenthesis is not closed"};
-    case unopened_parenthesis:
-      return {family, "unopened_parenthesis", "this parenthesis was not opened"};
-    case unexpected_symbol:
-      return {family, "unexpected_symbol", "this symbol is out of place"};
-    case assignment:
-      return {family, "assignment", "= assigns, and nothing can be assigned here"};
-    case chained_comparison:
-      return {family, "chained_comparison", "this comparison compares a comparison"};
-    case unknown_name:
-      return {family, "unknown_name", "this name is not known"};
-    case unknown_function:
-      return {family, "unknown_function", "this function is not known"};
-    case wrong_arity:
-      return {family, "wrong_arity", "the number of arguments does not fit"};
-    case wrong_type:
-      return {family, "wrong_type", "comparisons and numbers are mixed"};
-    case unit_mismatch:
-      return {family, "unit_mismatch", "the units do not add up"};
-    case unusable_name:
-      return {family, "unusable_name", "the name cannot be used in formulas"};
-    case duplicate_name:
-      return {family, "duplicate_name", "the name is given twice"};
-    case unknown_unit:
-      return {family, "unknown_unit", "the unit cannot be read"};
-    case not_finite:
-      return {family, "not_finite", "NaN or infinity"};
-    case no_counterpart:
-      return {family, "no_counterpart", "the language has no such operation"};
-  }
-  return {family, "unknown", "unknown error", ErrorKind::defect};
+  static constexpr detail::ErrorRow rows[] = {
+      {"empty_formula", "the formula is empty", ErrorKind::misuse},
+      {"too_large", "the formula is too large", ErrorKind::misuse},
+      {"too_deep", "the formula is nested too deeply here", ErrorKind::misuse},
+      {"stray_character", "this character means nothing here", ErrorKind::misuse},
+      {"malformed_number", "this number cannot be read", ErrorKind::misuse},
+      {"missing_operand", "a value is missing here", ErrorKind::misuse},
+      {"missing_operator", "an operator is missing here", ErrorKind::misuse},
+      {"unclosed_parenthesis", "this parenthesis is not closed", ErrorKind::misuse},
+      {"unopened_parenthesis", "this parenthesis was not opened", ErrorKind::misuse},
+      {"unexpected_symbol", "this symbol is out of place", ErrorKind::misuse},
+      {"assignment", "= assigns, and nothing can be assigned here", ErrorKind::misuse},
+      {"chained_comparison", "this comparison compares a comparison", ErrorKind::misuse},
+      {"unknown_name", "this name is not known", ErrorKind::misuse},
+      {"unknown_function", "this function is not known", ErrorKind::misuse},
+      {"wrong_arity", "the number of arguments does not fit", ErrorKind::misuse},
+      {"wrong_type", "comparisons and numbers are mixed", ErrorKind::misuse},
+      {"unit_mismatch", "the units do not add up", ErrorKind::misuse},
+      {"unusable_name", "the name cannot be used in formulas", ErrorKind::misuse},
+      {"duplicate_name", "the name is given twice", ErrorKind::misuse},
+      {"unknown_unit", "the unit cannot be read", ErrorKind::misuse},
+      {"not_finite", "NaN or infinity", ErrorKind::misuse},
+      {"no_counterpart", "the language has no such operation", ErrorKind::misuse},
+  };
+  return detail::info_of(code, "expression", rows);
 }
 
 }  // namespace flyball::expression
