@@ -175,6 +175,23 @@ TEST(FormulaErrors, HostileTextIsRefusedWithoutHarm) {
   EXPECT_EQ(codes(errors_of(std::string(5000, 'q'))), "unknown_name@0");
 }
 
+TEST(FormulaErrors, ATapeHasAMillionNodesAtMost) {
+  // 45 000 sums a formula, which begin with different numbers and so share nothing.
+  std::string sums;
+  for (int i = 0; i < 45'000; ++i) {
+    sums += "+x";
+  }
+  FormulaSet set{.variables = {{"x", ""}}};
+  for (int k = 1; k <= 22; ++k) {
+    set.outputs.push_back({"f" + std::to_string(k), std::to_string(k) + sums});
+  }
+  set.outputs.push_back({"last", "23" + sums});
+  const auto compiled = compile(set);
+  ASSERT_FALSE(compiled);
+  EXPECT_EQ(codes(compiled.error()), "too_large@0");
+  EXPECT_EQ(compiled.error()[0].where(), "last");
+}
+
 // Every mixture of tokens is answered, and each error has a place that a caret can show.
 TEST(FormulaErrors, RandomTextIsAnswered) {
   const char* const pieces[] = {"x",   "y ",   "2", ".5",  "(",   ")",  ",",    "+",
