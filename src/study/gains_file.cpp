@@ -136,7 +136,10 @@ std::string gains_toml(const DesignResult& result, const FeedforwardFit* fit) {
     job.estimator.model_std.clear();
   }
   job.profile.goal = result.motion.goal;
-  return write_project(project, heading(), {}, beside);
+  constexpr std::array<std::string_view, 8> sections{"mechanism",  "mechanism.motor", "gains",
+                                                     "controller", "estimator",       "sensor",
+                                                     "battery",    "profile"};
+  return write_project(project, heading(), sections, beside);
 }
 
 }  // namespace flyball::study

@@ -19,8 +19,9 @@ namespace {
 constexpr std::string_view part_section = "mechanism";
 
 Expected<mechanisms::DcMotor> motor_of(const MechanismParts& parts) {
+  const int count = parts.motor_count.value_or(1);
   if (!parts.custom_motor) {
-    return mechanisms::motor(parts.motor, parts.motor_count);
+    return mechanisms::motor(parts.motor, count);
   }
   const CustomMotor& custom = *parts.custom_motor;
   return mechanisms::motor("custom motor",
@@ -29,7 +30,7 @@ Expected<mechanisms::DcMotor> motor_of(const MechanismParts& parts) {
                             .stall_current = custom.stall_current,
                             .free_current = custom.free_current,
                             .free_speed = custom.free_speed},
-                           parts.motor_count);
+                           count);
 }
 
 /// Known gains stand in place of those of the parts. kV alone makes a plant; then a kA that is not

@@ -39,7 +39,8 @@ constexpr std::array mechanism_fields{
         .checked(check_motor)
         .takes("NAME"),
     whole("motor_count", at<&MechanismParts::motor_count>(), 1, 100, "2",
-          "Identical motors in one gearbox"),
+          "Identical motors in one gearbox")
+        .without("1"),
     quantity("gearing", at<&MechanismParts::gearing>(), dimensionless, positive, "10.0",
              "Motor turns per output turn, > 1 is a reduction"),
     quantity("mass", at<&MechanismParts::mass>(), mass, not_negative, "\"8 kg\"",

@@ -60,19 +60,31 @@ TomlDocument::TomlDocument(std::string_view text, std::string file)
 }
 
 void TomlDocument::apply(std::span<const Override> overrides, std::span<const Section> sections) {
-  for (const auto& [option, text] : overrides) {
+  for (const auto& [option, text] : is_toml_ ? overrides : std::span<const Override>()) {
+    std::vector<std::string> known;
     for (const Section& section : sections) {
       for (const Field& field : section.fields) {
-        if (option_of(field) != option || !is_toml_) {
+        known.push_back(option_of(field));
+        if (known.back() != option) {
           continue;
         }
         // No section of a section has options.
         const auto [place, inserted] = root_.insert(section.name, toml::table{});
         if (toml::table* keys = place->second.as_table()) {
           insert_text(*keys, field, text);
-          options_[name_of(section.name, field.key)] = option;
         }
+        options_[name_of(section.name, field.key)] = option;
       }
+    }
+    if (std::find(known.begin(), known.end(), option) == known.end()) {
+      const std::vector<std::string_view> names(known.begin(), known.end());
+      const std::string nearest = nearest_name(option, names);
+      found_.push_back(
+          {{},
+           Error(ProjectError::unknown_key)
+               .about(option)
+               .got("not an option that is known")
+               .hint(nearest.empty() ? "" : fmt::format("did you mean \"{}\"?", nearest))});
     }
   }
 }

@@ -112,7 +112,7 @@ TEST(Fields, CommentsStandBesideTheirKeys) {
   const std::string_view sections[] = {"mechanism", "gains"};
   const std::vector<KeyComment> comments{{"gains.kV", "V·s/m"}, {"gains.kA", "is not determined"}};
   EXPECT_EQ(write_project(project, "Two\nlines", sections, comments),
-            "# Two\n# lines\n\n[mechanism]\ntype = \"elevator\"\nmotor_count = 1\n\n[gains]\n"
+            "# Two\n# lines\n\n[mechanism]\ntype = \"elevator\"\n\n[gains]\n"
             "kV = 4.0  # V·s/m\n# kA is not determined\n");
 }
 

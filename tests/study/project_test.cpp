@@ -229,6 +229,14 @@ TEST(Project, AWrongOptionIsNamed) {
                 "kg\" or \"18 lb\""}));
 }
 
+TEST(Project, AnOptionThatThereIsNotIsNamed) {
+  const auto project =
+      parse_project(elevator_text, "p.toml", std::vector<Override>{{"--perod", "5ms"}});
+  ASSERT_FALSE(project);
+  EXPECT_EQ(to_string(project.error()),
+            "--perod is not an option that is known; did you mean \"--period\"?");
+}
+
 TEST(Project, AJobWithoutAFileTakesItsOptions) {
   const std::vector<Override> given{
       {"--mechanism", "arm"}, {"--unit", "rotations"}, {"--state-tolerance", "2deg,1rad/s"}};

@@ -36,7 +36,7 @@ struct MechanismParts {
   std::optional<mechanisms::MechanismKind> type{};
   std::string motor{};                        ///< A name of the motor table,
   std::optional<CustomMotor> custom_motor{};  ///< or [mechanism.motor].
-  int motor_count = 1;                        ///< In one gearbox.
+  std::optional<int> motor_count{};           ///< In one gearbox; one if absent.
   std::optional<double> gearing{};            ///< Motor turns per output turn.
   std::optional<Mass> mass{};
   std::optional<Length> drum_radius{};
