@@ -73,14 +73,17 @@ void add_common_options(CLI::App& command, CommonOptions& options, const std::st
 
 void add_field_options(CLI::App& command, study::JobKind job, std::vector<study::Override>& given) {
   for (const study::FieldInfo& field : study::fields_of(job)) {
-    const std::string absent = field.absent.empty() ? "" : " [" + field.absent + "]";
+    std::string help = field.help + ", such as " + field.example;
+    if (!field.absent.empty()) {
+      help += " [" + field.absent + "]";
+    }
     command
         .add_option_function<std::string>(
             field.option,
             [&given, option = field.option](const std::string& text) {
               given.push_back({option, text});
             },
-            field.help + absent)
+            help)
         ->type_name(field.value)
         ->group("[" + field.section + "]");
   }

@@ -79,6 +79,14 @@ std::string metavar(const Field& field) {
   return name;
 }
 
+/// The example as a shell takes it.
+std::string typed(const Field& field) {
+  std::string example(field.example);
+  std::erase_if(example,
+                [](char c) { return std::string_view("[]\" ").find(c) != std::string_view::npos; });
+  return example;
+}
+
 Names sections_of(JobKind job) {
   static constexpr std::array<std::string_view, 9> all{"log",       "mechanism", "controller",
                                                        "estimator", "sensor",    "battery",
@@ -171,6 +179,7 @@ std::vector<FieldInfo> fields_of(JobKind job) {
                        .option = std::move(option),
                        .value = metavar(field),
                        .help = std::string(field.help),
+                       .example = typed(field),
                        .absent = if_absent(section_of(name), field)});
       }
     }

@@ -98,7 +98,7 @@ constexpr std::array log_fields{
         .without("the type in [mechanism], else what the log says")
         .takes("KIND"),
     text("unit", at<&LogSelection::unit>(), "\"rotations\"",
-         "Unit of the recorded position: rotations, rad, deg, m, in, …")
+         "Unit of the recorded position (rad, deg, m, in, …)")
         .without("what the log says")
         .takes("UNIT"),
     quantity("scale", at<&LogSelection::scale>(), dimensionless, any, "0.1",

@@ -34,7 +34,7 @@ TEST_F(Command, OptionsStandInPlaceOfTheFile) {
   const Answer help = run("design --help");
   EXPECT_TRUE(holds(help.out, "[controller]")) << help.out;
   EXPECT_TRUE(holds(help.out, "--max-voltage VOLTAGE")) << help.out;
-  EXPECT_TRUE(holds(help.out, "Period of the control loop [20 ms]")) << help.out;
+  EXPECT_TRUE(holds(help.out, "Period of the control loop, such as 20ms [20 ms]")) << help.out;
   const std::string design = "design " + example("elevator.toml") + " --json ";
   const Answer answer = run(design + "--period 10ms --state-tolerance 1cm,0.5m/s --goal=-40cm");
   ASSERT_EQ(answer.status, 0) << answer.err;

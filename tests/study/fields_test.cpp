@@ -149,6 +149,7 @@ TEST(Fields, EveryOptionOfAJobIsItsOwnAndSaysWhatItTakes) {
   ASSERT_NE(period, design.end());
   EXPECT_EQ(period->section, "controller");
   EXPECT_EQ(period->value, "TIME");
+  EXPECT_EQ(period->example, "20ms");
   EXPECT_EQ(period->absent, "20 ms");  // ControllerOptions{}.period
 }
 

@@ -124,6 +124,7 @@ struct FieldInfo {
   std::string option;   ///< "--max-voltage"
   std::string value;    ///< What it takes, for a help text: "VOLTAGE".
   std::string help;     ///< "Limit of the voltage"
+  std::string example;  ///< As an option takes it: "12V".
   std::string absent;   ///< What holds without it: "12 V", "needed by elevator, arm".
 };
 /// Every field of a job that has an option, in the order of the file.
