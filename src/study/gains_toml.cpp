@@ -88,12 +88,18 @@ std::vector<KeyComment> comments(const PlantDescription& plant, const Feedforwar
                 "is not determined, below {} V·s²/{}{}", format_number(plant.kA_upper_bound),
                 plant.unit,
                 fit != nullptr && !fit->kA.reason.empty() ? ": " + one_line(fit->kA.reason) : "");
-  return {{"gains.kS", "V" + of(&FeedforwardFit::kS)},
-          {"gains.kV", fmt::format("V·s/{}{}", plant.unit, of(&FeedforwardFit::kV))},
-          {"gains.kA", kA},
-          {"gains.kG", "V" + of_some(&FeedforwardFit::kG)},
-          {"gains.angle_offset", "true angle from horizontal less the measured one" +
-                                     of_some(&FeedforwardFit::angle_offset)}};
+  std::vector<KeyComment> all{
+      {"gains.kS", "V" + of(&FeedforwardFit::kS)},
+      {"gains.kV", fmt::format("V·s/{}{}", plant.unit, of(&FeedforwardFit::kV))},
+      {"gains.kA", kA}};
+  if (plant.kind != MechanismKind::flywheel) {
+    all.push_back({"gains.kG", "V" + of_some(&FeedforwardFit::kG)});
+  }
+  if (plant.kind == MechanismKind::arm) {
+    all.push_back({"gains.angle_offset", "true angle from horizontal less the measured one" +
+                                             of_some(&FeedforwardFit::angle_offset)});
+  }
+  return all;
 }
 
 }  // namespace

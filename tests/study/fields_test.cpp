@@ -116,6 +116,44 @@ TEST(Fields, CommentsStandBesideTheirKeys) {
             "kV = 4.0  # V·s/m\n# kA is not determined\n");
 }
 
+TEST(Fields, ADesignAsAProjectIsTheSameJob) {
+  for (const char* motor :
+       {"motor = \"NEO\"\nmotor_count = 2\n",
+        "[mechanism.motor]\nnominal_voltage = \"24 V\"\nstall_torque = \"2.5 N m\"\n"
+        "stall_current = \"100 A\"\nfree_current = \"2 A\"\nfree_speed = \"600 rad/s\"\n"}) {
+    const std::string text = std::string(
+                                 "[mechanism]\ntype = \"elevator\"\ngearing = 10.0\n"
+                                 "mass = \"8 kg\"\ndrum_radius = \"1 in\"\n") +
+                             motor + "[controller]\ndelay = \"7 ms\"\n";
+    const auto job = parse_project(text, "p.toml");
+    ASSERT_TRUE(job) << to_string(job.error());
+    const auto result = design(job->job);
+    ASSERT_TRUE(result) << to_string(result.error());
+    const std::string written = gains_toml(*result, nullptr);
+    for (const char* other : {"angle_offset", "[log]", "mass"}) {
+      EXPECT_EQ(written.find(other), std::string::npos) << written;
+    }
+    const auto again = parse_project(written, "gains.toml");
+    ASSERT_TRUE(again) << to_string(again.error());
+    const PlantDescription& before = result->job.plant;
+    const PlantDescription& after = again->job.plant;
+    EXPECT_EQ(after.gains.kV, before.gains.kV);
+    EXPECT_EQ(after.gains.kA, before.gains.kA);
+    EXPECT_EQ(after.gains.kG, before.gains.kG);
+    EXPECT_EQ(after.motor->R, before.motor->R);
+    EXPECT_EQ(after.motor->count, before.motor->count);
+    EXPECT_EQ(after.nominal_voltage, before.nominal_voltage);
+    EXPECT_EQ(after.gearing, before.gearing);
+    EXPECT_EQ(after.drum_radius, before.drum_radius);
+    EXPECT_EQ(again->job.controller.delay, result->job.controller.delay);
+    EXPECT_EQ(again->job.controller.state_tolerance, result->job.controller.state_tolerance);
+    EXPECT_EQ(again->job.estimator.measurement_std, result->job.estimator.measurement_std);
+    // And its design is the same, battery and all.
+    EXPECT_EQ(design(again->job)->response.columns().back().values,
+              result->response.columns().back().values);
+  }
+}
+
 TEST(Fields, EveryExampleIsWhatTheFieldTakes) {
   for (const Section& section : project_document().sections) {
     EXPECT_FALSE(section.summary.empty()) << section.name;
