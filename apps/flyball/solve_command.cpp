@@ -124,7 +124,7 @@ int run(const Options& options, const CLI::App& command) {
     return success;
   }
   if (options.help && options.kind.empty()) {
-    print(command.help());
+    print(command.get_parent()->help());  // which names the program, too
     return success;
   }
   if (options.help) {
@@ -138,8 +138,8 @@ int run(const Options& options, const CLI::App& command) {
              .in("solve")
              .about("KIND")
              .got("left out")
-             .expected("a kind of problem")
-             .hint("flyball solve --list lists them"));
+             .expected("a kind of problem, such as dare")
+             .hint("flyball solve --list lists all"));
     return bad_input;
   }
   return answer_all(options.kind);

@@ -91,6 +91,11 @@ Outcome solve_margins(const Problem& problem, AnswerWriter& answer) {
   const MatrixXd& K = problem.matrix("K");
   const Time period(problem.number("T"));
   const Time delay(problem.number("delay"));
+  constexpr double most_periods = 500.0;  // each adds a state to the loop
+  if (period.si() > 0.0) {
+    FLYBALL_CHECK(
+        check_within(delay.si(), 0.0, most_periods * period.si(), "margins", "delay", "s"));
+  }
   const bool observer = problem.has("K_e");
   if (observer != problem.has("C")) {
     return tl::unexpected(Error(ArgumentError::malformed)

@@ -25,6 +25,18 @@ std::vector<Field> answered_system(std::string_view states, std::string_view inp
           matrix("D", outputs, inputs, "how the inputs reach the outputs")};
 }
 
+Outcome check_size(double numbers, std::string_view where, std::string_view about) {
+  constexpr double most = 2e7;
+  if (numbers <= most) {
+    return {};
+  }
+  return tl::unexpected(Error(ArgumentError::out_of_range)
+                            .in(std::string(where))
+                            .about(std::string(about))
+                            .got(fmt::format("so large that {:.3g} numbers are answered", numbers))
+                            .expected(fmt::format("such that at most {:.0f} are", most)));
+}
+
 std::span<const Kind> kinds() {
   static const std::vector<Kind> all = [] {
     std::vector<Kind> table;

@@ -11,6 +11,11 @@ namespace flyball::solve {
 
 namespace {
 
+/// How many numbers x and y have.
+double numbers_of(const ContinuousSystem<>& plant, double samples) {
+  return samples * static_cast<double>(plant.A.rows() + plant.C.rows());
+}
+
 /// x and y at the samples of u, exactly, the input held between them.
 Outcome solve_simulate(const Problem& problem, AnswerWriter& answer) {
   const ContinuousSystem<> plant = problem.system();
@@ -25,6 +30,7 @@ Outcome solve_simulate(const Problem& problem, AnswerWriter& answer) {
                               .expected("the time between the rows of u in seconds"));
   }
   const Time period(problem.has("T") ? problem.number("T") : 1.0);
+  FLYBALL_CHECK(check_size(numbers_of(plant, static_cast<double>(u.rows())), "simulate", "u"));
   FLYBALL_TRY(const auto response,
               discrete ? forced_response({plant.A, plant.B, plant.C, plant.D, period}, u, x0)
                        : forced_response(plant, u, x0, period));
@@ -38,6 +44,10 @@ Expected<std::optional<ResponseTimes>> times_of(const Problem& problem, std::str
   const bool discrete = problem.domain() == TimeDomain::discrete;
   if (!problem.has("samples") && (discrete || !problem.has("T"))) {
     return std::optional<ResponseTimes>();
+  }
+  if (problem.has("samples")) {
+    FLYBALL_CHECK(
+        check_size(numbers_of(problem.system(), problem.number("samples")), where, "samples"));
   }
   for (const char* name : {"samples", "T"}) {
     if (!problem.has(name) && !discrete) {

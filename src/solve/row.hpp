@@ -132,6 +132,10 @@ void write_system(const System& system, AnswerWriter& answer) {
 
 [[nodiscard]] std::vector<Field> operator+(std::vector<Field> some, const std::vector<Field>& more);
 
+/// An answer that is not much larger than a machine's memory: how many numbers it would hold.
+/// @param about  The field that makes it large. @errors ArgumentError::out_of_range.
+[[nodiscard]] Outcome check_size(double numbers, std::string_view where, std::string_view about);
+
 /// A system whose matrices are those of a discrete one, with the problem's T.
 [[nodiscard]] inline DiscreteSystem<> sampled(const Problem& problem,
                                               const ContinuousSystem<>& system) {

@@ -72,9 +72,16 @@ Outcome solve_sampled_cost(const Problem& problem, AnswerWriter& answer) {
 }
 
 Outcome solve_input_delay(const Problem& problem, AnswerWriter& answer) {
-  FLYBALL_TRY(const auto discrete,
-              discretize_with_input_delay(problem.system(), Time(problem.number("T")),
-                                          Time(problem.number("delay"))));
+  const Time period(problem.number("T"));
+  const Time delay(problem.number("delay"));
+  if (period.si() > 0.0 && delay.si() > 0.0) {
+    // Each period of the delay adds states, one an input.
+    const double states =
+        static_cast<double>(problem.matrix("A").rows()) +
+        delay.si() / period.si() * static_cast<double>(problem.matrix("B").cols());
+    FLYBALL_CHECK(check_size(states * states, "input-delay", "delay"));
+  }
+  FLYBALL_TRY(const auto discrete, discretize_with_input_delay(problem.system(), period, delay));
   write_system(discrete, answer);
   return {};
 }

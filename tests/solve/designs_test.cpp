@@ -161,6 +161,8 @@ TEST(SolveDesigns, Margins) {
   EXPECT_EQ(refusal("margins", plant + R"(,"C":[[1]]})"), "malformed");
   EXPECT_EQ(refusal("margins", plant + R"(,"K_e":[[1]]})"), "malformed");
   EXPECT_EQ(refusal("margins", plant + R"(,"delay":-1})"), "out_of_range");
+  EXPECT_EQ(refusal("margins", plant + R"(,"delay":51})"), "out_of_range");
+  EXPECT_EQ(refusal("margins", R"({"A":[[0]],"B":[[1]],"K":[[5]],"T":0})"), "not_positive");
   EXPECT_EQ(refusal("margins", R"({"A":[[0]],"B":[[1,1]],"K":[[25]],"T":0.1})"), "wrong_shape");
 }
 

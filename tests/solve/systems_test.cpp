@@ -68,6 +68,7 @@ TEST(SolveSystems, InputDelay) {
   expect_matrix(delayed, "C", {{1.0, 0.0}});
   EXPECT_EQ(refusal("input-delay", integrator + "-0.05}"), "out_of_range");
   EXPECT_EQ(refusal("input-delay", integrator + "\"inf\"}"), "not_finite");
+  EXPECT_EQ(refusal("input-delay", integrator + "500}"), "out_of_range");
 }
 
 // 1/(s + 1): 1 - e^{-t} and e^{-t}. x⁺ = x/2 + u: 2 - 2^{1-k} and 2^{1-k}, k >= 1.
@@ -83,6 +84,12 @@ TEST(SolveSystems, Responses) {
   const std::string discrete = R"({"A":[[0.5]],"B":[[1]],"domain":"discrete","samples":3)";
   expect_matrix(answer("step-response", discrete + "}"), "y", {{0.0}, {1.0}, {1.5}});
   expect_matrix(answer("impulse-response", discrete + "}"), "y", {{0.0}, {1.0}, {0.5}});
+  // No few bytes fill the memory.
+  const Json large =
+      answer("step-response", R"({"A":[[-1]],"B":[[1]],"T":0.5,"samples":20000000})");
+  EXPECT_EQ(large.at("error").at("message"),
+            "step-response: samples is so large that 4e+07 numbers are answered; it must be such "
+            "that at most 20000000 are");
   // Six time constants where nothing is said.
   const Json chosen = answer("step-response", R"({"A":[[-2]],"B":[[1]]})");
   EXPECT_NEAR(chosen.at("time").back().get<double>(), 3.0, 1e-12);
