@@ -63,7 +63,7 @@ class SimpleFeedforward {
   }
   /// Static friction, V: kS sgn(velocity), zero at rest.
   [[nodiscard]] double friction(double velocity) const noexcept {
-    return velocity > 0.0 ? gains_.kS : velocity < 0.0 ? -gains_.kS : 0.0;
+    return mechanisms::friction_voltage(gains_.kS, velocity);
   }
   /// What the linear model does not hold, V: gravity + friction.
   [[nodiscard]] double disturbance(double position, double velocity) const noexcept {

@@ -3,6 +3,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include <flyball/core/expected.hpp>
 #include <flyball/core/quantity.hpp>
@@ -36,12 +37,17 @@ struct DcMotor {
   double Kt = 0.0;  ///< N m/A: τ_stall/I_stall (12.4).
   double Kv = 0.0;  ///< rad/s/V: ω_free/(V - I_free R) (12.6).
 
-  /// I = V/R - ω/(K_v R), amperes of all motors together (12.1). @param omega  rad/s
-  [[nodiscard]] double current(double omega, double voltage) const noexcept {
+  /// I = V/R - ω/(K_v R), amperes of all motors together (12.1), over a generic scalar.
+  /// @param omega  rad/s
+  template <class Omega, class Volts>
+  [[nodiscard]] std::common_type_t<Omega, Volts> current(const Omega& omega,
+                                                         const Volts& voltage) const {
     return voltage / R - omega / (Kv * R);
   }
-  /// τ = K_t I, N m of all motors together (12.2).
-  [[nodiscard]] double torque(double omega, double voltage) const noexcept {
+  /// τ = K_t I, N m of all motors together (12.2), over a generic scalar.
+  template <class Omega, class Volts>
+  [[nodiscard]] std::common_type_t<Omega, Volts> torque(const Omega& omega,
+                                                        const Volts& voltage) const {
     return Kt * current(omega, voltage);
   }
 };

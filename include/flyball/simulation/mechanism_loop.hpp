@@ -6,7 +6,7 @@
 
 #include <flyball/control/mechanism_controller.hpp>
 #include <flyball/core/time_series.hpp>
-#include <flyball/simulation/battery.hpp>
+#include <flyball/mechanisms/battery.hpp>
 #include <flyball/simulation/mechanism_plant.hpp>
 #include <flyball/simulation/sensor.hpp>
 
@@ -17,7 +17,7 @@ struct MechanismTruth {
   mechanisms::FeedforwardGains gains{};  ///< True gains.
   double breakaway = 1.0;                ///< Static over sliding friction.
   double motor_resistance = std::numeric_limits<double>::infinity();  ///< Ω, for the battery.
-  Battery battery{};
+  mechanisms::Battery battery{};
   SensorModel sensor{};        ///< Of the velocity (flywheel), else of the position.
   Time actuation_delay{};      ///< From the sample to the change of the voltage, s.
   double voltage_noise = 0.0;  ///< V, standard deviation of the applied voltage of each period.

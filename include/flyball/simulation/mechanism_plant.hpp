@@ -4,11 +4,7 @@
 
 namespace flyball {
 
-/// Where a simulated mechanism is.
-struct MechanismState {
-  double position = 0.0;  ///< m or rad
-  double velocity = 0.0;  ///< m/s or rad/s
-};
+using mechanisms::MechanismState;
 
 /// The mechanism that a simulation takes for the truth: kA dv/dt = V - kV v - gravity - friction,
 /// with friction that sticks: at rest it holds whatever does not exceed breakaway kS.
@@ -40,17 +36,15 @@ class MechanismPlant {
  private:
   MechanismPlant(mechanisms::MechanismKind kind, const mechanisms::FeedforwardGains& gains,
                  double breakaway) noexcept
-      : kind_(kind), gains_(gains), breakaway_(breakaway) {}
-
-  /// The way it moves or sets off: -1, 0 (sticks) or 1, under V - gravity.
-  [[nodiscard]] int direction(double velocity, double drive) const noexcept;
-  /// Exact for a constant drive V - gravity.
-  [[nodiscard]] MechanismState step_constant(MechanismState state, double drive,
-                                             double duration) const noexcept;
+      : kind_(kind),
+        gains_(gains),
+        friction_{gains.kS, breakaway},
+        motion_(gains.kV, gains.kA, friction_) {}
 
   mechanisms::MechanismKind kind_;
   mechanisms::FeedforwardGains gains_;
-  double breakaway_;
+  mechanisms::Friction friction_;
+  mechanisms::FrictionMotion motion_;  ///< Exact for a constant drive V - gravity.
 };
 
 }  // namespace flyball

@@ -80,6 +80,24 @@ FeedforwardGains rotational_gains(const DcMotor& motor, double G, double J) {
 
 }  // namespace
 
+ModelDescription description_of(MechanismKind kind, const FeedforwardGains& gains) {
+  const std::string unit(position_unit(kind));
+  ModelDescription description{.name = std::string(to_string(kind)),
+                               .states = {{"position", unit}, {"velocity", unit + "/s"}},
+                               .inputs = {{"voltage", "V"}},
+                               .outputs = {{"position", unit}},
+                               .parameters = {{"kS", "V", gains.kS},
+                                              {"kV", "V·s/" + unit, gains.kV},
+                                              {"kA", "V·s²/" + unit, gains.kA},
+                                              {"kG", "V", gains.kG},
+                                              {"angle_offset", "rad", gains.angle_offset}}};
+  if (kind == MechanismKind::flywheel) {
+    description.states.erase(description.states.begin());
+    description.outputs = description.states;
+  }
+  return description;
+}
+
 Expected<Flywheel> flywheel(const FlywheelParameters& parameters) {
   constexpr std::string_view where = "flywheel";
   const auto& [motor, G, J] = parameters;

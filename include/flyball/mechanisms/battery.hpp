@@ -2,7 +2,7 @@
 
 #include <limits>
 
-namespace flyball {
+namespace flyball::mechanisms {
 
 /// A battery behind its resistance, feeding a motor through a switching controller.
 ///
@@ -27,4 +27,4 @@ struct Battery {
   }
 };
 
-}  // namespace flyball
+}  // namespace flyball::mechanisms

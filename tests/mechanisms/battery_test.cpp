@@ -1,8 +1,8 @@
-#include <flyball/simulation/battery.hpp>
+#include <flyball/mechanisms/battery.hpp>
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::mechanisms {
 namespace {
 
 // Stalled at full duty the battery's and the motor's resistances divide the voltage:
@@ -35,4 +35,4 @@ TEST(Battery, DoesNotSagWithoutResistanceOrMotor) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::mechanisms
