@@ -4,7 +4,7 @@
 #include <cstdio>
 
 #include <flyball/io/sysid_json.hpp>
-#include <flyball/simulation/test_session.hpp>
+#include <flyball/simulation/characterization.hpp>
 
 namespace {
 
@@ -31,7 +31,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: record_log FILE.json\n");
     return 2;
   }
-  simulation::TestSessionOptions session;
+  CharacterizationOptions session;
   session.mechanism = mechanisms::MechanismKind::elevator;
   session.kS = 0.15;
   session.kV = 4.0;
@@ -44,7 +44,7 @@ int main(int argc, char** argv) {
   session.friction_variation = 0.1;
   session.breakaway = 1.2;
   session.seed = 2024;
-  const auto recording = simulation::record_test_session(session);
+  const auto recording = record_characterization(session);
   if (!recording) {
     std::fprintf(stderr, "%s\n", to_string(recording.error()).c_str());
     return 1;

@@ -72,8 +72,7 @@ void run(const scenarios::Truth& truth, std::uint64_t first, std::uint64_t seeds
   std::vector<double> ols_kA;
   std::size_t refused = 0;
   for (std::uint64_t seed = first; seed < first + seeds; ++seed) {
-    const auto recording =
-        flyball::simulation::record_test_session(scenarios::session(truth, seed));
+    const auto recording = flyball::record_characterization(scenarios::session(truth, seed));
     if (!recording) {
       std::printf("%s\n", to_string(recording.error()).c_str());
       std::exit(1);
@@ -136,7 +135,7 @@ int main(int argc, char** argv) {
       return 2;
     }
   }
-  for (const scenarios::Truth& truth : scenarios::kMechanisms) {
+  for (const scenarios::Truth& truth : scenarios::mechanisms) {
     if (only.empty() || truth.name.find(only) != std::string_view::npos) {
       run(truth, first, seeds);
     }

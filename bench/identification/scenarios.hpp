@@ -6,13 +6,13 @@
 #include <string_view>
 
 #include <flyball/core/random.hpp>
-#include <flyball/simulation/test_session.hpp>
+#include <flyball/simulation/characterization.hpp>
 
 /// The six mechanisms that the identification is measured on.
 namespace scenarios {
 
+using flyball::CharacterizationOptions;
 using flyball::mechanisms::MechanismKind;
-using flyball::simulation::TestSessionOptions;
 
 struct Truth {
   std::string_view name;
@@ -20,7 +20,7 @@ struct Truth {
   double kS, kV, kA, kG, offset;
 };
 
-inline constexpr std::array<Truth, 6> kMechanisms{{
+inline constexpr std::array<Truth, 6> mechanisms{{
     {"flywheel 1", MechanismKind::flywheel, 0.2, 0.02, 0.004, 0.0, 0.0},
     {"flywheel 2", MechanismKind::flywheel, 0.5, 0.12, 0.05, 0.0, 0.0},
     {"elevator 1", MechanismKind::elevator, 0.15, 4.0, 0.3, 0.6, 0.0},
@@ -30,9 +30,9 @@ inline constexpr std::array<Truth, 6> kMechanisms{{
 }};
 
 /// A session of that mechanism; whatever the description leaves open varies with the seed.
-inline TestSessionOptions session(const Truth& truth, std::uint64_t seed) {
+inline CharacterizationOptions session(const Truth& truth, std::uint64_t seed) {
   flyball::Random random(seed * 7919 + 17);
-  TestSessionOptions options;
+  CharacterizationOptions options;
   options.mechanism = truth.kind;
   options.kS = truth.kS;
   options.kV = truth.kV;

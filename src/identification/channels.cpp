@@ -9,15 +9,15 @@
 namespace flyball::identification {
 namespace {
 
-constexpr double kSmoothingHalfWidth = 0.035;  // s
+constexpr double smoothing_half_width = 0.035;  // s
 
 std::vector<double> smooth_velocity(const PreparedRun& prepared, bool has_position) {
   const TestRun& run = prepared.run;
   std::vector<double> smoothed(run.time.size(), 0.0);
   if (!has_position) {
     for (std::size_t i = 0; i < run.time.size(); ++i) {
-      const std::size_t low = lower_index(run.time, run.time[i] - kSmoothingHalfWidth);
-      const std::size_t high = lower_index(run.time, run.time[i] + kSmoothingHalfWidth);
+      const std::size_t low = lower_index(run.time, run.time[i] - smoothing_half_width);
+      const std::size_t high = lower_index(run.time, run.time[i] + smoothing_half_width);
       double sum = 0.0;
       for (std::size_t j = low; j < high; ++j) {
         sum += run.velocity[j];
@@ -36,9 +36,9 @@ std::vector<double> smooth_velocity(const PreparedRun& prepared, bool has_positi
     return smoothed;
   }
   for (std::size_t i = 0; i < run.time.size(); ++i) {
-    const double low = std::max(run.time[i] - kSmoothingHalfWidth, time.front());
-    const double high = std::min(run.time[i] + kSmoothingHalfWidth, time.back());
-    if (high - low > 0.5 * kSmoothingHalfWidth) {
+    const double low = std::max(run.time[i] - smoothing_half_width, time.front());
+    const double high = std::min(run.time[i] + smoothing_half_width, time.back());
+    if (high - low > 0.5 * smoothing_half_width) {
       smoothed[i] =
           (interpolate(time, position, high) - interpolate(time, position, low)) / (high - low);
     }
@@ -274,11 +274,11 @@ void mend_signs(PreparedRecording& prepared) {
 }
 
 void drop_coarse_velocity(PreparedRecording& prepared) {
-  constexpr double kCoarse = 0.05;  // of top speed
-  constexpr double kSpan = 0.07;    // s, of the position differences that replace it
+  constexpr double coarse = 0.05;  // of top speed
+  constexpr double span = 0.07;    // s, of the position differences that replace it
   if (!prepared.has_position || !prepared.has_velocity ||
-      prepared.velocity_quantum < kCoarse * prepared.top_speed ||
-      prepared.velocity_quantum < 2.0 * prepared.position_quantum / kSpan) {
+      prepared.velocity_quantum < coarse * prepared.top_speed ||
+      prepared.velocity_quantum < 2.0 * prepared.position_quantum / span) {
     return;
   }
   prepared.has_velocity = false;

@@ -11,9 +11,9 @@
 namespace flyball::identification {
 namespace {
 
-constexpr double kBin = 0.02;   // s
-constexpr int kLags = 30;       // bins: correlation is followed for 0.6 s
-constexpr double kBlock = 0.6;  // s
+constexpr double bin_width = 0.02;    // s
+constexpr int lags = 30;              // bins: correlation is followed for 0.6 s
+constexpr double block_length = 0.6;  // s
 
 /// A run's residuals and Jacobians summed over bins of time, per channel.
 struct Bins {
@@ -36,7 +36,7 @@ LocalMatrix bin_channel(const Eigen::VectorXd& residuals, const ResidualBlock::J
     const double z = residuals[row] * inverse_scale;
     const double w = weight(z);
     const LocalVector j = jacobian.row(row).transpose() * inverse_scale;
-    const auto at = static_cast<std::size_t>(times[static_cast<std::size_t>(row)] / kBin);
+    const auto at = static_cast<std::size_t>(times[static_cast<std::size_t>(row)] / bin_width);
     if (at >= bins.size()) {
       bins.resize(at + 1);
     }
@@ -67,7 +67,7 @@ std::vector<double> residual_times(const OutputErrorProblem& problem, std::size_
 }
 
 double bartlett(int lag) {
-  return 1.0 - static_cast<double>(lag) / (kLags + 1);
+  return 1.0 - static_cast<double>(lag) / (lags + 1);
 }
 
 /// Means of a bin's residuals; NaN-free: bins without rows have weight 0.
@@ -76,7 +76,7 @@ double mean_residual(const Bins::ChannelBin& bin) {
 }
 
 /// Autocovariance and cross-covariance of the binned residuals of ramps or of steps.
-using Covariogram = std::array<std::array<std::array<double, kLags + 1>, 2>, 2>;
+using Covariogram = std::array<std::array<std::array<double, lags + 1>, 2>, 2>;
 Covariogram covariogram(const std::vector<Bins>& runs, bool ramps) {
   Covariogram sum{};
   Covariogram count{};
@@ -87,7 +87,7 @@ Covariogram covariogram(const std::vector<Bins>& runs, bool ramps) {
     for (std::size_t a = 0; a < 2; ++a) {
       for (std::size_t b = 0; b < 2; ++b) {
         for (std::size_t i = 0; i < run.channels[a].size(); ++i) {
-          for (std::size_t lag = 0; lag <= kLags && i + lag < run.channels[b].size(); ++lag) {
+          for (std::size_t lag = 0; lag <= lags && i + lag < run.channels[b].size(); ++lag) {
             const Bins::ChannelBin& first = run.channels[a][i];
             const Bins::ChannelBin& second = run.channels[b][i + lag];
             if (first.count > 0 && second.count > 0) {
@@ -101,7 +101,7 @@ Covariogram covariogram(const std::vector<Bins>& runs, bool ramps) {
   }
   for (std::size_t a = 0; a < 2; ++a) {
     for (std::size_t b = 0; b < 2; ++b) {
-      for (std::size_t lag = 0; lag <= kLags; ++lag) {
+      for (std::size_t lag = 0; lag <= lags; ++lag) {
         sum[a][b][lag] = count[a][b][lag] > 0.0 ? sum[a][b][lag] / count[a][b][lag] : 0.0;
       }
     }
@@ -132,7 +132,7 @@ LocalMatrix hac_middle(const Bins& run) {
   }
   for (std::size_t i = 0; i < bins; ++i) {
     middle += scores[i] * scores[i].transpose();
-    for (std::size_t lag = 1; lag <= kLags && i + lag < bins; ++lag) {
+    for (std::size_t lag = 1; lag <= lags && i + lag < bins; ++lag) {
       const LocalMatrix cross = scores[i] * scores[i + lag].transpose();
       middle += bartlett(static_cast<int>(lag)) * (cross + cross.transpose());
     }
@@ -143,7 +143,7 @@ LocalMatrix hac_middle(const Bins& run) {
 /// Sums of scores over blocks of 0.6 s count as independent.
 LocalMatrix block_middle(const Bins& run, std::size_t& blocks) {
   LocalMatrix middle = LocalMatrix::Zero();
-  const auto length = static_cast<std::size_t>(kBlock / kBin);
+  const auto length = static_cast<std::size_t>(block_length / bin_width);
   const std::size_t bins = bin_count(run);
   for (std::size_t begin = 0; begin < bins; begin += length) {
     LocalVector sum = LocalVector::Zero();
@@ -170,7 +170,7 @@ LocalMatrix correlation_middle(const Bins& run, const Covariogram& gamma) {
           continue;
         }
         LocalVector sum = LocalVector::Zero();
-        for (std::size_t lag = 0; lag <= kLags && i + lag < second.size(); ++lag) {
+        for (std::size_t lag = 0; lag <= lags && i + lag < second.size(); ++lag) {
           sum += (bartlett(static_cast<int>(lag)) * gamma[a][b][lag]) * second[i + lag].jacobian;
         }
         const LocalMatrix cross = first[i].jacobian * sum.transpose();
@@ -222,11 +222,13 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
   }
 
   // The same holds, more weakly, for what only nuisance parameters and kA may lack: data.
-  bread(kLogTimeConstant, kLogTimeConstant) += 0.1;
-  for (const int delay : {kPositionDelay, kVelocityDelay, kAveragingWidth}) {
+  bread(parameter::log_time_constant, parameter::log_time_constant) += 0.1;
+  for (const int delay :
+       {parameter::position_delay, parameter::velocity_delay, parameter::averaging_width}) {
     bread(delay, delay) += 1.0 / square(0.1);
   }
-  bread.diagonal().tail(n - kSharedParameters).array() += problem.initial_velocity_information();
+  bread.diagonal().tail(n - shared_parameter_count).array() +=
+      problem.initial_velocity_information();
 
   const Covariogram ramp_gamma = covariogram(runs, true);
   const Covariogram step_gamma = covariogram(runs, false);

@@ -12,9 +12,9 @@
 namespace flyball::identification {
 namespace {
 
-constexpr double kOneSided95 = 1.645;
-constexpr int kProfilePoints = 8;
-constexpr int kRefitIterations = 12;
+constexpr double one_sided_95 = 1.645;
+constexpr int profile_points = 8;
+constexpr int refit_iterations = 12;
 
 /// How much larger the variance is than independent residuals would make it.
 double correlation_inflation(const Covariances& spread, Eigen::Index parameter) {
@@ -44,21 +44,22 @@ std::optional<Inertia> fit_channel(OutputErrorProblem& problem, const RobustFit&
     return std::nullopt;
   }
   std::vector<bool> free = problem.free_parameters();
-  free[kPositionDelay] = free[kPositionDelay] && position;
-  free[kVelocityDelay] = free[kVelocityDelay] && !position;
-  free[kAveragingWidth] = free[kAveragingWidth] && !position;
-  free[kVelocityScale] = false;
-  const RobustFit fit = minimize(problem, best.x, free, bounds, chosen, kRefitIterations, 0.1);
+  free[parameter::position_delay] = free[parameter::position_delay] && position;
+  free[parameter::velocity_delay] = free[parameter::velocity_delay] && !position;
+  free[parameter::averaging_width] = free[parameter::averaging_width] && !position;
+  free[parameter::velocity_scale] = false;
+  const RobustFit fit = minimize(problem, best.x, free, bounds, chosen, refit_iterations, 0.1);
   const Covariances spread = covariances(problem, fit.x, free, bounds, chosen);
   const double slack = 1e-6;
-  if (spread.singular || fit.x[kLogTimeConstant] <= bounds.lower[kLogTimeConstant] + slack ||
-      fit.x[kLogTimeConstant] >= bounds.upper[kLogTimeConstant] - slack) {
+  if (spread.singular ||
+      fit.x[parameter::log_time_constant] <= bounds.lower[parameter::log_time_constant] + slack ||
+      fit.x[parameter::log_time_constant] >= bounds.upper[parameter::log_time_constant] - slack) {
     return std::nullopt;
   }
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(fit.x.size());
-  gradient[kLogTimeConstant] = 1.0;
-  gradient[kVelocityGain] = 1.0 / fit.x[kVelocityGain];
-  return Inertia{fit.x[kLogTimeConstant] + std::log(fit.x[kVelocityGain]),
+  gradient[parameter::log_time_constant] = 1.0;
+  gradient[parameter::velocity_gain] = 1.0 / fit.x[parameter::velocity_gain];
+  return Inertia{fit.x[parameter::log_time_constant] + std::log(fit.x[parameter::velocity_gain]),
                  spread.standard_error(gradient)};
 }
 
@@ -66,9 +67,9 @@ std::optional<Inertia> fit_channel(OutputErrorProblem& problem, const RobustFit&
 /// recorded.
 double overshoot(const std::vector<double>& time, const std::vector<double>& velocity,
                  double direction) {
-  constexpr double kSettling = 0.3;  // s
-  const std::size_t middle = lower_index(time, time.front() + kSettling);
-  const std::size_t end = lower_index(time, time.front() + 2.0 * kSettling);
+  constexpr double settling = 0.3;  // s
+  const std::size_t middle = lower_index(time, time.front() + settling);
+  const std::size_t end = lower_index(time, time.front() + 2.0 * settling);
   if (end >= time.size()) {
     return 0.0;
   }
@@ -88,31 +89,32 @@ double overshoot(const std::vector<double>& time, const std::vector<double>& vel
 
 double inertia_ceiling(OutputErrorProblem& problem, const RobustFit& best, const Bounds& bounds,
                        const ChannelScales& scales, const Covariances& spread) {
-  const double inflation = std::max(correlation_inflation(spread, kVelocityGain),
-                                    correlation_inflation(spread, kLogTimeConstant));
-  const double allowed = kOneSided95 * kOneSided95 * inflation;
+  const double inflation = std::max(correlation_inflation(spread, parameter::velocity_gain),
+                                    correlation_inflation(spread, parameter::log_time_constant));
+  const double allowed = one_sided_95 * one_sided_95 * inflation;
   std::vector<bool> free = problem.free_parameters();
-  free[kLogTimeConstant] = false;
+  free[parameter::log_time_constant] = false;
   Eigen::VectorXd x = best.x;
-  double below = x[kLogTimeConstant];
+  double below = x[parameter::log_time_constant];
   double rise_below = 0.0;
-  for (int point = 0; point < kProfilePoints; ++point) {
-    x[kLogTimeConstant] = std::min(below + std::log(1.8), bounds.upper[kLogTimeConstant]);
+  for (int point = 0; point < profile_points; ++point) {
+    x[parameter::log_time_constant] =
+        std::min(below + std::log(1.8), bounds.upper[parameter::log_time_constant]);
     const RobustFit fit =
-        minimize(problem, x, free, bounds, scales, kRefitIterations, 0.02 * allowed);
+        minimize(problem, x, free, bounds, scales, refit_iterations, 0.02 * allowed);
     const double rise = std::max(0.0, fit.cost - best.cost);
     x = fit.x;
     if (rise > allowed) {
       // Near the minimum √rise is linear in the parameter.
       const double fraction =
           (std::sqrt(allowed) - std::sqrt(rise_below)) / (std::sqrt(rise) - std::sqrt(rise_below));
-      const double log_tau = below + fraction * (x[kLogTimeConstant] - below);
-      return std::exp(log_tau) * x[kVelocityGain];
+      const double log_tau = below + fraction * (x[parameter::log_time_constant] - below);
+      return std::exp(log_tau) * x[parameter::velocity_gain];
     }
-    below = x[kLogTimeConstant];
+    below = x[parameter::log_time_constant];
     rise_below = rise;
   }
-  return std::exp(below) * x[kVelocityGain];
+  return std::exp(below) * x[parameter::velocity_gain];
 }
 
 void compare_channels(OutputErrorProblem& problem, const RobustFit& best, const Bounds& bounds,

@@ -11,22 +11,22 @@ namespace {
 
 using mechanisms::MechanismKind;
 
-constexpr double kNormal95 = 1.96;
-constexpr double kOneSided95 = 1.645;
-constexpr double kWidestTimeConstant = 0.6;  // relative half-width beyond which kA is unknown
+constexpr double normal_95 = 1.96;
+constexpr double one_sided_95 = 1.645;
+constexpr double widest_time_constant = 0.6;  // relative half-width beyond which kA is unknown
 
 // What no single session can tell: repeats of one mechanism on one day scatter by at least so much,
 // and voltages are not measured better than to a few millivolts.
-constexpr double kVoltageAllowance = 3e-3;  // V, standard error added to kS and kG
-constexpr double kSpeedAllowance = 1.5e-3;  // relative, added to kV
-constexpr double kInertiaAllowance = 1e-2;  // relative, added to kA
+constexpr double voltage_allowance = 3e-3;  // V, standard error added to kS and kG
+constexpr double speed_allowance = 1.5e-3;  // relative, added to kV
+constexpr double inertia_allowance = 1e-2;  // relative, added to kA
 
 /// @param allowance  Standard error of what the model leaves out, in the gain's unit.
 GainEstimate symmetric(double value, double random_error, double allowance) {
   const double standard_error = std::hypot(random_error, allowance);
   return {value,
           standard_error,
-          {value - kNormal95 * standard_error, value + kNormal95 * standard_error},
+          {value - normal_95 * standard_error, value + normal_95 * standard_error},
           true,
           0.0,
           {}};
@@ -45,25 +45,25 @@ Eigen::VectorXd unit_gradient(Eigen::Index size, Eigen::Index at) {
 /// kA = τ kV, positive: its interval is symmetric in the logarithm.
 GainEstimate inertia_gain(const PreparedRecording& prepared, const Eigen::VectorXd& x,
                           const Covariances& spread, const Bounds& bounds) {
-  const double tau = std::exp(x[kLogTimeConstant]);
-  const double kV = x[kVelocityGain];
+  const double tau = std::exp(x[parameter::log_time_constant]);
+  const double kV = x[parameter::velocity_gain];
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(x.size());
-  gradient[kLogTimeConstant] = 1.0;
-  gradient[kVelocityGain] = 1.0 / kV;
-  const double relative = std::hypot(spread.standard_error(gradient), kInertiaAllowance);
+  gradient[parameter::log_time_constant] = 1.0;
+  gradient[parameter::velocity_gain] = 1.0 / kV;
+  const double relative = std::hypot(spread.standard_error(gradient), inertia_allowance);
   GainEstimate kA;
   kA.value = tau * kV;
   kA.standard_error = relative * kA.value;
-  const double reach = std::min(kNormal95 * relative, 20.0);
+  const double reach = std::min(normal_95 * relative, 20.0);
   kA.interval = {kA.value * std::exp(-reach), kA.value * std::exp(reach)};
 
   const double refresh = std::max(
       {prepared.row_period, prepared.position_refresh_period, prepared.velocity_refresh_period});
-  if (x[kLogTimeConstant] <= bounds.lower[kLogTimeConstant] + 1e-6) {
+  if (x[parameter::log_time_constant] <= bounds.lower[parameter::log_time_constant] + 1e-6) {
     mark_undetermined(
         kA, kA.interval[1],
         detail::format("the speed-up is over within one sensor value ({:.0f} ms)", 1e3 * refresh));
-  } else if (x[kLogTimeConstant] >= bounds.upper[kLogTimeConstant] - 1e-6) {
+  } else if (x[parameter::log_time_constant] >= bounds.upper[parameter::log_time_constant] - 1e-6) {
     mark_undetermined(kA, kA.interval[1], "the speed hardly settles within the tests");
   } else if (tau < refresh) {
     mark_undetermined(
@@ -71,33 +71,34 @@ GainEstimate inertia_gain(const PreparedRecording& prepared, const Eigen::Vector
         detail::format("the time constant kA/kV = {:.1f} ms is shorter than the {:.0f} "
                        "ms between sensor values",
                        1e3 * tau, 1e3 * refresh));
-  } else if (kNormal95 * relative > kWidestTimeConstant) {
+  } else if (normal_95 * relative > widest_time_constant) {
     mark_undetermined(
         kA, kA.interval[1],
         detail::format("its 95 % interval is ±{:.0f} %: it trades against the sensors' "
                        "delay and averaging",
-                       100.0 * kNormal95 * relative));
+                       100.0 * normal_95 * relative));
   }
   return kA;
 }
 
 void gravity_gains(const Eigen::VectorXd& x, const Covariances& spread, FeedforwardFit& fit) {
-  const double cosine = x[kGravityCosine];
-  const double sine = x[kGravitySine];
+  const double cosine = x[parameter::gravity_cosine];
+  const double sine = x[parameter::gravity_sine];
   if (fit.mechanism == MechanismKind::elevator) {
-    fit.kG = symmetric(cosine, spread.standard_error(unit_gradient(x.size(), kGravityCosine)),
-                       kVoltageAllowance);
+    fit.kG =
+        symmetric(cosine, spread.standard_error(unit_gradient(x.size(), parameter::gravity_cosine)),
+                  voltage_allowance);
   } else if (fit.mechanism == MechanismKind::arm) {
     // kG cos(θ + offset) = kG cos(offset) cos θ − kG sin(offset) sin θ
     const double amplitude = std::max(std::hypot(cosine, sine), 1e-12);
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(x.size());
-    gradient[kGravityCosine] = cosine / amplitude;
-    gradient[kGravitySine] = sine / amplitude;
-    fit.kG = symmetric(amplitude, spread.standard_error(gradient), kVoltageAllowance);
-    gradient[kGravityCosine] = sine / (amplitude * amplitude);
-    gradient[kGravitySine] = -cosine / (amplitude * amplitude);
+    gradient[parameter::gravity_cosine] = cosine / amplitude;
+    gradient[parameter::gravity_sine] = sine / amplitude;
+    fit.kG = symmetric(amplitude, spread.standard_error(gradient), voltage_allowance);
+    gradient[parameter::gravity_cosine] = sine / (amplitude * amplitude);
+    gradient[parameter::gravity_sine] = -cosine / (amplitude * amplitude);
     fit.angle_offset = symmetric(std::atan2(-sine, cosine), spread.standard_error(gradient),
-                                 kVoltageAllowance / amplitude);
+                                 voltage_allowance / amplitude);
   } else {
     return;
   }
@@ -121,21 +122,22 @@ Expected<void> estimate_gains(const PreparedRecording& prepared, const Eigen::Ve
                               .in("identify")
                               .hint("record ramps and steps in both directions with more travel"));
   }
-  fit.kS =
-      symmetric(x[kStaticFriction], spread.standard_error(unit_gradient(x.size(), kStaticFriction)),
-                kVoltageAllowance);
+  fit.kS = symmetric(x[parameter::static_friction],
+                     spread.standard_error(unit_gradient(x.size(), parameter::static_friction)),
+                     voltage_allowance);
   fit.kS.interval[0] = std::max(0.0, fit.kS.interval[0]);
   if (fit.kS.interval[0] <= 0.0) {
     mark_undetermined(fit.kS, std::max(fit.kS.interval[1], 1e-3),
                       "static friction cannot be told from zero");
   }
-  fit.kV =
-      symmetric(x[kVelocityGain], spread.standard_error(unit_gradient(x.size(), kVelocityGain)),
-                kSpeedAllowance * x[kVelocityGain]);
+  fit.kV = symmetric(x[parameter::velocity_gain],
+                     spread.standard_error(unit_gradient(x.size(), parameter::velocity_gain)),
+                     speed_allowance * x[parameter::velocity_gain]);
   fit.kA = inertia_gain(prepared, x, spread, bounds);
   gravity_gains(x, spread, fit);
 
-  const bool kV_at_bound = x[kVelocityGain] <= 1.001 * bounds.lower[kVelocityGain];
+  const bool kV_at_bound =
+      x[parameter::velocity_gain] <= 1.001 * bounds.lower[parameter::velocity_gain];
   if (!(fit.kV.value > 0.0) || kV_at_bound) {
     return tl::unexpected(Error(IdentificationError::unphysical_gains)
                               .in("identify")
@@ -144,12 +146,12 @@ Expected<void> estimate_gains(const PreparedRecording& prepared, const Eigen::Ve
                               .expected("positive")
                               .hint("check the signs and units of voltage and velocity"));
   }
-  if (kNormal95 * fit.kV.standard_error > 0.5 * fit.kV.value) {
+  if (normal_95 * fit.kV.standard_error > 0.5 * fit.kV.value) {
     return tl::unexpected(Error(IdentificationError::singular)
                               .in("identify")
                               .about("kV")
                               .got(detail::format("{:.4g} ± {:.2g} V/({}/s)", fit.kV.value,
-                                                  kNormal95 * fit.kV.standard_error, fit.unit))
+                                                  normal_95 * fit.kV.standard_error, fit.unit))
                               .expected("known to better than 50 %")
                               .hint("record longer tests with more travel"));
   }

@@ -21,10 +21,10 @@ namespace {
 
 using mechanisms::MechanismKind;
 
-constexpr std::string_view kWhere = "identify";
-constexpr double kShortestTimeConstant = 0.002;  // s
-constexpr double kLongestTimeConstant = 10.0;    // s
-constexpr int kScaleRefreshes = 4;
+constexpr std::string_view where = "identify";
+constexpr double shortest_time_constant = 0.002;  // s
+constexpr double longest_time_constant = 10.0;    // s
+constexpr int scale_refreshes = 4;
 
 Expected<void> check_tests(const PreparedRecording& prepared) {
   bool any = false;
@@ -45,7 +45,7 @@ Expected<void> check_tests(const PreparedRecording& prepared) {
   }
   if (prepared.runs.empty()) {
     return tl::unexpected(Error(IdentificationError::no_data)
-                              .in(std::string(kWhere))
+                              .in(std::string(where))
                               .hint("record the four tests again"));
   }
   if (!any) {
@@ -63,7 +63,7 @@ Expected<void> check_tests(const PreparedRecording& prepared) {
     }
     return tl::unexpected(
         Error(IdentificationError::no_motion)
-            .in(std::string(kWhere))
+            .in(std::string(where))
             .hint(voltage < 0.1
                       ? "no voltage was applied either: the log was started but no test ran"
                       : "check that the encoder counts and that the mechanism is free")
@@ -73,7 +73,7 @@ Expected<void> check_tests(const PreparedRecording& prepared) {
   if (!ramps || !steps) {
     return tl::unexpected(
         Error(IdentificationError::missing_tests)
-            .in(std::string(kWhere))
+            .in(std::string(where))
             .about(ramps ? "dynamic tests (steps)" : "quasistatic tests (ramps)")
             .got("missing or without usable motion")
             .hint(ramps ? "ramps alone do not tell kA; record dynamic-forward and dynamic-reverse"
@@ -82,7 +82,7 @@ Expected<void> check_tests(const PreparedRecording& prepared) {
   }
   if (prepared.mechanism != MechanismKind::flywheel && !(forward && backward)) {
     return tl::unexpected(Error(IdentificationError::missing_tests)
-                              .in(std::string(kWhere))
+                              .in(std::string(where))
                               .about(forward ? "motion in reverse" : "motion forward")
                               .got("missing")
                               .hint("in one direction alone friction and gravity are one number; "
@@ -94,22 +94,21 @@ Expected<void> check_tests(const PreparedRecording& prepared) {
 Bounds make_bounds(const OutputErrorProblem& problem, const StartGains& start,
                    const FitOptions& options) {
   const Eigen::Index n = problem.parameters();
-  constexpr double kUnbounded = 1e12;
-  Bounds bounds{Eigen::VectorXd::Constant(n, -kUnbounded),
-                Eigen::VectorXd::Constant(n, kUnbounded)};
-  bounds.lower[kStaticFriction] = 0.0;
-  bounds.lower[kVelocityGain] = 1e-3 * start.kV;
-  bounds.upper[kVelocityGain] = 1e3 * start.kV;
-  bounds.lower[kLogTimeConstant] = std::log(kShortestTimeConstant);
-  bounds.upper[kLogTimeConstant] = std::log(kLongestTimeConstant);
-  bounds.lower[kPositionDelay] = -0.04;
-  bounds.upper[kPositionDelay] = options.max_delay;
-  bounds.lower[kAveragingWidth] = 0.0;
-  bounds.upper[kAveragingWidth] = 0.3;
-  bounds.lower[kVelocityDelay] = -0.04;
-  bounds.upper[kVelocityDelay] = options.max_delay + 0.15;
-  bounds.lower[kVelocityScale] = 0.3;
-  bounds.upper[kVelocityScale] = 3.0;
+  constexpr double unbounded = 1e12;
+  Bounds bounds{Eigen::VectorXd::Constant(n, -unbounded), Eigen::VectorXd::Constant(n, unbounded)};
+  bounds.lower[parameter::static_friction] = 0.0;
+  bounds.lower[parameter::velocity_gain] = 1e-3 * start.kV;
+  bounds.upper[parameter::velocity_gain] = 1e3 * start.kV;
+  bounds.lower[parameter::log_time_constant] = std::log(shortest_time_constant);
+  bounds.upper[parameter::log_time_constant] = std::log(longest_time_constant);
+  bounds.lower[parameter::position_delay] = -0.04;
+  bounds.upper[parameter::position_delay] = options.max_delay;
+  bounds.lower[parameter::averaging_width] = 0.0;
+  bounds.upper[parameter::averaging_width] = 0.3;
+  bounds.lower[parameter::velocity_delay] = -0.04;
+  bounds.upper[parameter::velocity_delay] = options.max_delay + 0.15;
+  bounds.lower[parameter::velocity_scale] = 0.3;
+  bounds.upper[parameter::velocity_scale] = 3.0;
   return bounds;
 }
 
@@ -117,20 +116,21 @@ Eigen::VectorXd make_start(const OutputErrorProblem& problem, const StartGains& 
                            double time_constant) {
   const PreparedRecording& recording = problem.recording();
   Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.parameters());
-  x[kStaticFriction] = gains.kS;
-  x[kVelocityGain] = gains.kV;
-  x[kLogTimeConstant] = std::log(time_constant);
-  x[kGravityCosine] = gains.gravity_cosine;
-  x[kGravitySine] = gains.gravity_sine;
-  x[kPositionDelay] = recording.has_position ? 0.01 : 0.0;
-  x[kVelocityDelay] = recording.has_velocity ? 0.03 : 0.0;
-  x[kAveragingWidth] = recording.has_velocity ? 0.03 : 0.0;
-  x[kVelocityScale] = recording.has_position && recording.has_velocity &&
-                              std::abs(recording.velocity_scale - 1.0) > 0.03
-                          ? recording.velocity_scale
-                          : 1.0;
+  x[parameter::static_friction] = gains.kS;
+  x[parameter::velocity_gain] = gains.kV;
+  x[parameter::log_time_constant] = std::log(time_constant);
+  x[parameter::gravity_cosine] = gains.gravity_cosine;
+  x[parameter::gravity_sine] = gains.gravity_sine;
+  x[parameter::position_delay] = recording.has_position ? 0.01 : 0.0;
+  x[parameter::velocity_delay] = recording.has_velocity ? 0.03 : 0.0;
+  x[parameter::averaging_width] = recording.has_velocity ? 0.03 : 0.0;
+  x[parameter::velocity_scale] = recording.has_position && recording.has_velocity &&
+                                         std::abs(recording.velocity_scale - 1.0) > 0.03
+                                     ? recording.velocity_scale
+                                     : 1.0;
   for (std::size_t i = 0; i < problem.runs().size(); ++i) {
-    x[kSharedParameters + static_cast<Eigen::Index>(i)] = problem.runs()[i].likely_initial_velocity;
+    x[shared_parameter_count + static_cast<Eigen::Index>(i)] =
+        problem.runs()[i].likely_initial_velocity;
   }
   return x;
 }
@@ -156,9 +156,9 @@ RobustFit fit_gains(OutputErrorProblem& problem, const StartGains& gains, const 
       best = std::move(fit);
     }
   }
-  for (int refresh = 0; refresh < kScaleRefreshes; ++refresh) {
-    const bool last = refresh + 1 == kScaleRefreshes;
-    problem.set_angle_delay(best.x[kPositionDelay]);
+  for (int refresh = 0; refresh < scale_refreshes; ++refresh) {
+    const bool last = refresh + 1 == scale_refreshes;
+    problem.set_angle_delay(best.x[parameter::position_delay]);
     scales = residual_scales(problem, best.x);
     best = minimize(problem, best.x, free, bounds, scales,
                     std::max(1, std::min(last ? 60 : 20, options.max_iterations - iterations)),
@@ -229,13 +229,13 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
                                       std::vector<Diagnostic>& diagnostics) {
   if (!prepared.mechanism) {
     return tl::unexpected(Error(IdentificationError::unknown_mechanism)
-                              .in(std::string(kWhere))
+                              .in(std::string(where))
                               .hint("say which: flywheel, elevator or arm"));
   }
   FLYBALL_CHECK(check_tests(prepared));
   if (*prepared.mechanism == MechanismKind::arm && !prepared.has_position) {
     return tl::unexpected(Error(IdentificationError::singular)
-                              .in(std::string(kWhere))
+                              .in(std::string(where))
                               .about("the position")
                               .got("missing or constant")
                               .expected("the arm's angle, which its gravity depends on"));
@@ -244,7 +244,7 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
   OutputErrorProblem problem(prepared, options);
   if (problem.residuals() < 10 * static_cast<std::size_t>(problem.parameters())) {
     return tl::unexpected(Error(IdentificationError::too_short)
-                              .in(std::string(kWhere))
+                              .in(std::string(where))
                               .hint("record longer tests")
                               .with("usable values", static_cast<double>(problem.residuals())));
   }
@@ -259,10 +259,10 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
   fit.unit = prepared.unit;
   fit.iterations = best.iterations;
   fit.residuals = problem.residuals();
-  fit.position_delay = best.x[kPositionDelay];
-  fit.velocity_delay = best.x[kVelocityDelay];
-  fit.averaging_width = best.x[kAveragingWidth];
-  fit.velocity_scale = best.x[kVelocityScale];
+  fit.position_delay = best.x[parameter::position_delay];
+  fit.velocity_delay = best.x[parameter::velocity_delay];
+  fit.averaging_width = best.x[parameter::averaging_width];
+  fit.velocity_scale = best.x[parameter::velocity_scale];
   add_runs(problem, best.x, fit);
   FLYBALL_CHECK(estimate_gains(prepared, best.x, spread, bounds, fit));
   if (auto one_step = fit_one_step(prepared)) {

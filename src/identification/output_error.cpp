@@ -9,16 +9,18 @@ namespace {
 
 using mechanisms::MechanismKind;
 
-constexpr double kTail = 0.06;           // s, simulated beyond the window for negative delays
-constexpr double kLead = 0.1;            // s, compared before a step that starts from rest
-constexpr double kLongestSpan = 0.2;     // s, of a position difference
-constexpr double kCrowded = 0.018;       // s, differences closer than this add nothing on a ramp
-constexpr double kShortestWidth = 1e-3;  // s, below this an average is a sample
+constexpr double tail = 0.06;         // s, simulated beyond the window for negative delays
+constexpr double lead = 0.1;          // s, compared before a step that starts from rest
+constexpr double longest_span = 0.2;  // s, of a position difference
+constexpr double crowding_distance =
+    0.018;                               // s, differences closer than this add nothing on a ramp
+constexpr double shortest_width = 1e-3;  // s, below this an average is a sample
 
 SimulationVector simulation_parameters(const Eigen::VectorXd& x, std::size_t run) {
-  return {x[kStaticFriction],  x[kVelocityGain],
-          x[kLogTimeConstant], x[kGravityCosine],
-          x[kGravitySine],     x[kSharedParameters + static_cast<Eigen::Index>(run)]};
+  return {
+      x[parameter::static_friction],   x[parameter::velocity_gain],
+      x[parameter::log_time_constant], x[parameter::gravity_cosine],
+      x[parameter::gravity_sine],      x[shared_parameter_count + static_cast<Eigen::Index>(run)]};
 }
 
 /// Keeps one value of `thinning`.
@@ -42,7 +44,7 @@ ResidualRun make_run(const PreparedRun& prepared, std::size_t index, const FitOp
       prepared.starts_at_rest ? 0.0 : prepared.smoothed_velocity[prepared.first];
   const double begin = source.time[prepared.first];
   run.window_end = source.time[prepared.last - 1];
-  const std::size_t end = lower_index(source.time, run.window_end + kTail);
+  const std::size_t end = lower_index(source.time, run.window_end + tail);
   const auto slice = [&](const std::vector<double>& values) {
     return std::vector<double>(values.begin() + static_cast<std::ptrdiff_t>(prepared.first),
                                values.begin() + static_cast<std::ptrdiff_t>(end));
@@ -53,7 +55,7 @@ ResidualRun make_run(const PreparedRun& prepared, std::size_t index, const FitOp
   run.input.gravity_sine.assign(run.input.time.size(), 0.0);
 
   // A run that starts in motion is compared only where no sensor looks back before its start.
-  const double earliest = prepared.starts_at_rest ? begin - kLead : begin + options.max_delay;
+  const double earliest = prepared.starts_at_rest ? begin - lead : begin + options.max_delay;
   const auto usable = [&](std::size_t row) {
     return source.time[row] >= earliest && row < prepared.last;
   };
@@ -69,9 +71,10 @@ ResidualRun make_run(const PreparedRun& prepared, std::size_t index, const FitOp
         ++from;
       }
       const double span = source.time[to] - source.time[fresh[from]];
-      const bool crowded = run.ramp && !run.differences.empty() &&
-                           source.time[to] - source.time[run.differences.back().second] < kCrowded;
-      if (usable(fresh[from]) && source.time[fresh[from]] <= latest && span <= kLongestSpan &&
+      const bool crowded =
+          run.ramp && !run.differences.empty() &&
+          source.time[to] - source.time[run.differences.back().second] < crowding_distance;
+      if (usable(fresh[from]) && source.time[fresh[from]] <= latest && span <= longest_span &&
           !crowded) {
         run.differences.emplace_back(fresh[from], to);
       }
@@ -103,7 +106,7 @@ struct Hints {
 
 Averaged moving_average(const Response& response, double time, double width, bool gradient,
                         Hints& hints) {
-  const double half = 0.5 * std::max(width, kShortestWidth);
+  const double half = 0.5 * std::max(width, shortest_width);
   const Response::Sample late = response.at(time + half, gradient, hints.late);
   const Response::Sample early = response.at(time - half, gradient, hints.early);
   Averaged average;
@@ -116,13 +119,14 @@ Averaged moving_average(const Response& response, double time, double width, boo
   return average;
 }
 
-constexpr int kLocalInitialVelocity = kLocalParameters - 1;
+constexpr int local_initial_velocity = local_parameter_count - 1;
 
 /// Simulation columns 0–4 are shared; the initial velocity is the last local column.
 template <class Row>
 void store_gradient(Row&& row, const SimulationGradient& gradient, double factor) {
-  row.template head<kInitialVelocity>() = factor * gradient.template head<kInitialVelocity>();
-  row[kLocalInitialVelocity] = factor * gradient[kInitialVelocity];
+  row.template head<parameter::initial_velocity>() =
+      factor * gradient.template head<parameter::initial_velocity>();
+  row[local_initial_velocity] = factor * gradient[parameter::initial_velocity];
 }
 
 }  // namespace
@@ -185,35 +189,36 @@ void OutputErrorProblem::evaluate(std::size_t index, const Eigen::VectorXd& x, b
   block.difference.resize(differences);
   block.velocity.resize(velocities);
   if (jacobian) {
-    block.difference_jacobian.setZero(differences, kLocalParameters);
-    block.velocity_jacobian.setZero(velocities, kLocalParameters);
+    block.difference_jacobian.setZero(differences, local_parameter_count);
+    block.velocity_jacobian.setZero(velocities, local_parameter_count);
   }
   Hints hints;
   for (Eigen::Index row = 0; row < differences; ++row) {
     const auto [from, to] = run.differences[static_cast<std::size_t>(row)];
     const Response::Sample early =
-        response.at(source.time[from] - x[kPositionDelay], jacobian, hints.early);
+        response.at(source.time[from] - x[parameter::position_delay], jacobian, hints.early);
     const Response::Sample late =
-        response.at(source.time[to] - x[kPositionDelay], jacobian, hints.late);
+        response.at(source.time[to] - x[parameter::position_delay], jacobian, hints.late);
     block.difference[row] =
         (source.position[to] - source.position[from]) - (late.position - early.position);
     if (jacobian) {
       store_gradient(block.difference_jacobian.row(row),
                      late.position_gradient - early.position_gradient, -1.0);
-      block.difference_jacobian(row, kPositionDelay) = late.velocity - early.velocity;
+      block.difference_jacobian(row, parameter::position_delay) = late.velocity - early.velocity;
     }
   }
   for (Eigen::Index row = 0; row < velocities; ++row) {
     const std::size_t at = run.velocities[static_cast<std::size_t>(row)];
-    const Averaged average = moving_average(response, source.time[at] - x[kVelocityDelay],
-                                            x[kAveragingWidth], jacobian, hints);
-    const double scale = x[kVelocityScale];
+    const Averaged average =
+        moving_average(response, source.time[at] - x[parameter::velocity_delay],
+                       x[parameter::averaging_width], jacobian, hints);
+    const double scale = x[parameter::velocity_scale];
     block.velocity[row] = source.velocity[at] - scale * average.value;
     if (jacobian) {
       store_gradient(block.velocity_jacobian.row(row), average.gradient, -scale);
-      block.velocity_jacobian(row, kVelocityDelay) = -scale * average.by_delay;
-      block.velocity_jacobian(row, kAveragingWidth) = -scale * average.by_width;
-      block.velocity_jacobian(row, kVelocityScale) = -average.value;
+      block.velocity_jacobian(row, parameter::velocity_delay) = -scale * average.by_delay;
+      block.velocity_jacobian(row, parameter::averaging_width) = -scale * average.by_width;
+      block.velocity_jacobian(row, parameter::velocity_scale) = -average.value;
     }
   }
 }
@@ -221,15 +226,16 @@ void OutputErrorProblem::evaluate(std::size_t index, const Eigen::VectorXd& x, b
 double OutputErrorProblem::velocity_shown(std::size_t run, const Eigen::VectorXd& x,
                                           double time) const {
   Hints hints;
-  return x[kVelocityScale] *
-         moving_average(responses_[run], time - x[kVelocityDelay], x[kAveragingWidth], false, hints)
-             .value;
+  return x[parameter::velocity_scale] * moving_average(responses_[run],
+                                                       time - x[parameter::velocity_delay],
+                                                       x[parameter::averaging_width], false, hints)
+                                            .value;
 }
 
 double OutputErrorProblem::position_shown(std::size_t run, const Eigen::VectorXd& x,
                                           double time) const {
   std::size_t hint = 0;
-  return responses_[run].at(time - x[kPositionDelay], false, hint).position;
+  return responses_[run].at(time - x[parameter::position_delay], false, hint).position;
 }
 
 double OutputErrorProblem::initial_velocity_information() const {
@@ -239,21 +245,21 @@ double OutputErrorProblem::initial_velocity_information() const {
 
 double OutputErrorProblem::initial_velocity_deviation(const Eigen::VectorXd& x,
                                                       Eigen::Index parameter) const {
-  const ResidualRun& run = runs_[static_cast<std::size_t>(parameter) - kSharedParameters];
+  const ResidualRun& run = runs_[static_cast<std::size_t>(parameter) - shared_parameter_count];
   return (x[parameter] - run.likely_initial_velocity) * std::sqrt(initial_velocity_information());
 }
 
 std::vector<bool> OutputErrorProblem::free_parameters() const {
   std::vector<bool> free(static_cast<std::size_t>(parameters()), true);
-  free[kGravityCosine] = mechanism_ != MechanismKind::flywheel;
-  free[kGravitySine] = mechanism_ == MechanismKind::arm;
-  free[kPositionDelay] = recording_.has_position;
-  free[kVelocityDelay] = recording_.has_velocity;
-  free[kAveragingWidth] = recording_.has_velocity;
-  free[kVelocityScale] = recording_.has_velocity && recording_.has_position &&
-                         std::abs(recording_.velocity_scale - 1.0) > 0.03;
+  free[parameter::gravity_cosine] = mechanism_ != MechanismKind::flywheel;
+  free[parameter::gravity_sine] = mechanism_ == MechanismKind::arm;
+  free[parameter::position_delay] = recording_.has_position;
+  free[parameter::velocity_delay] = recording_.has_velocity;
+  free[parameter::averaging_width] = recording_.has_velocity;
+  free[parameter::velocity_scale] = recording_.has_velocity && recording_.has_position &&
+                                    std::abs(recording_.velocity_scale - 1.0) > 0.03;
   for (std::size_t i = 0; i < runs_.size(); ++i) {
-    free[static_cast<std::size_t>(kSharedParameters) + i] = !runs_[i].starts_at_rest;
+    free[static_cast<std::size_t>(shared_parameter_count) + i] = !runs_[i].starts_at_rest;
   }
   return free;
 }

@@ -13,17 +13,22 @@
 /// The comparison of a recording with its simulation, as a least-squares problem.
 namespace flyball::identification {
 
+namespace parameter {
+
 /// Parameters that all runs share; after them, the initial velocity of each run.
-enum SharedParameter : int {
-  // 0 to 4 are those of SimulationParameter.
-  kPositionDelay = 5,   ///< s.
-  kVelocityDelay = 6,   ///< s, to the middle of the averaging window.
-  kAveragingWidth = 7,  ///< s.
-  kVelocityScale = 8,   ///< Velocity column over true velocity.
+enum Shared : int {
+  // 0 to 4 are those of Simulation.
+  position_delay = 5,   ///< s.
+  velocity_delay = 6,   ///< s, to the middle of the averaging window.
+  averaging_width = 7,  ///< s.
+  velocity_scale = 8,   ///< Velocity column over true velocity.
 };
-inline constexpr int kSharedParameters = 9;
+
+}  // namespace parameter
+
+inline constexpr int shared_parameter_count = 9;
 /// Columns of a run's Jacobian: the shared parameters and the run's initial velocity.
-inline constexpr int kLocalParameters = 10;
+inline constexpr int local_parameter_count = 10;
 
 enum class Channel { position, velocity };
 
@@ -46,7 +51,7 @@ struct ResidualRun {
 struct ResidualBlock {
   Eigen::VectorXd difference;
   Eigen::VectorXd velocity;
-  using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, kLocalParameters, Eigen::RowMajor>;
+  using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, local_parameter_count, Eigen::RowMajor>;
   Jacobian difference_jacobian;
   Jacobian velocity_jacobian;
 };
@@ -61,7 +66,7 @@ class OutputErrorProblem {
   [[nodiscard]] const PreparedRecording& recording() const { return recording_; }
   [[nodiscard]] mechanisms::MechanismKind mechanism() const { return mechanism_; }
   [[nodiscard]] int parameters() const {
-    return kSharedParameters + static_cast<int>(runs_.size());
+    return shared_parameter_count + static_cast<int>(runs_.size());
   }
   [[nodiscard]] std::size_t residuals() const;
 

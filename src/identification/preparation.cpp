@@ -17,7 +17,7 @@
 namespace flyball::identification {
 namespace {
 
-constexpr std::string_view kWhere = "prepare";
+constexpr std::string_view where = "prepare";
 
 Expected<void> check_columns(const TestRun& run, std::size_t index) {
   const std::size_t rows = run.time.size();
@@ -31,7 +31,7 @@ Expected<void> check_columns(const TestRun& run, std::size_t index) {
   }
   return tl::unexpected(
       Error(ArgumentError::wrong_shape)
-          .in(std::string(kWhere))
+          .in(std::string(where))
           .about(detail::format("run {} ({})", index, to_string(run.kind)))
           .got(detail::format("{} times, {} voltages, {} positions, {} velocities", rows,
                               run.voltage.size(), run.position.size(), run.velocity.size()))
@@ -287,15 +287,15 @@ void report_travel(PreparedRecording& prepared) {
     const auto [low, high] = std::minmax_element(run.run.position.begin(), run.run.position.end());
     travel = std::max(travel, *high - *low);
   }
-  constexpr double kTurn = 2.0 * std::numbers::pi;
-  if (travel > kTurn) {
+  constexpr double turn = 2.0 * std::numbers::pi;
+  if (travel > turn) {
     prepared.diagnostics.push_back(
         {"travel_exceeds_turn", Severity::warning,
          detail::format(
              "the arm's position spans {:.1f} rad ({:.1f} turns) in one test: it looks like "
              "the motor's angle, not the arm's; gravity cannot be found and all gains are per "
              "radian of that angle. Give the gearing to the encoder",
-             travel, travel / kTurn)});
+             travel, travel / turn)});
   }
 }
 

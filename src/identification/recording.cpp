@@ -8,7 +8,7 @@
 namespace flyball::identification {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, TestKind>, 8> kNames{{
+constexpr std::array<std::pair<std::string_view, TestKind>, 8> names{{
     {"quasistatic-forward", TestKind::quasistatic_forward},
     {"quasistatic-reverse", TestKind::quasistatic_reverse},
     {"dynamic-forward", TestKind::dynamic_forward},
@@ -22,9 +22,9 @@ constexpr std::array<std::pair<std::string_view, TestKind>, 8> kNames{{
 }  // namespace
 
 std::string_view to_string(TestKind kind) {
-  const auto* const entry = std::find_if(kNames.begin(), kNames.end(),
+  const auto* const entry = std::find_if(names.begin(), names.end(),
                                          [&](const auto& name) { return name.second == kind; });
-  return entry != kNames.end() ? entry->first : "unknown";
+  return entry != names.end() ? entry->first : "unknown";
 }
 
 Expected<TestKind> parse_test_kind(std::string_view name) {
@@ -32,7 +32,7 @@ Expected<TestKind> parse_test_kind(std::string_view name) {
   std::transform(plain.begin(), plain.end(), plain.begin(), [](unsigned char letter) {
     return letter == '_' || letter == ' ' ? '-' : static_cast<char>(std::tolower(letter));
   });
-  for (const auto& [known, kind] : kNames) {
+  for (const auto& [known, kind] : names) {
     if (plain == known) {
       return kind;
     }

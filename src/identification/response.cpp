@@ -1,7 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include <flyball/mechanisms/friction.hpp>
+
 #include "identification/response.hpp"
+
 namespace flyball::identification {
 namespace {
 
@@ -26,24 +29,24 @@ void slide(State& state, const Drive& drive, double sign, double duration,
            const SimulationVector& x, double tau, bool sensitivities) {
   const double a = std::exp(-duration / tau);
   const double c = tau * (1.0 - a);
-  const double kV = x[kVelocityGain];
+  const double kV = x[parameter::velocity_gain];
   const double b = (1.0 - a) / kV;
   const double d = (duration - c) / kV;
-  const double w = drive.force - sign * x[kStaticFriction];
+  const double w = drive.force - sign * x[parameter::static_friction];
   if (sensitivities) {
     // ∂a/∂ln τ = a T/τ, ∂c/∂ln τ = c − a T.
     const double a_log = a * duration / tau;
     const double c_log = c - a * duration;
     SimulationGradient force = SimulationGradient::Zero();
-    force[kStaticFriction] = -sign;
-    force[kGravityCosine] = -drive.cosine;
-    force[kGravitySine] = -drive.sine;
+    force[parameter::static_friction] = -sign;
+    force[parameter::gravity_cosine] = -drive.cosine;
+    force[parameter::gravity_sine] = -drive.sine;
     state.position_gradient += c * state.velocity_gradient + d * force;
-    state.position_gradient[kVelocityGain] -= d * w / kV;
-    state.position_gradient[kLogTimeConstant] += c_log * (state.velocity - w / kV);
+    state.position_gradient[parameter::velocity_gain] -= d * w / kV;
+    state.position_gradient[parameter::log_time_constant] += c_log * (state.velocity - w / kV);
     state.velocity_gradient = a * state.velocity_gradient + b * force;
-    state.velocity_gradient[kVelocityGain] -= b * w / kV;
-    state.velocity_gradient[kLogTimeConstant] += a_log * (state.velocity - w / kV);
+    state.velocity_gradient[parameter::velocity_gain] -= b * w / kV;
+    state.velocity_gradient[parameter::log_time_constant] += a_log * (state.velocity - w / kV);
   }
   state.position += c * state.velocity + d * w;
   state.velocity = a * state.velocity + b * w;
@@ -51,34 +54,28 @@ void slide(State& state, const Drive& drive, double sign, double duration,
 
 void advance(State& state, const Drive& drive, double duration, const SimulationVector& x,
              bool sensitivities) {
-  const double tau = std::exp(x[kLogTimeConstant]);
-  const double kS = std::max(0.0, x[kStaticFriction]);
-  double remaining = duration;
+  const double tau = std::exp(x[parameter::log_time_constant]);
+  const double kV = x[parameter::velocity_gain];
+  const double kS = x[parameter::static_friction];
+  const mechanisms::Friction friction{kS};
+  const mechanisms::FrictionMotion motion(kV, kV * tau, friction);
+  double left = duration;
   // At most: slow down to rest, then slip the other way.
-  for (int piece = 0; piece < 2 && remaining > 0.0; ++piece) {
-    if (state.velocity == 0.0 && std::abs(drive.force) <= kS) {
+  for (int motions = 0; motions < 2 && left > 0.0; ++motions) {
+    const auto piece = motion.piece(state.velocity, drive.force, left);
+    if (piece.direction == 0) {
       return;
     }
-    const bool moving = state.velocity != 0.0;
-    const double sign = std::copysign(1.0, moving ? state.velocity : drive.force);
-    const double final_velocity = (drive.force - sign * x[kStaticFriction]) / x[kVelocityGain];
-    double passed = remaining;
-    bool stops = false;
-    if (moving && sign * final_velocity < 0.0) {
-      const double until_rest = tau * std::log((state.velocity - final_velocity) / -final_velocity);
-      stops = until_rest < remaining;
-      passed = stops ? until_rest : remaining;
-    }
-    slide(state, drive, sign, passed, x, tau, sensitivities);
-    remaining -= passed;
-    if (stops) {
+    slide(state, drive, piece.direction, piece.duration, x, tau, sensitivities);
+    left -= piece.duration;
+    if (piece.stops) {
       state.velocity = 0.0;
       if (sensitivities) {
         // The instant of the stop moves with the parameters: dv⁺ = (v̇⁺/v̇⁻) dv⁻, 0 if it sticks.
-        const double reversed = drive.force + sign * x[kStaticFriction];
-        const bool sticks = std::abs(drive.force) <= kS || sign * reversed > 0.0;
-        const double before = drive.force - sign * x[kStaticFriction];
-        state.velocity_gradient *= sticks || before == 0.0 ? 0.0 : reversed / before;
+        const double before = drive.force - piece.direction * kS;
+        const double after = drive.force + piece.direction * kS;
+        const bool turns = friction.direction(0.0, drive.force) == -piece.direction;
+        state.velocity_gradient *= turns && before != 0.0 ? after / before : 0.0;
       }
     }
   }
@@ -93,12 +90,12 @@ void Response::simulate(const RunInput& input, const SimulationVector& parameter
   velocity_.resize(rows);
   position_.resize(rows);
   if (sensitivities) {
-    velocity_gradient_.resize(rows, kSimulationParameters);
-    position_gradient_.resize(rows, kSimulationParameters);
+    velocity_gradient_.resize(rows, simulation_parameter_count);
+    position_gradient_.resize(rows, simulation_parameter_count);
   }
-  State state{parameters[kInitialVelocity], 0.0, SimulationGradient::Zero(),
+  State state{parameters[parameter::initial_velocity], 0.0, SimulationGradient::Zero(),
               SimulationGradient::Zero()};
-  state.velocity_gradient[kInitialVelocity] = 1.0;
+  state.velocity_gradient[parameter::initial_velocity] = 1.0;
   for (Eigen::Index row = 0; row < rows; ++row) {
     velocity_[row] = state.velocity;
     position_[row] = state.position;
@@ -108,8 +105,8 @@ void Response::simulate(const RunInput& input, const SimulationVector& parameter
     }
     if (row + 1 < rows) {
       const auto i = static_cast<std::size_t>(row);
-      const double gravity = parameters[kGravityCosine] * input.gravity_cosine[i] +
-                             parameters[kGravitySine] * input.gravity_sine[i];
+      const double gravity = parameters[parameter::gravity_cosine] * input.gravity_cosine[i] +
+                             parameters[parameter::gravity_sine] * input.gravity_sine[i];
       advance(state, {input.voltage[i] - gravity, input.gravity_cosine[i], input.gravity_sine[i]},
               input.time[i + 1] - input.time[i], parameters, sensitivities);
     }

@@ -9,18 +9,24 @@
 /// The mechanism's response to a recorded voltage, with its sensitivities.
 namespace flyball::identification {
 
-/// What a run's simulation depends on, in the order of the sensitivities' columns.
-enum SimulationParameter : int {
-  kStaticFriction = 0,   ///< kS, V.
-  kVelocityGain = 1,     ///< kV, V/(unit/s).
-  kLogTimeConstant = 2,  ///< ln(kA/kV), kA/kV in s.
-  kGravityCosine = 3,    ///< Factor of the first gravity input (1 or cos θ), V.
-  kGravitySine = 4,      ///< Factor of the second gravity input (sin θ), V.
-  kInitialVelocity = 5,  ///< Of this run, unit/s.
+/// The numbers of the parameters, as columns of the sensitivities and rows of the estimate.
+namespace parameter {
+
+/// What a run's simulation depends on.
+enum Simulation : int {
+  static_friction = 0,    ///< kS, V.
+  velocity_gain = 1,      ///< kV, V/(unit/s).
+  log_time_constant = 2,  ///< ln(kA/kV), kA/kV in s.
+  gravity_cosine = 3,     ///< Factor of the first gravity input (1 or cos θ), V.
+  gravity_sine = 4,       ///< Factor of the second gravity input (sin θ), V.
+  initial_velocity = 5,   ///< Of this run, unit/s.
 };
-inline constexpr int kSimulationParameters = 6;
-using SimulationVector = std::array<double, kSimulationParameters>;
-using SimulationGradient = Eigen::Matrix<double, 1, kSimulationParameters>;
+
+}  // namespace parameter
+
+inline constexpr int simulation_parameter_count = 6;
+using SimulationVector = std::array<double, simulation_parameter_count>;
+using SimulationGradient = Eigen::Matrix<double, 1, simulation_parameter_count>;
 
 /// What drives a run: everything is held from a row to the next.
 struct RunInput {
@@ -48,7 +54,8 @@ class Response {
   [[nodiscard]] Sample at(double time, bool gradient, std::size_t& hint) const;
 
  private:
-  using Gradients = Eigen::Matrix<double, Eigen::Dynamic, kSimulationParameters, Eigen::RowMajor>;
+  using Gradients =
+      Eigen::Matrix<double, Eigen::Dynamic, simulation_parameter_count, Eigen::RowMajor>;
 
   const RunInput* input_ = nullptr;
   Eigen::VectorXd velocity_;

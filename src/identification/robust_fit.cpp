@@ -22,7 +22,7 @@ double total_cost(OutputErrorProblem& problem, const Eigen::VectorXd& x,
       cost += loss(residual * inverse(scales.velocity));
     }
   }
-  for (Eigen::Index i = kSharedParameters; i < x.size(); ++i) {
+  for (Eigen::Index i = shared_parameter_count; i < x.size(); ++i) {
     cost += square(problem.initial_velocity_deviation(x, i));
   }
   return cost;
@@ -60,12 +60,12 @@ NormalEquations normal_equations(OutputErrorProblem& problem, const Eigen::Vecto
     accumulate(block.velocity, block.velocity_jacobian, inverse(scales.velocity), hessian, gradient,
                equations.cost);
     scatter(equations.hessian, hessian, run);
-    for (int a = 0; a < kLocalParameters; ++a) {
+    for (int a = 0; a < local_parameter_count; ++a) {
       equations.gradient[global_index(a, run)] += gradient[a];
     }
   }
   const double information = problem.initial_velocity_information();
-  for (Eigen::Index i = kSharedParameters; i < n; ++i) {
+  for (Eigen::Index i = shared_parameter_count; i < n; ++i) {
     const double deviation = problem.initial_velocity_deviation(x, i);
     equations.cost += square(deviation);
     equations.gradient[i] += deviation * std::sqrt(information);

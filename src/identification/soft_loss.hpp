@@ -10,22 +10,22 @@
 /// and the variance of its answer.
 namespace flyball::identification {
 
-using LocalMatrix = Eigen::Matrix<double, kLocalParameters, kLocalParameters>;
-using LocalVector = Eigen::Matrix<double, kLocalParameters, 1>;
+using LocalMatrix = Eigen::Matrix<double, local_parameter_count, local_parameter_count>;
+using LocalVector = Eigen::Matrix<double, local_parameter_count, 1>;
 
-inline constexpr double kSoft = 1.5;  // δ: residuals beyond 1.5 σ count linearly
+inline constexpr double soft_limit = 1.5;  // δ: residuals beyond 1.5 σ count linearly
 
 inline double square(double value) {
   return value * value;
 }
 
 inline double loss(double z) {
-  return 2.0 * square(kSoft) * (std::sqrt(1.0 + square(z / kSoft)) - 1.0);
+  return 2.0 * square(soft_limit) * (std::sqrt(1.0 + square(z / soft_limit)) - 1.0);
 }
 
 /// ρ'(z)/(2z): the weight of iterated least squares. ρ''(z)/2 is its cube.
 inline double weight(double z) {
-  return 1.0 / std::sqrt(1.0 + square(z / kSoft));
+  return 1.0 / std::sqrt(1.0 + square(z / soft_limit));
 }
 
 /// 1/scale, and 0 for a channel that is switched off.
@@ -34,13 +34,14 @@ inline double inverse(double scale) {
 }
 
 inline Eigen::Index global_index(int local, std::size_t run) {
-  return local < kSharedParameters ? local : kSharedParameters + static_cast<Eigen::Index>(run);
+  return local < shared_parameter_count ? local
+                                        : shared_parameter_count + static_cast<Eigen::Index>(run);
 }
 
 /// Adds a run's matrix to that of all parameters.
 inline void scatter(Eigen::MatrixXd& global, const LocalMatrix& local, std::size_t run) {
-  for (int a = 0; a < kLocalParameters; ++a) {
-    for (int b = 0; b < kLocalParameters; ++b) {
+  for (int a = 0; a < local_parameter_count; ++a) {
+    for (int b = 0; b < local_parameter_count; ++b) {
       global(global_index(a, run), global_index(b, run)) += local(a, b);
     }
   }

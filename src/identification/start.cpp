@@ -15,8 +15,8 @@ namespace {
 
 using mechanisms::MechanismKind;
 
-constexpr double kAccelerationHalfWidth = 0.04;  // s
-constexpr int kReweightings = 10;
+constexpr double acceleration_half_width = 0.04;  // s
+constexpr int reweightings = 10;
 
 struct Rows {
   Eigen::MatrixXd regressors;  // sgn(v), v, a, gravity 1, gravity 2
@@ -33,8 +33,8 @@ Rows collect(const PreparedRecording& recording) {
     }
     for (std::size_t i = prepared.first; i < prepared.last; ++i) {
       const double velocity = prepared.smoothed_velocity[i];
-      const double low = run.time[i] - kAccelerationHalfWidth;
-      const double high = run.time[i] + kAccelerationHalfWidth;
+      const double low = run.time[i] - acceleration_half_width;
+      const double high = run.time[i] + acceleration_half_width;
       if (std::abs(velocity) < 0.04 * recording.top_speed || low < run.time[prepared.first] ||
           high > run.time[prepared.last - 1]) {
         continue;
@@ -68,7 +68,7 @@ Expected<StartGains> regress_gains(const PreparedRecording& recording) {
   }
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(rows.voltage.size());
   Eigen::VectorXd gains = Eigen::VectorXd::Zero(5);
-  for (int pass = 0; pass < kReweightings; ++pass) {
+  for (int pass = 0; pass < reweightings; ++pass) {
     Eigen::MatrixXd normal = rows.regressors.transpose() * weights.asDiagonal() * rows.regressors;
     // A ridge far below the data keeps absent regressors (no gravity, no acceleration) at zero.
     const double ridge = 1e-9 * normal.trace();

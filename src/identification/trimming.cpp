@@ -9,13 +9,13 @@
 namespace flyball::identification {
 namespace {
 
-constexpr double kSustained = 0.1;    // s, a ramp has started when motion lasts so long
-constexpr double kStalled = 0.06;     // s, a stop is hit when rest under voltage lasts so long
-constexpr double kMinimumRamp = 0.3;  // s, below this a ramp says nothing
-constexpr double kMinimumStep = 0.1;  // s
-constexpr double kShortStep = 0.35;   // s, below this a step is used with a warning
-constexpr double kRestWindow = 0.1;   // s before the step in which the mechanism must be at rest
-constexpr double kRestShare = 0.03;   // of top speed
+constexpr double sustained = 0.1;     // s, a ramp has started when motion lasts so long
+constexpr double stalled = 0.06;      // s, a stop is hit when rest under voltage lasts so long
+constexpr double minimum_ramp = 0.3;  // s, below this a ramp says nothing
+constexpr double minimum_step = 0.1;  // s
+constexpr double short_step = 0.35;   // s, below this a step is used with a warning
+constexpr double rest_window = 0.1;   // s before the step in which the mechanism must be at rest
+constexpr double rest_share = 0.03;   // of top speed
 
 double top_of(const std::vector<double>& values, double q) {
   std::vector<double> magnitudes(values.size());
@@ -40,8 +40,8 @@ bool lasts(const std::vector<double>& time, std::size_t i, std::size_t end, doub
 bool rests_before(const PreparedRun& prepared, const PreparedRecording& recording,
                   std::size_t row) {
   const TestRun& run = prepared.run;
-  const std::size_t begin = lower_index(run.time, run.time[row] - kRestWindow);
-  const double limit = kRestShare * recording.top_speed;
+  const std::size_t begin = lower_index(run.time, run.time[row] - rest_window);
+  const double limit = rest_share * recording.top_speed;
   if (recording.has_position && run.time[row] - run.time[begin] > 0.03) {
     const double moved = std::abs(run.position[row] - run.position[begin]);
     return moved <=
@@ -105,7 +105,7 @@ std::size_t motion_start(const PreparedRun& prepared, std::size_t begin, std::si
     const auto moves = [&](std::size_t j) {
       return prepared.direction * prepared.smoothed_velocity[j] > limits.speed;
     };
-    if (moves(i) && lasts(prepared.run.time, i, end, kSustained, moves)) {
+    if (moves(i) && lasts(prepared.run.time, i, end, sustained, moves)) {
       return i;
     }
   }
@@ -148,8 +148,8 @@ void mark_window(PreparedRun& prepared, PreparedRecording& recording,
       return prepared.direction * prepared.smoothed_velocity[j] < limits.speed &&
              std::abs(run.voltage[j]) >= 0.5 * top_voltage;
     };
-    if (stalls(i) && run.time[end - 1] - run.time[i] > kStalled &&
-        lasts(run.time, i, end, kStalled, stalls)) {
+    if (stalls(i) && run.time[end - 1] - run.time[i] > stalled &&
+        lasts(run.time, i, end, stalled, stalls)) {
       recording.diagnostics.push_back(
           {"hit_stop", Severity::warning,
            detail::format("{}: the mechanism stalls under {:.2f} V after {:.2f} s (a stop or a "
@@ -171,13 +171,13 @@ void mark_window(PreparedRun& prepared, PreparedRecording& recording,
                               ? run.time[prepared.last - 1] - run.time[prepared.first]
                               : 0.0;
   const bool ramp = is_quasistatic(run.kind);
-  if (duration < (ramp ? kMinimumRamp : kMinimumStep)) {
+  if (duration < (ramp ? minimum_ramp : minimum_step)) {
     prepared.moved = false;
     prepared.last = prepared.first;
     recording.diagnostics.push_back(
         {ramp ? "short_quasistatic_test" : "short_dynamic_test", Severity::warning,
          detail::format("{}: only {:.2f} s of motion, too short to use", name, duration)});
-  } else if (!ramp && duration < kShortStep) {
+  } else if (!ramp && duration < short_step) {
     recording.diagnostics.push_back(
         {"short_dynamic_test", Severity::warning,
          detail::format("{}: only {:.2f} s of acceleration; kA may not be determined. Give the "
@@ -197,9 +197,9 @@ double white_noise(const std::vector<double>& values, const std::vector<std::siz
 }
 
 // A hundred thousand values of normal noise span nine standard deviations.
-constexpr double kNoiseSpan = 12.0;
+constexpr double noise_span = 12.0;
 // Noise averaged over the smoothing window, of three values at least, stays below.
-constexpr double kNoiseSpeed = 2.0;
+constexpr double noise_speed = 2.0;
 
 }  // namespace
 
@@ -218,14 +218,14 @@ void detect_motion(PreparedRecording& prepared) {
       const auto [low, high] =
           std::minmax_element(run.run.position.begin(), run.run.position.end());
       const double noise = white_noise(run.run.position, run.fresh_position);
-      run.moved = *high - *low > std::max(10.0 * prepared.position_quantum, kNoiseSpan * noise) &&
+      run.moved = *high - *low > std::max(10.0 * prepared.position_quantum, noise_span * noise) &&
                   speed > 0.0;
     } else {
       // Without a position to show it, motion is a velocity that keeps its sign; noise does not.
       const double noise =
           prepared.has_velocity ? white_noise(run.run.velocity, run.fresh_velocity) : 0.0;
       run.moved = prepared.has_velocity &&
-                  speed > std::max(15.0 * prepared.velocity_quantum, kNoiseSpeed * noise) &&
+                  speed > std::max(15.0 * prepared.velocity_quantum, noise_speed * noise) &&
                   std::abs(signed_square) > 0.3 * square;
     }
     if (run.moved) {

@@ -8,10 +8,10 @@ namespace {
 
 using namespace flyball::identification;
 using flyball::mechanisms::MechanismKind;
+using recordings::arm;
+using recordings::elevator;
 using recordings::find;
-using recordings::kArm;
-using recordings::kElevator;
-using recordings::kFlywheel;
+using recordings::flywheel;
 using recordings::record;
 
 void expect_near(const GainEstimate& gain, double truth, double relative) {
@@ -22,7 +22,7 @@ void expect_near(const GainEstimate& gain, double truth, double relative) {
 }
 
 TEST(FeedforwardFit, RecoversAFlywheel) {
-  const auto fit = fit_feedforward(record(kFlywheel));
+  const auto fit = fit_feedforward(record(flywheel));
   ASSERT_TRUE(fit) << to_string(fit.error());
   EXPECT_EQ(fit->mechanism, MechanismKind::flywheel);
   expect_near(fit->kS, 0.5, 0.02);
@@ -33,7 +33,7 @@ TEST(FeedforwardFit, RecoversAFlywheel) {
 }
 
 TEST(FeedforwardFit, RecoversAnArmWithItsZero) {
-  const auto fit = fit_feedforward(record(kArm));
+  const auto fit = fit_feedforward(record(arm));
   ASSERT_TRUE(fit) << to_string(fit.error());
   expect_near(fit->kV, 1.2, 0.005);
   expect_near(fit->kA, 0.15, 0.02);
@@ -44,7 +44,7 @@ TEST(FeedforwardFit, RecoversAnArmWithItsZero) {
 
 // The regression that it replaces is off by far more (section 14.2 with repeated rows and noise).
 TEST(FeedforwardFit, ReportsTheBiasedRegressionBesideIt) {
-  const auto fit = fit_feedforward(record(kElevator));
+  const auto fit = fit_feedforward(record(elevator));
   ASSERT_TRUE(fit) << to_string(fit.error());
   expect_near(fit->kA, 0.3, 0.03);
   ASSERT_TRUE(fit->one_step);
@@ -52,7 +52,7 @@ TEST(FeedforwardFit, ReportsTheBiasedRegressionBesideIt) {
 }
 
 TEST(FeedforwardFit, OverlaysSimulationAndMeasurement) {
-  const Recording recording = record(kElevator);
+  const Recording recording = record(elevator);
   const auto fit = fit_feedforward(recording);
   ASSERT_TRUE(fit) << to_string(fit.error());
   ASSERT_EQ(fit->runs.size(), 4U);
@@ -68,14 +68,14 @@ TEST(FeedforwardFit, OverlaysSimulationAndMeasurement) {
 }
 
 TEST(FeedforwardFit, IsDeterministic) {
-  const Recording recording = record(kArm, 3);
+  const Recording recording = record(arm, 3);
   EXPECT_EQ(fit_feedforward(recording)->kA.value, fit_feedforward(recording)->kA.value);
 }
 
 TEST(FeedforwardFit, FindsTheDelay) {
-  auto options = scenarios::session(scenarios::kMechanisms[kElevator], 4);
+  auto options = scenarios::session(scenarios::mechanisms[elevator], 4);
   options.sensor_delay = 0.06;
-  const auto fit = fit_feedforward(flyball::simulation::record_test_session(options).value());
+  const auto fit = fit_feedforward(flyball::record_characterization(options).value());
   ASSERT_TRUE(fit) << to_string(fit.error());
   // A row sees the value half a row period old on average beside the sensor's own delay.
   EXPECT_NEAR(fit->position_delay, 0.06, 0.008);
@@ -83,7 +83,7 @@ TEST(FeedforwardFit, FindsTheDelay) {
 }
 
 TEST(FeedforwardFit, WorksWithoutVelocity) {
-  Recording recording = record(kElevator);
+  Recording recording = record(elevator);
   for (TestRun& run : recording.runs) {
     run.velocity.clear();
   }
@@ -94,7 +94,7 @@ TEST(FeedforwardFit, WorksWithoutVelocity) {
 }
 
 TEST(FeedforwardFit, WorksWithoutPosition) {
-  Recording recording = record(kFlywheel);
+  Recording recording = record(flywheel);
   for (TestRun& run : recording.runs) {
     run.position.clear();
   }
@@ -106,10 +106,9 @@ TEST(FeedforwardFit, WorksWithoutPosition) {
 
 // The time constant of 4 ms is far below the 20 ms between sensor values.
 TEST(FeedforwardFit, SaysThatKaIsNotDetermined) {
-  auto options = scenarios::session(scenarios::kMechanisms[kElevator], 1);
+  auto options = scenarios::session(scenarios::mechanisms[elevator], 1);
   options.kA = 0.016;
-  const auto report =
-      identify_feedforward(flyball::simulation::record_test_session(options).value());
+  const auto report = identify_feedforward(flyball::record_characterization(options).value());
   ASSERT_TRUE(report.fit) << to_string(report.fit.error());
   EXPECT_FALSE(report.fit->kA.determined);
   EXPECT_GE(report.fit->kA.upper_bound, 0.016);
@@ -120,11 +119,10 @@ TEST(FeedforwardFit, SaysThatKaIsNotDetermined) {
 }
 
 TEST(FeedforwardFit, SaysThatGravityAndFrictionAreNotThere) {
-  auto options = scenarios::session(scenarios::kMechanisms[kElevator], 1);
+  auto options = scenarios::session(scenarios::mechanisms[elevator], 1);
   options.kG = 0.0;
   options.kS = 0.0;
-  const auto report =
-      identify_feedforward(flyball::simulation::record_test_session(options).value());
+  const auto report = identify_feedforward(flyball::record_characterization(options).value());
   ASSERT_TRUE(report.fit) << to_string(report.fit.error());
   EXPECT_FALSE(report.fit->kG->determined);
   EXPECT_FALSE(report.fit->kS.determined);
@@ -133,7 +131,7 @@ TEST(FeedforwardFit, SaysThatGravityAndFrictionAreNotThere) {
 }
 
 TEST(FeedforwardFit, FitsAnInvertedEncoder) {
-  Recording recording = record(kElevator);
+  Recording recording = record(elevator);
   for (TestRun& run : recording.runs) {
     recordings::negate(run.position);
     recordings::negate(run.velocity);
@@ -146,7 +144,7 @@ TEST(FeedforwardFit, FitsAnInvertedEncoder) {
 
 TEST(FeedforwardFit, GoesOnWithThreeTestsOfFour) {
   for (std::size_t missing = 0; missing < 4; ++missing) {
-    Recording recording = record(kElevator);
+    Recording recording = record(elevator);
     recording.runs.erase(recording.runs.begin() + static_cast<std::ptrdiff_t>(missing));
     const auto report = identify_feedforward(recording);
     ASSERT_TRUE(report.fit) << missing << ": " << to_string(report.fit.error());
@@ -157,7 +155,7 @@ TEST(FeedforwardFit, GoesOnWithThreeTestsOfFour) {
 
 TEST(FeedforwardFit, RefusesOneTestOfFour) {
   for (std::size_t only = 0; only < 4; ++only) {
-    Recording recording = record(kElevator);
+    Recording recording = record(elevator);
     recording.runs = {recording.runs[only]};
     const auto report = identify_feedforward(recording);
     ASSERT_FALSE(report.fit);
@@ -167,7 +165,7 @@ TEST(FeedforwardFit, RefusesOneTestOfFour) {
 }
 
 TEST(FeedforwardFit, RefusesOnlyRampsAndOnlySteps) {
-  const Recording recording = record(kFlywheel);
+  const Recording recording = record(flywheel);
   Recording ramps = recording;
   ramps.runs = {recording.runs[0], recording.runs[1]};
   Recording steps = recording;
@@ -182,12 +180,12 @@ TEST(FeedforwardFit, RefusesOnlyRampsAndOnlySteps) {
 }
 
 TEST(FeedforwardFit, RefusesOneDirectionUnderGravityButNotOfAFlywheel) {
-  Recording elevator = record(kElevator);
+  Recording elevator = record(elevator);
   elevator.runs = {elevator.runs[0], elevator.runs[2]};
   const auto refused = fit_feedforward(elevator);
   ASSERT_FALSE(refused);
   EXPECT_TRUE(refused.error().is(IdentificationError::missing_tests));
-  Recording flywheel = record(kFlywheel);
+  Recording flywheel = record(flywheel);
   flywheel.runs = {flywheel.runs[0], flywheel.runs[2]};
   const auto fit = fit_feedforward(flywheel);
   ASSERT_TRUE(fit) << to_string(fit.error());
@@ -195,7 +193,7 @@ TEST(FeedforwardFit, RefusesOneDirectionUnderGravityButNotOfAFlywheel) {
 }
 
 TEST(FeedforwardFit, RefusesALogWithoutMotion) {
-  Recording recording = record(kArm);
+  Recording recording = record(arm);
   for (TestRun& run : recording.runs) {
     for (std::size_t i = 0; i < run.time.size(); ++i) {
       run.position[i] = i % 7 == 0 ? 0.0015 : 0.0;
@@ -213,7 +211,7 @@ TEST(FeedforwardFit, RefusesALogWithoutMotion) {
 TEST(FeedforwardFit, RefusesAMechanismThatOnlyShowsNoise) {
   enum Shown { both, position_only, velocity_only };
   flyball::Random random(7);
-  for (const std::size_t mechanism : {kFlywheel, kElevator, kArm}) {
+  for (const std::size_t mechanism : {flywheel, elevator, arm}) {
     for (const Shown shown : {both, position_only, velocity_only}) {
       for (const std::size_t repeat : {1U, 4U}) {  // rows that a value is shown in
         for (int trial = 0; trial < 5; ++trial) {
@@ -242,7 +240,7 @@ TEST(FeedforwardFit, RefusesAMechanismThatOnlyShowsNoise) {
 }
 
 TEST(FeedforwardFit, RefusesAnUnknownMechanismAndTakesTheOption) {
-  Recording recording = record(kFlywheel);
+  Recording recording = record(flywheel);
   recording.mechanism.reset();
   const auto refused = fit_feedforward(recording);
   ASSERT_FALSE(refused);
@@ -261,7 +259,7 @@ TEST(FeedforwardFit, RefusesNothing) {
 }
 
 TEST(FeedforwardFit, RefusesAnArmWithoutAngle) {
-  Recording recording = record(kArm);
+  Recording recording = record(arm);
   for (TestRun& run : recording.runs) {
     run.position.clear();
   }
@@ -271,7 +269,7 @@ TEST(FeedforwardFit, RefusesAnArmWithoutAngle) {
 }
 
 TEST(FeedforwardFit, RefusesMotionThatTheVoltageDoesNotExplain) {
-  Recording recording = record(kFlywheel);
+  Recording recording = record(flywheel);
   for (TestRun& run : recording.runs) {
     for (std::size_t i = 0; i < run.time.size(); ++i) {
       run.velocity[i] = 10.0 * std::sin(3.0 * run.time[i]) + 0.01 * std::sin(1e3 * run.time[i]);
@@ -285,7 +283,7 @@ TEST(FeedforwardFit, RefusesMotionThatTheVoltageDoesNotExplain) {
 TEST(FeedforwardFit, NeverHangsOnNoise) {
   flyball::Random random(5);
   for (int trial = 0; trial < 5; ++trial) {
-    Recording recording = record(kArm, 2);
+    Recording recording = record(arm, 2);
     for (TestRun& run : recording.runs) {
       for (std::size_t i = 0; i < run.time.size(); ++i) {
         run.position[i] = random.normal();

@@ -11,7 +11,7 @@ namespace {
 using flyball::identification::fit_feedforward;
 using flyball::identification::GainEstimate;
 
-constexpr std::uint64_t kSeeds = 12;
+constexpr std::uint64_t seeds = 12;
 
 struct Tally {
   std::vector<double> errors;
@@ -41,14 +41,13 @@ void expect_within(const Tally& tally, double error, double width, const char* g
 class MonteCarlo : public testing::TestWithParam<std::size_t> {};
 
 TEST_P(MonteCarlo, RecoversTheGainsWithHonestIntervals) {
-  const scenarios::Truth& truth = scenarios::kMechanisms.at(GetParam());
+  const scenarios::Truth& truth = scenarios::mechanisms.at(GetParam());
   Tally kS;
   Tally kV;
   Tally kA;
   Tally kG;
-  for (std::uint64_t seed = 5001; seed <= 5000 + kSeeds; ++seed) {
-    const auto recording =
-        flyball::simulation::record_test_session(scenarios::session(truth, seed));
+  for (std::uint64_t seed = 5001; seed <= 5000 + seeds; ++seed) {
+    const auto recording = flyball::record_characterization(scenarios::session(truth, seed));
     ASSERT_TRUE(recording);
     const auto fit = fit_feedforward(*recording);
     ASSERT_TRUE(fit) << "seed " << seed << ": " << to_string(fit.error());

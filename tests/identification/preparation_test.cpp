@@ -9,14 +9,14 @@ namespace {
 
 using namespace flyball::identification;
 using flyball::ArgumentError;
+using recordings::arm;
+using recordings::elevator;
 using recordings::find;
-using recordings::kArm;
-using recordings::kElevator;
-using recordings::kFlywheel;
+using recordings::flywheel;
 using recordings::record;
 
 TEST(Prepare, FindsRefreshAndResolution) {
-  const auto prepared = prepare(record(kElevator));
+  const auto prepared = prepare(record(elevator));
   ASSERT_TRUE(prepared);
   EXPECT_NEAR(prepared->row_period, 5e-3, 1e-9);
   EXPECT_NEAR(prepared->position_refresh_period, 20e-3, 1e-9);
@@ -33,7 +33,7 @@ TEST(Prepare, FindsRefreshAndResolution) {
 }
 
 TEST(Prepare, TellsRepeatedRows) {
-  Recording recording = record(kArm, 2);
+  Recording recording = record(arm, 2);
   for (TestRun& run : recording.runs) {
     for (std::size_t i = 0; i < run.velocity.size(); ++i) {
       run.velocity[i] = run.velocity[i - i % 4];
@@ -48,7 +48,7 @@ TEST(Prepare, TellsRepeatedRows) {
 }
 
 TEST(Prepare, SortsRowsThatGoBackInTime) {
-  const Recording sorted = record(kArm);
+  const Recording sorted = record(arm);
   Recording shuffled = sorted;
   for (std::vector<double> TestRun::* column :
        {&TestRun::time, &TestRun::voltage, &TestRun::position, &TestRun::velocity}) {
@@ -62,7 +62,7 @@ TEST(Prepare, SortsRowsThatGoBackInTime) {
 }
 
 TEST(Prepare, KeepsTheLaterOfTwoRowsOfOneInstant) {
-  Recording recording = record(kArm);
+  Recording recording = record(arm);
   recording.runs[0].time[101] = recording.runs[0].time[100];
   const auto prepared = prepare(recording);
   ASSERT_TRUE(prepared);
@@ -71,7 +71,7 @@ TEST(Prepare, KeepsTheLaterOfTwoRowsOfOneInstant) {
 }
 
 TEST(Prepare, DropsRowsThatAreNotFinite) {
-  Recording recording = record(kArm);
+  Recording recording = record(arm);
   recording.runs[1].velocity[50] = std::numeric_limits<double>::quiet_NaN();
   recording.runs[1].voltage[60] = std::numeric_limits<double>::infinity();
   const auto prepared = prepare(recording);
@@ -82,7 +82,7 @@ TEST(Prepare, DropsRowsThatAreNotFinite) {
 }
 
 TEST(Prepare, DropsSpikes) {
-  Recording recording = record(kArm);
+  Recording recording = record(arm);
   recording.runs[2].velocity[40] = -977.0;
   const auto prepared = prepare(recording);
   ASSERT_TRUE(prepared);
@@ -91,7 +91,7 @@ TEST(Prepare, DropsSpikes) {
 }
 
 TEST(Prepare, DropsStaleFirstPositionsAndGlitches) {
-  Recording recording = record(kElevator);
+  Recording recording = record(elevator);
   for (std::size_t i = 0; i < 5; ++i) {
     recording.runs[1].position[i] = 0.0;
   }
@@ -105,7 +105,7 @@ TEST(Prepare, DropsStaleFirstPositionsAndGlitches) {
 }
 
 TEST(Prepare, NamesAnInvertedEncoder) {
-  Recording recording = record(kElevator);
+  Recording recording = record(elevator);
   const Recording upright = recording;
   for (TestRun& run : recording.runs) {
     recordings::negate(run.position);
@@ -120,7 +120,7 @@ TEST(Prepare, NamesAnInvertedEncoder) {
 }
 
 TEST(Prepare, GivesAnUnsignedVoltageTheSignOfTheMotion) {
-  Recording recording = record(kFlywheel);
+  Recording recording = record(flywheel);
   for (TestRun& run : recording.runs) {
     for (double& voltage : run.voltage) {
       voltage = std::abs(voltage);
@@ -135,7 +135,7 @@ TEST(Prepare, GivesAnUnsignedVoltageTheSignOfTheMotion) {
 }
 
 TEST(Prepare, TellsAPositionAgainstItsVelocity) {
-  Recording recording = record(kFlywheel);
+  Recording recording = record(flywheel);
   for (TestRun& run : recording.runs) {
     recordings::negate(run.position);
   }
@@ -147,7 +147,7 @@ TEST(Prepare, TellsAPositionAgainstItsVelocity) {
 }
 
 TEST(Prepare, TellsOneTestRecordedTheOtherWayRound) {
-  Recording recording = record(kFlywheel);
+  Recording recording = record(flywheel);
   recordings::negate(recording.runs[3].voltage);
   const auto prepared = prepare(recording);
   ASSERT_TRUE(prepared);
@@ -157,7 +157,7 @@ TEST(Prepare, TellsOneTestRecordedTheOtherWayRound) {
 }
 
 TEST(Prepare, TellsTheScaleOfTheVelocity) {
-  Recording recording = record(kFlywheel);
+  Recording recording = record(flywheel);
   for (TestRun& run : recording.runs) {
     for (double& velocity : run.velocity) {
       velocity *= 0.87;
@@ -170,7 +170,7 @@ TEST(Prepare, TellsTheScaleOfTheVelocity) {
 }
 
 TEST(Prepare, GivesUpACoarseVelocity) {
-  Recording recording = record(kArm);
+  Recording recording = record(arm);
   for (TestRun& run : recording.runs) {
     for (double& velocity : run.velocity) {
       velocity = std::trunc(velocity / 0.6) * 0.6;
@@ -183,7 +183,7 @@ TEST(Prepare, GivesUpACoarseVelocity) {
 }
 
 TEST(Prepare, CutsAStall) {
-  Recording recording = record(kElevator);
+  Recording recording = record(elevator);
   TestRun& run = recording.runs[2];
   while (std::abs(run.voltage.back()) < 3.0) {
     for (std::vector<double> TestRun::* column :
@@ -205,7 +205,7 @@ TEST(Prepare, CutsAStall) {
 }
 
 TEST(Prepare, TellsMissingAndMotionlessTests) {
-  Recording recording = record(kElevator);
+  Recording recording = record(elevator);
   for (double& position : recording.runs[1].position) {
     position = 0.5;
   }
@@ -220,7 +220,7 @@ TEST(Prepare, TellsMissingAndMotionlessTests) {
 }
 
 TEST(Prepare, TellsAnArmThatTurnsRoundAndRound) {
-  Recording recording = record(kArm);
+  Recording recording = record(arm);
   for (TestRun& run : recording.runs) {
     for (double& position : run.position) {
       position *= 20.0;
@@ -232,7 +232,7 @@ TEST(Prepare, TellsAnArmThatTurnsRoundAndRound) {
 }
 
 TEST(Prepare, KeepsTheLongestStretchWithoutGaps) {
-  Recording recording = record(kFlywheel);
+  Recording recording = record(flywheel);
   TestRun& run = recording.runs[0];
   for (std::size_t i = run.time.size() - 200; i < run.time.size(); ++i) {
     run.time[i] += 1.0;
@@ -244,7 +244,7 @@ TEST(Prepare, KeepsTheLongestStretchWithoutGaps) {
 }
 
 TEST(Prepare, RefusesColumnsOfDifferentLength) {
-  Recording recording = record(kArm);
+  Recording recording = record(arm);
   recording.runs[1].velocity.pop_back();
   const auto prepared = prepare(recording);
   ASSERT_FALSE(prepared);
@@ -253,7 +253,7 @@ TEST(Prepare, RefusesColumnsOfDifferentLength) {
 }
 
 TEST(Prepare, RefusesARunWithoutPositionAndVelocity) {
-  Recording recording = record(kArm);
+  Recording recording = record(arm);
   recording.runs[0].position.clear();
   recording.runs[0].velocity.clear();
   EXPECT_FALSE(prepare(recording));

@@ -15,7 +15,7 @@ namespace {
 using namespace flyball::identification;
 using flyball::mechanisms::MechanismKind;
 
-const std::filesystem::path kData = FLYBALL_TEST_DATA;
+const std::filesystem::path data = FLYBALL_TEST_DATA;
 
 /// Rows [t, V, position, velocity] in rotations; of nine columns the left side.
 Recording read(const std::filesystem::path& path) {
@@ -46,7 +46,7 @@ Recording read(const std::filesystem::path& path) {
 }
 
 FeedforwardFit fit(const std::string& name) {
-  const auto result = fit_feedforward(read(kData / "sysid-json" / name));
+  const auto result = fit_feedforward(read(data / "sysid-json" / name));
   EXPECT_TRUE(result) << name << ": " << (result ? "" : to_string(result.error()));
   return result.value_or(FeedforwardFit{});
 }
@@ -81,21 +81,21 @@ TEST(RealLogs, RepeatsAgreeWithinTheirIntervals) {
 
 TEST(RealLogs, AnArmThatDoesNotMoveIsRefused) {
   const auto refused =
-      fit_feedforward(read(kData / "sysid-json-bad" / "mrt3216_arm_nomotion_20230301-172022.json"));
+      fit_feedforward(read(data / "sysid-json-bad" / "mrt3216_arm_nomotion_20230301-172022.json"));
   ASSERT_FALSE(refused);
   EXPECT_TRUE(refused.error().is(IdentificationError::no_motion));
 }
 
 TEST(RealLogs, AnIdleLogIsRefused) {
   const auto refused = fit_feedforward(
-      read(kData / "sysid-json-bad" / "frc_characterization_2019_nine_column_idle.json"));
+      read(data / "sysid-json-bad" / "frc_characterization_2019_nine_column_idle.json"));
   ASSERT_FALSE(refused);
   EXPECT_TRUE(refused.error().is(IdentificationError::no_motion));
 }
 
 TEST(RealLogs, AnInvertedEncoderIsNamed) {
   const auto report = identify_feedforward(
-      read(kData / "sysid-json-bad" / "frc1672_drive_inverted_encoder_20230427-151436.json"));
+      read(data / "sysid-json-bad" / "frc1672_drive_inverted_encoder_20230427-151436.json"));
   const auto* diagnostic = recordings::find(report.diagnostics, "sign_mismatch");
   ASSERT_NE(diagnostic, nullptr);
   EXPECT_NE(diagnostic->message.find("inverted encoder"), std::string::npos);

@@ -16,14 +16,14 @@ using flyball::identification::Recording;
 
 /// A clean recording of one of the benchmark's mechanisms.
 inline Recording record(std::size_t mechanism, std::uint64_t seed = 1) {
-  return flyball::simulation::record_test_session(
-             scenarios::session(scenarios::kMechanisms.at(mechanism), seed))
+  return flyball::record_characterization(
+             scenarios::session(scenarios::mechanisms.at(mechanism), seed))
       .value();
 }
 
-inline constexpr std::size_t kFlywheel = 1;
-inline constexpr std::size_t kElevator = 2;
-inline constexpr std::size_t kArm = 4;
+inline constexpr std::size_t flywheel = 1;
+inline constexpr std::size_t elevator = 2;
+inline constexpr std::size_t arm = 4;
 
 inline const Diagnostic* find(const std::vector<Diagnostic>& diagnostics, std::string_view code) {
   const auto found =

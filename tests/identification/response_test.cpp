@@ -11,7 +11,7 @@ using flyball::Random;
 
 constexpr double kS = 0.4;
 constexpr double kV = 2.0;
-constexpr double kTau = 0.15;
+constexpr double tau = 0.15;
 
 RunInput steady(double voltage, double duration, double step) {
   RunInput input;
@@ -38,11 +38,11 @@ double position_at(const Response& response, double time) {
 TEST(Response, StepFromRestIsExponential) {
   const RunInput input = steady(3.0, 1.0, 0.02);
   Response response;
-  response.simulate(input, {kS, kV, std::log(kTau), 0.0, 0.0, 0.0}, false);
+  response.simulate(input, {kS, kV, std::log(tau), 0.0, 0.0, 0.0}, false);
   for (const double time : {0.1, 0.38, 0.9}) {
-    const double rise = 1.0 - std::exp(-time / kTau);
+    const double rise = 1.0 - std::exp(-time / tau);
     EXPECT_NEAR(velocity_at(response, time), 1.3 * rise, 1e-12);
-    EXPECT_NEAR(position_at(response, time), 1.3 * (time - kTau * rise), 1e-12);
+    EXPECT_NEAR(position_at(response, time), 1.3 * (time - tau * rise), 1e-12);
   }
 }
 
@@ -52,9 +52,9 @@ TEST(Response, CoastsToRestWithinAStepAndSticks) {
   const RunInput input = steady(0.0, 1.0, 0.1);
   Response response;
   const double v0 = 1.1;
-  response.simulate(input, {kS, kV, std::log(kTau), 0.0, 0.0, v0}, false);
-  const double stop = kTau * std::log(1.0 + v0 * kV / kS);
-  EXPECT_NEAR(position_at(response, 0.9), v0 * kTau - stop * kS / kV, 1e-12);
+  response.simulate(input, {kS, kV, std::log(tau), 0.0, 0.0, v0}, false);
+  const double stop = tau * std::log(1.0 + v0 * kV / kS);
+  EXPECT_NEAR(position_at(response, 0.9), v0 * tau - stop * kS / kV, 1e-12);
   EXPECT_EQ(velocity_at(response, 0.9), 0.0);
 }
 
@@ -62,10 +62,10 @@ TEST(Response, SticksBelowBreakawayAndSlipsBackAboveIt) {
   const RunInput below = steady(0.39, 1.0, 0.05);
   const RunInput above = steady(-0.6, 1.0, 0.05);
   Response response;
-  response.simulate(below, {kS, kV, std::log(kTau), 0.0, 0.0, 0.0}, false);
+  response.simulate(below, {kS, kV, std::log(tau), 0.0, 0.0, 0.0}, false);
   EXPECT_EQ(position_at(response, 1.0), 0.0);
   // Reverses: forward friction until rest, then backwards towards (V + kS)/kV = −0.1.
-  response.simulate(above, {kS, kV, std::log(kTau), 0.0, 0.0, 0.5}, false);
+  response.simulate(above, {kS, kV, std::log(tau), 0.0, 0.0, 0.5}, false);
   EXPECT_NEAR(velocity_at(response, 1.0), -0.1, 1e-3);
 }
 
@@ -73,17 +73,17 @@ TEST(Response, GravityActsLikeVoltage) {
   RunInput input = steady(3.0, 1.0, 0.02);
   input.gravity_cosine.assign(input.time.size(), 1.0);
   Response with_gravity;
-  with_gravity.simulate(input, {kS, kV, std::log(kTau), 0.7, 0.0, 0.0}, false);
+  with_gravity.simulate(input, {kS, kV, std::log(tau), 0.7, 0.0, 0.0}, false);
   const RunInput lower = steady(2.3, 1.0, 0.02);
   Response without;
-  without.simulate(lower, {kS, kV, std::log(kTau), 0.0, 0.0, 0.0}, false);
+  without.simulate(lower, {kS, kV, std::log(tau), 0.0, 0.0, 0.0}, false);
   EXPECT_NEAR(velocity_at(with_gravity, 0.7), velocity_at(without, 0.7), 1e-13);
 }
 
 TEST(Response, StaysAtTheInitialVelocityBeforeItsStart) {
   const RunInput input = steady(3.0, 0.2, 0.02);
   Response response;
-  response.simulate(input, {kS, kV, std::log(kTau), 0.0, 0.0, 0.8}, false);
+  response.simulate(input, {kS, kV, std::log(tau), 0.0, 0.0, 0.8}, false);
   EXPECT_NEAR(position_at(response, -0.05), -0.04, 1e-15);
 }
 

@@ -3,7 +3,7 @@
 #include <string>
 
 #include <flyball/identification/feedforward_fit.hpp>
-#include <flyball/simulation/test_session.hpp>
+#include <flyball/simulation/characterization.hpp>
 #include <flyball/study/design.hpp>
 #include <flyball/study/identify.hpp>
 #include <flyball/study/tune.hpp>
@@ -43,8 +43,8 @@ inline study::DesignResult design_result(MechanismKind kind, bool kA_determined 
   return study::design(design_job(kind, kA_determined)).value();
 }
 
-inline simulation::TestSessionOptions session(MechanismKind kind) {
-  simulation::TestSessionOptions options;
+inline CharacterizationOptions session(MechanismKind kind) {
+  CharacterizationOptions options;
   const mechanisms::FeedforwardGains gains = design_job(kind).plant.gains;
   options.mechanism = kind;
   options.kS = gains.kS;
@@ -79,13 +79,13 @@ inline study::IdentifyResult identify_result(const identification::Recording& re
 }
 
 inline study::IdentifyResult identify_result(MechanismKind kind) {
-  return identify_result(simulation::record_test_session(session(kind)).value());
+  return identify_result(record_characterization(session(kind)).value());
 }
 
 /// A recording of a mechanism that did not move, so that the fit is refused.
 inline study::IdentifyResult refused_result() {
   identification::Recording recording =
-      simulation::record_test_session(session(MechanismKind::elevator)).value();
+      record_characterization(session(MechanismKind::elevator)).value();
   for (identification::TestRun& run : recording.runs) {
     run.position.assign(run.time.size(), 0.5);
     run.velocity.assign(run.time.size(), 0.0);

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include <flyball/io/sysid_json.hpp>
-#include <flyball/simulation/test_session.hpp>
+#include <flyball/simulation/characterization.hpp>
 #include <flyball/study/schema.hpp>
 
 namespace flyball::study {
@@ -24,10 +24,10 @@ const char* sysid_name(identification::TestKind kind) {
 // A simulated session in a file of its own, removed with it.
 class SessionFile {
  public:
-  SessionFile(const simulation::TestSessionOptions& session, const std::string& test,
+  SessionFile(const CharacterizationOptions& session, const std::string& test,
               const std::string& name)
       : path_((std::filesystem::temp_directory_path() / name).string()) {
-    const auto recording = simulation::record_test_session(session);
+    const auto recording = record_characterization(session);
     EXPECT_TRUE(recording);
     SysIdJson log;
     log.test = test;
@@ -52,7 +52,7 @@ class SessionFile {
 };
 
 TEST(Tune, GoesFromALogToAProvenController) {
-  simulation::TestSessionOptions session;
+  CharacterizationOptions session;
   session.mechanism = MechanismKind::arm;
   session.kS = 0.1;
   session.kV = 1.2;
@@ -93,7 +93,7 @@ TEST(Tune, GoesFromALogToAProvenController) {
 }
 
 TEST(Tune, ARefusedLogHasNoDesignAndSaysWhy) {
-  simulation::TestSessionOptions session;
+  CharacterizationOptions session;
   session.mechanism = MechanismKind::elevator;
   session.kS = 20.0;  // friction that no test overcomes
   session.kV = 4.0;

@@ -1,4 +1,4 @@
-#include <flyball/simulation/test_session.hpp>
+#include <flyball/simulation/characterization.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -8,10 +8,12 @@
 
 #include <flyball/core/argument.hpp>
 #include <flyball/core/random.hpp>
+#include <flyball/mechanisms/friction.hpp>
+#include <flyball/mechanisms/gravity.hpp>
 
 #include "core/try.hpp"
 
-namespace flyball::simulation {
+namespace flyball {
 namespace {
 
 using identification::Recording;
@@ -19,14 +21,14 @@ using identification::TestKind;
 using identification::TestRun;
 using mechanisms::MechanismKind;
 
-constexpr std::string_view kWhere = "record_test_session";
-constexpr double kStep = 0.25e-3;       // s, gravity and friction are constant over it
-constexpr double kSensorMemory = 0.5;   // s of rest before the first row that sensors may look at
-constexpr double kMaxDuration = 120.0;  // s, of one test
+constexpr std::string_view where = "record_characterization";
+constexpr double step = 0.25e-3;        // s, gravity and friction are constant over it
+constexpr double sensor_memory = 0.5;   // s of rest before the first row that sensors may look at
+constexpr double max_duration = 120.0;  // s, of one test
 
-Expected<void> check_options(const TestSessionOptions& options) {
+Expected<void> check_options(const CharacterizationOptions& options) {
   const bool travels = options.mechanism != MechanismKind::flywheel;
-  return Checks(kWhere)
+  return Checks(where)
       .not_negative(options.kS, "kS", "V")
       .positive(options.kV, "kV")
       .positive(options.kA, "kA")
@@ -36,101 +38,61 @@ Expected<void> check_options(const TestSessionOptions& options) {
       .within(options.breakaway, 1.0, 100.0, "breakaway")
       .positive(options.ramp_rate, "ramp_rate", "V/s")
       .positive(options.step_voltage, "step_voltage", "V")
-      .within(options.ramp_limit, 0.0, options.ramp_rate * kMaxDuration, "ramp_limit")
-      .within(options.step_duration, 0.0, kMaxDuration, "step_duration")
+      .within(options.ramp_limit, 0.0, options.ramp_rate * max_duration, "ramp_limit")
+      .within(options.step_duration, 0.0, max_duration, "step_duration")
       .within(options.rest_before, 0.0, 10.0, "rest_before")
       .within(options.coast_after, 0.0, 10.0, "coast_after")
       .within(options.row_period, 1e-3, 1.0, "row_period")
       .within(options.row_jitter, 0.0, options.row_period / 4.0, "row_jitter")
       .within(options.sensor_refresh, 0.0, 1.0, "sensor_refresh")
-      .within(options.sensor_delay, 0.0, kSensorMemory / 2.0, "sensor_delay")
+      .within(options.sensor_delay, 0.0, sensor_memory / 2.0, "sensor_delay")
       .not_negative(options.resolution, "resolution")
-      .within(options.velocity_window, 0.0, kSensorMemory / 2.0, "velocity_window")
+      .within(options.velocity_window, 0.0, sensor_memory / 2.0, "velocity_window")
       .not_negative(options.velocity_noise.value_or(0.0), "velocity_noise")
       .not_negative(options.voltage_noise, "voltage_noise", "V")
       .also([&] {
         return travels ? check_positive(
                              options.travel_high - options.travel_low - 2.0 * options.travel_margin,
-                             kWhere, "travel_high - travel_low - 2 travel_margin")
+                             where, "travel_high - travel_low - 2 travel_margin")
                        : Expected<void>{};
       });
 }
 
 /// kA v̇ = V − kS sgn(v) − kV v − gravity between hard stops.
-class Mechanism {
+class Truth {
  public:
-  Mechanism(const TestSessionOptions& options, double position)
-      : options_(options), position_(position) {}
+  Truth(const CharacterizationOptions& options, double position)
+      : options_(options), state_{position, 0.0} {}
 
-  [[nodiscard]] double position() const { return position_; }
-  void hold() { velocity_ = 0.0; }
+  [[nodiscard]] double position() const { return state_.position; }
+  void hold() { state_.velocity = 0.0; }
 
-  /// Advances by kStep with friction and gravity frozen: exact exponential pieces, split where the
-  /// velocity crosses zero.
+  /// Advances by a step with friction and gravity frozen.
   void advance(double voltage) {
-    const double friction = friction_here();
-    const double drive = voltage - gravity_here();
-    double remaining = kStep;
-    // At most: decelerate to rest, then slip the other way.
-    for (int piece = 0; piece < 3 && remaining > 0.0; ++piece) {
-      if (velocity_ == 0.0 && std::abs(drive) <= friction * options_.breakaway) {
-        break;
-      }
-      const double sign =
-          velocity_ != 0.0 ? std::copysign(1.0, velocity_) : std::copysign(1.0, drive);
-      remaining -= slide(drive - sign * friction, sign, remaining);
-    }
+    const double drive =
+        voltage - mechanisms::gravity_voltage(options_.mechanism, options_.kG, position(), 0.0);
+    const mechanisms::Friction friction{friction_here(), options_.breakaway};
+    state_ =
+        mechanisms::FrictionMotion(options_.kV, options_.kA, friction).step(state_, drive, step);
     if (options_.mechanism != MechanismKind::flywheel) {
-      const double stopped = std::clamp(position_, options_.travel_low, options_.travel_high);
-      if (stopped != position_) {
-        position_ = stopped;
-        velocity_ = 0.0;
+      const double stopped = std::clamp(position(), options_.travel_low, options_.travel_high);
+      if (stopped != position()) {
+        state_ = {stopped, 0.0};
       }
     }
   }
 
  private:
-  /// Slides for `duration` at most, ending early at rest; returns the time that passed.
-  double slide(double drive, double sign, double duration) {
-    const double tau = options_.kA / options_.kV;
-    const double final_velocity = drive / options_.kV;
-    const double decay = std::exp(-duration / tau);
-    const double next = final_velocity + (velocity_ - final_velocity) * decay;
-    if (next * sign >= 0.0) {
-      position_ += final_velocity * duration + (velocity_ - final_velocity) * tau * (1.0 - decay);
-      velocity_ = next;
-      return duration;
-    }
-    const double passed =
-        std::min(duration, tau * std::log((velocity_ - final_velocity) / -final_velocity));
-    position_ += final_velocity * passed + velocity_ * tau;
-    velocity_ = 0.0;
-    return passed;
-  }
-
   [[nodiscard]] double friction_here() const {
     const double length = options_.mechanism == MechanismKind::flywheel
                               ? 2.0 * std::numbers::pi
                               : 0.5 * (options_.travel_high - options_.travel_low);
     return options_.kS * (1.0 + options_.friction_variation *
-                                    std::sin(2.0 * std::numbers::pi * position_ / length));
+                                    std::sin(2.0 * std::numbers::pi * position() / length));
   }
 
-  [[nodiscard]] double gravity_here() const {
-    switch (options_.mechanism) {
-      case MechanismKind::elevator:
-        return options_.kG;
-      case MechanismKind::arm:
-        return options_.kG * std::cos(position_);
-      case MechanismKind::flywheel:
-        break;
-    }
-    return 0.0;
-  }
-
-  const TestSessionOptions& options_;
-  double position_;
-  double velocity_ = 0.0;
+  const CharacterizationOptions& options_;
+  mechanisms::MechanismState state_;
 };
 
 /// The true position on a fine grid, at rest before time 0.
@@ -143,7 +105,7 @@ class History {
     if (time <= 0.0) {
       return start_;
     }
-    const double place = time / kStep;
+    const double place = time / step;
     const auto index = std::min(static_cast<std::size_t>(place), positions_.size() - 1);
     const std::size_t next = std::min(index + 1, positions_.size() - 1);
     const double fraction = place - static_cast<double>(index);
@@ -162,7 +124,7 @@ struct Applied {
 };
 
 /// Drives one test and keeps what was truly applied and where the mechanism truly was.
-Applied drive(const TestSessionOptions& options, TestKind kind, Random random) {
+Applied drive(const CharacterizationOptions& options, TestKind kind, Random random) {
   const double sign = identification::is_forward(kind) ? 1.0 : -1.0;
   const bool ramp = identification::is_quasistatic(kind);
   const bool travels = options.mechanism != MechanismKind::flywheel;
@@ -171,16 +133,16 @@ Applied drive(const TestSessionOptions& options, TestKind kind, Random random) {
                                 : options.travel_low + options.travel_margin;
   const double duration = ramp ? options.ramp_limit / options.ramp_rate : options.step_duration;
 
-  Mechanism mechanism(options, start);
+  Truth mechanism(options, start);
   Applied applied{{}, {}, History(start)};
   double cut = -1.0;
   long steps = 0;
   for (long row = 0;; ++row) {
     const double nominal = static_cast<double>(row) * options.row_period;
     const double time =
-        std::max(static_cast<double>(steps) * kStep,
-                 std::round((nominal + options.row_jitter * random.normal()) / kStep) * kStep);
-    for (; static_cast<double>(steps) * kStep < time - kStep / 2.0; ++steps) {
+        std::max(static_cast<double>(steps) * step,
+                 std::round((nominal + options.row_jitter * random.normal()) / step) * step);
+    for (; static_cast<double>(steps) * step < time - step / 2.0; ++steps) {
       if (nominal <= options.rest_before) {
         mechanism.hold();
       } else {
@@ -205,7 +167,7 @@ Applied drive(const TestSessionOptions& options, TestKind kind, Random random) {
   }
 }
 
-TestRun record(const TestSessionOptions& options, TestKind kind, Random random) {
+TestRun record(const CharacterizationOptions& options, TestKind kind, Random random) {
   const Applied applied = drive(options, kind, random.split());
   Random voltage_noise = random.split();
   Random velocity_noise = random.split();
@@ -235,7 +197,7 @@ TestRun record(const TestSessionOptions& options, TestKind kind, Random random) 
       if (options.resolution > 0.0) {
         position = std::floor(position / options.resolution) * options.resolution;
       }
-      const double window = std::max(options.velocity_window, kStep);
+      const double window = std::max(options.velocity_window, step);
       velocity = (applied.history.at(instant) - applied.history.at(instant - window)) / window;
       velocity += options.noise_per_row ? 0.0 : velocity_std * velocity_noise.normal();
     }
@@ -250,7 +212,7 @@ TestRun record(const TestSessionOptions& options, TestKind kind, Random random) 
 
 }  // namespace
 
-Expected<Recording> record_test_session(const TestSessionOptions& options) {
+Expected<Recording> record_characterization(const CharacterizationOptions& options) {
   FLYBALL_CHECK(check_options(options));
   Recording recording;
   recording.mechanism = options.mechanism;
@@ -263,4 +225,4 @@ Expected<Recording> record_test_session(const TestSessionOptions& options) {
   return recording;
 }
 
-}  // namespace flyball::simulation
+}  // namespace flyball

@@ -8,11 +8,11 @@
 #include <flyball/identification/recording.hpp>
 #include <flyball/mechanisms/mechanism_kind.hpp>
 
-namespace flyball::simulation {
+namespace flyball {
 
-/// A characterisation session to be recorded: a mechanism with known gains, driven through the
+/// A characterization session to be recorded: a mechanism with known gains, driven through the
 /// four tests, seen through the sensors and the logger that real robots have.
-struct TestSessionOptions {
+struct CharacterizationOptions {
   mechanisms::MechanismKind mechanism = mechanisms::MechanismKind::flywheel;
   double kS = 0.2;            ///< V, static friction.
   double kV = 0.02;           ///< V/(unit/s), > 0.
@@ -51,7 +51,7 @@ struct TestSessionOptions {
 /// @return  A recording as a log of it would read.
 /// @errors ArgumentError::not_finite, not_positive, out_of_range for the option that is wrong.
 /// Cost: O(duration / 0.25 ms).
-[[nodiscard]] Expected<identification::Recording> record_test_session(
-    const TestSessionOptions& options);
+[[nodiscard]] Expected<identification::Recording> record_characterization(
+    const CharacterizationOptions& options);
 
-}  // namespace flyball::simulation
+}  // namespace flyball

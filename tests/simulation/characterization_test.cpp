@@ -1,11 +1,11 @@
-#include <flyball/simulation/test_session.hpp>
+#include <flyball/simulation/characterization.hpp>
 
 #include <cmath>
 #include <limits>
 
 namespace {
 
-using namespace flyball::simulation;
+using namespace flyball;
 using flyball::ArgumentError;
 using flyball::identification::Recording;
 using flyball::identification::TestKind;
@@ -13,8 +13,8 @@ using flyball::identification::TestRun;
 using flyball::mechanisms::MechanismKind;
 
 /// Perfect sensors, so that the physics can be read off.
-TestSessionOptions perfect() {
-  TestSessionOptions options;
+CharacterizationOptions perfect() {
+  CharacterizationOptions options;
   options.kS = 0.5;
   options.kV = 0.12;
   options.kA = 0.05;
@@ -27,8 +27,8 @@ TestSessionOptions perfect() {
   return options;
 }
 
-TEST(RecordTestSession, MakesTheFourTests) {
-  const auto recording = record_test_session({});
+TEST(RecordCharacterization, MakesTheFourTests) {
+  const auto recording = record_characterization({});
   ASSERT_TRUE(recording);
   ASSERT_EQ(recording->runs.size(), 4U);
   EXPECT_EQ(recording->runs[0].kind, TestKind::quasistatic_forward);
@@ -42,8 +42,8 @@ TEST(RecordTestSession, MakesTheFourTests) {
 }
 
 // p(t) = (V − kS)/kV (t − τ (1 − e^(−t/τ))), τ = kA/kV
-TEST(RecordTestSession, StepResponseIsExponential) {
-  const auto recording = record_test_session(perfect());
+TEST(RecordCharacterization, StepResponseIsExponential) {
+  const auto recording = record_characterization(perfect());
   ASSERT_TRUE(recording);
   const TestRun& run = recording->runs[2];
   const double tau = 0.05 / 0.12;
@@ -55,8 +55,8 @@ TEST(RecordTestSession, StepResponseIsExponential) {
 }
 
 // Slow ramp: V = kS + kV v + kA v̇ with v̇ = ramp/kV after the transient.
-TEST(RecordTestSession, RampFollowsTheVoltage) {
-  const auto recording = record_test_session(perfect());
+TEST(RecordCharacterization, RampFollowsTheVoltage) {
+  const auto recording = record_characterization(perfect());
   ASSERT_TRUE(recording);
   const TestRun& run = recording->runs[1];
   const std::size_t last = run.time.size() - 2;
@@ -66,8 +66,8 @@ TEST(RecordTestSession, RampFollowsTheVoltage) {
   EXPECT_NEAR(run.velocity[last], (voltage + 0.5 - 0.05 * slope) / 0.12, 0.02);
 }
 
-TEST(RecordTestSession, StaysAtRestBelowStaticFriction) {
-  const auto recording = record_test_session(perfect());
+TEST(RecordCharacterization, StaysAtRestBelowStaticFriction) {
+  const auto recording = record_characterization(perfect());
   ASSERT_TRUE(recording);
   const TestRun& run = recording->runs[0];
   for (std::size_t row = 0; row < run.time.size() && run.voltage[row] < 0.5; ++row) {
@@ -75,10 +75,10 @@ TEST(RecordTestSession, StaysAtRestBelowStaticFriction) {
   }
 }
 
-TEST(RecordTestSession, RepeatsRowsBetweenRefreshes) {
-  TestSessionOptions options;
+TEST(RecordCharacterization, RepeatsRowsBetweenRefreshes) {
+  CharacterizationOptions options;
   options.noise_per_row = false;
-  const auto recording = record_test_session(options);
+  const auto recording = record_characterization(options);
   ASSERT_TRUE(recording);
   const TestRun& run = recording->runs[2];
   std::size_t repeats = 0;
@@ -88,15 +88,15 @@ TEST(RecordTestSession, RepeatsRowsBetweenRefreshes) {
   EXPECT_NEAR(static_cast<double>(repeats) / static_cast<double>(run.time.size()), 0.75, 0.02);
 }
 
-TEST(RecordTestSession, StaysWithinItsTravel) {
-  TestSessionOptions options;
+TEST(RecordCharacterization, StaysWithinItsTravel) {
+  CharacterizationOptions options;
   options.mechanism = MechanismKind::arm;
   options.kV = 1.2;
   options.kA = 0.15;
   options.kG = 0.65;
   options.kS = 0.1;
   options.angle_offset = 0.2;
-  const auto recording = record_test_session(options);
+  const auto recording = record_characterization(options);
   ASSERT_TRUE(recording);
   for (const TestRun& run : recording->runs) {
     for (const double position : run.position) {
@@ -106,21 +106,21 @@ TEST(RecordTestSession, StaysWithinItsTravel) {
   }
 }
 
-TEST(RecordTestSession, SameSeedSameRecording) {
-  TestSessionOptions options;
+TEST(RecordCharacterization, SameSeedSameRecording) {
+  CharacterizationOptions options;
   options.seed = 7;
-  const Recording first = record_test_session(options).value();
-  const Recording second = record_test_session(options).value();
+  const Recording first = record_characterization(options).value();
+  const Recording second = record_characterization(options).value();
   EXPECT_EQ(first.runs[1].velocity, second.runs[1].velocity);
   options.seed = 8;
-  EXPECT_NE(first.runs[1].velocity, record_test_session(options).value().runs[1].velocity);
+  EXPECT_NE(first.runs[1].velocity, record_characterization(options).value().runs[1].velocity);
 }
 
-TEST(RecordTestSession, RefusesNonsense) {
+TEST(RecordCharacterization, RefusesNonsense) {
   const auto refused = [](auto change) {
-    TestSessionOptions options;
+    CharacterizationOptions options;
     change(options);
-    return record_test_session(options);
+    return record_characterization(options);
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(refused([](auto& o) { o.kV = 0.0; }).error().is(ArgumentError::not_positive));
