@@ -106,6 +106,23 @@ Expected<void> check_answer(std::string_view what, const std::vector<Coordinate>
 
 }  // namespace detail
 
+void ModelFunctions::step(VectorOut x, const VectorIn& u, const VectorIn& p, double dt,
+                          VectorOut work) const noexcept {
+  const Eigen::Index n = x.size();
+  auto at = work.head(n);
+  auto slope = work.segment(n, n);
+  auto sum = work.tail(n);
+  // x + dt/6 (k1 + 2 k2 + 2 k3 + k4)
+  derivative(x, u, p, slope);
+  sum = slope;
+  for (const double part : {0.5, 0.5, 1.0}) {
+    at = x + part * dt * slope;
+    derivative(at, u, p, slope);
+    sum += (part == 1.0 ? 1.0 : 2.0) * slope;
+  }
+  x += dt / 6.0 * sum;
+}
+
 Expected<void> ModelFunctions::check(const VectorIn& x, const VectorIn& u, const VectorIn& p,
                                      std::string_view where, double t) const {
   FLYBALL_CHECK(detail::check_point(description_, x, u, where, t));

@@ -4,6 +4,7 @@
 
 #include <flyball/core/argument.hpp>
 #include <flyball/math/derivatives/differentiation.hpp>
+#include <flyball/math/integration/fixed_step.hpp>
 #include <flyball/systems/model.hpp>
 #include <flyball/systems/system.hpp>
 
@@ -37,6 +38,11 @@ class ModelFunctions {
   /// ∂f/∂p (n x parameters) and ∂h/∂p (outputs x parameters), exact.
   virtual void parameter_jacobians(const VectorIn& x, const VectorIn& u, const VectorIn& p,
                                    MatrixOut F, MatrixOut H) const noexcept = 0;
+  /// One step of the classical Runge-Kutta method, the input held: `x` becomes the state `dt`
+  /// seconds later. Made of `derivative`; a compiled model does it in one call.
+  /// @param work  3 n x 1, whatever is in it.
+  virtual void step(VectorOut x, const VectorIn& u, const VectorIn& p, double dt,
+                    VectorOut work) const noexcept;
   /// `check_model` of the thing itself, for parameters that are not its own: that its answers have
   /// the sizes of the description and are finite.
   [[nodiscard]] virtual Expected<void> check(const VectorIn& x, const VectorIn& u,
@@ -139,6 +145,12 @@ class AnyModel {
   }
   ///@}
 
+  /// One step of the classical Runge-Kutta method: `x` (n x 1) becomes the state `dt` seconds
+  /// later, the input held. @param work  3 n x 1, whatever is in it. `ModelStepper` holds one.
+  void step(VectorOut x, const VectorIn& u, double dt, VectorOut work) const noexcept {
+    functions_->step(x, u, p_, dt, work);
+  }
+
   /// As `check_model`, which calls this.
   [[nodiscard]] Expected<void> check(const VectorIn& x, const VectorIn& u, std::string_view where,
                                      double t = 0.0) const {
@@ -204,6 +216,19 @@ class CompiledModel final : public ModelFunctions {
       }
     }
     H.setZero();
+  }
+  void step(VectorOut x, const VectorIn& u, const VectorIn& p, double dt,
+            VectorOut work) const noexcept override {
+    using State = StateOf<M>;
+    using Derivative = decltype(f(state(x), input(u), parameters(p)));
+    if constexpr (int(State::SizeAtCompileTime) != Eigen::Dynamic &&
+                  int(State::SizeAtCompileTime) == int(Derivative::SizeAtCompileTime)) {
+      const auto in = input(u);
+      const auto own = parameters(p);
+      x = rk4([&](const State& at) { return State(f(at, in, own)); }, State(x), dt);
+    } else {
+      ModelFunctions::step(x, u, p, dt, work);
+    }
   }
   [[nodiscard]] Expected<void> check(const VectorIn& x, const VectorIn& u, const VectorIn& p,
                                      std::string_view where, double t) const override {

@@ -17,19 +17,17 @@ template <class M, class State, class Input>
 /// RK4 steps of a model whose size is known at run time, in memory that is allocated once.
 class ModelStepper {
  public:
-  explicit ModelStepper(AnyModel model);
+  explicit ModelStepper(AnyModel model) : model_(std::move(model)), work_(3 * model_.states()) {}
 
   /// @param x  n x 1, the state, replaced by that `dt` seconds later. @param u  m x 1, held.
   /// Cost: four calls of the model; no allocation where the model makes none.
-  void step(VectorOut x, const VectorIn& u, double dt) noexcept;
+  void step(VectorOut x, const VectorIn& u, double dt) noexcept { model_.step(x, u, dt, work_); }
 
   [[nodiscard]] const AnyModel& model() const noexcept { return model_; }
 
  private:
   AnyModel model_;
-  Eigen::VectorXd at_;
-  Eigen::VectorXd slope_;
-  Eigen::VectorXd sum_;
+  Eigen::VectorXd work_;
 };
 
 /// A model and its input as `integrate` takes them: f(t, x) with its exact Jacobian.
