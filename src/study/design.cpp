@@ -127,12 +127,12 @@ void simulate_response(DesignResult& result) {
 }  // namespace
 
 ErrorInfo error_info(DesignError code) {
-  static constexpr detail::ErrorRow rows[] = {
+  static constexpr flyball::detail::ErrorRow rows[] = {
       {"gravity_too_strong", "the motor cannot hold the mechanism", ErrorKind::no_answer},
       {"no_motion_possible", "the motor cannot move the mechanism", ErrorKind::no_answer},
       {"margins_lost", "the loop cannot be made robust", ErrorKind::no_answer},
   };
-  return detail::info_of(code, "design", rows);
+  return flyball::detail::info_of(code, "design", rows);
 }
 
 Expected<DesignResult> design(const DesignJob& requested) {

@@ -144,7 +144,7 @@ ExpectedAll<Project> read(std::string_view text, const std::string& name,
 }  // namespace
 
 ErrorInfo error_info(ProjectError code) {
-  static constexpr detail::ErrorRow rows[] = {
+  static constexpr flyball::detail::ErrorRow rows[] = {
       {"syntax", "the file is not TOML", ErrorKind::misuse},
       {"unknown_key", "the key is not known", ErrorKind::misuse},
       {"missing_key", "a key is missing", ErrorKind::misuse},
@@ -152,7 +152,7 @@ ErrorInfo error_info(ProjectError code) {
       {"wrong_value", "the value cannot be", ErrorKind::misuse},
       {"more_errors", "there are more errors", ErrorKind::misuse},
   };
-  return detail::info_of(code, "project", rows);
+  return flyball::detail::info_of(code, "project", rows);
 }
 
 ExpectedAll<Project> parse_project(std::string_view text, const std::string& name,
