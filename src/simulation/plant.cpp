@@ -55,6 +55,21 @@ Expected<void> ModelPlant::advance(double time, const VectorIn& u, double durati
   return {};
 }
 
+/// The model's own error where the integration found no way on, so that it names the coordinate.
+Expected<void> ModelPlant::failed(const Error& error, const VectorIn& u) const {
+  double time = 0.0;
+  for (const Evidence& evidence : error.evidence()) {
+    if (evidence.name == "t" && evidence.values.size() == 1) {
+      time = evidence.values.front();
+    } else if (evidence.name == "x" &&
+               static_cast<Eigen::Index>(evidence.values.size()) == x_.size()) {
+      const auto x = Eigen::VectorXd::Map(evidence.values.data(), x_.size());
+      FLYBALL_CHECK(stepper_.model().check(x, u, where, time));
+    }
+  }
+  return tl::unexpected(error);
+}
+
 /// What is not finite in the step that began at `before_`: the model there, or what came of it.
 Expected<void> ModelPlant::not_finite(double time, const VectorIn& u) const {
   FLYBALL_CHECK(stepper_.model().check(before_, u, where, time));

@@ -27,15 +27,16 @@ struct Inputs {
 };
 
 // Motions, sags and sensors that fail, among them a standstill from which a motion starts.
-std::vector<Inputs> inputs() {
+// @param scale  Of the measurement and the velocities: a flywheel's are large.
+std::vector<Inputs> inputs(double scale = 1.0) {
   constexpr double inf = std::numeric_limits<double>::infinity();
   const std::array odd{std::nan(""), inf, -inf, 0.0, -3.0, 500.0, 2.0};
   Random random(5);
   std::vector<Inputs> all;
   for (int k = 0; k < 300; ++k) {
-    Inputs in{0.1 * random.normal(),
-              {0.1 * random.normal(), random.normal()},
-              {0.1 * random.normal(), random.normal()},
+    Inputs in{0.1 * scale * random.normal(),
+              {0.1 * random.normal(), scale * random.normal()},
+              {0.1 * random.normal(), scale * random.normal()},
               9.0 + 4.0 * random.uniform()};
     in.r.velocity = k % 5 == 0 ? 0.0 : in.r.velocity;
     in.measurement = k % 11 == 0 ? odd[static_cast<std::size_t>(k) % 3] : in.measurement;
@@ -65,7 +66,7 @@ TEST(MechanismController, IsWhatItsCommentSays) {
       Eigen::VectorXd x_hat = Eigen::VectorXd::Zero(n);
       double u_model = 0.0;
       bool saturated = false;
-      for (const Inputs& in : inputs()) {
+      for (const Inputs& in : inputs(flywheel ? 300.0 : 1.0)) {
         const double rate = flywheel ? (in.r_next.velocity - in.r.velocity) / 0.02 : in.r.velocity;
         const double y = in.measurement + 0.015 * rate;
         x_hat = design.plant.A * x_hat + design.plant.B * u_model;

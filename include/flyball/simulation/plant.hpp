@@ -62,6 +62,7 @@ class ModelPlant final : public SimulatedPlant {
  private:
   ModelPlant(const AnyModel& model, const MatrixRef& x0, const ModelIntegration& integration);
 
+  [[nodiscard]] Expected<void> failed(const Error& error, const VectorIn& u) const;
   [[nodiscard]] Expected<void> not_finite(double time, const VectorIn& u) const;
 
   ModelStepper stepper_;
