@@ -2,7 +2,8 @@
 #include <memory>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
+
+#include <flyball/io/json_writer.hpp>
 
 #include "book/figures.hpp"
 #include "commands.hpp"
@@ -13,7 +14,6 @@ namespace flyball::app {
 namespace {
 
 constexpr const char* schema = "flyball.book/1";
-using Json = nlohmann::ordered_json;
 
 struct Options {
   CommonOptions common;
@@ -30,13 +30,18 @@ std::string name_of(const std::string& id) {
 
 int list(const Options& options) {
   if (options.common.json) {
-    Json figures = Json::array();
-    for (const book::FigureEntry& entry : book::figures()) {
-      figures.push_back({{"id", std::string(entry.id)},
-                         {"section", std::string(entry.section)},
-                         {"title", std::string(entry.title)}});
-    }
-    print(Json{{"schema", schema}, {"figures", std::move(figures)}}.dump());
+    JsonWriter json;
+    json.object([&] {
+      json.add("schema", schema);
+      json.list("figures", book::figures(), [&](const book::FigureEntry& entry) {
+        json.object([&] {
+          json.add("id", entry.id);
+          json.add("section", entry.section);
+          json.add("title", entry.title);
+        });
+      });
+    });
+    print(json.text());
     return success;
   }
   std::string text = fmt::format("{:<10} {:<8} {}\n", "figure", "section", "title");
@@ -72,18 +77,24 @@ int check(const Options& options) {
   const bool passed = std::all_of(checks->begin(), checks->end(),
                                   [](const book::FigureCheck& c) { return c.passed; });
   if (options.common.json) {
-    Json list = Json::array();
-    for (const book::FigureCheck& c : *checks) {
-      list.push_back({{"figure", c.figure},
-                      {"name", c.name},
-                      {"values", c.values},
-                      {"worst_error", c.worst_error},
-                      {"tolerance", c.tolerance},
-                      {"passed", c.passed},
-                      {"source", c.source},
-                      {"problem", c.problem}});
-    }
-    print(Json{{"schema", schema}, {"passed", passed}, {"checks", std::move(list)}}.dump());
+    JsonWriter json;
+    json.object([&] {
+      json.add("schema", schema);
+      json.add("passed", passed);
+      json.list("checks", *checks, [&](const book::FigureCheck& c) {
+        json.object([&] {
+          json.add("figure", c.figure);
+          json.add("name", c.name);
+          json.add("values", c.values);
+          json.add("worst_error", c.worst_error);
+          json.add("tolerance", c.tolerance);
+          json.add("passed", c.passed);
+          json.add("source", c.source);
+          json.add("problem", c.problem);
+        });
+      });
+    });
+    print(json.text());
   } else {
     std::string text = fmt::format("{:<10} {:<34} {:>7} {:>12} {:>10}\n", "figure",
                                    "number or series", "values", "worst error", "tolerance");
@@ -102,9 +113,41 @@ int check(const Options& options) {
   return passed ? success : no_answer;
 }
 
+void write(JsonWriter& json, const book::FigureResult& figure,
+           const std::vector<std::string>& files) {
+  json.object([&] {
+    json.add("id", figure.id);
+    json.add("title", figure.title);
+    json.object("numbers", [&] {
+      for (const book::FigureNumber& number : figure.numbers) {
+        json.object(number.name, [&] {
+          json.add("value", number.value);
+          json.add("unit", number.unit);
+        });
+      }
+    });
+    json.add("files", files);
+  });
+}
+
+std::string text_of(const book::FigureResult& figure, const std::vector<std::string>& files) {
+  std::string text = fmt::format("{}: {}\n", name_of(figure.id), figure.title);
+  for (const book::FigureNumber& number : figure.numbers) {
+    text += fmt::format("  {} = {:.6g} {}\n", number.name, number.value, number.unit);
+  }
+  for (const std::string& file : files) {
+    text += fmt::format("  {}\n", file);
+  }
+  return text;
+}
+
 int draw(const Options& options) {
   const std::string folder = options.common.out.empty() ? "." : options.common.out;
-  Json answers = Json::array();
+  JsonWriter json;
+  json.open('{');
+  json.add("schema", schema);
+  json.key("figures");
+  json.open('[');
   for (const std::string& id : options.figures) {
     const auto entry = book::find_figure(id);
     if (!entry) {
@@ -118,26 +161,16 @@ int draw(const Options& options) {
     if (!files) {
       return fail(files.error(), options.common, schema);
     }
-    Json numbers = Json::object();
-    std::string text = fmt::format("{}: {}\n", name_of(figure->id), figure->title);
-    for (const book::FigureNumber& number : figure->numbers) {
-      numbers[number.name] = {{"value", number.value}, {"unit", number.unit}};
-      text += fmt::format("  {} = {:.6g} {}\n", number.name, number.value, number.unit);
-    }
-    for (const std::string& file : *files) {
-      text += fmt::format("  {}\n", file);
-    }
     if (options.common.json) {
-      answers.push_back({{"id", figure->id},
-                         {"title", figure->title},
-                         {"numbers", std::move(numbers)},
-                         {"files", *files}});
+      write(json, *figure, *files);
     } else {
-      print(text);
+      print(text_of(*figure, *files));
     }
   }
   if (options.common.json) {
-    print(Json{{"schema", schema}, {"figures", std::move(answers)}}.dump());
+    json.close(']');
+    json.close('}');
+    print(json.text());
   }
   return success;
 }

@@ -1,7 +1,6 @@
 #include <memory>
 
-#include <nlohmann/json.hpp>
-
+#include <flyball/io/json_writer.hpp>
 #include <flyball/mechanisms/motor.hpp>
 #include <flyball/report/terminal.hpp>
 
@@ -19,16 +18,18 @@ struct Options {
 
 constexpr const char* schema = "flyball.motors/1";
 
-nlohmann::ordered_json motor_json(const mechanisms::DcMotor& motor) {
-  return {{"name", motor.name},
-          {"nominal_voltage", motor.nominal_voltage},
-          {"stall_torque", motor.stall_torque},
-          {"stall_current", motor.stall_current},
-          {"free_current", motor.free_current},
-          {"free_speed", motor.free_speed},
-          {"R", motor.R},
-          {"Kt", motor.Kt},
-          {"Kv", motor.Kv}};
+void write(JsonWriter& json, const mechanisms::DcMotor& motor) {
+  json.object([&] {
+    json.add("name", motor.name);
+    json.add("nominal_voltage", motor.nominal_voltage);
+    json.add("stall_torque", motor.stall_torque);
+    json.add("stall_current", motor.stall_current);
+    json.add("free_current", motor.free_current);
+    json.add("free_speed", motor.free_speed);
+    json.add("R", motor.R);
+    json.add("Kt", motor.Kt);
+    json.add("Kv", motor.Kv);
+  });
 }
 
 int run(const Options& options) {
@@ -45,11 +46,12 @@ int run(const Options& options) {
     motors.push_back(*std::move(motor));
   }
   if (options.common.json) {
-    nlohmann::ordered_json list = nlohmann::ordered_json::array();
-    for (const mechanisms::DcMotor& motor : motors) {
-      list.push_back(motor_json(motor));
-    }
-    print(nlohmann::ordered_json{{"schema", schema}, {"motors", std::move(list)}}.dump());
+    JsonWriter json;
+    json.object([&] {
+      json.add("schema", schema);
+      json.list("motors", motors, [&](const auto& motor) { write(json, motor); });
+    });
+    print(json.text());
     return success;
   }
   print(report::motors_to_terminal(motors, terminal_style()));

@@ -3,30 +3,16 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include <flyball/core/argument.hpp>
 #include <flyball/io/file.hpp>
+#include <flyball/io/json_writer.hpp>
 #include <flyball/io/sysid_json.hpp>
 
 #include "io/sysid_columns.hpp"
 
 namespace flyball {
 namespace {
-
-/// The shortest decimal that reads back to the same double, with a point or an exponent so that it
-/// stays a floating-point number everywhere.
-std::string number(double value) {
-  std::string text = fmt::format("{}", value);
-  if (text.find_first_of(".e") == std::string::npos) {
-    text += ".0";
-  }
-  return text;
-}
-
-std::string quoted(const std::string& text) {
-  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
 
 Expected<void> check_run(const io::Run& run, std::span<const io::Column> columns) {
   for (std::size_t c = 0; c < columns.size(); ++c) {
@@ -60,13 +46,13 @@ Expected<std::string> to_sysid_json(const SysIdJson& log) {
     if (Expected<void> ok = check_run(run, columns); !ok) {
       return tl::unexpected(std::move(ok).error());
     }
-    text += fmt::format("{}  {}: [", separator, quoted(run.name));
+    text += fmt::format("{}  {}: [", separator, json_quoted(run.name));
     separator = ",\n";
     for (std::size_t i = 0; i < run.time.size(); ++i) {
       text += i == 0 ? "\n    [" : ",\n    [";
       for (std::size_t c = 0; c < columns.size(); ++c) {
         text += c == 0 ? "" : ", ";
-        text += columns[c] == nullptr ? "0.0" : number((run.*columns[c])[i]);
+        text += columns[c] == nullptr ? "0.0" : json_number((run.*columns[c])[i]);
       }
       text += "]";
     }
@@ -79,11 +65,11 @@ Expected<std::string> to_sysid_json(const SysIdJson& log) {
     separator = ",\n";
   }
   if (!log.test.empty()) {
-    text += fmt::format("{}  \"test\": {}", separator, quoted(log.test));
+    text += fmt::format("{}  \"test\": {}", separator, json_quoted(log.test));
     separator = ",\n";
   }
   if (!log.units.empty()) {
-    text += fmt::format("{}  \"units\": {}", separator, quoted(log.units));
+    text += fmt::format("{}  \"units\": {}", separator, json_quoted(log.units));
     separator = ",\n";
   }
   if (log.units_per_rotation) {
@@ -92,7 +78,8 @@ Expected<std::string> to_sysid_json(const SysIdJson& log) {
         !ok) {
       return tl::unexpected(std::move(ok).error());
     }
-    text += fmt::format("{}  \"unitsPerRotation\": {}", separator, number(*log.units_per_rotation));
+    text += fmt::format("{}  \"unitsPerRotation\": {}", separator,
+                        json_number(*log.units_per_rotation));
   }
   return text + "\n}\n";
 }

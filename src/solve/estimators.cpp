@@ -8,7 +8,7 @@ namespace flyball::solve {
 
 namespace {
 
-Outcome solve_kalman(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_kalman(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const auto gain, kalman_gain(problem.matrix("A"), problem.matrix("C"),
                                            problem.matrix("Q"), problem.matrix("R")));
   answer.add("K", gain.K);

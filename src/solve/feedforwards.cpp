@@ -19,7 +19,7 @@ using Eigen::MatrixXd;
 
 namespace {
 
-Outcome solve_plant_inversion(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_plant_inversion(const Problem& problem, JsonWriter& answer) {
   const MatrixXd& A = problem.matrix("A");
   const MatrixXd& B = problem.matrix("B");
   if (problem.has("Q") || problem.has("R")) {
@@ -38,7 +38,7 @@ Outcome solve_plant_inversion(const Problem& problem, AnswerWriter& answer) {
   return {};
 }
 
-Outcome solve_steady_state(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_steady_state(const Problem& problem, JsonWriter& answer) {
   MatrixXd A = problem.matrix("A");
   if (problem.domain() == TimeDomain::discrete) {
     A -= MatrixXd::Identity(A.rows(), A.cols());  // (C.5)
@@ -68,7 +68,7 @@ Outcome solve_steady_state(const Problem& problem, AnswerWriter& answer) {
   return {};
 }
 
-Outcome solve_delay_compensation(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_delay_compensation(const Problem& problem, JsonWriter& answer) {
   const MatrixXd& K = problem.matrix("K");
   const MatrixXd& A = problem.matrix("A");
   const MatrixXd& B = problem.matrix("B");
@@ -81,11 +81,11 @@ Outcome solve_delay_compensation(const Problem& problem, AnswerWriter& answer) {
   }
   FLYBALL_TRY(const auto gains, latency_gains(K, A, B, Time(problem.number("T")), latency));
   answer.add("K", gains.back());
-  answer.add_list("start", gains);
+  answer.add("start", gains);
   return {};
 }
 
-Outcome solve_margins(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_margins(const Problem& problem, JsonWriter& answer) {
   const MatrixXd& A = problem.matrix("A");
   const MatrixXd& B = problem.matrix("B");
   const MatrixXd& K = problem.matrix("K");
@@ -133,8 +133,8 @@ Outcome solve_margins(const Problem& problem, AnswerWriter& answer) {
     }
     return list;
   };
-  answer.add_list("gain_crossovers", frequencies(margins.gain_crossovers));
-  answer.add_list("phase_crossovers", frequencies(margins.phase_crossovers));
+  answer.add("gain_crossovers", frequencies(margins.gain_crossovers));
+  answer.add("phase_crossovers", frequencies(margins.phase_crossovers));
   return {};
 }
 

@@ -13,7 +13,7 @@ namespace {
 /// What `connect` makes of two systems of the domain that the problem names.
 template <class Connect>
 Outcome connect_both(const Problem& problem, std::string_view first, std::string_view second,
-                     AnswerWriter& answer, Connect&& connect) {
+                     JsonWriter& answer, Connect&& connect) {
   const auto write = [&](const auto& connected) -> Outcome {
     return connected.map([&](const auto& system) { write_system(system, answer); });
   };
@@ -24,23 +24,23 @@ Outcome connect_both(const Problem& problem, std::string_view first, std::string
              : write(connect(sampled(problem, one), sampled(problem, other)));
 }
 
-Outcome solve_series(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_series(const Problem& problem, JsonWriter& answer) {
   return connect_both(problem, "first", "second", answer,
                       [](const auto& first, const auto& second) { return series(first, second); });
 }
 
-Outcome solve_parallel(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_parallel(const Problem& problem, JsonWriter& answer) {
   return connect_both(
       problem, "first", "second", answer,
       [](const auto& first, const auto& second) { return parallel(first, second); });
 }
 
-Outcome solve_append(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_append(const Problem& problem, JsonWriter& answer) {
   return connect_both(problem, "first", "second", answer,
                       [](const auto& first, const auto& second) { return append(first, second); });
 }
 
-Outcome solve_feedback(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_feedback(const Problem& problem, JsonWriter& answer) {
   const FeedbackSign sign =
       problem.choice("sign") == "positive" ? FeedbackSign::positive : FeedbackSign::negative;
   // Without a system on the way back the outputs return as they are.

@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 
 namespace {
 
-Outcome write_riccati(Expected<RiccatiSolution> solved, AnswerWriter& answer) {
+Outcome write_riccati(Expected<RiccatiSolution> solved, JsonWriter& answer) {
   FLYBALL_TRY(const RiccatiSolution& solution, std::move(solved));
   answer.add("X", solution.X);
   answer.add("K", solution.K);
@@ -25,7 +25,7 @@ Outcome write_riccati(Expected<RiccatiSolution> solved, AnswerWriter& answer) {
   return {};
 }
 
-Outcome solve_dare(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_dare(const Problem& problem, JsonWriter& answer) {
   const MatrixXd& A = problem.matrix("A");
   const MatrixXd& B = problem.matrix("B");
   const MatrixXd& Q = problem.matrix("Q");
@@ -34,7 +34,7 @@ Outcome solve_dare(const Problem& problem, AnswerWriter& answer) {
                        answer);
 }
 
-Outcome solve_care(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_care(const Problem& problem, JsonWriter& answer) {
   const MatrixXd& A = problem.matrix("A");
   const MatrixXd& B = problem.matrix("B");
   const MatrixXd& Q = problem.matrix("Q");
@@ -43,7 +43,7 @@ Outcome solve_care(const Problem& problem, AnswerWriter& answer) {
                        answer);
 }
 
-Outcome write_linear(Expected<LinearMatrixSolution> solved, AnswerWriter& answer) {
+Outcome write_linear(Expected<LinearMatrixSolution> solved, JsonWriter& answer) {
   FLYBALL_TRY(const LinearMatrixSolution& solution, std::move(solved));
   answer.add("X", solution.X);
   answer.add("residual", solution.residual);
@@ -52,28 +52,28 @@ Outcome write_linear(Expected<LinearMatrixSolution> solved, AnswerWriter& answer
 }
 
 template <auto Function>
-Outcome solve_lyapunov(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_lyapunov(const Problem& problem, JsonWriter& answer) {
   return write_linear(Function(problem.matrix("A"), problem.matrix("Q")), answer);
 }
 
 template <auto Function>
-Outcome solve_sylvester(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_sylvester(const Problem& problem, JsonWriter& answer) {
   return write_linear(Function(problem.matrix("A"), problem.matrix("B"), problem.matrix("C")),
                       answer);
 }
 
-Outcome write_matrix(Expected<MatrixXd> solved, AnswerWriter& answer) {
+Outcome write_matrix(Expected<MatrixXd> solved, JsonWriter& answer) {
   FLYBALL_TRY(const MatrixXd& X, std::move(solved));
   answer.add("X", X);
   return {};
 }
 
 template <auto Function>
-Outcome solve_function(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_function(const Problem& problem, JsonWriter& answer) {
   return write_matrix(Function(problem.matrix("A")), answer);
 }
 
-Outcome solve_powm(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_powm(const Problem& problem, JsonWriter& answer) {
   return write_matrix(powm(problem.matrix("A"), problem.number("power")), answer);
 }
 

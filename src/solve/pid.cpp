@@ -20,7 +20,7 @@ PidForm form_of(const Problem& problem) {
                         : PidForm::pid;
 }
 
-Outcome write_gains(const Expected<PidGains>& gains, AnswerWriter& answer) {
+Outcome write_gains(const Expected<PidGains>& gains, JsonWriter& answer) {
   return gains.map([&](const PidGains& pid) {
     answer.add("kp", pid.kp);
     answer.add("ki", pid.ki);
@@ -28,7 +28,7 @@ Outcome write_gains(const Expected<PidGains>& gains, AnswerWriter& answer) {
   });
 }
 
-Outcome solve_ultimate(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_ultimate(const Problem& problem, JsonWriter& answer) {
   const UltimatePoint point{problem.number("ultimate_gain"), problem.number("ultimate_period")};
   return write_gains(problem.choice("rule") == "tyreus-luyben"
                          ? tyreus_luyben(point, form_of(problem))
@@ -36,7 +36,7 @@ Outcome solve_ultimate(const Problem& problem, AnswerWriter& answer) {
                      answer);
 }
 
-Outcome solve_reaction(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_reaction(const Problem& problem, JsonWriter& answer) {
   const ReactionCurve curve{problem.number("gain"), problem.number("time_constant"),
                             problem.number("delay")};
   const std::string_view rule = problem.choice("rule");
@@ -50,7 +50,7 @@ Outcome solve_reaction(const Problem& problem, AnswerWriter& answer) {
                      answer);
 }
 
-Outcome solve_curve(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_curve(const Problem& problem, JsonWriter& answer) {
   const Eigen::MatrixXd& times = problem.matrix("times");
   const Eigen::MatrixXd& values = problem.matrix("values");
   FLYBALL_TRY(const auto curve,
@@ -63,7 +63,7 @@ Outcome solve_curve(const Problem& problem, AnswerWriter& answer) {
   return {};
 }
 
-Outcome solve_by_poles(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_by_poles(const Problem& problem, JsonWriter& answer) {
   const Eigen::MatrixXd& A = problem.matrix("A");
   const Eigen::MatrixXd& B = problem.matrix("B");
   const double frequency = problem.number("natural_frequency");

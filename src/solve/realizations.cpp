@@ -10,24 +10,24 @@ namespace flyball::solve {
 
 namespace {
 
-Outcome solve_minimal(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_minimal(const Problem& problem, JsonWriter& answer) {
   return with_system(problem, [&](const auto& plant) -> Outcome {
     FLYBALL_TRY(const auto minimal, minimal_realization(plant, problem.number("tolerance")));
     write_system(minimal.system, answer);
-    answer.add("unreached", static_cast<double>(minimal.unreached));
-    answer.add("unseen", static_cast<double>(minimal.unseen));
+    answer.add("unreached", minimal.unreached);
+    answer.add("unseen", minimal.unseen);
     answer.add("transform", minimal.T);
     return {};
   });
 }
 
-Outcome solve_balanced(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_balanced(const Problem& problem, JsonWriter& answer) {
   return with_system(problem, [&](const auto& plant) -> Outcome {
     FLYBALL_TRY(const auto balanced, problem.has("order")
                                          ? balanced_truncation(plant, problem.integer("order"))
                                          : balanced_realization(plant));
     write_system(balanced.system, answer);
-    answer.add_list("hankel_singular_values", balanced.hankel);
+    answer.add("hankel_singular_values", balanced.hankel);
     answer.add("transform", balanced.T);
     answer.add("inverse_transform", balanced.T_inverse);
     answer.add("error_bound", balanced.error_bound);
@@ -35,7 +35,7 @@ Outcome solve_balanced(const Problem& problem, AnswerWriter& answer) {
   });
 }
 
-Outcome solve_canonical(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_canonical(const Problem& problem, JsonWriter& answer) {
   return with_system(problem, [&](const auto& plant) -> Outcome {
     FLYBALL_TRY(const auto canonical, problem.choice("form") == "controllable"
                                           ? controllable_canonical_form(plant)
@@ -45,7 +45,7 @@ Outcome solve_canonical(const Problem& problem, AnswerWriter& answer) {
   });
 }
 
-Outcome solve_similarity(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_similarity(const Problem& problem, JsonWriter& answer) {
   return with_system(problem, [&](const auto& plant) -> Outcome {
     FLYBALL_TRY(const auto transformed, similarity_transform(plant, problem.matrix("transform")));
     write_system(transformed, answer);

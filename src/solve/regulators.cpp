@@ -20,7 +20,7 @@ namespace {
 
 /// With T a continuous plant is sampled, and the weights are the discrete cost's, as in Theorem
 /// 7.7.1.
-Outcome solve_lqr(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_lqr(const Problem& problem, JsonWriter& answer) {
   DiscretizedMatrices plant{problem.matrix("A"), problem.matrix("B")};
   bool discrete = problem.domain() == TimeDomain::discrete;
   if (!discrete && problem.has("T")) {
@@ -42,7 +42,7 @@ Outcome solve_lqr(const Problem& problem, AnswerWriter& answer) {
   return {};
 }
 
-Outcome solve_lqi(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_lqi(const Problem& problem, JsonWriter& answer) {
   const ContinuousSystem<> plant = problem.system();
   const MatrixXd& Q = problem.matrix("Q");
   const MatrixXd& R = problem.matrix("R");
@@ -71,7 +71,7 @@ Outcome solve_lqi(const Problem& problem, AnswerWriter& answer) {
   return {};
 }
 
-Outcome solve_finite_horizon(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_finite_horizon(const Problem& problem, JsonWriter& answer) {
   const QuadraticCost cost{problem.matrix("Q"), problem.matrix("R"), problem.matrix("N")};
   const bool discrete = problem.domain() == TimeDomain::discrete;
   if (!discrete && !problem.has("horizon")) {
@@ -89,12 +89,12 @@ Outcome solve_finite_horizon(const Problem& problem, AnswerWriter& answer) {
               discrete ? finite_horizon_lqr(A, B, cost, S_end, steps)
                        : continuous_finite_horizon_lqr(A, B, cost, S_end,
                                                        Time(problem.number("horizon")), steps));
-  answer.add_list("K", design.K);
-  answer.add_list("S", design.S);
+  answer.add("K", design.K);
+  answer.add("S", design.S);
   return {};
 }
 
-Outcome solve_implicit_model(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_implicit_model(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const auto model, implicit_model_following(
                                     problem.matrix("A"), problem.matrix("B"), problem.matrix("C"),
                                     problem.matrix("A_ref"), problem.matrix("B_ref"),
@@ -109,7 +109,7 @@ Outcome solve_implicit_model(const Problem& problem, AnswerWriter& answer) {
   return {};
 }
 
-Outcome solve_place(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_place(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const auto placed,
               place(problem.matrix("A"), problem.matrix("B"), problem.complex_list("poles")));
   answer.add("K", placed.K);

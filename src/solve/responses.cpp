@@ -17,7 +17,7 @@ double numbers_of(const ContinuousSystem<>& plant, double samples) {
 }
 
 /// x and y at the samples of u, exactly, the input held between them.
-Outcome solve_simulate(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_simulate(const Problem& problem, JsonWriter& answer) {
   const ContinuousSystem<> plant = problem.system();
   const Eigen::MatrixXd& u = problem.matrix("u");
   const Eigen::MatrixXd& x0 = problem.matrix("x0");
@@ -62,28 +62,28 @@ Expected<std::optional<ResponseTimes>> times_of(const Problem& problem, std::str
   return std::optional<ResponseTimes>({Time(problem.number("T")), problem.integer("samples")});
 }
 
-Outcome write_response(const Expected<LinearResponse>& answered, AnswerWriter& answer) {
+Outcome write_response(const Expected<LinearResponse>& answered, JsonWriter& answer) {
   return answered.map([&](const LinearResponse& response) {
-    answer.add_list("time", response.time);
+    answer.add("time", response.time);
     answer.add("y", response.y);
   });
 }
 
-Outcome solve_step(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_step(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const auto times, times_of(problem, "step-response"));
   return with_system(problem, [&](const auto& plant) {
     return write_response(step_response(plant, problem.integer("input"), times), answer);
   });
 }
 
-Outcome solve_impulse(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_impulse(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const auto times, times_of(problem, "impulse-response"));
   return with_system(problem, [&](const auto& plant) {
     return write_response(impulse_response(plant, problem.integer("input"), times), answer);
   });
 }
 
-Outcome solve_initial(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_initial(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const auto times, times_of(problem, "initial-response"));
   return with_system(problem, [&](const auto& plant) {
     return write_response(initial_response(plant, problem.matrix("x0"), times), answer);

@@ -3,9 +3,9 @@
 #include <initializer_list>
 #include <vector>
 
+#include <flyball/io/json_writer.hpp>
 #include <flyball/systems/system.hpp>
 
-#include "io/answer_writer.hpp"
 #include "solve/problem.hpp"
 
 /// What the tables of kinds are written with: one row a kind, one file a domain.
@@ -123,7 +123,7 @@ inline constexpr Field condition =
 [[nodiscard]] std::vector<Field> answered_system(std::string_view states, std::string_view inputs,
                                                  std::string_view outputs);
 template <class System>
-void write_system(const System& system, AnswerWriter& answer) {
+void write_system(const System& system, JsonWriter& answer) {
   answer.add("A", system.A);
   answer.add("B", system.B);
   answer.add("C", system.C);

@@ -1,7 +1,10 @@
 #include <flyball/solve/solver.hpp>
 
+#include <utility>
+
+#include <flyball/io/json_writer.hpp>
+
 #include "core/try.hpp"
-#include "io/answer_writer.hpp"
 #include "solve/json_object.hpp"
 #include "solve/problem.hpp"
 
@@ -11,10 +14,25 @@ using Json = nlohmann::json;
 
 namespace {
 
-Answer refused(AnswerWriter& answer, const Json* id, const Error& error) {
-  answer.begin(id);
-  answer.add(error);
-  return {answer.end(), false, error.kind()};
+/// A new answer, open, with the problem's id if it has one.
+JsonWriter begin(const Json* id) {
+  JsonWriter answer;
+  answer.open('{');
+  if (id != nullptr) {
+    answer.add_json("id", id->dump(-1, ' ', false, Json::error_handler_t::replace));
+  }
+  return answer;
+}
+
+std::string end(JsonWriter answer) {
+  answer.close('}');
+  return std::move(answer).text();
+}
+
+Answer refused(const Json* id, const Error& error) {
+  JsonWriter answer = begin(id);
+  answer.add("error", error);
+  return {end(std::move(answer)), false, error.kind()};
 }
 
 }  // namespace
@@ -24,8 +42,7 @@ Expected<Solver> Solver::create(std::string_view kind) {
 }
 
 std::string Solver::error_json(const Error& error) {
-  AnswerWriter answer;
-  return refused(answer, nullptr, error).json;
+  return refused(nullptr, error).json;
 }
 
 bool Solver::is_complete(std::string_view text) {
@@ -33,22 +50,21 @@ bool Solver::is_complete(std::string_view text) {
 }
 
 Answer Solver::solve(std::string_view text) const {
-  AnswerWriter answer;
   const auto object = parse_object(text, kind_->name, "problem");
   if (!object) {
-    return refused(answer, nullptr, object.error());
+    return refused(nullptr, object.error());
   }
   const auto found = object->find("id");
   const Json* const id = found == object->end() ? nullptr : &*found;
   const auto problem = Problem::read(*object, kind_->fields, kind_->name);
   if (!problem) {
-    return refused(answer, id, problem.error());
+    return refused(id, problem.error());
   }
-  answer.begin(id);
+  JsonWriter answer = begin(id);
   if (const Expected<void> outcome = kind_->function(*problem, answer); !outcome) {
-    return refused(answer, id, outcome.error());
+    return refused(id, outcome.error());
   }
-  return {answer.end(), true, ErrorKind::no_answer};
+  return {end(std::move(answer)), true, ErrorKind::no_answer};
 }
 
 }  // namespace flyball::solve

@@ -5,7 +5,7 @@ namespace flyball::solve {
 namespace {
 
 void write_reach(const ReachAnalysis& analysis, const std::string& prefix, std::string_view hidden,
-                 AnswerWriter& answer) {
+                 JsonWriter& answer) {
   std::vector<std::complex<double>> hidden_modes;
   Eigen::VectorXd distances(static_cast<Eigen::Index>(analysis.modes.size()));
   Eigen::VectorXcd modes(distances.size());
@@ -19,21 +19,21 @@ void write_reach(const ReachAnalysis& analysis, const std::string& prefix, std::
   }
   answer.add(hidden, Eigen::VectorXcd(Eigen::Map<const Eigen::VectorXcd>(
                          hidden_modes.data(), static_cast<Eigen::Index>(hidden_modes.size()))));
-  answer.add(prefix + "_rank", static_cast<double>(analysis.rank));
+  answer.add(prefix + "_rank", analysis.rank);
   answer.add(prefix + "_condition", analysis.matrix_condition);
   answer.add(prefix + "_modes", modes);
-  answer.add_list(prefix + "_distances", distances);
+  answer.add(prefix + "_distances", distances);
 }
 
 }  // namespace
 
 void write_structure(const StructureAnalysis& structure, std::span<const std::string> states,
-                     AnswerWriter& answer) {
+                     JsonWriter& answer) {
   answer.add("controllable", structure.controllability.controllable);
   answer.add("observable", structure.observability.observable);
   answer.add("stabilizable", structure.controllability.stabilizable);
   answer.add("detectable", structure.observability.detectable);
-  answer.add_text("stability", to_string(structure.modes.stability));
+  answer.add("stability", to_string(structure.modes.stability));
   const std::vector<Mode>& modes = structure.modes.modes;
   Eigen::VectorXcd poles(static_cast<Eigen::Index>(modes.size()));
   Eigen::VectorXd damping(poles.size());
@@ -45,12 +45,12 @@ void write_structure(const StructureAnalysis& structure, std::span<const std::st
     frequency(k) = mode.natural_frequency;
   }
   answer.add("poles", poles);
-  answer.add_list("damping_ratios", damping);
-  answer.add_list("natural_frequencies", frequency);
+  answer.add("damping_ratios", damping);
+  answer.add("natural_frequencies", frequency);
   write_reach(structure.controllability, "controllability", "uncontrollable_modes", answer);
   write_reach(structure.observability, "observability", "unobservable_modes", answer);
-  answer.add_text("words", describe(structure.controllability, states) + "\n" +
-                               describe(structure.observability, states));
+  answer.add("words", describe(structure.controllability, states) + "\n" +
+                          describe(structure.observability, states));
 }
 
 std::vector<Field> structure_fields() {

@@ -11,7 +11,7 @@ namespace flyball::solve {
 
 /// The fields that `solve analyze` answers and `analyze --json` too.
 void write_structure(const StructureAnalysis& structure, std::span<const std::string> states,
-                     AnswerWriter& answer);
+                     JsonWriter& answer);
 
 /// What it writes, as fields of an answer.
 [[nodiscard]] std::vector<Field> structure_fields();

@@ -31,7 +31,7 @@ Expected<Conversion> conversion_of(const Problem& problem) {
   return Conversion{method, AngularVelocity(problem.number("prewarp"))};
 }
 
-Outcome solve_c2d(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_c2d(const Problem& problem, JsonWriter& answer) {
   const ContinuousSystem<> plant = problem.system();
   const Time period(problem.number("T"));
   FLYBALL_TRY(const auto conversion, conversion_of(problem));
@@ -49,7 +49,7 @@ Outcome solve_c2d(const Problem& problem, AnswerWriter& answer) {
   return {};
 }
 
-Outcome solve_d2c(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_d2c(const Problem& problem, JsonWriter& answer) {
   const ContinuousSystem<> given = problem.system();
   FLYBALL_TRY(const auto conversion, conversion_of(problem));
   FLYBALL_TRY(const auto continuous,
@@ -59,7 +59,7 @@ Outcome solve_d2c(const Problem& problem, AnswerWriter& answer) {
   return {};
 }
 
-Outcome solve_sampled_cost(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_sampled_cost(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const auto cost,
               sampled_cost(problem.matrix("A"), problem.matrix("B"), problem.matrix("Q"),
                            problem.matrix("R"), problem.matrix("N"), Time(problem.number("T"))));
@@ -71,7 +71,7 @@ Outcome solve_sampled_cost(const Problem& problem, AnswerWriter& answer) {
   return {};
 }
 
-Outcome solve_input_delay(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_input_delay(const Problem& problem, JsonWriter& answer) {
   const Time period(problem.number("T"));
   const Time delay(problem.number("delay"));
   if (period.si() > 0.0 && delay.si() > 0.0) {
@@ -86,7 +86,7 @@ Outcome solve_input_delay(const Problem& problem, AnswerWriter& answer) {
   return {};
 }
 
-Outcome solve_gramians(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_gramians(const Problem& problem, JsonWriter& answer) {
   const ContinuousSystem<> plant{
       problem.matrix("A"), problem.matrix("B"), problem.matrix("C"),
       MatrixXd::Zero(problem.matrix("C").rows(), problem.matrix("B").cols())};
@@ -102,7 +102,7 @@ Outcome solve_gramians(const Problem& problem, AnswerWriter& answer) {
                             : hankel_singular_values(
                                   DiscreteSystem<>{plant.A, plant.B, plant.C, plant.D, Time(1.0)});
     if (hankel) {
-      answer.add_list("hankel_singular_values", *hankel);
+      answer.add("hankel_singular_values", *hankel);
     }
   }
   answer.add("residual", std::max(controllability.residual, observability.residual));
@@ -110,14 +110,14 @@ Outcome solve_gramians(const Problem& problem, AnswerWriter& answer) {
   return {};
 }
 
-Outcome solve_analyze(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_analyze(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const auto structure,
               analyze_structure(problem.system(), problem.domain(), Time(problem.number("T"))));
   write_structure(structure, {}, answer);
   return {};
 }
 
-Outcome solve_h2_norm(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_h2_norm(const Problem& problem, JsonWriter& answer) {
   return with_system(problem, [&](const auto& plant) -> Outcome {
     FLYBALL_TRY(const double norm, h2_norm(plant));
     answer.add("norm", norm);
@@ -125,7 +125,7 @@ Outcome solve_h2_norm(const Problem& problem, AnswerWriter& answer) {
   });
 }
 
-Outcome solve_h_infinity_norm(const Problem& problem, AnswerWriter& answer) {
+Outcome solve_h_infinity_norm(const Problem& problem, JsonWriter& answer) {
   return with_system(problem, [&](const auto& plant) -> Outcome {
     FLYBALL_TRY(const HInfinityNorm peak, h_infinity_norm(plant));
     answer.add("norm", peak.norm);

@@ -1,7 +1,6 @@
+#include <flyball/io/json_writer.hpp>
 #include <flyball/study/schema.hpp>
 
-#include "io/answer_writer.hpp"
-#include "io/json.hpp"
 #include "solve/structure_answer.hpp"
 
 namespace flyball::study {
@@ -10,39 +9,33 @@ namespace {
 
 using solve::write_structure;
 
-void write_names(std::string_view field, const std::vector<std::string>& names,
-                 AnswerWriter& answer) {
-  answer.add_json(field, dump(names));
-}
-
-void write_sampled(const SampledAnalysis& sampled, const ModelFile& model, AnswerWriter& answer) {
-  AnswerWriter inner;
-  inner.begin(nullptr);
-  inner.add("T", model.period->si());
-  inner.add("A", sampled.system.A);
-  inner.add("B", sampled.system.B);
-  inner.add("nyquist_frequency", sampled.sampling.nyquist_frequency);
-  inner.add("samples_per_radian", sampled.sampling.samples_per_radian);
-  inner.add("aliases", sampled.sampling.aliases);
-  inner.add("loses_controllability", sampled.sampling.loses_controllability);
-  write_structure(sampled, model.states, inner);
-  answer.add_json("sampled", inner.end());
+void write_sampled(const SampledAnalysis& sampled, const ModelFile& model, JsonWriter& answer) {
+  answer.object("sampled", [&] {
+    answer.add("T", model.period->si());
+    answer.add("A", sampled.system.A);
+    answer.add("B", sampled.system.B);
+    answer.add("nyquist_frequency", sampled.sampling.nyquist_frequency);
+    answer.add("samples_per_radian", sampled.sampling.samples_per_radian);
+    answer.add("aliases", sampled.sampling.aliases);
+    answer.add("loses_controllability", sampled.sampling.loses_controllability);
+    write_structure(sampled, model.states, answer);
+  });
 }
 
 }  // namespace
 
 std::string to_json(const ModelAnalysis& analysis) {
   const ModelFile& model = analysis.model;
-  AnswerWriter answer;
-  answer.begin(nullptr);
-  answer.add_text("schema", "flyball.analyze/1");
-  answer.add_text("domain", model.domain == TimeDomain::continuous ? "continuous" : "discrete");
+  JsonWriter answer;
+  answer.open('{');
+  answer.add("schema", "flyball.analyze/1");
+  answer.add("domain", model.domain == TimeDomain::continuous ? "continuous" : "discrete");
   if (model.period) {
     answer.add("T", model.period->si());
   }
-  write_names("states", model.states, answer);
-  write_names("inputs", model.inputs, answer);
-  write_names("outputs", model.outputs, answer);
+  answer.add("states", model.states);
+  answer.add("inputs", model.inputs);
+  answer.add("outputs", model.outputs);
   answer.add("A", model.system.A);
   answer.add("B", model.system.B);
   answer.add("C", model.system.C);
@@ -61,8 +54,9 @@ std::string to_json(const ModelAnalysis& analysis) {
   if (analysis.sampled) {
     write_sampled(*analysis.sampled, model, answer);
   }
-  answer.add_json("diagnostics", dump(json_of(model.notes)));
-  return answer.end();
+  answer.add("diagnostics", model.notes);
+  answer.close('}');
+  return std::move(answer).text();
 }
 
 }  // namespace flyball::study

@@ -7,7 +7,7 @@
 #include <flyball/core/expected.hpp>
 
 namespace flyball {
-class AnswerWriter;
+class JsonWriter;
 }
 
 namespace flyball::solve {
@@ -59,7 +59,7 @@ struct Kind {
   std::vector<Field> answer;  ///< In the order in which they are written.
   std::string_view example;   ///< A problem that has an answer, as JSON on one line.
   /// Writes the answer to a problem whose fields are there and of the right shape.
-  Expected<void> (*function)(const Problem& problem, AnswerWriter& answer);
+  Expected<void> (*function)(const Problem& problem, JsonWriter& answer);
   std::string_view section{};  ///< Where it stands in the documentation, such as "Systems".
 };
 

@@ -1,0 +1,153 @@
+#include <flyball/io/json_writer.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <iterator>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace flyball {
+
+namespace {
+
+void append_number(std::string& text, double value) {
+  const std::size_t from = text.size();
+  fmt::format_to(std::back_inserter(text), "{}", value);
+  if (text.find_first_of(".e", from) == std::string::npos) {
+    text += ".0";
+  }
+}
+
+void append_quoted(std::string& text, std::string_view value) {
+  const bool plain = std::all_of(value.begin(), value.end(), [](char c) {
+    return c >= ' ' && c < '\x7F' && c != '"' && c != '\\';
+  });
+  if (plain) {
+    text += '"';
+    text += value;
+    text += '"';
+  } else {
+    text += nlohmann::json(value).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  }
+}
+
+}  // namespace
+
+std::string json_number(double value) {
+  std::string text;
+  append_number(text, value);
+  return text;
+}
+
+std::string json_quoted(std::string_view text) {
+  std::string quoted;
+  append_quoted(quoted, text);
+  return quoted;
+}
+
+void JsonWriter::separate() {
+  if (!text_.empty() && text_.back() != '{' && text_.back() != '[' && text_.back() != ':') {
+    text_ += ',';
+  }
+}
+
+void JsonWriter::key(std::string_view name) {
+  separate();
+  append_quoted(text_, name);
+  text_ += ':';
+}
+
+void JsonWriter::open(char bracket) {
+  separate();
+  text_ += bracket;
+}
+
+void JsonWriter::add(std::string_view name,
+                     std::initializer_list<std::pair<std::string_view, double>> numbers) {
+  object(name, [&] {
+    for (const auto& [member, value] : numbers) {
+      add(member, value);
+    }
+  });
+}
+
+void JsonWriter::write_json(std::string_view json) {
+  separate();
+  text_ += json;
+}
+
+void JsonWriter::write(double value) {
+  separate();
+  if (std::isfinite(value)) {
+    append_number(text_, value);
+  } else {
+    text_ += std::isnan(value) ? "null" : value > 0.0 ? "\"inf\"" : "\"-inf\"";
+  }
+}
+
+void JsonWriter::write(std::string_view text) {
+  separate();
+  append_quoted(text_, text);
+}
+
+void JsonWriter::write(const Eigen::MatrixXd& M) {
+  open('[');
+  for (Eigen::Index i = 0; i < M.rows(); ++i) {
+    open('[');
+    for (Eigen::Index j = 0; j < M.cols(); ++j) {
+      write(M(i, j));
+    }
+    close(']');
+  }
+  close(']');
+}
+
+void JsonWriter::write(std::span<const double> values) {
+  list(values, [this](double value) { write(value); });
+}
+
+void JsonWriter::write(const Eigen::VectorXd& values) {
+  write(std::span<const double>(values.data(), static_cast<std::size_t>(values.size())));
+}
+
+void JsonWriter::write(const Eigen::VectorXcd& values) {
+  list(values, [this](const std::complex<double>& value) {
+    open('[');
+    write(value.real());
+    write(value.imag());
+    close(']');
+  });
+}
+
+void JsonWriter::write(const Error& error) {
+  object([&] {
+    std::vector<std::string_view> names{"code", "message"};
+    add("code", error.code());
+    add("message", to_string(error));
+    for (const Evidence& evidence : error.evidence()) {
+      if (std::find(names.begin(), names.end(), evidence.name) != names.end()) {
+        continue;
+      }
+      names.push_back(evidence.name);
+      if (evidence.values.empty()) {
+        add(evidence.name, evidence.text);
+      } else if (evidence.values.size() == 1) {
+        add(evidence.name, evidence.values.front());
+      } else {
+        add(evidence.name, evidence.values);
+      }
+    }
+  });
+}
+
+void JsonWriter::write(const Diagnostic& diagnostic) {
+  object([&] {
+    add("code", diagnostic.code);
+    add("severity", to_string(diagnostic.severity));
+    add("message", diagnostic.message);
+  });
+}
+
+}  // namespace flyball

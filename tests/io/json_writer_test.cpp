@@ -1,0 +1,111 @@
+#include <flyball/io/json_writer.hpp>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <rapidcheck/gtest.h>
+
+namespace flyball {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+template <class T>
+std::string text_of(const T& value) {
+  JsonWriter json;
+  json.write(value);
+  return json.text();
+}
+
+TEST(JsonWriter, ValuesOfEveryKind) {
+  EXPECT_EQ(text_of(0.1), "0.1");
+  EXPECT_EQ(text_of(2), "2");
+  EXPECT_EQ(text_of(std::size_t{18446744073709551615U}), "18446744073709551615");
+  EXPECT_EQ(text_of(true), "true");
+  EXPECT_EQ(text_of("text"), R"("text")");  // not a bool, which a pointer would convert to
+  EXPECT_EQ(text_of(std::optional<double>()), "null");
+  EXPECT_EQ(text_of(std::optional(3)), "3");
+  EXPECT_EQ(text_of(std::vector<double>{1.0, 2.5}), "[1.0,2.5]");
+  EXPECT_EQ(text_of(std::vector<std::string>{"a", "b"}), R"(["a","b"])");
+  EXPECT_EQ(text_of(std::vector<double>()), "[]");
+}
+
+TEST(JsonWriter, ADoubleStaysADouble) {
+  EXPECT_EQ(text_of(2.0), "2.0");
+  EXPECT_EQ(text_of(-0.0), "-0.0");
+  EXPECT_EQ(text_of(1e300), "1e+300");
+  EXPECT_EQ(text_of(infinity), R"("inf")");
+  EXPECT_EQ(text_of(-infinity), R"("-inf")");
+  EXPECT_EQ(text_of(std::numeric_limits<double>::quiet_NaN()), "null");
+}
+
+RC_GTEST_PROP(JsonWriter, EveryFiniteDoubleReadsBack, (std::uint64_t bits)) {
+  const auto value = std::bit_cast<double>(bits);
+  RC_PRE(std::isfinite(value));
+  const auto read = nlohmann::json::parse(text_of(value));
+  RC_ASSERT(read.is_number_float());
+  RC_ASSERT(std::bit_cast<std::uint64_t>(read.get<double>()) == bits);
+}
+
+TEST(JsonWriter, MatricesAreRowsVectorsListsAndComplexNumbersPairs) {
+  Eigen::MatrixXd M(2, 3);
+  M << 1, 2, 3, 4, 5, infinity;
+  EXPECT_EQ(text_of(M), R"([[1.0,2.0,3.0],[4.0,5.0,"inf"]])");
+  EXPECT_EQ(text_of(Eigen::MatrixXd(0, 2)), "[]");
+  EXPECT_EQ(text_of(Eigen::MatrixXd(2, 0)), "[[],[]]");
+  EXPECT_EQ(text_of(Eigen::VectorXd(Eigen::Vector2d(1, 2))), "[1.0,2.0]");
+  EXPECT_EQ(text_of(Eigen::VectorXcd(Eigen::Vector2cd({1, 2}, {3, -4}))), "[[1.0,2.0],[3.0,-4.0]]");
+}
+
+TEST(JsonWriter, ObjectsAndListsNest) {
+  JsonWriter json;
+  json.object([&] {
+    json.add("id", 7);
+    json.object("empty", [] {});
+    json.add("gains", {{"kS", 0.5}, {"kV", 2.0}});
+    json.list("points", std::vector<int>{1, 2},
+              [&](int i) { json.object([&] { json.add("x", i); }); });
+    json.add_json("raw", "[null]");
+  });
+  EXPECT_EQ(
+      json.text(),
+      R"({"id":7,"empty":{},"gains":{"kS":0.5,"kV":2.0},"points":[{"x":1},{"x":2}],"raw":[null]})");
+}
+
+TEST(JsonWriter, TextIsEscapedAndBytesThatAreNotUtf8AreReplaced) {
+  EXPECT_EQ(text_of("a\"b\\c\n\x01"), R"("a\"b\\c\n\u0001")");
+  EXPECT_EQ(text_of("V·s²"), "\"V·s²\"");
+  EXPECT_EQ(text_of("bad\xff"), "\"bad\xEF\xBF\xBD\"");
+  JsonWriter json;
+  json.object([&] { json.add("a\"b", 1); });
+  EXPECT_EQ(json.text(), R"({"a\"b":1})");
+}
+
+TEST(JsonWriter, AnErrorHasCodeMessageAndItsEvidenceOnce) {
+  const Error error = Error(ArgumentError::out_of_range)
+                          .in("f")
+                          .with("limit", 2.0)
+                          .with("pole", {0.5, -0.5})
+                          .with("name", "x")
+                          .with("limit", 3.0)
+                          .with("code", "mine");
+  const auto json = nlohmann::ordered_json::parse(text_of(error));
+  EXPECT_EQ(json["code"], "out_of_range");
+  EXPECT_EQ(json["message"], to_string(error));
+  EXPECT_EQ(json["limit"], 2.0);
+  EXPECT_EQ(json["pole"], (nlohmann::json{0.5, -0.5}));
+  EXPECT_EQ(json["name"], "x");
+  EXPECT_EQ(json.size(), 5U);
+}
+
+TEST(JsonWriter, ADiagnostic) {
+  EXPECT_EQ(text_of(std::vector<Diagnostic>{{"repeated_rows", Severity::warning, "75 %"}}),
+            R"([{"code":"repeated_rows","severity":"warning","message":"75 %"}])");
+}
+
+}  // namespace
+}  // namespace flyball
