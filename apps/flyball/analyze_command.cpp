@@ -1,6 +1,6 @@
 #include <memory>
 
-#include <flyball/study/analyze.hpp>
+#include <flyball/study/answer.hpp>
 
 #include "answer.hpp"
 #include "commands.hpp"
@@ -27,7 +27,7 @@ int run(const Options& options) {
   if (!analysis) {
     return fail(analysis.error(), options.common, schema);
   }
-  return answer(*analysis, &report::write_analyze_report, options.common, false, schema);
+  return tell(study::answer_of(*analysis), options.common, false);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <flyball/io/json_writer.hpp>
+#include <flyball/report/terminal.hpp>
 
 #include "book/figures.hpp"
 #include "commands.hpp"
@@ -44,11 +45,12 @@ int list(const Options& options) {
     print(json.text());
     return success;
   }
-  std::string text = fmt::format("{:<10} {:<8} {}\n", "figure", "section", "title");
+  Table table{.header = {"figure", "section", "title"}, .words = {0, 1, 2}};
   for (const book::FigureEntry& entry : book::figures()) {
-    text += fmt::format("{:<10} {:<8} {}\n", entry.id, entry.section, entry.title);
+    table.rows.push_back(
+        {std::string(entry.id), std::string(entry.section), std::string(entry.title)});
   }
-  print(text);
+  print(report::to_terminal({.sections = {{"figures", "", {std::move(table)}}}}, terminal_style()));
   return success;
 }
 
@@ -67,6 +69,24 @@ Expected<std::vector<book::FigureCheck>> checks_of(const Options& options) {
     checks.insert(checks.end(), of_figure.begin(), of_figure.end());
   }
   return checks;
+}
+
+Document document_of(const std::vector<book::FigureCheck>& checks) {
+  Table table{.header = {"figure", "number or series", "values", "worst error", "tolerance", ""},
+              .words = {0, 1, 5}};
+  std::size_t wrong = 0;
+  for (const book::FigureCheck& c : checks) {
+    const Value mark = c.passed ? Value("ok", Tone::good) : Value("WRONG", Tone::bad);
+    table.rows.push_back({c.figure, c.name, fmt::to_string(c.values),
+                          fmt::format("{:.2e}", c.worst_error), fmt::format("{:.0e}", c.tolerance),
+                          c.problem.empty() ? mark : Value(c.problem, Tone::bad)});
+    wrong += c.passed ? 0 : 1;
+  }
+  const Paragraph sum =
+      wrong == 0
+          ? Paragraph{fmt::format("all {} agree with their references", checks.size()), Tone::good}
+          : Paragraph{fmt::format("{} of {} are WRONG", wrong, checks.size()), Tone::bad};
+  return {.sections = {{"checks", "", {std::move(table), sum}}}};
 }
 
 int check(const Options& options) {
@@ -96,19 +116,7 @@ int check(const Options& options) {
     });
     print(json.text());
   } else {
-    std::string text = fmt::format("{:<10} {:<34} {:>7} {:>12} {:>10}\n", "figure",
-                                   "number or series", "values", "worst error", "tolerance");
-    for (const book::FigureCheck& c : *checks) {
-      text += c.problem.empty()
-                  ? fmt::format("{:<10} {:<34} {:>7} {:>12.2e} {:>10.0e}  {}\n", c.figure, c.name,
-                                c.values, c.worst_error, c.tolerance, c.passed ? "ok" : "WRONG")
-                  : fmt::format("{:<10} {:<34} {}\n", c.figure, c.name, c.problem);
-    }
-    const auto wrong = std::count_if(checks->begin(), checks->end(),
-                                     [](const book::FigureCheck& c) { return !c.passed; });
-    text += wrong == 0 ? fmt::format("all {} agree with their references\n", checks->size())
-                       : fmt::format("{} of {} are WRONG\n", wrong, checks->size());
-    print(text);
+    print(report::to_terminal(document_of(*checks), terminal_style()));
   }
   return passed ? success : no_answer;
 }

@@ -4,7 +4,7 @@
 
 #include <unistd.h>
 
-#include <flyball/study/schema.hpp>
+#include <flyball/io/json_writer.hpp>
 
 #include "console.hpp"
 
@@ -104,7 +104,7 @@ void print(const std::string& text) {
 
 int fail(const Errors& errors, const CommonOptions& options, const std::string& schema) {
   if (options.json) {
-    print(study::to_json(errors, schema));
+    print(refusal_json(schema, errors));
   }
   for (const QuotedError& error : errors.all()) {
     tell(error);

@@ -1,5 +1,6 @@
 #include <memory>
 
+#include <flyball/study/answer.hpp>
 #include <flyball/study/project.hpp>
 
 #include "answer.hpp"
@@ -27,7 +28,7 @@ int run(const Options& options) {
   if (!result) {
     return fail(result.error(), options.common, schema);
   }
-  return answer(*result, &report::write_design_report, options.common, true, schema);
+  return tell(study::answer_of(*result), options.common, true);
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include <memory>
 
+#include <flyball/study/answer.hpp>
+
 #include "answer.hpp"
 #include "commands.hpp"
 #include "console.hpp"
@@ -25,8 +27,7 @@ int run(const Options& options) {
   if (!result) {
     return fail(result.error(), options.common, schema);
   }
-  const Error* refusal = result->report.fit ? nullptr : &result->report.fit.error();
-  return answer(*result, &report::write_identify_report, options.common, false, schema, refusal);
+  return tell(study::answer_of(*result), options.common, false);
 }
 
 }  // namespace

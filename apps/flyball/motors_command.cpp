@@ -1,9 +1,8 @@
 #include <memory>
 
-#include <flyball/io/json_writer.hpp>
-#include <flyball/mechanisms/motor.hpp>
-#include <flyball/report/terminal.hpp>
+#include <flyball/study/motors.hpp>
 
+#include "answer.hpp"
 #include "commands.hpp"
 #include "console.hpp"
 
@@ -18,20 +17,6 @@ struct Options {
 
 constexpr const char* schema = "flyball.motors/1";
 
-void write(JsonWriter& json, const mechanisms::DcMotor& motor) {
-  json.object([&] {
-    json.add("name", motor.name);
-    json.add("nominal_voltage", motor.nominal_voltage);
-    json.add("stall_torque", motor.stall_torque);
-    json.add("stall_current", motor.stall_current);
-    json.add("free_current", motor.free_current);
-    json.add("free_speed", motor.free_speed);
-    json.add("R", motor.R);
-    json.add("Kt", motor.Kt);
-    json.add("Kv", motor.Kv);
-  });
-}
-
 int run(const Options& options) {
   std::vector<mechanisms::DcMotor> motors;
   if (options.name.empty()) {
@@ -45,17 +30,7 @@ int run(const Options& options) {
     }
     motors.push_back(*std::move(motor));
   }
-  if (options.common.json) {
-    JsonWriter json;
-    json.object([&] {
-      json.add("schema", schema);
-      json.list("motors", motors, [&](const auto& motor) { write(json, motor); });
-    });
-    print(json.text());
-    return success;
-  }
-  print(report::motors_to_terminal(motors, terminal_style()));
-  return success;
+  return tell(study::answer_of(motors), options.common, false);
 }
 
 }  // namespace

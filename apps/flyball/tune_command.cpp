@@ -1,7 +1,7 @@
 #include <memory>
 
+#include <flyball/study/answer.hpp>
 #include <flyball/study/project.hpp>
-#include <flyball/study/tune.hpp>
 
 #include "answer.hpp"
 #include "commands.hpp"
@@ -20,14 +20,6 @@ struct Options {
   std::vector<study::Override> given;
 };
 
-// The error that a tuning ended with, if it did.
-const Error* refusal_of(const study::TuneResult& result) {
-  if (!result.identification.report.fit) {
-    return &result.identification.report.fit.error();
-  }
-  return result.design && !*result.design ? &result.design->error() : nullptr;
-}
-
 int run(const Options& options) {
   const auto job = study::tune_job(options.path, options.project, options.given);
   if (!job) {
@@ -37,8 +29,7 @@ int run(const Options& options) {
   if (!result) {
     return fail(result.error(), options.common, schema);
   }
-  return answer(*result, &report::write_tune_report, options.common, true, schema,
-                refusal_of(*result));
+  return tell(study::answer_of(*result), options.common, true);
 }
 
 }  // namespace

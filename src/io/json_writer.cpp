@@ -47,6 +47,19 @@ std::string json_quoted(std::string_view text) {
   return quoted;
 }
 
+std::string refusal_json(std::string_view schema, const Errors& errors) {
+  JsonWriter json;
+  json.object([&] {
+    json.add("schema", schema);
+    json.add("error", static_cast<const Error&>(errors));
+    if (errors.all().size() > 1) {
+      json.add("errors", errors.all());
+    }
+    json.add("diagnostics", std::vector<Diagnostic>());
+  });
+  return std::move(json).text();
+}
+
 void JsonWriter::separate() {
   if (!text_.empty() && text_.back() != '{' && text_.back() != '[' && text_.back() != ':') {
     text_ += ',';
@@ -62,15 +75,6 @@ void JsonWriter::key(std::string_view name) {
 void JsonWriter::open(char bracket) {
   separate();
   text_ += bracket;
-}
-
-void JsonWriter::add(std::string_view name,
-                     std::initializer_list<std::pair<std::string_view, double>> numbers) {
-  object(name, [&] {
-    for (const auto& [member, value] : numbers) {
-      add(member, value);
-    }
-  });
 }
 
 void JsonWriter::write_json(std::string_view json) {

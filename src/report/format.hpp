@@ -1,39 +1,11 @@
 #pragma once
 
-#include <complex>
 #include <cstddef>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include <Eigen/Core>
-
 namespace flyball::report {
-
-/// A number for people: `digits` significant digits, trailing zeros of a fraction dropped, a power
-/// of ten only beyond 1e-4 and 1e6; "none" for NaN, "∞" for infinity.
-[[nodiscard]] std::string number(double value, int digits = 4);
-
-/// The shortest digits that read back to the same double; "NaN", "inf" where there is no number.
-[[nodiscard]] std::string exact(double value);
-
-/// "0.150 ± 0.012": the half-width with two significant digits, the value with as many decimals.
-[[nodiscard]] std::string with_half_width(double value, double half_width);
-
-/// The value with as many decimals as `with_half_width` would give it.
-[[nodiscard]] std::string in_digits_of(double value, double half_width);
-
-/// "12 %" of a ratio.
-[[nodiscard]] std::string percent(double ratio, int digits = 3);
-
-/// "20 ms" below a second, "1.2 s" from there.
-[[nodiscard]] std::string seconds(double value);
-
-/// "0.91 ± 0.1j" for a pair's member with a positive imaginary part, "0.91" for a real number.
-[[nodiscard]] std::string complex_number(std::complex<double> value, int digits = 4);
-
-/// "[0 1; 0 -13.3]", rows separated by semicolons.
-[[nodiscard]] std::string matrix(const Eigen::MatrixXd& M, int digits = 5);
 
 /// What a terminal shows: code points, which is what our texts are made of.
 [[nodiscard]] std::size_t display_width(std::string_view text);
@@ -41,20 +13,8 @@ namespace flyball::report {
 /// Broken at spaces into lines of at most `width`; a word that is longer stands alone.
 [[nodiscard]] std::vector<std::string> wrap(std::string_view text, std::size_t width);
 
-/// The text with each byte that is not UTF-8 replaced by U+FFFD.
-[[nodiscard]] std::string valid_utf8(std::string_view text);
-
 /// & < > " ' as entities and control characters as a replacement mark: text from a log cannot
 /// become markup.
 [[nodiscard]] std::string escape_html(std::string_view text);
-
-/// Control characters (among them the escape that colours a terminal) as '?', except the newline.
-[[nodiscard]] std::string printable(std::string_view text);
-
-/// Words joined as "a, b and c".
-[[nodiscard]] std::string enumerate(const std::vector<std::string>& words);
-
-/// "1 run", "4 runs".
-[[nodiscard]] std::string count(std::size_t n, std::string_view thing);
 
 }  // namespace flyball::report

@@ -34,9 +34,9 @@ Expected<std::vector<StepResponse>> step_responses(const ModelFile& model,
 /// Names for all that have none: an output that is one state has the state's.
 void complete_names(ModelFile& model) {
   const ContinuousSystem<>& system = model.system;
-  const auto complete = [](std::vector<std::string>& names, Eigen::Index count, char letter) {
+  const auto complete = [](std::vector<Coordinate>& names, Eigen::Index count, char letter) {
     for (auto k = static_cast<Eigen::Index>(names.size()); k < count; ++k) {
-      names.push_back(fmt::format("{}{}", letter, k + 1));
+      names.push_back({.name = fmt::format("{}{}", letter, k + 1)});
     }
   };
   const bool named = !model.states.empty();
@@ -48,7 +48,7 @@ void complete_names(ModelFile& model) {
     const bool is_state = system.C(k, state) == 1.0 && largest == system.C.row(k).lpNorm<1>() &&
                           system.D.row(k).isZero(0.0);
     model.outputs.push_back(named && is_state ? model.states[static_cast<std::size_t>(state)]
-                                              : fmt::format("y{}", k + 1));
+                                              : Coordinate{.name = fmt::format("y{}", k + 1)});
   }
 }
 

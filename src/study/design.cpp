@@ -84,7 +84,7 @@ Expected<LoopDesign> search_tolerances(const LinearModel& model, DesignJob& job,
   std::vector<std::string> words;
   for (std::size_t k = 0; k < best_tolerances.size(); ++k) {
     words.push_back(
-        fmt::format("{} for {}", format_number(best_tolerances[k], 3), model.states[k]));
+        fmt::format("{} for {}", format_number(best_tolerances[k], 3), label(model.states[k])));
   }
   diagnostics.push_back(
       {"assumed", Severity::info,

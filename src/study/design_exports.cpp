@@ -2,7 +2,7 @@
 
 namespace flyball::study {
 
-exports::MechanismConstants constants_of(const DesignResult& design, std::string_view kA_reason) {
+exports::MechanismConstants constants_of(const DesignResult& design) {
   const PlantDescription& plant = design.job.plant;
   return {.kind = plant.kind,
           .unit = plant.unit,
@@ -13,7 +13,7 @@ exports::MechanismConstants constants_of(const DesignResult& design, std::string
           .angle_offset = plant.gains.angle_offset,
           .kA_determined = plant.kA_determined,
           .kA_upper_bound = plant.kA_upper_bound,
-          .kA_reason = std::string(kA_reason)};
+          .kA_reason = plant.kA_reason};
 }
 
 }  // namespace flyball::study

@@ -66,8 +66,8 @@ double measurement_std(const DesignJob& job) {
 
 Expected<LinearModel> linear_model(const PlantDescription& plant, double period) {
   LinearModel model;
-  const std::string position = fmt::format("position ({})", plant.unit);
-  const std::string velocity = fmt::format("velocity ({}/s)", plant.unit);
+  const Coordinate position{"position", plant.unit};
+  const Coordinate velocity{"velocity", plant.unit + "/s"};
   const bool flywheel = plant.kind == MechanismKind::flywheel;
   const auto zero = Eigen::MatrixXd::Zero(1, 1);
   if (!plant.kA_determined) {
@@ -139,7 +139,7 @@ Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
             .in("design")
             .about("state_tolerance")
             .got(fmt::format("{} values long", tolerances.size()))
-            .expected(fmt::format("one value a state: {}", fmt::join(model.states, ", "))));
+            .expected(fmt::format("one value a state: {}", fmt::join(labels(model.states), ", "))));
   }
   LoopDesign loop;
   auto Q = bryson(tolerances);

@@ -13,7 +13,7 @@ namespace flyball::study {
 struct LinearModel {
   Eigen::MatrixXd A, B, C;    ///< Continuous.
   DiscreteSystem<> discrete;  ///< Zero-order hold.
-  std::vector<std::string> states;
+  std::vector<Coordinate> states;
 };
 [[nodiscard]] Expected<LinearModel> linear_model(const PlantDescription& plant, double period);
 

@@ -18,9 +18,12 @@ using mechanisms::MechanismKind;
 
 constexpr std::size_t largest_model = std::size_t{64} << 20;
 
-Expected<void> check_names(const std::vector<std::string>& names, Eigen::Index count,
-                           const std::string& where, std::string_view field,
-                           std::string_view meaning) {
+/// The coordinates that a field names, each as its label or by its name alone; none where the field
+/// is left out.
+Expected<std::vector<Coordinate>> read_coordinates(const std::vector<std::string>& names,
+                                                   Eigen::Index count, const std::string& where,
+                                                   std::string_view field,
+                                                   std::string_view meaning) {
   constexpr std::size_t longest = 80;
   for (const std::string& name : names) {
     const bool control = std::any_of(name.begin(), name.end(), [](char c) {
@@ -37,7 +40,11 @@ Expected<void> check_names(const std::vector<std::string>& names, Eigen::Index c
     }
   }
   if (names.empty() || static_cast<Eigen::Index>(names.size()) == count) {
-    return {};
+    std::vector<Coordinate> coordinates;
+    for (const std::string& name : names) {
+      coordinates.push_back(coordinate_from_label(name));
+    }
+    return coordinates;
   }
   return tl::unexpected(Error(ArgumentError::wrong_shape)
                             .in(where)
@@ -72,9 +79,6 @@ Expected<ModelFile> parse_matrices(std::string_view text, const std::string& nam
   if (fields.has("T")) {
     model.period = Time(fields.number("T"));
   }
-  model.states = fields.texts("states");
-  model.inputs = fields.texts("inputs");
-  model.outputs = fields.texts("outputs");
   if (model.domain == TimeDomain::discrete && !model.period) {
     return tl::unexpected(Error(ArgumentError::malformed)
                               .in(name)
@@ -85,19 +89,13 @@ Expected<ModelFile> parse_matrices(std::string_view text, const std::string& nam
   const ContinuousSystem<>& system = model.system;
   FLYBALL_CHECK(Checks(name)
                     .also([&] { return check_system(system, name); })
-                    .positive(model.period.value_or(Time(1.0)).si(), "T", "s")
-                    .also([&] {
-                      return check_names(model.states, system.A.rows(), name, "states",
-                                         "one for each row of A");
-                    })
-                    .also([&] {
-                      return check_names(model.inputs, system.B.cols(), name, "inputs",
-                                         "one for each column of B");
-                    })
-                    .also([&] {
-                      return check_names(model.outputs, system.C.rows(), name, "outputs",
-                                         "one for each row of C");
-                    }));
+                    .positive(model.period.value_or(Time(1.0)).si(), "T", "s"));
+  FLYBALL_TRY(model.states, read_coordinates(fields.texts("states"), system.A.rows(), name,
+                                             "states", "one for each row of A"));
+  FLYBALL_TRY(model.inputs, read_coordinates(fields.texts("inputs"), system.B.cols(), name,
+                                             "inputs", "one for each column of B"));
+  FLYBALL_TRY(model.outputs, read_coordinates(fields.texts("outputs"), system.C.rows(), name,
+                                              "outputs", "one for each row of C"));
   return model;
 }
 
@@ -173,7 +171,7 @@ ExpectedAll<ModelFile> model_of(const Project& project) {
   model.path = project.path;
   model.period = Time(period);
   model.states = linear.states;
-  model.inputs = {"voltage (V)"};
+  model.inputs = {{"voltage", "V"}};
   model.outputs = {model.states.front()};
   model.plant = plant;
   const DiscreteSystem<>& discrete = linear.discrete;

@@ -20,6 +20,7 @@ PlantDescription plant_from_fit(const identification::FeedforwardFit& fit) {
   plant.gains.kA = known(fit.kA);
   plant.kA_determined = fit.kA.determined;
   plant.kA_upper_bound = fit.kA.determined ? 0.0 : fit.kA.upper_bound;
+  plant.kA_reason = fit.kA.determined ? "" : fit.kA.reason;
   plant.gains.kG = fit.kG ? known(*fit.kG) : 0.0;
   plant.gains.angle_offset = fit.angle_offset ? known(*fit.angle_offset) : 0.0;
   return plant;

@@ -50,11 +50,6 @@ Expected<void> check_finite_entries(const MatrixRef& v, const std::vector<Coordi
 
 }  // namespace
 
-std::string label(const Coordinate& coordinate) {
-  return coordinate.unit.empty() ? coordinate.name
-                                 : detail::format("{} ({})", coordinate.name, coordinate.unit);
-}
-
 namespace detail {
 
 ModelDescription completed(ModelDescription description, Eigen::Index states, Eigen::Index inputs,

@@ -66,6 +66,7 @@ TEST(JsonWriter, ObjectsAndListsNest) {
   json.object([&] {
     json.add("id", 7);
     json.object("empty", [] {});
+    json.add({{"x", 0.5}, {"y", 1.5}});
     json.add("gains", {{"kS", 0.5}, {"kV", 2.0}});
     json.list("points", std::vector<int>{1, 2},
               [&](int i) { json.object([&] { json.add("x", i); }); });
@@ -73,7 +74,7 @@ TEST(JsonWriter, ObjectsAndListsNest) {
   });
   EXPECT_EQ(
       json.text(),
-      R"({"id":7,"empty":{},"gains":{"kS":0.5,"kV":2.0},"points":[{"x":1},{"x":2}],"raw":[null]})");
+      R"({"id":7,"empty":{},"x":0.5,"y":1.5,"gains":{"kS":0.5,"kV":2.0},"points":[{"x":1},{"x":2}],"raw":[null]})");
 }
 
 TEST(JsonWriter, TextIsEscapedAndBytesThatAreNotUtf8AreReplaced) {

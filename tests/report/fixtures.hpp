@@ -4,9 +4,8 @@
 
 #include <flyball/identification/feedforward_fit.hpp>
 #include <flyball/simulation/characterization.hpp>
-#include <flyball/study/design.hpp>
-#include <flyball/study/identify.hpp>
-#include <flyball/study/tune.hpp>
+#include <flyball/study/answer.hpp>
+#include <flyball/study/motors.hpp>
 
 /// Results as the studies give them, from a simulated mechanism each.
 namespace flyball::report {
@@ -107,7 +106,11 @@ inline study::TuneResult tune_result(MechanismKind kind, bool kA_determined = tr
   if (!kA_determined) {
     identification = without_kA(std::move(identification));
   }
-  return {std::move(identification), study::design(design_job(kind, kA_determined))};
+  study::DesignJob job = design_job(kind, kA_determined);
+  if (!kA_determined) {
+    job.plant.kA_reason = identification.report.fit->kA.reason;
+  }
+  return {std::move(identification), study::design(job)};
 }
 
 }  // namespace flyball::report

@@ -10,6 +10,12 @@
 namespace flyball::report {
 namespace {
 
+/// The page of a result's answer.
+template <class Result>
+std::string page_of(const Result& result, const Provenance& provenance = {}) {
+  return to_html(study::answer_of(result), provenance);
+}
+
 bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
@@ -87,7 +93,7 @@ TEST(Html, ATunesPageHasEverythingAndNeedsNothing) {
   for (const MechanismKind kind :
        {MechanismKind::flywheel, MechanismKind::elevator, MechanismKind::arm}) {
     const study::TuneResult result = tune_result(kind);
-    const std::string page = to_html(result, {.command = "flyball tune lift.wpilog", .files = {}});
+    const std::string page = page_of(result, {.command = "flyball tune lift.wpilog", .files = {}});
     expect_well_formed(page);
     expect_self_contained(page);
     for (const char* id : {"data", "gains", "plant", "controller", "robustness", "motion",
@@ -107,7 +113,7 @@ TEST(Html, ATunesPageHasEverythingAndNeedsNothing) {
 
 TEST(Html, IsDeterministic) {
   const study::DesignResult design = design_result(MechanismKind::arm);
-  EXPECT_EQ(to_html(design), to_html(design));
+  EXPECT_EQ(page_of(design), page_of(design));
 }
 
 TEST(Html, TextOfALogCannotBecomeMarkup) {
@@ -117,7 +123,7 @@ TEST(Html, TextOfALogCannotBecomeMarkup) {
   result.source.diagnostics.push_back(
       {"<b>code</b>", Severity::warning, "</li></ul><svg onload=alert(1)>"});
   const std::string page =
-      to_html(result, {.command = "flyball '<script>'", .files = {"a\"><script>.csv"}});
+      page_of(result, {.command = "flyball '<script>'", .files = {"a\"><script>.csv"}});
   EXPECT_FALSE(has(page, "<script"));
   EXPECT_FALSE(has(page, "<img"));
   EXPECT_FALSE(has(page, "<svg onload"));
@@ -130,7 +136,7 @@ TEST(Html, ARefusedLogIsShownWithItsReasonOnTop) {
   const study::IdentifyResult refused = refused_result();
   ASSERT_FALSE(refused.report.fit);
   for (const std::string& page :
-       {to_html(refused), to_html(study::TuneResult{refused, std::nullopt})}) {
+       {page_of(refused), page_of(study::TuneResult{refused, std::nullopt})}) {
     expect_well_formed(page);
     expect_self_contained(page);
     EXPECT_EQ(occurrences(page, "<svg"), 4u);
@@ -144,7 +150,7 @@ TEST(Html, ARefusedLogIsShownWithItsReasonOnTop) {
 TEST(Html, ADesignThatIsRefusedKeepsTheIdentification) {
   study::TuneResult result = tune_result(MechanismKind::elevator);
   result.design = tl::unexpected(Error(study::DesignError::gravity_too_strong).in("design"));
-  const std::string page = to_html(result);
+  const std::string page = page_of(result);
   expect_well_formed(page);
   EXPECT_TRUE(has(page, "No controller"));
   EXPECT_TRUE(has(page, "the motor cannot hold the mechanism"));
@@ -155,7 +161,7 @@ TEST(Html, NoNaNIsPrintedAsANumber) {
   study::DesignResult design = design_result(MechanismKind::flywheel);
   design.tracking_error_rms = std::nan("");
   design.margins.delay_margin = std::numeric_limits<double>::infinity();
-  const std::string page = to_html(design);
+  const std::string page = page_of(design);
   EXPECT_FALSE(has(page, "nan "));
   EXPECT_FALSE(has(page, "NaN"));
   EXPECT_FALSE(has(page, ">inf<"));

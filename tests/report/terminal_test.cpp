@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include <flyball/report/html.hpp>
-#include <flyball/study/schema.hpp>
 
 #include "fixtures.hpp"
 #include "report/format.hpp"
@@ -25,6 +24,13 @@ std::vector<std::string> lines_of(const std::string& text) {
     lines.push_back(line);
   }
   return lines;
+}
+
+/// What a terminal shows of a result's answer.
+template <class Result>
+std::string text_of(const Result& result, const TerminalStyle& style = {},
+                    std::string_view report_folder = {}) {
+  return to_terminal(study::answer_of(result).document, style, report_folder);
 }
 
 bool has(const std::string& text, const std::string& part) {
@@ -77,7 +83,7 @@ TEST(Terminal, ShowsEveryNumberThatTheJsonHas) {
   for (const MechanismKind kind :
        {MechanismKind::flywheel, MechanismKind::elevator, MechanismKind::arm}) {
     const study::TuneResult result = tune_result(kind);
-    const std::vector<double> numbers = numbers_in(to_terminal(result));
+    const std::vector<double> numbers = numbers_in(text_of(result));
     const Json json = Json::parse(study::to_json(result));
     for (const char* pointer :
          {"/identification/gains", "/identification/fit", "/identification/one_step_regression",
@@ -98,7 +104,7 @@ TEST(Terminal, ShowsEveryNumberThatTheJsonHas) {
 TEST(Terminal, IsWithinItsWidthAndAligned) {
   for (const MechanismKind kind :
        {MechanismKind::flywheel, MechanismKind::elevator, MechanismKind::arm}) {
-    for (const std::string& line : lines_of(to_terminal(tune_result(kind)))) {
+    for (const std::string& line : lines_of(text_of(tune_result(kind)))) {
       // Code to paste keeps its lines.
       EXPECT_TRUE(display_width(line) <= 100 || has(line, "//")) << line;
     }
@@ -107,9 +113,9 @@ TEST(Terminal, IsWithinItsWidthAndAligned) {
 
 TEST(Terminal, WithoutColourThereIsNoEscape) {
   const study::TuneResult result = tune_result(MechanismKind::elevator);
-  const std::string plain = to_terminal(result);
+  const std::string plain = text_of(result);
   EXPECT_EQ(plain.find('\x1b'), std::string::npos);
-  const std::string colored = to_terminal(result, {.color = true});
+  const std::string colored = text_of(result, {.color = true});
   EXPECT_NE(colored.find('\x1b'), std::string::npos);
   std::string stripped;
   for (std::size_t i = 0; i < colored.size(); ++i) {
@@ -131,7 +137,7 @@ TEST(Terminal, NoNaNIsPrintedAsANumber) {
   design.robustness.front().overshoot = std::numeric_limits<double>::infinity();
   design.robust = false;
   result.identification.report.fit->one_step->kA = std::nan("");
-  const std::string text = to_terminal(result);
+  const std::string text = text_of(result);
   EXPECT_EQ(text.find("nan"), std::string::npos);
   EXPECT_EQ(text.find("NaN"), std::string::npos);
   EXPECT_FALSE(std::regex_search(text, std::regex("\\binf\\b")));
@@ -142,7 +148,7 @@ TEST(Terminal, NoNaNIsPrintedAsANumber) {
 }
 
 TEST(Terminal, SaysWhatALogDoesNotDetermine) {
-  const std::string text = to_terminal(tune_result(MechanismKind::elevator, false));
+  const std::string text = text_of(tune_result(MechanismKind::elevator, false));
   EXPECT_TRUE(has(text, "not determined"));
   EXPECT_TRUE(has(text, "below 0.0371"));
   EXPECT_TRUE(has(text, "the speed-up is over within two rows"));
@@ -152,11 +158,11 @@ TEST(Terminal, SaysWhatALogDoesNotDetermine) {
 TEST(Terminal, ARefusedLogIsToldWithItsReason) {
   const study::IdentifyResult refused = refused_result();
   ASSERT_FALSE(refused.report.fit);
-  const std::string text = to_terminal(refused);
+  const std::string text = text_of(refused);
   EXPECT_TRUE(has(text, "No gains can be taken from this log."));
   const std::string reason(refused.report.fit.error().info().summary);
   EXPECT_TRUE(has(text, reason.substr(0, reason.find(' ')))) << text;
-  EXPECT_TRUE(has(to_terminal(study::TuneResult{refused, std::nullopt}),
+  EXPECT_TRUE(has(text_of(study::TuneResult{refused, std::nullopt}),
                   "No gains can be taken from this log."));
 }
 
@@ -166,7 +172,7 @@ TEST(Terminal, DiagnosticsStandMostSevereFirstAndOnce) {
                                {"truncated_log", Severity::warning, "then this"},
                                {"assumed", Severity::info, "first told"},
                                {"worst", Severity::error, "above all"}};
-  const std::string text = to_terminal(result);
+  const std::string text = text_of(result);
   EXPECT_LT(text.find("above all"), text.find("then this"));
   EXPECT_LT(text.find("then this"), text.find("first told"));
   EXPECT_EQ(text.find("first told"), text.rfind("first told"));
@@ -176,7 +182,7 @@ TEST(Terminal, DiagnosticsStandMostSevereFirstAndOnce) {
 TEST(Terminal, TextOfALogCannotSteerTheTerminal) {
   study::IdentifyResult result = identify_result(MechanismKind::flywheel);
   result.source.subject = "\x1b]0;owned\x07 wheel";
-  const std::string text = to_terminal(result, {.color = false});
+  const std::string text = text_of(result, {.color = false});
   EXPECT_EQ(text.find('\x1b'), std::string::npos);
   EXPECT_EQ(text.find('\x07'), std::string::npos);
 }
@@ -189,7 +195,7 @@ TEST(Terminal, ALinearSystemIsToldInWordsAndNumbers) {
                          "carts")
           .and_then(&study::analyze)
           .value();
-  const std::string text = to_terminal(analysis);
+  const std::string text = text_of(analysis);
   for (const std::string& line : lines_of(text)) {
     EXPECT_LE(display_width(line), 100U) << line;
   }
@@ -200,16 +206,16 @@ TEST(Terminal, ALinearSystemIsToldInWordsAndNumbers) {
   EXPECT_TRUE(has(text, "No input moves <b>."));
   EXPECT_TRUE(has(text, "0.9801 ± 0.1987j")) << "e^{2jT}";
   EXPECT_EQ(text.find('\x1b'), std::string::npos);
-  EXPECT_NE(to_terminal(analysis, {.color = true}).find('\x1b'), std::string::npos);
-  const std::string page = to_html(analysis);
+  EXPECT_NE(text_of(analysis, {.color = true}).find('\x1b'), std::string::npos);
+  const std::string page = to_html(study::answer_of(analysis));
   EXPECT_TRUE(has(page, "&lt;b&gt;"));
   EXPECT_FALSE(has(page, "<b>"));
 }
 
 TEST(Terminal, NamesTheReport) {
   const study::DesignResult design = design_result(MechanismKind::arm);
-  EXPECT_TRUE(has(to_terminal(design, {}, "out/arm"), "out/arm/index.html"));
-  EXPECT_FALSE(has(to_terminal(design), "index.html"));
+  EXPECT_TRUE(has(text_of(design, {}, "out/arm"), "out/arm/index.html"));
+  EXPECT_FALSE(has(text_of(design), "index.html"));
 }
 
 TEST(Motors, TableHasEveryMotorWithItsNumbers) {
@@ -217,7 +223,7 @@ TEST(Motors, TableHasEveryMotorWithItsNumbers) {
   for (const mechanisms::MotorTableEntry& entry : mechanisms::motor_table()) {
     motors.push_back(mechanisms::motor(entry.name).value());
   }
-  const std::string text = motors_to_terminal(motors);
+  const std::string text = text_of(std::span<const mechanisms::DcMotor>(motors));
   for (const mechanisms::MotorTableEntry& entry : mechanisms::motor_table()) {
     bool found = false;
     for (const std::string& line : lines_of(text)) {

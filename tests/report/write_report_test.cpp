@@ -11,7 +11,6 @@
 #include <flyball/io/csv.hpp>
 #include <flyball/io/file.hpp>
 #include <flyball/study/project.hpp>
-#include <flyball/study/schema.hpp>
 
 #include "fixtures.hpp"
 
@@ -49,13 +48,20 @@ class WriteReport : public ::testing::Test {
   fs::path root_;
 };
 
+/// The report of a result's answer.
+template <class Result>
+Expected<void> write(const Result& result, const std::string& folder,
+                     const Provenance& provenance = {}) {
+  return write_report(study::answer_of(result), folder, provenance);
+}
+
 std::string text_of(const std::string& path) {
   return read_file(path).value();
 }
 
 TEST_F(WriteReport, HoldsEverythingThatATuneGives) {
   const study::TuneResult result = tune_result(MechanismKind::elevator);
-  const auto written = write_tune_report(result, folder());
+  const auto written = write(result, folder());
   ASSERT_TRUE(written) << to_string(written.error());
   const std::set<std::string> files = files_in(folder());
   for (const char* name :
@@ -80,7 +86,7 @@ TEST_F(WriteReport, HoldsEverythingThatATuneGives) {
 
 TEST_F(WriteReport, TablesReadBackAsTheyWere) {
   const study::TuneResult result = tune_result(MechanismKind::arm);
-  ASSERT_TRUE(write_tune_report(result, folder()));
+  ASSERT_TRUE(write(result, folder()));
   const TimeSeries& response = (*result.design)->response;
   const auto csv = parse_csv(text_of(folder() + "/data/closed_loop.csv"), "closed_loop.csv");
   ASSERT_TRUE(csv) << to_string(csv.error());
@@ -102,7 +108,7 @@ TEST_F(WriteReport, GainsAreAProjectThatGivesTheSameDesign) {
          {MechanismKind::flywheel, MechanismKind::elevator, MechanismKind::arm}) {
       const study::DesignResult design = design_result(kind, kA_determined);
       const std::string where = folder(std::string(to_string(kind)) + (kA_determined ? "" : "0"));
-      ASSERT_TRUE(write_design_report(design, where));
+      ASSERT_TRUE(write(design, where));
       const auto project = study::parse_project(text_of(where + "/gains.toml"), "gains.toml");
       ASSERT_TRUE(project) << to_string(project.error());
       ASSERT_FALSE(project->plant_error) << to_string(*project->plant_error);
@@ -117,8 +123,8 @@ TEST_F(WriteReport, GainsAreAProjectThatGivesTheSameDesign) {
 
 TEST_F(WriteReport, TheSameResultGivesTheSameBytes) {
   const study::IdentifyResult result = identify_result(MechanismKind::flywheel);
-  ASSERT_TRUE(write_identify_report(result, folder("a"), {.command = "flyball", .files = {}}));
-  ASSERT_TRUE(write_identify_report(result, folder("b"), {.command = "flyball", .files = {}}));
+  ASSERT_TRUE(write(result, folder("a"), {.command = "flyball", .files = {}}));
+  ASSERT_TRUE(write(result, folder("b"), {.command = "flyball", .files = {}}));
   EXPECT_EQ(files_in(folder("a")), files_in(folder("b")));
   for (const std::string& name : files_in(folder("a"))) {
     EXPECT_EQ(text_of(folder("a") + "/" + name), text_of(folder("b") + "/" + name)) << name;
@@ -126,7 +132,7 @@ TEST_F(WriteReport, TheSameResultGivesTheSameBytes) {
 }
 
 TEST_F(WriteReport, ARefusedLogIsWrittenToo) {
-  ASSERT_TRUE(write_identify_report(refused_result(), folder()));
+  ASSERT_TRUE(write(refused_result(), folder()));
   const std::set<std::string> files = files_in(folder());
   EXPECT_EQ(files.count("pictures/recorded_1_quasistatic-forward.png"), 1u);
   EXPECT_EQ(files.count("gains.toml"), 0u);
@@ -135,14 +141,14 @@ TEST_F(WriteReport, ARefusedLogIsWrittenToo) {
 }
 
 TEST_F(WriteReport, AnEarlierReportIsReplacedAndNothingElse) {
-  ASSERT_TRUE(write_design_report(design_result(MechanismKind::arm), folder()));
-  ASSERT_TRUE(write_design_report(design_result(MechanismKind::elevator), folder()));
+  ASSERT_TRUE(write(design_result(MechanismKind::arm), folder()));
+  ASSERT_TRUE(write(design_result(MechanismKind::elevator), folder()));
   EXPECT_EQ(files_in(folder()).count("ElevatorLoop.hpp"), 1u);
   EXPECT_EQ(files_in(folder()).count("ArmLoop.hpp"), 0u);
 
   fs::create_directories(folder("mine"));
   std::ofstream(folder("mine") + "/thesis.txt") << "years of work";
-  const auto refused = write_design_report(design_result(MechanismKind::arm), folder("mine"));
+  const auto refused = write(design_result(MechanismKind::arm), folder("mine"));
   ASSERT_FALSE(refused);
   EXPECT_TRUE(refused.error().is(FileError::folder_in_use));
   EXPECT_EQ(files_in(folder("mine")), (std::set<std::string>{"thesis.txt"}));

@@ -41,7 +41,8 @@ TEST(Analyze, UnstableAndIntegratingModels) {
   EXPECT_EQ(unstable.modes.stability, Stability::unstable);
   EXPECT_FALSE(unstable.controllability.stabilizable);
   EXPECT_FALSE(unstable.h2_norm.has_value());
-  EXPECT_NE(describe(unstable.controllability, unstable.model.states).find("a"), std::string::npos);
+  EXPECT_NE(describe(unstable.controllability, labels(unstable.model.states)).find("a"),
+            std::string::npos);
   const auto integrator = analyze(parse_model(R"({"A":[[0]],"B":[[1]]})", "m").value()).value();
   EXPECT_FALSE(integrator.dc_gain.has_value());
   EXPECT_NEAR(integrator.steps.at(0).y(10, 0), integrator.steps.at(0).time(10), 1e-14);
@@ -68,8 +69,8 @@ TEST(Analyze, ProjectsAreSampledWithTheirPeriod) {
       "[controller]\nperiod = \"50 ms\"\n";
   const auto analysis = analyze(parse_model(text, "wheel.toml").value()).value();
   EXPECT_EQ(analysis.model.plant->kind, mechanisms::MechanismKind::flywheel);
-  EXPECT_EQ(analysis.model.states, std::vector<std::string>{"velocity (rad/s)"});
-  EXPECT_EQ(analysis.model.outputs, analysis.model.states);
+  EXPECT_EQ(labels(analysis.model.states), std::vector<std::string>{"velocity (rad/s)"});
+  EXPECT_EQ(labels(analysis.model.outputs), labels(analysis.model.states));
   EXPECT_EQ(analysis.model.notes.at(0).code, "left_out");
   EXPECT_DOUBLE_EQ(analysis.modes.modes.at(0).pole.real(), -4.0);
   ASSERT_TRUE(analysis.sampled);
@@ -92,8 +93,8 @@ TEST(Analyze, NamesOutputsByTheirStates) {
                                             "m")
                                     .value())
                             .value();
-  EXPECT_EQ(analysis.model.outputs, (std::vector<std::string>{"v", "y2"}));
-  EXPECT_EQ(analysis.model.inputs, std::vector<std::string>{"u1"});
+  EXPECT_EQ(labels(analysis.model.outputs), (std::vector<std::string>{"v", "y2"}));
+  EXPECT_EQ(labels(analysis.model.inputs), std::vector<std::string>{"u1"});
 }
 
 TEST(Analyze, RefusesBadModels) {

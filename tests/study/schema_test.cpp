@@ -1,9 +1,9 @@
-#include <flyball/study/schema.hpp>
-
 #include <limits>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+
+#include <flyball/study/answer.hpp>
 
 namespace flyball::study {
 namespace {

@@ -8,7 +8,7 @@
 
 #include <flyball/io/sysid_json.hpp>
 #include <flyball/simulation/characterization.hpp>
-#include <flyball/study/schema.hpp>
+#include <flyball/study/answer.hpp>
 
 namespace flyball::study {
 namespace {

@@ -12,7 +12,7 @@
 #include <Eigen/Core>
 
 #include <flyball/core/diagnostic.hpp>
-#include <flyball/core/error.hpp>
+#include <flyball/core/errors.hpp>
 
 namespace flyball {
 
@@ -40,9 +40,17 @@ class JsonWriter {
     key(name);
     write(value);
   }
+  /// Members that are numbers.
+  void add(std::initializer_list<std::pair<std::string_view, double>> numbers) {
+    for (const auto& [name, value] : numbers) {
+      add(name, value);
+    }
+  }
   /// An object of numbers.
   void add(std::string_view name,
-           std::initializer_list<std::pair<std::string_view, double>> numbers);
+           std::initializer_list<std::pair<std::string_view, double>> numbers) {
+    object(name, [&] { add(numbers); });
+  }
   /// A member that is JSON already.
   void add_json(std::string_view name, std::string_view json) {
     key(name);
@@ -130,5 +138,9 @@ class JsonWriter {
 
 /// A text in quotes, escaped.
 [[nodiscard]] std::string json_quoted(std::string_view text);
+
+/// A refusal: {"schema": …, "error": {"code", "message", …evidence}, "diagnostics": []}, and
+/// `errors` with all of them where there are several.
+[[nodiscard]] std::string refusal_json(std::string_view schema, const Errors& errors);
 
 }  // namespace flyball

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include <flyball/core/coordinate.hpp>
 #include <flyball/core/diagnostic.hpp>
 #include <flyball/core/expected.hpp>
 #include <flyball/core/time_series.hpp>
@@ -22,6 +23,7 @@ struct PlantDescription {
   mechanisms::FeedforwardGains gains{};
   bool kA_determined = true;                   ///< If not, Theorem 14.3.2 is the plant.
   double kA_upper_bound = 0.0;                 ///< V·s²/unit, if not determined.
+  std::string kA_reason{};                     ///< Why it is not determined, if a log says so.
   std::optional<mechanisms::DcMotor> motor{};  ///< If known: current and battery sag are simulated.
   double gearing = 1.0;                        ///< Motor turns per output turn.
   double drum_radius = 0.0;                    ///< m, elevators with a known drum, else 0.
@@ -115,9 +117,9 @@ using PasteGains = exports::UnitGains;
 /// old, is moved along the reference to now, y + delay dr/dt, so that a moving reference causes no
 /// error; the observer predicts and corrects; u = K_delayed (r - x_hat) + B⁺ (r' - A r) + kS + kG.
 struct DesignResult {
-  DesignJob job;                      ///< As run, with every default filled in.
-  std::vector<std::string> states{};  ///< Names with units: "position (m)", …
-  bool velocity_servo = false;        ///< kA is not determined: Theorem 14.3.2 is the plant.
+  DesignJob job;                     ///< As run, with every default filled in.
+  std::vector<Coordinate> states{};  ///< Position (m), …
+  bool velocity_servo = false;       ///< kA is not determined: Theorem 14.3.2 is the plant.
 
   Eigen::MatrixXd A_continuous, B_continuous;
   Eigen::MatrixXd A, B, C;        ///< Discrete plant (Theorem 7.3.1) and its output.

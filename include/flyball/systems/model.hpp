@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include <flyball/core/argument.hpp>
+#include <flyball/core/coordinate.hpp>
 
 /// What everything that simulates, linearises, estimates and plans takes: a model, written once.
 ///
@@ -46,13 +47,6 @@
 /// them.
 namespace flyball {
 
-/// A state, an input or an output of a model.
-struct Coordinate {
-  std::string name{};
-  std::string unit{};     ///< SI; empty where it has none.
-  bool is_angle = false;  ///< Whether values that differ by 2π are the same; rad.
-};
-
 /// A constant of a model.
 struct Parameter {
   std::string name{};
@@ -68,9 +62,6 @@ struct ModelDescription {
   std::vector<Coordinate> outputs{};
   std::vector<Parameter> parameters{};  ///< In the order of `parameters()`.
 };
-
-/// "angle (rad)"; the name alone where there is no unit.
-[[nodiscard]] std::string label(const Coordinate& coordinate);
 
 /// The scalar of a formula in several Eigen vectors: that of the one that carries derivatives.
 template <class... Vectors>

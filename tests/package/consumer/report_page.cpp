@@ -2,6 +2,7 @@
 #include <cstdio>
 
 #include <flyball/report/write_report.hpp>
+#include <flyball/study/answer.hpp>
 #include <flyball/study/design.hpp>
 #include <flyball/study/project.hpp>
 
@@ -21,7 +22,7 @@ int main(int, char** arguments) {
       flyball::study::parse_project(project, "flywheel.toml")
           .and_then([](const auto& read) { return flyball::study::design(read.job); })
           .and_then([&](const auto& result) {
-            return flyball::report::write_design_report(result, arguments[1]);
+            return flyball::report::write_report(flyball::study::answer_of(result), arguments[1]);
           });
   if (!written) {
     std::puts(to_string(written.error()).c_str());

@@ -4,23 +4,32 @@
 
 #include <fmt/format.h>
 
-#include "report/format.hpp"
-#include "report/sections.hpp"
+#include <flyball/export/constants.hpp>
+#include <flyball/study/design_exports.hpp>
 
-namespace flyball::report {
+#include "core/wording.hpp"
+#include "study/answer/parts.hpp"
+
+namespace flyball::study {
 
 namespace {
 
 using mechanisms::MechanismKind;
-using study::DesignResult;
+using text::complex_number;
+using text::enumerate;
+using text::matrix;
+using text::number;
+using text::percent;
+using text::seconds;
 
 double degrees(double radians) {
   return radians * 180.0 / std::numbers::pi;
 }
 
-std::string state_name(const DesignResult& result, Eigen::Index i) {
+Coordinate state_of(const DesignResult& result, Eigen::Index i) {
   const auto at = static_cast<std::size_t>(i);
-  return at < result.states.size() ? result.states[at] : fmt::format("x{}", i + 1);
+  return at < result.states.size() ? result.states[at]
+                                   : Coordinate{.name = fmt::format("x{}", i + 1)};
 }
 
 std::string input_unit(const DesignResult& result) {
@@ -43,23 +52,23 @@ void add_poles(Table& table, const std::string& which, const Eigen::VectorXcd& p
   }
 }
 
-std::string entry(const std::vector<double>& values, Eigen::Index i) {
+Value entry(const std::vector<double>& values, Eigen::Index i, const std::string& unit) {
   const auto at = static_cast<std::size_t>(i);
-  return at < values.size() ? number(values[at]) : "";
+  return at < values.size() ? quantity(values[at], unit, 4, /*shown=*/false) : "";
 }
 
-std::string matrix_entry(const Eigen::MatrixXd& M, Eigen::Index i, Eigen::Index j) {
-  return i < M.rows() && j < M.cols() ? number(M(i, j), 6) : "";
+Value entry(const Eigen::MatrixXd& M, Eigen::Index i, Eigen::Index j) {
+  return i < M.rows() && j < M.cols() ? quantity(M(i, j), "", 6) : "";
 }
 
 Tone tone_of_margin(double value, double good, double poor) {
   return value >= good ? Tone::good : value >= poor ? Tone::caution : Tone::bad;
 }
 
-std::vector<double> distinct(const std::vector<study::RobustnessPoint>& points,
-                             double study::RobustnessPoint::* factor) {
+std::vector<double> distinct(const std::vector<RobustnessPoint>& points,
+                             double RobustnessPoint::* factor) {
   std::vector<double> values;
-  for (const study::RobustnessPoint& point : points) {
+  for (const RobustnessPoint& point : points) {
     if (std::find(values.begin(), values.end(), point.*factor) == values.end()) {
       values.push_back(point.*factor);
     }
@@ -69,23 +78,20 @@ std::vector<double> distinct(const std::vector<study::RobustnessPoint>& points,
 }
 
 Table robustness_table(const DesignResult& result) {
-  const std::vector<double> gains =
-      distinct(result.robustness, &study::RobustnessPoint::gain_factor);
+  const std::vector<double> gains = distinct(result.robustness, &RobustnessPoint::gain_factor);
   Table table;
   table.caption = "Overshoot of a small step if the mechanism is not as it was modelled:";
   table.header = {"inertia"};
   for (const double gain : gains) {
     table.header.push_back("gain × " + number(gain));
   }
-  for (const double inertia :
-       distinct(result.robustness, &study::RobustnessPoint::inertia_factor)) {
-    std::vector<Table::Cell> row{"× " + number(inertia)};
+  for (const double inertia : distinct(result.robustness, &RobustnessPoint::inertia_factor)) {
+    std::vector<Value> row{"× " + number(inertia)};
     for (const double gain : gains) {
-      Table::Cell cell("");
-      for (const study::RobustnessPoint& point : result.robustness) {
+      Value cell("");
+      for (const RobustnessPoint& point : result.robustness) {
         if (point.inertia_factor == inertia && point.gain_factor == gain) {
-          cell = point.stable ? Table::Cell(percent(point.overshoot, 2))
-                              : Table::Cell("unstable", Tone::bad);
+          cell = point.stable ? Value(percent(point.overshoot, 2)) : Value("unstable", Tone::bad);
         }
       }
       row.push_back(std::move(cell));
@@ -105,51 +111,11 @@ double largest(const TimeSeries& series, std::string_view column) {
   return found;
 }
 
-}  // namespace
-
-std::string measured_name(MechanismKind kind) {
-  return kind == MechanismKind::flywheel ? "velocity" : "position";
-}
-
-std::string controlled_unit(const study::PlantDescription& plant) {
-  return plant.kind == MechanismKind::flywheel ? plant.unit + "/s" : plant.unit;
-}
-
-Facts plant_facts(const study::PlantDescription& plant) {
-  const std::string& unit = plant.unit;
-  Facts facts;
-  facts.add("mechanism", std::string(to_string(plant.kind)));
-  if (plant.motor) {
-    const mechanisms::DcMotor& motor = *plant.motor;
-    facts.add("motor",
-              fmt::format("{} {}, R {} Ω, Kt {} N·m/A, Kv {} rad/s/V", motor.count, motor.name,
-                          number(motor.R), number(motor.Kt), number(motor.Kv)));
-    facts.add("gearing", number(plant.gearing) + " motor turns per output turn");
-  }
-  if (plant.drum_radius > 0.0) {
-    facts.add("drum radius", number(plant.drum_radius) + " m");
-  }
-  std::string gains =
-      fmt::format("kS {} V, kV {} V·s/{}", number(plant.gains.kS), number(plant.gains.kV), unit);
-  gains += plant.kA_determined ? fmt::format(", kA {} V·s²/{}", number(plant.gains.kA), unit)
-           : plant.kA_upper_bound > 0.0
-               ? fmt::format(", kA below {} V·s²/{}", number(plant.kA_upper_bound), unit)
-               : std::string(", kA not known");
-  if (plant.kind != MechanismKind::flywheel) {
-    gains += fmt::format(", kG {} V", number(plant.gains.kG));
-  }
-  if (plant.kind == MechanismKind::arm) {
-    gains += fmt::format(", angle offset {} rad", number(plant.gains.angle_offset));
-  }
-  facts.add("gains", gains);
-  return facts;
-}
-
 Section plant_section(const DesignResult& result) {
-  const study::PlantDescription& plant = result.job.plant;
+  const PlantDescription& plant = result.job.plant;
   Section section{"plant", "Plant", {}};
   Facts facts = plant_facts(plant);
-  facts.add("states", enumerate(result.states));
+  facts.add("states", enumerate(labels(result.states)));
   facts.add("input",
             result.velocity_servo
                 ? fmt::format("velocity ({0}/s); the volts are kS sgn(u) + kV u{1} "
@@ -166,8 +132,8 @@ Section plant_section(const DesignResult& result) {
 }
 
 Section controller_section(const DesignResult& result) {
-  const study::ControllerOptions& controller = result.job.controller;
-  const study::PlantDescription& plant = result.job.plant;
+  const ControllerOptions& controller = result.job.controller;
+  const PlantDescription& plant = result.job.plant;
   const bool has_gravity = plant.kind != MechanismKind::flywheel;
   const double delay = controller.delay.value_or(0.0);
   Section section{"controller", "Controller", {}};
@@ -192,15 +158,16 @@ Section controller_section(const DesignResult& result) {
     table.header.emplace_back("model std");
   }
   for (Eigen::Index i = 0; i < result.A.rows(); ++i) {
-    std::vector<Table::Cell> row{state_name(result, i), entry(controller.state_tolerance, i),
-                                 matrix_entry(result.K, 0, i)};
+    const Coordinate state = state_of(result, i);
+    std::vector<Value> row{label(state), entry(controller.state_tolerance, i, state.unit),
+                           entry(result.K, 0, i)};
     if (delayed) {
-      row.emplace_back(matrix_entry(result.K_delayed, 0, i));
+      row.emplace_back(entry(result.K_delayed, 0, i));
     }
-    row.emplace_back(matrix_entry(result.inversion, 0, i));
-    row.emplace_back(matrix_entry(result.kalman_gain, i, 0));
+    row.emplace_back(entry(result.inversion, 0, i));
+    row.emplace_back(entry(result.kalman_gain, i, 0));
     if (model_given) {
-      row.emplace_back(entry(result.job.estimator.model_std, i));
+      row.emplace_back(entry(result.job.estimator.model_std, i, state.unit));
     }
     table.rows.push_back(std::move(row));
   }
@@ -215,12 +182,12 @@ Section controller_section(const DesignResult& result) {
   } else if (controller.delay) {
     facts.add("delay", seconds(delay));
   }
-  facts.add("input tolerance", number(controller.input_tolerance) + " V");
+  facts.add("input tolerance", quantity(controller.input_tolerance, "V"));
   facts.add("weights",
             fmt::format("Q = {}, R = {} (Bryson's rule)", matrix(result.Q), matrix(result.R)));
   if (result.job.estimator.measurement_std) {
-    facts.add("measurement std", fmt::format("{} {}", number(*result.job.estimator.measurement_std),
-                                             controlled_unit(plant)));
+    facts.add("measurement std",
+              quantity(*result.job.estimator.measurement_std, controlled_unit(plant)));
   }
   section.blocks.emplace_back(std::move(facts));
 
@@ -233,7 +200,7 @@ Section controller_section(const DesignResult& result) {
 }
 
 Section robustness_section(const DesignResult& result) {
-  const study::LoopMargins& margins = result.margins;
+  const LoopMargins& margins = result.margins;
   Section section{"robustness", "Robustness", {}};
   Facts facts;
   facts.add(
@@ -273,13 +240,13 @@ Section robustness_section(const DesignResult& result) {
 }
 
 Section motion_section(const DesignResult& result) {
-  const study::MotionLimits& motion = result.motion;
-  const study::PlantDescription& plant = result.job.plant;
+  const MotionLimits& motion = result.motion;
+  const PlantDescription& plant = result.job.plant;
   const bool flywheel = plant.kind == MechanismKind::flywheel;
   Section section{"motion", flywheel ? "Fastest ramp" : "Fastest trapezoid", {}};
   Facts facts;
-  facts.add("velocity", fmt::format("{} {}/s", number(motion.max_velocity), plant.unit));
-  facts.add("acceleration", fmt::format("{} {}/s²", number(motion.max_acceleration), plant.unit));
+  facts.add("velocity", quantity(motion.max_velocity, plant.unit + "/s"));
+  facts.add("acceleration", quantity(motion.max_acceleration, plant.unit + "/s²"));
   facts.add("voltage reserve",
             fmt::format("{} V of {} V kept back for feedback", number(motion.voltage_reserve),
                         number(result.job.controller.max_voltage)));
@@ -291,7 +258,7 @@ Section motion_section(const DesignResult& result) {
                         controlled_unit(plant)));
   const double voltage = largest(result.response, "motor_voltage");
   if (!std::isnan(voltage)) {
-    facts.add("peak voltage", number(voltage, 3) + " V");
+    facts.add("peak voltage", quantity(voltage, "V", 3));
   }
   const double current = largest(result.response, "current");
   if (!std::isnan(current) && current > 0.0) {
@@ -301,4 +268,57 @@ Section motion_section(const DesignResult& result) {
   return section;
 }
 
-}  // namespace flyball::report
+Section constants_section(const DesignResult& result) {
+  Section section{"constants", "Constants to paste", {}};
+  for (const exports::PasteText& paste : exports::paste_constants(constants_of(result))) {
+    section.blocks.emplace_back(Code{paste.title, paste.text, paste.file});
+  }
+  return section;
+}
+
+}  // namespace
+
+std::string measured_name(MechanismKind kind) {
+  return kind == MechanismKind::flywheel ? "velocity" : "position";
+}
+
+std::string controlled_unit(const PlantDescription& plant) {
+  return plant.kind == MechanismKind::flywheel ? plant.unit + "/s" : plant.unit;
+}
+
+Facts plant_facts(const PlantDescription& plant) {
+  const std::string& unit = plant.unit;
+  Facts facts;
+  facts.add("mechanism", std::string(to_string(plant.kind)));
+  if (plant.motor) {
+    const mechanisms::DcMotor& motor = *plant.motor;
+    facts.add("motor",
+              fmt::format("{} {}, R {} Ω, Kt {} N·m/A, Kv {} rad/s/V", motor.count, motor.name,
+                          number(motor.R), number(motor.Kt), number(motor.Kv)));
+    facts.add("gearing", quantity(plant.gearing, "motor turns per output turn"));
+  }
+  if (plant.drum_radius > 0.0) {
+    facts.add("drum radius", quantity(plant.drum_radius, "m"));
+  }
+  std::string gains =
+      fmt::format("kS {} V, kV {} V·s/{}", number(plant.gains.kS), number(plant.gains.kV), unit);
+  gains += plant.kA_determined ? fmt::format(", kA {} V·s²/{}", number(plant.gains.kA), unit)
+           : plant.kA_upper_bound > 0.0
+               ? fmt::format(", kA below {} V·s²/{}", number(plant.kA_upper_bound), unit)
+               : std::string(", kA not known");
+  if (plant.kind != MechanismKind::flywheel) {
+    gains += fmt::format(", kG {} V", number(plant.gains.kG));
+  }
+  if (plant.kind == MechanismKind::arm) {
+    gains += fmt::format(", angle offset {} rad", number(plant.gains.angle_offset));
+  }
+  facts.add("gains", gains);
+  return facts;
+}
+
+std::vector<Section> design_sections(const DesignResult& result) {
+  return {plant_section(result), controller_section(result), robustness_section(result),
+          motion_section(result), constants_section(result)};
+}
+
+}  // namespace flyball::study

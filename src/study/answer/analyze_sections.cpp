@@ -4,15 +4,20 @@
 
 #include <fmt/format.h>
 
-#include "report/format.hpp"
-#include "report/sections.hpp"
+#include "core/wording.hpp"
+#include "study/answer/parts.hpp"
 
-namespace flyball::report {
+namespace flyball::study {
 
 namespace {
 
-using study::ModelAnalysis;
-using study::ModelFile;
+using text::capitalized;
+using text::complex_number;
+using text::count;
+using text::enumerate;
+using text::matrix;
+using text::number;
+using text::seconds;
 
 constexpr std::size_t most_rows = 40;   ///< Of a table that is read; JSON has them all.
 constexpr Eigen::Index most_shown = 8;  ///< States of a matrix that is printed.
@@ -27,10 +32,11 @@ std::string shown(const Eigen::MatrixXd& M) {
              : fmt::format("{} x {}, see --json", M.rows(), M.cols());
 }
 
-std::string named(std::size_t n, std::string_view thing, const std::vector<std::string>& names) {
-  return n <= static_cast<std::size_t>(most_shown)
-             ? fmt::format("{}: {}", count(n, thing), enumerate(names))
-             : count(n, thing);
+std::string named(const std::vector<Coordinate>& coordinates, std::string_view thing) {
+  const std::string size = count(coordinates.size(), thing);
+  return coordinates.size() <= static_cast<std::size_t>(most_shown)
+             ? size + ": " + enumerate(labels(coordinates))
+             : size;
 }
 
 Section system_section(const ModelAnalysis& result) {
@@ -41,9 +47,9 @@ Section system_section(const ModelAnalysis& result) {
                         ? std::string("continuous, dx/dt = A x + B u, y = C x + D u")
                         : fmt::format("discrete, x_next = A x + B u, y = C x + D u, each {}",
                                       seconds(model.period->si())));
-  facts.add("x", named(model.states.size(), "state", model.states));
-  facts.add("u", named(model.inputs.size(), "input", model.inputs));
-  facts.add("y", named(model.outputs.size(), "output", model.outputs));
+  facts.add("x", named(model.states, "state"));
+  facts.add("u", named(model.inputs, "input"));
+  facts.add("y", named(model.outputs, "output"));
   facts.add("A", shown(model.system.A));
   facts.add("B", shown(model.system.B));
   facts.add("C", shown(model.system.C));
@@ -84,9 +90,8 @@ Section poles_section(const ModelAnalysis& result) {
   if (sampled) {
     table.header.push_back("sampled: z");
   }
-  for (const char* name : {"time constant", "frequency (rad/s)", "damping", "what it does"}) {
-    table.header.emplace_back(name);
-  }
+  table.header.insert(table.header.end(),
+                      {"time constant", "frequency (rad/s)", "damping", "what it does"});
   table.wide_column = table.header.size() - 1;
   std::size_t left_out = 0;
   for (const Mode& mode : result.modes.modes) {
@@ -97,7 +102,7 @@ Section poles_section(const ModelAnalysis& result) {
       ++left_out;
       continue;
     }
-    std::vector<Table::Cell> row{complex_number(mode.pole)};
+    std::vector<Value> row{complex_number(mode.pole)};
     if (sampled) {
       row.emplace_back(complex_number(std::exp(mode.pole * result.model.period->si())));
     }
@@ -168,7 +173,7 @@ void add_reach(Section& section, const ReachAnalysis& analysis, const std::strin
 }
 
 Section structure_section(const ModelAnalysis& result) {
-  const std::vector<std::string>& names = result.model.states;
+  const std::vector<std::string> names = labels(result.model.states);
   const auto tone = [](bool all, bool enough) {
     return all ? Tone::good : enough ? Tone::caution : Tone::bad;
   };
@@ -198,10 +203,10 @@ std::string gain_at_rest(const ModelAnalysis& result) {
   std::vector<std::string> parts;
   for (Eigen::Index i = 0; i < gain.rows(); ++i) {
     parts.push_back(fmt::format("{} in {}", number(gain(i, 0)),
-                                result.model.outputs[static_cast<std::size_t>(i)]));
+                                label(result.model.outputs[static_cast<std::size_t>(i)])));
   }
   return fmt::format(
-      "{}, for a constant one in {}{}", enumerate(parts), result.model.inputs[0],
+      "{}, for a constant one in {}{}", enumerate(parts), label(result.model.inputs[0]),
       result.modes.stability == Stability::unstable ? "; not reached, it is unstable" : "");
 }
 
@@ -227,7 +232,7 @@ Section response_section(const ModelAnalysis& result) {
 }
 
 Section sampling_section(const ModelAnalysis& result) {
-  const study::SampledAnalysis& sampled = *result.sampled;
+  const SampledAnalysis& sampled = *result.sampled;
   const SamplingAnalysis& sampling = sampled.sampling;
   Section section{
       "sampling", fmt::format("Sampled each {}", seconds(result.model.period->si())), {}};
@@ -240,7 +245,7 @@ Section sampling_section(const ModelAnalysis& result) {
                           number(sampling.fastest_rate), number(sampling.samples_per_radian, 3)),
               sampling.samples_per_radian < 1.0 ? Tone::caution : Tone::plain);
   }
-  facts.add("Nyquist frequency", number(sampling.nyquist_frequency) + " rad/s");
+  facts.add("Nyquist frequency", quantity(sampling.nyquist_frequency, "rad/s"));
   section.blocks.emplace_back(std::move(facts));
   if (sampling.aliases) {
     section.blocks.emplace_back(
@@ -257,44 +262,36 @@ Section sampling_section(const ModelAnalysis& result) {
   return section;
 }
 
-}  // namespace
-
 Verdict verdict_of(const ModelAnalysis& result) {
   Verdict verdict;
   const ControllabilityAnalysis& controllability = result.controllability;
   const ObservabilityAnalysis& observability = result.observability;
-  const auto reason = [&](Tone tone, std::string text) {
-    verdict.tone = verdict.tone == Tone::bad ? Tone::bad : tone == Tone::good ? verdict.tone : tone;
-    verdict.reasons.push_back(std::move(text));
-  };
   if (result.modes.stability == Stability::unstable) {
-    reason(Tone::caution, "left alone, it runs away");
+    verdict.add(Tone::caution, "left alone, it runs away");
   } else if (result.modes.stability == Stability::marginal) {
-    reason(Tone::good, "left alone, it neither comes back to where it was nor runs away");
+    verdict.add(Tone::good, "left alone, it neither comes back to where it was nor runs away");
   }
   if (!controllability.stabilizable) {
-    reason(Tone::bad,
-           "a mode that does not decay is moved by no input: no controller can make it "
-           "stable");
+    verdict.add(Tone::bad,
+                "a mode that does not decay is moved by no input: no controller can make it "
+                "stable");
   } else if (!controllability.controllable) {
-    reason(Tone::caution,
-           "no input moves every mode, but those that none moves decay by "
-           "themselves");
+    verdict.add(Tone::caution,
+                "no input moves every mode, but those that none moves decay by themselves");
   }
   if (!observability.detectable) {
-    reason(Tone::bad,
-           "a mode that does not decay is shown by no output: no observer can know the "
-           "state");
+    verdict.add(Tone::bad,
+                "a mode that does not decay is shown by no output: no observer can know the "
+                "state");
   } else if (!observability.observable) {
-    reason(Tone::caution,
-           "no output shows every mode, but those that none shows decay by "
-           "themselves");
+    verdict.add(Tone::caution,
+                "no output shows every mode, but those that none shows decay by themselves");
   }
   if (result.sampled &&
       (result.sampled->sampling.aliases || result.sampled->sampling.loses_controllability)) {
-    reason(Tone::caution, "the sample period is too long for it, see below");
+    verdict.add(Tone::caution, "the sample period is too long for it, see below");
   }
-  verdict.line = capitalized(std::string(to_string(result.modes.stability)));
+  verdict.line = capitalized(to_string(result.modes.stability));
   verdict.line += controllability.controllable && observability.observable
                       ? ", controllable and observable: every state can be moved and seen."
                   : controllability.stabilizable && observability.detectable
@@ -302,6 +299,8 @@ Verdict verdict_of(const ModelAnalysis& result) {
                       : "; no controller with these inputs and outputs can make it stable.";
   return verdict;
 }
+
+}  // namespace
 
 Document document_of(const ModelAnalysis& result) {
   Document document;
@@ -317,7 +316,8 @@ Document document_of(const ModelAnalysis& result) {
   if (!model.notes.empty()) {
     document.sections.push_back(diagnostics_section(model.notes));
   }
+  document.origins.add("model", model.path);
   return document;
 }
 
-}  // namespace flyball::report
+}  // namespace flyball::study

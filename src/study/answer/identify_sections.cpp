@@ -4,10 +4,10 @@
 
 #include <fmt/format.h>
 
-#include "report/format.hpp"
-#include "report/sections.hpp"
+#include "core/wording.hpp"
+#include "study/answer/parts.hpp"
 
-namespace flyball::report {
+namespace flyball::study {
 
 namespace {
 
@@ -16,6 +16,12 @@ using identification::FittedRun;
 using identification::GainEstimate;
 using identification::PreparedRun;
 using identification::TestKind;
+using text::count;
+using text::in_digits_of;
+using text::number;
+using text::percent;
+using text::seconds;
+using text::with_half_width;
 
 double largest_magnitude(const std::vector<double>& values) {
   double largest = 0.0;
@@ -44,19 +50,7 @@ std::string channel_text(double refresh, double row_period, double quantum,
   return quantum > 0.0 ? fmt::format("{}, steps of {} {}", text, number(quantum, 3), unit) : text;
 }
 
-const FittedRun* fitted_run(const study::IdentifyResult& result, std::size_t source) {
-  if (!result.report.fit) {
-    return nullptr;
-  }
-  for (const FittedRun& run : result.report.fit->runs) {
-    if (run.source == source) {
-      return &run;
-    }
-  }
-  return nullptr;
-}
-
-Table runs_table(const study::IdentifyResult& result) {
+Table runs_table(const IdentifyResult& result) {
   const std::string rate = result.unit + "/s";
   const std::vector<PreparedRun> shown = shown_runs(result);
   Table table;
@@ -64,6 +58,9 @@ Table runs_table(const study::IdentifyResult& result) {
                   "used (s)",  "voltage (V)", "top speed (" + rate + ")",
                   "in the fit"};
   table.words = {0, 6};
+  const auto cell = [](double value, const std::string& unit) {
+    return quantity(value, unit, 3, /*shown=*/false);
+  };
   constexpr std::array kinds{TestKind::quasistatic_forward, TestKind::quasistatic_reverse,
                              TestKind::dynamic_forward, TestKind::dynamic_reverse};
   for (const TestKind kind : kinds) {
@@ -77,19 +74,19 @@ Table runs_table(const study::IdentifyResult& result) {
       const bool used = fitted != nullptr && fitted->used;
       const std::vector<double>& speed =
           prepared.run.velocity.empty() ? prepared.smoothed_velocity : prepared.run.velocity;
-      Table::Cell state = used ? Table::Cell("yes", Tone::good) : Table::Cell("no", Tone::caution);
+      Value state = used ? Value("yes", Tone::good) : Value("no", Tone::caution);
       if (!prepared.moved) {
         state = {"did not move", Tone::bad};
       }
       table.rows.push_back({std::string(to_string(kind)), fmt::to_string(prepared.run.time.size()),
-                            number(duration(prepared.run.time), 3),
-                            fitted != nullptr ? number(duration(fitted->time), 3) : "",
-                            number(largest_magnitude(prepared.run.voltage), 3),
-                            number(largest_magnitude(speed), 3), state});
+                            cell(duration(prepared.run.time), "s"),
+                            fitted != nullptr ? cell(duration(fitted->time), "s") : "",
+                            cell(largest_magnitude(prepared.run.voltage), "V"),
+                            cell(largest_magnitude(speed), rate), state});
     }
     if (!found) {
-      table.rows.push_back({std::string(to_string(kind)), "0", "", "", "", "",
-                            Table::Cell("missing", Tone::caution)});
+      table.rows.push_back(
+          {std::string(to_string(kind)), "0", "", "", "", "", Value("missing", Tone::caution)});
     }
   }
   return table;
@@ -101,12 +98,15 @@ std::string interval_text(const GainEstimate& gain) {
                      in_digits_of(gain.interval[1], half));
 }
 
-std::vector<Table::Cell> gain_row(const std::string& name, const GainEstimate& gain,
-                                  const std::string& unit, double one_step, bool has_one_step,
-                                  const std::string& meaning) {
-  std::vector<Table::Cell> row{name};
+std::vector<Value> gain_row(const std::string& name, const GainEstimate& gain,
+                            const std::string& unit, double one_step, bool has_one_step,
+                            const std::string& meaning) {
+  std::vector<Value> row{name};
   if (gain.determined) {
-    row.emplace_back(with_half_width(gain.value, 0.5 * (gain.interval[1] - gain.interval[0])));
+    Value& value =
+        row.emplace_back(with_half_width(gain.value, 0.5 * (gain.interval[1] - gain.interval[0])));
+    value.number = gain.value;
+    value.unit = unit;
     row.emplace_back(interval_text(gain));
   } else {
     row.emplace_back("not determined", Tone::caution);
@@ -144,7 +144,18 @@ Table gains_table(const FeedforwardFit& fit) {
 
 }  // namespace
 
-std::vector<PreparedRun> shown_runs(const study::IdentifyResult& result) {
+const FittedRun* fitted_run(const IdentifyResult& result, std::size_t source) {
+  if (result.report.fit) {
+    for (const FittedRun& run : result.report.fit->runs) {
+      if (run.source == source) {
+        return &run;
+      }
+    }
+  }
+  return nullptr;
+}
+
+std::vector<PreparedRun> shown_runs(const IdentifyResult& result) {
   std::vector<PreparedRun> runs = result.report.prepared.runs;
   if (runs.empty()) {
     for (const identification::TestRun& run : result.source.recording.runs) {
@@ -158,23 +169,7 @@ std::vector<PreparedRun> shown_runs(const study::IdentifyResult& result) {
   return runs;
 }
 
-std::string kind_of(const study::IdentifyResult& result) {
-  // A drivetrain's log is refused before it is taken for a mechanism's.
-  return result.source.refusal ? "drivetrain" : std::string(to_string(result.mechanism));
-}
-
-std::string capitalized(std::string name) {
-  if (!name.empty() && name.front() >= 'a' && name.front() <= 'z') {
-    name.front() = static_cast<char>(name.front() - 'a' + 'A');
-  }
-  return name;
-}
-
-std::string capitalized(mechanisms::MechanismKind kind) {
-  return capitalized(std::string(to_string(kind)));
-}
-
-Section data_section(const study::IdentifyResult& result) {
+Section data_section(const IdentifyResult& result) {
   const identification::PreparedRecording& data = result.report.prepared;
   const std::string rate = result.unit + "/s";
   Section section{"data", "Data", {}};
@@ -210,7 +205,7 @@ Section data_section(const study::IdentifyResult& result) {
     facts.add("velocity", "not recorded; derived from the position", Tone::caution);
   }
   if (!data.runs.empty()) {
-    facts.add("top speed", number(data.top_speed, 4) + " " + rate);
+    facts.add("top speed", quantity(data.top_speed, rate));
   }
   if (result.report.fit) {
     const FeedforwardFit& fit = *result.report.fit;
@@ -235,13 +230,13 @@ Section data_section(const study::IdentifyResult& result) {
   return section;
 }
 
-Section gains_section(const study::IdentifyResult& result) {
+Section gains_section(const IdentifyResult& result) {
   Section section{"gains", "Gains", {}};
   if (!result.report.fit) {
     section.blocks.emplace_back(
         Paragraph{"No gains: " + to_string(result.report.fit.error()) + ".", Tone::bad});
-    section.blocks.emplace_back(
-        Paragraph{"The log is shown as it is; record it again with the mend above.", Tone::plain});
+    section.blocks.emplace_back(Paragraph{
+        "The log is shown as it is; record it again as the sentence above says.", Tone::plain});
     return section;
   }
   const FeedforwardFit& fit = *result.report.fit;
@@ -287,4 +282,4 @@ Section gains_section(const study::IdentifyResult& result) {
   return section;
 }
 
-}  // namespace flyball::report
+}  // namespace flyball::study

@@ -1,7 +1,7 @@
-#include <flyball/io/json_writer.hpp>
-#include <flyball/study/schema.hpp>
+#include <utility>
 
 #include "solve/structure_answer.hpp"
+#include "study/answer/parts.hpp"
 
 namespace flyball::study {
 
@@ -18,7 +18,7 @@ void write_sampled(const SampledAnalysis& sampled, const ModelFile& model, JsonW
     answer.add("samples_per_radian", sampled.sampling.samples_per_radian);
     answer.add("aliases", sampled.sampling.aliases);
     answer.add("loses_controllability", sampled.sampling.loses_controllability);
-    write_structure(sampled, model.states, answer);
+    write_structure(sampled, labels(model.states), answer);
   });
 }
 
@@ -33,14 +33,14 @@ std::string to_json(const ModelAnalysis& analysis) {
   if (model.period) {
     answer.add("T", model.period->si());
   }
-  answer.add("states", model.states);
-  answer.add("inputs", model.inputs);
-  answer.add("outputs", model.outputs);
+  answer.add("states", labels(model.states));
+  answer.add("inputs", labels(model.inputs));
+  answer.add("outputs", labels(model.outputs));
   answer.add("A", model.system.A);
   answer.add("B", model.system.B);
   answer.add("C", model.system.C);
   answer.add("D", model.system.D);
-  write_structure(analysis, model.states, answer);
+  write_structure(analysis, labels(model.states), answer);
   if (analysis.dc_gain) {
     answer.add("dc_gain", *analysis.dc_gain);
   }
@@ -57,6 +57,14 @@ std::string to_json(const ModelAnalysis& analysis) {
   answer.add("diagnostics", model.notes);
   answer.close('}');
   return std::move(answer).text();
+}
+
+Answer answer_of(const ModelAnalysis& result) {
+  return {.schema = "flyball.analyze/1",
+          .json = to_json(result),
+          .document = document_of(result),
+          .figures = figures_of(result),
+          .files = data_files(result)};
 }
 
 }  // namespace flyball::study

@@ -1,11 +1,12 @@
+#include <flyball/report/html.hpp>
+
 #include <fmt/format.h>
 
 #include <flyball/core/version.hpp>
 
 #include "report/format.hpp"
 #include "report/page_style.hpp"
-#include "report/render_html.hpp"
-#include "report/sections.hpp"
+#include "report/pictures.hpp"
 
 namespace flyball::report {
 
@@ -56,8 +57,8 @@ std::string render(const Facts& facts) {
   std::string out = "<table class=\"facts\"><tbody>\n";
   for (const Facts::Fact& fact : facts.facts) {
     out += fmt::format("<tr><th scope=\"row\" class=\"w\">{}</th><td{}>{}</td></tr>\n",
-                       escape_html(fact.name), class_attribute("w", fact.tone),
-                       escape_html(fact.value));
+                       escape_html(fact.name), class_attribute("w", fact.value.tone),
+                       escape_html(fact.value.text));
   }
   return out + "</tbody></table>\n";
 }
@@ -94,12 +95,10 @@ std::string render(const Paragraph& paragraph) {
 std::string render(const Findings& findings) {
   std::string out = "<ul class=\"findings\">\n";
   for (const Diagnostic& diagnostic : findings.diagnostics) {
-    const Tone tone = diagnostic.severity == Severity::info      ? Tone::quiet
-                      : diagnostic.severity == Severity::warning ? Tone::caution
-                                                                 : Tone::bad;
     out += fmt::format("<li><span{}>{}</span> {} <code class=\"quiet\">{}</code></li>\n",
-                       class_attribute("badge", tone), to_string(diagnostic.severity),
-                       escape_html(diagnostic.message), escape_html(diagnostic.code));
+                       class_attribute("badge", tone_of(diagnostic.severity)),
+                       to_string(diagnostic.severity), escape_html(diagnostic.message),
+                       escape_html(diagnostic.code));
   }
   return out + "</ul>\n";
 }
@@ -142,14 +141,14 @@ std::string with_own_ids(std::string_view svg, std::size_t number) {
   return out;
 }
 
-std::string render(const RenderedFigure& rendered, std::size_t number) {
-  const Figure& figure = rendered.figure;
+std::string render(const Picture& picture, std::size_t number) {
+  const Figure& figure = picture.figure;
   const std::string label = escape_html(figure.title + ". " + figure.description);
   std::string out = "<figure>\n";
-  const std::string_view svg = svg_element(rendered.svg);
+  const std::string_view svg = svg_element(picture.svg);
   if (svg.empty()) {
     out += fmt::format("<p class=\"caution\">▲ The picture “{}” could not be drawn: {}</p>\n",
-                       escape_html(figure.title), escape_html(rendered.problem));
+                       escape_html(figure.title), escape_html(picture.problem));
   } else {
     out += fmt::format("<div class=\"picture\" role=\"img\" aria-label=\"{}\">\n{}</div>\n", label,
                        with_own_ids(svg, number));
@@ -163,16 +162,14 @@ std::string heading(const Section& section) {
                      section.id, section.id, section.id, escape_html(section.title));
 }
 
-std::string origin_section(const Origins& origins, const Provenance& provenance) {
+std::string origin_section(const Facts& origins, const Provenance& provenance) {
   std::string out = heading({"origin", "How it was made", {}});
   Facts facts;
   facts.add("Flyball", std::string(version));
   if (!provenance.command.empty()) {
     facts.add("command", provenance.command);
   }
-  for (const auto& [name, value] : origins) {
-    facts.add(name, value);
-  }
+  facts.facts.insert(facts.facts.end(), origins.facts.begin(), origins.facts.end());
   out += render(facts);
   if (!provenance.files.empty()) {
     out += "<p>Beside this page:</p>\n<ul>\n";
@@ -184,31 +181,10 @@ std::string origin_section(const Origins& origins, const Provenance& provenance)
   return out + "</section>\n";
 }
 
-Origins origins_of(const study::IdentifyResult& result) {
-  return {{"log", result.source.path}};
-}
-
-Origins origins_of(const study::DesignResult& result) {
-  return {{"seed", fmt::to_string(result.job.seed)}};
-}
-
-Origins origins_of(const study::TuneResult& result) {
-  Origins origins = origins_of(result.identification);
-  if (result.design && *result.design) {
-    const Origins more = origins_of(**result.design);
-    origins.insert(origins.end(), more.begin(), more.end());
-  }
-  return origins;
-}
-
-Origins origins_of(const study::ModelAnalysis& result) {
-  return {{"model", result.model.path}};
-}
-
 }  // namespace
 
-std::string render_html(const Document& document, const std::vector<RenderedFigure>& figures,
-                        const Origins& origins, const Provenance& provenance) {
+std::string page_of(const Document& document, const std::vector<Picture>& pictures,
+                    const Provenance& provenance) {
   std::string out = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
@@ -237,51 +213,19 @@ std::string render_html(const Document& document, const std::vector<RenderedFigu
     for (const Block& block : section.blocks) {
       out += std::visit([](const auto& b) { return render(b); }, block);
     }
-    for (const RenderedFigure& figure : figures) {
-      if (figure.figure.section == section.id) {
-        out += render(figure, ++number);
+    for (const Picture& picture : pictures) {
+      if (picture.figure.section == section.id) {
+        out += render(picture, ++number);
       }
     }
     out += "</section>\n";
   }
-  out += origin_section(origins, provenance);
+  out += origin_section(document.origins, provenance);
   return out + "</main>\n</body>\n</html>\n";
 }
 
-std::string page_of(const study::IdentifyResult& result, const std::vector<RenderedFigure>& figures,
-                    const Provenance& provenance) {
-  return render_html(document_of(result), figures, origins_of(result), provenance);
-}
-
-std::string page_of(const study::DesignResult& result, const std::vector<RenderedFigure>& figures,
-                    const Provenance& provenance) {
-  return render_html(document_of(result), figures, origins_of(result), provenance);
-}
-
-std::string page_of(const study::TuneResult& result, const std::vector<RenderedFigure>& figures,
-                    const Provenance& provenance) {
-  return render_html(document_of(result), figures, origins_of(result), provenance);
-}
-
-std::string page_of(const study::ModelAnalysis& result, const std::vector<RenderedFigure>& figures,
-                    const Provenance& provenance) {
-  return render_html(document_of(result), figures, origins_of(result), provenance);
-}
-
-std::string to_html(const study::IdentifyResult& result, const Provenance& provenance) {
-  return page_of(result, render(figures_of(result), false), provenance);
-}
-
-std::string to_html(const study::DesignResult& result, const Provenance& provenance) {
-  return page_of(result, render(figures_of(result), false), provenance);
-}
-
-std::string to_html(const study::TuneResult& result, const Provenance& provenance) {
-  return page_of(result, render(figures_of(result), false), provenance);
-}
-
-std::string to_html(const study::ModelAnalysis& result, const Provenance& provenance) {
-  return page_of(result, render(figures_of(result), false), provenance);
+std::string to_html(const Answer& answer, const Provenance& provenance) {
+  return page_of(answer.document, draw(answer.figures, false), provenance);
 }
 
 }  // namespace flyball::report

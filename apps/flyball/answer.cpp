@@ -1,0 +1,28 @@
+#include <flyball/report/terminal.hpp>
+#include <flyball/report/write_report.hpp>
+
+#include "answer.hpp"
+
+namespace flyball::app {
+
+int tell(const Answer& answer, const CommonOptions& options, bool by_default) {
+  std::string written;
+  if (const auto folder = report_folder(options, by_default)) {
+    if (auto report = report::write_report(answer, *folder, {.command = options.typed})) {
+      written = *folder;
+    } else if (!options.out.empty()) {
+      return fail(report.error(), options, answer.schema);
+    } else {
+      warn("no report: " + to_string(report.error()));
+    }
+  }
+  print(options.json ? answer.json
+                     : report::to_terminal(answer.document, terminal_style(), written));
+  if (answer.refusal) {
+    tell(*answer.refusal);
+    return exit_status(*answer.refusal);
+  }
+  return success;
+}
+
+}  // namespace flyball::app

@@ -1,0 +1,50 @@
+#include <algorithm>
+#include <atomic>
+#include <thread>
+#include <utility>
+
+#include <flyball/io/plot.hpp>
+
+#include "report/pictures.hpp"
+
+namespace flyball::report {
+
+std::vector<Picture> draw(const std::vector<Figure>& figures, bool png) {
+  std::vector<Picture> pictures(figures.size());
+  for (std::size_t i = 0; i < figures.size(); ++i) {
+    pictures[i].figure = figures[i];
+  }
+  const std::size_t jobs = pictures.size() * (png ? 2 : 1);
+  std::vector<std::string> problems(jobs);
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t job = next++; job < jobs; job = next++) {
+      const bool raster = job >= pictures.size();
+      Picture& target = pictures[job % pictures.size()];
+      Expected<std::string> picture =
+          raster ? render_png(target.figure.plot) : render_svg(target.figure.plot);
+      if (!picture) {
+        problems[job] = to_string(picture.error());
+      } else if (raster) {
+        target.png = *std::move(picture);
+      } else {
+        target.svg = *std::move(picture);
+      }
+    }
+  };
+  // Each picture is a process of its own; waiting for one costs nothing.
+  std::vector<std::jthread> workers;
+  const std::size_t threads =
+      std::min<std::size_t>(jobs, std::clamp(std::thread::hardware_concurrency(), 1U, 8U));
+  for (std::size_t i = 1; i < threads; ++i) {
+    workers.emplace_back(work);
+  }
+  work();
+  workers.clear();
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    pictures[i].problem = problems[i];
+  }
+  return pictures;
+}
+
+}  // namespace flyball::report

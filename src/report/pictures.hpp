@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <flyball/report/html.hpp>
+
+namespace flyball::report {
+
+/// A figure, drawn.
+struct Picture {
+  Figure figure{};
+  std::string svg{};  ///< Empty if it could not be drawn.
+  std::string png{};  ///< Empty if it could not be drawn or was not asked for.
+  std::string problem{};
+};
+
+/// Draws them, a few at a time. @param png  Whether PNGs are wanted too.
+[[nodiscard]] std::vector<Picture> draw(const std::vector<Figure>& figures, bool png);
+
+/// The page of a document whose pictures are drawn already; they stand at the end of the section
+/// that they name.
+[[nodiscard]] std::string page_of(const Document& document, const std::vector<Picture>& pictures,
+                                  const Provenance& provenance);
+
+}  // namespace flyball::report

@@ -1,0 +1,94 @@
+// Pictures and tables of what a linear system is like.
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include <flyball/io/csv.hpp>
+
+#include "core/wording.hpp"
+#include "study/answer/drawing.hpp"
+#include "study/answer/parts.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+constexpr std::size_t most_panels = 8;  ///< Of a picture that is looked at.
+
+Figure pole_figure(const std::string& section, const ModalAnalysis& modes, bool continuous) {
+  PolePlotGroup group;
+  for (const Mode& mode : modes.modes) {
+    group.poles.push_back(mode.pole);
+  }
+  const std::string title = continuous ? "Poles in the s plane" : "Poles in the z plane";
+  return {section, section == "poles" ? "poles" : "poles_sampled", title,
+          continuous ? "Left of the vertical line a mode decays, the faster the farther left; away "
+                       "from the horizontal line it oscillates."
+                     : "Inside the circle a mode decays, the faster the nearer to the centre.",
+          pole_plot(title, {group}, !continuous)};
+}
+
+std::vector<double> list(const auto& values) {
+  return {values.begin(), values.end()};
+}
+
+Figure step_figure(const ModelAnalysis& result) {
+  const std::vector<std::string> inputs = labels(result.model.inputs);
+  const std::vector<Coordinate>& outputs = result.model.outputs;
+  const bool single = result.steps.size() == 1;
+  const bool continuous = result.model.domain == TimeDomain::continuous;
+  const std::size_t panels = std::min(outputs.size(), most_panels);
+  Figure figure = over_time(
+      "response", "step_response", "Step responses",
+      fmt::format(
+          "Each output after a unit step of {}, from rest{}{}.",
+          single ? inputs.front() : std::string("each input in turn"),
+          panels < outputs.size()
+              ? fmt::format("; the first {} of {} outputs", panels, outputs.size())
+              : "",
+          result.steps.size() < inputs.size()
+              ? fmt::format("; the first {} of {} inputs", result.steps.size(), inputs.size())
+              : ""));
+  if (single) {
+    figure.plot.title = "Unit step of " + inputs.front();
+  }
+  for (std::size_t output = 0; output < panels; ++output) {
+    std::vector<PlotLine> lines;
+    for (std::size_t input = 0; input < result.steps.size(); ++input) {
+      const StepResponse& step = result.steps[input];
+      lines.push_back(line(single ? "" : "after " + inputs[input], list(step.time),
+                           list(step.y.col(static_cast<Eigen::Index>(output))), -1,
+                           continuous ? LineStyle::solid : LineStyle::steps));
+    }
+    figure.plot.panels.push_back(
+        panel({text::capitalized(outputs[output].name), outputs[output].unit}, std::move(lines)));
+  }
+  return figure;
+}
+
+}  // namespace
+
+std::vector<Figure> figures_of(const ModelAnalysis& result) {
+  std::vector<Figure> figures{
+      pole_figure("poles", result.modes, result.model.domain == TimeDomain::continuous)};
+  if (result.sampled) {
+    figures.push_back(pole_figure("sampling", result.sampled->modes, false));
+  }
+  figures.push_back(step_figure(result));
+  return figures;
+}
+
+std::vector<AnswerFile> data_files(const ModelAnalysis& result) {
+  TimeSeries series(list(result.steps.front().time));
+  for (std::size_t input = 0; input < result.steps.size(); ++input) {
+    for (std::size_t output = 0; output < result.model.outputs.size(); ++output) {
+      static_cast<void>(
+          series.add(fmt::format("{} after {}", label(result.model.outputs[output]),
+                                 label(result.model.inputs[input])),
+                     "", list(result.steps[input].y.col(static_cast<Eigen::Index>(output)))));
+    }
+  }
+  return {{"data/step_response.csv", to_csv(series)}};
+}
+
+}  // namespace flyball::study

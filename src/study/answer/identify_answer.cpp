@@ -1,0 +1,194 @@
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <flyball/study/project.hpp>
+
+#include "core/wording.hpp"
+#include "study/answer/parts.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+using identification::GainEstimate;
+
+constexpr double poor_fit = 0.9;  ///< R² below which the overlay deserves a look.
+
+void write_gain(JsonWriter& json, std::string_view name, const GainEstimate& gain,
+                const std::string& unit) {
+  json.object(name, [&] {
+    json.add("value", gain.determined ? std::optional(gain.value) : std::nullopt);
+    json.add("determined", gain.determined);
+    json.add("unit", unit);
+    if (gain.determined) {
+      json.add("standard_error", gain.standard_error);
+      json.add("interval", std::span<const double>(gain.interval));
+    } else {
+      json.add("upper_bound", gain.upper_bound);
+      json.add("reason", gain.reason);
+    }
+  });
+}
+
+void write_gains(JsonWriter& json, const identification::FeedforwardFit& fit) {
+  json.object("gains", [&] {
+    write_gain(json, "kS", fit.kS, "V");
+    write_gain(json, "kV", fit.kV, fmt::format("V·s/{}", fit.unit));
+    write_gain(json, "kA", fit.kA, fmt::format("V·s²/{}", fit.unit));
+    if (fit.kG) {
+      write_gain(json, "kG", *fit.kG, "V");
+    }
+    if (fit.angle_offset) {
+      write_gain(json, "angle_offset", *fit.angle_offset, "rad");
+    }
+  });
+}
+
+void write_fit(JsonWriter& json, const identification::FeedforwardFit& fit) {
+  json.add("mechanism", to_string(fit.mechanism));
+  json.add("unit", fit.unit);
+  write_gains(json, fit);
+  json.object("fit", [&] {
+    json.add({{"r_squared", fit.r_squared},
+              {"velocity_nrmse", fit.velocity_nrmse},
+              {"position_delay", fit.position_delay},
+              {"velocity_delay", fit.velocity_delay},
+              {"averaging_width", fit.averaging_width}});
+    json.add("iterations", fit.iterations);
+  });
+  if (fit.one_step) {
+    json.object("one_step_regression", [&] {
+      json.add({{"kS", fit.one_step->kS},
+                {"kV", fit.one_step->kV},
+                {"kA", fit.one_step->kA},
+                {"r_squared", fit.one_step->r_squared}});
+      if (fit.kG) {
+        json.add("kG", fit.one_step->kG);
+      }
+    });
+  }
+}
+
+void write_source(JsonWriter& json, const recording::LoadedRecording& source) {
+  json.object("log", [&] {
+    json.add("path", source.path);
+    json.add("format", source.format);
+    json.add("subject", source.subject);
+    std::size_t rows = 0;
+    for (const identification::TestRun& run : source.recording.runs) {
+      rows += run.time.size();
+    }
+    json.add("rows", rows);
+    json.list("runs", source.recording.runs, [&](const identification::TestRun& run) {
+      json.object([&] {
+        json.add("test", to_string(run.kind));
+        json.add("rows", run.time.size());
+        json.add("duration", run.time.empty() ? 0.0 : run.time.back() - run.time.front());
+      });
+    });
+  });
+}
+
+}  // namespace
+
+void write_identification(JsonWriter& json, const IdentifyResult& result) {
+  json.object([&] {
+    json.add("schema", "flyball.identify/1");
+    if (result.report.fit) {
+      write_fit(json, *result.report.fit);
+    } else {
+      json.add("error", result.report.fit.error());
+    }
+    write_source(json, result.source);
+    json.add("diagnostics", result.diagnostics());
+  });
+}
+
+std::string to_json(const IdentifyResult& result) {
+  JsonWriter json;
+  write_identification(json, result);
+  return std::move(json).text();
+}
+
+void add_warnings(Verdict& verdict, const std::vector<Diagnostic>& diagnostics,
+                  std::string_view about) {
+  const auto warnings =
+      std::count_if(diagnostics.begin(), diagnostics.end(),
+                    [](const Diagnostic& d) { return d.severity != Severity::info; });
+  if (warnings > 0) {
+    verdict.add(Tone::caution,
+                fmt::format("{} {}, listed below",
+                            text::count(static_cast<std::size_t>(warnings), "warning"), about));
+  }
+}
+
+std::string title_of(const std::string& kind, const std::string& subject, const std::string& path) {
+  std::string title = text::capitalized(kind);
+  if (!subject.empty()) {
+    title += fmt::format(" “{}”", subject);
+  }
+  const std::size_t slash = path.find_last_of('/');
+  const std::string file = slash == std::string::npos ? path : path.substr(slash + 1);
+  return file.empty() ? title : title + " from " + file;
+}
+
+std::string kind_of(const IdentifyResult& result) {
+  // A drivetrain's log is refused before it is taken for a mechanism's.
+  return result.source.refusal ? "drivetrain" : std::string(to_string(result.mechanism));
+}
+
+Verdict verdict_of(const IdentifyResult& result) {
+  if (!result.report.fit) {
+    return {
+        Tone::bad, "No gains can be taken from this log.", {to_string(result.report.fit.error())}};
+  }
+  const identification::FeedforwardFit& fit = *result.report.fit;
+  Verdict verdict;
+  const auto undetermined = [&](const char* name, const identification::GainEstimate& gain) {
+    if (!gain.determined) {
+      verdict.add(Tone::caution, fmt::format("the log does not determine {}", name));
+    }
+  };
+  undetermined("kS", fit.kS);
+  undetermined("kV", fit.kV);
+  undetermined("kA; the design does without it", fit.kA);
+  if (fit.kG) {
+    undetermined("kG", *fit.kG);
+  }
+  if (fit.r_squared < poor_fit) {
+    verdict.add(Tone::caution,
+                fmt::format("the simulated velocity explains only {} of the measured one: "
+                            "compare them before you trust the gains",
+                            text::percent(std::max(0.0, fit.r_squared))));
+  }
+  add_warnings(verdict, result.diagnostics(), "about the data");
+  verdict.line = verdict.tone == Tone::good
+                     ? fmt::format(
+                           "The gains can be used: the model explains {} of the measured "
+                           "velocity.",
+                           text::percent(fit.r_squared))
+                     : "The gains can be used with care.";
+  return verdict;
+}
+
+Answer answer_of(const IdentifyResult& result) {
+  Answer answer{.schema = "flyball.identify/1", .json = to_json(result)};
+  Document& document = answer.document;
+  document.title = title_of(kind_of(result), result.source.subject, result.source.path);
+  document.verdict = verdict_of(result);
+  document.sections = {data_section(result), gains_section(result),
+                       diagnostics_section(result.diagnostics())};
+  document.origins.add("log", result.source.path);
+  answer.figures = figures_of(result);
+  if (result.report.fit) {
+    answer.files.push_back({"gains.toml", gains_toml(result)});
+  } else {
+    answer.refusal = result.report.fit.error();
+  }
+  append(answer.files, data_files(result));
+  return answer;
+}
+
+}  // namespace flyball::study

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <iterator>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <flyball/io/json_writer.hpp>
+#include <flyball/study/answer.hpp>
+
+/// Pieces that the answers are put together from.
+namespace flyball::study {
+
+/// Puts `more` at the end of a list.
+template <class T>
+void append(std::vector<T>& list, std::vector<T> more) {
+  list.insert(list.end(), std::make_move_iterator(more.begin()),
+              std::make_move_iterator(more.end()));
+}
+
+/// The runs to show: as prepared, or as recorded where the log was refused before.
+[[nodiscard]] std::vector<identification::PreparedRun> shown_runs(const IdentifyResult& result);
+/// The fit of a run, or null.
+[[nodiscard]] const identification::FittedRun* fitted_run(const IdentifyResult& result,
+                                                          std::size_t source);
+/// "elevator", …, or "drivetrain" for a log that was refused as one.
+[[nodiscard]] std::string kind_of(const IdentifyResult& result);
+
+[[nodiscard]] Section data_section(const IdentifyResult& result);
+/// Gains and the quality of the fit; for a refused fit, its reason.
+[[nodiscard]] Section gains_section(const IdentifyResult& result);
+/// Plant, controller, robustness, motion, constants.
+[[nodiscard]] std::vector<Section> design_sections(const DesignResult& result);
+
+[[nodiscard]] Verdict verdict_of(const IdentifyResult& result);
+[[nodiscard]] Verdict verdict_of(const DesignResult& result);
+/// "2 warnings about the data, listed below", if there are any.
+void add_warnings(Verdict& verdict, const std::vector<Diagnostic>& diagnostics,
+                  std::string_view about);
+
+[[nodiscard]] Document document_of(const ModelAnalysis& result);
+
+/// Each run, measured against simulated; as recorded where nothing was simulated.
+[[nodiscard]] std::vector<Figure> figures_of(const IdentifyResult& result);
+/// Pole map, closed-loop response, estimate against truth.
+[[nodiscard]] std::vector<Figure> figures_of(const DesignResult& result);
+/// Pole map and step responses.
+[[nodiscard]] std::vector<Figure> figures_of(const ModelAnalysis& result);
+
+/// The same as CSV: the runs; the response and the robustness grid; the step responses.
+[[nodiscard]] std::vector<AnswerFile> data_files(const IdentifyResult& result);
+[[nodiscard]] std::vector<AnswerFile> data_files(const DesignResult& result);
+[[nodiscard]] std::vector<AnswerFile> data_files(const ModelAnalysis& result);
+/// gains.toml, the generated header, constants to paste, data. A header that cannot be made is a
+/// sentence in the last section.
+/// @param fit  For the gains' intervals; may be null.
+void add_design_files(Answer& answer, const DesignResult& result,
+                      const identification::FeedforwardFit* fit);
+
+/// The object of "flyball.identify/1".
+void write_identification(JsonWriter& json, const IdentifyResult& result);
+/// The members of "flyball.design/1", without the schema.
+void write_design(JsonWriter& json, const DesignResult& result);
+
+/// Its kind, motors, gearing, drum and gains.
+[[nodiscard]] Facts plant_facts(const PlantDescription& plant);
+/// "Elevator “lift” from log.json". @param subject  May be empty, as `path`.
+[[nodiscard]] std::string title_of(const std::string& kind, const std::string& subject,
+                                   const std::string& path);
+/// What was measured: "velocity" for a flywheel, else "position".
+[[nodiscard]] std::string measured_name(mechanisms::MechanismKind kind);
+/// The unit of the controlled quantity: "rad/s" for a flywheel, else the unit itself.
+[[nodiscard]] std::string controlled_unit(const PlantDescription& plant);
+
+}  // namespace flyball::study

@@ -1,0 +1,86 @@
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "study/answer/parts.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+const DesignResult* design_in(const TuneResult& result) {
+  return result.design && result.design->has_value() ? &**result.design : nullptr;
+}
+
+std::optional<Error> refusal_of(const TuneResult& result) {
+  if (!result.identification.report.fit) {
+    return result.identification.report.fit.error();
+  }
+  return result.design && !*result.design ? std::optional(result.design->error()) : std::nullopt;
+}
+
+Verdict verdict_of(const TuneResult& result) {
+  Verdict verdict = verdict_of(result.identification);
+  if (const DesignResult* design = design_in(result)) {
+    const Verdict more = verdict_of(*design);
+    verdict.line += " " + more.line;
+    verdict.tone = worse(verdict.tone, more.tone);
+    append(verdict.reasons, more.reasons);
+  } else if (result.design) {
+    verdict.line += " No controller can be designed from them.";
+    verdict.add(Tone::bad, to_string(result.design->error()));
+  }
+  return verdict;
+}
+
+}  // namespace
+
+std::string to_json(const TuneResult& result) {
+  const DesignResult* design = design_in(result);
+  JsonWriter json;
+  json.object([&] {
+    json.add("schema", "flyball.tune/1");
+    if (const auto refusal = refusal_of(result)) {
+      json.add("error", *refusal);
+    }
+    json.key("identification");
+    write_identification(json, result.identification);
+    if (design != nullptr) {
+      json.object("design", [&] { write_design(json, *design); });
+    } else {
+      json.add("diagnostics", result.identification.diagnostics());
+    }
+  });
+  return std::move(json).text();
+}
+
+Answer answer_of(const TuneResult& result) {
+  Answer answer = answer_of(result.identification);
+  answer.schema = "flyball.tune/1";
+  answer.json = to_json(result);
+  answer.refusal = refusal_of(result);
+  Document& document = answer.document;
+  document.verdict = verdict_of(result);
+  if (const DesignResult* design = design_in(result)) {
+    std::vector<Diagnostic> diagnostics = result.identification.diagnostics();
+    append(diagnostics, design->diagnostics);
+    document.sections.pop_back();
+    append(document.sections, design_sections(*design));
+    document.origins.add("seed", fmt::to_string(design->job.seed));
+    append(answer.figures, figures_of(*design));
+    const auto& fit = result.identification.report.fit;
+    answer.files.clear();
+    add_design_files(answer, *design, fit ? &*fit : nullptr);
+    append(answer.files, data_files(result.identification));
+    document.sections.push_back(diagnostics_section(std::move(diagnostics)));
+  } else if (result.design) {
+    document.sections.insert(
+        document.sections.end() - 1,
+        {"controller",
+         "Controller",
+         {Paragraph{"No controller: " + to_string(result.design->error()) + ".", Tone::bad}}});
+  }
+  return answer;
+}
+
+}  // namespace flyball::study
