@@ -180,14 +180,14 @@ TEST(FeedforwardFit, RefusesOnlyRampsAndOnlySteps) {
 }
 
 TEST(FeedforwardFit, RefusesOneDirectionUnderGravityButNotOfAFlywheel) {
-  Recording elevator = record(elevator);
-  elevator.runs = {elevator.runs[0], elevator.runs[2]};
-  const auto refused = fit_feedforward(elevator);
+  Recording lift = record(elevator);
+  lift.runs = {lift.runs[0], lift.runs[2]};
+  const auto refused = fit_feedforward(lift);
   ASSERT_FALSE(refused);
   EXPECT_TRUE(refused.error().is(IdentificationError::missing_tests));
-  Recording flywheel = record(flywheel);
-  flywheel.runs = {flywheel.runs[0], flywheel.runs[2]};
-  const auto fit = fit_feedforward(flywheel);
+  Recording wheel = record(flywheel);
+  wheel.runs = {wheel.runs[0], wheel.runs[2]};
+  const auto fit = fit_feedforward(wheel);
   ASSERT_TRUE(fit) << to_string(fit.error());
   expect_near(fit->kS, 0.5, 0.02);
 }
