@@ -225,8 +225,7 @@ TEST(SolveTable, UnknownFieldsAndChoicesNameTheNearest) {
   EXPECT_EQ(shape.at("error").at("message"), "dare: B is 2x1; it must be states x inputs (1x1)");
 }
 
-// docs/ is what the table says: `flyball solve --markdown > docs/solve.md` and
-// `flyball solve --schema > docs/schemas/solve.schema.json` write it.
+// docs/ is what the table says; `scripts/write-docs` writes it.
 TEST(SolveTable, DocumentationIsUpToDate) {
   EXPECT_EQ(file("solve.md"), markdown());
   EXPECT_EQ(file("schemas/solve.schema.json"), json_schema());
