@@ -15,8 +15,11 @@ constexpr std::string_view where = "lqr";
 
 Expected<LqrDesign<>> solve(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
                             const Weight& R, const Eigen::MatrixXd* N) {
-  FLYBALL_TRY(const auto weight_Q, Q.get());
-  FLYBALL_TRY(const auto weight_R, R.get());
+  if (!Q.get() || !R.get()) {
+    return tl::unexpected((Q.get() ? R : Q).get().error());
+  }
+  const Eigen::MatrixXd& weight_Q = *Q.get();  // Not copied: a gain may be designed in a loop.
+  const Eigen::MatrixXd& weight_R = *R.get();
   FLYBALL_CHECK(check_square(A, where, "A"));
   const Eigen::Index n = A.rows();
   const Eigen::Index m = B.cols();
@@ -90,17 +93,12 @@ Expected<LqrDesign<>> lqr(const MatrixRef& A, const MatrixRef& B, const Weight& 
   return solve(A, B, Q, R, &cross);
 }
 
-#define FLYBALL_LQR(States, Inputs, Outputs)                                                       \
+#define FLYBALL_STATES_INPUTS_OUTPUTS(States, Inputs, Outputs)                                     \
   template Expected<LqrDesign<States, Inputs>> lqr(const DiscreteSystem<States, Inputs, Outputs>&, \
                                                    const Weight&, const Weight&);                  \
   template Expected<LqrDesign<States, Inputs>> lqr(const DiscreteSystem<States, Inputs, Outputs>&, \
-                                                   const Weight&, const Weight&, const MatrixRef&)
-FLYBALL_LQR(1, 1, 1);
-FLYBALL_LQR(2, 1, 1);
-FLYBALL_LQR(2, 1, 2);
-FLYBALL_LQR(2, 2, 2);
-FLYBALL_LQR(3, 1, 1);
-FLYBALL_LQR(3, 1, 2);
-FLYBALL_LQR(Eigen::Dynamic, Eigen::Dynamic, Eigen::Dynamic);
+                                                   const Weight&, const Weight&,                   \
+                                                   const MatrixRef&);
+#include <flyball/core/instantiated_sizes.inc>
 
 }  // namespace flyball

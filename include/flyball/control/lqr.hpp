@@ -76,20 +76,12 @@ template <int States, int Inputs, int Outputs>
 template <int States, int Inputs, int Outputs, class... Rest>
 void lqr(const ContinuousSystem<States, Inputs, Outputs>& plant, const Rest&...) = delete;
 
-// The common sizes are compiled once, in the library.
-#define FLYBALL_LQR(States, Inputs, Outputs)                                         \
+#define FLYBALL_STATES_INPUTS_OUTPUTS(States, Inputs, Outputs)                       \
   extern template Expected<LqrDesign<States, Inputs>> lqr(                           \
       const DiscreteSystem<States, Inputs, Outputs>&, const Weight&, const Weight&); \
   extern template Expected<LqrDesign<States, Inputs>> lqr(                           \
       const DiscreteSystem<States, Inputs, Outputs>&, const Weight&, const Weight&,  \
-      const MatrixRef&)
-FLYBALL_LQR(1, 1, 1);
-FLYBALL_LQR(2, 1, 1);
-FLYBALL_LQR(2, 1, 2);
-FLYBALL_LQR(2, 2, 2);
-FLYBALL_LQR(3, 1, 1);
-FLYBALL_LQR(3, 1, 2);
-FLYBALL_LQR(Eigen::Dynamic, Eigen::Dynamic, Eigen::Dynamic);
-#undef FLYBALL_LQR
+      const MatrixRef&);
+#include <flyball/core/instantiated_sizes.inc>
 
 }  // namespace flyball
