@@ -69,4 +69,28 @@ inline Bulge start_of_sweep(int ld, const double* H, int low, int end, double x,
   }
 }
 
+/// The reflection I - (x y z)ᵀ(1 q r) that turns (p q r)ᵀ into (top 0 0)ᵀ; I where that is zero.
+struct Reflection {
+  double x = 0.0, y = 0.0, z = 0.0, q = 0.0, r = 0.0, top = 0.0;
+};
+inline Reflection reflection_of(double p, double q, double r) {
+  double scale = 1.0;
+  double square = p * p + q * q + r * r;
+  if (!(square > 1e-280 && square < 1e280)) {
+    scale = std::abs(p) + std::abs(q) + std::abs(r);
+    if (!(scale > 0.0)) {
+      return {};
+    }
+    p /= scale;
+    q /= scale;
+    r /= scale;
+    square = p * p + q * q + r * r;
+  }
+  const double s = std::copysign(std::sqrt(square), p);
+  p += s;
+  const double inverse_s = 1.0 / s;
+  const double inverse_p = 1.0 / p;
+  return {p * inverse_s, q * inverse_s, r * inverse_s, q * inverse_p, r * inverse_p, -s * scale};
+}
+
 }  // namespace flyball::detail::FLYBALL_VARIANT

@@ -129,37 +129,22 @@ inline bool eigenvalues(Size<N> size, double* H, std::complex<double>* lambda) {
     const int first = low / 4 * 4;
     for (int k = m; k < end; ++k) {
       const bool last = k == end - 1;
-      double scale = 1.0;
       if (k != m) {
         p = h(k, k - 1);
         q = h(k + 1, k - 1);
         r = last ? 0.0 : h(k + 2, k - 1);
       }
-      double square = p * p + q * q + r * r;
-      if (!(square > 1e-280 && square < 1e280)) {
-        scale = std::abs(p) + std::abs(q) + std::abs(r);
-        if (!(scale > 0.0)) {
-          continue;
-        }
-        p /= scale;
-        q /= scale;
-        r /= scale;
-        square = p * p + q * q + r * r;
-      }
-      const double s = std::copysign(std::sqrt(square), p);
+      const Reflection turn = reflection_of(p, q, r);
       if (k != m) {
-        h(k, k - 1) = -s * scale;
+        h(k, k - 1) = turn.top;
       } else if (low != m) {
         h(k, k - 1) = -h(k, k - 1);
       }
-      p += s;
-      const double inverse_s = 1.0 / s;
-      const double inverse_p = 1.0 / p;
-      x = p * inverse_s;
-      y = q * inverse_s;
-      const double z = r * inverse_s;
-      q *= inverse_p;
-      r *= inverse_p;
+      x = turn.x;
+      y = turn.y;
+      q = turn.q;
+      r = turn.r;
+      const double z = turn.z;
       if (last) {
         for (int j = k; j <= end; ++j) {
           const double t = h(k, j) + q * h(k + 1, j);
