@@ -142,7 +142,7 @@ Expected<DesignResult> design(const DesignJob& requested) {
   DesignJob& job = result.job;
   fill_defaults(job, result.diagnostics);
 
-  FLYBALL_TRY(auto motion, motion_limits(job));
+  FLYBALL_TRY(auto motion, fastest_motion(job));
   result.motion = motion;
 
   FLYBALL_TRY(auto model, linear_model(job.plant, job.controller.period));

@@ -43,7 +43,7 @@ struct LoopDesign {
 [[nodiscard]] bool is_comfortable(const LoopDesign& loop);
 
 /// The fastest trapezoid over a distance that needs no more volts than there are.
-[[nodiscard]] Expected<MotionLimits> motion_limits(const DesignJob& job);
+[[nodiscard]] Expected<FastestMotion> fastest_motion(const DesignJob& job);
 
 /// The gains in the units of other tools.
 [[nodiscard]] std::vector<PasteGains> paste_gains(const PlantDescription& plant,

@@ -95,7 +95,7 @@ struct RobustnessPoint {
 };
 
 /// The fastest trapezoid that the motor can follow with its voltage.
-struct MotionLimits {
+struct FastestMotion {
   double max_velocity = 0.0;      ///< unit/s
   double max_acceleration = 0.0;  ///< unit/s²
   double goal = 0.0;              ///< unit (unit/s for a flywheel), of the simulated motion.
@@ -136,7 +136,7 @@ struct DesignResult {
   bool robust = false;  ///< Whether every point of the grid is stable.
   double worst_overshoot = 0.0;
 
-  MotionLimits motion;
+  FastestMotion motion;
   TimeSeries response{};  ///< The simulated closed loop: columns as `MechanismResponse`.
   double tracking_error_rms =
       0.0;  ///< unit, of the true position (velocity) against the reference.

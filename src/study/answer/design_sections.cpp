@@ -240,7 +240,7 @@ Section robustness_section(const DesignResult& result) {
 }
 
 Section motion_section(const DesignResult& result) {
-  const MotionLimits& motion = result.motion;
+  const FastestMotion& motion = result.motion;
   const PlantDescription& plant = result.job.plant;
   const bool flywheel = plant.kind == MechanismKind::flywheel;
   Section section{"motion", flywheel ? "Fastest ramp" : "Fastest trapezoid", {}};

@@ -40,13 +40,13 @@ double travel_time(double distance, double v, double a) {
 
 }  // namespace
 
-Expected<MotionLimits> motion_limits(const DesignJob& job) {
+Expected<FastestMotion> fastest_motion(const DesignJob& job) {
   const PlantDescription& plant = job.plant;
   const mechanisms::FeedforwardGains& gains = plant.gains;
   const double maximum = job.controller.max_voltage;
 
   VoltageBudget budget;
-  MotionLimits motion;
+  FastestMotion motion;
   motion.voltage_reserve = 0.1 * maximum;
   budget.limit = maximum - motion.voltage_reserve;
   budget.holding = gains.kS + std::abs(gains.kG);
