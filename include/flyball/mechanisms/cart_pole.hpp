@@ -26,7 +26,9 @@ struct CartPole {
   double pole_length = 0.5;           ///< l, m, from the hinge to the mass.
   double gravity = standard_gravity;  ///< g, m/s².
 
+  /// The size of x.
   static constexpr int states() { return 4; }
+  /// The size of u.
   static constexpr int inputs() { return 1; }
   /// [m_c, m_p, l, g].
   [[nodiscard]] Eigen::Vector4d parameters() const {

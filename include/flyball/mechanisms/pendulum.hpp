@@ -20,7 +20,9 @@ struct Pendulum {
   double damping = 0.0;               ///< c, N m s/rad, at the pivot.
   double gravity = standard_gravity;  ///< g, m/s².
 
+  /// The size of x.
   static constexpr int states() { return 2; }
+  /// The size of u.
   static constexpr int inputs() { return 1; }
   /// [m, l, c, g].
   [[nodiscard]] Eigen::Vector4d parameters() const { return {mass, length, damping, gravity}; }

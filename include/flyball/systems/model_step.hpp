@@ -17,6 +17,7 @@ template <class M, class State, class Input>
 /// RK4 steps of a model whose size is known at run time, in memory that is allocated once.
 class ModelStepper {
  public:
+  /// Steps of this model.
   explicit ModelStepper(AnyModel model) : model_(std::move(model)), work_(3 * model_.states()) {}
 
   /// @param x  n x 1, the state, replaced by that `dt` seconds later. @param u  m x 1, held.
@@ -34,6 +35,7 @@ class ModelStepper {
 template <class M, class Input>
 class DrivenModel {
  public:
+  /// @param input  m x 1, or a function of the time.
   DrivenModel(M model, Input input) : model_(std::move(model)), input_(std::move(input)) {}
 
   template <class State>

@@ -17,17 +17,17 @@ struct ContinuousSystem {
   Eigen::Matrix<double, Outputs, States> C;  ///< Outputs x states, output matrix.
   Eigen::Matrix<double, Outputs, Inputs> D;  ///< Outputs x inputs, feedthrough matrix.
 
-  /// The sizes, constants where the type fixes them.
-  ///@{
   // clang-format off
+  /// The size of x, a constant where the type fixes it.
   static constexpr int states() requires(States != Eigen::Dynamic) { return States; }
   Eigen::Index states() const requires(States == Eigen::Dynamic) { return A.rows(); }
+  /// The size of u.
   static constexpr int inputs() requires(Inputs != Eigen::Dynamic) { return Inputs; }
   Eigen::Index inputs() const requires(Inputs == Eigen::Dynamic) { return B.cols(); }
+  /// The size of y.
   static constexpr int outputs() requires(Outputs != Eigen::Dynamic) { return Outputs; }
   Eigen::Index outputs() const requires(Outputs == Eigen::Dynamic) { return C.rows(); }
   // clang-format on
-  ///@}
   /// A x + B u, over a generic scalar. @param x  n x 1. @param u  m x 1.
   template <class X, class U>
   [[nodiscard]] auto derivative(const X& x, const U& u) const {
