@@ -58,7 +58,9 @@ TEST(JsonWriter, MatricesAreRowsVectorsListsAndComplexNumbersPairs) {
   EXPECT_EQ(text_of(Eigen::MatrixXd(0, 2)), "[]");
   EXPECT_EQ(text_of(Eigen::MatrixXd(2, 0)), "[[],[]]");
   EXPECT_EQ(text_of(Eigen::VectorXd(Eigen::Vector2d(1, 2))), "[1.0,2.0]");
-  EXPECT_EQ(text_of(Eigen::VectorXcd(Eigen::Vector2cd({1, 2}, {3, -4}))), "[[1.0,2.0],[3.0,-4.0]]");
+  Eigen::VectorXcd z(2);
+  z << std::complex<double>(1, 2), std::complex<double>(3, -4);
+  EXPECT_EQ(text_of(z), "[[1.0,2.0],[3.0,-4.0]]");
 }
 
 TEST(JsonWriter, ObjectsAndListsNest) {
