@@ -181,13 +181,15 @@ TEST(Design, PastesTheSameGainsInOtherUnits) {
 
 // What is exported is what was designed: the delayed gain, the inversion, the gains in every unit.
 TEST(Design, ExportsItsLoopAndItsConstants) {
-  const auto result = design(arm_job());
+  auto job = arm_job();
+  job.plant.kA_reason = "no reason";
+  const auto result = design(job);
   ASSERT_TRUE(result) << to_string(result.error());
   const MechanismControllerDesign loop = controller_of(*result);
   EXPECT_EQ(loop.K, result->K_delayed);
   EXPECT_EQ(loop.measurement_delay.si(), 0.020);
   EXPECT_EQ(MechanismController<>::create(loop).value().B_pinv(), result->inversion);
-  const exports::MechanismConstants constants = constants_of(*result, "no reason");
+  const exports::MechanismConstants constants = constants_of(*result);
   ASSERT_EQ(constants.gains.size(), 3u);
   EXPECT_EQ(constants.gains[1].kP, result->paste[1].kP);
   EXPECT_EQ(constants.angle_offset, 0.2);
