@@ -63,28 +63,35 @@ class Checks {
   /// @param where  The function's name; it must outlive the checks.
   explicit Checks(std::string_view where) noexcept : where_(where) {}
 
+  /// As check_shape.
   Checks& shape(const MatrixRef& M, Eigen::Index rows, Eigen::Index columns, std::string_view name,
                 std::string_view meaning = {}) {
     return also([&] { return check_shape(M, rows, columns, where_, name, meaning); });
   }
+  /// As check_square.
   Checks& square(const MatrixRef& M, std::string_view name) {
     return also([&] { return check_square(M, where_, name); });
   }
+  /// As check_finite.
   Checks& finite(const MatrixRef& M, std::string_view name) {
     return also([&] { return check_finite(M, where_, name); });
   }
   Checks& finite(double value, std::string_view name) {
     return also([&] { return check_finite(value, where_, name); });
   }
+  /// As check_symmetric.
   Checks& symmetric(const MatrixRef& M, std::string_view name) {
     return also([&] { return check_symmetric(M, where_, name); });
   }
+  /// As check_positive.
   Checks& positive(double value, std::string_view name, std::string_view unit = {}) {
     return also([&] { return check_positive(value, where_, name, unit); });
   }
+  /// As check_not_negative.
   Checks& not_negative(double value, std::string_view name, std::string_view unit = {}) {
     return also([&] { return check_not_negative(value, where_, name, unit); });
   }
+  /// As check_within.
   Checks& within(double value, double low, double high, std::string_view name,
                  std::string_view unit = {}) {
     return also([&] { return check_within(value, low, high, where_, name, unit); });

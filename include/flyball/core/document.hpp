@@ -34,6 +34,7 @@ struct Value {
 
 /// Names and their values.
 struct Facts {
+  /// One name and its value.
   struct Fact {
     std::string name;
     Value value;
@@ -46,6 +47,7 @@ struct Facts {
   }
 };
 
+/// Rows under a header.
 struct Table {
   static constexpr std::size_t npos = static_cast<std::size_t>(-1);
 
@@ -55,9 +57,11 @@ struct Table {
   std::vector<std::size_t> words{0};  ///< Columns of words; the others are numbers, right-aligned.
   std::size_t wide_column = npos;     ///< Column of words that takes the rest of the line.
 
+  /// Whether a column is of words, left-aligned.
   [[nodiscard]] bool is_words(std::size_t column) const;
 };
 
+/// Sentences.
 struct Paragraph {
   std::string text{};
   Tone tone = Tone::plain;
@@ -68,14 +72,17 @@ struct Findings {
   std::vector<Diagnostic> diagnostics{};
 };
 
+/// Lines to copy.
 struct Code {
   std::string title{};
   std::string text{};
   std::string file{};  ///< Its name in the report's folder.
 };
 
+/// What a section is made of.
 using Block = std::variant<Facts, Table, Paragraph, Findings, Code>;
 
+/// A part of an answer under its title.
 struct Section {
   std::string id{};  ///< Of the page's anchor; pictures are placed by it.
   std::string title{};
@@ -92,6 +99,7 @@ struct Verdict {
   void add(Tone tone_of_reason, std::string reason);
 };
 
+/// What an answer says, whole.
 struct Document {
   std::string title{};
   Verdict verdict{};

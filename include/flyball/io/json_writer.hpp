@@ -124,6 +124,7 @@ class JsonWriter {
   void open(char bracket);
   void close(char bracket) { text_ += bracket; }
 
+  /// What has been written.
   [[nodiscard]] const std::string& text() const& { return text_; }
   [[nodiscard]] std::string text() && { return std::move(text_); }
 
