@@ -107,10 +107,13 @@ int fail(const Errors& errors, const CommonOptions& options, const std::string& 
     print(refusal_json(schema, errors));
   }
   for (const QuotedError& error : errors.all()) {
-    tell(error);
+    std::string text = to_string(error);
     if (!error.excerpt.empty()) {
-      std::fprintf(stderr, "%s\n", error.excerpt.c_str());
+      // It shows the place, which a formula's error says in bytes, too.
+      text = text.substr(0, text.rfind(" (offset = ")) + "\n" + error.excerpt;
     }
+    std::fflush(stdout);
+    std::fprintf(stderr, "flyball: %s\n", text.c_str());
   }
   return exit_status(errors);
 }

@@ -1,7 +1,7 @@
 #include <memory>
 
 #include <flyball/study/answer.hpp>
-#include <flyball/study/project.hpp>
+#include <flyball/study/simulate.hpp>
 
 #include "answer.hpp"
 #include "commands.hpp"
@@ -20,11 +20,19 @@ struct Options {
 };
 
 int run(const Options& options) {
-  const auto job = study::design_job(options.project, options.given);
-  if (!job) {
-    return fail(job.error(), options.common, schema);
+  const auto project = study::read_project(options.project, options.given);
+  if (!project) {
+    return fail(project.error(), options.common, schema);
   }
-  const auto result = study::design(*job);
+  if (project->model_job) {
+    const auto result = study::design_model(*project->model_job);
+    return result ? tell(study::answer_of(*result), options.common, true)
+                  : fail(result.error(), options.common, "flyball.design_model/1");
+  }
+  if (project->plant_error) {
+    return fail(*project->plant_error, options.common, schema);
+  }
+  const auto result = study::design(project->job);
   if (!result) {
     return fail(result.error(), options.common, schema);
   }

@@ -52,6 +52,7 @@ int run(int argc, char** argv) {
       "  flyball tune lift.wpilog --mechanism elevator --period 20ms --out report/\n"
       "  flyball identify shooter.json --json       only the gains, for other programs\n"
       "  flyball design elevator.toml               no robot yet: mass, gearing and motors\n"
+      "  flyball simulate pendulum.toml             a mechanism, or a model by formula\n"
       "  flyball motors kraken                      what the motor table knows\n"
       "  flyball analyze elevator.toml              poles, what can be moved and seen, gains\n"
       "  flyball solve dare < problems.jsonl        any kernel, from any language\n"
@@ -68,6 +69,7 @@ int run(int argc, char** argv) {
       .typed = flyball::app::typed_command({argv, static_cast<std::size_t>(argc)})};
   flyball::app::add_identify_command(program, invocation);
   flyball::app::add_design_command(program, invocation);
+  flyball::app::add_simulate_command(program, invocation);
   flyball::app::add_tune_command(program, invocation);
   flyball::app::add_motors_command(program, invocation);
   flyball::app::add_book_command(program, invocation);

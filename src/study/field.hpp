@@ -13,6 +13,7 @@
 #include <flyball/core/expected.hpp>
 #include <flyball/core/quantity.hpp>
 #include <flyball/mechanisms/mechanism_kind.hpp>
+#include <flyball/study/model_job.hpp>
 
 /// The fields of jobs as data. A row says everything that is known of a field; the reader and the
 /// writer of project files, the command's options, the schema and the docs page come from the rows.
@@ -29,6 +30,8 @@ enum class FieldType {
   text,
   whole,  ///< A whole number.
   flag,   ///< true or false.
+  names,  ///< A list of texts.
+  map,    ///< A table whose keys a person chooses, of texts.
 };
 
 /// What a number must be, each of a list.
@@ -38,8 +41,8 @@ enum class Range { any, not_negative, positive };
 constexpr long long largest_whole = std::numeric_limits<long long>::max();
 
 /// A value, once read; nothing if it is not given.
-using FieldValue =
-    std::variant<std::monostate, bool, long long, double, std::string, std::vector<double>>;
+using FieldValue = std::variant<std::monostate, bool, long long, double, std::string,
+                                std::vector<double>, std::vector<std::string>, NamedTexts>;
 
 /// The dimensions of what a mechanism moves. They decide which units a goal or a tolerance has.
 struct SignalDimensions {
@@ -68,7 +71,8 @@ struct FieldAccess {
   void (*set)(void* section, const FieldValue& value);
 };
 
-/// A key of a section: a row, made by `quantity`, `list`, `text`, `whole` or `flag`.
+/// A key of a section: a row, made by `quantity`, `list`, `text`, `whole`, `flag`, `names` or
+/// `map`.
 struct Field {
   std::string_view key;
   FieldType type;
@@ -146,6 +150,17 @@ constexpr Field whole(std::string_view key, FieldAccess access, long long least,
 constexpr Field flag(std::string_view key, FieldAccess access, std::string_view example,
                      std::string_view help) {
   return {.key = key, .type = FieldType::flag, .access = access, .example = example, .help = help};
+}
+
+constexpr Field names(std::string_view key, FieldAccess access, std::string_view example,
+                      std::string_view help) {
+  return {.key = key, .type = FieldType::names, .access = access, .example = example, .help = help};
+}
+
+/// What the texts mean is found out when all of them are there.
+constexpr Field map(std::string_view key, FieldAccess access, std::string_view example,
+                    std::string_view help) {
+  return {.key = key, .type = FieldType::map, .access = access, .example = example, .help = help};
 }
 
 /// A table of a file: [name].

@@ -69,6 +69,9 @@ std::string metavar(const Field& field) {
   if (field.type == FieldType::whole || field.type == FieldType::list) {
     return field.type == FieldType::whole ? "N" : "LIST";
   }
+  if (field.type == FieldType::map) {
+    return "NAME=VALUE,…";
+  }
   if (field.type != FieldType::quantity || dimensions.empty()) {
     return "VALUE";
   }
@@ -91,8 +94,13 @@ Names sections_of(JobKind job) {
   static constexpr std::array<std::string_view, 9> all{"log",       "mechanism", "controller",
                                                        "estimator", "sensor",    "battery",
                                                        "profile",   "mechanism", "gains"};
-  static constexpr std::array<std::string_view, 7> design{
-      "mechanism", "gains", "controller", "estimator", "sensor", "battery", "profile"};
+  static constexpr std::array<std::string_view, 8> design{
+      "mechanism", "gains", "controller", "estimator", "sensor", "battery", "profile", "point"};
+  static constexpr std::array<std::string_view, 5> analyze{"mechanism", "gains", "controller",
+                                                           "model", "point"};
+  static constexpr std::array<std::string_view, 10> simulate{
+      "simulation", "point",  "model",     "mechanism", "gains",
+      "controller", "sensor", "estimator", "battery",   "profile"};
   switch (job) {
     case JobKind::identify:
       return Names(all).first(1);
@@ -101,7 +109,9 @@ Names sections_of(JobKind job) {
     case JobKind::tune:
       return Names(all).first(7);
     case JobKind::analyze:
-      return Names(design).first(3);
+      return analyze;
+    case JobKind::simulate:
+      return simulate;
   }
   return {};
 }
@@ -138,6 +148,14 @@ Json schema_of(const Field& field, const std::string& description) {
       break;
     case FieldType::flag:
       schema["type"] = "boolean";
+      break;
+    case FieldType::names:
+      schema["type"] = "array";
+      schema["items"] = {{"type", "string"}, {"minLength", 1}};
+      break;
+    case FieldType::map:
+      schema["type"] = "object";
+      schema["additionalProperties"] = {{"type", {"string", "number"}}};
       break;
   }
   for (std::size_t start = 0; start < field.choices.size();) {
@@ -221,7 +239,7 @@ std::string project_schema() {
                        {"title", "A Flyball project file"},
                        {"type", "object"},
                        {"additionalProperties", false},
-                       {"required", {"mechanism"}},
+                       {"anyOf", {{{"required", {"mechanism"}}}, {{"required", {"model"}}}}},
                        {"properties", std::move(properties)}};
   return schema.dump(2) + "\n";
 }

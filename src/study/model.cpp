@@ -4,6 +4,7 @@
 
 #include <flyball/io/file.hpp>
 #include <flyball/study/analyze.hpp>
+#include <flyball/systems/linearize.hpp>
 
 #include "core/try.hpp"
 #include "solve/json_object.hpp"
@@ -160,7 +161,31 @@ ExpectedAll<ModelFile> parse_model(std::string_view text, const std::string& nam
   return parse_matrices(text, name);
 }
 
+/// A model by formula about its point.
+Expected<ModelFile> linearized(const ModelJob& job) {
+  FLYBALL_TRY(auto point, operating_point(job));
+  ModelFile model;
+  FLYBALL_TRY(model.system, linearize(job.model, point.x, point.u));
+  const ModelDescription& names = job.model.names();
+  model.path = job.path;
+  model.name = names.name;
+  model.period = Time(job.period);
+  model.states = names.states;
+  model.inputs = names.inputs;
+  model.outputs = names.outputs;
+  if (!point.is_equilibrium) {
+    model.notes.push_back(
+        {"no_equilibrium", Severity::warning,
+         "the point is " + describe(point, names) + "; the linear model leaves that motion out"});
+  }
+  model.point = std::move(point);
+  return model;
+}
+
 ExpectedAll<ModelFile> model_of(const Project& project) {
+  if (project.model_job) {
+    return linearized(*project.model_job);
+  }
   if (project.plant_error) {
     return tl::unexpected(*project.plant_error);
   }

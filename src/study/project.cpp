@@ -10,6 +10,7 @@
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "study/mechanism_parts.hpp"
+#include "study/model_project.hpp"
 #include "study/toml_document.hpp"
 
 namespace flyball::study {
@@ -117,9 +118,19 @@ ExpectedAll<Project> read(std::string_view text, const std::string& name,
   document.read(project_document(), &project);
   auto& type = project.parts.type;
   const auto& logged = project.log.mechanism;
-  if (alone && document.is_toml() && !document.writes(part_section)) {
+  const bool formulas = document.has("", "model");
+  if (alone && document.is_toml() && !formulas && !document.writes(part_section)) {
     document.miss("", part_section,
-                  "begin with [mechanism] and type = \"elevator\", \"arm\" or \"flywheel\"");
+                  "begin with [mechanism] and type = \"elevator\", \"arm\" or \"flywheel\", or "
+                  "with [model] and formulas");
+  }
+  if (formulas) {
+    project.model_job = model_job(document, project);
+    project.plant_error = Error(ProjectError::wrong_value)
+                              .in(name)
+                              .about("[model]")
+                              .got("a model by formula")
+                              .expected("a [mechanism] for this command");
   }
   if (type && logged && *type != *logged) {
     document.refuse("log", "mechanism",

@@ -135,7 +135,18 @@ constexpr std::array controller_fields{
              "Limit of the voltage"),
     quantity("delay", at<&ControllerOptions::delay>(), time, not_negative, "\"10 ms\"",
              "Delay from sensing to acting")
-        .without("what the log shows, else none")};
+        .without("what the log shows, else none"),
+    map("tolerance", at<&ControllerOptions::named, &NamedControl::tolerance>(),
+        "{ theta = \"5 deg\", omega = \"1 rad/s\", u = \"2 N m\" }",
+        "Of a model by formula: largest acceptable error of each state and size of each input "
+        "(Bryson's rule)")
+        .without("one of each"),
+    map("limit", at<&ControllerOptions::named, &NamedControl::limit>(), "{ u = \"3 N m\" }",
+        "Of a model by formula: largest size of inputs")
+        .without("none"),
+    map("reference", at<&ControllerOptions::named, &NamedControl::reference>(),
+        "{ theta = \"170 deg\" }", "Of a model by formula: the state that the loop goes to")
+        .without("the point")};
 
 constexpr std::array estimator_fields{
     quantity("measurement_std", at<&EstimatorOptions::measurement_std>(), Of::output, positive,
@@ -170,12 +181,88 @@ constexpr std::array profile_fields{
         .without("the fastest that the motor can follow"),
     whole("seed", at<&DesignJob::seed>(), 0, largest_whole, "1", "Seed of the simulation's noise")};
 
+constexpr std::array model_fields{
+    text("name", at<&FormulaSection::name>(), "\"pendulum\"", "What it is called")
+        .without("model")
+        .no_option(),
+    map("states", at<&FormulaSection::states>(), "{ theta = \"rad\", omega = \"rad/s\" }",
+        "Each state's unit; \"1\" for a plain number")
+        .without("it must be there")
+        .no_option(),
+    map("inputs", at<&FormulaSection::inputs>(), "{ u = \"N m\" }", "Each input's unit")
+        .without("none")
+        .no_option(),
+    map("parameters", at<&FormulaSection::parameters>(),
+        "{ g = \"9.81 m/s^2\", l = \"0.5 m\", m = \"2 kg\" }", "Each constant's value and unit")
+        .without("none")
+        .takes("NAME=VALUE,…"),
+    names("angles", at<&FormulaSection::angles>(), "[\"theta\"]",
+          "States whose values repeat after a turn")
+        .without("those in an angle's unit")
+        .no_option(),
+    map("definitions", at<&FormulaSection::definitions>(), "{ J = \"m*l^2\" }",
+        "Named parts of formulas, each usable by those after it")
+        .without("none")
+        .no_option(),
+    map("derivative", at<&FormulaSection::derivative>(),
+        "{ theta = \"omega\", omega = \"-g/l*sin(theta) + u/J\" }",
+        "Each state's change per second, a formula ([formulas](formulas.md))")
+        .without("it must be there")
+        .no_option(),
+    map("outputs", at<&FormulaSection::outputs>(), "{ angle = \"theta\" }",
+        "What is measured, formulas")
+        .without("the states")
+        .no_option()};
+
+constexpr std::array point_fields{
+    map("at", at<&PointSection::at>(), "{ theta = \"180 deg\", u = \"0 N m\" }",
+        "Values of states and inputs")
+        .called("point")
+        .without("zero"),
+    flag("find_equilibrium", at<&PointSection::find_equilibrium>(), "true",
+         "Whether the equilibrium near it, with the same inputs, is taken instead")
+        .without("false")};
+
+constexpr std::array simulation_fields{
+    quantity("duration", at<&SimulationSection::duration>(), time, positive, "\"5 s\"",
+             "How long is simulated")
+        .without("10 s; of a mechanism its motion"),
+    quantity("step", at<&SimulationSection::step>(), time, positive, "\"10 ms\"",
+             "Time between the rows of an open loop's record")
+        .without("a thousandth of the duration"),
+    quantity("accuracy", at<&SimulationSection::accuracy>(), dimensionless, positive, "1e-8",
+             "Relative accuracy of a step of an open loop")
+        .without("1e-8"),
+    flag("closed_loop", at<&SimulationSection::closed_loop>(), "true",
+         "Whether the controller acts: LQR about the point")
+        .without("false; of a mechanism true"),
+    map("initial", at<&SimulationSection::initial>(), "{ theta = \"10 deg\" }",
+        "The states at the start")
+        .without("the point"),
+    map("input", at<&SimulationSection::input>(), "{ u = \"if(t < 1, 0.5, 0)\" }",
+        "The inputs of an open loop: a value with its unit, or a formula of the time t in seconds "
+        "and the parameters, in SI")
+        .without("the point"),
+    map("noise", at<&SimulationSection::noise>(), "{ theta = \"0.1 deg\" }",
+        "Standard deviation of each reading of an output, in a closed loop")
+        .without("none"),
+    map("resolution", at<&SimulationSection::resolution>(), "{ theta = \"0.1 deg\" }",
+        "Smallest step of an output's readings, in a closed loop")
+        .called("reading-step")
+        .without("none")};
+
 constexpr std::array sections{
     Section{"mechanism", mechanism_fields, &within<&Project::parts>,
             "What the mechanism is, and the parts it is made of.", "every mechanism"},
     Section{"mechanism.motor", motor_fields,
             &within<&Project::parts, &MechanismParts::custom_motor>,
             "In place of a motor's name, its numbers.", "a custom motor"},
+    Section{"model", model_fields, &within<&Project::model>,
+            "A model by formula, in place of a mechanism."},
+    Section{"point", point_fields, &within<&Project::point>,
+            "Where a model by formula is linearised, and held by its controller."},
+    Section{"simulation", simulation_fields, &within<&Project::simulation>,
+            "What `flyball simulate` does."},
     Section{"gains", gains_fields, &within<&Project::gains>,
             "Feedforward gains that are known, in place of those that follow from the parts. With "
             "kV no part is needed."},

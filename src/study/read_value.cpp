@@ -149,12 +149,41 @@ Expected<FieldValue> read_value(const Field& field, const toml::node& node,
       const auto value = node.value_exact<bool>();
       return value ? Expected<FieldValue>(*value) : wrong_type(node, name, "true or false");
     }
+    case FieldType::names: {
+      std::vector<std::string> texts;
+      const toml::array* array = node.as_array();
+      for (const toml::node& element : array != nullptr ? *array : toml::array{}) {
+        texts.push_back(element.value_exact<std::string>().value_or(""));
+      }
+      const bool all = std::find(texts.begin(), texts.end(), "") == texts.end();
+      return array != nullptr && all ? Expected<FieldValue>(std::move(texts))
+                                     : wrong_type(node, name, "a list of texts in quotes");
+    }
+    case FieldType::map:
+      return wrong_type(node, name, fmt::format("a table such as {}", field.example));
   }
   return FieldValue{};
 }
 
 void insert_text(toml::table& table, const Field& field, std::string_view text) {
-  if (field.type == FieldType::list) {
+  if (field.type == FieldType::map) {
+    // NAME=VALUE,… stands beside the file's own; a comma in parentheses is a formula's.
+    toml::table* values = table[field.key].as_table();
+    if (values == nullptr) {
+      values = table.insert_or_assign(field.key, toml::table{}).first->second.as_table();
+    }
+    for (std::size_t start = 0; start < text.size();) {
+      std::size_t end = start;
+      for (int depth = 0; end < text.size() && (depth > 0 || text[end] != ','); ++end) {
+        depth += text[end] == '(' ? 1 : text[end] == ')' ? -1 : 0;
+      }
+      const std::string_view part = text.substr(start, end - start);
+      const std::size_t equals = std::min(part.find('='), part.size());
+      values->insert_or_assign(part.substr(0, equals),
+                               std::string(part.substr(std::min(equals + 1, part.size()))));
+      start = end + 1;
+    }
+  } else if (field.type == FieldType::list || field.type == FieldType::names) {
     toml::array values;
     for (std::size_t start = 0; start <= text.size();) {
       const std::size_t end = std::min(text.find(',', start), text.size());

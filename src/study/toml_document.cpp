@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <flyball/core/text.hpp>
+#include <flyball/math/expression/formula.hpp>
 
 #include "study/read_value.hpp"
 #include "study/toml_document.hpp"
@@ -53,9 +54,12 @@ TomlDocument::TomlDocument(std::string_view text, std::string file)
     root_ = toml::parse(text, file_);
   } catch (const toml::parse_error& problem) {
     is_toml_ = false;
-    found_.push_back({problem.source(), Error(ProjectError::syntax)
-                                            .in(place(problem.source()))
-                                            .hint(std::string(problem.description()))});
+    found_.push_back({problem.source(),
+                      Error(ProjectError::syntax)
+                          .in(place(problem.source()))
+                          .hint(std::string(problem.description())),
+                      true,
+                      {}});
   }
 }
 
@@ -141,6 +145,19 @@ void TomlDocument::read_section(const Section& section, const toml::table& keys,
     }
     const std::vector<Dimension> dimensions = dimensions_of(field, document.signals(into));
     const std::string called = name(section.name, field.key);
+    if (const toml::table* texts = value->as_table();
+        texts != nullptr && field.type == FieldType::map) {
+      field.access.set(object, named_texts(name_of(section.name, field.key), *texts));
+      continue;
+    }
+    if (dimensions.empty() && has("", "model")) {
+      refuse(section.name, field.key,
+             Error(ProjectError::wrong_value)
+                 .about(called)
+                 .got("for a mechanism")
+                 .hint("[model] has its names in tables: tolerance, limit, noise, resolution"));
+      continue;
+    }
     if (dimensions.empty()) {
       if (found_.empty()) {
         refuse(section.name, field.key,
@@ -159,6 +176,35 @@ void TomlDocument::read_section(const Section& section, const toml::table& keys,
   }
 }
 
+NamedTexts TomlDocument::named_texts(const std::string& section, const toml::table& keys) {
+  std::vector<std::pair<const toml::key*, const toml::node*>> sorted;
+  for (const auto& [key, value] : keys) {
+    sorted.emplace_back(&key, &value);
+  }
+  std::stable_sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
+    const auto& [first, second] = std::pair(a.first->source().begin, b.first->source().begin);
+    return std::tie(first.line, first.column) < std::tie(second.line, second.column);
+  });
+  NamedTexts texts;
+  for (const auto& [key, value] : sorted) {
+    std::string text;
+    if (value->is_string()) {
+      text = *value->value_exact<std::string>();
+    } else if (value->is_number()) {
+      text = fmt::format("{}", *value->value<double>());
+    } else {
+      refuse(section, key->str(),
+             Error(ProjectError::wrong_type)
+                 .about(name(section, key->str()))
+                 .got("no text")
+                 .expected("a text in quotes"));
+      continue;
+    }
+    texts.push_back({std::string(key->str()), std::move(text)});
+  }
+  return texts;
+}
+
 void TomlDocument::check_names(const toml::table& names, std::string_view section,
                                std::span<const std::string_view> known) {
   for (const auto& [key, value] : names) {
@@ -175,7 +221,9 @@ void TomlDocument::check_names(const toml::table& names, std::string_view sectio
              .got(section.empty() ? "not a section that is known"
                                   : fmt::format("not a key of [{}]", section))
              .hint(nearest.empty() ? fmt::format("known are {}", fmt::join(known, ", "))
-                                   : fmt::format("did you mean \"{}\"?", nearest))});
+                                   : fmt::format("did you mean \"{}\"?", nearest)),
+         true,
+         {}});
   }
 }
 
@@ -183,14 +231,59 @@ void TomlDocument::refuse(std::string_view section, std::string_view key, Error 
   const toml::table* keys = table(section);
   toml::source_region source = source_of(section);
   std::string where = place(source);
-  if (const auto option = options_.find(name_of(section, key)); option != options_.end()) {
+  auto option = options_.find(name_of(section, key));
+  if (option == options_.end()) {
+    option = options_.find(section);  // of a table whose keys a person chooses
+  }
+  if (option != options_.end()) {
     where = option->second == error.subject() ? "" : option->second;
     source = {};
   } else if (keys != nullptr && keys->contains(key)) {
     where = place(keys->find(key)->first.source());
     source = keys->get(key)->source();
   }
-  found_.push_back({source, std::move(error).in(std::move(where))});
+  found_.push_back({source, std::move(error).in(std::move(where)), true, {}});
+}
+
+void TomlDocument::refuse_part(std::string_view section, std::string_view key, Error error) {
+  const toml::node* value = node(section, key);
+  const auto evidence = [&](std::string_view of) {
+    for (const Evidence& one : error.evidence()) {
+      if (one.name == of && one.values.size() == 1) {
+        return static_cast<std::size_t>(one.values.front());
+      }
+    }
+    return std::string::npos;
+  };
+  const std::size_t offset = evidence("offset");
+  if (value == nullptr || !value->is_string() || offset == std::string::npos) {
+    refuse(section, key, std::move(error));
+    return;
+  }
+  const std::string text = *value->value_exact<std::string>();
+  toml::source_region source = value->source();
+  const std::string_view line = line_of(source.begin.line);
+  // Where the text stands in the file as it is, between quotes, its parts have places of their own.
+  const std::vector<std::string> all = characters(line);
+  const std::size_t begin = std::min<std::size_t>(source.begin.column, all.size());
+  const std::vector<std::string> written = characters(text);
+  const bool as_it_is =
+      source.begin.line != 0 && begin + written.size() < all.size() &&
+      std::equal(written.begin(), written.end(), all.begin() + static_cast<std::ptrdiff_t>(begin));
+  if (!as_it_is) {
+    const std::string lines = expression::caret_lines(text, error);
+    refuse(section, key, std::move(error));
+    found_.back().excerpt = lines;
+    return;
+  }
+  const auto count = [&](std::size_t from, std::size_t bytes) {
+    return static_cast<toml::source_index>(
+        characters(std::string_view(text).substr(std::min(from, text.size()), bytes)).size());
+  };
+  source.begin.column = source.begin.column + 1 + count(0, offset);
+  source.end = source.begin;
+  source.end.column += std::max<toml::source_index>(count(offset, evidence("length")), 1);
+  found_.push_back({source, std::move(error).in(place(source)), true, {}});
 }
 
 Error TomlDocument::missing(std::string_view section, std::string_view key,
@@ -203,7 +296,7 @@ Error TomlDocument::missing(std::string_view section, std::string_view key,
 }
 
 void TomlDocument::miss(std::string_view section, std::string_view key, std::string hint) {
-  found_.push_back({source_of(section), missing(section, key, std::move(hint)), false});
+  found_.push_back({source_of(section), missing(section, key, std::move(hint)), false, {}});
 }
 
 std::optional<Errors> TomlDocument::errors() const {
@@ -227,7 +320,9 @@ std::optional<Errors> TomlDocument::errors() const {
                      {}});
       break;
     }
-    all.push_back({found->error, found->quote ? excerpt(found->source) : ""});
+    all.push_back({found->error, !found->excerpt.empty() ? found->excerpt
+                                 : found->quote          ? excerpt(found->source)
+                                                         : ""});
   }
   return Errors(std::move(all));
 }
@@ -263,15 +358,19 @@ std::string TomlDocument::name(std::string_view section, std::string_view key) c
   return option == options_.end() ? full : option->second;
 }
 
+std::string_view TomlDocument::line_of(toml::source_index number) const {
+  std::string_view rest = text_;
+  for (toml::source_index line = 1; line < number; ++line) {
+    rest.remove_prefix(std::min(rest.find('\n'), rest.size() - 1) + 1);
+  }
+  return rest.substr(0, rest.find_first_of("\r\n"));
+}
+
 std::string TomlDocument::excerpt(const toml::source_region& source) const {
   if (source.begin.line == 0) {
     return "";
   }
-  std::string_view rest = text_;
-  for (toml::source_index line = 1; line < source.begin.line; ++line) {
-    rest.remove_prefix(std::min(rest.find('\n'), rest.size() - 1) + 1);
-  }
-  const std::vector<std::string> line = characters(rest.substr(0, rest.find_first_of("\r\n")));
+  const std::vector<std::string> line = characters(line_of(source.begin.line));
   // Of a long line, what stands about the place.
   constexpr std::size_t widest = 100;
   const std::size_t at = std::min<std::size_t>(source.begin.column - 1, line.size());

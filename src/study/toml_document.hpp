@@ -44,6 +44,8 @@ class TomlDocument {
 
   /// Keeps an error about a key, with its place in the file or its option.
   void refuse(std::string_view section, std::string_view key, Error error);
+  /// The same of a part of a text: evidence `offset` and `length`, in bytes, say which.
+  void refuse_part(std::string_view section, std::string_view key, Error error);
   /// An error about a key that should be there, with the section's place.
   [[nodiscard]] Error missing(std::string_view section, std::string_view key,
                               std::string hint) const;
@@ -58,13 +60,17 @@ class TomlDocument {
     toml::source_region source;
     Error error;
     bool quote = true;
+    std::string excerpt{};  // if not the file's line
   };
 
   [[nodiscard]] const toml::table* table(std::string_view section) const;
   [[nodiscard]] const toml::node* node(std::string_view section, std::string_view key) const;
   [[nodiscard]] toml::source_region source_of(std::string_view section) const;
   [[nodiscard]] std::string place(const toml::source_region& source) const;
+  [[nodiscard]] std::string_view line_of(toml::source_index number) const;
   [[nodiscard]] std::string excerpt(const toml::source_region& source) const;
+  /// The texts of a table, in the order of the file; what is no text is refused.
+  [[nodiscard]] NamedTexts named_texts(const std::string& section, const toml::table& keys);
   void check_names(const toml::table& names, std::string_view section,
                    std::span<const std::string_view> known);
   void read_section(const Section& section, const toml::table& keys, const Document& document,

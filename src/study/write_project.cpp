@@ -59,6 +59,23 @@ std::string written(const FieldValue& value, std::span<const Dimension> dimensio
     }
     return parts.empty() ? "" : fmt::format("[{}]", fmt::join(parts, ", "));
   }
+  if (const auto* texts = std::get_if<std::vector<std::string>>(&value)) {
+    std::vector<std::string> parts;
+    std::transform(texts->begin(), texts->end(), std::back_inserter(parts), &toml_text);
+    return fmt::format("[{}]", fmt::join(parts, ", "));
+  }
+  if (const auto* map = std::get_if<NamedTexts>(&value)) {
+    std::vector<std::string> parts;
+    for (const NamedText& one : *map) {
+      const bool bare = std::all_of(one.name.begin(), one.name.end(), [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+               c == '_';
+      });
+      parts.push_back(
+          fmt::format("{} = {}", bare ? one.name : toml_text(one.name), toml_text(one.text)));
+    }
+    return fmt::format("{{ {} }}", fmt::join(parts, ", "));
+  }
   return "";
 }
 

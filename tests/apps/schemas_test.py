@@ -45,9 +45,9 @@ def answer(arguments, status, folder):
     return json.loads(done.stdout)
 
 
-def check_answer(arguments, status, folder):
+def check_answer(arguments, status, folder, name=None):
     """The answer is as its schema says, and no member of it may be left out or be of another type."""
-    name = arguments[0]
+    name = name or arguments[0]
     document = answer(arguments, status, folder)
     what = " ".join(map(str, arguments))
     check(name, document, what)
@@ -81,6 +81,12 @@ def check_answers(folder):
     servo = folder / "servo.toml"
     servo.write_text('[mechanism]\ntype = "elevator"\n[gains]\nkV = 4.0\n')
     check_answer(["design", servo], 0, folder)
+    for model in ("pendulum", "cart_pole"):
+        check("project", tomllib.loads((examples / f"{model}.toml").read_text()), model)
+        check_answer(["simulate", examples / f"{model}.toml"], 0, folder)
+        check_answer(["analyze", examples / f"{model}.toml"], 0, folder)
+        check_answer(["design", examples / f"{model}.toml"], 0, folder, "design_model")
+    check_answer(["simulate", examples / "elevator.toml"], 0, folder)
     (folder / "discrete.json").write_text('{"A":[[0.5]],"B":[[1]],"domain":"discrete","T":0.02}')
     check_answer(["analyze", "discrete.json"], 0, folder)
 

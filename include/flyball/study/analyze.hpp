@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include <flyball/study/design_model.hpp>
 #include <flyball/study/project.hpp>
 #include <flyball/systems/discretize.hpp>
 #include <flyball/systems/norms.hpp>
@@ -27,6 +28,8 @@ struct ModelFile {
   std::vector<Coordinate> inputs{};         ///< Or u1, u2, …
   std::vector<Coordinate> outputs{};        ///< Or a state's name, or y1, y2, …
   std::optional<PlantDescription> plant{};  ///< The mechanism, if the model is one's.
+  std::optional<OperatingPoint> point{};    ///< Where a model by formula was linearised.
+  std::string name{};                       ///< Of a model by formula.
   std::vector<Diagnostic> notes{};          ///< What the linear model leaves out.
 };
 

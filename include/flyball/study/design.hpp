@@ -13,6 +13,7 @@
 #include <flyball/export/constants.hpp>
 #include <flyball/mechanisms/mechanism.hpp>
 #include <flyball/mechanisms/motor.hpp>
+#include <flyball/study/model_job.hpp>
 
 namespace flyball::study {
 
@@ -38,6 +39,7 @@ struct ControllerOptions {
   double input_tolerance = 12.0;          ///< V
   double max_voltage = 12.0;              ///< V, the input's limit.
   std::optional<double> delay{};          ///< s, from sensing to acting; identified or 0 if absent.
+  NamedControl named{};                   ///< Of a model by formula, see ModelJob.
 };
 
 /// What is measured, per sample, and how far the model is trusted.

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include <flyball/core/errors.hpp>
+#include <flyball/study/model_job.hpp>
 #include <flyball/study/tune.hpp>
 
 namespace flyball::study {
@@ -64,9 +65,13 @@ struct Project {
   MechanismParts parts{};
   KnownGains gains{};
   recording::LogSelection log{};
+  FormulaSection model{};  ///< In place of a mechanism.
+  PointSection point{};
+  SimulationSection simulation{};
   DesignJob job;  ///< Its plant comes from the parts and the gains.
   /// Why the file does not define a mechanism, if it does not: all that is missing.
   std::optional<Errors> plant_error{};
+  std::optional<ModelJob> model_job{};  ///< What a file with [model] describes.
 };
 
 /// Reads a project file. @param overrides  They are checked like the file's own values.
@@ -115,7 +120,7 @@ struct KeyComment {
                                             std::span<const Override> overrides = {});
 
 /// The jobs whose fields a person may set.
-enum class JobKind { identify, design, tune, analyze };
+enum class JobKind { identify, design, tune, analyze, simulate };
 
 /// A field of a job, for whoever asks a person for it: a command line, a form, a binding.
 struct FieldInfo {

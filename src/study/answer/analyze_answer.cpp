@@ -1,7 +1,7 @@
 #include <utility>
 
 #include "solve/structure_answer.hpp"
-#include "study/answer/parts.hpp"
+#include "study/answer/model_parts.hpp"
 
 namespace flyball::study {
 
@@ -53,6 +53,9 @@ std::string to_json(const ModelAnalysis& analysis) {
   }
   if (analysis.sampled) {
     write_sampled(*analysis.sampled, model, answer);
+  }
+  if (model.point) {
+    write_point(answer, *model.point);
   }
   answer.add("diagnostics", model.notes);
   answer.close('}');

@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 
 #include "core/wording.hpp"
-#include "study/answer/parts.hpp"
+#include "study/answer/model_parts.hpp"
 
 namespace flyball::study {
 
@@ -305,11 +305,17 @@ Verdict verdict_of(const ModelAnalysis& result) {
 Document document_of(const ModelAnalysis& result) {
   Document document;
   const ModelFile& model = result.model;
-  document.title = title_of(
-      model.plant ? std::string(to_string(model.plant->kind)) : "linear system", "", model.path);
+  document.title = title_of(model.plant           ? std::string(to_string(model.plant->kind))
+                            : !model.name.empty() ? model.name
+                                                  : "linear system",
+                            "", model.path);
   document.verdict = verdict_of(result);
   document.sections = {system_section(result), poles_section(result), structure_section(result),
                        response_section(result)};
+  if (model.point) {
+    const ModelDescription names{.states = model.states, .inputs = model.inputs};
+    document.sections.insert(document.sections.begin(), point_section(*model.point, names));
+  }
   if (result.sampled) {
     document.sections.push_back(sampling_section(result));
   }

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <flyball/core/quantity.hpp>
+#include <flyball/math/expression/tape.hpp>
+#include <flyball/systems/any_model.hpp>
+
+/// Models by formula in a project file: what its sections say, and what they mean.
+namespace flyball::study {
+
+/// A key of a table whose keys a person chooses, and its value as it is written: a unit, a
+/// quantity, a formula.
+struct NamedText {
+  std::string name{};
+  std::string text{};
+  friend bool operator==(const NamedText&, const NamedText&) = default;
+};
+using NamedTexts = std::vector<NamedText>;
+
+/// [model]: the names with their units, the parameters with their values, the formulas; in the
+/// order of the file.
+struct FormulaSection {
+  std::string name{};
+  NamedTexts states{}, inputs{}, parameters{}, definitions{}, derivative{}, outputs{};
+  std::vector<std::string> angles{};  ///< Empty: what is in rad.
+};
+
+/// [point]: where a model is linearised and held.
+struct PointSection {
+  NamedTexts at{};  ///< Of states and inputs; zero where nothing is said.
+  bool find_equilibrium = false;
+};
+
+/// What [controller] says for a model, by the names of its states and inputs.
+struct NamedControl {
+  NamedTexts tolerance{}, limit{}, reference{};
+};
+
+/// [simulation].
+struct SimulationSection {
+  std::optional<double> duration{};  ///< s
+  std::optional<double> step{};      ///< s, between the rows of the record.
+  std::optional<double> accuracy{};  ///< Relative, of an open loop.
+  bool closed_loop = false;
+  NamedTexts initial{}, input{}, noise{}, resolution{};
+};
+
+/// The inputs of an open loop, over time.
+class InputSignals {
+ public:
+  InputSignals() = default;
+  /// @param tape  One input, the time in seconds; an output for each input of the model.
+  InputSignals(expression::Tape tape, std::vector<double> parameters);
+
+  /// u at a time, s. Allocates.
+  [[nodiscard]] Eigen::VectorXd operator()(double t) const;
+
+ private:
+  expression::Tape tape_;
+  std::vector<double> prepared_;
+};
+
+/// A run of a model: what is simulated, in SI.
+struct ModelRun {
+  double duration = 10.0;  ///< s
+  bool duration_is_given = false;
+  std::optional<double> step{};
+  double accuracy = 1e-8;
+  bool closed_loop = false;
+  Eigen::VectorXd initial{};      ///< n; where it starts.
+  bool initial_is_given = false;  ///< If not, it is the point.
+  InputSignals input{};
+  std::vector<double> noise{};       ///< Standard deviation of a reading of each output.
+  std::vector<double> resolution{};  ///< Smallest step of a reading of each output.
+  unsigned long long seed = 1;
+};
+
+/// A model, and what a project file wants of it; every list has the model's sizes.
+struct ModelJob {
+  std::string path{};
+  AnyModel model;
+  bool outputs_are_states = false;  ///< No [model.outputs].
+  Eigen::VectorXd x{}, u{};         ///< The point as written.
+  bool find_equilibrium = false;
+  double period = 0.020;  ///< s, of the loop.
+  double delay = 0.0;     ///< s, from sensing to acting.
+  /// Bryson's; nothing where none is given, for all or none of the states, and of the inputs.
+  std::vector<double> state_tolerance{}, input_tolerance{};
+  Eigen::VectorXd limit{};      ///< m, largest size of each input's deviation from zero; infinite.
+  Eigen::VectorXd reference{};  ///< n, where the loop goes; NaN: the point.
+  ModelRun run{};
+};
+
+}  // namespace flyball::study

@@ -1,0 +1,253 @@
+#include <algorithm>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "study/answer/model_parts.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+using text::complex_number;
+using text::matrix;
+using text::number;
+
+constexpr double thin_gain_margin = 1.7;    ///< Below the classical rules of thumb 2 and 30°.
+constexpr double thin_phase_margin = 30.0;  ///< deg
+
+/// A row a gain, a column a state, with their units.
+Table gain_table(const ModelDesign& result) {
+  const ModelDescription& names = result.job.model.names();
+  Table table;
+  table.caption = "Feedback, u = u* + K (r − x)";
+  table.header = {"K"};
+  for (const Coordinate& state : names.states) {
+    table.header.push_back(label(state));
+  }
+  for (std::size_t i = 0; i < names.inputs.size(); ++i) {
+    std::vector<Value> row{label(names.inputs[i])};
+    for (std::size_t k = 0; k < names.states.size(); ++k) {
+      row.emplace_back(number(
+          result.regulator.K_delayed(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k))));
+    }
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+Table estimator_table(const ModelDesign& result) {
+  const ModelDescription& names = result.job.model.names();
+  Table table;
+  table.caption = "Observer, x̂ = x̂⁻ + L (y − C x̂⁻)";
+  table.header = {"L"};
+  for (const Coordinate& output : names.outputs) {
+    table.header.push_back(label(output));
+  }
+  for (std::size_t i = 0; i < names.states.size(); ++i) {
+    std::vector<Value> row{label(names.states[i])};
+    for (std::size_t k = 0; k < names.outputs.size(); ++k) {
+      row.emplace_back(number(result.regulator.kalman_gain(static_cast<Eigen::Index>(i),
+                                                           static_cast<Eigen::Index>(k))));
+    }
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+std::string poles_text(const Eigen::VectorXcd& poles) {
+  std::vector<std::string> words;
+  for (const std::complex<double>& pole : poles) {
+    if (pole.imag() >= 0.0) {
+      words.push_back(complex_number(pole));
+    }
+  }
+  return text::enumerate(words);
+}
+
+Section controller_section(const ModelDesign& result) {
+  const ModelRegulator& regulator = result.regulator;
+  Section section{"controller", "Controller", {}};
+  section.blocks.emplace_back(gain_table(result));
+  if (regulator.observer) {
+    section.blocks.emplace_back(estimator_table(result));
+  }
+  Facts facts;
+  facts.add("period", text::seconds(result.job.period));
+  if (result.job.delay > 0.0) {
+    facts.add("delay", text::seconds(result.job.delay));
+  }
+  facts.add("poles", poles_text(regulator.poles));
+  if (regulator.observer) {
+    facts.add("observer's poles", poles_text(regulator.estimator_poles));
+  }
+  if (const auto& margins = regulator.margins) {
+    facts.add("gain margin", fmt::format("{} × up, {} × down", number(margins->gain_margin_up, 3),
+                                         number(margins->gain_margin_down, 3)));
+    facts.add("phase margin", quantity(margins->phase_margin, "deg", 3));
+    facts.add("delay margin", text::seconds(margins->delay_margin));
+    facts.add("disk margin", number(margins->disk_margin, 3));
+  }
+  section.blocks.emplace_back(std::move(facts));
+  return section;
+}
+
+Section plant_section(const ModelDesign& result) {
+  constexpr Eigen::Index most_shown = 8;
+  const ModelRegulator& regulator = result.regulator;
+  Section section{"plant", "About the point", {}};
+  Facts facts;
+  const auto add = [&](const std::string& name, const Eigen::MatrixXd& M) {
+    facts.add(name, std::max(M.rows(), M.cols()) <= most_shown
+                        ? matrix(M)
+                        : fmt::format("{} x {}, see --json", M.rows(), M.cols()));
+  };
+  add("A", regulator.linear.A);
+  add("B", regulator.linear.B);
+  add("sampled A", regulator.plant.A);
+  add("sampled B", regulator.plant.B);
+  add("C", regulator.linear.C);
+  section.blocks.emplace_back(std::move(facts));
+  return section;
+}
+
+Verdict verdict_of(const ModelDesign& result) {
+  Verdict verdict;
+  if (const auto& margins = result.regulator.margins) {
+    if (!margins->stable) {
+      verdict.add(Tone::bad, "with its delay the loop is unstable");
+    } else if (margins->gain_margin_up < thin_gain_margin) {
+      verdict.add(Tone::caution,
+                  fmt::format("the gain margin is only {} ×", number(margins->gain_margin_up, 3)));
+    }
+    if (margins->stable && margins->phase_margin < thin_phase_margin) {
+      verdict.add(Tone::caution,
+                  fmt::format("the phase margin is only {}°", number(margins->phase_margin, 3)));
+    }
+  }
+  const auto& states = result.simulation.state_summary;
+  const auto& noise = result.job.run.noise;
+  const bool noisy = std::any_of(noise.begin(), noise.end(), [](double std) { return std > 0.0; });
+  if (!noisy && std::any_of(states.begin(), states.end(),
+                            [](const SignalSummary& state) { return !state.settling_time; })) {
+    verdict.add(Tone::caution, "the simulated model has not settled at its end");
+  }
+  verdict.line = verdict.tone == Tone::bad ? "Do not run this controller as it is."
+                 : verdict.tone == Tone::good
+                     ? "The loop holds the point."
+                     : "The loop is stable about the point; mind what follows before you run it.";
+  return verdict;
+}
+
+Figure pole_figure(const ModelDesign& result) {
+  const auto list = [](const Eigen::VectorXcd& values) {
+    return std::vector<std::complex<double>>(values.begin(), values.end());
+  };
+  std::vector<PolePlotGroup> groups{{"closed loop", list(result.regulator.poles), {}}};
+  if (result.regulator.observer) {
+    groups.push_back({"observer", list(result.regulator.estimator_poles), {}});
+  }
+  const std::string title = "Poles in the z plane";
+  return {"controller", "poles", title,
+          "Poles of the loop and of its observer with the unit circle; inside it is stable, nearer "
+          "to the origin is faster.",
+          pole_plot(title, groups, true)};
+}
+
+void write_margins(JsonWriter& json, const StabilityMargins& margins) {
+  json.add("margins", {{"gain_margin", margins.gain_margin_up},
+                       {"gain_reduction", margins.gain_margin_down},
+                       {"phase_margin", margins.phase_margin * std::numbers::pi / 180.0},
+                       {"delay_margin", margins.delay_margin},
+                       {"disk_margin", margins.disk_margin}});
+}
+
+}  // namespace
+
+Section point_section(const OperatingPoint& point, const ModelDescription& model) {
+  Section section{"point", "Operating point", {}};
+  Facts facts;
+  const auto add = [&](const std::vector<Coordinate>& names, const Eigen::VectorXd& values) {
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      facts.add(names[i].name, quantity(values(static_cast<Eigen::Index>(i)), names[i].unit));
+    }
+  };
+  add(model.states, point.x);
+  add(model.inputs, point.u);
+  facts.add("it is", describe(point, model), point.is_equilibrium ? Tone::good : Tone::caution);
+  section.blocks.emplace_back(std::move(facts));
+  return section;
+}
+
+void write_point(JsonWriter& json, const OperatingPoint& point) {
+  json.object("point", [&] {
+    json.add("x", point.x);
+    json.add("u", point.u);
+    json.add("derivative", point.derivative);
+    json.add("is_equilibrium", point.is_equilibrium);
+    if (point.nearest) {
+      json.object("nearest_equilibrium", [&] {
+        json.add("x", point.nearest->x);
+        json.add("u", point.nearest->u);
+      });
+    }
+  });
+}
+
+Answer answer_of(const ModelDesign& result) {
+  const ModelDescription& names = result.job.model.names();
+  const ModelRegulator& regulator = result.regulator;
+  Answer answer{.schema = "flyball.design_model/1"};
+  JsonWriter json;
+  json.object([&] {
+    json.add("schema", answer.schema);
+    json.add("model", names.name);
+    json.add("states", labels(names.states));
+    json.add("inputs", labels(names.inputs));
+    json.add("outputs", labels(names.outputs));
+    json.add("period", result.job.period);
+    json.add("delay", result.job.delay);
+    write_point(json, regulator.point);
+    json.add("K", regulator.K);
+    json.add("K_delay_compensated", regulator.K_delayed);
+    json.add("poles", regulator.poles);
+    if (regulator.observer) {
+      json.add("kalman_gain", regulator.kalman_gain);
+      json.add("estimator_poles", regulator.estimator_poles);
+    }
+    if (regulator.margins) {
+      write_margins(json, *regulator.margins);
+    }
+    json.object("plant", [&] {
+      json.add("A", regulator.plant.A);
+      json.add("B", regulator.plant.B);
+      json.add("C", regulator.plant.C);
+      json.add("D", regulator.plant.D);
+      json.add("A_continuous", regulator.linear.A);
+      json.add("B_continuous", regulator.linear.B);
+    });
+    json.object("weights", [&] {
+      json.add("Q", regulator.Q);
+      json.add("R", regulator.R);
+    });
+    json.object("simulation", [&] { write_simulation(json, result.simulation); });
+    json.add("diagnostics", regulator.diagnostics);
+  });
+  answer.json = std::move(json).text();
+  Document& document = answer.document;
+  document.title = text::capitalized(names.name) + " controller";
+  document.verdict = verdict_of(result);
+  document.sections = {point_section(regulator.point, names), plant_section(result),
+                       controller_section(result), simulation_section(result.simulation)};
+  if (!regulator.diagnostics.empty()) {
+    document.sections.push_back(diagnostics_section(regulator.diagnostics));
+  }
+  document.origins.add("model", result.job.path);
+  document.origins.add("seed", fmt::to_string(result.job.run.seed));
+  answer.figures = {pole_figure(result)};
+  append(answer.figures, figures_of(result.simulation));
+  answer.files = {data_file(result.simulation)};
+  return answer;
+}
+
+}  // namespace flyball::study

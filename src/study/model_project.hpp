@@ -1,0 +1,11 @@
+#pragma once
+
+#include "study/toml_document.hpp"
+
+namespace flyball::study {
+
+/// What a file with [model] describes. What is wrong with it is kept by the document; nothing then.
+/// @param project  As read, section by section.
+[[nodiscard]] std::optional<ModelJob> model_job(TomlDocument& document, const Project& project);
+
+}  // namespace flyball::study

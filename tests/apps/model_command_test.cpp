@@ -1,0 +1,85 @@
+// Models by formula on the command line: simulated, analysed, regulated.
+#include <nlohmann/json.hpp>
+
+#include "run.hpp"
+
+namespace flyball::test {
+namespace {
+
+using Json = nlohmann::json;
+
+TEST_F(Command, SimulatesAModelByFormula) {
+  const Answer words = run("simulate " + example("pendulum.toml") + " --out report");
+  ASSERT_EQ(words.status, 0) << words.err;
+  EXPECT_TRUE(holds(words.out, "theta")) << words.out;
+  EXPECT_TRUE(holds(contents(work() / "report/data/simulation.csv"), "omega"));
+  const Answer answer = run("simulate " + example("pendulum.toml") + " --json");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  const Json json = Json::parse(answer.out);
+  EXPECT_EQ(json.at("schema"), "flyball.simulate/1");
+  EXPECT_EQ(json.at("loop"), "closed");
+  EXPECT_NEAR(json.at("states")[0].at("final").get<double>(), 3.14159265, 1e-3);
+  EXPECT_LE(json.at("inputs")[0].at("max").get<double>(), 6.0);
+}
+
+TEST_F(Command, SimulatesAnOpenLoopFromOptions) {
+  write("p.toml",
+        "[model]\nstates = { x = \"m\" }\ninputs = { v = \"m/s\" }\n[model.derivative]\nx = "
+        "\"v\"\n");
+  const Answer answer =
+      run("simulate p.toml --json --duration 2s --input 'v=if(t < 1, 0.5, 0)' --initial x=10cm");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  const Json json = Json::parse(answer.out);
+  EXPECT_NEAR(json.at("states")[0].at("final").get<double>(), 0.6, 1e-6);
+  EXPECT_EQ(json.at("loop"), "open");
+  EXPECT_NEAR(json.at("inputs")[0].at("energy").get<double>(), 0.25, 1e-3);
+}
+
+TEST_F(Command, SimulatesAMechanism) {
+  const Answer closed = run("simulate " + example("elevator.toml") + " --json");
+  ASSERT_EQ(closed.status, 0) << closed.err;
+  EXPECT_EQ(Json::parse(closed.out).at("loop"), "closed");
+  const Answer open =
+      run("simulate " + example("elevator.toml") + " --json --input voltage=6V --duration 1s");
+  ASSERT_EQ(open.status, 0) << open.err;
+  EXPECT_GT(Json::parse(open.out).at("states")[0].at("final").get<double>(), 0.1);
+  const Answer wrong = run("simulate " + example("elevator.toml") + " --input volts=6V");
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_TRUE(holds(wrong.err, "its input is voltage")) << wrong.err;
+}
+
+TEST_F(Command, AnalysesAndRegulatesAModelByFormula) {
+  const Answer analysis = run("analyze " + example("cart_pole.toml") + " --json");
+  ASSERT_EQ(analysis.status, 0) << analysis.err;
+  const Json model = Json::parse(analysis.out);
+  EXPECT_EQ(model.at("stability"), "unstable");
+  EXPECT_EQ(model.at("states")[1], "theta (rad)");
+  EXPECT_TRUE(model.at("point").at("is_equilibrium").get<bool>());
+  const Answer design = run("design " + example("cart_pole.toml") + " --json");
+  ASSERT_EQ(design.status, 0) << design.err;
+  const Json json = Json::parse(design.out);
+  EXPECT_EQ(json.at("schema"), "flyball.design_model/1");
+  EXPECT_EQ(json.at("K")[0].size(), 4U);
+  EXPECT_EQ(json.at("kalman_gain").size(), 4U);
+  EXPECT_NEAR(json.at("simulation").at("states")[0].at("final").get<double>(), 0.5, 0.02);
+  const Answer words = run("design " + example("cart_pole.toml"));
+  EXPECT_TRUE(holds(words.out, "Operating point")) << words.out;
+}
+
+TEST_F(Command, TellsAllMistakesOfAModelByFormula) {
+  write("p.toml",
+        "[model]\nstates = { theta = \"rad\", omega = \"rad/s\" }\n[model.derivative]\ntheta = "
+        "\"omgea\"\nomega = \"-sin(thta)\"\n");
+  for (const char* command : {"simulate", "analyze", "design"}) {
+    const Answer answer = run(std::string(command) + " p.toml");
+    EXPECT_EQ(answer.status, 2) << command;
+    EXPECT_TRUE(holds(answer.err, "p.toml:4:10: ")) << answer.err;
+    EXPECT_TRUE(holds(answer.err, "p.toml:5:15: ")) << answer.err;
+    EXPECT_TRUE(holds(answer.err, "              ^^^^")) << answer.err;
+    EXPECT_FALSE(holds(answer.err, "offset")) << answer.err;
+    EXPECT_TRUE(answer.out.empty());
+  }
+}
+
+}  // namespace
+}  // namespace flyball::test
