@@ -53,7 +53,7 @@ int run(int argc, char** argv) {
       "  flyball identify shooter.json --json       only the gains, for other programs\n"
       "  flyball design elevator.toml               no robot yet: mass, gearing and motors\n"
       "  flyball simulate pendulum.toml             a mechanism, or a model by formula\n"
-      "  flyball motors kraken                      what the motor table knows\n"
+      "  flyball motors krakenX60                   what the motor table knows\n"
       "  flyball analyze elevator.toml              poles, what can be moved and seen, gains\n"
       "  flyball solve dare < problems.jsonl        any kernel, from any language\n"
       "  flyball book 6.3                           a figure of the book, from this library\n"

@@ -168,6 +168,13 @@ Expected<ReactionCurve> reaction_curve(std::span<const double> times,
   }
   for (std::size_t k = 0; k < times.size(); ++k) {
     FLYBALL_CHECK(Checks(where).finite(times[k], "times").finite(values[k], "values"));
+    if (k > 0 && !(times[k] > times[k - 1])) {
+      return tl::unexpected(Error(ArgumentError::out_of_range)
+                                .in(std::string(where))
+                                .about(detail::format("times[{}]", k))
+                                .got(detail::format("{} after {}", times[k], times[k - 1]))
+                                .expected("later than the one before"));
+    }
   }
   FLYBALL_CHECK(check_positive(std::abs(input_step), where, "input_step"));
   const double start = values.front();

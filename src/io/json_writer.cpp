@@ -87,6 +87,7 @@ void JsonWriter::write(double value) {
   if (std::isfinite(value)) {
     append_number(text_, value);
   } else {
+    all_finite_ = false;
     text_ += std::isnan(value) ? "null" : value > 0.0 ? "\"inf\"" : "\"-inf\"";
   }
 }

@@ -144,7 +144,7 @@ Expected<void> OutputFolder::write(std::string_view name, std::string_view conte
   if (error) {
     return tl::unexpected(not_writable(path.parent_path().string(), error.message()));
   }
-  // The folder that is being built has a passing name; the person knows the one it shall have.
+  // The folder that is being built has a passing name; the person knows the one it will have.
   return write_file_atomically(path.string(), contents).map_error([&](Error refused) {
     return std::move(refused).in((fs::path(destination_) / relative).string());
   });

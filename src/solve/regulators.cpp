@@ -174,7 +174,7 @@ std::vector<Kind> regulator_kinds() {
        "the gain with which A - BK has given eigenvalues (7.6)",
        {A, B, complex_list("poles", "n", "where they are to be")},
        {gain, complex_list("poles", "n", "where they are with this K, in the same order"),
-        number("condition", "", "how much a relative error of A - BK moves a pole")},
+        unbounded(number("condition", "", "how much a relative error of A - BK moves a pole"))},
        R"({"A": [[0, 1], [0, 0]], "B": [[0], [1]], "poles": [[-1, 1], [-1, -1]]})",
        &solve_place},
   };

@@ -94,6 +94,12 @@ constexpr Field or_first(Field field) {
   return optional(field, Absent::first_choice);
 }
 
+/// A field of an answer that may be infinite, or NaN where there is no such number.
+constexpr Field unbounded(Field field) {
+  field.unbounded = true;
+  return field;
+}
+
 // Fields that many kinds have.
 
 namespace field {
@@ -114,8 +120,8 @@ inline constexpr Field any_period = or_number(period, 1.0);
 
 inline constexpr Field residual =
     number("residual", "", "what is left of the equation over the sum of its terms' norms");
-inline constexpr Field condition =
-    number("condition", "", "how much relative errors of the data grow in the answer, an estimate");
+inline constexpr Field condition = unbounded(number(
+    "condition", "", "how much relative errors of the data grow in the answer, an estimate"));
 
 }  // namespace field
 

@@ -1,9 +1,11 @@
 #include <flyball/solve/solver.hpp>
 
+#include <algorithm>
 #include <utility>
 
 #include <flyball/io/json_writer.hpp>
 
+#include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "solve/json_object.hpp"
 #include "solve/problem.hpp"
@@ -11,6 +13,13 @@
 namespace flyball::solve {
 
 using Json = nlohmann::json;
+
+ErrorInfo error_info(SolveError code) {
+  static constexpr flyball::detail::ErrorRow rows[] = {
+      {"overflow", "the answer is too large for a double", ErrorKind::no_answer},
+  };
+  return flyball::detail::info_of(code, "solve", rows);
+}
 
 namespace {
 
@@ -27,6 +36,30 @@ JsonWriter begin(const Json* id) {
 std::string end(JsonWriter answer) {
   answer.close('}');
   return std::move(answer).text();
+}
+
+/// Whether a JSON value has a number that is NaN (null) or infinite.
+bool is_bounded(const Json& value) {
+  if (value.is_array() || value.is_object()) {
+    return std::all_of(value.begin(), value.end(), is_bounded);
+  }
+  return !value.is_null() && value != "inf" && value != "-inf";
+}
+
+/// Refuses an answer in which a number overflowed where its kind's row has no place for that.
+Expected<void> check_answer(const std::string& answer, const Kind& kind) {
+  const Json json = Json::parse(answer);
+  for (const Field& field : kind.answer) {
+    const auto found = json.find(field.name);
+    if (!field.unbounded && found != json.end() && !is_bounded(*found)) {
+      return tl::unexpected(Error(SolveError::overflow)
+                                .in(std::string(kind.name))
+                                .about(std::string(field.name))
+                                .got("beyond the range of a double")
+                                .hint("choose units in which the numbers are nearer to 1"));
+    }
+  }
+  return {};
 }
 
 Answer refused(const Json* id, const Error& error) {
@@ -64,7 +97,14 @@ Answer Solver::solve(std::string_view text) const {
   if (const Expected<void> outcome = kind_->function(*problem, answer); !outcome) {
     return refused(id, outcome.error());
   }
-  return {end(std::move(answer)), true, ErrorKind::no_answer};
+  const bool all_finite = answer.all_finite();
+  std::string json = end(std::move(answer));
+  if (!all_finite) {
+    if (const auto checked = check_answer(json, *kind_); !checked) {
+      return refused(id, checked.error());
+    }
+  }
+  return {std::move(json), true, ErrorKind::no_answer};
 }
 
 }  // namespace flyball::solve

@@ -59,10 +59,12 @@ std::vector<Field> structure_fields() {
                         std::string_view distances) {
     return std::vector{
         complex_list(hidden, "h", hidden_help), integer(rank, "how many dimensions that is"),
-        number(condition, "", "condition of the book's matrix (6.37 or 6.41), in the given units"),
+        unbounded(number(condition, "",
+                         "condition of the book's matrix (6.37 or 6.41), in the given units")),
         complex_list(modes, "n", "every mode, the hidden ones first, then by increasing distance"),
-        list(distances, "n", "",
-             "the relative change of the matrices that would cut off each of these modes")};
+        unbounded(
+            list(distances, "n", "",
+                 "the relative change of the matrices that would cut off each of these modes"))};
   };
   return std::vector{flag("controllable", "whether the inputs move every mode"),
                      flag("observable", "whether the outputs show every mode"),
@@ -70,8 +72,8 @@ std::vector<Field> structure_fields() {
                      flag("detectable", "whether every mode that no output shows decays"),
                      text("stability", "\"stable\", \"marginally stable\" or \"unstable\""),
                      complex_list("poles", "n", "the slowest or most unstable first"),
-                     list("damping_ratios", "n", "", "of these poles"),
-                     list("natural_frequencies", "n", "rad/s", "of these poles")} +
+                     unbounded(list("damping_ratios", "n", "", "of these poles")),
+                     unbounded(list("natural_frequencies", "n", "rad/s", "of these poles"))} +
          reach("uncontrollable_modes", "modes that no input moves", "controllability_rank",
                "controllability_condition", "controllability_modes", "controllability_distances") +
          reach("unobservable_modes", "modes that no output shows", "observability_rank",

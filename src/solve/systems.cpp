@@ -207,7 +207,7 @@ std::vector<Kind> system_kinds() {
        "the largest gain over all frequencies and input directions",
        any_system,
        {number("norm", "", "the largest singular value of G(jω), or of G(e^{jωT})"),
-        number("frequency", "rad/s", "where it is"),
+        unbounded(number("frequency", "rad/s", "where it is")),
         number("upper_bound", "", "no gain exceeds it")},
        R"({"A": [[0, 1], [-4, -0.4]], "B": [[0], [4]], "C": [[1, 0]]})",
        &solve_h_infinity_norm},

@@ -42,8 +42,8 @@ void fill_defaults(DesignJob& job, std::vector<Diagnostic>& diagnostics) {
 }
 
 // Of tolerances from tight to loose, takes those that leave comfortable margins and the stiffest
-// loop. The tightest comfortable ones need not be it: the compensation of a long delay (B.12) turns
-// an aggressive gain into nearly none.
+// loop. The tightest comfortable ones may not be the best: the compensation of a long delay (B.12)
+// turns an aggressive gain into nearly none.
 Expected<LoopDesign> search_tolerances(const LinearModel& model, DesignJob& job,
                                        std::vector<Diagnostic>& diagnostics) {
   const std::vector<double> start =
@@ -111,17 +111,14 @@ void add_margin_warnings(const LoopDesign& loop, const DesignJob& job,
                    format_number(1e3 * job.controller.delay.value_or(0.0), 3))});
 }
 
-void simulate_response(DesignResult& result) {
-  auto simulated = simulate_design(
-      result,
-      {.measurement_noise = *result.job.estimator.measurement_std, .seed = result.job.seed});
-  if (!simulated) {
-    result.diagnostics.push_back({"not_simulated", Severity::error, to_string(simulated.error())});
-    return;
-  }
-  result.response = std::move(simulated->series);
-  result.tracking_error_rms = simulated->rms_error;
-  result.tracking_error_max = simulated->max_error;
+Expected<void> simulate_response(DesignResult& result) {
+  FLYBALL_TRY(auto simulated,
+              simulate_design(result, {.measurement_noise = *result.job.estimator.measurement_std,
+                                       .seed = result.job.seed}));
+  result.response = std::move(simulated.series);
+  result.tracking_error_rms = simulated.rms_error;
+  result.tracking_error_max = simulated.max_error;
+  return {};
 }
 
 }  // namespace
@@ -217,7 +214,7 @@ Expected<DesignResult> design(const DesignJob& requested) {
   result.worst_overshoot = loop->robustness.worst_overshoot;
 
   result.paste = paste_gains(job.plant, result.K_delayed);
-  simulate_response(result);
+  FLYBALL_CHECK(simulate_response(result));
   return result;
 }
 

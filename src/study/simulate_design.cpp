@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include <flyball/core/argument.hpp>
 
 #include "core/try.hpp"
@@ -27,11 +29,21 @@ MechanismControllerDesign controller_of(const DesignResult& design) {
   return controller;
 }
 
+namespace {
+
+constexpr double hold = 0.5;  // s after the motion, to see it settle
+constexpr double most_periods = 1e6;
+
+double periods_of(const DesignResult& design) {
+  return std::ceil((design.motion.duration + hold) / design.job.controller.period);
+}
+
+}  // namespace
+
 std::vector<MotionState> reference_of(const DesignResult& design) {
-  constexpr double hold = 0.5;  // s, to see it settle
   const double T = design.job.controller.period;
   const double goal = design.motion.goal;
-  const auto rows = static_cast<std::size_t>(std::ceil((design.motion.duration + hold) / T)) + 1;
+  const auto rows = static_cast<std::size_t>(std::min(periods_of(design), most_periods)) + 1;
   std::vector<MotionState> reference(rows);
   if (design.job.plant.kind == MechanismKind::flywheel) {
     // A flywheel's motion is a ramp of its velocity.
@@ -57,6 +69,15 @@ Expected<MechanismResponse> simulate_design(const DesignResult& design, const De
                     .positive(trial.inertia_factor, "inertia_factor")
                     .positive(trial.gain_factor, "gain_factor")
                     .not_negative(trial.measurement_noise, "measurement_noise"));
+  if (const double periods = periods_of(design); !(periods <= most_periods)) {
+    return tl::unexpected(
+        Error(ArgumentError::out_of_range)
+            .in(std::string(where))
+            .about("the motion")
+            .got(fmt::format("{} periods of controller.period long", format_number(periods, 3)))
+            .expected(fmt::format("at most {} of them", format_number(most_periods, 7)))
+            .hint("bring profile.goal nearer, raise profile.max_velocity, or lengthen the period"));
+  }
   const DesignJob& designed = design.job;
   MechanismLoop loop;
   loop.controller = controller_of(design);

@@ -269,4 +269,20 @@ TEST(Tuning, Errors) {
 }
 
 }  // namespace
+// Times that stand still or go back would give a time constant of zero or below.
+TEST(ReactionCurve, RefusesTimesThatDoNotIncrease) {
+  std::vector<double> times;
+  std::vector<double> values;
+  for (int k = 0; k <= 50; ++k) {
+    times.push_back(0.2 * k);
+    values.push_back(1.0 - std::exp(-0.2 * k));
+  }
+  ASSERT_TRUE(reaction_curve(times, values, 1.0));
+  std::swap(times[3], times[4]);
+  const auto refused = reaction_curve(times, values, 1.0);
+  ASSERT_FALSE(refused);
+  EXPECT_TRUE(refused.error().is(ArgumentError::out_of_range));
+  EXPECT_NE(to_string(refused.error()).find("times[4]"), std::string::npos);
+}
+
 }  // namespace flyball

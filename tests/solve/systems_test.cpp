@@ -20,6 +20,15 @@ TEST(SolveSystems, H2Norm) {
             "not_positive");
 }
 
+// An answer that overflows is no answer; where infinity says something it stays.
+TEST(SolveSystems, WhatOverflowsIsRefused) {
+  EXPECT_EQ(
+      refusal("sampled-cost", R"({"A":[[0]],"B":[[1e308]],"Q":[[1e308]],"R":[[1e308]],"T":1e3})"),
+      "overflow");
+  const Json analysis = answer("analyze", R"({"A":[[-1]],"B":[[0]],"C":[[1]]})");
+  EXPECT_EQ(analysis.at("controllability_condition"), "inf");
+}
+
 // A CIM motor's speed: 80-digit Lyapunov solutions (tests/data has the same motor).
 TEST(SolveSystems, H2NormAndGramiansOfAMotor) {
   const std::string motor =

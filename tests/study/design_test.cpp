@@ -179,6 +179,16 @@ TEST(Design, PastesTheSameGainsInOtherUnits) {
   EXPECT_DOUBLE_EQ(result->paste[1].kG, 0.65);
 }
 
+// A motion of more periods than anyone wants to see is refused before it is simulated.
+TEST(Design, RefusesAMotionWithoutEnd) {
+  auto job = arm_job();
+  job.profile.max_velocity = 1e-9;
+  const auto refused = design(job);
+  ASSERT_FALSE(refused);
+  EXPECT_TRUE(refused.error().is(ArgumentError::out_of_range)) << to_string(refused.error());
+  EXPECT_NE(to_string(refused.error()).find("periods"), std::string::npos);
+}
+
 // What is exported is what was designed: the delayed gain, the inversion, the gains in every unit.
 TEST(Design, ExportsItsLoopAndItsConstants) {
   auto job = arm_job();

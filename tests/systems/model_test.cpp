@@ -121,6 +121,37 @@ TEST(Model, AnyModelIsTheModel) {
             longer.parameters());
 }
 
+// Its own Jacobians are asked for the parameters that the copy has: dx/dt = k x, A = k.
+struct Growth {
+  double k = 1.0;
+  static constexpr int states() { return 1; }
+  static constexpr int inputs() { return 1; }
+  [[nodiscard]] Eigen::Vector<double, 1> parameters() const { return Eigen::Vector<double, 1>(k); }
+  template <class X, class U>
+  auto derivative(const X& x, const U& u) const {
+    return derivative(x, u, parameters());
+  }
+  template <class X, class U, class P>
+  auto derivative(const X& x, const U&, const P& p) const {
+    return Eigen::Vector<ScalarOf<X, U, P>, 1>(p(0) * x(0));
+  }
+  template <class X, class U, class A, class B>
+  void jacobians(const X&, const U&, A&& by_x, B&& by_u) const {
+    by_x(0, 0) = k;
+    by_u(0, 0) = 0.0;
+  }
+};
+
+TEST(Model, JacobiansFollowTheParameters) {
+  const AnyModel model = AnyModel(Growth{}).with_parameter("p1", 5.0).value();
+  const Eigen::VectorXd x = Eigen::VectorXd::Constant(1, 2.0);
+  Eigen::MatrixXd A(1, 1);
+  Eigen::MatrixXd B(1, 1);
+  model.jacobians(x, Eigen::VectorXd::Zero(1), A, B);
+  EXPECT_EQ(model.derivative(x, Eigen::VectorXd::Zero(1))(0), 10.0);
+  EXPECT_EQ(A(0, 0), 5.0);
+}
+
 TEST(Model, ALinearSystemIsOne) {
   const ContinuousSystem<2, 1, 1> system{Eigen::Matrix2d{{0.0, 1.0}, {-2.0, -3.0}},
                                          Vector2d(0.5, 1.0), Eigen::RowVector2d(1.0, 4.0),

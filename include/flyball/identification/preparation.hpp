@@ -11,7 +11,7 @@
 
 namespace flyball::identification {
 
-/// A run made fit for fitting: rows sorted, finite, signs mended, its usable window marked.
+/// A run made fit for fitting: rows sorted, finite, signs corrected, its usable window marked.
 struct PreparedRun {
   TestRun run;             ///< The rows kept; time starts as recorded.
   std::size_t source = 0;  ///< Index of the run in the recording.

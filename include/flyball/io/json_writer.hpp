@@ -124,6 +124,8 @@ class JsonWriter {
   void open(char bracket);
   void close(char bracket) { text_ += bracket; }
 
+  /// Whether a number that was written is NaN or infinite.
+  [[nodiscard]] bool all_finite() const noexcept { return all_finite_; }
   /// What has been written.
   [[nodiscard]] const std::string& text() const& { return text_; }
   [[nodiscard]] std::string text() && { return std::move(text_); }
@@ -132,6 +134,7 @@ class JsonWriter {
   void separate();
 
   std::string text_;
+  bool all_finite_ = true;
 };
 
 /// A double as `JsonWriter` writes it. @param value  Finite.

@@ -11,7 +11,7 @@ namespace flyball::report {
 /// report is replaced, any other that is not empty is refused): index.html (to_html), result.json,
 /// the answer's files, pictures/*.svg and *.png. The same answer gives the same bytes.
 ///
-/// @param folder  Where it shall stand. @param provenance  Its `files` are filled in here.
+/// @param folder  Where it will stand. @param provenance  Its `files` are filled in here.
 /// @errors FileError. A picture that gnuplot refuses is left out and said so in the page.
 [[nodiscard]] Expected<void> write_report(const Answer& answer, const std::string& folder,
                                           const Provenance& provenance = {});

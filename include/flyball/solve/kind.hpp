@@ -48,6 +48,7 @@ struct Field {
   std::string_view choices{};  ///< Of a choice, separated by spaces.
   Absent absent = Absent::refused;
   double otherwise = 0.0;  ///< The number that stands for one left out.
+  bool unbounded = false;  ///< Of an answer: whether infinity and NaN say something.
 };
 
 /// One kind of problem: everything that is known of it. The reader, the help, the documentation and
@@ -62,6 +63,12 @@ struct Kind {
   Expected<void> (*function)(const Problem& problem, JsonWriter& answer);
   std::string_view section{};  ///< Where it stands in the documentation, such as "Systems".
 };
+
+/// Why a problem whose fields are as they must be has no answer, beside what its function says.
+enum class SolveError {
+  overflow,  ///< A number of the answer is beyond the range of a double (no_answer).
+};
+[[nodiscard]] ErrorInfo error_info(SolveError code);
 
 /// All kinds, in the order of the documentation.
 [[nodiscard]] std::span<const Kind> kinds();

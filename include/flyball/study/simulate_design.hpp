@@ -16,11 +16,13 @@ struct DesignTrial {
 /// The controller of a design, as robot code, simulations and generated code run it.
 [[nodiscard]] MechanismControllerDesign controller_of(const DesignResult& design);
 
-/// The design's reference: the trapezoid to its goal, one row a period, held for half a second.
+/// The design's reference: the trapezoid to its goal, one row a period, held for half a second; of
+/// a motion longer than a million periods the beginning.
 [[nodiscard]] std::vector<MotionState> reference_of(const DesignResult& design);
 
 /// Simulates the design's trapezoid with its delay, quantisation, noise and battery.
-/// @errors ArgumentError for factors that are not positive and noise that is negative.
+/// @errors ArgumentError for factors that are not positive, noise that is negative, and a motion of
+/// more than a million periods.
 [[nodiscard]] Expected<MechanismResponse> simulate_design(const DesignResult& design,
                                                           const DesignTrial& trial);
 

@@ -184,7 +184,9 @@ class CompiledModel final : public ModelFunctions {
   }
   void jacobians(const VectorIn& x, const VectorIn& u, const VectorIn& p, MatrixOut A,
                  MatrixOut B) const noexcept override {
-    if constexpr (requires { model_.jacobians(x, u, A, B); }) {
+    if constexpr (requires { model_.jacobians(x, u, p, A, B); }) {
+      model_.jacobians(x, u, p, A, B);
+    } else if constexpr (!ParametricModel<M> && requires { model_.jacobians(x, u, A, B); }) {
       model_.jacobians(x, u, A, B);
     } else {
       const auto of_f = flyball::jacobians(
@@ -196,7 +198,9 @@ class CompiledModel final : public ModelFunctions {
   }
   void output_jacobians(const VectorIn& x, const VectorIn& u, const VectorIn& p, MatrixOut C,
                         MatrixOut D) const noexcept override {
-    if constexpr (requires { model_.output_jacobians(x, u, C, D); }) {
+    if constexpr (requires { model_.output_jacobians(x, u, p, C, D); }) {
+      model_.output_jacobians(x, u, p, C, D);
+    } else if constexpr (!ParametricModel<M> && requires { model_.output_jacobians(x, u, C, D); }) {
       model_.output_jacobians(x, u, C, D);
     } else {
       const auto of_h = flyball::jacobians(

@@ -40,7 +40,8 @@
 ///   with respect to p,
 /// - `description()`, a ModelDescription: names, units, which coordinates are angles,
 /// - `jacobians(x, u, A, B)` and `output_jacobians(x, u, C, D)`, which write exact derivatives that
-///   it knows better than dual numbers do.
+///   it knows better than dual numbers do; of a model with parameters `jacobians(x, u, p, A, B)`
+///   and `output_jacobians(x, u, p, C, D)`.
 ///
 /// `states()` and `inputs()` of a model whose size is known at run time only are ordinary members.
 /// A ContinuousSystem is a model, and so are the mechanisms and `AnyModel`, which holds any of
@@ -215,7 +216,7 @@ template <Model M, class State, class Input>
   }
 }
 
-/// a - b in (-π, π], the way round that is shorter; rad, over a generic scalar.
+/// a - b in [-π, π], the way round that is shorter; rad, over a generic scalar.
 template <class Scalar>
 [[nodiscard]] Scalar angle_difference(const Scalar& a, const Scalar& b) noexcept {
   using std::remainder;

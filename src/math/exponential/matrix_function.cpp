@@ -128,7 +128,7 @@ Expected<MatrixXd> fractional_power(const MatrixRef& given, double f, std::strin
   };
   const MatrixXd result = power(f);
   // A^f A^(1-f) = A holds for the principal power and fails where a defective zero spoils it; in
-  // balanced units, lest large entries hide the small ones.
+  // balanced units, so that large entries do not hide the small ones.
   const auto size = [&](const MatrixXd& M) {
     return detail::norm1(form.d.cwiseInverse().asDiagonal() * M * form.d.asDiagonal());
   };

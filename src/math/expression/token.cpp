@@ -176,8 +176,8 @@ class Lexer {
   void stray(Character c) {
     const Place place{at_, c.length};
     std::string_view hint = "leave it out";
-    for (const auto& [symbol, mend] : elsewhere) {
-      hint = text_.substr(at_, c.length) == symbol ? mend : hint;
+    for (const auto& [symbol, advice] : elsewhere) {
+      hint = text_.substr(at_, c.length) == symbol ? advice : hint;
     }
     complaints_.add(Error(ExpressionError::stray_character)
                         .about(complaints_.quote(place))
