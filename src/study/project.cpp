@@ -4,6 +4,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <flyball/io/file.hpp>
 
@@ -48,29 +49,39 @@ void take_gains(const KnownGains& known, PlantDescription& plant) {
   gains.angle_offset = known.angle_offset.value_or(Angle(gains.angle_offset)).si();
 }
 
-/// What is missing for a plant, if anything is.
-std::optional<Errors> missing_parts(const TomlDocument& document, const Project& project) {
-  if (project.gains.kV) {
-    return std::nullopt;
+struct MissingKey {
+  std::string_view section;
+  std::string_view key;
+  std::string hint;
+};
+
+/// What is missing for a plant of a kind.
+std::vector<MissingKey> missing_parts(const TomlDocument& document, const MechanismRow& row) {
+  if (document.has("gains", "kV")) {
+    return {};
   }
-  const MechanismRow& row = mechanism_row(*project.parts.type);
   const std::string_view kind = to_string(row.kind);
   const bool vowel = std::string_view("aeiou").find(kind.front()) != std::string_view::npos;
-  std::vector<QuotedError> all;
+  std::vector<MissingKey> all;
   for (const Field& field : section_of(part_section).fields) {
     if (std::find(row.needs.begin(), row.needs.end(), field.key) != row.needs.end() &&
         !document.has(part_section, field.key)) {
-      all.push_back(
-          {document.missing(part_section, field.key,
-                            fmt::format("{} {} needs it, for example {} = {}", vowel ? "an" : "a",
-                                        kind, field.key, field.example)),
-           {}});
+      all.push_back({part_section, field.key,
+                     fmt::format("{} {} needs it, for example {} = {}", vowel ? "an" : "a", kind,
+                                 field.key, field.example)});
     }
   }
   if (!all.empty() && document.has("", "gains")) {
-    return document.missing("gains", "kV", "in V·s per rad or m, for example kV = 1.2");
+    std::vector<std::string_view> parts;
+    for (const MissingKey& part : all) {
+      parts.push_back(part.key);
+    }
+    return {{"gains", "kV",
+             fmt::format("in V·s per rad or m, for example kV = 1.2; or else say in [mechanism]: "
+                         "{}",
+                         fmt::join(parts, ", "))}};
   }
-  return all.empty() ? std::nullopt : std::optional<Errors>(std::move(all));
+  return all;
 }
 
 /// What a log cannot say of the plant.
@@ -96,7 +107,13 @@ void make_plant(TomlDocument& document, Project& project) {
   const MechanismRow& row = mechanism_row(*project.parts.type);
   plant.kind = row.kind;
   plant.unit = mechanisms::position_unit(row.kind);
-  project.plant_error = missing_parts(document, project);
+  std::vector<QuotedError> missing;
+  for (MissingKey& key : missing_parts(document, row)) {
+    missing.push_back({document.missing(key.section, key.key, std::move(key.hint)), {}});
+  }
+  if (!missing.empty()) {
+    project.plant_error = Errors(std::move(missing));
+  }
   const auto given = [&](std::string_view key) { return document.has(part_section, key); };
   if (plant.motor && std::all_of(row.needs.begin(), row.needs.end(), given)) {
     if (auto made = row.make(project.parts, plant); !made) {
@@ -108,9 +125,11 @@ void make_plant(TomlDocument& document, Project& project) {
   take_gains(project.gains, plant);
 }
 
-/// @param alone  Whether the text is all that says what the mechanism is.
+/// What says what the mechanism is: a file; a log, and a file of that mechanism; a log alone.
+enum class Source { file, file_with_log, log };
+
 ExpectedAll<Project> read(std::string_view text, const std::string& name,
-                          std::span<const Override> overrides, bool alone) {
+                          std::span<const Override> overrides, Source source) {
   TomlDocument document(text, name);
   document.apply(overrides, project_document().sections);
   Project project;
@@ -119,7 +138,7 @@ ExpectedAll<Project> read(std::string_view text, const std::string& name,
   auto& type = project.parts.type;
   const auto& logged = project.log.mechanism;
   const bool formulas = document.has("", "model");
-  if (alone && document.is_toml() && !formulas && !document.writes(part_section)) {
+  if (source != Source::log && document.is_toml() && !formulas && !document.writes(part_section)) {
     document.miss("", part_section,
                   "begin with [mechanism] and type = \"elevator\", \"arm\" or \"flywheel\", or "
                   "with [model] and formulas");
@@ -145,9 +164,28 @@ ExpectedAll<Project> read(std::string_view text, const std::string& name,
   }
   if (type && !document.errors()) {
     make_plant(document, project);
+  } else if (type && !formulas && source == Source::file) {
+    // With errors there is no project to keep them for: what is missing is told beside them.
+    for (MissingKey& key : missing_parts(document, mechanism_row(*type))) {
+      document.miss(key.section, key.key, std::move(key.hint));
+    }
   }
   if (auto errors = document.errors()) {
     return tl::unexpected(*std::move(errors));
+  }
+  return project;
+}
+
+ExpectedAll<Project> read_file_of(const std::string& path, std::span<const Override> overrides,
+                                  Source source) {
+  constexpr std::size_t largest = 1 << 20;
+  FLYBALL_TRY(const auto text, read_file(path, largest));
+  auto project = read(text, path, overrides, source);
+  const bool log = path.ends_with(".json") || path.ends_with(".wpilog") || path.ends_with(".csv");
+  if (!project && log && project.error().is(ProjectError::syntax)) {
+    return tl::unexpected(Error(std::move(project).error())
+                              .hint("a log goes to `flyball tune`, a linear model to `flyball "
+                                    "analyze`"));
   }
   return project;
 }
@@ -168,20 +206,11 @@ ErrorInfo error_info(ProjectError code) {
 
 ExpectedAll<Project> parse_project(std::string_view text, const std::string& name,
                                    std::span<const Override> overrides) {
-  return read(text, name, overrides, true);
+  return read(text, name, overrides, Source::file);
 }
 
 ExpectedAll<Project> read_project(const std::string& path, std::span<const Override> overrides) {
-  constexpr std::size_t largest = 1 << 20;
-  FLYBALL_TRY(const auto text, read_file(path, largest));
-  auto project = parse_project(text, path, overrides);
-  const bool log = path.ends_with(".json") || path.ends_with(".wpilog") || path.ends_with(".csv");
-  if (!project && log && project.error().is(ProjectError::syntax)) {
-    return tl::unexpected(Error(std::move(project).error())
-                              .hint("a log goes to `flyball tune`, a linear model to `flyball "
-                                    "analyze`"));
-  }
-  return project;
+  return read_file_of(path, overrides, Source::file);
 }
 
 ExpectedAll<DesignJob> design_job(const std::string& project, std::span<const Override> overrides) {
@@ -193,15 +222,15 @@ ExpectedAll<DesignJob> design_job(const std::string& project, std::span<const Ov
 }
 
 ExpectedAll<IdentifyJob> identify_job(const std::string& log, std::span<const Override> overrides) {
-  return read("", "", overrides, false).map([&](Project said) {
+  return read("", "", overrides, Source::log).map([&](Project said) {
     return IdentifyJob{.log = log, .selection = std::move(said.log)};
   });
 }
 
 ExpectedAll<TuneJob> tune_job(const std::string& log, const std::string& project,
                               std::span<const Override> overrides) {
-  FLYBALL_TRY(auto said,
-              project.empty() ? read("", "", overrides, false) : read_project(project, overrides));
+  FLYBALL_TRY(auto said, project.empty() ? read("", "", overrides, Source::log)
+                                         : read_file_of(project, overrides, Source::file_with_log));
   TuneJob job{.identification = {.log = log, .selection = std::move(said.log)},
               .design = std::move(said.job)};
   if (!job.identification.selection.mechanism) {

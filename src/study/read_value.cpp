@@ -83,24 +83,33 @@ Expected<double> quantity(const toml::node& node, Range range, Dimension dimensi
   return wrong_type(node, name, fmt::format("a text with number and unit, such as \"1 {}\"", unit));
 }
 
-Expected<FieldValue> list(const toml::node& node, Range range,
-                          std::span<const Dimension> dimensions, const std::string& name) {
+ExpectedAll<FieldValue> list(const toml::node& node, Range range,
+                             std::span<const Dimension> dimensions, const std::string& name) {
   const toml::array* array = node.as_array();
   if (array == nullptr && dimensions.size() != 1) {
     return wrong_type(node, name,
                       fmt::format("a list of {} texts, one a state", dimensions.size()));
   }
-  if (array != nullptr && array->size() != dimensions.size()) {
-    return tl::unexpected(Error(ArgumentError::wrong_shape)
-                              .about(name)
-                              .got(fmt::format("{} values long", array->size()))
-                              .expected(fmt::format("one value a state ({})", dimensions.size())));
+  std::vector<QuotedError> wrong;
+  const std::size_t size = array != nullptr ? array->size() : 1;
+  if (size != dimensions.size()) {
+    wrong.push_back({Error(ArgumentError::wrong_shape)
+                         .about(name)
+                         .got(fmt::format("{} value{} long", size, size == 1 ? "" : "s"))
+                         .expected(fmt::format("one value a state ({})", dimensions.size())),
+                     {}});
   }
   std::vector<double> values;
-  for (std::size_t i = 0; i < dimensions.size(); ++i) {
-    FLYBALL_TRY(const double value,
-                quantity(array != nullptr ? (*array)[i] : node, range, dimensions[i], name));
-    values.push_back(value);
+  for (std::size_t i = 0; i < std::min(size, dimensions.size()); ++i) {
+    auto value = quantity(array != nullptr ? (*array)[i] : node, range, dimensions[i], name);
+    if (value) {
+      values.push_back(*value);
+    } else {
+      wrong.push_back({std::move(value).error(), {}});
+    }
+  }
+  if (!wrong.empty()) {
+    return tl::unexpected(Errors(std::move(wrong)));
   }
   return values;
 }
@@ -114,8 +123,8 @@ std::optional<long long> whole_number(std::string_view text) {
 
 }  // namespace
 
-Expected<FieldValue> read_value(const Field& field, const toml::node& node,
-                                std::span<const Dimension> dimensions, const std::string& name) {
+ExpectedAll<FieldValue> read_value(const Field& field, const toml::node& node,
+                                   std::span<const Dimension> dimensions, const std::string& name) {
   switch (field.type) {
     case FieldType::quantity:
       return quantity(node, field.range, dimensions.front(), name);
@@ -147,7 +156,7 @@ Expected<FieldValue> read_value(const Field& field, const toml::node& node,
     }
     case FieldType::flag: {
       const auto value = node.value_exact<bool>();
-      return value ? Expected<FieldValue>(*value) : wrong_type(node, name, "true or false");
+      return value ? ExpectedAll<FieldValue>(*value) : wrong_type(node, name, "true or false");
     }
     case FieldType::names: {
       std::vector<std::string> texts;
@@ -156,7 +165,7 @@ Expected<FieldValue> read_value(const Field& field, const toml::node& node,
         texts.push_back(element.value_exact<std::string>().value_or(""));
       }
       const bool all = std::find(texts.begin(), texts.end(), "") == texts.end();
-      return array != nullptr && all ? Expected<FieldValue>(std::move(texts))
+      return array != nullptr && all ? ExpectedAll<FieldValue>(std::move(texts))
                                      : wrong_type(node, name, "a list of texts in quotes");
     }
     case FieldType::map:

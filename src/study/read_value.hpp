@@ -6,16 +6,18 @@
 
 #include <toml++/toml.h>
 
+#include <flyball/core/errors.hpp>
+
 #include "study/field.hpp"
 
 namespace flyball::study {
 
 /// A field's value from the node of a file.
 /// @param dimensions  One; of a list one for each state. @param name  The field's, for messages.
-/// @errors ProjectError and ArgumentError, without a place.
-[[nodiscard]] Expected<FieldValue> read_value(const Field& field, const toml::node& node,
-                                              std::span<const Dimension> dimensions,
-                                              const std::string& name);
+/// @errors ProjectError and ArgumentError, without a place; of a list those of all its values.
+[[nodiscard]] ExpectedAll<FieldValue> read_value(const Field& field, const toml::node& node,
+                                                 std::span<const Dimension> dimensions,
+                                                 const std::string& name);
 
 /// The node that a text of the command line stands for.
 void insert_text(toml::table& table, const Field& field, std::string_view text);

@@ -171,7 +171,9 @@ void TomlDocument::read_section(const Section& section, const toml::table& keys,
     if (auto read = read_value(field, *value, dimensions, called)) {
       field.access.set(object, *read);
     } else {
-      refuse(section.name, field.key, std::move(read).error());
+      for (const QuotedError& wrong : read.error().all()) {
+        refuse(section.name, field.key, wrong);
+      }
     }
   }
 }
@@ -213,6 +215,7 @@ void TomlDocument::check_names(const toml::table& names, std::string_view sectio
       continue;
     }
     const std::string nearest = nearest_name(text, known);
+    meant_.push_back(name_of(section, nearest));
     found_.push_back(
         {key.source(),
          Error(ProjectError::unknown_key)
@@ -296,6 +299,9 @@ Error TomlDocument::missing(std::string_view section, std::string_view key,
 }
 
 void TomlDocument::miss(std::string_view section, std::string_view key, std::string hint) {
+  if (std::find(meant_.begin(), meant_.end(), name_of(section, key)) != meant_.end()) {
+    return;
+  }
   found_.push_back({source_of(section), missing(section, key, std::move(hint)), false, {}});
 }
 

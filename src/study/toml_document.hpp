@@ -49,7 +49,7 @@ class TomlDocument {
   /// An error about a key that should be there, with the section's place.
   [[nodiscard]] Error missing(std::string_view section, std::string_view key,
                               std::string hint) const;
-  /// The same, kept.
+  /// The same, kept; not of a key that stands there misspelt, which is told.
   void miss(std::string_view section, std::string_view key, std::string hint);
 
   /// Nothing if all is well; else the errors in the order of the file, the first twenty of them.
@@ -81,6 +81,7 @@ class TomlDocument {
   toml::table root_;
   bool is_toml_ = true;
   std::map<std::string, std::string, std::less<>> options_;  // of overridden keys, by their names
+  std::vector<std::string> meant_;  // the names nearest to those that are not known
   std::vector<Found> found_;
 };
 

@@ -163,7 +163,9 @@ TEST_F(AnalyzeCommand, ModelsThatAreWrong) {
   refused(R"({"A": [[1]], "B": [[1]], "states": ["a", "b"]})", "wrong_shape", "2 names");
   refused(R"({"A": [[1]], "B": [[1]], "inputs": "u"})", "malformed", "inputs");
   refused("{\"A\": " + std::string(1000, '['), "malformed", "brackets");
-  write("p.toml", "[mechanism]\ntype = \"elevator\"\ngearng = 3\n");
+  write("p.toml",
+        "[mechanism]\ntype = \"flywheel\"\nmotor = \"NEO\"\ngearng = 3\n"
+        "moment_of_inertia = \"0.001 kg m^2\"\n");
   expect_refused("p.toml", "unknown_key", "did you mean \"gearing\"?");
   write("p.toml", "[mechanism]\ntype = \"elevator\"\nmotor = \"NEO\"\n");
   expect_refused("p.toml", "missing_key", "gearing");
