@@ -97,7 +97,7 @@ void take_parts(TomlDocument& document, Project& project) {
     plant.nominal_voltage = motor->nominal_voltage;
     plant.motor = *std::move(motor);
   } else {
-    document.refuse(part_section, "motor", std::move(motor).error());
+    document.refuse(part_section, "motor", std::move(motor).error(), TomlDocument::Fault::value);
   }
 }
 
@@ -119,7 +119,8 @@ void make_plant(TomlDocument& document, Project& project) {
     if (auto made = row.make(project.parts, plant); !made) {
       // The mechanism's function names a part as its key does.
       const std::string part = made.error().subject();
-      document.refuse(part_section, given(part) ? part : "type", std::move(made).error());
+      document.refuse(part_section, given(part) ? part : "type", std::move(made).error(),
+                      TomlDocument::Fault::value);
     }
   }
   take_gains(project.gains, plant);
@@ -156,7 +157,8 @@ ExpectedAll<Project> read(std::string_view text, const std::string& name,
                     Error(ProjectError::wrong_value)
                         .about(document.name("log", "mechanism"))
                         .got(std::string(to_string(*logged)))
-                        .expected(fmt::format("the type in [mechanism], {}", to_string(*type))));
+                        .expected(fmt::format("the type in [mechanism], {}", to_string(*type))),
+                    TomlDocument::Fault::value);
   }
   if (!document.errors()) {
     take_parts(document, project);

@@ -42,10 +42,6 @@ std::vector<std::string> characters(std::string_view line) {
   return all;
 }
 
-std::string joined(std::span<const std::string> parts) {
-  return fmt::format("{}", fmt::join(parts, ""));
-}
-
 }  // namespace
 
 TomlDocument::TomlDocument(std::string_view text, std::string file)
@@ -114,7 +110,8 @@ void TomlDocument::read(const Document& document, void* into) {
              Error(ProjectError::wrong_type)
                  .about(std::string(key))
                  .got("no section")
-                 .expected(fmt::format("a section, written [{}]", section.name)));
+                 .expected(fmt::format("a section, written [{}]", section.name)),
+             Fault::value);
     }
   }
 }
@@ -172,7 +169,7 @@ void TomlDocument::read_section(const Section& section, const toml::table& keys,
       field.access.set(object, *read);
     } else {
       for (const QuotedError& wrong : read.error().all()) {
-        refuse(section.name, field.key, wrong);
+        refuse(section.name, field.key, wrong, Fault::value);
       }
     }
   }
@@ -199,7 +196,8 @@ NamedTexts TomlDocument::named_texts(const std::string& section, const toml::tab
              Error(ProjectError::wrong_type)
                  .about(name(section, key->str()))
                  .got("no text")
-                 .expected("a text in quotes"));
+                 .expected("a text in quotes"),
+             Fault::value);
       continue;
     }
     texts.push_back({std::string(key->str()), std::move(text)});
@@ -230,22 +228,23 @@ void TomlDocument::check_names(const toml::table& names, std::string_view sectio
   }
 }
 
-void TomlDocument::refuse(std::string_view section, std::string_view key, Error error) {
+void TomlDocument::refuse(std::string_view section, std::string_view key, Error error,
+                          Fault fault) {
   const toml::table* keys = table(section);
   toml::source_region source = source_of(section);
-  std::string where = place(source);
   auto option = options_.find(name_of(section, key));
   if (option == options_.end()) {
     option = options_.find(section);  // of a table whose keys a person chooses
   }
   if (option != options_.end()) {
-    where = option->second == error.subject() ? "" : option->second;
-    source = {};
-  } else if (keys != nullptr && keys->contains(key)) {
-    where = place(keys->find(key)->first.source());
-    source = keys->get(key)->source();
+    error = std::move(error).in(option->second == error.subject() ? "" : option->second);
+    found_.push_back({{}, std::move(error), true, {}});
+    return;
   }
-  found_.push_back({source, std::move(error).in(std::move(where)), true, {}});
+  if (keys != nullptr && keys->contains(key)) {
+    source = fault == Fault::key ? keys->find(key)->first.source() : keys->get(key)->source();
+  }
+  found_.push_back({source, std::move(error).in(place(source)), true, {}});
 }
 
 void TomlDocument::refuse_part(std::string_view section, std::string_view key, Error error) {
@@ -275,7 +274,7 @@ void TomlDocument::refuse_part(std::string_view section, std::string_view key, E
       std::equal(written.begin(), written.end(), all.begin() + static_cast<std::ptrdiff_t>(begin));
   if (!as_it_is) {
     const std::string lines = expression::caret_lines(text, error);
-    refuse(section, key, std::move(error));
+    refuse(section, key, std::move(error), Fault::value);
     found_.back().excerpt = lines;
     return;
   }
@@ -352,6 +351,12 @@ toml::source_region TomlDocument::source_of(std::string_view section) const {
   return keys == nullptr ? root_.source() : keys->source();
 }
 
+bool TomlDocument::writes(std::string_view section) const {
+  const auto [parent, name] = split(section);
+  const toml::node* found = node(parent, name);
+  return found != nullptr && found->source().begin.line != 0;
+}
+
 std::string TomlDocument::place(const toml::source_region& source) const {
   return source.begin.line == 0
              ? file_
@@ -385,7 +390,7 @@ std::string TomlDocument::excerpt(const toml::source_region& source) const {
       std::span(line).subspan(first, std::min(widest, line.size() - first));
   const bool one_line = source.end.line == source.begin.line && source.end.column > at + 1;
   const std::size_t length = one_line ? source.end.column - 1 - at : 1;
-  return fmt::format("{:>5} | {}\n{:>5} | {}{}", source.begin.line, joined(shown), "",
+  return fmt::format("{:>5} | {}\n{:>5} | {}{}", source.begin.line, fmt::join(shown, ""), "",
                      std::string(at - first, ' '),
                      std::string(std::clamp<std::size_t>(length, 1, widest), '^'));
 }

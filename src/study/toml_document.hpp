@@ -31,10 +31,8 @@ class TomlDocument {
   void read(const Document& document, void* into);
 
   [[nodiscard]] bool is_toml() const { return is_toml_; }
-  /// Whether the file has a section, not only the command line.
-  [[nodiscard]] bool writes(std::string_view section) const {
-    return table(section) != nullptr && source_of(section).begin.line != 0;
-  }
+  /// Whether the file has a section, or what is none in its place; not only the command line.
+  [[nodiscard]] bool writes(std::string_view section) const;
   [[nodiscard]] bool has(std::string_view section, std::string_view key) const {
     return node(section, key) != nullptr;
   }
@@ -42,8 +40,11 @@ class TomlDocument {
   /// "controller.period", or "--period" if the value is the command line's.
   [[nodiscard]] std::string name(std::string_view section, std::string_view key) const;
 
-  /// Keeps an error about a key, with its place in the file or its option.
-  void refuse(std::string_view section, std::string_view key, Error error);
+  /// What is wrong: the key, or the value that it has.
+  enum class Fault { key, value };
+  /// Keeps an error with the place of what is wrong in the file, or its option.
+  void refuse(std::string_view section, std::string_view key, Error error,
+              Fault fault = Fault::key);
   /// The same of a part of a text: evidence `offset` and `length`, in bytes, say which.
   void refuse_part(std::string_view section, std::string_view key, Error error);
   /// An error about a key that should be there, with the section's place.

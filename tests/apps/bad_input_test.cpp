@@ -152,7 +152,7 @@ TEST_F(BadInput, MotorsThatAreNone) {
   expect("motors warpdrive", 2, "known motors are");
   expect("motors kraken", 2, "one of Kraken X60, Kraken X60 FOC");
   project(with(good_elevator, "\"NEO\"", "\"NEP\""));
-  expect("design project.toml", 2, "project.toml:3:1: motor is \"NEP\"");
+  expect("design project.toml", 2, "project.toml:3:9: motor is \"NEP\"");
   expect("design project.toml", 2, "did you mean \"NEO\"?");
 }
 
@@ -164,9 +164,9 @@ TEST_F(BadInput, ProjectFiles) {
     expect("design project.toml --out report", 2, words);
   };
   refused(with(good_elevator, "8 kg", "8 m"), "",
-          "project.toml:6:1: mechanism.mass is \"8 m\", a length");
+          "project.toml:6:8: mechanism.mass is \"8 m\", a length");
   refused(with(good_elevator, "\"8 kg\"", "8"), "",
-          "project.toml:6:1: mechanism.mass is 8, without a unit");
+          "project.toml:6:8: mechanism.mass is 8, without a unit");
   refused(with(good_elevator, "8 kg", "-8 kg"), "", "mass");
   refused(with(good_elevator, "8 kg", "nan kg"), "", "mass");
   refused(with(good_elevator, "10.0", "0"), "", "gearing");
@@ -199,7 +199,7 @@ TEST_F(BadInput, SeveralErrorsAtOnce) {
       "\"gearing\"?\n"
       "    5 | gearng = 10.0\n"
       "      | ^^^^^^\n"
-      "flyball: project.toml:6:1: mechanism.mass is \"8 m\", a length; it must be a mass such "
+      "flyball: project.toml:6:8: mechanism.mass is \"8 m\", a length; it must be a mass such "
       "as \"8 kg\" or \"18 lb\"\n"
       "    6 | mass = \"8 m\"\n"
       "      |        ^^^^^\n");
