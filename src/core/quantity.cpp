@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include <flyball/core/text.hpp>
@@ -98,11 +99,13 @@ const NamedUnit* find_unit(std::string_view text) {
   return match(singular(folded), true);
 }
 
-std::string nearest_unit(std::string_view text) {
+/// @param of  The dimension that is wanted; any if it is not known.
+std::string nearest_unit(std::string_view text, std::optional<Dimension> of = std::nullopt) {
   std::vector<std::string_view> names;
-  names.reserve(units.size());
   for (const NamedUnit& unit : units) {
-    names.push_back(unit.text);
+    if (!of || unit.dimension == *of) {
+      names.push_back(unit.text);
+    }
   }
   return nearest_name(canonical(text), names);
 }
@@ -285,7 +288,7 @@ Expected<double> parse_quantity(std::string_view text, Dimension dimension, std:
   }
   auto unit = parse_unit(unit_text);
   if (!unit) {
-    const std::string nearest = nearest_unit(unit_text);
+    const std::string nearest = nearest_unit(unit_text, dimension);
     return tl::unexpected(Error(ArgumentError::wrong_unit)
                               .about(std::string(name))
                               .got(detail::format("\"{}\", in an unknown unit", text))

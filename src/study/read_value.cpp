@@ -73,12 +73,13 @@ Expected<double> quantity(const toml::node& node, Range range, Dimension dimensi
   }
   const std::string unit(si_unit(dimension));
   if (number || whole) {
+    const bool finite = std::isfinite(*node.value<double>());
     return tl::unexpected(
         Error(ArgumentError::wrong_unit)
             .about(name)
             .got(description(node) + ", without a unit")
             .expected(fmt::format("a text with number and unit, such as \"{} {}\"",
-                                  description(node), unit)));
+                                  finite ? description(node) : "1", unit)));
   }
   return wrong_type(node, name, fmt::format("a text with number and unit, such as \"1 {}\"", unit));
 }

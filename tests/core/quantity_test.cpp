@@ -226,6 +226,11 @@ TEST(ParseQuantity, MessagesNameTheThingAndWhatToDo) {
   EXPECT_EQ(message("8 kgg", Dimension::mass, "mass"),
             "mass is \"8 kgg\", in an unknown unit; it must be a mass such as \"8 kg\" or \"18 "
             "lb\"; did you mean \"kg\"?");
+  // A unit that is near but of another dimension is no help.
+  EXPECT_EQ(message("8 lbs ft", Dimension::mass, "mass"),
+            "mass is \"8 lbs ft\", in an unknown unit; it must be a mass such as \"8 kg\" or \"18 "
+            "lb\"; did you mean \"lbs\"?");
+  EXPECT_EQ(message("20 s m", Dimension::time, "period").find("cm"), std::string::npos);
 }
 
 TEST(ParseQuantity, GivesATaggedQuantity) {

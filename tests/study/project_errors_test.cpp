@@ -79,6 +79,16 @@ TEST(ProjectErrors, ThePlaceAndTheCaretAreOfWhatIsWrong) {
   EXPECT_EQ(all[1].excerpt, "    3 | moter  = 2\n      | ^^^^^");
 }
 
+TEST(ProjectErrors, AnExampleIsANumberThatMayBe) {
+  const auto project = parse_project(
+      "[mechanism]\ntype = \"arm\"\n[gains]\nkV = 1.0\n[controller]\nmax_voltage = inf\n",
+      "p.toml");
+  ASSERT_FALSE(project);
+  EXPECT_EQ(to_string(project.error()),
+            "p.toml:6:15: controller.max_voltage is inf, without a unit; it must be a text with "
+            "number and unit, such as \"1 V\"");
+}
+
 TEST(ProjectErrors, ASectionThatIsNoneIsNotMissingToo) {
   const auto project = parse_project("mechanism = 3\n", "p.toml");
   ASSERT_FALSE(project);
