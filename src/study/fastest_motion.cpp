@@ -28,6 +28,8 @@ struct VoltageBudget {
     const double by_battery = (open - velocity_volts) / (1.0 + sag) - holding;
     return std::min(by_limit, by_battery);
   }
+  // What a motor that stands still can be given under the sag of its own current.
+  [[nodiscard]] double under_sag() const { return open / (1.0 + sag); }
   // The largest kV v at which anything is left.
   [[nodiscard]] double top_velocity_volts() const {
     return std::min(limit - holding, open - holding * (1.0 + sag));
@@ -64,9 +66,19 @@ Expected<FastestMotion> fastest_motion(const DesignJob& job) {
   }
   const double top = budget.top_velocity_volts();
   if (!(top > 0.0)) {
+    const Error error = Error(DesignError::no_motion_possible).in("design");
+    if (budget.holding < budget.limit) {
+      return tl::unexpected(
+          Error(error)
+              .about("the battery")
+              .got(fmt::format("left with {} V under its sag, less a tenth for feedback",
+                               format_number(budget.under_sag())))
+              .expected(fmt::format("above the {} V of friction and gravity",
+                                    format_number(budget.holding)))
+              .hint("lower battery.resistance or raise battery.open_circuit_voltage"));
+    }
     return tl::unexpected(
-        Error(DesignError::no_motion_possible)
-            .in("design")
+        Error(error)
             .about("friction and gravity")
             .got(fmt::format("{} V together", format_number(budget.holding)))
             .expected(fmt::format("below {} V, so that a tenth is left for feedback",

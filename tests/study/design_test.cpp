@@ -144,6 +144,17 @@ TEST(Design, RefusesWhatCannotBe) {
   ASSERT_FALSE(result);
   EXPECT_TRUE(result.error().is(DesignError::no_motion_possible)) << to_string(result.error());
 
+  // A battery whose sag takes all is called that, not friction.
+  job = elevator_job();
+  job.battery.resistance = 1e9;
+  result = design(job);
+  ASSERT_FALSE(result);
+  EXPECT_TRUE(result.error().is(DesignError::no_motion_possible)) << to_string(result.error());
+  EXPECT_TRUE(to_string(result.error()).starts_with("design: the battery is left with "))
+      << to_string(result.error());
+  EXPECT_EQ(to_string(result.error()).find("below"), std::string::npos)
+      << to_string(result.error());
+
   job = elevator_job();
   job.controller.period = 0.0;
   result = design(job);
