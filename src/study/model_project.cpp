@@ -13,6 +13,7 @@
 #include <flyball/systems/formula_model.hpp>
 
 #include "study/model_project.hpp"
+#include "study/named_value.hpp"
 
 namespace flyball::study {
 
@@ -23,9 +24,6 @@ constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 using Coordinates = std::vector<Coordinate>;
 using Index = Eigen::Index;
-
-/// What must be true of a value.
-enum class Sign { any, positive, not_negative };
 
 /// Reads a document's model, section by section; every error goes to the document.
 class ModelReader {
@@ -262,41 +260,12 @@ class ModelReader {
   /// A value with the unit of a coordinate, in SI; nothing where it is refused.
   std::optional<double> value(const std::string& section, const NamedText& said,
                               const std::string& unit, Sign sign) {
-    const std::string called = document_.name(section, said.name);
-    // The unit of a coordinate that was refused is not known.
-    const auto wanted =
-        unit.empty() ? std::nullopt : std::optional(parse_si_unit(unit).value_or(SiUnit{}));
-    auto parts = split_quantity(said.text, called);
-    auto given = parts ? parse_si_unit(parts->unit) : Expected<SiUnit>();
-    if (!parts || !given) {
-      document_.refuse(section, said.name,
-                       parts ? std::move(given).error() : std::move(parts).error());
-      return std::nullopt;
+    auto read = named_value(said.text, document_.name(section, said.name), unit, sign);
+    if (read) {
+      return *read;
     }
-    const bool plain = parts->unit.empty();
-    const bool is_plain = wanted && wanted->dimension.exponents == SiDimension{}.exponents;
-    if (wanted && parts->number != 0.0 &&
-        (!wanted->dimension.fits(given->dimension) || (plain && !is_plain))) {
-      document_.refuse(
-          section, said.name,
-          Error(ArgumentError::wrong_unit)
-              .about(called)
-              .got(plain ? fmt::format("{}, without a unit", said.text)
-                         : fmt::format("\"{}\", in {}", said.text, to_text(given->dimension)))
-              .expected(fmt::format("in {}, such as \"1 {}\"", to_text(wanted->dimension), unit)));
-      return std::nullopt;
-    }
-    const double si = parts->number * given->factor;
-    if ((sign == Sign::positive && !(si > 0.0)) || (sign == Sign::not_negative && !(si >= 0.0))) {
-      document_.refuse(
-          section, said.name,
-          Error(sign == Sign::positive ? ArgumentError::not_positive : ArgumentError::out_of_range)
-              .about(called)
-              .got(said.text)
-              .expected(sign == Sign::positive ? "greater than zero" : "zero or greater"));
-      return std::nullopt;
-    }
-    return si;
+    document_.refuse(section, said.name, std::move(read).error());
+    return std::nullopt;
   }
 
   /// Values by the names of states and inputs. @param x, u  Where they go; null: not allowed.
@@ -423,18 +392,6 @@ class ModelReader {
 };
 
 }  // namespace
-
-InputSignals::InputSignals(expression::Tape tape, std::vector<double> parameters)
-    : tape_(std::move(tape)), prepared_(tape_.size()) {
-  tape_.prepare<double>(parameters, prepared_);
-}
-
-Eigen::VectorXd InputSignals::operator()(double t) const {
-  std::vector<double> values = prepared_;
-  Eigen::VectorXd u(static_cast<Eigen::Index>(tape_.outputs()));
-  tape_.evaluate<double>({&t, 1}, {u.data(), tape_.outputs()}, values);
-  return u;
-}
 
 std::optional<ModelJob> model_job(TomlDocument& document, const Project& project) {
   return ModelReader(document, project).run();
