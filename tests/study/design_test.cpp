@@ -146,6 +146,7 @@ TEST(Design, RefusesWhatCannotBe) {
 
   // A battery whose sag takes all is called that, not friction.
   job = elevator_job();
+  job.plant.motor = *mechanisms::motor("NEO", 2);
   job.battery.resistance = 1e9;
   result = design(job);
   ASSERT_FALSE(result);
