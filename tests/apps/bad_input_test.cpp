@@ -220,7 +220,7 @@ TEST_F(BadInput, OptionsOfTheCommandLine) {
   expect("design project.toml --max-voltage -3V", 2, "--max-voltage");
   expect("design project.toml --delay -3ms", 2, "--delay");
   expect("design project.toml --seed banana", 2, "--seed");
-  expect("design project.toml --state-tolerance 2cm", 2, "--state-tolerance is 1 values long");
+  expect("design project.toml --state-tolerance 2cm", 2, "--state-tolerance is 1 value long");
   expect("design project.toml --goal 2V", 2, "--goal is \"2V\", a voltage");
   expect("analyze project.toml --mass 0kg", 2, "mass is 0 kg");
   expect("analyze model.json --mass 1kg", 2, "model.json");
