@@ -115,8 +115,14 @@ Error named(Error error, const ModelJob& job) {
     }
   }
   if (error.is(IntegrationError::not_finite) && x.size() == job.model.states()) {
-    if (auto checked = job.model.check(x, job.run.input(t), where, t); !checked) {
-      return std::move(checked).error();
+    // Where it stopped the model still has numbers; a little ahead it has not.
+    const VectorXd slope = job.model.derivative(x, job.run.input(t));
+    double h = 0.0;
+    for (int i = 0; i < 10; ++i, h = std::max(10.0 * h, 1e-9)) {
+      if (auto checked = job.model.check(x + h * slope, job.run.input(t + h), where, t + h);
+          !checked) {
+        return std::move(checked).error();
+      }
     }
   }
   return std::move(error).in(std::string(where));

@@ -22,10 +22,10 @@ TEST(SolveSystems, H2Norm) {
 
 // An answer that overflows is no answer; where infinity says something it stays.
 TEST(SolveSystems, WhatOverflowsIsRefused) {
-  EXPECT_EQ(
-      refusal("sampled-cost", R"({"A":[[0]],"B":[[1e308]],"Q":[[1e308]],"R":[[1e308]],"T":1e3})"),
-      "overflow");
-  const Json analysis = answer("analyze", R"({"A":[[-1]],"B":[[0]],"C":[[1]]})");
+  EXPECT_EQ(refusal("steady-state-feedforward", R"({"A":[[1]],"B":[[1e200]],"C":[[1]]})"),
+            "overflow");
+  const Json analysis =
+      answer("analyze", R"({"A":[[-1]],"B":[[0]],"C":[[1]],"domain":"continuous"})");
   EXPECT_EQ(analysis.at("controllability_condition"), "inf");
 }
 
