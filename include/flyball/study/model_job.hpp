@@ -18,6 +18,7 @@ struct NamedText {
   std::string text{};
   friend bool operator==(const NamedText&, const NamedText&) = default;
 };
+/// In the order of the file.
 using NamedTexts = std::vector<NamedText>;
 
 /// [model]: the names with their units, the parameters with their values, the formulas; in the
