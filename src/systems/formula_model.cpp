@@ -52,13 +52,12 @@ class PreparedTape {
     prepared_.resize(tape_.inputs() > 0 ? tape_.input_slot(0).index : tape_.size());
   }
 
-  /// Calls `use` with the results. @param inputs  Each a part of the tape's inputs, in order.
-  template <class Use, class... Inputs>
-  void evaluate(const VectorIn& p, const Use& use, const Inputs&... inputs) const noexcept {
+  /// Calls `use` with room for the inputs, room for the results, and what computes these from
+  /// those: as often as it is called, the parameters being looked at once.
+  template <class Use>
+  void open(const VectorIn& p, const Use& use) const noexcept {
     Room room(tape_.inputs() + tape_.size() + tape_.outputs());
     const std::span<double> in = room.take(tape_.inputs());
-    double* next = in.data();
-    ((next = std::copy_n(inputs.data(), inputs.size(), next)), ...);
     const std::span<double> values = room.take(tape_.size());
     const std::span<double> out = room.take(tape_.outputs());
     if (std::equal(parameters_.begin(), parameters_.end(), p.data())) {
@@ -66,8 +65,18 @@ class PreparedTape {
     } else {
       tape_.prepare<double>({p.data(), static_cast<std::size_t>(p.size())}, values);
     }
-    tape_.evaluate<double>(in, out, values);
-    use(std::span<const double>(out));
+    use(in, std::span<const double>(out), [&] { tape_.evaluate<double>(in, out, values); });
+  }
+
+  /// Calls `use` with the results. @param inputs  Each a part of the tape's inputs, in order.
+  template <class Use>
+  void evaluate(const VectorIn& x, const VectorIn& u, const VectorIn& p,
+                const Use& use) const noexcept {
+    open(p, [&](std::span<double> in, std::span<const double> out, const auto& compute) {
+      std::copy_n(u.data(), u.size(), std::copy_n(x.data(), x.size(), in.data()));
+      compute();
+      use(out);
+    });
   }
 
  private:
@@ -89,17 +98,14 @@ class PreparedDerivatives {
                 MatrixOut& second) const noexcept {
     first.setZero();
     second.setZero();
-    tape_.evaluate(
-        p,
-        [&](std::span<const double> values) {
-          for (std::size_t k = 0; k < entries_.size(); ++k) {
-            const auto row = static_cast<Eigen::Index>(entries_[k].row);
-            const auto column = static_cast<Eigen::Index>(entries_[k].column);
-            (column < first.cols() ? first(row, column) : second(row, column - first.cols())) =
-                values[rows_ + k];
-          }
-        },
-        x, u);
+    tape_.evaluate(x, u, p, [&](std::span<const double> values) {
+      for (std::size_t k = 0; k < entries_.size(); ++k) {
+        const auto row = static_cast<Eigen::Index>(entries_[k].row);
+        const auto column = static_cast<Eigen::Index>(entries_[k].column);
+        (column < first.cols() ? first(row, column) : second(row, column - first.cols())) =
+            values[rows_ + k];
+      }
+    });
   }
 
  private:
@@ -136,12 +142,12 @@ class FormulaModel final : public ModelFunctions {
   void derivative(const VectorIn& x, const VectorIn& u, const VectorIn& p,
                   VectorOut dxdt) const noexcept override {
     f_.value.evaluate(
-        p, [&](std::span<const double> values) { std::ranges::copy(values, dxdt.data()); }, x, u);
+        x, u, p, [&](std::span<const double> values) { std::ranges::copy(values, dxdt.data()); });
   }
   void output(const VectorIn& x, const VectorIn& u, const VectorIn& p,
               VectorOut y) const noexcept override {
-    h_.value.evaluate(
-        p, [&](std::span<const double> values) { std::ranges::copy(values, y.data()); }, x, u);
+    h_.value.evaluate(x, u, p,
+                      [&](std::span<const double> values) { std::ranges::copy(values, y.data()); });
   }
   void jacobians(const VectorIn& x, const VectorIn& u, const VectorIn& p, MatrixOut A,
                  MatrixOut B) const noexcept override {
@@ -157,6 +163,29 @@ class FormulaModel final : public ModelFunctions {
     MatrixOut rest(none);
     f_.by_parameters.evaluate(x, u, p, F, rest);
     h_.by_parameters.evaluate(x, u, p, H, rest);
+  }
+  void step(VectorOut x, const VectorIn& u, const VectorIn& p, double dt,
+            VectorOut work) const noexcept override {
+    f_.value.open(p, [&](std::span<double> in, std::span<const double> k, const auto& compute) {
+      const auto n = static_cast<std::size_t>(x.size());
+      double* const sum = work.data();
+      const auto stage = [&](double weight, double ahead) {
+        compute();
+        for (std::size_t i = 0; i < n; ++i) {
+          sum[i] += weight * k[i];
+          in[i] = x.data()[i] + ahead * k[i];
+        }
+      };
+      std::copy_n(u.data(), u.size(), std::copy_n(x.data(), x.size(), in.data()));
+      std::fill_n(sum, n, 0.0);
+      stage(1.0, 0.5 * dt);
+      stage(2.0, 0.5 * dt);
+      stage(2.0, dt);
+      stage(1.0, 0.0);
+      for (std::size_t i = 0; i < n; ++i) {
+        x.data()[i] += dt / 6.0 * sum[i];
+      }
+    });
   }
 
  private:

@@ -127,6 +127,28 @@ TEST(FormulaModel, TakesOtherParameters) {
   EXPECT_GT((model.derivative(x0, u0) - expected).norm(), 0.1);
 }
 
+TEST(FormulaModel, StepsAsTheCompiledModelAndDoesNotAllocate) {
+  const AnyModel formula = formula_model(cart_pole_formulas()).value();
+  for (const double l : {0.5, 0.7}) {  // as it was made, and changed
+    ModelStepper by_formula(formula.with_parameter("l", l).value());
+    VectorXd x = x0;
+    Eigen::Vector4d expected = x0;
+    const Eigen::Vector4d p(5.0, 0.5, l, 9.81);
+    const test::AllocationCounter count;
+    for (int i = 0; i < 100; ++i) {
+      by_formula.step(x, u0, 0.01);
+    }
+    EXPECT_EQ(test::counts_allocations() ? count.count() : 0U, 0U);
+    for (int i = 0; i < 100; ++i) {
+      expected =
+          rk4([&](const Eigen::Vector4d& at) { return CartPole{}.derivative(at, u0, p).eval(); },
+              expected, 0.01);
+    }
+    EXPECT_GT((x - x0).norm(), 0.5);
+    EXPECT_LT((x - expected).norm(), 1e-12);
+  }
+}
+
 TEST(FormulaModel, MayBeUsedByManyThreadsAndDoesNotAllocate) {
   const AnyModel model = formula_model(cart_pole_formulas()).value();
   const VectorXd expected = model.derivative(x0, u0);
