@@ -52,11 +52,11 @@ class StableLyapunov {
     }
     const double defect = measure();
     const double error = gain * (defect + epsilon * scale_);
-    answer_.residual = scale_ > 0.0 ? defect / scale_ : 0.0;
     answer_.condition = size_X_ > 0.0 ? std::max(1.0, gain * scale_ / size_X_) : gain;
     // Beyond, more corrections earn digits.
     if (!(answer_.condition < 1e4) || !(step <= 1e-10 * size_X_) ||
-        !(error <= 250.0 * n_() * epsilon * size_X_) || !holds_by_entries()) {
+        !(error <= 250.0 * n_() * epsilon * size_X_) || !holds_by_entries() ||
+        defect > 1e-6 * scale_) {
       return false;
     }
     for (int j = 0; j < n_(); ++j) {
@@ -194,10 +194,12 @@ class StableLyapunov {
       for (int i = 0; i < n; ++i) {
         const double size = data_.continuous ? T[i + j * ld()] + T[j + i * ld()]
                                              : terms[i + j * ld()] + X[i + j * ld()];
-        const double allowed = (16.0 + n) * epsilon * (size + std::abs(C_[i + j * ld()]));
-        if (!(std::abs(F_[i + j * ld()]) <= allowed)) {
+        const double left = std::abs(F_[i + j * ld()]);
+        const double all = size + std::abs(C_[i + j * ld()]);
+        if (!(left <= (16.0 + n) * epsilon * all)) {
           return false;
         }
+        answer_.residual = left > answer_.residual * all ? left / all : answer_.residual;
       }
     }
     return true;

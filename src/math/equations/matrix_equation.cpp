@@ -1,38 +1,34 @@
 #include <flyball/math/equations/matrix_equation.hpp>
 
 #include <cmath>
-#include <complex>
 #include <limits>
-#include <vector>
+#include <optional>
 
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/equations/lyapunov_kernel.hpp"
 #include "math/equations/sylvester_kernel.hpp"
-#include "math/extended/double_double.hpp"
+#include "math/equations/sylvester_operator.hpp"
 
 namespace flyball {
 
 namespace {
 
-using Complex = std::complex<double>;
+using detail::Domain;
+using detail::SylvesterOperator;
 using Eigen::Index;
-using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
+constexpr double infinity = std::numeric_limits<double>::infinity();
 
-enum class Domain { continuous, discrete };
-
-bool is_triangular(const MatrixXd& M) {
-  for (Index j = 0; j + 1 < M.cols(); ++j) {
-    if (!M.col(j).tail(M.rows() - j - 1).isZero(0.0)) {
-      return false;
-    }
-  }
-  return true;
-}
+/// An answer that leaves more of an entry of the equation than this share of its terms is none.
+constexpr double largest_backward_error = 1e-11;
+/// And where the terms cancel so far in sums of products that X's last digits are all that is left
+/// of them, the equation holds for no doubles.
+constexpr double largest_residual = 1e-4;
 
 /// As a product CᵀC is, whose entries are summed in different orders.
 bool is_symmetric_but_for_rounding(const MatrixRef& Q) {
@@ -47,206 +43,88 @@ bool is_symmetric_but_for_rounding(const MatrixRef& Q) {
   return true;
 }
 
-/// M = D U T Uᴴ D⁻¹ with D powers of two.
-struct Factor {
-  Eigen::VectorXd d;
-  MatrixXcd T;
-  MatrixXcd U;
-  bool converged = false;
-  double uncertainty = 0.0;  ///< Of the eigenvalues, by rounding.
+/// A X + X B = F or A X B - X = F; without B: B = Aᵀ.
+struct Problem {
+  Domain domain;
+  MatrixXd A;
+  std::optional<MatrixXd> B;
+  MatrixXd F;
+  bool symmetric;  ///< X is to be so to the last bit.
 };
 
-Factor factorize(const MatrixXd& M) {
-  Factor f;
-  f.d = detail::balance_of(M);
-  const MatrixXd balanced = f.d.cwiseInverse().asDiagonal() * M * f.d.asDiagonal();
-  if (is_triangular(balanced)) {
-    f.T = balanced.cast<Complex>();
-    f.U = MatrixXcd::Identity(M.rows(), M.cols());
-    f.converged = true;
-    return f;
+/// Neither huge nor tiny: the squares of such numbers are sums' terms without a loss.
+bool is_ordinary(const MatrixRef& M) {
+  const double largest = M.cwiseAbs().maxCoeff();
+  return largest == 0.0 || (largest < 0x1p200 && largest > 0x1p-200);
+}
+
+/// The power of two of a matrix's largest entry; 0 for a matrix of zeros.
+int exponent_of(const MatrixRef& M) {
+  const double largest = M.cwiseAbs().maxCoeff();
+  return largest > 0.0 ? std::ilogb(largest) : 0;
+}
+
+/// M_ij 2^(row_i + column_j + all).
+MatrixXd times_powers(const MatrixXd& M, const Eigen::VectorXi& row, const Eigen::VectorXi& column,
+                      int all) {
+  MatrixXd scaled(M.rows(), M.cols());
+  for (Index j = 0; j < M.cols(); ++j) {
+    for (Index i = 0; i < M.rows(); ++i) {
+      scaled(i, j) = std::ldexp(M(i, j), row(i) + column(j) + all);
+    }
   }
-  detail::ComplexSchur schur = detail::complex_schur_of(balanced);
-  f.T = std::move(schur.T);
-  f.U = std::move(schur.U);
-  f.converged = schur.converged;
-  f.uncertainty = epsilon * balanced.norm();
-  return f;
+  return scaled;
 }
 
-/// The factor of Mᵀ = D⁻¹ conj(U) Tᵀ Uᵀ D, with the order reversed so that it is upper triangular.
-Factor transposed(const Factor& f) {
-  return {f.d.cwiseInverse(), f.T.transpose().reverse(), f.U.conjugate().rowwise().reverse(),
-          f.converged, f.uncertainty};
+/// The exponents of the powers of two that balance M, whatever its size.
+Eigen::VectorXi balance_exponents(const MatrixXd& M) {
+  const VectorXd d = detail::balance_of(M * std::ldexp(0.5, -exponent_of(M)));
+  return d.unaryExpr([](double value) { return std::ilogb(value); }).cast<int>();
 }
 
-/// A X ± … as an operator on X, with its inverse by the triangular factors.
-class Equation {
+/// An equation in units in which A, B and F are of ordinary size, by powers of two:
+/// X = Da X' Db⁻¹ 2^unit, and time in another unit where it is continuous. Not `balanced`, Da and
+/// Db are one.
+class InOtherUnits {
  public:
-  Equation(Domain domain, const MatrixRef& A, const MatrixRef& B)
-      : domain_(domain), A_(A), B_(B), a_(factorize(A)), b_(factorize(B)) {}
-
-  /// The Lyapunov equation: B = Aᵀ shares the factors.
-  Equation(Domain domain, const MatrixRef& A)
-      : domain_(domain), A_(A), B_(A.transpose()), a_(factorize(A)), b_(transposed(a_)) {}
-
-  [[nodiscard]] Expected<void> check(std::string_view where) const {
-    if (!a_.converged || !b_.converged) {
-      return tl::unexpected(
-          Error(MatrixEquationError::no_convergence).in(std::string(where)).about("eigenvalues"));
+  explicit InOtherUnits(const Problem& p, bool balanced = true)
+      : a_(balanced ? balance_exponents(p.A) : Eigen::VectorXi(Eigen::VectorXi::Zero(p.A.rows()))),
+        b_(!p.B       ? Eigen::VectorXi(-a_)
+           : balanced ? balance_exponents(*p.B)
+                      : Eigen::VectorXi(Eigen::VectorXi::Zero(p.B->rows()))),
+        problem_{p.domain, times_powers(p.A, -a_, a_, 0), std::nullopt, {}, p.symmetric} {
+    int time = exponent_of(problem_.A);
+    if (p.B) {
+      problem_.B = times_powers(*p.B, -b_, b_, 0);
+      const int other = exponent_of(*problem_.B);
+      time = problem_.A.isZero(0.0) || (!problem_.B->isZero(0.0) && other > time) ? other : time;
     }
-    double smallest = std::numeric_limits<double>::infinity();
-    Complex worst_a;
-    Complex worst_b;
-    for (const Complex& a : a_.T.diagonal()) {
-      for (const Complex& b : b_.T.diagonal()) {
-        const bool continuous = domain_ == Domain::continuous;
-        const double gap = continuous ? std::abs(a + b) : std::abs(a * b - 1.0);
-        const double size = continuous ? std::abs(a) + std::abs(b) : std::abs(a * b) + 1.0;
-        const double blur = continuous
-                                ? a_.uncertainty + b_.uncertainty
-                                : a_.uncertainty * std::abs(b) + b_.uncertainty * std::abs(a);
-        const double ratio = gap == 0.0 ? 0.0 : gap / (epsilon * size + blur);
-        if (ratio < smallest) {
-          smallest = ratio;
-          worst_a = a;
-          worst_b = b;
-        }
+    if (p.domain == Domain::discrete) {
+      time = 0;
+    } else {
+      problem_.A = times_powers(p.A, -a_, a_, -time);
+      if (p.B) {
+        problem_.B = times_powers(*p.B, -b_, b_, -time);
       }
     }
-    if (smallest > 4.0) {
-      return {};
-    }
-    return tl::unexpected(
-        Error(MatrixEquationError::no_unique_solution)
-            .in(std::string(where))
-            .got(domain_ == Domain::continuous ? "two eigenvalues with the sum zero"
-                                               : "two eigenvalues with the product one")
-            .with("eigenvalue", std::vector<double>{worst_a.real(), worst_a.imag()})
-            .with("eigenvalue of the other side",
-                  std::vector<double>{worst_b.real(), worst_b.imag()}));
+    // The largest entry before the balance, then the one after it.
+    unit_ = exponent_of(p.F) - time;
+    unit_ += exponent_of(times_powers(p.F, -a_, b_, -unit_ - time));
+    problem_.F = times_powers(p.F, -a_, b_, -unit_ - time);
   }
 
-  /// The X of A X + X B = F, or of A X B - X = F.
-  [[nodiscard]] MatrixXd solve(const MatrixXd& F) const {
-    MatrixXcd Y = transform(F);
-    const MatrixXcd& S = a_.T;
-    const MatrixXcd& T = b_.T;
-    Eigen::VectorXcd known(Y.rows());
-    for (Index j = 0; j < Y.cols(); ++j) {
-      // Column j of S Y + Y T, or of S Y T - Y, by back substitution.
-      const Complex t = T(j, j);
-      const bool continuous = domain_ == Domain::continuous;
-      if (continuous) {
-        for (Index k = 0; k < j; ++k) {
-          Y.col(j) -= T(k, j) * Y.col(k);
-        }
-      } else {
-        known.setZero();
-        for (Index k = 0; k < j; ++k) {
-          known += T(k, j) * Y.col(k);
-        }
-        for (Index k = 0; k < S.cols(); ++k) {
-          Y.col(j).head(k + 1) -= known(k) * S.col(k).head(k + 1);
-        }
-      }
-      for (Index k = Y.rows() - 1; k >= 0; --k) {
-        const Complex pivot = continuous ? S(k, k) + t : S(k, k) * t - 1.0;
-        const Complex y = Y(k, j) / pivot;
-        Y(k, j) = y;
-        Y.col(j).head(k) -= (continuous ? y : y * t) * S.col(k).head(k);
-      }
-    }
-    const MatrixXcd left = detail::complex_product(a_.U, Y);
-    const MatrixXd X = detail::complex_product(left, b_.U.adjoint()).real();
-    return a_.d.asDiagonal() * X * b_.d.cwiseInverse().asDiagonal();
-  }
-
-  /// F minus the operator applied to X, in twice the working precision.
-  [[nodiscard]] MatrixXd residual(const MatrixXd& X, const MatrixXd& F) const {
-    using detail::add_product;
-    using Matrix = detail::DoubleDoubleMatrix;
-    if (domain_ == Domain::continuous) {
-      const Matrix rest = add_product(Matrix(F), -1.0, Matrix(A_), Matrix(X));
-      return add_product(rest, -1.0, Matrix(X), Matrix(B_)).rounded();
-    }
-    const Matrix rest = sum(Matrix(F), 1.0, Matrix(X));
-    return add_product(rest, -1.0, Matrix(A_), detail::product(Matrix(X), Matrix(B_))).rounded();
-  }
-
-  /// The same in working precision.
-  [[nodiscard]] MatrixXd defect(const MatrixXd& X, const MatrixXd& F) const {
-    if (domain_ == Domain::continuous) {
-      return F - detail::product(A_, X) - detail::product(X, B_);
-    }
-    return F + X - detail::product(A_, detail::product(X, B_));
-  }
-
-  /// The sum of the norms of the equation's terms.
-  [[nodiscard]] double scale(const MatrixXd& X, const MatrixXd& F) const {
-    if (domain_ == Domain::continuous) {
-      return detail::product(A_, X).norm() + detail::product(X, B_).norm() + F.norm();
-    }
-    return detail::product(A_, detail::product(X, B_)).norm() + X.norm() + F.norm();
-  }
+  [[nodiscard]] const Problem& problem() const noexcept { return problem_; }
+  [[nodiscard]] MatrixXd back(const MatrixXd& X) const { return times_powers(X, a_, -b_, unit_); }
+  [[nodiscard]] MatrixXd there(const MatrixXd& X) const { return times_powers(X, -a_, b_, -unit_); }
 
  private:
-  [[nodiscard]] MatrixXcd transform(const MatrixXd& F) const {
-    const MatrixXd scaled = a_.d.cwiseInverse().asDiagonal() * F * b_.d.asDiagonal();
-    const MatrixXcd left = detail::complex_product(a_.U.adjoint(), scaled.cast<Complex>());
-    return detail::complex_product(left, b_.U);
-  }
-
-  Domain domain_;
-  MatrixXd A_;
-  MatrixXd B_;
-  Factor a_;
-  Factor b_;
+  Eigen::VectorXi a_;
+  Eigen::VectorXi b_;
+  int unit_ = 0;
+  Problem problem_;
 };
 
-Expected<LinearMatrixSolution> solve(const Equation& equation, const MatrixXd& F, bool symmetric,
-                                     std::string_view where) {
-  FLYBALL_CHECK(equation.check(where));
-  LinearMatrixSolution solution;
-  MatrixXd& X = solution.X;
-  X = equation.solve(F);
-  double previous = std::numeric_limits<double>::infinity();
-  for (int pass = 0; pass < 10 && X.allFinite(); ++pass) {
-    const MatrixXd correction = equation.solve(equation.residual(X, F));
-    const double step = correction.norm();
-    if (!std::isfinite(step) || !(step < 0.5 * previous)) {
-      break;
-    }
-    X += correction;
-    if (symmetric) {
-      X = detail::symmetrized(X);
-    }
-    // The next step would be as much smaller than this one as this one is than X.
-    if (step <= 1e-12 * X.norm()) {
-      break;
-    }
-    previous = step;
-  }
-  if (!X.allFinite()) {
-    return tl::unexpected(Error(MatrixEquationError::overflow).in(std::string(where)));
-  }
-  const double scale = equation.scale(X, F);
-  solution.residual = scale > 0.0 ? equation.defect(X, F).norm() / scale : 0.0;
-  // ‖L⁻¹‖ from two matrices of signs, which no direction is orthogonal to.
-  double gain = 0.0;
-  for (const Index stride : {1, 3}) {
-    MatrixXd signs(X.rows(), X.cols());
-    for (Index k = 0; k < signs.size(); ++k) {
-      signs(k) = (k * stride + k / 5) % 2 == 0 ? 1.0 : -1.0;
-    }
-    gain = std::max(gain, equation.solve(signs).norm() / signs.norm());
-  }
-  solution.condition = X.norm() > 0.0 ? std::max(1.0, gain * scale / X.norm()) : gain;
-  return solution;
-}
-
-/// What the kernel makes of A X + X B = F or A X B - X = F, B null: Aᵀ; false where it does not
-/// vouch for it.
+/// What the kernels make of it; false where they do not vouch for it.
 bool solve_quickly(Domain domain, const MatrixRef& A, const MatrixRef* B, const MatrixXd& F,
                    bool symmetric, LinearMatrixSolution& solution) {
   if (A.outerStride() != A.rows() || (B != nullptr && B->outerStride() != B->rows())) {
@@ -266,6 +144,117 @@ bool solve_quickly(Domain domain, const MatrixRef& A, const MatrixRef* B, const 
   return true;
 }
 
+/// X by the triangular factors, corrected until no entry of the equation leaves more than rounding
+/// or nothing is gained any more.
+void solve_by_factors(const SylvesterOperator& equation, const Problem& p,
+                      LinearMatrixSolution& solution) {
+  MatrixXd X = equation.solve(p.F);
+  solution.residual = infinity;
+  double previous = infinity;
+  for (int pass = 0; pass < 12 && X.allFinite(); ++pass) {
+    if (p.symmetric) {
+      X = detail::symmetrized(X);
+    }
+    const double error = equation.backward_error(X, p.F).in_context;
+    if (error < solution.residual) {
+      solution.X = X;
+      solution.residual = error;
+    }
+    const MatrixXd correction = equation.solve(equation.residual(X, p.F));
+    const double step = correction.norm();
+    const bool settled = step <= 1e-12 * X.norm() && error <= 16.0 * epsilon;
+    if (!std::isfinite(step) || settled ||
+        (!(step < 0.5 * previous) && !(error > 16.0 * epsilon))) {
+      break;
+    }
+    X += correction;
+    previous = step;
+  }
+  // ‖L⁻¹‖ from two matrices of signs, which no direction is orthogonal to.
+  double gain = 0.0;
+  for (const Index stride : {1, 3}) {
+    MatrixXd signs(X.rows(), X.cols());
+    for (Index k = 0; k < signs.size(); ++k) {
+      signs(k) = (k * stride + k / 5) % 2 == 0 ? 1.0 : -1.0;
+    }
+    gain = std::max(gain, equation.solve(signs).norm() / signs.norm());
+  }
+  const double size = solution.X.norm();
+  const double scale = solution.X.size() > 0 ? equation.terms(solution.X, p.F).norm() : 0.0;
+  solution.condition = size > 0.0 ? std::max(1.0, gain * scale / size) : gain;
+}
+
+/// Whether X satisfies the equation by its largest entries, in the units of the caller.
+bool holds(const InOtherUnits& units, const MatrixXd& X) {
+  const Problem& p = units.problem();
+  const MatrixXd B = p.B ? *p.B : MatrixXd(p.A.transpose());
+  const MatrixXd there = units.there(X);
+  const auto largest = [](const MatrixXd& M) {
+    return M.allFinite() ? M.cwiseAbs().maxCoeff() : std::numeric_limits<double>::quiet_NaN();
+  };
+  const double left = largest(detail::sylvester_residual(p.domain, p.A, B, there, p.F));
+  const double terms = largest(detail::sylvester_terms(p.domain, p.A, B, there, p.F));
+  const MatrixXd XB = detail::product(there, B);
+  const double products = p.domain == Domain::continuous
+                              ? largest(detail::product(p.A, there)) + largest(XB)
+                              : largest(detail::product(p.A, XB)) + largest(there);
+  return units.back(there) == X && left <= largest_backward_error * terms &&
+         left <= largest_residual * (products + largest(p.F));
+}
+
+Expected<LinearMatrixSolution> solve_carefully(const Problem& given, std::string_view where) {
+  const InOtherUnits units(given);
+  const Problem& p = units.problem();
+  const SylvesterOperator equation =
+      p.B ? SylvesterOperator(p.domain, p.A, *p.B) : SylvesterOperator(p.domain, p.A);
+  // Of two answers the better, as they stand in the units of the caller: there they may have lost
+  // digits, or be infinite.
+  LinearMatrixSolution best;
+  detail::BackwardError error;
+  bool overflows = false;
+  const auto consider = [&](const LinearMatrixSolution& solution) {
+    const MatrixXd X = units.back(solution.X);
+    if (!X.allFinite()) {
+      overflows = overflows || solution.X.allFinite();
+      return;
+    }
+    const detail::BackwardError its = equation.backward_error(units.there(X), p.F);
+    if (its.strict < error.strict && holds(InOtherUnits(given, false), X)) {
+      best = {X, its.in_context, solution.condition};
+      error = its;
+    }
+  };
+  const auto unique = equation.check(where);
+  if (unique) {
+    LinearMatrixSolution solution;
+    solve_by_factors(equation, p, solution);
+    if (solution.X.size() > 0) {
+      consider(solution);
+    }
+  }
+  // Eigenvalues that cancel within the rounding of A's norm may be apart within that of its
+  // entries.
+  if (!(error.strict <= largest_backward_error)) {
+    if (auto direct = detail::solve_kronecker(equation, p.F)) {
+      if (!(direct->condition < (unique ? infinity : 1e-3 / epsilon))) {
+        return tl::unexpected(equation.not_solved(where));
+      }
+      consider({p.symmetric ? detail::symmetrized(direct->X) : direct->X, 0.0, direct->condition});
+    }
+  }
+  if (error.in_context <= largest_backward_error) {
+    return best;
+  }
+  if (overflows) {
+    return tl::unexpected(Error(MatrixEquationError::overflow).in(std::string(where)));
+  }
+  FLYBALL_CHECK(unique);
+  return tl::unexpected(Error(MatrixEquationError::not_accurate)
+                            .in(std::string(where))
+                            .got("entries too far apart for sixteen digits")
+                            .with("backward error", error.in_context));
+}
+
 Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A, const MatrixRef& Q,
                                               std::string_view where) {
   FLYBALL_CHECK(Checks(where)
@@ -274,6 +263,10 @@ Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A,
                     .finite(A, "A")
                     .finite(Q, "Q"));
   const bool symmetric = Q == Q.transpose();
+  const MatrixXd F = -Q;
+  if (!is_ordinary(A) || !is_ordinary(Q)) {
+    return solve_carefully({domain, A, std::nullopt, F, symmetric}, where);
+  }
   LinearMatrixSolution solution;
   if (is_symmetric_but_for_rounding(Q) && A.outerStride() == A.rows() &&
       Q.outerStride() == Q.rows()) {
@@ -281,17 +274,17 @@ Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A,
     detail::LyapunovAnswer answer{solution.X.data()};
     if (detail::solve_stable_lyapunov(
             {static_cast<int>(A.rows()), domain == Domain::continuous, A.data(), Q.data()},
-            answer)) {
+            answer) &&
+        solution.X.allFinite()) {
       solution.residual = answer.residual;
       solution.condition = answer.condition;
       return solution;
     }
   }
-  const MatrixXd F = -Q;
   if (solve_quickly(domain, A, nullptr, F, symmetric, solution)) {
     return solution;
   }
-  return solve(Equation(domain, A), F, symmetric, where);
+  return solve_carefully({domain, A, std::nullopt, F, symmetric}, where);
 }
 
 Expected<LinearMatrixSolution> solve_sylvester(Domain domain, const MatrixRef& A,
@@ -307,10 +300,11 @@ Expected<LinearMatrixSolution> solve_sylvester(Domain domain, const MatrixRef& A
   const double sign = domain == Domain::continuous ? 1.0 : -1.0;
   const MatrixXd F = sign * C;
   LinearMatrixSolution solution;
-  if (solve_quickly(domain, A, &B, F, false, solution)) {
+  if (is_ordinary(A) && is_ordinary(B) && is_ordinary(C) &&
+      solve_quickly(domain, A, &B, F, false, solution)) {
     return solution;
   }
-  return solve(Equation(domain, A, B), F, false, where);
+  return solve_carefully({domain, A, B, F, false}, where);
 }
 
 }  // namespace
@@ -320,6 +314,7 @@ ErrorInfo error_info(MatrixEquationError code) {
       {"no_unique_solution", "the equation has no unique solution", ErrorKind::no_answer},
       {"no_convergence", "the eigenvalues could not be computed", ErrorKind::no_answer},
       {"overflow", "the solution exceeds the largest double", ErrorKind::no_answer},
+      {"not_accurate", "no solution was found that satisfies the equation", ErrorKind::no_answer},
   };
   return detail::info_of(code, "matrix_equation", rows);
 }

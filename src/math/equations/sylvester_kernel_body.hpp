@@ -78,7 +78,7 @@ class HessenbergSchur {
       previous = step;
     }
     // Beyond, two eigenvalues may cancel but for rounding.
-    if (!(answer_.condition < 1e9)) {
+    if (!(answer_.condition < 1e9) || left_ > 1e-6 || !holds_by_entries()) {
       return false;
     }
     for (int j = 0; j < m_; ++j) {
@@ -319,8 +319,36 @@ class HessenbergSchur {
         R_[k] = F_[k] + X_[k] - second_[k];
       }
     }
-    answer_.residual = terms > 0.0 ? std::sqrt(sum_of_squares(R_)) / terms : 0.0;
+    // Where terms cancel so far in products' sums that rounding is what they have in common, others
+    // have to say whether that is an answer.
+    left_ = std::sqrt(sum_of_squares(R_)) / terms;
     answer_.condition = size > 0.0 ? std::max(1.0, gain * terms / size) : gain;
+  }
+
+  /// What is left of each entry of the equation is rounding beside the terms that made it.
+  bool holds_by_entries() {
+    const auto magnitudes = [](double* to, const double* from, int size) {
+      for (int k = 0; k < size; ++k) {
+        to[k] = std::abs(from[k]);
+      }
+    };
+    magnitudes(A_, A_, lda_ * n_);
+    magnitudes(B_, B_, ldb_ * m_);
+    magnitudes(Y_, X_, lda_ * m_);
+    multiply(rows(lda_), first_, lda_, Y_, lda_, B_, ldb_, m_, m_);
+    multiply(rows(lda_), second_, lda_, A_, lda_, data_.continuous ? Y_ : first_, lda_, n_, m_);
+    for (int j = 0; j < m_; ++j) {
+      for (int i = 0; i < n_; ++i) {
+        const int k = i + j * lda_;
+        const double terms = std::abs(F_[k]) + second_[k] + (data_.continuous ? first_[k] : Y_[k]);
+        const double left = std::abs(R_[k]);
+        if (!(left <= (16.0 + n_ + m_) * epsilon * terms)) {
+          return false;
+        }
+        answer_.residual = left > answer_.residual * terms ? left / terms : answer_.residual;
+      }
+    }
+    return true;
   }
 
   const SylvesterData& data_;
@@ -332,6 +360,7 @@ class HessenbergSchur {
   double *B_, *T_, *V_, *Vt_;
   double *F_, *X_, *R_, *first_, *second_, *Y_;
   double *known_, *vectors_, *da_, *db_;
+  double left_ = 0.0;  ///< What the products of the terms leave beside their norms.
 };
 
 bool solve_sylvester(const SylvesterData& data, SylvesterAnswer& answer, double* memory) {

@@ -13,13 +13,16 @@ enum class MatrixEquationError {
                        ///< (discrete).
   no_convergence,      ///< The eigenvalues could not be computed.
   overflow,            ///< An entry of the solution exceeds the largest double.
+  not_accurate,        ///< What was found leaves more than 1e-11 of an entry's terms.
 };
 [[nodiscard]] ErrorInfo error_info(MatrixEquationError code);
 
 /// The solution of a linear matrix equation, and how good it is.
 struct LinearMatrixSolution {
   Eigen::MatrixXd X;
-  double residual = 0.0;   ///< Norm of what is left of the equation / sum of its terms' norms.
+  /// What is left of an entry of the equation / the sum of the magnitudes of that entry's terms,
+  /// the largest over the entries: the relative change of the data of which X is exact.
+  double residual = 0.0;
   double condition = 0.0;  ///< Estimate: how much relative errors of the data grow in X.
 };
 
@@ -29,12 +32,14 @@ struct LinearMatrixSolution {
 /// corrected once by its residual in twice the working precision and taken where its residual times
 /// the condition vouches for it. Else by the real Schur form of the balanced A and, where the
 /// condition is not ordinary, by its complex one (Bartels and Stewart), both with the residual
-/// formed in twice the working precision and corrected until it is rounding.
+/// formed in twice the working precision and corrected until it is rounding. Data that is neither
+/// is first brought to other units by powers of two; what then remains of n m <= 100 unknowns is
+/// solved as so many linear equations in twice the working precision.
 ///
 /// @param A  n x n, no two of whose eigenvalues add up to zero. It need not be stable.
 /// @param Q  n x n; X is symmetric where Q is.
 /// @errors   ArgumentError::wrong_shape, empty, not_finite; MatrixEquationError::no_unique_solution
-///           with the pair of eigenvalues as evidence.
+///           with the pair of eigenvalues as evidence; overflow; not_accurate.
 /// Cost: O(n³), allocates.
 ///
 /// Source: book, section 5.11.3, equation 5.3; Bartels and Stewart, Comm. ACM 15 (1972); Smith,
