@@ -46,15 +46,23 @@ Expected<void> check_values(const MatrixRef& A, const MatrixRef& B, const Matrix
   return Checks(where).symmetric(Q, "Q").symmetric(R, "R");
 }
 
-/// The same answers as check_finite and check_symmetric without their messages.
-bool finite(const double* values, int count) {
+/// The largest magnitude; not a number where one is not, infinite where one is.
+double largest(const double* values, int count) {
+  double most = 0.0;
   double sum = 0.0;
   for (int k = 0; k < count; ++k) {
+    most = std::max(most, std::abs(values[k]));
     sum += 0.0 * values[k];
   }
-  return sum == 0.0;
+  return most + sum;
 }
 
+/// Whether products of such numbers and their squares are far from the ends of the doubles' range.
+bool is_ordinary(double size) {
+  return size < 0x1p100 && (size == 0.0 || size > 0x1p-100);
+}
+
+/// The same answer as check_symmetric without its message; S finite.
 bool symmetric(const double* S, int n) {
   double largest = 0.0;
   double difference = 0.0;
@@ -64,7 +72,7 @@ bool symmetric(const double* S, int n) {
       difference = std::max(difference, std::abs(S[i + j * n] - S[j + i * n]));
     }
   }
-  return finite(S, n * n) && difference <= 1e-10 * largest;
+  return difference <= 1e-10 * largest;
 }
 
 }  // namespace
@@ -76,6 +84,7 @@ ErrorInfo error_info(RiccatiError code) {
       {"no_stabilizing_solution", "no stabilising solution exists", ErrorKind::no_answer},
       {"singular", "R + B'XB has no inverse", ErrorKind::no_answer},
       {"no_convergence", "no solution was found that could be verified", ErrorKind::no_answer},
+      {"overflow", "the solution exceeds the largest double", ErrorKind::no_answer},
   };
   return detail::info_of(code, "riccati", rows);
 }
@@ -86,9 +95,14 @@ Expected<void> solve_riccati(const RiccatiData& data, RiccatiAnswer& answer) {
   using ConstMap = Eigen::Map<const Eigen::MatrixXd>;
   const int n = data.states;
   const int m = data.inputs;
-  const bool acceptable = finite(data.A, n * n) && finite(data.B, n * m) && symmetric(data.Q, n) &&
-                          symmetric(data.R, m) && (data.N == nullptr || finite(data.N, n * m));
-  if (acceptable && solve_riccati_quickly(data, answer)) {
+  const double size_A = largest(data.A, n * n);
+  const bool ordinary = (is_ordinary(size_A) || (size_A < 1.0 && !data.continuous)) &&
+                        is_ordinary(largest(data.B, n * m)) &&
+                        is_ordinary(largest(data.Q, n * n)) &&
+                        is_ordinary(largest(data.R, m * m)) &&
+                        (data.N == nullptr || is_ordinary(largest(data.N, n * m)));
+  if (ordinary && symmetric(data.Q, n) && symmetric(data.R, m) &&
+      solve_riccati_quickly(data, answer)) {
     return {};
   }
   const ConstMap A(data.A, n, n);
@@ -98,8 +112,9 @@ Expected<void> solve_riccati(const RiccatiData& data, RiccatiAnswer& answer) {
   const Eigen::MatrixXd N = data.N == nullptr ? Eigen::MatrixXd(Eigen::MatrixXd::Zero(n, m))
                                               : Eigen::MatrixXd(ConstMap(data.N, n, m));
   FLYBALL_CHECK(check_values(A, B, Q, R, N, data.continuous ? "care" : "dare"));
+  const RiccatiProblem problem{A, B, symmetrized(Q), symmetrized(R), N, data.continuous};
   FLYBALL_TRY(auto solution,
-              solve_riccati_robustly({A, B, symmetrized(Q), symmetrized(R), N, data.continuous}));
+              ordinary ? solve_riccati_robustly(problem) : solve_riccati_in_other_units(problem));
   Eigen::Map<Eigen::MatrixXd>(answer.X, n, n) = solution.X;
   Eigen::Map<Eigen::MatrixXd>(answer.K, m, n) = solution.K;
   Eigen::Map<Eigen::VectorXcd>(answer.poles, n) = solution.poles;

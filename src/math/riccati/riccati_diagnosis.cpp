@@ -16,8 +16,12 @@ using Eigen::MatrixXd;
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
-std::vector<double> parts(std::complex<double> value) {
-  return {value.real(), value.imag()};
+/// An eigenvalue, or a part of one, in the units of the caller.
+double in_units(const RiccatiProblem& p, double value) {
+  return std::ldexp(value, p.rate);
+}
+std::vector<double> parts(const RiccatiProblem& p, std::complex<double> value) {
+  return {in_units(p, value.real()), in_units(p, value.imag())};
 }
 
 /// What the Hamiltonian matrix [A -G; -H -Aᵀ] says: its eigenvalues on the imaginary axis would be
@@ -58,14 +62,15 @@ Error diagnose_continuous(const RiccatiProblem& p) {
         .got("left with a mode on the imaginary axis")
         .expected("left of it")
         .hint("weigh that mode in Q, so that the controller has to move it")
-        .with("eigenvalue", parts(on_axis))
-        .with("distance from the imaginary axis", closest);
+        .with("eigenvalue", parts(p, on_axis))
+        .with("distance from the imaginary axis", in_units(p, closest));
   }
   return Error(RiccatiError::no_convergence)
       .in("care")
       .about("X")
       .hint("check the scaling of A, B, Q and R, and whether Q and R are the weights of a minimum")
-      .with("distance of the Hamiltonian's eigenvalues from the imaginary axis", closest);
+      .with("distance of the Hamiltonian's eigenvalues from the imaginary axis",
+            in_units(p, closest));
 }
 
 }  // namespace
@@ -103,8 +108,8 @@ Error diagnose_riccati(const RiccatiProblem& p) {
           .in(where)
           .about("(A, B)")
           .hint("give this mode an input, or take it out of the model")
-          .with("eigenvalue", parts(eigenvalues(k)))
-          .with("magnitude", std::abs(eigenvalues(k)));
+          .with("eigenvalue", parts(p, eigenvalues(k)))
+          .with("magnitude", in_units(p, std::abs(eigenvalues(k))));
     }
   }
 
@@ -176,7 +181,7 @@ Error diagnose_riccati(const RiccatiProblem& p) {
         .got("left with a mode on the unit circle")
         .expected("inside it")
         .hint("weigh that mode in Q, so that the controller has to move it")
-        .with("eigenvalue", parts(on_circle))
+        .with("eigenvalue", parts(p, on_circle))
         .with("distance from the unit circle", closest);
   }
   return Error(RiccatiError::no_convergence)

@@ -238,8 +238,8 @@ class Kernel {
   bool close_loop();
   /// Errors are measured in the coordinates Dx, d = √X_ii, in which X has a unit diagonal: states
   /// in other units (metres beside metres per second) must not make the answer look worse than it
-  /// is.
-  void scale_states();
+  /// is. False where X has none.
+  bool scale_states();
   void measure();
   /// One step of Newton's method with the residual in twice the working precision; its norm in the
   /// coordinates of `scale_states`.

@@ -83,13 +83,15 @@ inline bool Kernel<N>::close_loop() {
       answer_.X[i + j * n] = X[i + j * ld()];
     }
   }
-  scale_states();
+  if (!scale_states()) {
+    return false;
+  }
   measure();
   return true;
 }
 
 template <int N>
-inline void Kernel<N>::scale_states() {
+inline bool Kernel<N>::scale_states() {
   double* const V = V_;
   double* const X = X_;
   const int n = n_();
@@ -98,8 +100,14 @@ inline void Kernel<N>::scale_states() {
   d_ = d;
   d_inverse_ = d_inverse;
   double largest = 0.0;
+  double least = 0.0;
   for (int i = 0; i < n; ++i) {
     largest = std::max(largest, X[i + i * ld()]);
+    least = std::min(least, X[i + i * ld()]);
+  }
+  // Of an X that is indefinite the diagonal gives no units.
+  if (least < -1e-8 * largest) {
+    return false;
   }
   for (int i = 0; i < n; ++i) {
     d[i] = std::sqrt(std::max(X[i + i * ld()], 1e-16 * largest));
@@ -113,6 +121,7 @@ inline void Kernel<N>::scale_states() {
       V[i + j * ld()] *= d[i] * d_inverse[j];
     }
   }
+  return true;
 }
 
 template <int N>

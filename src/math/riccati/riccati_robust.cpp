@@ -4,6 +4,7 @@
 
 #include <flyball/core/random.hpp>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/riccati/riccati_robust.hpp"
 
@@ -151,14 +152,15 @@ Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem) 
                          d.asDiagonal() * problem.Q * d.asDiagonal(),
                          problem.R,
                          d.asDiagonal() * problem.N,
-                         problem.continuous};
+                         problem.continuous,
+                         problem.rate};
   const auto answer = solve_riccati_extended(p);
   if (!answer) {
     return tl::unexpected(diagnose_riccati(p));
   }
   RiccatiSolution solution;
-  solution.X = inverse.asDiagonal() * answer->X * inverse.asDiagonal();
-  solution.K = answer->K * inverse.asDiagonal();
+  solution.X = answer->X;
+  solution.K = answer->K;
   solution.poles = eigenvalues_of(answer->closed_loop);
   if (!solution.X.allFinite() || !solution.K.allFinite()) {
     return tl::unexpected(diagnose_riccati(p));
@@ -180,10 +182,29 @@ Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem) 
     return tl::unexpected(std::move(why));
   }
   const double size = answer->X.norm();
-  solution.residual = answer->scale > 0.0 ? answer->residual / answer->scale : 0.0;
   solution.condition = size > 0.0 ? answer->gain * answer->scale / size : answer->gain;
   solution.iterations = answer->iterations;
+  FLYBALL_CHECK(check_riccati(p, solution));
+  solution.X = inverse.asDiagonal() * solution.X * inverse.asDiagonal();
+  solution.K = solution.K * inverse.asDiagonal();
+  FLYBALL_CHECK(check_riccati(problem, solution));
   return solution;
+}
+
+Expected<void> check_riccati(const RiccatiProblem& p, RiccatiSolution& solution) {
+  constexpr double largest = 1e-10;
+  const double residual = riccati_residual(p, solution.X, solution.K);
+  solution.residual = std::max(solution.residual, residual);
+  if (!(residual <= largest)) {
+    return tl::unexpected(Error(RiccatiError::no_convergence)
+                              .in(p.continuous ? "care" : "dare")
+                              .about("X")
+                              .got("lost to rounding: it leaves more of the equation")
+                              .expected(format_number(largest) + " of its terms at most")
+                              .hint("choose units in which the numbers are nearer to 1")
+                              .with("residual", residual));
+  }
+  return {};
 }
 
 }  // namespace flyball::detail

@@ -14,6 +14,7 @@ struct RiccatiProblem {
   Eigen::MatrixXd R;
   Eigen::MatrixXd N;
   bool continuous = false;
+  int rate = 0;  ///< A is given in units of 2^rate, which its eigenvalues are told without.
 };
 
 /// M⁻¹ rhs for a symmetric M, equilibrated by powers of two first; `rcond` is that of the scaled M.
@@ -40,10 +41,9 @@ struct ExtendedRiccati {
   Eigen::MatrixXd X;
   Eigen::MatrixXd K;
   Eigen::MatrixXd closed_loop;
-  double gain = 0.0;      ///< ‖L⁻¹(I)‖ of the closed loop's Lyapunov operator.
-  double scale = 0.0;     ///< Sum of the norms of F's terms.
-  double residual = 0.0;  ///< ‖F(X)‖ of the rounded X.
-  bool cancels = false;   ///< Twice the working precision was not enough.
+  double gain = 0.0;     ///< ‖L⁻¹(I)‖ of the closed loop's Lyapunov operator.
+  double scale = 0.0;    ///< Sum of the norms of F's terms.
+  bool cancels = false;  ///< Twice the working precision was not enough.
   int iterations = 0;
 };
 
@@ -55,6 +55,21 @@ struct ExtendedRiccati {
 /// Balances, solves in twice the working precision, verifies; the careful way for data that the
 /// kernels do not vouch for.
 [[nodiscard]] Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem);
+
+/// Raises the residual to that of X and K as they stand.
+/// @errors RiccatiError::no_convergence where it is not small.
+[[nodiscard]] Expected<void> check_riccati(const RiccatiProblem& p, RiccatiSolution& solution);
+
+/// What X and K leave of the closed loop's equation, SᵀXS - X + [I -Kᵀ][Q N; Nᵀ R][I; -K] with
+/// S = A - BK, and of (R + BᵀXB)K = BᵀXA + Nᵀ, each beside the norms of its terms, the larger of
+/// the two; in twice the working precision. Both are zero exactly for a solution of the Riccati
+/// equation and its gain; F of a rounded X alone is not small where XB cancels.
+[[nodiscard]] double riccati_residual(const RiccatiProblem& p, const Eigen::MatrixXd& X,
+                                      const Eigen::MatrixXd& K);
+
+/// The same for data whose size has no room in doubles for products: in other units, by powers of
+/// two. K does not change when Q, R and N are multiplied by one number, nor X but for it.
+[[nodiscard]] Expected<RiccatiSolution> solve_riccati_in_other_units(const RiccatiProblem& problem);
 
 /// Why there is no answer.
 [[nodiscard]] Error diagnose_riccati(const RiccatiProblem& p);

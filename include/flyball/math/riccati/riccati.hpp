@@ -15,6 +15,7 @@ enum class RiccatiError {
   no_stabilizing_solution,  ///< Closed-loop poles cannot all be inside the unit circle.
   singular,                 ///< R + BᵀXB has no inverse.
   no_convergence,           ///< The iterations ended without an answer that could be verified.
+  overflow,                 ///< An entry of X or K exceeds the largest double.
 };
 [[nodiscard]] ErrorInfo error_info(RiccatiError code);
 
@@ -23,7 +24,9 @@ struct RiccatiSolution {
   Eigen::MatrixXd X;       ///< n x n, symmetric.
   Eigen::MatrixXd K;       ///< m x n, (R + BᵀXB)⁻¹(BᵀXA + Nᵀ): u = -K x.
   Eigen::VectorXcd poles;  ///< n, eigenvalues of A - BK, all inside the unit circle.
-  double residual = 0.0;   ///< ‖F(X)‖ / sum of the norms of F's terms (Frobenius).
+  /// What X leaves of F beside the sum of the norms of F's terms, or X and K of the closed loop's
+  /// equation and of K's beside theirs, in units in which X or the data is balanced. At most 1e-9.
+  double residual = 0.0;
   double condition = 0.0;  ///< Estimate: condition * residual estimates X's relative error.
   int iterations = 0;      ///< Doubling steps plus Newton steps; 0: a closed form.
 };
@@ -49,7 +52,7 @@ struct RiccatiSolution {
 ///           RiccatiError::no_stabilizing_solution with the eigenvalue of the symplectic pencil
 ///           that lies on the unit circle; RiccatiError::singular where R + BᵀXB is singular for
 ///           every X; RiccatiError::no_convergence, also where X exists but the last digits of
-///           A - BK decide whether it is stable.
+///           A - BK decide whether it is stable; RiccatiError::overflow.
 /// Cost: about 100 n³ operations for ordinary data; data that is badly scaled, near the unit circle
 /// or has a singular R is solved again with balancing, shifts and refinement in twice the working
 /// precision; up to twenty states that grow a thousandfold a step or hang on the inputs by 1e-6 in

@@ -1,0 +1,153 @@
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/try.hpp"
+#include "math/dense/dense.hpp"
+#include "math/riccati/riccati_robust.hpp"
+
+namespace flyball::detail {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXi;
+
+/// Exponents of powers of two: the states x = 2^states z, the inputs u = 2^inputs v, the cost in
+/// 2^weight, and, of a continuous equation, the rates in 2^rate.
+struct Units {
+  VectorXi states;
+  VectorXi inputs;
+  int weight = 0;
+  int rate = 0;
+};
+
+/// The units in which the entries that are not zero have the least sum of squared logarithms
+/// (Curtis and Reid, J. Inst. Maths Applics 10 (1972)).
+Units best_units(const RiccatiProblem& p) {
+  const Index n = p.A.rows();
+  const Index m = p.B.cols();
+  const Index weight = n + m;
+  const Index rate = weight + 1;
+  const Index unknowns = p.continuous ? n + m + 2 : n + m + 1;
+  MatrixXd normal = MatrixXd::Zero(unknowns, unknowns);
+  MatrixXd rhs = MatrixXd::Zero(unknowns, 1);
+  struct Term {
+    Index unknown;
+    double factor;
+  };
+  const auto add = [&](double entry, std::initializer_list<Term> terms) {
+    if (entry == 0.0) {
+      return;
+    }
+    const double size = std::log2(std::abs(entry));
+    for (const Term& a : terms) {
+      if (a.unknown >= unknowns) {
+        continue;
+      }
+      rhs(a.unknown, 0) -= a.factor * size;
+      for (const Term& b : terms) {
+        if (b.unknown < unknowns) {
+          normal(a.unknown, b.unknown) += a.factor * b.factor;
+        }
+      }
+    }
+  };
+  for (Index j = 0; j < n; ++j) {
+    for (Index i = 0; i < n; ++i) {
+      add(p.A(i, j), {{j, 1.0}, {i, -1.0}, {rate, -1.0}});
+      add(p.Q(i, j), {{i, 1.0}, {j, 1.0}, {weight, -1.0}, {rate, -1.0}});
+    }
+  }
+  for (Index j = 0; j < m; ++j) {
+    for (Index i = 0; i < n; ++i) {
+      add(p.B(i, j), {{n + j, 1.0}, {i, -1.0}});
+      add(p.N(i, j), {{i, 1.0}, {n + j, 1.0}, {weight, -1.0}});
+    }
+    for (Index i = 0; i < m; ++i) {
+      add(p.R(i, j), {{n + i, 1.0}, {n + j, 1.0}, {weight, -1.0}, {rate, 1.0}});
+    }
+  }
+  const MatrixXd best = solve_least_squares(normal, rhs);
+  const auto rounded = [&](Index first, Index count) -> VectorXi {
+    return best.col(0).segment(first, count).array().round().cast<int>();
+  };
+  return {rounded(0, n), rounded(n, m), rounded(weight, 1)(0),
+          p.continuous ? rounded(rate, 1)(0) : 0};
+}
+
+/// M_ij 2^(row_i + column_j + all).
+MatrixXd times_powers(const MatrixXd& M, const VectorXi& row, const VectorXi& column, int all) {
+  MatrixXd scaled(M.rows(), M.cols());
+  for (Index j = 0; j < M.cols(); ++j) {
+    for (Index i = 0; i < M.rows(); ++i) {
+      scaled(i, j) = std::ldexp(M(i, j), row(i) + column(j) + all);
+    }
+  }
+  return scaled;
+}
+
+/// The power of two of the largest entry.
+int exponent(const MatrixXd& M) {
+  const double largest = M.cwiseAbs().maxCoeff();
+  return largest > 0.0 ? std::ilogb(largest) : -2000;
+}
+
+}  // namespace
+
+Expected<RiccatiSolution> solve_riccati_in_other_units(const RiccatiProblem& given) {
+  const Units units = best_units(given);
+  const VectorXi& x = units.states;
+  const VectorXi& u = units.inputs;
+  const RiccatiProblem p{times_powers(given.A, -x, x, -units.rate),
+                         times_powers(given.B, -x, u, 0),
+                         times_powers(given.Q, x, x, -units.weight - units.rate),
+                         times_powers(given.R, u, u, -units.weight + units.rate),
+                         times_powers(given.N, x, u, -units.weight),
+                         given.continuous,
+                         units.rate};
+  const char* const where = p.continuous ? "care" : "dare";
+  if (!p.A.allFinite() || !p.B.allFinite() || !p.Q.allFinite() || !p.R.allFinite() ||
+      !p.N.allFinite()) {
+    return tl::unexpected(
+        Error(RiccatiError::no_convergence)
+            .in(where)
+            .about("A, B, Q and R")
+            .got("entries too far apart for doubles")
+            .hint("choose units in which the numbers are nearer to 1, and leave out what is zero"));
+  }
+  FLYBALL_TRY(auto solution, solve_riccati_robustly(p));
+  const MatrixXd X = times_powers(solution.X, -x, -x, units.weight);
+  const MatrixXd K = times_powers(solution.K, u, -x, units.rate);
+  solution.poles *= std::ldexp(1.0, units.rate);
+  if (!X.allFinite() || !K.allFinite() || !solution.poles.allFinite()) {
+    return tl::unexpected(
+        Error(RiccatiError::overflow)
+            .in(where)
+            .about(X.allFinite() ? "K" : "X")
+            .hint("choose units in which the numbers are nearer to 1: weights may be multiplied "
+                  "by any number"));
+  }
+  // As they stand: X may have lost digits where it is nearly too small for a double. And by its
+  // largest entries in the units of the states and the inputs that it was given in.
+  solution.X = times_powers(X, x, x, -units.weight);
+  solution.K = times_powers(K, -u, x, -units.rate);
+  FLYBALL_CHECK(check_riccati(p, solution));
+  const int rate = given.continuous ? exponent(given.A) : 0;
+  const int weight =
+      std::max({exponent(given.Q) - rate, exponent(given.R) + rate, exponent(given.N)});
+  const VectorXi none = VectorXi::Zero(std::max(given.A.rows(), given.B.cols()));
+  solution.X = times_powers(X, none, none, -weight);
+  solution.K = times_powers(K, none, none, -rate);
+  FLYBALL_CHECK(check_riccati({times_powers(given.A, none, none, -rate), given.B,
+                               times_powers(given.Q, none, none, -weight - rate),
+                               times_powers(given.R, none, none, -weight + rate),
+                               times_powers(given.N, none, none, -weight), given.continuous},
+                              solution));
+  solution.X = X;
+  solution.K = K;
+  return solution;
+}
+
+}  // namespace flyball::detail

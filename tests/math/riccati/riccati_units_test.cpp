@@ -1,0 +1,154 @@
+#include <cmath>
+
+#include <Eigen/Dense>
+#include <gtest/gtest.h>
+
+#include <flyball/core/random.hpp>
+#include <flyball/math/riccati/riccati.hpp>
+
+#include "support/laws.hpp"
+#include "support/random_systems.hpp"
+
+namespace flyball {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using test::LongMatrix;
+using test::scalar;
+using test::wide;
+
+Eigen::VectorXi powers(Random& random, Index count, int most) {
+  return Eigen::VectorXi::NullaryExpr(
+      count, [&] { return static_cast<int>(std::lround(random.uniform(-most, most))); });
+}
+
+/// M_ij 2^(row_i + column_j + all).
+MatrixXd in_units(const MatrixXd& M, const Eigen::VectorXi& row, const Eigen::VectorXi& column,
+                  int all = 0) {
+  MatrixXd scaled = M;
+  for (Index j = 0; j < M.cols(); ++j) {
+    for (Index i = 0; i < M.rows(); ++i) {
+      scaled(i, j) = std::ldexp(M(i, j), row(i) + column(j) + all);
+    }
+  }
+  return scaled;
+}
+
+// x = a² x b² ... with q = 0: X = R(A² - 1)/B², K = (A² - 1)/(A B), for weights of any size.
+TEST(RiccatiUnits, WeightsOfAnySize) {
+  for (const double r : {1e-310, 1e-300, 1e-200, 1e-155, 1e-30, 1e30, 1e155, 1e200, 1e300}) {
+    const auto s = dare(scalar(2), scalar(1), scalar(0), scalar(r));
+    ASSERT_TRUE(s.has_value()) << r << to_string(s.error());
+    EXPECT_NEAR(s->X(0, 0) / r, 3.0, r < 1e-305 ? 1e-12 : 1e-14) << r;
+    EXPECT_NEAR(s->K(0, 0), 1.5, 1e-14) << r;
+  }
+  const MatrixXd A = (MatrixXd(2, 2) << 2, 1, 0, 1).finished();
+  const MatrixXd B = (MatrixXd(2, 1) << 0, 1).finished();
+  const MatrixXd I = MatrixXd::Identity(2, 2);
+  for (const double w : {1e-300, 1e-100, 1.0, 1e150, 1e300}) {
+    const auto d = dare(A, B, w * I, scalar(w)).value();
+    const auto c = care(A, B, w * I, scalar(w)).value();
+    EXPECT_LE((d.K - (MatrixXd(1, 2) << 2.6404768030109373, 2.2400793355181503).finished()).norm(),
+              1e-14)
+        << w;
+    EXPECT_LE((c.K - (MatrixXd(1, 2) << 13.928203230275509, 6.464101615137754).finished()).norm(),
+              1e-13)
+        << w;
+  }
+  // X has no double, K has: it is told, not answered with an infinite X.
+  const auto beyond = dare(scalar(2), scalar(1e-10), scalar(0), scalar(1e300));
+  ASSERT_FALSE(beyond.has_value());
+  EXPECT_TRUE(beyond.error().is(RiccatiError::overflow)) << to_string(beyond.error());
+}
+
+// Time, states, inputs and cost in other units: the same X, K and poles in them.
+TEST(RiccatiUnits, DoNotMatter) {
+  Random random(41);
+  for (int trial = 0; trial < 400; ++trial) {
+    const Index n = 1 + trial % 5;
+    const Index m = 1 + trial % 2;
+    const MatrixXd A = test::random_matrix(random, n, n);
+    const MatrixXd B = test::random_matrix(random, n, m);
+    const MatrixXd Q = MatrixXd::Identity(n, n);
+    const MatrixXd R = MatrixXd::Identity(m, m);
+    const Eigen::VectorXi x = powers(random, n, 60);
+    const Eigen::VectorXi u = powers(random, m, 100);
+    const int weight = powers(random, 1, 300)(0);
+    const int rate = powers(random, 1, 200)(0);
+    for (const bool continuous : {false, true}) {
+      const int t = continuous ? rate : 0;
+      const auto solve = [&](const MatrixXd& a, const MatrixXd& b, const MatrixXd& q,
+                             const MatrixXd& r) {
+        return continuous ? care(a, b, q, r) : dare(a, b, q, r);
+      };
+      const auto plain = solve(A, B, Q, R).value();
+      const auto other = solve(in_units(A, x, -x, t), in_units(B, x, u),
+                               in_units(Q, -x, -x, weight + t), in_units(R, u, u, weight - t));
+      ASSERT_TRUE(other.has_value()) << trial << to_string(other.error());
+      const double close = 1e-13 * std::max(1.0, plain.condition);
+      EXPECT_LE((in_units(other->X, x, x, -weight) - plain.X).norm(), close * plain.X.norm())
+          << trial;
+      EXPECT_LE((in_units(other->K, u, x, -t) - plain.K).norm(), close * plain.K.norm()) << trial;
+      EXPECT_LE(other->residual, 1e-13);
+    }
+  }
+}
+
+// Whatever finite entries: an answer stabilises, and X and K satisfy the closed loop's equation.
+TEST(RiccatiUnits, AnyFiniteEntries) {
+  constexpr double palette[] = {0.0,    0.0,   1.0,     -1.0,    2.2e-16, 5e-324, 1e-310, 1e20,
+                                -1e-20, 1e154, -1e-154, 1.7e308, 3.0,     -2.0,   0.5};
+  Random random(43);
+  const auto any = [&](Index rows, Index columns) {
+    return MatrixXd(MatrixXd::NullaryExpr(rows, columns, [&] {
+      return palette[static_cast<std::size_t>(random.uniform() * std::size(palette))];
+    }));
+  };
+  const auto symmetric = [&](Index size) {
+    const MatrixXd half = any(size, size);
+    return MatrixXd(half.triangularView<Eigen::Lower>().toDenseMatrix() +
+                    half.triangularView<Eigen::StrictlyLower>().toDenseMatrix().transpose());
+  };
+  int answers = 0;
+  for (int trial = 0; trial < 1500; ++trial) {
+    const Index n = 1 + trial % 3;
+    const Index m = 1 + trial % 2;
+    const MatrixXd A = any(n, n);
+    const MatrixXd B = any(n, m);
+    const MatrixXd Q = symmetric(n);
+    const MatrixXd R = symmetric(m);
+    for (const bool continuous : {false, true}) {
+      const auto s = continuous ? care(A, B, Q, R) : dare(A, B, Q, R);
+      if (!s) {
+        continue;
+      }
+      ++answers;
+      ASSERT_TRUE(s->X.allFinite() && s->K.allFinite() && s->poles.allFinite()) << trial;
+      EXPECT_LE(s->residual, 1e-9);
+      const LongMatrix K = wide(s->K);
+      const LongMatrix X = wide(s->X);
+      const LongMatrix S = wide(A) - wide(B) * K;
+      const LongMatrix cost = wide(Q) + K.transpose() * wide(R) * K;
+      const LongMatrix XS = X * S;
+      const LongMatrix left = continuous ? LongMatrix(XS + XS.transpose() + cost)
+                                         : LongMatrix(S.transpose() * XS - X + cost);
+      const LongMatrix size = X.cwiseAbs() * S.cwiseAbs();
+      const LongMatrix terms =
+          (continuous ? LongMatrix(size + size.transpose())
+                      : LongMatrix(S.cwiseAbs().transpose() * size + X.cwiseAbs())) +
+          wide(Q).cwiseAbs() + K.cwiseAbs().transpose() * wide(R).cwiseAbs() * K.cwiseAbs();
+      EXPECT_LE(left.cwiseAbs().maxCoeff(), 1e-10L * terms.maxCoeff())
+          << trial << (continuous ? " continuous\n" : " discrete\n") << A << "\n\n"
+          << B << "\n\n"
+          << Q << "\n\n"
+          << R << "\n\n"
+          << s->X << "\n\n"
+          << s->K;
+    }
+  }
+  EXPECT_GT(answers, 100);
+}
+
+}  // namespace
+}  // namespace flyball
