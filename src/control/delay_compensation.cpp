@@ -41,11 +41,9 @@ Expected<std::vector<Eigen::MatrixXd>> latency_gains(const MatrixRef& K, const M
     periods = std::round(periods);
   }
   if (!(periods <= most_periods)) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("latency")
-                              .got(format_number(latency.si()) + " s")
-                              .expected("at most 10 000 periods"));
+    return refusal(ArgumentError::out_of_range, where, "latency")
+        .got(format_number(latency.si()) + " s")
+        .expected("at most 10 000 periods");
   }
   const auto starting = static_cast<std::size_t>(std::ceil(periods));
   const Eigen::MatrixXd closed = A - detail::product(B, K);

@@ -58,18 +58,13 @@ Expected<void> check_steps(std::size_t steps, Eigen::Index n, std::string_view w
   if (steps >= 1 && static_cast<double>(steps) * static_cast<double>(n * n) <= most_entries) {
     return {};
   }
-  return tl::unexpected(
-      Error(ArgumentError::out_of_range)
-          .in(std::string(where))
-          .about("steps")
-          .got(detail::format("{}", steps))
-          .expected(detail::format("from 1 to {:.0f}", most_entries / static_cast<double>(n * n))));
+  return refusal(ArgumentError::out_of_range, where, "steps")
+      .got(detail::format("{}", steps))
+      .expected(detail::format("from 1 to {:.0f}", most_entries / static_cast<double>(n * n)));
 }
 
-Error not_definite(std::string_view where, std::string_view what, std::size_t step) {
-  return Error(RiccatiError::singular)
-      .in(std::string(where))
-      .about(std::string(what))
+Refusal not_definite(std::string_view where, std::string_view what, std::size_t step) {
+  return refusal(RiccatiError::singular, where, what)
       .got("not positive definite")
       .hint("R must penalise every input")
       .with("step", static_cast<double>(step));
@@ -106,7 +101,7 @@ Expected<FiniteHorizonLqr> recursion(const auto& plant_at, std::size_t steps,
     const auto& [A, B] = plant_at(k);
     auto earlier = step_back(A, B, weights, design.S[k + 1]);
     if (!earlier) {
-      return tl::unexpected(not_definite(where, "R + B'SB", k));
+      return not_definite(where, "R + B'SB", k);
     }
     design.K[k] = std::move(earlier->K);
     design.S[k] = std::move(earlier->S);
@@ -183,11 +178,7 @@ Expected<FiniteHorizonLqr> finite_horizon_lqr(std::span<const DiscretizedMatrice
                                               const QuadraticCost& cost, const Weight& S_N) {
   constexpr std::string_view where = "finite_horizon_lqr";
   if (plants.empty()) {
-    return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(where))
-                              .about("plants")
-                              .got("empty")
-                              .expected("one plant a step"));
+    return refusal(ArgumentError::empty, where, "plants").got("empty").expected("one plant a step");
   }
   const Eigen::Index n = plants.front().A.rows();
   const Eigen::Index m = plants.front().B.cols();
@@ -217,7 +208,7 @@ Expected<FiniteHorizonLqr> continuous_finite_horizon_lqr(const MatrixRef& A, con
   }));
   FLYBALL_TRY(auto weights, check_weights(cost, S_T, n, B.cols(), where));
   if (!detail::cholesky_of(weights.R)) {
-    return tl::unexpected(not_definite(where, "R", count));
+    return not_definite(where, "R", count);
   }
   // The cross weight is a change of the input's origin: A - BR⁻¹Nᵀ, Q - NR⁻¹Nᵀ.
   const Eigen::MatrixXd R_B = detail::solve_symmetric(weights.R, B.transpose());
@@ -234,9 +225,7 @@ Expected<FiniteHorizonLqr> continuous_finite_horizon_lqr(const MatrixRef& A, con
     return tl::unexpected(Error(std::move(flow.error()).in(std::string(where))));
   }
   const auto unbounded = [&](std::size_t step) {
-    return Error(RiccatiError::singular)
-        .in(std::string(where))
-        .about("S")
+    return refusal(RiccatiError::singular, where, "S")
         .got("without bound within the horizon")
         .hint(
             "the cost has no minimum over so long a time: Q and the terminal weight must not "

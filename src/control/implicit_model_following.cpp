@@ -41,10 +41,9 @@ Expected<Eigen::MatrixXd> following_gain(const MatrixRef& A, const MatrixRef& B,
                                          const MatrixRef& A_ref, const Eigen::MatrixXd& Q,
                                          const Eigen::MatrixXd& R, const QuadraticCost& cost) {
   if (!detail::cholesky_of(cost.R)) {
-    return tl::unexpected(Error(RiccatiError::singular)
-                              .about("R + (CB)'Q(CB)")
-                              .got("not positive definite")
-                              .hint("give every input a weight in R"));
+    return refusal(RiccatiError::singular, {}, "R + (CB)'Q(CB)")
+        .got("not positive definite")
+        .hint("give every input a weight in R");
   }
   // Completing the square: u = -R⁻¹Nᵀx + u' leaves A - BR⁻¹Nᵀ and the cost Q - NR⁻¹Nᵀ.
   const Eigen::MatrixXd shift = detail::solve_symmetric(cost.R, cost.N.transpose());

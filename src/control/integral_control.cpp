@@ -35,16 +35,13 @@ Expected<void> check_trackable(const MatrixRef& A, const MatrixRef& B, const Mat
   if (smallest > 1e-12 * singular(0)) {
     return {};
   }
-  return tl::unexpected(Error(IntegralControlError::not_trackable)
-                            .in(std::string(where))
-                            .about("the plant")
-                            .hint("track fewer outputs, or others: each needs an input of its own "
-                                  "that moves it in steady state")
-                            .with("outputs", static_cast<double>(p))
-                            .with("inputs", static_cast<double>(B.cols()))
-                            .with("smallest singular value of [A - I, B; C, D], rows and columns "
-                                  "scaled",
-                                  smallest));
+  return refusal(IntegralControlError::not_trackable, where, "the plant")
+      .hint(
+          "track fewer outputs, or others: each needs an input of its own that moves it in steady "
+          "state")
+      .with("outputs", static_cast<double>(p))
+      .with("inputs", static_cast<double>(B.cols()))
+      .with("smallest singular value of [A - I, B; C, D], rows and columns scaled", smallest);
 }
 
 }  // namespace
@@ -105,11 +102,7 @@ Expected<Eigen::MatrixXd> input_error_gain(const MatrixRef& B, const MatrixRef& 
   constexpr std::string_view where = "input_error_gain";
   constexpr double negligible = 1e-9;
   if (B.size() == 0) {
-    return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(where))
-                              .about("B")
-                              .got("empty")
-                              .expected("states x inputs"));
+    return refusal(ArgumentError::empty, where, "B").got("empty").expected("states x inputs");
   }
   FLYBALL_CHECK(Checks(where)
                     .shape(B_error, B.rows(), B_error.cols(), "B_error", "states x disturbances")
@@ -118,11 +111,9 @@ Expected<Eigen::MatrixXd> input_error_gain(const MatrixRef& B, const MatrixRef& 
   Eigen::MatrixXd gain = detail::solve_least_squares(B, B_error);
   const double left = (detail::product(B, gain) - B_error).norm();
   if (left > negligible * B_error.norm()) {
-    return tl::unexpected(Error(IntegralControlError::not_matched)
-                              .in(std::string(where))
-                              .about("B_error")
-                              .hint("estimate a disturbance that enters where an input does")
-                              .with("share that no input cancels", left / B_error.norm()));
+    return refusal(IntegralControlError::not_matched, where, "B_error")
+        .hint("estimate a disturbance that enters where an input does")
+        .with("share that no input cancels", left / B_error.norm());
   }
   return gain;
 }

@@ -25,12 +25,9 @@ Expected<void> check_lqg(const MatrixRef& A, const MatrixRef& B, const MatrixRef
                     .finite(K_e, "K_e"));
   for (Eigen::Index i = 0; i < m; ++i) {
     if (!(u_min(i, 0) < u_max(i, 0))) {
-      return tl::unexpected(Error(ArgumentError::out_of_range)
-                                .in(std::string(where))
-                                .about(detail::format("u_min({})", i))
-                                .got(format_number(u_min(i, 0)))
-                                .expected(detail::format("below u_max({}), which is {}", i,
-                                                         format_number(u_max(i, 0)))));
+      return refusal(ArgumentError::out_of_range, where, detail::format("u_min({})", i))
+          .got(format_number(u_min(i, 0)))
+          .expected(detail::format("below u_max({}), which is {}", i, format_number(u_max(i, 0))));
     }
   }
   return {};

@@ -45,11 +45,9 @@ Expected<LqrDesign<>> solve(const MatrixRef& A, const MatrixRef& B, const Weight
 Expected<Eigen::MatrixXd> bryson(std::span<const double> tolerances, double rho) {
   constexpr std::string_view name = "bryson";
   if (tolerances.empty()) {
-    return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(name))
-                              .about("tolerances")
-                              .got("empty")
-                              .expected("one tolerance a state or input"));
+    return refusal(ArgumentError::empty, name, "tolerances")
+        .got("empty")
+        .expected("one tolerance a state or input");
   }
   FLYBALL_CHECK(check_positive(rho, name, "rho"));
   const auto n = static_cast<Eigen::Index>(tolerances.size());
@@ -67,11 +65,9 @@ Expected<Eigen::MatrixXd> bryson(std::span<const double> tolerances, double rho)
     }
     const double value = rho / (tolerance * tolerance);
     if (!std::isfinite(value) || value == 0.0) {
-      return tl::unexpected(Error(ArgumentError::out_of_range)
-                                .in(std::string(name))
-                                .about(entry)
-                                .got(format_number(tolerance))
-                                .expected("such that rho / tolerance^2 is a normal number"));
+      return refusal(ArgumentError::out_of_range, name, entry)
+          .got(format_number(tolerance))
+          .expected("such that rho / tolerance^2 is a normal number");
     }
     weight(i, i) = value;
   }

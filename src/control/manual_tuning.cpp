@@ -213,12 +213,9 @@ Expected<ManualTuning> tune_manually(const DiscreteSystem<>& plant, const Tuning
   };
   FLYBALL_TRY(auto gains, raise_kp(bench, first_gain(scenario), push(), velocity));
   if (gains.kp == 0.0) {
-    return tl::unexpected(Error(TuningError::nothing_improves)
-                              .in(std::string(where))
-                              .about("Kp")
-                              .hint("even a small one makes the loop oscillate: shorten the period "
-                                    "or the delay")
-                              .with("smallest Kp tried", first_gain(scenario)));
+    return refusal(TuningError::nothing_improves, where, "Kp")
+        .hint("even a small one makes the loop oscillate: shorten the period or the delay")
+        .with("smallest Kp tried", first_gain(scenario));
   }
   if (!velocity) {
     FLYBALL_TRY(gains, raise_kd(bench, gains, plant.period.si()));
@@ -232,12 +229,11 @@ Expected<ManualTuning> tune_manually(const DiscreteSystem<>& plant, const Tuning
   }
   FLYBALL_TRY(auto response, simulate_pid(plant, gains, scenario));
   if (std::abs(response.metrics.steady_state_error) >= std::abs(scenario.reference)) {
-    return tl::unexpected(Error(TuningError::nothing_improves)
-                              .in(std::string(where))
-                              .about("the loop")
-                              .hint("the plant needs more than its limits allow, or another "
-                                    "controller: see whether it is controllable")
-                              .with("error that remains", response.metrics.steady_state_error));
+    return refusal(TuningError::nothing_improves, where, "the loop")
+        .hint(
+            "the plant needs more than its limits allow, or another controller: see whether it is "
+            "controllable")
+        .with("error that remains", response.metrics.steady_state_error);
   }
   return ManualTuning{gains, std::move(bench.steps()), std::move(response)};
 }

@@ -18,15 +18,12 @@ Expected<void> check_states(const MechanismControllerDesign& design, Eigen::Inde
   if (n == wanted && !(flywheel && n == 2)) {
     return {};
   }
-  return tl::unexpected(
-      Error(ArgumentError::wrong_shape)
-          .in(std::string(where))
-          .about("the plant")
-          .got(n == 1 ? std::string("of one state") : detail::format("of {} states", n))
-          .expected(flywheel      ? "of one state, the velocity"
-                    : wanted == 1 ? "of one state, the position"
-                    : n == 1      ? "of two states, position and velocity"
-                             : "of one state, the position, or of two, position and velocity"));
+  return refusal(ArgumentError::wrong_shape, where, "the plant")
+      .got(n == 1 ? std::string("of one state") : detail::format("of {} states", n))
+      .expected(flywheel      ? "of one state, the velocity"
+                : wanted == 1 ? "of one state, the position"
+                : n == 1      ? "of two states, position and velocity"
+                              : "of one state, the position, or of two, position and velocity");
 }
 
 // The measurement is of the first state: what the plant's C and D have to say.
@@ -35,11 +32,9 @@ Expected<void> check_output(const DiscreteSystem<>& plant) {
   if (plant.C == first && plant.D.isZero(0.0)) {
     return {};
   }
-  return tl::unexpected(Error(ArgumentError::out_of_range)
-                            .in(std::string(where))
-                            .about("the plant's output")
-                            .got("a mixture of its states and input")
-                            .expected("its first state: C = [1 0], D = 0"));
+  return refusal(ArgumentError::out_of_range, where, "the plant's output")
+      .got("a mixture of its states and input")
+      .expected("its first state: C = [1 0], D = 0");
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 
 #include <flyball/core/argument.hpp>
 
+#include "core/try.hpp"
+
 namespace flyball {
 
 namespace {
@@ -18,23 +20,18 @@ double cut(double term) noexcept {
 
 Expected<void> check_limits(double low, double high, std::string_view name) {
   if (std::isnan(low) || std::isnan(high) || !(low < high)) {
-    return tl::unexpected(
-        Error(ArgumentError::out_of_range)
-            .in("Pid")
-            .about(std::string(name) + "_min")
-            .got(format_number(low))
-            .expected("below " + std::string(name) + "_max, which is " + format_number(high)));
+    return refusal(ArgumentError::out_of_range, "Pid", std::string(name) + "_min")
+        .got(format_number(low))
+        .expected("below " + std::string(name) + "_max, which is " + format_number(high));
   }
   return {};
 }
 
 Expected<void> check_zone(double zone) {
   return zone > 0.0 ? Expected<void>{}
-                    : tl::unexpected(Error(ArgumentError::not_positive)
-                                         .in("Pid")
-                                         .about("integral_zone")
-                                         .got(format_number(zone))
-                                         .expected("positive, or infinity for none"));
+                    : refusal(ArgumentError::not_positive, "Pid", "integral_zone")
+                          .got(format_number(zone))
+                          .expected("positive, or infinity for none");
 }
 
 }  // namespace

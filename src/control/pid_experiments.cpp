@@ -27,12 +27,9 @@ Expected<int> steps_of(double duration, double period, std::string_view where) {
   constexpr double most = 1e7;
   const double steps = std::round(duration / period);
   if (!(steps >= 2.0 && steps <= most)) {
-    return tl::unexpected(
-        Error(ArgumentError::out_of_range)
-            .in(std::string(where))
-            .about("duration")
-            .got(format_number(duration) + " s")
-            .expected("from 2 to 10 000 000 periods of " + format_number(period) + " s"));
+    return refusal(ArgumentError::out_of_range, where, "duration")
+        .got(format_number(duration) + " s")
+        .expected("from 2 to 10 000 000 periods of " + format_number(period) + " s");
   }
   return static_cast<int>(steps);
 }
@@ -127,11 +124,9 @@ Expected<UltimatePoint> relay_experiment(const DiscreteSystem<>& plant, double h
     x = (plant.A * x + plant.B.col(0) * (bias + side * height)).eval();
   }
   const auto no_cycle = [&](std::string hint) {
-    return tl::unexpected(Error(TuningError::no_oscillation)
-                              .in(std::string(where))
-                              .about("the plant")
-                              .hint(std::move(hint))
-                              .with("switches seen", switches));
+    return refusal(TuningError::no_oscillation, where, "the plant")
+        .hint(std::move(hint))
+        .with("switches seen", switches);
   };
   constexpr std::size_t needed = 5;
   if (upward.size() < needed) {
@@ -160,20 +155,16 @@ Expected<ReactionCurve> reaction_curve(std::span<const double> times,
   constexpr std::string_view where = "reaction_curve";
   constexpr std::size_t fewest = 10;
   if (times.size() != values.size() || times.size() < fewest) {
-    return tl::unexpected(Error(ArgumentError::wrong_shape)
-                              .in(std::string(where))
-                              .about("values")
-                              .got(detail::format("{} for {} times", values.size(), times.size()))
-                              .expected("as many as times, at least 10"));
+    return refusal(ArgumentError::wrong_shape, where, "values")
+        .got(detail::format("{} for {} times", values.size(), times.size()))
+        .expected("as many as times, at least 10");
   }
   for (std::size_t k = 0; k < times.size(); ++k) {
     FLYBALL_CHECK(Checks(where).finite(times[k], "times").finite(values[k], "values"));
     if (k > 0 && !(times[k] > times[k - 1])) {
-      return tl::unexpected(Error(ArgumentError::out_of_range)
-                                .in(std::string(where))
-                                .about(detail::format("times[{}]", k))
-                                .got(detail::format("{} after {}", times[k], times[k - 1]))
-                                .expected("later than the one before"));
+      return refusal(ArgumentError::out_of_range, where, detail::format("times[{}]", k))
+          .got(detail::format("{} after {}", times[k], times[k - 1]))
+          .expected("later than the one before");
     }
   }
   FLYBALL_CHECK(check_positive(std::abs(input_step), where, "input_step"));
@@ -183,14 +174,12 @@ Expected<ReactionCurve> reaction_curve(std::span<const double> times,
   const auto tail = values.subspan(values.size() - values.size() / 5);
   const auto [low, high] = std::minmax_element(tail.begin(), tail.end());
   if (!(std::abs(change) > 10.0 * (*high - *low))) {
-    return tl::unexpected(
-        Error(TuningError::no_reaction)
-            .in(std::string(where))
-            .about("the output")
-            .hint("wait until it has settled; a plant that integrates never does: "
-                  "tune it with a relay or by its poles")
-            .with("change", change)
-            .with("change in the last fifth", *high - *low));
+    return refusal(TuningError::no_reaction, where, "the output")
+        .hint(
+            "wait until it has settled; a plant that integrates never does: tune it with a relay "
+            "or by its poles")
+        .with("change", change)
+        .with("change in the last fifth", *high - *low);
   }
   const auto reached = [&](double level) {
     for (std::size_t k = 1; k < values.size(); ++k) {

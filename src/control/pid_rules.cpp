@@ -32,13 +32,10 @@ Expected<void> check_curve(const ReactionCurve& curve, std::string_view where, b
       !checked || !needs_delay || curve.delay > 0.0) {
     return checked;
   }
-  return tl::unexpected(
-      Error(ArgumentError::not_positive)
-          .in(std::string(where))
-          .about("the delay")
-          .got("zero")
-          .expected("positive")
-          .hint("without a delay any gain would do by this rule; use simc or pole placement"));
+  return refusal(ArgumentError::not_positive, where, "the delay")
+      .got("zero")
+      .expected("positive")
+      .hint("without a delay any gain would do by this rule; use simc or pole placement");
 }
 
 Expected<void> check_shape_of_motion(const MatrixRef& A, const MatrixRef& B,
@@ -46,11 +43,9 @@ Expected<void> check_shape_of_motion(const MatrixRef& A, const MatrixRef& B,
   if (A(0, 0) == 0.0 && A(0, 1) == 1.0 && B(0, 0) == 0.0 && B(1, 0) != 0.0) {
     return {};
   }
-  return tl::unexpected(Error(ArgumentError::malformed)
-                            .in(std::string(where))
-                            .about("the plant")
-                            .got("of other states")
-                            .expected("[position, velocity] with the input on the velocity"));
+  return refusal(ArgumentError::malformed, where, "the plant")
+      .got("of other states")
+      .expected("[position, velocity] with the input on the velocity");
 }
 
 Expected<void> check_shape_of_loop(double natural_frequency, double damping,

@@ -39,22 +39,18 @@ Expected<Eigen::VectorXcd> paired(const Eigen::VectorXcd& poles) {
     });
     if (partner == lower.end() ||
         std::abs(*partner - std::conj(pole)) > conjugate * std::max(1.0, std::abs(pole))) {
-      return tl::unexpected(Error(PolePlacementError::not_conjugate)
-                                .in(std::string(where))
-                                .about("poles")
-                                .hint("add the conjugate of each complex pole")
-                                .with("pole", {pole.real(), pole.imag()}));
+      return refusal(PolePlacementError::not_conjugate, where, "poles")
+          .hint("add the conjugate of each complex pole")
+          .with("pole", {pole.real(), pole.imag()});
     }
     lower.erase(partner);
     sorted.push_back(pole);
     sorted.push_back(std::conj(pole));
   }
   if (!lower.empty()) {
-    return tl::unexpected(Error(PolePlacementError::not_conjugate)
-                              .in(std::string(where))
-                              .about("poles")
-                              .hint("add the conjugate of each complex pole")
-                              .with("pole", {lower.front().real(), lower.front().imag()}));
+    return refusal(PolePlacementError::not_conjugate, where, "poles")
+        .hint("add the conjugate of each complex pole")
+        .with("pole", {lower.front().real(), lower.front().imag()});
   }
   return Eigen::VectorXcd(
       Eigen::Map<const Eigen::VectorXcd>(sorted.data(), static_cast<Eigen::Index>(sorted.size())));
@@ -221,13 +217,10 @@ Expected<PolePlacement<>> place_in_units(const MatrixRef& A, const MatrixRef& B,
   }
   if (!found || !found->reached.accepted()) {
     const detail::Reached reached = found ? found->reached : detail::Reached{};
-    return tl::unexpected(
-        Error(PolePlacementError::not_reached)
-            .in(std::string(where))
-            .about("(A, B)")
-            .hint("it is nearly uncontrollable: ask for poles nearer to those of A")
-            .with("largest distance of a pole from its place", reached.pole_error)
-            .with("condition of the eigenvectors", reached.condition));
+    return refusal(PolePlacementError::not_reached, where, "(A, B)")
+        .hint("it is nearly uncontrollable: ask for poles nearer to those of A")
+        .with("largest distance of a pole from its place", reached.pole_error)
+        .with("condition of the eigenvectors", reached.condition);
   }
   placed.K = found->K * units.cwiseInverse().asDiagonal();
   placed.poles = found->reached.poles;
@@ -257,19 +250,15 @@ Expected<void> check_arguments(const MatrixRef& A, const MatrixRef& B,
   FLYBALL_CHECK(check_square(A, where, "A"));
   const Eigen::Index n = A.rows();
   if (B.cols() == 0) {
-    return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(where))
-                              .about("B")
-                              .got("without columns")
-                              .expected("states x inputs with at least one input"));
+    return refusal(ArgumentError::empty, where, "B")
+        .got("without columns")
+        .expected("states x inputs with at least one input");
   }
   FLYBALL_CHECK(check_shape(B, n, B.cols(), where, "B", "states x inputs"));
   if (poles.size() != n) {
-    return tl::unexpected(Error(ArgumentError::wrong_shape)
-                              .in(std::string(where))
-                              .about("poles")
-                              .got(detail::format("{} numbers", poles.size()))
-                              .expected(detail::format("one pole a state ({})", n)));
+    return refusal(ArgumentError::wrong_shape, where, "poles")
+        .got(detail::format("{} numbers", poles.size()))
+        .expected(detail::format("one pole a state ({})", n));
   }
   return Checks(where)
       .finite(A, "A")

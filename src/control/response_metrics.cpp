@@ -16,21 +16,16 @@ constexpr std::string_view where = "response_metrics";
 
 Expected<void> check_samples(std::span<const double> times, std::span<const double> values) {
   if (values.size() != times.size() || times.size() < 2) {
-    return tl::unexpected(Error(ArgumentError::wrong_shape)
-                              .in(std::string(where))
-                              .about("values")
-                              .got(detail::format("{} for {} times", values.size(), times.size()))
-                              .expected("as many as times, at least two"));
+    return refusal(ArgumentError::wrong_shape, where, "values")
+        .got(detail::format("{} for {} times", values.size(), times.size()))
+        .expected("as many as times, at least two");
   }
   for (std::size_t k = 0; k < times.size(); ++k) {
     FLYBALL_CHECK(Checks(where).finite(times[k], "times").finite(values[k], "values"));
     if (k > 0 && !(times[k] > times[k - 1])) {
-      return tl::unexpected(
-          Error(ArgumentError::out_of_range)
-              .in(std::string(where))
-              .about(detail::format("times[{}]", k))
-              .got(format_number(times[k]))
-              .expected("after the one before it, " + format_number(times[k - 1])));
+      return refusal(ArgumentError::out_of_range, where, detail::format("times[{}]", k))
+          .got(format_number(times[k]))
+          .expected("after the one before it, " + format_number(times[k - 1]));
     }
   }
   return {};
@@ -48,12 +43,9 @@ Expected<ResponseMetrics> response_metrics(std::span<const double> times,
   const double start = values.front();
   const double step = reference - start;
   if (step == 0.0 || tolerance >= 1.0) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about(step == 0.0 ? "reference" : "tolerance")
-                              .got(format_number(step == 0.0 ? reference : tolerance))
-                              .expected(step == 0.0 ? "different from the first value"
-                                                    : "below 1, a share of the step"));
+    return refusal(ArgumentError::out_of_range, where, step == 0.0 ? "reference" : "tolerance")
+        .got(format_number(step == 0.0 ? reference : tolerance))
+        .expected(step == 0.0 ? "different from the first value" : "below 1, a share of the step");
   }
   // In units of the step: from 0 to 1, whichever way it goes.
   const auto share = [&](std::size_t k) { return (values[k] - start) / step; };

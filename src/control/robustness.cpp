@@ -46,11 +46,7 @@ Expected<void> judge_step(const detail::SampledLoop& loop, const Eigen::MatrixXd
 
 Expected<void> check_factors(const std::vector<double>& factors, std::string_view name) {
   if (factors.empty()) {
-    return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(where))
-                              .about(std::string(name))
-                              .got("empty")
-                              .expected("at least one factor"));
+    return refusal(ArgumentError::empty, where, name).got("empty").expected("at least one factor");
   }
   for (std::size_t i = 0; i < factors.size(); ++i) {
     FLYBALL_CHECK(check_positive(factors[i], where, detail::format("{} factor {}", name, i)));

@@ -130,12 +130,9 @@ Expected<PlantInputLoop> observer_regulator_loop(const MatrixRef& A, const Matri
                     .shape(K, 1, n, "K", "1 x states")
                     .shape(K_e, n, p, "K_e", "states x outputs"));
   if (!model.D.isZero(0.0)) {
-    return tl::unexpected(
-        Error(ArgumentError::out_of_range)
-            .in(std::string(where))
-            .about("the model's D")
-            .got("not zero")
-            .expected("zero: a measurement that contains the input closes a second loop"));
+    return refusal(ArgumentError::out_of_range, where, "the model's D")
+        .got("not zero")
+        .expected("zero: a measurement that contains the input closes a second loop");
   }
   // With the prediction q = x_hat⁻: x_hat = q + K_e (y - C q), u = -K x_hat, q⁺ = A x_hat + B u.
   const Eigen::MatrixXd I_KC = Eigen::MatrixXd::Identity(n, n) - K_e * model.C;
@@ -161,12 +158,9 @@ Expected<std::complex<double>> loop_response(const PlantInputLoop& loop, double 
   FLYBALL_CHECK(check_not_negative(frequency, where, "frequency", "rad/s"));
   const double nyquist = std::numbers::pi / loop.period.si();
   if (frequency > nyquist * (1.0 + 1e-12)) {
-    return tl::unexpected(
-        Error(ArgumentError::out_of_range)
-            .in(std::string(where))
-            .about("frequency")
-            .got(format_number(frequency) + " rad/s")
-            .expected("at most the Nyquist frequency, " + format_number(nyquist) + " rad/s"));
+    return refusal(ArgumentError::out_of_range, where, "frequency")
+        .got(format_number(frequency) + " rad/s")
+        .expected("at most the Nyquist frequency, " + format_number(nyquist) + " rad/s");
   }
   return detail::SampledLoop::create(loop).map([&](const detail::SampledLoop& sampled) {
     return sampled.response(frequency * loop.period.si());

@@ -20,12 +20,9 @@ Expected<void> check_limits(const Eigen::VectorXd& u_min, const Eigen::VectorXd&
                     .shape(u_max, m, 1, "u_max", "inputs x 1"));
   for (Eigen::Index i = 0; i < m; ++i) {
     if (!(u_min(i) < u_max(i))) {
-      return tl::unexpected(Error(ArgumentError::out_of_range)
-                                .in(std::string(where))
-                                .about(detail::format("u_min({})", i))
-                                .got(format_number(u_min(i)))
-                                .expected(detail::format("below u_max({}), which is {}", i,
-                                                         format_number(u_max(i)))));
+      return refusal(ArgumentError::out_of_range, where, detail::format("u_min({})", i))
+          .got(format_number(u_min(i)))
+          .expected(detail::format("below u_max({}), which is {}", i, format_number(u_max(i))));
     }
   }
   return {};
@@ -100,11 +97,9 @@ Expected<SaturatedStep> saturation_of_step(const DiscreteSystem<>& plant, const 
                     .finite(r, "r")
                     .also([&] { return check_limits(u_min, u_max, m, where); }));
   if (steps < 1 || steps > 10'000'000) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("steps")
-                              .got(detail::format("{}", steps))
-                              .expected("from 1 to 10000000"));
+    return refusal(ArgumentError::out_of_range, where, "steps")
+        .got(detail::format("{}", steps))
+        .expected("from 1 to 10000000");
   }
   SaturatedStep step;
   const Eigen::VectorXd demand = r - plant.A * r;

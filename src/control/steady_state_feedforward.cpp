@@ -33,11 +33,10 @@ Expected<SteadyStateFeedforward<>> solve(const MatrixRef& A, const MatrixRef& B,
     for (Eigen::Index i = 0; i < n + p; ++i) {
       const double size = std::max(terms(i, j), target(i, j));
       if (!(std::abs(rest(i, j)) <= left_over * size) && size > 0.0) {
-        return tl::unexpected(Error(FeedforwardError::no_steady_state)
-                                  .in(std::string(where))
-                                  .about(detail::format("output {}", first_output + j))
-                                  .hint("hold another output, or give the plant an input that can")
-                                  .with("what is left of its equation", rest.col(j).norm()));
+        return refusal(FeedforwardError::no_steady_state, where,
+                       detail::format("output {}", first_output + j))
+            .hint("hold another output, or give the plant an input that can")
+            .with("what is left of its equation", rest.col(j).norm());
       }
     }
   }
@@ -75,22 +74,19 @@ Expected<SteadyStateFeedforward<>> steady_state_feedforward_of_pairs(const Matri
   const Eigen::Index m = B.cols();
   const Eigen::Index p = C.rows();
   if (static_cast<Eigen::Index>(inputs.size()) != p) {
-    return tl::unexpected(Error(ArgumentError::wrong_shape)
-                              .in(std::string(where))
-                              .about("inputs")
-                              .got(detail::format("{} entries", inputs.size()))
-                              .expected(detail::format("one an output ({})", p)));
+    return refusal(ArgumentError::wrong_shape, where, "inputs")
+        .got(detail::format("{} entries", inputs.size()))
+        .expected(detail::format("one an output ({})", p));
   }
   SteadyStateFeedforward<> sum{Eigen::MatrixXd::Zero(n, p), Eigen::MatrixXd::Zero(m, p),
                                Eigen::MatrixXd::Zero(m, n)};
   for (Eigen::Index j = 0; j < p; ++j) {
     const int input = inputs[static_cast<std::size_t>(j)];
     if (input < 0 || input >= m) {
-      return tl::unexpected(Error(ArgumentError::out_of_range)
-                                .in(std::string(where))
-                                .about(detail::format("the input of output {}", j))
-                                .got(detail::format("{}", input))
-                                .expected(detail::format("from 0 to {}", m - 1)));
+      return refusal(ArgumentError::out_of_range, where,
+                     detail::format("the input of output {}", j))
+          .got(detail::format("{}", input))
+          .expected(detail::format("from 0 to {}", m - 1));
     }
     FLYBALL_TRY(const auto pair, solve(A, B.col(input), C.row(j), D.block(j, input, 1, 1), j));
     sum.N_x.col(j) = pair.N_x;
@@ -117,10 +113,8 @@ Expected<Eigen::MatrixXd> qr_weighted_gain(const MatrixRef& B, const Weight& Q, 
   const Eigen::MatrixXd Q_B = detail::product(weight_Q, B);
   const Eigen::MatrixXd inner = detail::symmetrized(detail::transposed_product(B, Q_B) + weight_R);
   if (m == 0 || !detail::cholesky_of(inner)) {
-    return tl::unexpected(Error(FeedforwardError::singular)
-                              .in(std::string(name))
-                              .about("B'QB + R")
-                              .hint("give every input a weight in R"));
+    return refusal(FeedforwardError::singular, name, "B'QB + R")
+        .hint("give every input a weight in R");
   }
   return detail::solve_symmetric(inner, Q_B.transpose());
 }

@@ -7,6 +7,7 @@
 
 #include "control/placement.hpp"
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball::detail {
 
@@ -15,7 +16,7 @@ namespace {
 using Complex = std::complex<double>;
 
 /// The answer to poles that leave out a mode yᴴx on which no input acts, yᴴ A = λ yᴴ, yᴴ B = 0.
-Error uncontrollable_mode(const Eigen::VectorXcd& y, const Eigen::VectorXd& units, Complex mode) {
+Refusal uncontrollable_mode(const Eigen::VectorXcd& y, const Eigen::VectorXd& units, Complex mode) {
   Eigen::VectorXd share = y.cwiseAbs().cwiseQuotient(units);
   share /= share.maxCoeff();
   std::string states;
@@ -24,8 +25,7 @@ Error uncontrollable_mode(const Eigen::VectorXcd& y, const Eigen::VectorXd& unit
       states += detail::format("{}{}", states.empty() ? "" : ", ", i);
     }
   }
-  return Error(PolePlacementError::not_controllable)
-      .about("(A, B)")
+  return refusal(PolePlacementError::not_controllable, {}, "(A, B)")
       .hint("keep this mode among the poles, or give it an input")
       .with("mode", {mode.real(), mode.imag()})
       .with("states it lives in (counted from 0)", states);
@@ -61,8 +61,8 @@ Expected<Eigen::VectorXcd> poles_to_move(const ControllableStaircase& form,
     const double along =
         std::abs((left.vectors.col(same).transpose() * right.vectors.col(i)).value());
     if (!(std::abs(wanted(static_cast<Eigen::Index>(match)) - mode) <= kept_within(mode, along))) {
-      return tl::unexpected(uncontrollable_mode(
-          form.Q.rightCols(rest).cast<Complex>() * left.vectors.col(same), units, mode));
+      return uncontrollable_mode(form.Q.rightCols(rest).cast<Complex>() * left.vectors.col(same),
+                                 units, mode);
     }
     stays[match] = true;
     staying.push_back(mode);

@@ -29,29 +29,20 @@ Expected<void> check_shape(const MatrixRef& M, Eigen::Index rows, Eigen::Index c
   if (M.rows() == rows && M.cols() == columns) {
     return {};
   }
-  return tl::unexpected(Error(ArgumentError::wrong_shape)
-                            .in(std::string(where))
-                            .about(std::string(name))
-                            .got(shape_text(M))
-                            .expected(meaning.empty()
-                                          ? detail::format("{}x{}", rows, columns)
-                                          : detail::format("{} ({}x{})", meaning, rows, columns)));
+  return refusal(ArgumentError::wrong_shape, where, name)
+      .got(shape_text(M))
+      .expected(meaning.empty() ? detail::format("{}x{}", rows, columns)
+                                : detail::format("{} ({}x{})", meaning, rows, columns));
 }
 
 Expected<void> check_square(const MatrixRef& M, std::string_view where, std::string_view name) {
   if (M.size() == 0) {
-    return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(where))
-                              .about(std::string(name))
-                              .got("empty")
-                              .expected("a square matrix with at least one row"));
+    return refusal(ArgumentError::empty, where, name)
+        .got("empty")
+        .expected("a square matrix with at least one row");
   }
   if (M.rows() != M.cols()) {
-    return tl::unexpected(Error(ArgumentError::wrong_shape)
-                              .in(std::string(where))
-                              .about(std::string(name))
-                              .got(shape_text(M))
-                              .expected("square"));
+    return refusal(ArgumentError::wrong_shape, where, name).got(shape_text(M)).expected("square");
   }
   return {};
 }
@@ -60,11 +51,9 @@ Expected<void> check_finite(const MatrixRef& M, std::string_view where, std::str
   for (Eigen::Index j = 0; j < M.cols(); ++j) {
     for (Eigen::Index i = 0; i < M.rows(); ++i) {
       if (!std::isfinite(M(i, j))) {
-        return tl::unexpected(Error(ArgumentError::not_finite)
-                                  .in(std::string(where))
-                                  .about(detail::format("{}({}, {})", name, i, j))
-                                  .got(format_number(M(i, j)))
-                                  .expected("a finite number"));
+        return refusal(ArgumentError::not_finite, where, detail::format("{}({}, {})", name, i, j))
+            .got(format_number(M(i, j)))
+            .expected("a finite number");
       }
     }
   }
@@ -75,11 +64,9 @@ Expected<void> check_finite(double value, std::string_view where, std::string_vi
   if (std::isfinite(value)) {
     return {};
   }
-  return tl::unexpected(Error(ArgumentError::not_finite)
-                            .in(std::string(where))
-                            .about(std::string(name))
-                            .got(format_number(value))
-                            .expected("a finite number"));
+  return refusal(ArgumentError::not_finite, where, name)
+      .got(format_number(value))
+      .expected("a finite number");
 }
 
 Expected<void> check_symmetric(const MatrixRef& M, std::string_view where, std::string_view name) {
@@ -88,15 +75,11 @@ Expected<void> check_symmetric(const MatrixRef& M, std::string_view where, std::
   for (Eigen::Index j = 0; j < M.cols(); ++j) {
     for (Eigen::Index i = 0; i < j; ++i) {
       if (!(std::abs(M(i, j) - M(j, i)) <= limit)) {
-        return tl::unexpected(
-            Error(ArgumentError::not_symmetric)
-                .in(std::string(where))
-                .about(std::string(name))
-                .got(detail::format(
-                    "not symmetric: entries ({0}, {1}) and ({1}, {0}) are {2:.17g} and "
-                    "{3:.17g}",
-                    i, j, M(i, j), M(j, i)))
-                .expected("symmetric"));
+        return refusal(ArgumentError::not_symmetric, where, name)
+            .got(detail::format(
+                "not symmetric: entries ({0}, {1}) and ({1}, {0}) are {2:.17g} and {3:.17g}", i, j,
+                M(i, j), M(j, i)))
+            .expected("symmetric");
       }
     }
   }
@@ -109,11 +92,9 @@ Expected<void> check_positive(double value, std::string_view where, std::string_
   if (value > 0.0) {
     return {};
   }
-  return tl::unexpected(Error(ArgumentError::not_positive)
-                            .in(std::string(where))
-                            .about(std::string(name))
-                            .got(with_unit(value, unit))
-                            .expected("greater than zero"));
+  return refusal(ArgumentError::not_positive, where, name)
+      .got(with_unit(value, unit))
+      .expected("greater than zero");
 }
 
 Expected<void> check_not_negative(double value, std::string_view where, std::string_view name,
@@ -122,11 +103,9 @@ Expected<void> check_not_negative(double value, std::string_view where, std::str
   if (value >= 0.0) {
     return {};
   }
-  return tl::unexpected(Error(ArgumentError::out_of_range)
-                            .in(std::string(where))
-                            .about(std::string(name))
-                            .got(with_unit(value, unit))
-                            .expected("zero or greater"));
+  return refusal(ArgumentError::out_of_range, where, name)
+      .got(with_unit(value, unit))
+      .expected("zero or greater");
 }
 
 Expected<void> check_within(double value, double low, double high, std::string_view where,
@@ -137,12 +116,9 @@ Expected<void> check_within(double value, double low, double high, std::string_v
   if (value >= low && value <= high) {
     return {};
   }
-  return tl::unexpected(
-      Error(ArgumentError::out_of_range)
-          .in(std::string(where))
-          .about(std::string(name))
-          .got(with_unit(value, unit))
-          .expected(detail::format("in [{}, {}]", format_number(low), format_number(high))));
+  return refusal(ArgumentError::out_of_range, where, name)
+      .got(with_unit(value, unit))
+      .expected(detail::format("in [{}, {}]", format_number(low), format_number(high)));
 }
 
 }  // namespace flyball

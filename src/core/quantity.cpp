@@ -9,6 +9,7 @@
 #include <flyball/core/text.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 #include "core/unit_table.hpp"
 
 namespace flyball {
@@ -245,12 +246,10 @@ Expected<Unit> parse_unit(std::string_view text) {
     return Unit{unit->dimension, unit->factor};
   }
   const std::string nearest = nearest_unit(text);
-  return tl::unexpected(Error(ArgumentError::wrong_unit)
-                            .about("unit")
-                            .got(detail::format("\"{}\", which is not known", text))
-                            .hint(nearest.empty()
-                                      ? "units are written like kg, cm, in, rpm, V"
-                                      : detail::format("did you mean \"{}\"?", nearest)));
+  return refusal(ArgumentError::wrong_unit, {}, "unit")
+      .got(detail::format("\"{}\", which is not known", text))
+      .hint(nearest.empty() ? "units are written like kg, cm, in, rpm, V"
+                            : detail::format("did you mean \"{}\"?", nearest));
 }
 
 Expected<double> parse_quantity(std::string_view text, Dimension dimension, std::string_view name) {
@@ -270,10 +269,9 @@ Expected<double> parse_quantity(std::string_view text, Dimension dimension, std:
                               .expected(expected()));
   }
   const auto not_finite = [&] {
-    return tl::unexpected(Error(ArgumentError::not_finite)
-                              .about(std::string(name))
-                              .got(detail::format("\"{}\"", text))
-                              .expected(detail::format("finite, {}", expected())));
+    return refusal(ArgumentError::not_finite, {}, name)
+        .got(detail::format("\"{}\"", text))
+        .expected(detail::format("finite, {}", expected()));
   };
   if (!std::isfinite(number)) {
     return not_finite();
@@ -281,27 +279,23 @@ Expected<double> parse_quantity(std::string_view text, Dimension dimension, std:
   const std::string_view unit_text =
       trim(digits.substr(static_cast<std::size_t>(end - digits.data())));
   if (unit_text.empty() && dimension != dimensionless) {
-    return tl::unexpected(Error(ArgumentError::wrong_unit)
-                              .about(std::string(name))
-                              .got(detail::format("\"{}\", without a unit", text))
-                              .expected(expected()));
+    return refusal(ArgumentError::wrong_unit, {}, name)
+        .got(detail::format("\"{}\", without a unit", text))
+        .expected(expected());
   }
   auto unit = parse_unit(unit_text);
   if (!unit) {
     const std::string nearest = nearest_unit(unit_text, dimension);
-    return tl::unexpected(Error(ArgumentError::wrong_unit)
-                              .about(std::string(name))
-                              .got(detail::format("\"{}\", in an unknown unit", text))
-                              .expected(expected())
-                              .hint(nearest.empty()
-                                        ? std::string("see the list of units in the docs")
-                                        : detail::format("did you mean \"{}\"?", nearest)));
+    return refusal(ArgumentError::wrong_unit, {}, name)
+        .got(detail::format("\"{}\", in an unknown unit", text))
+        .expected(expected())
+        .hint(nearest.empty() ? std::string("see the list of units in the docs")
+                              : detail::format("did you mean \"{}\"?", nearest));
   }
   if (unit->dimension != dimension) {
-    return tl::unexpected(Error(ArgumentError::wrong_unit)
-                              .about(std::string(name))
-                              .got(detail::format("\"{}\", {}", text, article(unit->dimension)))
-                              .expected(expected()));
+    return refusal(ArgumentError::wrong_unit, {}, name)
+        .got(detail::format("\"{}\", {}", text, article(unit->dimension)))
+        .expected(expected());
   }
   const double si = number * unit->factor;
   if (!std::isfinite(si)) {

@@ -5,16 +5,15 @@
 #include <utility>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball {
 
 Expected<void> TimeSeries::add(std::string name, std::string unit, std::vector<double> values) {
   if (values.size() != time_.size()) {
-    return tl::unexpected(Error(ArgumentError::wrong_shape)
-                              .in("TimeSeries::add")
-                              .about(name)
-                              .got(detail::format("{} values long", values.size()))
-                              .expected(detail::format("one value a row ({})", time_.size())));
+    return refusal(ArgumentError::wrong_shape, "TimeSeries::add", name)
+        .got(detail::format("{} values long", values.size()))
+        .expected(detail::format("one value a row ({})", time_.size()));
   }
   columns_.push_back({std::move(name), std::move(unit), std::move(values)});
   return {};

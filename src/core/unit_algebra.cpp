@@ -114,10 +114,9 @@ class Reader {
   }
 
   tl::unexpected<Error> malformed(std::string_view what) const {
-    return tl::unexpected(Error(ArgumentError::malformed)
-                              .about(detail::format("unit \"{}\"", text_))
-                              .got(detail::format("written with {}", what))
-                              .expected("a product of units such as \"kg m^2/s^2\""));
+    return refusal(ArgumentError::malformed, {}, detail::format("unit \"{}\"", text_))
+        .got(detail::format("written with {}", what))
+        .expected("a product of units such as \"kg m^2/s^2\"");
   }
 
   Expected<SiUnit> product(int depth) {
@@ -352,10 +351,9 @@ Expected<QuantityText> split_quantity(std::string_view text, std::string_view na
   double number = 0.0;
   const auto [end, status] = std::from_chars(digits, text.data() + text.size(), number);
   const auto refuse = [&](ArgumentError code, std::string_view expected) {
-    return tl::unexpected(Error(code)
-                              .about(std::string(name))
-                              .got(detail::format("\"{}\"", text))
-                              .expected(std::string(expected)));
+    return refusal(code, {}, name)
+        .got(detail::format("\"{}\"", text))
+        .expected(std::string(expected));
   };
   if (status == std::errc::result_out_of_range || !std::isfinite(number)) {
     return refuse(ArgumentError::not_finite, "a finite number with its unit");

@@ -10,11 +10,9 @@ namespace flyball {
 Expected<Eigen::MatrixXd> standard_deviations(std::span<const double> sigmas) {
   constexpr std::string_view where = "standard_deviations";
   if (sigmas.empty()) {
-    return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(where))
-                              .about("sigmas")
-                              .got("empty")
-                              .expected("one standard deviation a state or output"));
+    return refusal(ArgumentError::empty, where, "sigmas")
+        .got("empty")
+        .expected("one standard deviation a state or output");
   }
   const auto n = static_cast<Eigen::Index>(sigmas.size());
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);

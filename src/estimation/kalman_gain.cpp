@@ -102,11 +102,9 @@ Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const
 
   const auto filter = corrected(A, C, noise_Q, noise_R, dual->X);
   if (!filter) {
-    return tl::unexpected(Error(RiccatiError::singular)
-                              .in(std::string(where))
-                              .about("C P Cᵀ + R")
-                              .got("singular")
-                              .hint("give each output a noise of its own in R"));
+    return refusal(RiccatiError::singular, where, "C P Cᵀ + R")
+        .got("singular")
+        .hint("give each output a noise of its own in R");
   }
   KalmanGain<> gain;
   gain.K = filter->update.K.rounded();

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 #include "identification/estimates.hpp"
 #include "identification/output_error.hpp"
 
@@ -118,9 +119,8 @@ Expected<void> estimate_gains(const PreparedRecording& prepared, const Eigen::Ve
                               const Covariances& spread, const Bounds& bounds,
                               FeedforwardFit& fit) {
   if (spread.singular) {
-    return tl::unexpected(Error(IdentificationError::singular)
-                              .in("identify")
-                              .hint("record ramps and steps in both directions with more travel"));
+    return refusal(IdentificationError::singular, "identify")
+        .hint("record ramps and steps in both directions with more travel");
   }
   fit.kS = symmetric(x[parameter::static_friction],
                      spread.standard_error(unit_gradient(x.size(), parameter::static_friction)),
@@ -139,30 +139,24 @@ Expected<void> estimate_gains(const PreparedRecording& prepared, const Eigen::Ve
   const bool kV_at_bound =
       x[parameter::velocity_gain] <= 1.001 * bounds.lower[parameter::velocity_gain];
   if (!(fit.kV.value > 0.0) || kV_at_bound) {
-    return tl::unexpected(Error(IdentificationError::unphysical_gains)
-                              .in("identify")
-                              .about("kV")
-                              .got(detail::format("{:.4g} V/({}/s)", fit.kV.value, fit.unit))
-                              .expected("positive")
-                              .hint("check the signs and units of voltage and velocity"));
+    return refusal(IdentificationError::unphysical_gains, "identify", "kV")
+        .got(detail::format("{:.4g} V/({}/s)", fit.kV.value, fit.unit))
+        .expected("positive")
+        .hint("check the signs and units of voltage and velocity");
   }
   if (normal_95 * fit.kV.standard_error > 0.5 * fit.kV.value) {
-    return tl::unexpected(Error(IdentificationError::singular)
-                              .in("identify")
-                              .about("kV")
-                              .got(detail::format("{:.4g} ± {:.2g} V/({}/s)", fit.kV.value,
-                                                  normal_95 * fit.kV.standard_error, fit.unit))
-                              .expected("known to better than 50 %")
-                              .hint("record longer tests with more travel"));
+    return refusal(IdentificationError::singular, "identify", "kV")
+        .got(detail::format("{:.4g} ± {:.2g} V/({}/s)", fit.kV.value,
+                            normal_95 * fit.kV.standard_error, fit.unit))
+        .expected("known to better than 50 %")
+        .hint("record longer tests with more travel");
   }
   if (fit.r_squared < 0.5) {
-    return tl::unexpected(
-        Error(IdentificationError::unphysical_gains)
-            .in("identify")
-            .about("the simulated velocity")
-            .got(detail::format("unlike the measured one (R² = {:.2f})", fit.r_squared))
-            .hint("no gains of this model explain the log; check the mechanism's kind, the units "
-                  "and the signs"));
+    return refusal(IdentificationError::unphysical_gains, "identify", "the simulated velocity")
+        .got(detail::format("unlike the measured one (R² = {:.2f})", fit.r_squared))
+        .hint(
+            "no gains of this model explain the log; check the mechanism's kind, the units and the "
+            "signs");
   }
   return {};
 }

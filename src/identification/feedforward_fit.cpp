@@ -44,9 +44,7 @@ Expected<void> check_tests(const PreparedRecording& prepared) {
     }
   }
   if (prepared.runs.empty()) {
-    return tl::unexpected(Error(IdentificationError::no_data)
-                              .in(std::string(where))
-                              .hint("record the four tests again"));
+    return refusal(IdentificationError::no_data, where).hint("record the four tests again");
   }
   if (!any) {
     double voltage = 0.0;
@@ -61,32 +59,25 @@ Expected<void> check_tests(const PreparedRecording& prepared) {
         travel = std::max(travel, *high - *low);
       }
     }
-    return tl::unexpected(
-        Error(IdentificationError::no_motion)
-            .in(std::string(where))
-            .hint(voltage < 0.1
-                      ? "no voltage was applied either: the log was started but no test ran"
-                      : "check that the encoder counts and that the mechanism is free")
-            .with("largest voltage (V)", voltage)
-            .with("largest travel (" + prepared.unit + ")", travel));
+    return refusal(IdentificationError::no_motion, where)
+        .hint(voltage < 0.1 ? "no voltage was applied either: the log was started but no test ran"
+                            : "check that the encoder counts and that the mechanism is free")
+        .with("largest voltage (V)", voltage)
+        .with("largest travel (" + prepared.unit + ")", travel);
   }
   if (!ramps || !steps) {
-    return tl::unexpected(
-        Error(IdentificationError::missing_tests)
-            .in(std::string(where))
-            .about(ramps ? "dynamic tests (steps)" : "quasistatic tests (ramps)")
-            .got("missing or without usable motion")
-            .hint(ramps ? "ramps alone do not tell kA; record dynamic-forward and dynamic-reverse"
-                        : "steps alone do not tell friction from speed; record quasistatic-forward "
-                          "and quasistatic-reverse"));
+    return refusal(IdentificationError::missing_tests, where,
+                   ramps ? "dynamic tests (steps)" : "quasistatic tests (ramps)")
+        .got("missing or without usable motion")
+        .hint(ramps ? "ramps alone do not tell kA; record dynamic-forward and dynamic-reverse"
+                    : "steps alone do not tell friction from speed; record quasistatic-forward and "
+                      "quasistatic-reverse");
   }
   if (prepared.mechanism != MechanismKind::flywheel && !(forward && backward)) {
-    return tl::unexpected(Error(IdentificationError::missing_tests)
-                              .in(std::string(where))
-                              .about(forward ? "motion in reverse" : "motion forward")
-                              .got("missing")
-                              .hint("in one direction alone friction and gravity are one number; "
-                                    "record both directions"));
+    return refusal(IdentificationError::missing_tests, where,
+                   forward ? "motion in reverse" : "motion forward")
+        .got("missing")
+        .hint("in one direction alone friction and gravity are one number; record both directions");
   }
   return {};
 }
@@ -228,25 +219,21 @@ void add_runs(OutputErrorProblem& problem, const Eigen::VectorXd& x, Feedforward
 Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const FitOptions& options,
                                       std::vector<Diagnostic>& diagnostics) {
   if (!prepared.mechanism) {
-    return tl::unexpected(Error(IdentificationError::unknown_mechanism)
-                              .in(std::string(where))
-                              .hint("say which: flywheel, elevator or arm"));
+    return refusal(IdentificationError::unknown_mechanism, where)
+        .hint("say which: flywheel, elevator or arm");
   }
   FLYBALL_CHECK(check_tests(prepared));
   if (*prepared.mechanism == MechanismKind::arm && !prepared.has_position) {
-    return tl::unexpected(Error(IdentificationError::singular)
-                              .in(std::string(where))
-                              .about("the position")
-                              .got("missing or constant")
-                              .expected("the arm's angle, which its gravity depends on"));
+    return refusal(IdentificationError::singular, where, "the position")
+        .got("missing or constant")
+        .expected("the arm's angle, which its gravity depends on");
   }
   FLYBALL_TRY(auto gains, regress_gains(prepared));
   OutputErrorProblem problem(prepared, options);
   if (problem.residuals() < 10 * static_cast<std::size_t>(problem.parameters())) {
-    return tl::unexpected(Error(IdentificationError::too_short)
-                              .in(std::string(where))
-                              .hint("record longer tests")
-                              .with("usable values", static_cast<double>(problem.residuals())));
+    return refusal(IdentificationError::too_short, where)
+        .hint("record longer tests")
+        .with("usable values", static_cast<double>(problem.residuals()));
   }
   const Bounds bounds = make_bounds(problem, gains, options);
   ChannelScales scales;
@@ -295,7 +282,7 @@ FitReport identify_feedforward(const Recording& recording, const FitOptions& opt
   if (!prepared) {
     return {{}, {}, tl::unexpected(std::move(prepared).error())};
   }
-  FitReport report{*std::move(prepared), {}, tl::unexpected(Error(IdentificationError::no_data))};
+  FitReport report{*std::move(prepared), {}, refusal(IdentificationError::no_data)};
   report.diagnostics = report.prepared.diagnostics;
   report.fit = fit_prepared(report.prepared, options, report.diagnostics);
   return report;

@@ -9,13 +9,14 @@
 
 #include <flyball/identification/identification_error.hpp>
 
+#include "core/try.hpp"
+
 namespace flyball::identification {
 
 Expected<OneStepFit> fit_one_step(const PreparedRecording& recording) {
   using mechanisms::MechanismKind;
   if (!recording.mechanism) {
-    return tl::unexpected(
-        Error(IdentificationError::unknown_mechanism).in("fit_one_step").about("the mechanism"));
+    return refusal(IdentificationError::unknown_mechanism, "fit_one_step", "the mechanism");
   }
   const bool elevator = *recording.mechanism == MechanismKind::elevator;
   const bool arm = *recording.mechanism == MechanismKind::arm && recording.has_position;
@@ -43,21 +44,19 @@ Expected<OneStepFit> fit_one_step(const PreparedRecording& recording) {
   }
   const auto rows = static_cast<Eigen::Index>(next.size());
   if (rows < 10 * terms) {
-    return tl::unexpected(Error(IdentificationError::too_short)
-                              .in("fit_one_step")
-                              .hint("record longer tests")
-                              .with("rows in motion", static_cast<double>(rows)));
+    return refusal(IdentificationError::too_short, "fit_one_step")
+        .hint("record longer tests")
+        .with("rows in motion", static_cast<double>(rows));
   }
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const Eigen::MatrixXd regressors = Eigen::Map<const RowMajor>(values.data(), rows, terms);
   const Eigen::VectorXd x_next = Eigen::Map<const Eigen::VectorXd>(next.data(), rows);
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(regressors);
   if (qr.rank() < terms) {
-    return tl::unexpected(Error(IdentificationError::singular)
-                              .in("fit_one_step")
-                              .hint("record ramps and steps in both directions")
-                              .with("rank", static_cast<double>(qr.rank()))
-                              .with("gains", static_cast<double>(terms)));
+    return refusal(IdentificationError::singular, "fit_one_step")
+        .hint("record ramps and steps in both directions")
+        .with("rank", static_cast<double>(qr.rank()))
+        .with("gains", static_cast<double>(terms));
   }
   const Eigen::VectorXd solution = qr.solve(x_next);
 

@@ -29,13 +29,11 @@ Expected<void> check_columns(const TestRun& run, std::size_t index) {
   if (sized && moves) {
     return {};
   }
-  return tl::unexpected(
-      Error(ArgumentError::wrong_shape)
-          .in(std::string(where))
-          .about(detail::format("run {} ({})", index, to_string(run.kind)))
-          .got(detail::format("{} times, {} voltages, {} positions, {} velocities", rows,
-                              run.voltage.size(), run.position.size(), run.velocity.size()))
-          .expected("columns of one length, position or velocity among them"));
+  return refusal(ArgumentError::wrong_shape, where,
+                 detail::format("run {} ({})", index, to_string(run.kind)))
+      .got(detail::format("{} times, {} voltages, {} positions, {} velocities", rows,
+                          run.voltage.size(), run.position.size(), run.velocity.size()))
+      .expected("columns of one length, position or velocity among them");
 }
 
 /// Keeps the rows listed, in their order.

@@ -5,6 +5,8 @@
 #include <cctype>
 #include <utility>
 
+#include "core/try.hpp"
+
 namespace flyball::identification {
 namespace {
 
@@ -37,12 +39,9 @@ Expected<TestKind> parse_test_kind(std::string_view name) {
       return kind;
     }
   }
-  return tl::unexpected(Error(ArgumentError::unknown_name)
-                            .in("parse_test_kind")
-                            .about("the test")
-                            .got("'" + std::string(name) + "'")
-                            .expected("quasistatic-forward, quasistatic-reverse, dynamic-forward "
-                                      "or dynamic-reverse"));
+  return refusal(ArgumentError::unknown_name, "parse_test_kind", "the test")
+      .got("'" + std::string(name) + "'")
+      .expected("quasistatic-forward, quasistatic-reverse, dynamic-forward or dynamic-reverse");
 }
 
 }  // namespace flyball::identification

@@ -6,6 +6,7 @@
 
 #include <flyball/identification/identification_error.hpp>
 
+#include "core/try.hpp"
 #include "identification/start.hpp"
 #include "identification/statistics.hpp"
 #include "math/dense/dense.hpp"
@@ -61,10 +62,9 @@ Rows collect(const PreparedRecording& recording) {
 Expected<StartGains> regress_gains(const PreparedRecording& recording) {
   const Rows rows = collect(recording);
   if (rows.voltage.size() < 20) {
-    return tl::unexpected(Error(IdentificationError::too_short)
-                              .in("fit_feedforward")
-                              .hint("record longer tests")
-                              .with("rows in motion", static_cast<double>(rows.voltage.size())));
+    return refusal(IdentificationError::too_short, "fit_feedforward")
+        .hint("record longer tests")
+        .with("rows in motion", static_cast<double>(rows.voltage.size()));
   }
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(rows.voltage.size());
   Eigen::VectorXd gains = Eigen::VectorXd::Zero(5);

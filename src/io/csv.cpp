@@ -94,9 +94,7 @@ class Reader {
     }
     io::tidy(log_);
     if (log_.signals.empty() && log_.texts.empty()) {
-      Error error = Error(LogError::no_data)
-                        .in(source_)
-                        .about("the table")
+      Error error = refusal(LogError::no_data, source_, "the table")
                         .got("without one row that has a time and a value");
       return tl::unexpected(io::with_diagnostics(std::move(error), log_.diagnostics));
     }
@@ -110,12 +108,9 @@ class Reader {
 
   Expected<void> read_header() {
     if (table_.rows.empty() || table_.rows.front().size() < 2) {
-      return tl::unexpected(
-          Error(LogError::not_a_log)
-              .in(source_)
-              .about("the file")
-              .got("text without a table")
-              .expected("a CSV with a header and at least two columns, a SysId JSON or a WPILOG"));
+      return refusal(LogError::not_a_log, source_, "the file")
+          .got("text without a table")
+          .expected("a CSV with a header and at least two columns, a SysId JSON or a WPILOG");
     }
     const std::vector<std::string>& first = table_.rows.front();
     const bool headless = std::all_of(first.begin(), first.end(), [&](const std::string& cell) {
@@ -156,14 +151,14 @@ class Reader {
     for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
       const std::optional<double> value = number(cell(row, 0));
       if (other_unit || !value || (last && !(*value >= *last))) {
-        return tl::unexpected(
-            Error(LogError::no_time)
-                .in(fmt::format("{}:{}", source_, table_.lines[other_unit ? 0 : row]))
-                .about("the table")
-                .got("without a column of time")
-                .expected("a table with a column named Timestamp, Time or t, or with a first "
-                          "column whose numbers ascend")
-                .hint("name the column of time \"Time (s)\" in the header"));
+        return refusal(LogError::no_time,
+                       fmt::format("{}:{}", source_, table_.lines[other_unit ? 0 : row]),
+                       "the table")
+            .got("without a column of time")
+            .expected(
+                "a table with a column named Timestamp, Time or t, or with a first column whose "
+                "numbers ascend")
+            .hint("name the column of time \"Time (s)\" in the header");
       }
       last = value;
     }

@@ -96,11 +96,9 @@ class Splitter {
     for (;;) {
       const std::size_t quote = text_.find('"', at_);
       if (quote == std::string_view::npos) {
-        return tl::unexpected(Error(LogError::malformed)
-                                  .in(place(source_, text_, opened))
-                                  .about("the quoted cell")
-                                  .got("never closed")
-                                  .hint("close it with \", or remove the \""));
+        return refusal(LogError::malformed, place(source_, text_, opened), "the quoted cell")
+            .got("never closed")
+            .hint("close it with \", or remove the \"");
       }
       const std::string_view part = text_.substr(at_, quote - at_);
       line_ += static_cast<std::size_t>(std::count(part.begin(), part.end(), '\n'));

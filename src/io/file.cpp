@@ -44,24 +44,19 @@ std::string reason(int error) {
   return std::generic_category().message(error);
 }
 
-Error cannot_write(const std::string& path, int error) {
+Refusal cannot_write(const std::string& path, int error) {
   switch (error) {
     case ENOENT:
-      return Error(FileError::not_found)
-          .in(path)
-          .about("the folder of the file")
+      return refusal(FileError::not_found, path, "the folder of the file")
           .got("missing")
           .hint("make the folder, or give another path");
     case EISDIR:
-      return Error(FileError::is_a_folder)
-          .in(path)
-          .about("the path")
+      return refusal(FileError::is_a_folder, path, "the path")
           .got("a folder")
           .expected("a file")
           .hint("give a file name in it");
     default:
-      return Error(FileError::not_writable)
-          .in(path)
+      return refusal(FileError::not_writable, path)
           .hint("give a path in a folder that you may write to")
           .with("system", reason(error));
   }
@@ -88,10 +83,8 @@ std::string temporary_beside(const std::string& path) {
       .string();
 }
 
-Error not_a_file(const std::string& path, std::string what, std::string hint) {
-  return Error(FileError::not_a_file)
-      .in(path)
-      .about("the path")
+Refusal not_a_file(const std::string& path, std::string what, std::string hint) {
+  return refusal(FileError::not_a_file, path, "the path")
       .got(std::move(what))
       .expected("a file, or a pipe that something writes to")
       .hint(std::move(hint));
@@ -101,19 +94,17 @@ Error not_a_file(const std::string& path, std::string what, std::string hint) {
 Expected<struct stat> status_of(int fd, const std::string& path) {
   struct stat status{};
   if (::fstat(fd, &status) != 0) {
-    return tl::unexpected(Error(FileError::not_readable).in(path).with("system", reason(errno)));
+    return refusal(FileError::not_readable, path).with("system", reason(errno));
   }
   if (S_ISDIR(status.st_mode)) {
-    return tl::unexpected(Error(FileError::is_a_folder)
-                              .in(path)
-                              .about("the path")
-                              .got("a folder")
-                              .expected("a file")
-                              .hint("give one of the files in it"));
+    return refusal(FileError::is_a_folder, path, "the path")
+        .got("a folder")
+        .expected("a file")
+        .hint("give one of the files in it");
   }
   if (!S_ISREG(status.st_mode) && !S_ISFIFO(status.st_mode)) {
-    return tl::unexpected(not_a_file(path, ::isatty(fd) == 1 ? "a terminal" : "a device",
-                                     "give the name of the file"));
+    return not_a_file(path, ::isatty(fd) == 1 ? "a terminal" : "a device",
+                      "give the name of the file");
   }
   return status;
 }
@@ -140,16 +131,13 @@ Expected<std::string> read_file(const std::string& path, std::size_t max_bytes) 
   if (file.get() < 0) {
     const int error = errno;
     if (error == ENOENT || error == ENOTDIR) {
-      return tl::unexpected(Error(FileError::not_found)
-                                .in(path)
-                                .about("the file")
-                                .got("missing")
-                                .hint("check the spelling and the folder"));
+      return refusal(FileError::not_found, path, "the file")
+          .got("missing")
+          .hint("check the spelling and the folder");
     }
-    return tl::unexpected(Error(FileError::not_readable)
-                              .in(path)
-                              .hint("check its permissions")
-                              .with("system", reason(error)));
+    return refusal(FileError::not_readable, path)
+        .hint("check its permissions")
+        .with("system", reason(error));
   }
   FLYBALL_TRY(const auto status, status_of(file.get(), path));
   const bool pipe = S_ISFIFO(status.st_mode);
@@ -159,10 +147,8 @@ Expected<std::string> read_file(const std::string& path, std::size_t max_bytes) 
   std::size_t used = 0;
   for (;;) {
     if (used > max_bytes || announced > max_bytes) {
-      return tl::unexpected(Error(FileError::too_large)
-                                .in(path)
-                                .about("the file")
-                                .got(fmt::format("longer than {} bytes", max_bytes)));
+      return refusal(FileError::too_large, path, "the file")
+          .got(fmt::format("longer than {} bytes", max_bytes));
     }
     constexpr std::size_t chunk = std::size_t{1} << 16;
     contents.resize(used == 0 ? std::max(announced + 1, chunk)
@@ -177,11 +163,11 @@ Expected<std::string> read_file(const std::string& path, std::size_t max_bytes) 
       continue;
     }
     if (got == 0 && used == 0 && pipe) {
-      return tl::unexpected(not_a_file(path, "an empty pipe that nothing writes to",
-                                       "start the program that writes to it first"));
+      return not_a_file(path, "an empty pipe that nothing writes to",
+                        "start the program that writes to it first");
     }
     if (got < 0) {
-      return tl::unexpected(Error(FileError::not_readable).in(path).with("system", reason(errno)));
+      return refusal(FileError::not_readable, path).with("system", reason(errno));
     }
     if (got == 0) {
       break;
@@ -197,7 +183,7 @@ Expected<void> write_file_atomically(const std::string& path, std::string_view c
   struct stat status{};
   const bool exists = ::stat(path.c_str(), &status) == 0;
   if (exists && S_ISDIR(status.st_mode)) {
-    return tl::unexpected(cannot_write(path, EISDIR));
+    return cannot_write(path, EISDIR);
   }
   if (exists && !S_ISREG(status.st_mode)) {
     // Not blocking, or a pipe without a reader is waited for; with one, it may be full meanwhile.
@@ -206,7 +192,7 @@ Expected<void> write_file_atomically(const std::string& path, std::string_view c
       ::fcntl(device.get(), F_SETFL, ::fcntl(device.get(), F_GETFL) & ~O_NONBLOCK);
     }
     const int error = device.get() < 0 ? errno : write_all(device.get(), contents);
-    return error == 0 ? Expected<void>{} : tl::unexpected(cannot_write(path, error));
+    return error == 0 ? Expected<void>{} : cannot_write(path, error);
   }
   std::error_code ignored;
   const std::string target =
@@ -214,7 +200,7 @@ Expected<void> write_file_atomically(const std::string& path, std::string_view c
   const std::string temporary = temporary_beside(target);
   Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
   if (file.get() < 0) {
-    return tl::unexpected(cannot_write(path, errno));
+    return cannot_write(path, errno);
   }
   if (exists) {
     ::fchmod(file.get(), status.st_mode & 07777);
@@ -228,7 +214,7 @@ Expected<void> write_file_atomically(const std::string& path, std::string_view c
   }
   if (error != 0) {
     ::unlink(temporary.c_str());
-    return tl::unexpected(cannot_write(path, error));
+    return cannot_write(path, error);
   }
   return {};
 }

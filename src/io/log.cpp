@@ -48,10 +48,8 @@ bool looks_binary(std::string_view bytes) {
   });
 }
 
-Error not_a_log(const std::string& source, std::string got, std::string hint) {
-  return Error(LogError::not_a_log)
-      .in(source)
-      .about("the file")
+Refusal not_a_log(const std::string& source, std::string got, std::string hint) {
+  return refusal(LogError::not_a_log, source, "the file")
       .got(std::move(got))
       .expected(std::string(what_is_read))
       .hint(std::move(hint));
@@ -86,12 +84,10 @@ const TextSignal* Log::find_text(std::string_view name) const noexcept {
 
 Expected<Log> parse_log(std::string_view bytes, const std::string& source) {
   if (bytes.empty()) {
-    return tl::unexpected(Error(LogError::empty)
-                              .in(source)
-                              .about("the file")
-                              .got("empty")
-                              .expected(std::string(what_is_read))
-                              .hint("record it again, or copy it again from the robot"));
+    return refusal(LogError::empty, source, "the file")
+        .got("empty")
+        .expected(std::string(what_is_read))
+        .hint("record it again, or copy it again from the robot");
   }
   const bool named_wpilog = io::lower(source).ends_with(".wpilog");
   if (bytes.starts_with("WPILOG") || named_wpilog) {
@@ -99,8 +95,7 @@ Expected<Log> parse_log(std::string_view bytes, const std::string& source) {
   }
   for (const Signature& signature : signatures) {
     if (bytes.starts_with(signature.bytes)) {
-      return tl::unexpected(
-          not_a_log(source, std::string(signature.name), std::string(signature.hint)));
+      return not_a_log(source, std::string(signature.name), std::string(signature.hint));
     }
   }
   std::string_view text = bytes;
@@ -118,14 +113,14 @@ Expected<Log> parse_log(std::string_view bytes, const std::string& source) {
     return log;
   }
   if (looks_binary(bytes)) {
-    return tl::unexpected(not_a_log(
+    return not_a_log(
         source, fmt::format("binary and begins with \"{}\"", io::printable(bytes.substr(0, 8))),
-        "CTRE .hoot and driver-station logs have to be converted to WPILOG first"));
+        "CTRE .hoot and driver-station logs have to be converted to WPILOG first");
   }
   if (io::lower(source).ends_with(".json")) {
-    return tl::unexpected(not_a_log(
+    return not_a_log(
         source, fmt::format("text that begins with \"{}\"", io::printable(bytes.substr(0, 20), 20)),
-        "a SysId JSON begins with {"));
+        "a SysId JSON begins with {");
   }
   return parse_csv(bytes, source);
 }

@@ -16,10 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Error not_writable(const std::string& path, const std::string& system) {
-  return Error(FileError::not_writable)
-      .in(path)
-      .about("the output folder")
+Refusal not_writable(const std::string& path, const std::string& system) {
+  return refusal(FileError::not_writable, path, "the output folder")
       .got("not writable")
       .hint("give a folder that you may write to")
       .with("system", system);
@@ -33,27 +31,22 @@ Expected<void> check_destination(const std::string& path) {
     return {};
   }
   if (status.type() == fs::file_type::none) {
-    return tl::unexpected(not_writable(path, error.message()));
+    return not_writable(path, error.message());
   }
   if (!fs::is_directory(status)) {
-    return tl::unexpected(Error(FileError::not_a_folder)
-                              .in(path)
-                              .about("the output folder")
-                              .got("a file")
-                              .expected("a folder, or a path where nothing is yet"));
+    return refusal(FileError::not_a_folder, path, "the output folder")
+        .got("a file")
+        .expected("a folder, or a path where nothing is yet");
   }
   const bool empty = fs::is_empty(path, error);
   if (error) {
-    return tl::unexpected(not_writable(path, error.message()));
+    return not_writable(path, error.message());
   }
   if (!empty && !fs::is_regular_file(fs::path(path) / OutputFolder::marker, error)) {
-    return tl::unexpected(
-        Error(FileError::folder_in_use)
-            .in(path)
-            .about("the output folder")
-            .got("not empty and not an earlier Flyball report")
-            .expected("new, empty, or an earlier report, which is replaced")
-            .hint("give another folder, so that nothing of yours is overwritten"));
+    return refusal(FileError::folder_in_use, path, "the output folder")
+        .got("not empty and not an earlier Flyball report")
+        .expected("new, empty, or an earlier report, which is replaced")
+        .hint("give another folder, so that nothing of yours is overwritten");
   }
   return {};
 }
@@ -67,7 +60,7 @@ Expected<OutputFolder> OutputFolder::create(const std::string& path) {
     target = target.parent_path();  // "report/" names the folder "report"
   }
   if (path.empty() || !target.has_filename()) {
-    return tl::unexpected(not_writable(path, "no folder name"));
+    return not_writable(path, "no folder name");
   }
   if (fs::exists(target, error)) {
     target = fs::canonical(target, error);
@@ -82,14 +75,14 @@ Expected<OutputFolder> OutputFolder::create(const std::string& path) {
   }
   for (auto parent = missing.rbegin(); parent != missing.rend(); ++parent) {
     if (!fs::create_directory(*parent, error)) {
-      return tl::unexpected(not_writable(path, error.message()));
+      return not_writable(path, error.message());
     }
     folder.made_parents_.push_back(parent->string());
   }
   std::string pattern =
       (target.parent_path() / fmt::format(".{}.XXXXXX", target.filename().string())).string();
   if (::mkdtemp(pattern.data()) == nullptr) {
-    return tl::unexpected(not_writable(path, std::generic_category().message(errno)));
+    return not_writable(path, std::generic_category().message(errno));
   }
   folder.building_ = pattern;
   // mkdtemp makes the folder private; a report is as open as the user's other folders.
@@ -133,16 +126,14 @@ Expected<void> OutputFolder::write(std::string_view name, std::string_view conte
   const fs::path relative = fs::path(name).lexically_normal();
   if (building_.empty() || relative.empty() || relative.is_absolute() ||
       *relative.begin() == "..") {
-    return tl::unexpected(Error(FileError::not_writable)
-                              .in("OutputFolder::write")
-                              .about(fmt::format("\"{}\"", name))
-                              .got("not a name in the folder"));
+    return refusal(FileError::not_writable, "OutputFolder::write", fmt::format("\"{}\"", name))
+        .got("not a name in the folder");
   }
   const fs::path path = building_ / relative;
   std::error_code error;
   fs::create_directories(path.parent_path(), error);
   if (error) {
-    return tl::unexpected(not_writable(path.parent_path().string(), error.message()));
+    return not_writable(path.parent_path().string(), error.message());
   }
   // The folder that is being built has a passing name; the person knows the one it will have.
   return write_file_atomically(path.string(), contents).map_error([&](Error refused) {
@@ -152,7 +143,7 @@ Expected<void> OutputFolder::write(std::string_view name, std::string_view conte
 
 Expected<void> OutputFolder::commit() {
   if (building_.empty()) {
-    return tl::unexpected(not_writable(destination_, "the folder was committed before"));
+    return not_writable(destination_, "the folder was committed before");
   }
   Expected<void> ok =
       write(marker, "Flyball replaces this folder when it writes the next report.\n");
@@ -167,20 +158,20 @@ Expected<void> OutputFolder::commit() {
     const std::string earlier = building_ + ".earlier";
     fs::rename(destination_, earlier, error);
     if (error) {
-      return tl::unexpected(not_writable(destination_, error.message()));
+      return not_writable(destination_, error.message());
     }
     fs::rename(building_, destination_, error);
     if (error) {
       std::error_code ignored;
       fs::rename(earlier, destination_, ignored);
-      return tl::unexpected(not_writable(destination_, error.message()));
+      return not_writable(destination_, error.message());
     }
     std::error_code ignored;
     fs::remove_all(earlier, ignored);
   } else {
     fs::rename(building_, destination_, error);
     if (error) {
-      return tl::unexpected(not_writable(destination_, error.message()));
+      return not_writable(destination_, error.message());
     }
   }
   building_.clear();

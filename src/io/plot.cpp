@@ -7,6 +7,7 @@
 #include <flyball/io/file.hpp>
 
 #include "core/error_rows.hpp"
+#include "core/try.hpp"
 #include "io/plot_script.hpp"
 #include "io/process.hpp"
 #include "io/text.hpp"
@@ -26,13 +27,10 @@ Expected<std::string> run_gnuplot(const std::string& script) {
   const std::string words = io::printable(io::trim(result.err), 400);
   switch (result.end) {
     case ProcessResult::End::not_found:
-      return tl::unexpected(
-          Error(PlotError::gnuplot_missing)
-              .in("plot")
-              .hint("install it (Debian and Ubuntu: apt install gnuplot-nox), or run "
-                    "without pictures"));
+      return refusal(PlotError::gnuplot_missing, "plot")
+          .hint("install it (Debian and Ubuntu: apt install gnuplot-nox), or run without pictures");
     case ProcessResult::End::timed_out:
-      return tl::unexpected(Error(PlotError::timed_out).in("plot").with("gnuplot", words));
+      return refusal(PlotError::timed_out, "plot").with("gnuplot", words);
     case ProcessResult::End::not_started:
     case ProcessResult::End::signalled:
       break;
@@ -42,10 +40,9 @@ Expected<std::string> run_gnuplot(const std::string& script) {
       }
       break;
   }
-  return tl::unexpected(Error(PlotError::gnuplot_failed)
-                            .in("plot")
-                            .with("code", static_cast<double>(result.code))
-                            .with("gnuplot", words));
+  return refusal(PlotError::gnuplot_failed, "plot")
+      .with("code", static_cast<double>(result.code))
+      .with("gnuplot", words);
 }
 
 void replace_all(std::string& text, std::string_view from, std::string_view to) {

@@ -29,25 +29,21 @@ constexpr std::size_t max_scatter = 4000;
 
 Expected<void> check_lengths(const std::string& label, std::size_t x, std::size_t y) {
   if (x != y) {
-    return tl::unexpected(Error(ArgumentError::wrong_shape)
-                              .in("plot")
-                              .about(fmt::format("the curve \"{}\"", label))
-                              .got(fmt::format("{} x and {} y long", x, y))
-                              .expected("as long in x as in y"));
+    return refusal(ArgumentError::wrong_shape, "plot", fmt::format("the curve \"{}\"", label))
+        .got(fmt::format("{} x and {} y long", x, y))
+        .expected("as long in x as in y");
   }
   return {};
 }
 
 Expected<void> check(const Plot& plot) {
   if (plot.panels.empty()) {
-    return tl::unexpected(Error(ArgumentError::empty).in("plot").about("panels"));
+    return refusal(ArgumentError::empty, "plot", "panels");
   }
   if (plot.width < 200 || plot.width > 8000 || plot.height < 0 || plot.height > 8000) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in("plot")
-                              .about("the size")
-                              .got(fmt::format("{}x{} pixels", plot.width, plot.height))
-                              .expected("200 to 8000 wide and at most 8000 high"));
+    return refusal(ArgumentError::out_of_range, "plot", "the size")
+        .got(fmt::format("{}x{} pixels", plot.width, plot.height))
+        .expected("200 to 8000 wide and at most 8000 high");
   }
   for (const PlotPanel& panel : plot.panels) {
     for (const PlotLine& line : panel.lines) {

@@ -32,26 +32,20 @@ bool even(const std::vector<double>& axis) {
 
 Expected<void> check(const SurfacePlot& plot, bool from_above) {
   if (plot.x.size() < 2 || plot.y.size() < 2 || plot.z.size() != plot.x.size() * plot.y.size()) {
-    return tl::unexpected(Error(ArgumentError::wrong_shape)
-                              .in("plot")
-                              .about("z")
-                              .got(fmt::format("{} values long", plot.z.size()))
-                              .expected(fmt::format("rows x columns ({}x{}), at least 2x2",
-                                                    plot.y.size(), plot.x.size())));
+    return refusal(ArgumentError::wrong_shape, "plot", "z")
+        .got(fmt::format("{} values long", plot.z.size()))
+        .expected(
+            fmt::format("rows x columns ({}x{}), at least 2x2", plot.y.size(), plot.x.size()));
   }
   if (from_above && !(even(plot.x) && even(plot.y))) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in("plot")
-                              .about("the axes of a map")
-                              .got("uneven steps")
-                              .expected("x and y that ascend evenly"));
+    return refusal(ArgumentError::out_of_range, "plot", "the axes of a map")
+        .got("uneven steps")
+        .expected("x and y that ascend evenly");
   }
   if (plot.width < 200 || plot.width > 8000 || plot.height < 200 || plot.height > 8000) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in("plot")
-                              .about("the size")
-                              .got(fmt::format("{}x{} pixels", plot.width, plot.height))
-                              .expected("200 to 8000 pixels a side"));
+    return refusal(ArgumentError::out_of_range, "plot", "the size")
+        .got(fmt::format("{}x{} pixels", plot.width, plot.height))
+        .expected("200 to 8000 pixels a side");
   }
   return {};
 }
@@ -250,8 +244,7 @@ Expected<std::string> gnuplot_script(const SurfacePlot& plot, PictureFormat form
   }
   FLYBALL_CHECK(std::move(ok));
   if (z.empty()) {
-    return tl::unexpected(
-        Error(ArgumentError::empty).in("plot").about("z").got("without a finite value"));
+    return refusal(ArgumentError::empty, "plot", "z").got("without a finite value");
   }
   z.pad(0.0);
   return plot.from_above ? MapScript(plot, z).build(format) : perspective_script(plot, z, format);

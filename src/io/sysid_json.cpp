@@ -13,6 +13,7 @@
 
 #include <flyball/io/log_error.hpp>
 
+#include "core/try.hpp"
 #include "io/signals.hpp"
 #include "io/sysid_columns.hpp"
 #include "io/sysid_rows.hpp"
@@ -26,10 +27,8 @@ using io::SysIdRows;
 using io::SysIdTable;
 using Row = io::SysIdRow;
 
-Error not_sysid(const std::string& source, std::string got) {
-  return Error(LogError::not_a_log)
-      .in(source)
-      .about("the JSON")
+Refusal not_sysid(const std::string& source, std::string got) {
+  return refusal(LogError::not_a_log, source, "the JSON")
       .got(std::move(got))
       .expected("an object with slow-forward, slow-backward, fast-forward and fast-backward")
       .hint("give the sysid_data….json that the logger wrote");
@@ -153,12 +152,10 @@ const SysIdJson::Run* SysIdJson::find(std::string_view name) const noexcept {
 
 Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& source) {
   if (io::trim(text).empty()) {
-    return tl::unexpected(Error(LogError::empty)
-                              .in(source)
-                              .about("the file")
-                              .got("empty")
-                              .expected("a SysId JSON")
-                              .hint("record it again, or copy it again"));
+    return refusal(LogError::empty, source, "the file")
+        .got("empty")
+        .expected("a SysId JSON")
+        .hint("record it again, or copy it again");
   }
   SysIdRows handler;
   bool complete = nlohmann::json::sax_parse(text.begin(), text.end(), &handler);
@@ -174,29 +171,26 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
   const bool truncated = !complete && handler.error_at > content_end;
   if (!complete && !truncated) {
     const std::size_t detail = handler.error_text.rfind("; ");
-    return tl::unexpected(
-        Error(LogError::malformed)
-            .in(io::place(source, text, handler.error_at == 0 ? 0 : handler.error_at - 1))
-            .about("the JSON")
-            .got("broken")
-            .expected("valid JSON")
-            .hint("copy the file again, or repair that place")
-            .with("parser",
-                  io::printable(detail == std::string::npos
-                                    ? std::string_view(handler.error_text)
-                                    : std::string_view(handler.error_text).substr(detail + 2),
-                                120)));
+    return refusal(LogError::malformed,
+                   io::place(source, text, handler.error_at == 0 ? 0 : handler.error_at - 1),
+                   "the JSON")
+        .got("broken")
+        .expected("valid JSON")
+        .hint("copy the file again, or repair that place")
+        .with("parser", io::printable(detail == std::string::npos
+                                          ? std::string_view(handler.error_text)
+                                          : std::string_view(handler.error_text).substr(detail + 2),
+                                      120));
   }
   if (!handler.top_is_object) {
-    return tl::unexpected(not_sysid(source, "a list or a single value"));
+    return not_sysid(source, "a list or a single value");
   }
   const bool any_test = std::any_of(handler.tables.begin(), handler.tables.end(),
                                     [](const SysIdTable& table) { return table.present; });
   if (!any_test && !handler.sysid && !truncated) {
-    return tl::unexpected(not_sysid(source, handler.first_key
-                                                ? fmt::format("an object that begins with \"{}\"",
-                                                              io::printable(*handler.first_key, 30))
-                                                : std::string("an empty object")));
+    return not_sysid(source, handler.first_key ? fmt::format("an object that begins with \"{}\"",
+                                                             io::printable(*handler.first_key, 30))
+                                               : std::string("an empty object"));
   }
 
   SysIdJson log;
@@ -244,9 +238,7 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
                      io::printable(handler.unknown_keys.front(), 30))});
   }
   if (log.runs.empty()) {
-    Error error = Error(LogError::no_data)
-                      .in(source)
-                      .about("the SysId JSON")
+    Error error = refusal(LogError::no_data, source, "the SysId JSON")
                       .got(truncated ? "cut before its first complete row"
                                      : "without one complete row of finite numbers")
                       .hint("record the tests again");

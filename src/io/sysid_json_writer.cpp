@@ -9,6 +9,7 @@
 #include <flyball/io/json_writer.hpp>
 #include <flyball/io/sysid_json.hpp>
 
+#include "core/try.hpp"
 #include "io/sysid_columns.hpp"
 
 namespace flyball {
@@ -21,11 +22,10 @@ Expected<void> check_run(const io::Run& run, std::span<const io::Column> columns
     }
     const std::vector<double>& values = run.*columns[c];
     if (values.size() != run.time.size()) {
-      return tl::unexpected(Error(ArgumentError::wrong_shape)
-                                .in("to_sysid_json")
-                                .about(fmt::format("column {} of {}", c, run.name))
-                                .got(fmt::format("{} values long", values.size()))
-                                .expected(fmt::format("one value a row ({})", run.time.size())));
+      return refusal(ArgumentError::wrong_shape, "to_sysid_json",
+                     fmt::format("column {} of {}", c, run.name))
+          .got(fmt::format("{} values long", values.size()))
+          .expected(fmt::format("one value a row ({})", run.time.size()));
     }
     for (const double value : values) {
       if (Expected<void> ok = check_finite(value, "to_sysid_json", run.name); !ok) {

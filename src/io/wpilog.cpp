@@ -136,26 +136,20 @@ class Reader {
  private:
   Expected<void> read_header() {
     if (!bytes_.starts_with(magic)) {
-      return tl::unexpected(
-          Error(LogError::wrong_magic)
-              .in(source_ + ": byte 0")
-              .about("the beginning of the file")
-              .got(fmt::format("\"{}\"", io::printable(bytes_.substr(0, magic.size()))))
-              .expected("\"WPILOG\"")
-              .hint("copy the log again from the robot, or give the file its true extension"));
+      return refusal(LogError::wrong_magic, source_ + ": byte 0", "the beginning of the file")
+          .got(fmt::format("\"{}\"", io::printable(bytes_.substr(0, magic.size()))))
+          .expected("\"WPILOG\"")
+          .hint("copy the log again from the robot, or give the file its true extension");
     }
     if (bytes_.size() < header_bytes) {
       return tl::unexpected(cut_header(header_bytes));
     }
     const auto version = read_le<std::uint16_t>(bytes_.substr(6));
     if (version >> 8 != 1) {
-      return tl::unexpected(
-          Error(LogError::wrong_version)
-              .in(source_ + ": byte 6")
-              .about("the WPILOG version")
-              .got(fmt::format("{}.{}", version >> 8, version & 0xFF))
-              .expected("1.0")
-              .hint("export the log with AdvantageScope, which writes version 1.0"));
+      return refusal(LogError::wrong_version, source_ + ": byte 6", "the WPILOG version")
+          .got(fmt::format("{}.{}", version >> 8, version & 0xFF))
+          .expected("1.0")
+          .hint("export the log with AdvantageScope, which writes version 1.0");
     }
     const std::size_t extra = read_le<std::uint32_t>(bytes_.substr(8));
     if (extra > bytes_.size() - header_bytes) {
@@ -169,9 +163,8 @@ class Reader {
   }
 
   Error cut_header(std::size_t needed) const {
-    return Error(LogError::malformed)
-        .in(fmt::format("{}: byte {}", source_, bytes_.size()))
-        .about("the WPILOG header")
+    return refusal(LogError::malformed, fmt::format("{}: byte {}", source_, bytes_.size()),
+                   "the WPILOG header")
         .got(fmt::format("cut after {} bytes", bytes_.size()))
         .expected(fmt::format("{} bytes long by its own account", needed))
         .hint("copy the log again from the robot");
@@ -373,9 +366,7 @@ class Reader {
     }
     io::tidy(log_);
     if (log_.signals.empty() && log_.texts.empty()) {
-      Error error = Error(LogError::no_data)
-                        .in(source_)
-                        .about("the WPILOG")
+      Error error = refusal(LogError::no_data, source_, "the WPILOG")
                         .got("without a number or a text that can be decoded")
                         .hint("check that the robot program logs the mechanism (SysIdRoutineLog)");
       return tl::unexpected(io::with_diagnostics(std::move(error), log_.diagnostics));

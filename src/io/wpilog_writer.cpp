@@ -44,11 +44,9 @@ std::uint64_t microseconds(double time) {
 Expected<void> check_channel(const std::string& name, const std::vector<double>& time,
                              std::size_t values) {
   if (time.size() != values) {
-    return tl::unexpected(Error(ArgumentError::wrong_shape)
-                              .in("to_wpilog")
-                              .about(name)
-                              .got(fmt::format("{} values long", values))
-                              .expected(fmt::format("one value a time ({})", time.size())));
+    return refusal(ArgumentError::wrong_shape, "to_wpilog", name)
+        .got(fmt::format("{} values long", values))
+        .expected(fmt::format("one value a time ({})", time.size()));
   }
   for (const double t : time) {
     if (Expected<void> ok = check_not_negative(t, "to_wpilog", name + ": time", "s"); !ok) {

@@ -14,23 +14,19 @@ constexpr std::string_view gearing_hint =
 
 Expected<void> check_drive(const DcMotor& motor, double gearing, std::string_view where) {
   if (motor.count < 1) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("motor count")
-                              .got(std::to_string(motor.count))
-                              .expected("at least 1"));
+    return refusal(ArgumentError::out_of_range, where, "motor count")
+        .got(std::to_string(motor.count))
+        .expected("at least 1");
   }
   FLYBALL_CHECK(Checks(where)
                     .positive(motor.R, "motor.R", "Ohm")
                     .positive(motor.Kt, "motor.Kt", "N m/A")
                     .positive(motor.Kv, "motor.Kv", "rad/s/V"));
   if (!(gearing > 0.0) || !std::isfinite(gearing)) {
-    return tl::unexpected(
-        Error(std::isfinite(gearing) ? ArgumentError::not_positive : ArgumentError::not_finite)
-            .in(std::string(where))
-            .about("gearing")
-            .got(format_number(gearing))
-            .expected("greater than zero" + std::string(gearing_hint)));
+    return refusal(std::isfinite(gearing) ? ArgumentError::not_positive : ArgumentError::not_finite,
+                   where, "gearing")
+        .got(format_number(gearing))
+        .expected("greater than zero" + std::string(gearing_hint));
   }
   return {};
 }

@@ -4,6 +4,8 @@
 #include <cctype>
 #include <string>
 
+#include "core/try.hpp"
+
 namespace flyball::mechanisms {
 
 std::string_view to_string(MechanismKind kind) {
@@ -33,10 +35,9 @@ Expected<MechanismKind> parse_mechanism_kind(std::string_view text) {
   if (folded == "arm" || folded == "singlejointedarm") {
     return MechanismKind::arm;
   }
-  return tl::unexpected(Error(ArgumentError::unknown_name)
-                            .about("mechanism")
-                            .got("\"" + std::string(text) + "\"")
-                            .expected("flywheel, elevator or arm"));
+  return refusal(ArgumentError::unknown_name, {}, "mechanism")
+      .got("\"" + std::string(text) + "\"")
+      .expected("flywheel, elevator or arm");
 }
 
 std::string_view position_unit(MechanismKind kind) {

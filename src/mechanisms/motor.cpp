@@ -93,11 +93,9 @@ Expected<void> check_count(int count) {
   if (count >= 1) {
     return {};
   }
-  return tl::unexpected(Error(ArgumentError::out_of_range)
-                            .in("motor")
-                            .about("motor count")
-                            .got(std::to_string(count))
-                            .expected("at least 1"));
+  return refusal(ArgumentError::out_of_range, "motor", "motor count")
+      .got(std::to_string(count))
+      .expected("at least 1");
 }
 
 }  // namespace
@@ -116,12 +114,9 @@ Expected<DcMotor> motor(std::string_view name, const MotorDatasheet& one, int co
                     .not_negative(one.free_current.si(), "free_current", "A")
                     .positive(one.free_speed.si(), "free_speed", "rad/s"));
   if (one.free_current >= one.stall_current) {
-    return tl::unexpected(
-        Error(ArgumentError::out_of_range)
-            .in(std::string(where))
-            .about("free_current")
-            .got(to_text(one.free_current))
-            .expected(detail::format("below the stall current ({})", to_text(one.stall_current))));
+    return refusal(ArgumentError::out_of_range, where, "free_current")
+        .got(to_text(one.free_current))
+        .expected(detail::format("below the stall current ({})", to_text(one.stall_current)));
   }
   DcMotor result = from_datasheet(name, one, count);
   // Numbers can have quotients that are none: 1e300 V / 1e-300 A.
@@ -151,11 +146,9 @@ Expected<DcMotor> motor(std::string_view name, int count) {
     return table_motor(candidates.front(), count);
   }
   if (!candidates.empty()) {
-    return tl::unexpected(
-        Error(ArgumentError::ambiguous_name)
-            .about("motor")
-            .got(detail::format("\"{}\", which fits several", name))
-            .expected(detail::format("one of {}", detail::comma_separated("{}", candidates))));
+    return refusal(ArgumentError::ambiguous_name, {}, "motor")
+        .got(detail::format("\"{}\", which fits several", name))
+        .expected(detail::format("one of {}", detail::comma_separated("{}", candidates)));
   }
   std::vector<std::string_view> names;
   names.reserve(table.size());
@@ -163,14 +156,13 @@ Expected<DcMotor> motor(std::string_view name, int count) {
     names.push_back(entry.name);
   }
   const std::string nearest = nearest_name(name, names);
-  return tl::unexpected(
-      Error(ArgumentError::unknown_name)
-          .about("motor")
-          .got(detail::format("\"{}\", which is not in the table", name))
-          .hint(nearest.empty() ? detail::format("known motors are {}; another one can be given by "
-                                                 "its five datasheet numbers",
-                                                 detail::comma_separated("{}", names))
-                                : detail::format("did you mean \"{}\"?", nearest)));
+  return refusal(ArgumentError::unknown_name, {}, "motor")
+      .got(detail::format("\"{}\", which is not in the table", name))
+      .hint(nearest.empty()
+                ? detail::format(
+                      "known motors are {}; another one can be given by its five datasheet numbers",
+                      detail::comma_separated("{}", names))
+                : detail::format("did you mean \"{}\"?", nearest));
 }
 
 DcMotor cim(int count) {

@@ -28,11 +28,9 @@ Expected<TimeSeries> generate_trapezoid_profile(double max_velocity, Time time_t
   const double end = brake + ramp;
   constexpr double most_rows = 1e7;
   if (!(end / dt < most_rows)) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("the profile")
-                              .got(detail::format("{:.3g} periods long", end / dt))
-                              .expected("at most ten million periods long"));
+    return refusal(ArgumentError::out_of_range, where, "the profile")
+        .got(detail::format("{:.3g} periods long", end / dt))
+        .expected("at most ten million periods long");
   }
 
   std::vector<double> time{0.0};

@@ -90,12 +90,10 @@ Expected<const Signal*> named_channel(const Log& log, const std::string& name, Q
     names.push_back(signal.name);
   }
   const std::string nearest = nearest_name(name, names);
-  return tl::unexpected(Error(RecordingError::no_channel)
-                            .about(quantity_name(quantity) + " channel")
-                            .got(fmt::format("\"{}\", which the log does not have", name))
-                            .hint(nearest.empty() ? std::string("flyball lists the channels when "
-                                                                "it cannot choose")
-                                                  : fmt::format("did you mean \"{}\"?", nearest)));
+  return refusal(RecordingError::no_channel, {}, quantity_name(quantity) + " channel")
+      .got(fmt::format("\"{}\", which the log does not have", name))
+      .hint(nearest.empty() ? std::string("flyball lists the channels when it cannot choose")
+                            : fmt::format("did you mean \"{}\"?", nearest));
 }
 
 Expected<const Signal*> choose(const Log& log, const FoundTests& tests, Quantity quantity,
@@ -133,12 +131,10 @@ Expected<const Signal*> choose(const Log& log, const FoundTests& tests, Quantity
       names.push_back("\"" + signal->name + "\"");
     }
   }
-  return tl::unexpected(
-      Error(RecordingError::ambiguous_channel)
-          .about(quantity_name(quantity) + " channel")
-          .got(fmt::format("one of {}: {}{}", candidates.signals.size(), fmt::join(names, ", "),
-                           candidates.signals.size() > names.size() ? ", …" : ""))
-          .hint(fmt::format("choose one with --{}", quantity_name(quantity))));
+  return refusal(RecordingError::ambiguous_channel, {}, quantity_name(quantity) + " channel")
+      .got(fmt::format("one of {}: {}{}", candidates.signals.size(), fmt::join(names, ", "),
+                       candidates.signals.size() > names.size() ? ", …" : ""))
+      .hint(fmt::format("choose one with --{}", quantity_name(quantity)));
 }
 
 // Linear interpolation in a sorted signal; `cursor` only moves forward.
@@ -242,14 +238,12 @@ Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
               choose(log, tests, Quantity::velocity, selection.velocity_channel, channels.voltage));
   if (channels.voltage == nullptr ||
       (channels.position == nullptr && channels.velocity == nullptr)) {
-    return tl::unexpected(
-        Error(RecordingError::no_channel)
-            .about(channels.voltage == nullptr ? "voltage channel" : "position or velocity channel")
-            .got(fmt::format("not found by name among {} numeric channels{}", log.signals.size(),
-                             fullest_channels(log, tests)))
-            .hint(channels.voltage == nullptr
-                      ? "name the channel of the applied volts with --voltage"
-                      : "name them with --position and --velocity"));
+    return refusal(RecordingError::no_channel, {},
+                   channels.voltage == nullptr ? "voltage channel" : "position or velocity channel")
+        .got(fmt::format("not found by name among {} numeric channels{}", log.signals.size(),
+                         fullest_channels(log, tests)))
+        .hint(channels.voltage == nullptr ? "name the channel of the applied volts with --voltage"
+                                          : "name them with --position and --velocity");
   }
   return channels;
 }

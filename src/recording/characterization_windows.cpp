@@ -9,6 +9,7 @@
 
 #include <flyball/core/text.hpp>
 
+#include "core/try.hpp"
 #include "recording/channel_names.hpp"
 #include "recording/characterization_windows.hpp"
 
@@ -60,19 +61,17 @@ Expected<FoundTests> find_tests(const Log& log, const std::string& state_channel
         names.push_back(text.name);
       }
       const std::string nearest = nearest_name(state_channel, names);
-      return tl::unexpected(
-          Error(RecordingError::no_test_state)
-              .about("state channel")
-              .got(fmt::format("\"{}\", which the log does not have as a text", state_channel))
-              .hint(nearest.empty() ? "" : fmt::format("did you mean \"{}\"?", nearest)));
+      return refusal(RecordingError::no_test_state, {}, "state channel")
+          .got(fmt::format("\"{}\", which the log does not have as a text", state_channel))
+          .hint(nearest.empty() ? "" : fmt::format("did you mean \"{}\"?", nearest));
     }
     found = {state->name, subject_of(state->name), windows_of(*state)};
     if (found.windows.empty()) {
-      return tl::unexpected(Error(RecordingError::no_tests)
-                                .about(state_channel)
-                                .got("without the name of a test")
-                                .expected("quasistatic-forward, quasistatic-reverse, "
-                                          "dynamic-forward or dynamic-reverse at times"));
+      return refusal(RecordingError::no_tests, {}, state_channel)
+          .got("without the name of a test")
+          .expected(
+              "quasistatic-forward, quasistatic-reverse, dynamic-forward or dynamic-reverse at "
+              "times");
     }
     return found;
   }
@@ -92,19 +91,17 @@ Expected<FoundTests> find_tests(const Log& log, const std::string& state_channel
     for (const FoundTests& tests : all) {
       names.push_back("\"" + tests.state_name + "\"");
     }
-    return tl::unexpected(Error(RecordingError::ambiguous_channel)
-                              .about("mechanism")
-                              .got(fmt::format("one of {}: {}", all.size(), fmt::join(names, ", ")))
-                              .hint("choose one with --state"));
+    return refusal(RecordingError::ambiguous_channel, {}, "mechanism")
+        .got(fmt::format("one of {}: {}", all.size(), fmt::join(names, ", ")))
+        .hint("choose one with --state");
   }
   if (all.size() == 1) {
     return all.front();
   }
   if (!silent.empty()) {
-    return tl::unexpected(Error(RecordingError::no_tests)
-                              .about(silent)
-                              .got("\"none\" throughout")
-                              .hint("no characterisation test ran while this was recorded"));
+    return refusal(RecordingError::no_tests, {}, silent)
+        .got("\"none\" throughout")
+        .hint("no characterisation test ran while this was recorded");
   }
   return found;
 }

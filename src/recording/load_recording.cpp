@@ -12,6 +12,7 @@
 #include <flyball/io/log.hpp>
 
 #include "core/error_rows.hpp"
+#include "core/try.hpp"
 #include "recording/channel_names.hpp"
 #include "recording/channels.hpp"
 #include "recording/characterization_windows.hpp"
@@ -42,38 +43,32 @@ Expected<OutputScale> output_scale(std::string_view unit_text, double scale,
                                    std::optional<MechanismKind> kind) {
   auto unit = parse_unit(unit_text);
   if (!unit) {
-    return tl::unexpected(Error(RecordingError::unit_mismatch)
-                              .about("position unit")
-                              .got(fmt::format("\"{}\", which is not known", unit_text))
-                              .expected("rotations, radians, degrees, metres, inches or feet")
-                              .hint("say it with --unit"));
+    return refusal(RecordingError::unit_mismatch, {}, "position unit")
+        .got(fmt::format("\"{}\", which is not known", unit_text))
+        .expected("rotations, radians, degrees, metres, inches or feet")
+        .hint("say it with --unit");
   }
   if (unit->dimension == Dimension::length) {
     if (kind == MechanismKind::arm) {
-      return tl::unexpected(Error(RecordingError::unit_mismatch)
-                                .about("position unit")
-                                .got(fmt::format("\"{}\", a length", unit_text))
-                                .expected("an angle for an arm")
-                                .hint("check --mechanism, or say the unit with --unit"));
+      return refusal(RecordingError::unit_mismatch, {}, "position unit")
+          .got(fmt::format("\"{}\", a length", unit_text))
+          .expected("an angle for an arm")
+          .hint("check --mechanism, or say the unit with --unit");
     }
     return OutputScale{unit->factor * scale, "m"};
   }
   if (unit->dimension != Dimension::angle) {
-    return tl::unexpected(
-        Error(RecordingError::unit_mismatch)
-            .about("position unit")
-            .got(fmt::format("\"{}\", a {}", unit_text, to_string(unit->dimension)))
-            .expected("a length or an angle"));
+    return refusal(RecordingError::unit_mismatch, {}, "position unit")
+        .got(fmt::format("\"{}\", a {}", unit_text, to_string(unit->dimension)))
+        .expected("a length or an angle");
   }
   if (kind == MechanismKind::elevator) {
     if (scale == 1.0) {
-      return tl::unexpected(
-          Error(RecordingError::unit_mismatch)
-              .about("position unit")
-              .got(fmt::format("\"{}\", an angle", unit_text))
-              .expected("a length for an elevator")
-              .hint(fmt::format("say how many metres one of them is with --scale "
-                                "(for rotations the drum's circumference, 2π r)")));
+      return refusal(RecordingError::unit_mismatch, {}, "position unit")
+          .got(fmt::format("\"{}\", an angle", unit_text))
+          .expected("a length for an elevator")
+          .hint(fmt::format("say how many metres one of them is with --scale (for rotations the "
+                            "drum's circumference, 2π r)"));
     }
     return OutputScale{scale, "m"};
   }
@@ -111,11 +106,10 @@ Expected<LoadedRecording> from_sysid_json(const Log& log, const LogSelection& se
         defects += "; " + diagnostic.message;
       }
     }
-    loaded.refusal = Error(RecordingError::drivetrain)
-                         .in(log.source)
+    loaded.refusal = refusal(RecordingError::drivetrain, log.source)
                          .hint(
-                             "its two sides cannot be identified as one mechanism, and "
-                             "drivetrains are not supported yet" +
+                             "its two sides cannot be identified as one mechanism, and drivetrains "
+                             "are not supported yet" +
                              defects);
     return loaded;
   }
@@ -154,9 +148,7 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
   }
   loaded.subject = tests->subject;
   if (const std::string reason = drivetrain_reason(log, *tests, selection); !reason.empty()) {
-    loaded.refusal = Error(RecordingError::drivetrain)
-                         .in(log.source)
-                         .about("mechanism")
+    loaded.refusal = refusal(RecordingError::drivetrain, log.source, "mechanism")
                          .got("a drivetrain: " + reason)
                          .expected("a flywheel, an elevator or an arm")
                          .hint(
@@ -177,12 +169,9 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
   if (tests->windows.empty()) {
     tests->windows = split_by_voltage(*channels->voltage);
     if (tests->windows.empty()) {
-      return tl::unexpected(
-          Error(RecordingError::no_tests)
-              .in(log.source)
-              .about(channels->voltage->name)
-              .got("never driven, and no channel names the running test")
-              .hint("record the voltage that was applied, or name the channel with --state"));
+      return refusal(RecordingError::no_tests, log.source, channels->voltage->name)
+          .got("never driven, and no channel names the running test")
+          .hint("record the voltage that was applied, or name the channel with --state");
     }
     assume(loaded, fmt::format("no channel names the running test: {} tests were told apart by the "
                                "voltage",
@@ -195,10 +184,8 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
                      channels->velocity ? "\"" + channels->velocity->name + "\"" : "nowhere"));
   loaded.recording.runs = join_channels(*channels, tests->windows);
   if (loaded.recording.runs.empty()) {
-    return tl::unexpected(Error(RecordingError::no_tests)
-                              .in(log.source)
-                              .about(tests->state_name)
-                              .got("without a test in which the mechanism was recorded"));
+    return refusal(RecordingError::no_tests, log.source, tests->state_name)
+        .got("without a test in which the mechanism was recorded");
   }
   // Unit: said by the person, else by the position's or the velocity's channel, else rotations.
   std::string unit = selection.unit;
@@ -228,13 +215,10 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
     }
   }
   if (!kind) {
-    return tl::unexpected(
-        Error(RecordingError::mechanism_unknown)
-            .in(log.source)
-            .about("mechanism")
-            .got(fmt::format("not told by the log (positions in \"{}\" fit an arm and a flywheel)",
-                             unit))
-            .hint("say it with --mechanism arm or --mechanism flywheel"));
+    return refusal(RecordingError::mechanism_unknown, log.source, "mechanism")
+        .got(fmt::format("not told by the log (positions in \"{}\" fit an arm and a flywheel)",
+                         unit))
+        .hint("say it with --mechanism arm or --mechanism flywheel");
   }
   auto output = output_scale(unit, selection.scale, kind);
   if (!output) {
@@ -281,11 +265,9 @@ ErrorInfo error_info(RecordingError code) {
 
 Expected<LoadedRecording> recording_from_log(const Log& log, const LogSelection& selection) {
   if (!std::isfinite(selection.scale) || selection.scale == 0.0) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("scale")
-                              .got(fmt::format("{}", selection.scale))
-                              .expected("a finite number other than zero"));
+    return refusal(ArgumentError::out_of_range, where, "scale")
+        .got(fmt::format("{}", selection.scale))
+        .expected("a finite number other than zero");
   }
   LoadedRecording loaded;
   loaded.path = log.source;
@@ -294,9 +276,7 @@ Expected<LoadedRecording> recording_from_log(const Log& log, const LogSelection&
   auto result = log.sysid ? from_sysid_json(log, selection, std::move(loaded))
                           : from_channels(log, selection, std::move(loaded));
   if (result && !result->refusal && !result->recording.mechanism) {
-    Error error = Error(RecordingError::mechanism_unknown)
-                      .in(log.source)
-                      .about("mechanism")
+    Error error = refusal(RecordingError::mechanism_unknown, log.source, "mechanism")
                       .got("not told by the log")
                       .hint("say it with --mechanism flywheel, elevator or arm");
     // A log that was cut short often lost the key that says it.

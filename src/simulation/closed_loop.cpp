@@ -30,22 +30,16 @@ const std::vector<Coordinate>& referred(const ModelDescription& plant, const Clo
 Expected<void> check_count(std::size_t count, std::size_t most, std::string_view name,
                            std::string_view of) {
   return count <= most ? Expected<void>{}
-                       : tl::unexpected(Error(ArgumentError::wrong_shape)
-                                            .in(std::string(where))
-                                            .about(std::string(name))
-                                            .got(detail::format("{}", count))
-                                            .expected(detail::format("at most one for each {}, {}",
-                                                                     of, most)));
+                       : refusal(ArgumentError::wrong_shape, where, name)
+                             .got(detail::format("{}", count))
+                             .expected(detail::format("at most one for each {}, {}", of, most));
 }
 
 Expected<void> check_actuator(const ActuatorModel& actuator, const Coordinate& input) {
   if (!(actuator.min < actuator.max)) {
-    return tl::unexpected(
-        Error(ArgumentError::out_of_range)
-            .in(std::string(where))
-            .about("the lower limit of " + input.name)
-            .got(format_number(actuator.min))
-            .expected("below the upper, which is " + format_number(actuator.max)));
+    return refusal(ArgumentError::out_of_range, where, "the lower limit of " + input.name)
+        .got(format_number(actuator.min))
+        .expected("below the upper, which is " + format_number(actuator.max));
   }
   return Checks(where)
       .not_negative(actuator.delay.si(), "the delay of " + input.name, "s")
@@ -60,11 +54,9 @@ Expected<void> check_loop(const ModelDescription& plant, const ClosedLoop& loop)
                     .positive(loop.period.si(), "period", "s")
                     .positive(loop.record_step.si(), "record_step", "s"));
   if (r.cols() == 0) {
-    return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(where))
-                              .about("the reference")
-                              .got("empty")
-                              .expected("one column a period"));
+    return refusal(ArgumentError::empty, where, "the reference")
+        .got("empty")
+        .expected("one column a period");
   }
   if (r.rows() > 0) {
     const bool states = loop.reference_of == ReferenceOf::states;
@@ -83,13 +75,10 @@ Expected<void> check_command(const LoopCommand& command, const ModelDescription&
                              double time) {
   const auto refuse = [&](ArgumentError code, std::string about, std::string got,
                           std::string expected) {
-    return tl::unexpected(
-        Error(code)
-            .in(std::string(where))
-            .about(std::move(about))
-            .got(std::move(got) + detail::format(" at t = {} s", format_number(time)))
-            .expected(std::move(expected))
-            .with("t", time));
+    return refusal(code, where, about)
+        .got(std::move(got) + detail::format(" at t = {} s", format_number(time)))
+        .expected(std::move(expected))
+        .with("t", time);
   };
   const Index m = size_of(plant.inputs);
   const Index n = size_of(plant.states);

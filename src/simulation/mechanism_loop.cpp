@@ -20,11 +20,9 @@ constexpr std::string_view where = "simulate_mechanism";
 
 Expected<void> check_loop(const MechanismLoop& loop) {
   if (loop.reference.empty()) {
-    return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(where))
-                              .about("the reference")
-                              .got("empty")
-                              .expected("one row a period"));
+    return refusal(ArgumentError::empty, where, "the reference")
+        .got("empty")
+        .expected("one row a period");
   }
   for (std::size_t k = 0; k < loop.reference.size(); ++k) {
     const std::string row = detail::format("reference {}", k);

@@ -21,11 +21,9 @@ Expected<MechanismPlant> MechanismPlant::create(mechanisms::MechanismKind kind,
                     .finite(gains.angle_offset, "angle_offset")
                     .finite(breakaway, "breakaway"));
   if (breakaway < 1.0) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("breakaway")
-                              .got(format_number(breakaway))
-                              .expected("at least 1: static over sliding friction"));
+    return refusal(ArgumentError::out_of_range, where, "breakaway")
+        .got(format_number(breakaway))
+        .expected("at least 1: static over sliding friction");
   }
   return MechanismPlant(kind, gains, breakaway);
 }

@@ -77,15 +77,13 @@ Expected<void> ModelPlant::not_finite(double time, const VectorIn& u) const {
   while (std::isfinite(x_(i))) {
     ++i;
   }
-  return tl::unexpected(
-      Error(ArgumentError::not_finite)
-          .in(std::string(where))
-          .about("the state " + description().states[static_cast<std::size_t>(i)].name)
-          .got(detail::format("{} after t = {} s", format_number(x_(i)), format_number(time)))
-          .expected("a finite number")
-          .hint("is the loop unstable, or max_step too long for the model?")
-          .with("t", time)
-          .with("x", std::vector<double>(before_.begin(), before_.end())));
+  return refusal(ArgumentError::not_finite, where,
+                 "the state " + description().states[static_cast<std::size_t>(i)].name)
+      .got(detail::format("{} after t = {} s", format_number(x_(i)), format_number(time)))
+      .expected("a finite number")
+      .hint("is the loop unstable, or max_step too long for the model?")
+      .with("t", time)
+      .with("x", std::vector<double>(before_.begin(), before_.end()));
 }
 
 }  // namespace flyball

@@ -50,11 +50,9 @@ Outcome solve_steady_state(const Problem& problem, JsonWriter& answer) {
   if (problem.has("pairs")) {
     for (const double input : problem.matrix("pairs").reshaped()) {
       if (input != std::floor(input) || std::abs(input) > 1e9) {
-        return tl::unexpected(Error(ArgumentError::malformed)
-                                  .in("steady-state-feedforward")
-                                  .about("pairs")
-                                  .got(format_number(input))
-                                  .expected("the number of an input, from 0"));
+        return refusal(ArgumentError::malformed, "steady-state-feedforward", "pairs")
+            .got(format_number(input))
+            .expected("the number of an input, from 0");
       }
       inputs.push_back(static_cast<int>(input));
     }
@@ -98,11 +96,9 @@ Outcome solve_margins(const Problem& problem, JsonWriter& answer) {
   }
   const bool observer = problem.has("K_e");
   if (observer != problem.has("C")) {
-    return tl::unexpected(Error(ArgumentError::malformed)
-                              .in("margins")
-                              .about(observer ? "C" : "K_e")
-                              .got("left out")
-                              .expected("there: an observer has both C and K_e"));
+    return refusal(ArgumentError::malformed, "margins", observer ? "C" : "K_e")
+        .got("left out")
+        .expected("there: an observer has both C and K_e");
   }
   FLYBALL_TRY(const auto loop,
               observer

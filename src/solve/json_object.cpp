@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "core/try.hpp"
 #include "solve/json_object.hpp"
 #include "solve/json_value.hpp"
 
@@ -36,11 +37,9 @@ int depth_of(std::string_view text) {
   return deepest;
 }
 
-Error malformed(std::string_view where, std::string_view what, std::string got,
-                std::string expected) {
-  return Error(ArgumentError::malformed)
-      .in(std::string(where))
-      .about("the " + std::string(what))
+Refusal malformed(std::string_view where, std::string_view what, std::string got,
+                  std::string expected) {
+  return refusal(ArgumentError::malformed, where, "the " + std::string(what))
       .got(std::move(got))
       .expected(std::move(expected));
 }
@@ -62,22 +61,21 @@ std::string complaint(std::string_view text, std::size_t byte) {
 Expected<Json> parse_object(std::string_view text, std::string_view where, std::string_view what) {
   constexpr int deepest = 64;
   if (const int depth = depth_of(text); depth > deepest) {
-    return tl::unexpected(malformed(where, what,
-                                    fmt::format("{} brackets within each other", depth),
-                                    fmt::format("at most {}", deepest)));
+    return malformed(where, what, fmt::format("{} brackets within each other", depth),
+                     fmt::format("at most {}", deepest));
   }
   constexpr const char* example = "one JSON object, such as {\"A\": [[0, 1], [0, -2]], …}";
   try {
     Json object = Json::parse(text);
     if (!object.is_object()) {
-      return tl::unexpected(malformed(where, what, kind_of(object), example));
+      return malformed(where, what, kind_of(object), example);
     }
     return object;
   } catch (const Json::parse_error& problem) {
-    return tl::unexpected(malformed(where, what, complaint(text, problem.byte), example));
+    return malformed(where, what, complaint(text, problem.byte), example);
   } catch (const Json::exception&) {
-    return tl::unexpected(malformed(where, what, "not to be read: a number is beyond 1.8e308",
-                                    "numbers that a double holds"));
+    return malformed(where, what, "not to be read: a number is beyond 1.8e308",
+                     "numbers that a double holds");
   }
 }
 

@@ -8,6 +8,7 @@
 
 #include <flyball/core/text.hpp>
 
+#include "core/try.hpp"
 #include "solve/row.hpp"
 
 namespace flyball::solve {
@@ -30,11 +31,9 @@ Outcome check_size(double numbers, std::string_view where, std::string_view abou
   if (numbers <= most) {
     return {};
   }
-  return tl::unexpected(Error(ArgumentError::out_of_range)
-                            .in(std::string(where))
-                            .about(std::string(about))
-                            .got(fmt::format("so large that {:.3g} numbers are answered", numbers))
-                            .expected(fmt::format("such that at most {:.0f} are", most)));
+  return refusal(ArgumentError::out_of_range, where, about)
+      .got(fmt::format("so large that {:.3g} numbers are answered", numbers))
+      .expected(fmt::format("such that at most {:.0f} are", most));
 }
 
 std::span<const Kind> kinds() {
@@ -69,12 +68,10 @@ Expected<const Kind*> find_kind(std::string_view name) {
     names.push_back(kind.name);
   }
   const std::string nearest = nearest_name(name, names);
-  return tl::unexpected(Error(ArgumentError::unknown_name)
-                            .in("solve")
-                            .about("kind of problem")
-                            .got("\"" + std::string(name.substr(0, 40)) + "\"")
-                            .expected(fmt::format("one of {}", fmt::join(names, ", ")))
-                            .hint(nearest.empty() ? "" : "did you mean \"" + nearest + "\"?"));
+  return refusal(ArgumentError::unknown_name, "solve", "kind of problem")
+      .got("\"" + std::string(name.substr(0, 40)) + "\"")
+      .expected(fmt::format("one of {}", fmt::join(names, ", ")))
+      .hint(nearest.empty() ? "" : "did you mean \"" + nearest + "\"?");
 }
 
 }  // namespace flyball::solve

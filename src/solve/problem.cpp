@@ -59,9 +59,7 @@ class ProblemReader {
     return std::string(prefix_).append(name);
   }
   [[nodiscard]] Error malformed(const Field& field, std::string got, std::string expected) const {
-    return Error(ArgumentError::malformed)
-        .in(std::string(where_))
-        .about(full(field.name))
+    return refusal(ArgumentError::malformed, where_, full(field.name))
         .got(std::move(got))
         .expected(std::move(expected));
   }
@@ -107,15 +105,13 @@ Expected<void> ProblemReader::check_names(std::span<const Field> fields) const {
     }
     const std::vector<std::string_view> names = names_of(true);
     const std::string nearest = nearest_name(name, names);
-    return tl::unexpected(
-        Error(ArgumentError::unknown_name)
-            .in(std::string(where_))
-            .about(prefix_.empty()
+    return refusal(ArgumentError::unknown_name, where_,
+                   prefix_.empty()
                        ? std::string("field")
                        : fmt::format("field of {}", prefix_.substr(0, prefix_.size() - 1)))
-            .got(in_quotes(name))
-            .expected(fmt::format("one of {}", fmt::join(names, ", ")))
-            .hint(nearest.empty() ? "take it out" : "did you mean " + in_quotes(nearest) + "?"));
+        .got(in_quotes(name))
+        .expected(fmt::format("one of {}", fmt::join(names, ", ")))
+        .hint(nearest.empty() ? "take it out" : "did you mean " + in_quotes(nearest) + "?");
   }
   for (const Field& field : fields) {
     if (field.absent == Absent::refused && find(field.name) == nullptr) {
@@ -230,13 +226,10 @@ Expected<std::string_view> ProblemReader::choice(const Field& field, const Json&
   const std::string last = listed.back();
   listed.pop_back();
   const std::string nearest = nearest_name(text, choices);
-  return tl::unexpected(
-      Error(ArgumentError::unknown_name)
-          .in(std::string(where_))
-          .about(full(field.name))
-          .got(in_quotes(text))
-          .expected(fmt::format("{} or {}", fmt::join(listed, ", "), last))
-          .hint(nearest.empty() ? "" : "did you mean " + in_quotes(nearest) + "?"));
+  return refusal(ArgumentError::unknown_name, where_, full(field.name))
+      .got(in_quotes(text))
+      .expected(fmt::format("{} or {}", fmt::join(listed, ", "), last))
+      .hint(nearest.empty() ? "" : "did you mean " + in_quotes(nearest) + "?");
 }
 
 Expected<void> ProblemReader::matrix(const Field& field, const Json& json, MatrixXd& M) {

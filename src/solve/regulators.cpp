@@ -48,11 +48,9 @@ Outcome solve_lqi(const Problem& problem, JsonWriter& answer) {
   const MatrixXd& R = problem.matrix("R");
   const bool discrete = problem.domain() == TimeDomain::discrete;
   if (discrete && !problem.has("T")) {
-    return tl::unexpected(Error(ArgumentError::malformed)
-                              .in("lqi")
-                              .about("T")
-                              .got("left out")
-                              .expected("the time over which a sample of the error is integrated"));
+    return refusal(ArgumentError::malformed, "lqi", "T")
+        .got("left out")
+        .expected("the time over which a sample of the error is integrated");
   }
   const Time period(problem.has("T") ? problem.number("T") : 1.0);
   FLYBALL_TRY(const auto design,
@@ -75,11 +73,9 @@ Outcome solve_finite_horizon(const Problem& problem, JsonWriter& answer) {
   const QuadraticCost cost{problem.matrix("Q"), problem.matrix("R"), problem.matrix("N")};
   const bool discrete = problem.domain() == TimeDomain::discrete;
   if (!discrete && !problem.has("horizon")) {
-    return tl::unexpected(Error(ArgumentError::malformed)
-                              .in("finite-horizon-lqr")
-                              .about("horizon")
-                              .got("left out")
-                              .expected("how long a continuous regulator acts, in seconds"));
+    return refusal(ArgumentError::malformed, "finite-horizon-lqr", "horizon")
+        .got("left out")
+        .expected("how long a continuous regulator acts, in seconds");
   }
   const MatrixXd& A = problem.matrix("A");
   const MatrixXd& B = problem.matrix("B");

@@ -23,11 +23,9 @@ Outcome solve_simulate(const Problem& problem, JsonWriter& answer) {
   const Eigen::MatrixXd& x0 = problem.matrix("x0");
   const bool discrete = problem.domain() == TimeDomain::discrete;
   if (!discrete && !problem.has("T")) {
-    return tl::unexpected(Error(ArgumentError::malformed)
-                              .in("simulate")
-                              .about("T")
-                              .got("left out")
-                              .expected("the time between the rows of u in seconds"));
+    return refusal(ArgumentError::malformed, "simulate", "T")
+        .got("left out")
+        .expected("the time between the rows of u in seconds");
   }
   const Time period(problem.has("T") ? problem.number("T") : 1.0);
   FLYBALL_CHECK(check_size(numbers_of(plant, static_cast<double>(u.rows())), "simulate", "u"));
@@ -51,12 +49,9 @@ Expected<std::optional<ResponseTimes>> times_of(const Problem& problem, std::str
   }
   for (const char* name : {"samples", "T"}) {
     if (!problem.has(name) && !discrete) {
-      return tl::unexpected(Error(ArgumentError::malformed)
-                                .in(std::string(where))
-                                .about(name)
-                                .got("left out")
-                                .expected("there: of a continuous system both samples and T are "
-                                          "said, or neither"));
+      return refusal(ArgumentError::malformed, where, name)
+          .got("left out")
+          .expected("there: of a continuous system both samples and T are said, or neither");
     }
   }
   return std::optional<ResponseTimes>({Time(problem.number("T")), problem.integer("samples")});

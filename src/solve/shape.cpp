@@ -72,11 +72,7 @@ Index Sizes::bind(std::string_view size, Index actual) {
 Expected<void> check_shape_of(const Eigen::MatrixXd& M, const Field& field, Sizes& sizes,
                               std::string_view where, std::string_view name) {
   if (M.size() == 0) {
-    return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(where))
-                              .about(std::string(name))
-                              .got("empty")
-                              .expected("at least one number"));
+    return refusal(ArgumentError::empty, where, name).got("empty").expected("at least one number");
   }
   if (field.rows == field.columns && !sizes.knows(field.rows)) {
     FLYBALL_CHECK(check_square(M, where, name));

@@ -52,11 +52,9 @@ Expected<void> check_answer(const std::string& answer, const Kind& kind) {
   for (const Field& field : kind.answer) {
     const auto found = json.find(field.name);
     if (!field.unbounded && found != json.end() && !is_bounded(*found)) {
-      return tl::unexpected(Error(SolveError::overflow)
-                                .in(std::string(kind.name))
-                                .about(std::string(field.name))
-                                .got("beyond the range of a double")
-                                .hint("choose units in which the numbers are nearer to 1"));
+      return refusal(SolveError::overflow, kind.name, field.name)
+          .got("beyond the range of a double")
+          .hint("choose units in which the numbers are nearer to 1");
     }
   }
   return {};

@@ -85,11 +85,9 @@ void add_gains(ModelAnalysis& analysis) {
 Expected<ModelAnalysis> analyze(const ModelFile& model) {
   const bool continuous = model.domain == TimeDomain::continuous;
   if (!continuous && !model.period) {
-    return tl::unexpected(Error(ArgumentError::malformed)
-                              .in("analyze")
-                              .about("period")
-                              .got("left out")
-                              .expected("the sample period of the discrete system"));
+    return refusal(ArgumentError::malformed, "analyze", "period")
+        .got("left out")
+        .expected("the sample period of the discrete system");
   }
   FLYBALL_TRY(auto structure,
               analyze_structure(model.system, model.domain, model.period.value_or(Time(1.0))));

@@ -73,13 +73,10 @@ Expected<LoopDesign> search_tolerances(const LinearModel& model, DesignJob& job,
     return tl::unexpected(*std::move(last));
   }
   if (!best) {
-    return tl::unexpected(
-        Error(DesignError::margins_lost)
-            .in(std::string(where))
-            .about("the loop")
-            .got(fmt::format("without margins at any tolerance with a delay of {} ms",
-                             format_number(1e3 * job.controller.delay.value_or(0.0), 3)))
-            .hint("shorten the delay or the period"));
+    return refusal(DesignError::margins_lost, where, "the loop")
+        .got(fmt::format("without margins at any tolerance with a delay of {} ms",
+                         format_number(1e3 * job.controller.delay.value_or(0.0), 3)))
+        .hint("shorten the delay or the period");
   }
   std::vector<std::string> words;
   for (std::size_t k = 0; k < best_tolerances.size(); ++k) {
@@ -158,14 +155,11 @@ Expected<DesignResult> design(const DesignJob& requested) {
     return tl::unexpected(std::move(loop).error());
   }
   if (!loop->margins.stable) {
-    return tl::unexpected(
-        Error(DesignError::margins_lost)
-            .in(std::string(where))
-            .about("the loop")
-            .got(fmt::format("unstable with its delay of {} ms",
-                             format_number(1e3 * job.controller.delay.value_or(0.0), 3)))
-            .hint("loosen controller.state_tolerance, or leave it out to have it chosen")
-            .with("spectral_radius", loop->margins.spectral_radius));
+    return refusal(DesignError::margins_lost, where, "the loop")
+        .got(fmt::format("unstable with its delay of {} ms",
+                         format_number(1e3 * job.controller.delay.value_or(0.0), 3)))
+        .hint("loosen controller.state_tolerance, or leave it out to have it chosen")
+        .with("spectral_radius", loop->margins.spectral_radius);
   }
   if (!chosen) {
     add_margin_warnings(*loop, job, result.diagnostics);

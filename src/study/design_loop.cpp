@@ -134,12 +134,9 @@ Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
   const DiscreteSystem<>& plant = model.discrete;
   const Time delay(controller.delay.value_or(0.0));
   if (static_cast<Eigen::Index>(tolerances.size()) != plant.A.rows()) {
-    return tl::unexpected(
-        Error(ArgumentError::wrong_shape)
-            .in("design")
-            .about("state_tolerance")
-            .got(fmt::format("{} values long", tolerances.size()))
-            .expected(fmt::format("one value a state: {}", fmt::join(labels(model.states), ", "))));
+    return refusal(ArgumentError::wrong_shape, "design", "state_tolerance")
+        .got(fmt::format("{} values long", tolerances.size()))
+        .expected(fmt::format("one value a state: {}", fmt::join(labels(model.states), ", ")));
   }
   LoopDesign loop;
   auto Q = bryson(tolerances);

@@ -143,21 +143,16 @@ std::string describe(const OperatingPoint& point, const ModelDescription& model)
 Expected<ModelRegulator> regulate(const ModelJob& job) {
   const AnyModel& model = job.model;
   if (model.inputs() == 0) {
-    return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(where))
-                              .about("inputs")
-                              .got("empty")
-                              .expected("at least one, for a controller to act with"));
+    return refusal(ArgumentError::empty, where, "inputs")
+        .got("empty")
+        .expected("at least one, for a controller to act with");
   }
   FLYBALL_TRY(auto point, operating_point(job));
   if (!point.is_equilibrium) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("the point")
-                              .got(describe(point, model.names()))
-                              .hint("give that one in [point], or write find_equilibrium = true")
-                              .with("derivative", std::vector<double>(point.derivative.begin(),
-                                                                      point.derivative.end())));
+    return refusal(ArgumentError::out_of_range, where, "the point")
+        .got(describe(point, model.names()))
+        .hint("give that one in [point], or write find_equilibrium = true")
+        .with("derivative", std::vector<double>(point.derivative.begin(), point.derivative.end()));
   }
   FLYBALL_TRY(auto linear, linearize(model, point.x, point.u));
   const Time period(job.period);

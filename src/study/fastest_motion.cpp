@@ -6,6 +6,7 @@
 
 #include <flyball/core/argument.hpp>
 
+#include "core/try.hpp"
 #include "study/design_steps.hpp"
 
 namespace flyball::study {
@@ -56,34 +57,27 @@ Expected<FastestMotion> fastest_motion(const DesignJob& job) {
   budget.sag = plant.motor ? job.battery.resistance / plant.motor->R : 0.0;
 
   if (std::abs(gains.kG) >= maximum) {
-    return tl::unexpected(
-        Error(DesignError::gravity_too_strong)
-            .in("design")
-            .about("kG")
-            .got(fmt::format("{} V", format_number(gains.kG)))
-            .expected(fmt::format("below the {} V that may be applied", format_number(maximum)))
-            .hint("add motors, gear lower or counterbalance"));
+    return refusal(DesignError::gravity_too_strong, "design", "kG")
+        .got(fmt::format("{} V", format_number(gains.kG)))
+        .expected(fmt::format("below the {} V that may be applied", format_number(maximum)))
+        .hint("add motors, gear lower or counterbalance");
   }
   const double top = budget.top_velocity_volts();
   if (!(top > 0.0)) {
-    const Error error = Error(DesignError::no_motion_possible).in("design");
+    const Error error = refusal(DesignError::no_motion_possible, "design");
     if (budget.holding < budget.limit) {
-      return tl::unexpected(
-          Error(error)
-              .about("the battery")
-              .got(fmt::format("left with {} V under its sag, less a tenth for feedback",
-                               format_number(budget.under_sag())))
-              .expected(fmt::format("above the {} V of friction and gravity",
-                                    format_number(budget.holding)))
-              .hint("lower battery.resistance or raise battery.open_circuit_voltage"));
+      return refusal(error, {}, "the battery")
+          .got(fmt::format("left with {} V under its sag, less a tenth for feedback",
+                           format_number(budget.under_sag())))
+          .expected(
+              fmt::format("above the {} V of friction and gravity", format_number(budget.holding)))
+          .hint("lower battery.resistance or raise battery.open_circuit_voltage");
     }
-    return tl::unexpected(
-        Error(error)
-            .about("friction and gravity")
-            .got(fmt::format("{} V together", format_number(budget.holding)))
-            .expected(fmt::format("below {} V, so that a tenth is left for feedback",
-                                  format_number(budget.limit)))
-            .hint("add motors, gear lower or counterbalance"));
+    return refusal(error, {}, "friction and gravity")
+        .got(fmt::format("{} V together", format_number(budget.holding)))
+        .expected(fmt::format("below {} V, so that a tenth is left for feedback",
+                              format_number(budget.limit)))
+        .hint("add motors, gear lower or counterbalance");
   }
 
   // Without a kA nothing tells the fastest acceleration. Its upper bound is safe; without that
@@ -100,13 +94,11 @@ Expected<FastestMotion> fastest_motion(const DesignJob& job) {
   if (plant.kind == MechanismKind::flywheel) {
     const double goal = job.profile.goal.value_or(0.75 * v_top);
     if (std::abs(goal) >= v_top) {
-      return tl::unexpected(Error(DesignError::no_motion_possible)
-                                .in("design")
-                                .about("profile.goal")
-                                .got(fmt::format("{} {}/s", format_number(goal), plant.unit))
-                                .expected(fmt::format("below {} {}/s, the fastest within the "
-                                                      "voltage less a tenth for feedback",
-                                                      format_number(v_top), plant.unit)));
+      return refusal(DesignError::no_motion_possible, "design", "profile.goal")
+          .got(fmt::format("{} {}/s", format_number(goal), plant.unit))
+          .expected(
+              fmt::format("below {} {}/s, the fastest within the voltage less a tenth for feedback",
+                          format_number(v_top), plant.unit));
     }
     motion.goal = goal;
     motion.max_velocity = v_top;

@@ -31,13 +31,11 @@ Expected<std::vector<Coordinate>> read_coordinates(const std::vector<std::string
       return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
     });
     if (name.empty() || name.size() > longest || control) {
-      return tl::unexpected(Error(ArgumentError::malformed)
-                                .in(where)
-                                .about("a name of " + std::string(field))
-                                .got(name.empty() ? "empty"
-                                     : control    ? "not plain text"
-                                                  : fmt::format("{} bytes long", name.size()))
-                                .expected(fmt::format("one line of at most {} bytes", longest)));
+      return refusal(ArgumentError::malformed, where, "a name of " + std::string(field))
+          .got(name.empty() ? "empty"
+               : control    ? "not plain text"
+                            : fmt::format("{} bytes long", name.size()))
+          .expected(fmt::format("one line of at most {} bytes", longest));
     }
   }
   if (names.empty() || static_cast<Eigen::Index>(names.size()) == count) {
@@ -47,11 +45,9 @@ Expected<std::vector<Coordinate>> read_coordinates(const std::vector<std::string
     }
     return coordinates;
   }
-  return tl::unexpected(Error(ArgumentError::wrong_shape)
-                            .in(where)
-                            .about(std::string(field))
-                            .got(fmt::format("{} names long", names.size()))
-                            .expected(fmt::format("{}, {} names", meaning, count)));
+  return refusal(ArgumentError::wrong_shape, where, field)
+      .got(fmt::format("{} names long", names.size()))
+      .expected(fmt::format("{}, {} names", meaning, count));
 }
 
 /// What a model in JSON has.
@@ -81,11 +77,9 @@ Expected<ModelFile> parse_matrices(std::string_view text, const std::string& nam
     model.period = Time(fields.number("T"));
   }
   if (model.domain == TimeDomain::discrete && !model.period) {
-    return tl::unexpected(Error(ArgumentError::malformed)
-                              .in(name)
-                              .about("T")
-                              .got("left out")
-                              .expected("the sample period of the discrete model in seconds"));
+    return refusal(ArgumentError::malformed, name, "T")
+        .got("left out")
+        .expected("the sample period of the discrete model in seconds");
   }
   const ContinuousSystem<>& system = model.system;
   FLYBALL_CHECK(Checks(name)
@@ -153,10 +147,9 @@ ExpectedAll<ModelFile> parse_model(std::string_view text, const std::string& nam
     return parse_project(text, name, overrides).and_then(&model_of);
   }
   if (!overrides.empty()) {
-    return tl::unexpected(Error(ArgumentError::unknown_name)
-                              .about(overrides.front().option)
-                              .got("given with matrices")
-                              .hint("it is for a project file"));
+    return refusal(ArgumentError::unknown_name, {}, overrides.front().option)
+        .got("given with matrices")
+        .hint("it is for a project file");
   }
   return parse_matrices(text, name);
 }

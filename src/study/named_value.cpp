@@ -23,12 +23,10 @@ Expected<double> named_value(const std::string& text, const std::string& called,
   const bool takes_plain = wanted && wanted->exponents == SiDimension{}.exponents;
   if (wanted && parts.number != 0.0 &&
       (!wanted->fits(given.dimension) || (plain && !takes_plain))) {
-    return tl::unexpected(
-        Error(ArgumentError::wrong_unit)
-            .about(called)
-            .got(plain ? fmt::format("{}, without a unit", text)
-                       : fmt::format("\"{}\", in {}", text, to_text(given.dimension)))
-            .expected(fmt::format("in {}, such as \"1 {}\"", to_text(*wanted), unit)));
+    return refusal(ArgumentError::wrong_unit, {}, called)
+        .got(plain ? fmt::format("{}, without a unit", text)
+                   : fmt::format("\"{}\", in {}", text, to_text(given.dimension)))
+        .expected(fmt::format("in {}, such as \"1 {}\"", to_text(*wanted), unit));
   }
   const double si = parts.number * given.factor;
   if ((sign == Sign::positive && !(si > 0.0)) || (sign == Sign::not_negative && !(si >= 0.0))) {

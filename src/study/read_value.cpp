@@ -35,18 +35,16 @@ std::string description(const toml::node& node) {
 
 tl::unexpected<Error> wrong_type(const toml::node& node, const std::string& name,
                                  std::string expected) {
-  return tl::unexpected(Error(ProjectError::wrong_type)
-                            .about(name)
-                            .got(description(node))
-                            .expected(std::move(expected)));
+  return refusal(ProjectError::wrong_type, {}, name)
+      .got(description(node))
+      .expected(std::move(expected));
 }
 
 Expected<double> in_range(double value, Range range, Dimension dimension, const std::string& name) {
   if (!std::isfinite(value)) {
-    return tl::unexpected(Error(ArgumentError::not_finite)
-                              .about(name)
-                              .got(format_number(value))
-                              .expected("a finite number"));
+    return refusal(ArgumentError::not_finite, {}, name)
+        .got(format_number(value))
+        .expected("a finite number");
   }
   if (range == Range::any || value > 0.0 || (range == Range::not_negative && value == 0.0)) {
     return value;
@@ -74,12 +72,10 @@ Expected<double> quantity(const toml::node& node, Range range, Dimension dimensi
   const std::string unit(si_unit(dimension));
   if (number || whole) {
     const bool finite = std::isfinite(*node.value<double>());
-    return tl::unexpected(
-        Error(ArgumentError::wrong_unit)
-            .about(name)
-            .got(description(node) + ", without a unit")
-            .expected(fmt::format("a text with number and unit, such as \"{} {}\"",
-                                  finite ? description(node) : "1", unit)));
+    return refusal(ArgumentError::wrong_unit, {}, name)
+        .got(description(node) + ", without a unit")
+        .expected(fmt::format("a text with number and unit, such as \"{} {}\"",
+                              finite ? description(node) : "1", unit));
   }
   return wrong_type(node, name, fmt::format("a text with number and unit, such as \"1 {}\"", unit));
 }
@@ -137,7 +133,7 @@ ExpectedAll<FieldValue> read_value(const Field& field, const toml::node& node,
         return wrong_type(node, name, "a text in quotes");
       }
       if (text->empty()) {
-        return tl::unexpected(Error(ArgumentError::empty).about(name).got("empty"));
+        return refusal(ArgumentError::empty, {}, name).got("empty");
       }
       if (field.check != nullptr) {
         FLYBALL_CHECK(field.check(*text));

@@ -104,7 +104,7 @@ class Regulating {
 };
 
 /// An error of the integration says which state has no derivative, where that is the reason.
-Error named(Error error, const ModelJob& job) {
+Refusal named(Error error, const ModelJob& job) {
   double t = 0.0;
   VectorXd x;
   for (const Evidence& evidence : error.evidence()) {
@@ -121,11 +121,11 @@ Error named(Error error, const ModelJob& job) {
     for (int i = 0; i < 10; ++i, h = std::max(10.0 * h, 1e-9)) {
       if (auto checked = job.model.check(x + h * slope, job.run.input(t + h), where, t + h);
           !checked) {
-        return std::move(checked).error();
+        return Refusal(std::move(checked).error());
       }
     }
   }
-  return std::move(error).in(std::string(where));
+  return Refusal(std::move(error).in(std::string(where)));
 }
 
 /// A mechanism at a constant voltage.
@@ -190,11 +190,9 @@ Expected<void> take(const NamedTexts& said, std::string_view key,
     });
     const std::string name = fmt::format("simulation.{}.{}", key, one.name);
     if (found == known.end()) {
-      return tl::unexpected(Error(ArgumentError::unknown_name)
-                                .about(name)
-                                .got("nothing that the mechanism has")
-                                .hint(key == "input" ? "its input is voltage"
-                                                     : "its states are position and velocity"));
+      return refusal(ArgumentError::unknown_name, {}, name)
+          .got("nothing that the mechanism has")
+          .hint(key == "input" ? "its input is voltage" : "its states are position and velocity");
     }
     FLYBALL_TRY(*std::get<2>(*found), parse_quantity(one.text, std::get<1>(*found), name));
   }
@@ -216,7 +214,7 @@ Expected<Simulation> simulate_open_loop(const ModelJob& job) {
                                    .max_steps = 1'000'000};
   auto solution = integrate(with_input(model, run.input), 0.0, run.initial, run.duration, options);
   if (!solution) {
-    return tl::unexpected(named(std::move(solution).error(), job));
+    return named(std::move(solution).error(), job);
   }
   Simulation result = described(job);
   result.closed_loop = false;
@@ -279,7 +277,7 @@ Expected<Simulation> simulate_closed_loop(const ModelJob& job, const ModelRegula
   FLYBALL_TRY(auto law, Regulating::create(job, regulator));
   auto looped = flyball::simulate_closed_loop(plant, law, loop);
   if (!looped) {
-    return tl::unexpected(named(std::move(looped).error(), job));
+    return named(std::move(looped).error(), job);
   }
   Simulation result = described(job);
   result.closed_loop = true;

@@ -70,13 +70,10 @@ Expected<MechanismResponse> simulate_design(const DesignResult& design, const De
                     .positive(trial.gain_factor, "gain_factor")
                     .not_negative(trial.measurement_noise, "measurement_noise"));
   if (const double periods = periods_of(design); !(periods <= most_periods)) {
-    return tl::unexpected(
-        Error(ArgumentError::out_of_range)
-            .in(std::string(where))
-            .about("the motion")
-            .got(fmt::format("{} periods of controller.period long", format_number(periods, 3)))
-            .expected(fmt::format("at most {} of them", format_number(most_periods, 7)))
-            .hint("bring profile.goal nearer, raise profile.max_velocity, or lengthen the period"));
+    return refusal(ArgumentError::out_of_range, where, "the motion")
+        .got(fmt::format("{} periods of controller.period long", format_number(periods, 3)))
+        .expected(fmt::format("at most {} of them", format_number(most_periods, 7)))
+        .hint("bring profile.goal nearer, raise profile.max_velocity, or lengthen the period");
   }
   const DesignJob& designed = design.job;
   MechanismLoop loop;

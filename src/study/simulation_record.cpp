@@ -6,6 +6,7 @@
 #include <flyball/core/argument.hpp>
 #include <flyball/systems/model.hpp>
 
+#include "core/try.hpp"
 #include "study/simulation_record.hpp"
 
 namespace flyball::study {
@@ -79,12 +80,10 @@ Expected<Eigen::Index> steps_of(double duration, double step) {
   constexpr double most_rows = 1e6;
   const double count = std::max(1.0, std::round(duration / step));
   if (!(count <= most_rows)) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in("simulate")
-                              .about("the record")
-                              .got(fmt::format("{} rows long", format_number(count)))
-                              .expected("at most a million rows")
-                              .hint("simulate for less time, or in longer steps"));
+    return refusal(ArgumentError::out_of_range, "simulate", "the record")
+        .got(fmt::format("{} rows long", format_number(count)))
+        .expected("at most a million rows")
+        .hint("simulate for less time, or in longer steps");
   }
   return static_cast<Eigen::Index>(count);
 }

@@ -7,6 +7,7 @@
 #include <flyball/core/text.hpp>
 #include <flyball/math/expression/formula.hpp>
 
+#include "core/try.hpp"
 #include "study/read_value.hpp"
 #include "study/toml_document.hpp"
 
@@ -290,9 +291,7 @@ void TomlDocument::refuse_part(std::string_view section, std::string_view key, E
 
 Error TomlDocument::missing(std::string_view section, std::string_view key,
                             std::string hint) const {
-  return Error(ProjectError::missing_key)
-      .in(place(source_of(section)))
-      .about(name(section, key))
+  return refusal(ProjectError::missing_key, place(source_of(section)), name(section, key))
       .got("missing")
       .hint(std::move(hint));
 }

@@ -48,12 +48,10 @@ Expected<Equilibrium> rest(const MatrixXd& balance, const ContinuousSystem<>& sy
   const double left = (detail::product(M, x) - right).norm();
   const double size = M.norm() * x.norm() + right.norm();
   if (!(left <= 1e3 * small * size)) {
-    return tl::unexpected(Error(SystemError::no_equilibrium)
-                              .in(std::string(where))
-                              .about("u")
-                              .got("driving an integrator")
-                              .hint("only inputs that leave every integrator at rest have one")
-                              .with("relative residual", left / size));
+    return refusal(SystemError::no_equilibrium, where, "u")
+        .got("driving an integrator")
+        .hint("only inputs that leave every integrator at rest have one")
+        .with("relative residual", left / size);
   }
   Equilibrium found;
   found.x = scaling.states.asDiagonal() * x;
@@ -175,10 +173,8 @@ Expected<ModalAnalysis> analyze_modes(const MatrixRef& A, TimeDomain domain, Tim
   }));
   const detail::JudgedEigenvalues judged = detail::judged_eigenvalues(A, domain);
   if (!judged.converged) {
-    return tl::unexpected(Error(SystemError::no_convergence)
-                              .in(std::string(where))
-                              .about("the eigenvalues of A")
-                              .hint("scale its rows and columns to like magnitudes"));
+    return refusal(SystemError::no_convergence, where, "the eigenvalues of A")
+        .hint("scale its rows and columns to like magnitudes");
   }
   ModalAnalysis analysis;
   analysis.stability = judged.stability;
@@ -262,13 +258,10 @@ Expected<LyapunovCertificate> lyapunov_certificate(const MatrixRef& A, const Mat
                     .symmetric(Q, "Q"));
   const MatrixXd weight = detail::symmetrized(Q);
   if (!detail::cholesky_of(weight)) {
-    return tl::unexpected(
-        Error(ArgumentError::not_positive)
-            .in(std::string(where))
-            .about("Q")
-            .got("not positive definite")
-            .expected("positive definite: V has to fall wherever x is not zero")
-            .with("smallest eigenvalue", detail::symmetric_eigensystem_of(weight).values(0)));
+    return refusal(ArgumentError::not_positive, where, "Q")
+        .got("not positive definite")
+        .expected("positive definite: V has to fall wherever x is not zero")
+        .with("smallest eigenvalue", detail::symmetric_eigensystem_of(weight).values(0));
   }
   FLYBALL_TRY(auto solution, domain == TimeDomain::continuous
                                  ? lyapunov(A.transpose(), weight)

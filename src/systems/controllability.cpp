@@ -121,10 +121,8 @@ Expected<Verdict> analyze(const MatrixRef& A_given, const MatrixRef& B_given, Ti
   Eigen::VectorXcd all;
   const std::vector<Eigen::VectorXd> shares = participations(A, all);
   if (!all.allFinite()) {
-    return tl::unexpected(Error(SystemError::no_convergence)
-                              .in(std::string(where))
-                              .about("the eigenvalues of A")
-                              .hint("scale its rows and columns to like magnitudes"));
+    return refusal(SystemError::no_convergence, where, "the eigenvalues of A")
+        .hint("scale its rows and columns to like magnitudes");
   }
   const auto share_of = [&](Complex lambda) {
     Index nearest = 0;
@@ -148,8 +146,7 @@ Expected<Verdict> analyze(const MatrixRef& A_given, const MatrixRef& B_given, Ti
   const MatrixXd B_r = stairs.B.topRows(r);
   const detail::JudgedEigenvalues seen = detail::judged_eigenvalues(A_r, domain, blur);
   if (!hidden.converged || !seen.converged) {
-    return tl::unexpected(
-        Error(SystemError::no_convergence).in(std::string(where)).about("the eigenvalues of A"));
+    return refusal(SystemError::no_convergence, where, "the eigenvalues of A");
   }
   const detail::ModeDistance distances(A_r, B_r);
   std::vector<Complex> missed;

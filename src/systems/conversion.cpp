@@ -52,14 +52,11 @@ class Shifted {
       if (gap > 4.0 * (blur + epsilon * (std::abs(constant_) + std::abs(factor_ * lambda)))) {
         continue;
       }
-      return tl::unexpected(
-          Error(SystemError::no_image)
-              .in(std::string(where))
-              .about("A")
-              .got("with an eigenvalue that " + std::string(method) + " maps to infinity")
-              .expected("without the eigenvalue " + format_number(forbidden))
-              .hint("choose another period or zoh")
-              .with("eigenvalue", std::vector<double>{lambda.real(), lambda.imag()}));
+      return refusal(SystemError::no_image, where, "A")
+          .got("with an eigenvalue that " + std::string(method) + " maps to infinity")
+          .expected("without the eigenvalue " + format_number(forbidden))
+          .hint("choose another period or zoh")
+          .with("eigenvalue", std::vector<double>{lambda.real(), lambda.imag()});
     }
     return {};
   }
@@ -99,19 +96,14 @@ Expected<void> check_arguments(Time period, ConversionMethod method, AngularVelo
   }
   const double nyquist = std::numbers::pi / period.si();
   if (method != ConversionMethod::tustin) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("prewarp")
-                              .got("given for " + std::string(to_string(method)))
-                              .expected("zero: only tustin can be prewarped"));
+    return refusal(ArgumentError::out_of_range, where, "prewarp")
+        .got("given for " + std::string(to_string(method)))
+        .expected("zero: only tustin can be prewarped");
   }
   if (prewarp.si() >= nyquist) {
-    return tl::unexpected(
-        Error(ArgumentError::out_of_range)
-            .in(std::string(where))
-            .about("prewarp")
-            .got(format_number(prewarp.si()) + " rad/s")
-            .expected("below the Nyquist frequency, pi/T = " + format_number(nyquist) + " rad/s"));
+    return refusal(ArgumentError::out_of_range, where, "prewarp")
+        .got(format_number(prewarp.si()) + " rad/s")
+        .expected("below the Nyquist frequency, pi/T = " + format_number(nyquist) + " rad/s");
   }
   return {};
 }
@@ -158,11 +150,10 @@ Expected<ConversionMethod> parse_conversion_method(std::string_view name) {
     }
   }
   const std::string nearest = nearest_name(name, names);
-  return tl::unexpected(Error(ArgumentError::unknown_name)
-                            .about("method")
-                            .got('"' + std::string(name) + '"')
-                            .expected("zoh, foh, tustin, forward-euler, backward-euler or matched")
-                            .hint(nearest.empty() ? "" : "did you mean \"" + nearest + "\"?"));
+  return refusal(ArgumentError::unknown_name, {}, "method")
+      .got('"' + std::string(name) + '"')
+      .expected("zoh, foh, tustin, forward-euler, backward-euler or matched")
+      .hint(nearest.empty() ? "" : "did you mean \"" + nearest + "\"?");
 }
 
 Expected<DiscreteSystem<>> convert_to_discrete(const ContinuousSystem<>& system, Time period,

@@ -52,13 +52,9 @@ Expected<Eigen::MatrixXd> discretize(const MatrixRef& A, const ProcessDensity& d
   const double T = period.si();
   FLYBALL_TRY(auto Q_d, detail::quadratic_integral(A, Q, T));
   if (!Q_d.allFinite()) {
-    return tl::unexpected(
-        Error(ArgumentError::not_finite)
-            .in(std::string(where))
-            .about("the discretised Q")
-            .got(
-                detail::format("too large for a double: A grows by more than 1e150 within {} s", T))
-            .hint("shorten the period"));
+    return refusal(ArgumentError::not_finite, where, "the discretised Q")
+        .got(detail::format("too large for a double: A grows by more than 1e150 within {} s", T))
+        .hint("shorten the period");
   }
   return Q_d;
 }

@@ -62,14 +62,12 @@ Expected<ModelEquilibrium> find_equilibrium(const AnyModel& model, const MatrixR
   ModelEquilibrium at{.x = x, .u = u};
   const Eigen::Index n = at.x.size();
   const auto refuse = [&](SearchError code, const Eigen::VectorXd& f) {
-    return tl::unexpected(Error(code)
-                              .in(std::string(where))
-                              .about("the search")
-                              .got("without an equilibrium near the point")
-                              .hint("begin nearer to one, or with other inputs")
-                              .with("x", list(at.x))
-                              .with("u", list(at.u))
-                              .with("derivative", list(f)));
+    return refusal(code, where, "the search")
+        .got("without an equilibrium near the point")
+        .hint("begin nearer to one, or with other inputs")
+        .with("x", list(at.x))
+        .with("u", list(at.u))
+        .with("derivative", list(f));
   };
   for (; at.iterations < most_iterations; ++at.iterations) {
     const Local local(model, at.x, at.u);

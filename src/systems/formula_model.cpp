@@ -8,6 +8,7 @@
 #include <flyball/math/expression/differentiate.hpp>
 
 #include "core/format.hpp"
+#include "core/try.hpp"
 
 namespace flyball {
 
@@ -234,9 +235,7 @@ std::vector<Formula> ordered_derivatives(const ModelFormulas& model, std::vector
     if (found == states.end()) {
       const std::string nearest = nearest_name(formula.name, states);
       errors.push_back(
-          Error(ArgumentError::unknown_name)
-              .in(std::move(where))
-              .about(detail::format("\"{}\"", formula.name))
+          refusal(ArgumentError::unknown_name, where, detail::format("\"{}\"", formula.name))
               .got("not a state")
               .hint(nearest.empty()
                         ? detail::format("states are {}", detail::comma_separated("{}", states))
@@ -245,9 +244,8 @@ std::vector<Formula> ordered_derivatives(const ModelFormulas& model, std::vector
     }
     Formula& place = ordered[static_cast<std::size_t>(found - states.begin())];
     if (!place.name.empty()) {
-      errors.push_back(Error(ArgumentError::ambiguous_name)
-                           .in(std::move(where))
-                           .about(detail::format("the derivative of \"{}\"", formula.name))
+      errors.push_back(refusal(ArgumentError::ambiguous_name, where,
+                               detail::format("the derivative of \"{}\"", formula.name))
                            .got("given twice"));
       continue;
     }
@@ -257,9 +255,8 @@ std::vector<Formula> ordered_derivatives(const ModelFormulas& model, std::vector
     const std::string& unit = model.states[k].unit;
     Formula& formula = ordered[k];
     if (formula.name.empty()) {
-      errors.push_back(Error(ArgumentError::empty)
-                           .in(detail::format("derivative of {}", states[k]))
-                           .about(detail::format("the derivative of \"{}\"", states[k]))
+      errors.push_back(refusal(ArgumentError::empty, detail::format("derivative of {}", states[k]),
+                               detail::format("the derivative of \"{}\"", states[k]))
                            .got("missing")
                            .hint(detail::format("each state needs one: {} = \"…\"", states[k])));
     } else if (formula.unit.empty() && !unit.empty()) {
@@ -276,9 +273,8 @@ std::vector<Formula> named_outputs(const ModelFormulas& model, std::vector<Error
     std::string where = "output " + formula.name;
     if (std::any_of(outputs.begin(), outputs.end(),
                     [&](const Formula& other) { return other.name == where; })) {
-      errors.push_back(Error(ArgumentError::ambiguous_name)
-                           .in(where)
-                           .about(detail::format("the output \"{}\"", formula.name))
+      errors.push_back(refusal(ArgumentError::ambiguous_name, where,
+                               detail::format("the output \"{}\"", formula.name))
                            .got("given twice"));
     }
     outputs.push_back({std::move(where), formula.text, formula.unit});

@@ -24,24 +24,21 @@ using Eigen::MatrixXd;
 Expected<void> check_stable(const MatrixRef& A, TimeDomain domain, std::string_view where) {
   const JudgedEigenvalues judged = judged_eigenvalues(A, domain);
   if (!judged.converged) {
-    return tl::unexpected(
-        Error(SystemError::no_convergence).in(std::string(where)).about("the eigenvalues of A"));
+    return refusal(SystemError::no_convergence, where, "the eigenvalues of A");
   }
   for (Index k = 0; k < judged.values.size(); ++k) {
     if (judged.verdicts[static_cast<std::size_t>(k)] != Stability::stable) {
-      return tl::unexpected(
-          Error(SystemError::not_stable)
-              .in(std::string(where))
-              .about("A")
-              .got(judged.verdicts[static_cast<std::size_t>(k)] == Stability::marginal
-                       ? "marginally stable"
-                       : "unstable")
-              .expected(domain == TimeDomain::continuous
-                            ? "stable: every pole left of the imaginary axis"
-                            : "stable: every pole within the unit circle")
-              .hint("stabilise the system first, or remove a pole that is not reached or seen "
-                    "with minimal_realization")
-              .with("pole", std::vector<double>{judged.values(k).real(), judged.values(k).imag()}));
+      return refusal(SystemError::not_stable, where, "A")
+          .got(judged.verdicts[static_cast<std::size_t>(k)] == Stability::marginal
+                   ? "marginally stable"
+                   : "unstable")
+          .expected(domain == TimeDomain::continuous
+                        ? "stable: every pole left of the imaginary axis"
+                        : "stable: every pole within the unit circle")
+          .hint(
+              "stabilise the system first, or remove a pole that is not reached or seen with "
+              "minimal_realization")
+          .with("pole", std::vector<double>{judged.values(k).real(), judged.values(k).imag()});
     }
   }
   return {};
@@ -89,10 +86,8 @@ Expected<MatrixXd> gramian_factor(const MatrixRef& A, const MatrixRef& B, TimeDo
     }
     power = product(power, power);
   }
-  return tl::unexpected(Error(SystemError::no_convergence)
-                            .in(std::string(where))
-                            .about("the Gramian")
-                            .hint("a pole is too close to the boundary of stability"));
+  return refusal(SystemError::no_convergence, where, "the Gramian")
+      .hint("a pole is too close to the boundary of stability");
 }
 
 Expected<GramianFactors> gramian_factors(const ContinuousSystem<>& system, TimeDomain domain,

@@ -18,11 +18,9 @@ Expected<DelayedInputMatrices> discretize_delayed_input(const MatrixRef& A, cons
   const double periods = delay.si() / T;
   constexpr double most_periods = 1e4;
   if (periods > most_periods) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("delay")
-                              .got(format_number(periods) + " periods")
-                              .expected("at most 10000 periods"));
+    return refusal(ArgumentError::out_of_range, where, "delay")
+        .got(format_number(periods) + " periods")
+        .expected("at most 10000 periods");
   }
   // A delay of decimal fractions is seldom whole periods to the last bit.
   double whole = std::floor(periods);

@@ -41,11 +41,9 @@ Expected<void> check_count(Index got, Index expected, std::string_view where,
   if (got == expected) {
     return {};
   }
-  return tl::unexpected(Error(ArgumentError::wrong_shape)
-                            .in(std::string(where))
-                            .about(std::string(subject))
-                            .got(std::to_string(got))
-                            .expected(std::to_string(expected) + ", " + std::string(of)));
+  return refusal(ArgumentError::wrong_shape, where, subject)
+      .got(std::to_string(got))
+      .expected(std::to_string(expected) + ", " + std::string(of));
 }
 
 Expected<Continuous> connect_series(const Continuous& first, const Continuous& second) {
@@ -107,13 +105,11 @@ Expected<Continuous> connect_feedback(const Continuous& forward, const Continuou
   double rcond = 0.0;
   const MatrixXd e = detail::solve_linear(loop, right, &rcond);
   if (!(rcond > 10.0 * std::numeric_limits<double>::epsilon()) || !e.allFinite()) {
-    return tl::unexpected(Error(SystemError::algebraic_loop)
-                              .in(std::string(where))
-                              .about(s > 0.0 ? "I + D1 D2" : "I - D1 D2")
-                              .got("singular")
-                              .expected("invertible")
-                              .hint("give one of the paths dynamics: no loop acts instantly")
-                              .with("reciprocal condition", rcond));
+    return refusal(SystemError::algebraic_loop, where, s > 0.0 ? "I + D1 D2" : "I - D1 D2")
+        .got("singular")
+        .expected("invertible")
+        .hint("give one of the paths dynamics: no loop acts instantly")
+        .with("reciprocal condition", rcond);
   }
   Continuous loop_system;
   const MatrixXd y_x1 = forward.C + product(forward.D, e.leftCols(n));
@@ -139,12 +135,10 @@ Expected<Discrete> discrete(const Discrete& first, const Discrete& second, std::
   }
   const double T = first.period.si();
   if (!(std::abs(second.period.si() - T) <= 1e-12 * T)) {
-    return tl::unexpected(Error(SystemError::period_mismatch)
-                              .in(std::string(where))
-                              .about("the second system's period")
-                              .got(format_number(second.period.si()) + " s")
-                              .expected(format_number(T) + " s, the first's")
-                              .hint("resample one of them"));
+    return refusal(SystemError::period_mismatch, where, "the second system's period")
+        .got(format_number(second.period.si()) + " s")
+        .expected(format_number(T) + " s, the first's")
+        .hint("resample one of them");
   }
   return connect(bare(first), bare(second)).map([&](const Continuous& both) {
     return Discrete{both.A, both.B, both.C, both.D, first.period};
@@ -178,11 +172,9 @@ Expected<Eigen::MatrixXcd> evaluate(const Continuous& system, std::complex<doubl
   double rcond = 0.0;
   const Eigen::MatrixXcd x = detail::solve_complex(shifted, B.cast<std::complex<double>>(), &rcond);
   if (rcond == 0.0 || !x.allFinite()) {
-    return tl::unexpected(Error(SystemError::no_image)
-                              .in(std::string(where))
-                              .about("the point")
-                              .got("a pole")
-                              .with("point", std::vector<double>{point.real(), point.imag()}));
+    return refusal(SystemError::no_image, where, "the point")
+        .got("a pole")
+        .with("point", std::vector<double>{point.real(), point.imag()});
   }
   return Eigen::MatrixXcd(detail::complex_product(C.cast<std::complex<double>>(), x) +
                           system.D.cast<std::complex<double>>());

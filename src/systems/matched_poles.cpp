@@ -25,13 +25,10 @@ Expected<void> check_single(const MatrixXd& D, std::string_view where) {
   if (D.rows() == 1 && D.cols() == 1) {
     return {};
   }
-  return tl::unexpected(
-      Error(ArgumentError::wrong_shape)
-          .in(std::string(where))
-          .about("the system")
-          .got(std::to_string(D.rows()) + " outputs by " + std::to_string(D.cols()) + " inputs")
-          .expected("one output by one input: only then are there zeros to match")
-          .hint("convert each channel, or choose zoh"));
+  return refusal(ArgumentError::wrong_shape, where, "the system")
+      .got(std::to_string(D.rows()) + " outputs by " + std::to_string(D.cols()) + " inputs")
+      .expected("one output by one input: only then are there zeros to match")
+      .hint("convert each channel, or choose zoh");
 }
 
 /// (eˣ - 1)/x.
@@ -55,10 +52,8 @@ Expected<DiscreteSystem<>> match_to_discrete(const ContinuousSystem<>& system, T
   FLYBALL_CHECK(check_single(system.D, where));
   const auto zpk = zero_pole_gain(system);
   if (!zpk) {
-    return tl::unexpected(Error(SystemError::zero_transfer)
-                              .in(std::string(where))
-                              .about("the system")
-                              .hint("there is no gain to match; choose zoh"));
+    return refusal(SystemError::zero_transfer, where, "the system")
+        .hint("there is no gain to match; choose zoh");
   }
   const double T = period.si();
   ZeroPoleGain image;
@@ -72,14 +67,11 @@ Expected<DiscreteSystem<>> match_to_discrete(const ContinuousSystem<>& system, T
     // The zero of a small D far to the right: with the gain that belongs to it nothing is left.
     constexpr double largest_exponent = 300.0;
     if (z.real() * T > largest_exponent) {
-      return tl::unexpected(
-          Error(SystemError::no_image)
-              .in(std::string(where))
-              .about("a zero")
-              .got("whose image exp(s T) a double cannot hold")
-              .expected("s T below " + format_number(largest_exponent))
-              .hint("shorten the period, set a negligible D to zero, or choose zoh")
-              .with("zero", std::vector<double>{z.real(), z.imag()}));
+      return refusal(SystemError::no_image, where, "a zero")
+          .got("whose image exp(s T) a double cannot hold")
+          .expected("s T below " + format_number(largest_exponent))
+          .hint("shorten the period, set a negligible D to zero, or choose zoh")
+          .with("zero", std::vector<double>{z.real(), z.imag()});
     }
     image.zeros.push_back(std::exp(z * T));
     gain /= T * phi(z * T);
@@ -99,8 +91,7 @@ Expected<ContinuousSystem<>> match_to_continuous(const DiscreteSystem<>& system)
   FLYBALL_CHECK(check_single(system.D, where));
   auto zpk = zero_pole_gain({system.A, system.B, system.C, system.D});
   if (!zpk) {
-    return tl::unexpected(
-        Error(SystemError::zero_transfer).in(std::string(where)).about("the system"));
+    return refusal(SystemError::zero_transfer, where, "the system");
   }
   // k equal zeros scatter by the k-th root of rounding.
   std::vector<Complex>& zeros = zpk->zeros;
@@ -119,14 +110,11 @@ Expected<ContinuousSystem<>> match_to_continuous(const DiscreteSystem<>& system)
                        std::string_view what, bool pole) -> Expected<void> {
     for (const Complex& z : from) {
       if (std::abs(z) < 1e-300 || (z.imag() == 0.0 && z.real() <= 0.0)) {
-        return tl::unexpected(
-            Error(SystemError::no_image)
-                .in(std::string(where))
-                .about("the " + std::string(what))
-                .got("zero or negative")
-                .expected("off the closed negative real axis: e^{sT} of a real system is")
-                .hint("choose tustin")
-                .with(std::string(what), std::vector<double>{z.real(), z.imag()}));
+        return refusal(SystemError::no_image, where, "the " + std::string(what))
+            .got("zero or negative")
+            .expected("off the closed negative real axis: e^{sT} of a real system is")
+            .hint("choose tustin")
+            .with(std::string(what), std::vector<double>{z.real(), z.imag()});
       }
       const Complex s = std::log(z) / T;
       to.push_back(s);

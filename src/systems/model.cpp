@@ -24,8 +24,8 @@ std::vector<double> values(const MatrixRef& v) {
   return {v.data(), v.data() + v.size()};
 }
 
-Error at_point(Error error, const MatrixRef& x, const MatrixRef& u, double t) {
-  return std::move(error).with("t", t).with("x", values(x)).with("u", values(u));
+Refusal at_point(Refusal refused, const MatrixRef& x, const MatrixRef& u, double t) {
+  return std::move(refused).with("t", t).with("x", values(x)).with("u", values(u));
 }
 
 Expected<void> check_finite_entries(const MatrixRef& v, const std::vector<Coordinate>& coordinates,
@@ -34,15 +34,13 @@ Expected<void> check_finite_entries(const MatrixRef& v, const std::vector<Coordi
   for (Eigen::Index i = 0; i < v.size(); ++i) {
     if (!std::isfinite(v(i, 0))) {
       const std::string& name = coordinates[static_cast<std::size_t>(i)].name;
-      return tl::unexpected(
-          at_point(Error(ArgumentError::not_finite)
-                       .in(std::string(where))
-                       .about(detail::format("the {} {} of the model", what, name))
-                       .got(detail::format("{} at t = {} s",
-                                           std::isnan(v(i, 0)) ? "nan" : format_number(v(i, 0)),
-                                           format_number(t)))
-                       .expected("finite"),
-                   x, u, t));
+      return at_point(refusal(ArgumentError::not_finite, where,
+                              detail::format("the {} {} of the model", what, name))
+                          .got(detail::format("{} at t = {} s",
+                                              std::isnan(v(i, 0)) ? "nan" : format_number(v(i, 0)),
+                                              format_number(t)))
+                          .expected("finite"),
+                      x, u, t);
     }
   }
   return {};
@@ -85,16 +83,14 @@ Expected<void> check_answer(std::string_view what, const std::vector<Coordinate>
                             std::string_view where, double t) {
   const auto size = static_cast<Eigen::Index>(coordinates.size());
   if (answer.rows() != size || answer.cols() != 1) {
-    return tl::unexpected(at_point(
-        Error(ArgumentError::wrong_shape)
-            .in(std::string(where))
-            .about(format("the {} of the model", what))
+    return at_point(
+        refusal(ArgumentError::wrong_shape, where, format("the {} of the model", what))
             .got(format("{}x{} at t = {} s", answer.rows(), answer.cols(), format_number(t)))
             .expected(format("{} ({}x1)",
                              what == "derivative" ? "of the size of the state"
                                                   : "of as many entries as outputs()",
                              size)),
-        x, u, t));
+        x, u, t);
   }
   return check_finite_entries(answer, coordinates, format("{} of", what), x, u, where, t);
 }
@@ -210,14 +206,10 @@ Expected<AnyModel> AnyModel::with_parameter(std::string_view name, double value)
     }
     known.push_back(parameter.name);
   }
-  return tl::unexpected(
-      Error(ArgumentError::unknown_name)
-          .in(std::string(where))
-          .about("the parameter")
-          .got(detail::format("\"{}\"", name))
-          .expected(known.empty()
-                        ? "none: the model has no parameters"
-                        : detail::format("one of {}", detail::comma_separated("{}", known))));
+  return refusal(ArgumentError::unknown_name, where, "the parameter")
+      .got(detail::format("\"{}\"", name))
+      .expected(known.empty() ? "none: the model has no parameters"
+                              : detail::format("one of {}", detail::comma_separated("{}", known)));
 }
 
 }  // namespace flyball

@@ -249,11 +249,9 @@ Expected<HInfinityNorm> largest_gain(const ContinuousSystem<>& system, std::stri
       return best;
     }
   }
-  return tl::unexpected(Error(SystemError::no_convergence)
-                            .in(std::string(where))
-                            .about("the largest gain")
-                            .with("gain reached", best.norm)
-                            .with("frequency", best.frequency));
+  return refusal(SystemError::no_convergence, where, "the largest gain")
+      .with("gain reached", best.norm)
+      .with("frequency", best.frequency);
 }
 
 Expected<double> root_of_power(const ContinuousSystem<>& system, TimeDomain domain) {
@@ -269,12 +267,10 @@ Expected<double> h2_norm(const ContinuousSystem<>& system) {
   constexpr std::string_view where = "h2_norm";
   FLYBALL_CHECK(check_system(system, where));
   if (!system.D.isZero(0.0)) {
-    return tl::unexpected(Error(SystemError::infinite_norm)
-                              .in(std::string(where))
-                              .about("D")
-                              .got("not zero")
-                              .expected("zero: white noise through D has infinite power")
-                              .with("norm of D", system.D.norm()));
+    return refusal(SystemError::infinite_norm, where, "D")
+        .got("not zero")
+        .expected("zero: white noise through D has infinite power")
+        .with("norm of D", system.D.norm());
   }
   return root_of_power(system, TimeDomain::continuous);
 }

@@ -56,12 +56,10 @@ Expected<Continuous> transform(const Continuous& system, const MatrixRef& T) {
   const MatrixXd solved =
       columns.cwiseInverse().asDiagonal() * detail::solve_linear(unit, right, &rcond);
   if (!(rcond > 10.0 * epsilon) || !solved.allFinite()) {
-    return tl::unexpected(Error(SystemError::singular_transform)
-                              .in(std::string(where))
-                              .about("T")
-                              .got("singular")
-                              .expected("invertible")
-                              .with("reciprocal condition", rcond));
+    return refusal(SystemError::singular_transform, where, "T")
+        .got("singular")
+        .expected("invertible")
+        .with("reciprocal condition", rcond);
   }
   return Continuous{solved.leftCols(n), solved.rightCols(system.B.cols()), product(system.C, T),
                     system.D};
@@ -73,13 +71,10 @@ Expected<Continuous> companion(const Continuous& given, SystemError failure,
   const Index n = given.A.rows();
   if (given.B.cols() != 1) {
     const bool dual = failure == SystemError::not_observable;
-    return tl::unexpected(
-        Error(ArgumentError::wrong_shape)
-            .in(std::string(where))
-            .about(dual ? "C" : "B")
-            .got("of " + std::to_string(given.B.cols()) + (dual ? " rows" : " columns"))
-            .expected(dual ? "one row: the form is of a single output"
-                           : "one column: the form is of a single input"));
+    return refusal(ArgumentError::wrong_shape, where, dual ? "C" : "B")
+        .got("of " + std::to_string(given.B.cols()) + (dual ? " rows" : " columns"))
+        .expected(dual ? "one row: the form is of a single output"
+                       : "one column: the form is of a single input");
   }
   const detail::SystemScaling scaling = detail::scaling_of(given.A, given.B, given.C);
   // Time in the unit of the fastest mode keeps the powers of A within range.
@@ -101,12 +96,9 @@ Expected<Continuous> companion(const Continuous& given, SystemError failure,
   const MatrixXd q =
       detail::solve_linear(K.transpose(), MatrixXd::Identity(n, n).col(n - 1), &rcond);
   if (!(rcond > 10.0 * epsilon) || !q.allFinite()) {
-    return tl::unexpected(Error(failure)
-                              .in(std::string(where))
-                              .about("the system")
-                              .hint("it has no companion form in double precision; see "
-                                    "minimal_realization")
-                              .with("reciprocal condition", rcond));
+    return refusal(failure, where, "the system")
+        .hint("it has no companion form in double precision; see minimal_realization")
+        .with("reciprocal condition", rcond);
   }
   MatrixXd rows(n, n);
   rows.row(0) = q.transpose();
@@ -157,22 +149,18 @@ Expected<BalancedRealization<Continuous>> truncate(const System& given, TimeDoma
   const double floor = static_cast<double>(n) * epsilon * svd.values(0);
   const Index present = (svd.values.array() > floor).count();
   if (all && present < n) {
-    return tl::unexpected(Error(SystemError::not_controllable)
-                              .in(std::string(where))
-                              .about("a state")
-                              .got("not reached or not seen")
-                              .expected("reached and seen: only such states can be balanced")
-                              .hint("leave it out with balanced_truncation or minimal_realization")
-                              .with("states that are both", static_cast<double>(present))
-                              .with("smallest Hankel singular value", svd.values(n - 1)));
+    return refusal(SystemError::not_controllable, where, "a state")
+        .got("not reached or not seen")
+        .expected("reached and seen: only such states can be balanced")
+        .hint("leave it out with balanced_truncation or minimal_realization")
+        .with("states that are both", static_cast<double>(present))
+        .with("smallest Hankel singular value", svd.values(n - 1));
   }
   if (!all && (order < 1 || order > present)) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("order")
-                              .got(std::to_string(order))
-                              .expected("from 1 to " + std::to_string(present) +
-                                        ", the number of states that are reached and seen"));
+    return refusal(ArgumentError::out_of_range, where, "order")
+        .got(std::to_string(order))
+        .expected("from 1 to " + std::to_string(present) +
+                  ", the number of states that are reached and seen");
   }
   const Index r = all ? n : order;
   // x = L_c V σ^{-1/2} x', x' = σ^{-1/2} Uᵀ L_oᵀ x.
@@ -202,11 +190,9 @@ Expected<MinimalRealization<Continuous>> minimal(const Continuous& system, doubl
   constexpr std::string_view where = "minimal_realization";
   FLYBALL_CHECK(check_not_negative(tolerance, where, "tolerance"));
   if (tolerance >= 1.0) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("tolerance")
-                              .got(format_number(tolerance))
-                              .expected("below 1"));
+    return refusal(ArgumentError::out_of_range, where, "tolerance")
+        .got(format_number(tolerance))
+        .expected("below 1");
   }
   const Index n = system.A.rows();
   const double small = tolerance > 0.0 ? tolerance : 100.0 * epsilon * static_cast<double>(n);
@@ -267,7 +253,7 @@ Expected<Continuous> observable_canonical_form(const Continuous& system) {
   constexpr std::string_view where = "observable_canonical_form";
   FLYBALL_CHECK(check_system(system, where));
   if (system.C.rows() == 0) {
-    return tl::unexpected(Error(SystemError::not_observable).in(std::string(where)));
+    return refusal(SystemError::not_observable, where);
   }
   return companion(dual(system), SystemError::not_observable, where).map(dual);
 }

@@ -30,12 +30,10 @@ Expected<void> check_input(Index input, Index inputs, std::string_view where) {
   if (input >= 0 && input < inputs) {
     return {};
   }
-  return tl::unexpected(Error(ArgumentError::out_of_range)
-                            .in(std::string(where))
-                            .about("input")
-                            .got(detail::format("{}", input))
-                            .expected(detail::format("from 0 to {}: B has {} column{}", inputs - 1,
-                                                     inputs, inputs == 1 ? "" : "s")));
+  return refusal(ArgumentError::out_of_range, where, "input")
+      .got(detail::format("{}", input))
+      .expected(detail::format("from 0 to {}: B has {} column{}", inputs - 1, inputs,
+                               inputs == 1 ? "" : "s"));
 }
 
 Expected<LinearResponse> respond(const DiscreteSystem<>& system, const MatrixRef& u,
@@ -87,12 +85,9 @@ Expected<ResponseTimes> chosen(const DiscreteSystem<>& system,
   }
   FLYBALL_CHECK(check_times(*times, where));
   if (times->step.si() != system.period.si()) {
-    return tl::unexpected(
-        Error(ArgumentError::out_of_range)
-            .in(std::string(where))
-            .about("step")
-            .got(detail::format("{} s", times->step.si()))
-            .expected(detail::format("the system's period, {} s", system.period.si())));
+    return refusal(ArgumentError::out_of_range, where, "step")
+        .got(detail::format("{} s", times->step.si()))
+        .expected(detail::format("the system's period, {} s", system.period.si()));
   }
   return *times;
 }

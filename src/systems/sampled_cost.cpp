@@ -45,11 +45,9 @@ Expected<SampledCost> sampled_cost(const MatrixRef& A, const MatrixRef& B, const
   W << Q, unit * N, unit * N.transpose(), unit * unit * R;
   FLYBALL_TRY(const auto integral, detail::quadratic_integral(F_transposed, W, T));
   if (!integral.allFinite()) {
-    return tl::unexpected(Error(ArgumentError::not_finite)
-                              .in(std::string(where))
-                              .about("the sampled cost")
-                              .got("too large for a double")
-                              .hint("shorten the period"));
+    return refusal(ArgumentError::not_finite, where, "the sampled cost")
+        .got("too large for a double")
+        .hint("shorten the period");
   }
   return SampledCost{std::move(held.A), std::move(held.B), integral.topLeftCorner(n, n),
                      integral.bottomRightCorner(m, m) / (unit * unit),

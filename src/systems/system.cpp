@@ -16,11 +16,9 @@ Expected<void> check_system(const MatrixRef& A, const MatrixRef& B, const Matrix
   const Eigen::Index p = C.rows();
   FLYBALL_CHECK(check_shape(B, n, m, where, "B", "states x inputs"));
   if (m == 0) {
-    return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(where))
-                              .about("B")
-                              .got("without columns")
-                              .expected("states x inputs with at least one input"));
+    return refusal(ArgumentError::empty, where, "B")
+        .got("without columns")
+        .expected("states x inputs with at least one input");
   }
   FLYBALL_CHECK(Checks(where)
                     .shape(C, p, n, "C", "outputs x states")
@@ -36,11 +34,9 @@ Expected<Eigen::VectorXcd> poles(const MatrixRef& A) {
   FLYBALL_CHECK(Checks("poles").square(A, "A").finite(A, "A"));
   Eigen::VectorXcd eigenvalues = detail::eigenvalues_of(A);
   if (!eigenvalues.allFinite()) {
-    return tl::unexpected(Error(ArgumentError::malformed)
-                              .in("poles")
-                              .about("A")
-                              .got("a matrix on which the QR iteration did not converge")
-                              .hint("scale its rows and columns to like magnitudes"));
+    return refusal(ArgumentError::malformed, "poles", "A")
+        .got("a matrix on which the QR iteration did not converge")
+        .hint("scale its rows and columns to like magnitudes");
   }
   return eigenvalues;
 }

@@ -27,16 +27,13 @@ Expected<void> check_symmetric_matrix(const MatrixRef& S, std::string_view where
 Expected<Pseudoinverse> pseudoinverse(const MatrixRef& A, double tolerance) {
   constexpr std::string_view where = "pseudoinverse";
   if (A.size() == 0) {
-    return tl::unexpected(
-        Error(ArgumentError::empty).in(std::string(where)).about("A").got("empty"));
+    return refusal(ArgumentError::empty, where, "A").got("empty");
   }
   FLYBALL_CHECK(Checks(where).finite(A, "A").not_negative(tolerance, "tolerance"));
   if (tolerance >= 1.0) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("tolerance")
-                              .got(format_number(tolerance))
-                              .expected("below 1"));
+    return refusal(ArgumentError::out_of_range, where, "tolerance")
+        .got(format_number(tolerance))
+        .expected("below 1");
   }
   const detail::SingularValues svd = detail::svd_of(A);
   const double relative =

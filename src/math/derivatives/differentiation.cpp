@@ -19,10 +19,8 @@ using Eigen::VectorXd;
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
-Error not_finite(std::string_view where, Index variable, const VectorXd& x) {
-  return Error(DifferentiationError::not_finite)
-      .in(std::string(where))
-      .about("f(x)")
+Refusal not_finite(std::string_view where, Index variable, const VectorXd& x) {
+  return refusal(DifferentiationError::not_finite, where, "f(x)")
       .got("NaN or infinite beside the point")
       .hint("take a smaller step, or a point inside f's domain")
       .with("variable", static_cast<double>(variable))
@@ -96,7 +94,7 @@ Expected<MatrixXd> numerical_jacobian(VectorFunction f, const Eigen::Ref<const V
     const double h = options.step > 0.0 ? options.step : relative * std::max(1.0, std::abs(x(j)));
     J.col(j) = is_central ? central(f, x, j, h, outputs) : richardson(f, x, j, h, outputs);
     if (!J.col(j).allFinite()) {
-      return tl::unexpected(not_finite(where, j, x));
+      return not_finite(where, j, x);
     }
   }
   return J;
@@ -138,7 +136,7 @@ Expected<MatrixXd> numerical_hessian(ScalarFunction f, const Eigen::Ref<const Ve
                              (4.0 * h(i) * h(j));
       H(j, i) = H(i, j);
       if (!std::isfinite(H(i, j))) {
-        return tl::unexpected(not_finite(where, i, x));
+        return not_finite(where, i, x);
       }
     }
   }

@@ -246,13 +246,12 @@ Expected<LinearMatrixSolution> solve_carefully(const Problem& given, std::string
     return best;
   }
   if (overflows) {
-    return tl::unexpected(Error(MatrixEquationError::overflow).in(std::string(where)));
+    return refusal(MatrixEquationError::overflow, where);
   }
   FLYBALL_CHECK(unique);
-  return tl::unexpected(Error(MatrixEquationError::not_accurate)
-                            .in(std::string(where))
-                            .got("entries too far apart for sixteen digits")
-                            .with("backward error", error.in_context));
+  return refusal(MatrixEquationError::not_accurate, where)
+      .got("entries too far apart for sixteen digits")
+      .with("backward error", error.in_context);
 }
 
 Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A, const MatrixRef& Q,

@@ -5,6 +5,7 @@
 
 #include <flyball/math/equations/matrix_equation.hpp>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/equations/sylvester_operator.hpp"
 #include "math/extended/double_double.hpp"
@@ -140,8 +141,7 @@ Error SylvesterOperator::not_solved(std::string_view where) const {
 
 Expected<void> SylvesterOperator::check(std::string_view where) const {
   if (!a_.converged || !b_.converged) {
-    return tl::unexpected(
-        Error(MatrixEquationError::no_convergence).in(std::string(where)).about("eigenvalues"));
+    return refusal(MatrixEquationError::no_convergence, where, "eigenvalues");
   }
   constexpr double roundings = 4.0;
   if (!(closest_pair().distance > roundings)) {

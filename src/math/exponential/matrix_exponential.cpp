@@ -52,11 +52,9 @@ Expected<MatrixXd> expm(const MatrixRef& A) {
   if (!E.allFinite()) {
     const double scale = std::max(1.0, A.cwiseAbs().maxCoeff());
     const double abscissa = detail::eigenvalues_of(A / scale).real().maxCoeff() * scale;
-    return tl::unexpected(Error(MatrixExponentialError::overflow)
-                              .in("expm")
-                              .about("exp(A)")
-                              .hint("exponents above 709.78 have no double; shorten the time step")
-                              .with("spectral abscissa of A", abscissa));
+    return refusal(MatrixExponentialError::overflow, "expm", "exp(A)")
+        .hint("exponents above 709.78 have no double; shorten the time step")
+        .with("spectral abscissa of A", abscissa);
   }
   return E;
 }

@@ -20,10 +20,9 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-Error no_answer(MatrixFunctionError code, std::string_view where, std::string_view what,
-                const Complex& eigenvalue) {
-  return Error(code)
-      .in(std::string(where))
+Refusal no_answer(MatrixFunctionError code, std::string_view where, std::string_view what,
+                  const Complex& eigenvalue) {
+  return refusal(code, where)
       .got(std::string(what))
       .with("eigenvalue", std::vector<double>{eigenvalue.real(), eigenvalue.imag()});
 }
@@ -88,8 +87,8 @@ Expected<MatrixXd> fractional_power(const MatrixRef& given, double f, std::strin
   const MatrixXd A = lower ? MatrixXd(given.transpose()) : MatrixXd(given);
   Triangularized form = triangularize(A);
   if (!form.schur.converged) {
-    return tl::unexpected(no_answer(MatrixFunctionError::no_real_power, where,
-                                    "a matrix whose eigenvalues cannot be found", 0.0));
+    return no_answer(MatrixFunctionError::no_real_power, where,
+                     "a matrix whose eigenvalues cannot be found", 0.0);
   }
   MatrixXcd& T = form.schur.T;
   const Index n = T.rows();
@@ -148,10 +147,7 @@ Expected<MatrixXd> inverse_of(const MatrixRef& A, std::string_view where) {
   double rcond = 0.0;
   const MatrixXd inverse = detail::solve_linear(M, MatrixXd::Identity(A.rows(), A.cols()), &rcond);
   if (!(rcond > 0.0) || !inverse.allFinite()) {
-    return tl::unexpected(Error(MatrixFunctionError::singular)
-                              .in(std::string(where))
-                              .about("A")
-                              .with("reciprocal condition", rcond));
+    return refusal(MatrixFunctionError::singular, where, "A").with("reciprocal condition", rcond);
   }
   return MatrixXd(d.asDiagonal() * inverse * d.cwiseInverse().asDiagonal());
 }
@@ -180,20 +176,19 @@ Expected<MatrixXd> logm(const MatrixRef& A) {
   const bool lower = is_lower_triangular(A);
   const Triangularized form = lower ? triangularize(MatrixXd(A.transpose())) : triangularize(A);
   if (!form.schur.converged) {
-    return tl::unexpected(no_answer(MatrixFunctionError::no_real_logarithm, where,
-                                    "a matrix whose eigenvalues cannot be found", 0.0));
+    return no_answer(MatrixFunctionError::no_real_logarithm, where,
+                     "a matrix whose eigenvalues cannot be found", 0.0);
   }
   for (const Complex& lambda : form.schur.T.diagonal()) {
     if (lambda == 0.0 || (lambda.real() <= 0.0 && std::abs(lambda.imag()) <= form.zero)) {
       const bool zero = std::abs(lambda) <= form.zero;
-      return tl::unexpected(no_answer(MatrixFunctionError::no_real_logarithm, where,
-                                      zero ? "a singular matrix" : "a negative real eigenvalue",
-                                      lambda));
+      return no_answer(MatrixFunctionError::no_real_logarithm, where,
+                       zero ? "a singular matrix" : "a negative real eigenvalue", lambda);
     }
   }
   MatrixXd L = form.assemble(detail::triangular_logarithm(form.schur.T));
   if (!L.allFinite()) {
-    return tl::unexpected(Error(MatrixFunctionError::overflow).in(std::string(where)));
+    return refusal(MatrixFunctionError::overflow, where);
   }
   return lower ? MatrixXd(L.transpose()) : L;
 }
@@ -203,11 +198,9 @@ Expected<MatrixXd> powm(const MatrixRef& A, double power) {
   FLYBALL_CHECK(Checks(where).square(A, "A").finite(A, "A").finite(power, "power"));
   constexpr double largest = 1e9;
   if (std::abs(power) > largest) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("power")
-                              .got(format_number(power))
-                              .expected("at most 1e9 in magnitude"));
+    return refusal(ArgumentError::out_of_range, where, "power")
+        .got(format_number(power))
+        .expected("at most 1e9 in magnitude");
   }
   // Quotients such as L/T of decimal fractions are seldom whole to the last bit.
   const double nearest = std::round(power);
@@ -232,7 +225,7 @@ Expected<MatrixXd> powm(const MatrixRef& A, double power) {
     }
   }
   if (!result.allFinite()) {
-    return tl::unexpected(Error(MatrixFunctionError::overflow).in(std::string(where)));
+    return refusal(MatrixFunctionError::overflow, where);
   }
   return result;
 }

@@ -302,21 +302,17 @@ Expected<SourceText> source_text(const Tape& tape, std::span<const std::string> 
     if (got >= wanted) {
       return {};
     }
-    return tl::unexpected(Error(ArgumentError::wrong_shape)
-                              .in("source_text")
-                              .about(std::string(what))
-                              .got(detail::format("{} names", got))
-                              .expected(detail::format("{}, one for each", wanted)));
+    return refusal(ArgumentError::wrong_shape, "source_text", what)
+        .got(detail::format("{} names", got))
+        .expected(detail::format("{}, one for each", wanted));
   };
   FLYBALL_CHECK(check("inputs", inputs.size(), tape.inputs()));
   FLYBALL_CHECK(check("parameters", parameters.size(), tape.parameters()));
   for (const Node& node : tape.nodes()) {
     if (language == Language::java && node.operation == erf) {
-      return tl::unexpected(Error(ExpressionError::no_counterpart)
-                                .in("source_text")
-                                .about("erf")
-                                .got("not in Java's library")
-                                .hint("leave it out of the formula, or write C++"));
+      return refusal(ExpressionError::no_counterpart, "source_text", "erf")
+          .got("not in Java's library")
+          .hint("leave it out of the formula, or write C++");
     }
   }
   return Writer(tape, inputs, parameters, language).run();

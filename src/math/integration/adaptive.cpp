@@ -25,11 +25,9 @@ constexpr std::string_view where = "integrate";
 Expected<VectorXd> tolerances_of(const IntegrationOptions& options, Index states) {
   constexpr double least = 100.0 * std::numeric_limits<double>::epsilon();
   if (!(options.relative_tolerance >= least) || !std::isfinite(options.relative_tolerance)) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("relative_tolerance")
-                              .got(format_number(options.relative_tolerance))
-                              .expected("at least 2.3e-14"));
+    return refusal(ArgumentError::out_of_range, where, "relative_tolerance")
+        .got(format_number(options.relative_tolerance))
+        .expected("at least 2.3e-14");
   }
   if (options.absolute_tolerances.size() == 0) {
     return check_positive(options.absolute_tolerance, where, "absolute_tolerance").map([&] {
@@ -47,22 +45,18 @@ Expected<VectorXd> tolerances_of(const IntegrationOptions& options, Index states
 Expected<void> check_arguments(double t0, const Eigen::Ref<const VectorXd>& x0, double t1,
                                const IntegrationOptions& options) {
   if (x0.size() == 0) {
-    return tl::unexpected(Error(ArgumentError::empty).in(std::string(where)).about("x0"));
+    return refusal(ArgumentError::empty, where, "x0");
   }
   if (std::isnan(options.max_step) || options.max_step <= 0.0) {
-    return tl::unexpected(Error(ArgumentError::not_positive)
-                              .in(std::string(where))
-                              .about("max_step")
-                              .got(format_number(options.max_step)));
+    return refusal(ArgumentError::not_positive, where, "max_step")
+        .got(format_number(options.max_step));
   }
   return Checks(where).finite(t0, "t0").finite(t1, "t1").finite(x0, "x0").not_negative(
       options.initial_step, "initial_step", "s");
 }
 
-Error not_finite(std::string about, double t, const VectorXd& x) {
-  return Error(IntegrationError::not_finite)
-      .in(std::string(where))
-      .about(std::move(about))
+Refusal not_finite(std::string about, double t, const VectorXd& x) {
+  return refusal(IntegrationError::not_finite, where, about)
       .got("NaN or infinite")
       .with("t", t)
       .with("x", std::vector<double>(x.data(), x.data() + x.size()));
@@ -128,14 +122,14 @@ class OdeIntegrator {
     }
     detail::OdeState state{.t = t0, .x = x0, .f = problem_.derivative(t0, x0)};
     if (!state.f.allFinite()) {
-      return tl::unexpected(not_finite("f(t0, x0)", t0, x0));
+      return not_finite("f(t0, x0)", t0, x0);
     }
     state.step = options.initial_step > 0.0 ? std::min(options.initial_step, options.max_step)
                                             : problem_.first_step(t0, x0, state.f);
     for (std::size_t i = 0; i < events_.size(); ++i) {
       values_.push_back(events_[i].function(t0, x0));
       if (!std::isfinite(values_.back())) {
-        return tl::unexpected(not_finite("event " + std::to_string(i), t0, x0));
+        return not_finite("event " + std::to_string(i), t0, x0);
       }
     }
 
@@ -176,7 +170,7 @@ class OdeIntegrator {
         const double t = part == parts ? state.t : segment.t + s * segment.h;
         const double after = events_[i].function(t, x);
         if (!std::isfinite(after)) {
-          return tl::unexpected(not_finite("event " + std::to_string(i), t, x));
+          return not_finite("event " + std::to_string(i), t, x);
         }
         if (crosses(before, after, events_[i].direction)) {
           const auto event = [&](double place) {

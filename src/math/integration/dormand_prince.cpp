@@ -64,33 +64,27 @@ double OdeProblem::first_step(double t, const VectorXd& x, const VectorXd& f0) {
 Expected<void> check_step(const OdeProblem& problem, const OdeState& state, bool was_not_finite) {
   const std::vector<double> x(state.x.data(), state.x.data() + state.x.size());
   if (problem.statistics.steps + problem.statistics.rejected >= problem.max_steps) {
-    return tl::unexpected(Error(IntegrationError::too_many_steps)
-                              .in("integrate")
-                              .hint("raise max_steps or the tolerance, or take the method for "
-                                    "stiff systems")
-                              .with("t", state.t)
-                              .with("steps", problem.max_steps)
-                              .with("x", x));
+    return refusal(IntegrationError::too_many_steps, "integrate")
+        .hint("raise max_steps or the tolerance, or take the method for stiff systems")
+        .with("t", state.t)
+        .with("steps", problem.max_steps)
+        .with("x", x);
   }
   if (state.step > 10.0 * std::numeric_limits<double>::epsilon() * std::abs(state.t) &&
       state.step > std::numeric_limits<double>::min()) {
     return {};
   }
   if (was_not_finite) {
-    return tl::unexpected(Error(IntegrationError::not_finite)
-                              .in("integrate")
-                              .about("f(t, x)")
-                              .got("NaN or infinite ahead of t")
-                              .with("t", state.t)
-                              .with("x", x));
+    return refusal(IntegrationError::not_finite, "integrate", "f(t, x)")
+        .got("NaN or infinite ahead of t")
+        .with("t", state.t)
+        .with("x", x);
   }
-  return tl::unexpected(Error(IntegrationError::step_underflow)
-                            .in("integrate")
-                            .hint("the solution is singular there, or f is discontinuous; end "
-                                  "before it, or at an event")
-                            .with("t", state.t)
-                            .with("step", state.step)
-                            .with("x", x));
+  return refusal(IntegrationError::step_underflow, "integrate")
+      .hint("the solution is singular there, or f is discontinuous; end before it, or at an event")
+      .with("t", state.t)
+      .with("step", state.step)
+      .with("x", x);
 }
 
 Expected<void> DormandPrinceStepper::step(OdeProblem& problem, OdeState& state) {

@@ -18,9 +18,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-Error no_step(IntegrationError code, std::string_view hint, double t, const VectorXd& x) {
-  return Error(code)
-      .in("implicit_runge_kutta_step")
+Refusal no_step(IntegrationError code, std::string_view hint, double t, const VectorXd& x) {
+  return refusal(code, "implicit_runge_kutta_step")
       .hint(std::string(hint))
       .with("t", t)
       .with("x", std::vector<double>(x.data(), x.data() + x.size()));
@@ -33,7 +32,7 @@ Expected<VectorXd> implicit_step(const ButcherTableauView& tableau, OdeFunction 
                                  const Eigen::Ref<const VectorXd>& x, double dt) {
   constexpr std::string_view where = "implicit_runge_kutta_step";
   if (x.size() == 0) {
-    return tl::unexpected(Error(ArgumentError::empty).in(std::string(where)).about("x"));
+    return refusal(ArgumentError::empty, where, "x");
   }
   FLYBALL_CHECK(Checks(where).finite(t, "t").finite(x, "x").finite(dt, "dt"));
   const Index n = x.size();
@@ -70,7 +69,7 @@ Expected<VectorXd> implicit_step(const ButcherTableauView& tableau, OdeFunction 
     }
     const MatrixXd step = detail::solve_linear(M, residual);
     if (!step.allFinite()) {
-      return tl::unexpected(no_step(IntegrationError::not_finite, "take a shorter step", t, x));
+      return no_step(IntegrationError::not_finite, "take a shorter step", t, x);
     }
     z += step.reshaped(n, stages);
     const double size = step.cwiseAbs().maxCoeff();
@@ -84,13 +83,13 @@ Expected<VectorXd> implicit_step(const ButcherTableauView& tableau, OdeFunction 
         next += dt * tableau.b[place] * problem.derivative(t + tableau.c[place] * dt, x + z.col(i));
       }
       if (!next.allFinite()) {
-        return tl::unexpected(no_step(IntegrationError::not_finite, "take a shorter step", t, x));
+        return no_step(IntegrationError::not_finite, "take a shorter step", t, x);
       }
       return next;
     }
     previous = size;
   }
-  return tl::unexpected(no_step(IntegrationError::no_convergence, "take a shorter step", t, x));
+  return no_step(IntegrationError::no_convergence, "take a shorter step", t, x);
 }
 
 }  // namespace flyball

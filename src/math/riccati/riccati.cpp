@@ -26,11 +26,9 @@ Expected<void> check_shapes(const MatrixRef& A, const MatrixRef& B, const Matrix
   }
   FLYBALL_CHECK(check_square(A, where, "A"));
   if (m == 0) {
-    return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(where))
-                              .about("B")
-                              .got("without columns")
-                              .expected("states x inputs with at least one input"));
+    return refusal(ArgumentError::empty, where, "B")
+        .got("without columns")
+        .expected("states x inputs with at least one input");
   }
   auto shapes = Checks(where)
                     .shape(B, n, m, "B", "states x inputs")

@@ -4,6 +4,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/riccati/riccati_robust.hpp"
 
@@ -32,9 +33,7 @@ Error diagnose_continuous(const RiccatiProblem& p) {
   if (!reduced) {
     double rcond = 0.0;
     (void)solve_equilibrated(p.R, MatrixXd::Identity(p.R.rows(), p.R.rows()), rcond);
-    return Error(RiccatiError::singular)
-        .in("care")
-        .about("R")
+    return refusal(RiccatiError::singular, "care", "R")
         .got("singular")
         .expected("invertible")
         .hint("weigh every input in R")
@@ -56,18 +55,14 @@ Error diagnose_continuous(const RiccatiProblem& p) {
     }
   }
   if (closest <= 1e-6 * size) {
-    return Error(RiccatiError::no_stabilizing_solution)
-        .in("care")
-        .about("the closed loop")
+    return refusal(RiccatiError::no_stabilizing_solution, "care", "the closed loop")
         .got("left with a mode on the imaginary axis")
         .expected("left of it")
         .hint("weigh that mode in Q, so that the controller has to move it")
         .with("eigenvalue", parts(p, on_axis))
         .with("distance from the imaginary axis", in_units(p, closest));
   }
-  return Error(RiccatiError::no_convergence)
-      .in("care")
-      .about("X")
+  return refusal(RiccatiError::no_convergence, "care", "X")
       .hint("check the scaling of A, B, Q and R, and whether Q and R are the weights of a minimum")
       .with("distance of the Hamiltonian's eigenvalues from the imaginary axis",
             in_units(p, closest));
@@ -104,9 +99,7 @@ Error diagnose_riccati(const RiccatiProblem& p) {
     const double smallest = std::abs(pivoted_qr(pencil).R(2 * n - 1, 2 * n - 1));
     if (smallest <=
         1e-12 * static_cast<double>(n) * (p.continuous ? size_A : std::max(1.0, size_A))) {
-      return Error(RiccatiError::not_stabilizable)
-          .in(where)
-          .about("(A, B)")
+      return refusal(RiccatiError::not_stabilizable, where, "(A, B)")
           .hint("give this mode an input, or take it out of the model")
           .with("eigenvalue", parts(p, eigenvalues(k)))
           .with("magnitude", in_units(p, std::abs(eigenvalues(k))));
@@ -134,9 +127,7 @@ Error diagnose_riccati(const RiccatiProblem& p) {
     }
   }
   if (!(best > 10.0 * epsilon)) {
-    return Error(RiccatiError::singular)
-        .in(where)
-        .about("R + B'XB")
+    return refusal(RiccatiError::singular, where, "R + B'XB")
         .got("singular for every X")
         .expected("invertible")
         .hint("weigh every input in R, or remove inputs that do the same")
@@ -175,18 +166,14 @@ Error diagnose_riccati(const RiccatiProblem& p) {
     break;
   }
   if (closest < 1e-5) {
-    return Error(RiccatiError::no_stabilizing_solution)
-        .in(where)
-        .about("the closed loop")
+    return refusal(RiccatiError::no_stabilizing_solution, where, "the closed loop")
         .got("left with a mode on the unit circle")
         .expected("inside it")
         .hint("weigh that mode in Q, so that the controller has to move it")
         .with("eigenvalue", parts(p, on_circle))
         .with("distance from the unit circle", closest);
   }
-  return Error(RiccatiError::no_convergence)
-      .in(where)
-      .about("X")
+  return refusal(RiccatiError::no_convergence, where, "X")
       .hint("check the scaling of A, B, Q and R, and whether Q and R are the weights of a minimum")
       .with("distance of the pencil's eigenvalues from the unit circle", closest);
 }

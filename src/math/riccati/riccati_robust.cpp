@@ -169,14 +169,12 @@ Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem) 
       (answer->cancels && !survives_rounding(answer->closed_loop, p.continuous))) {
     Error why = diagnose_riccati(p);
     if (why.is(RiccatiError::no_convergence)) {
-      why = Error(RiccatiError::no_convergence)
-                .in(p.continuous ? "care" : "dare")
-                .about("A - BK")
+      why = refusal(RiccatiError::no_convergence, p.continuous ? "care" : "dare", "A - BK")
                 .got("stable or not by the last digits of its entries")
                 .expected("stable")
                 .hint(
-                    "the plant grows too much in a step, or hangs on its inputs by too little, "
-                    "for 16 digits: sample faster, or add an input")
+                    "the plant grows too much in a step, or hangs on its inputs by too little, for "
+                    "16 digits: sample faster, or add an input")
                 .with("size of X", answer->X.norm());
     }
     return tl::unexpected(std::move(why));

@@ -32,11 +32,9 @@ Expected<Minimum> find_minimum(FunctionRef<double(double)> f, double low, double
   constexpr std::string_view where = "find_minimum";
   FLYBALL_CHECK(detail::check_search(low, high, options, where));
   if (!(low < high)) {
-    return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
-                              .about("the interval")
-                              .got(detail::format("from {} to {}", low, high))
-                              .expected("increasing"));
+    return refusal(ArgumentError::out_of_range, where, "the interval")
+        .got(detail::format("from {} to {}", low, high))
+        .expected("increasing");
   }
   const double relative = std::max(options.relative_tolerance, 1e-12);
   const double section = 2.0 - std::numbers::phi;

@@ -33,17 +33,11 @@ Expected<void> check_search(double a, double b, const SearchOptions& options,
 }
 
 Error not_a_number(double x, std::string_view where) {
-  return Error(SearchError::not_finite)
-      .in(std::string(where))
-      .about("the function")
-      .got("not a number")
-      .with("x", x);
+  return refusal(SearchError::not_finite, where, "the function").got("not a number").with("x", x);
 }
 
 Error not_converged(double x, double value, double low, double high, std::string_view where) {
-  return Error(SearchError::no_convergence)
-      .in(std::string(where))
-      .about("the search")
+  return refusal(SearchError::no_convergence, where, "the search")
       .hint("give a larger tolerance")
       .with("x", x)
       .with("value", value)
@@ -76,12 +70,10 @@ Expected<Root> find_root(FunctionRef<double(double)> f, double a, double b, doub
     return Root{x, 0.0, x, x, 0};
   }
   if ((f_a > 0.0) == (f_b > 0.0)) {
-    return tl::unexpected(Error(SearchError::no_sign_change)
-                              .in(std::string(where))
-                              .about("the bracket")
-                              .hint("give two places where the function has different signs")
-                              .with("bracket", {a, b})
-                              .with("values", {f_a, f_b}));
+    return refusal(SearchError::no_sign_change, where, "the bracket")
+        .hint("give two places where the function has different signs")
+        .with("bracket", {a, b})
+        .with("values", {f_a, f_b});
   }
   const double relative = std::max(options.relative_tolerance, 2.0 * epsilon);
   // a is the newest place, b the other end, c what a or b was before.
