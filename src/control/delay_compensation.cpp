@@ -54,11 +54,7 @@ Expected<std::vector<Eigen::MatrixXd>> latency_gains(const MatrixRef& K, const M
       free[k] = detail::product(free[k + 1], A);
       continue;
     }
-    auto power = powm(A, periods - static_cast<double>(k));
-    if (!power) {
-      return tl::unexpected(Error(std::move(power.error()).in(std::string(where))));
-    }
-    free[k] = std::move(*power);
+    FLYBALL_TRY_IN(where, free[k], powm(A, periods - static_cast<double>(k)));
   }
   std::vector<Eigen::MatrixXd> gains;
   gains.reserve(starting + 1);
@@ -67,11 +63,8 @@ Expected<std::vector<Eigen::MatrixXd>> latency_gains(const MatrixRef& K, const M
     gains.push_back(detail::product(controlled, power));
     controlled = detail::product(controlled, closed);
   }
-  auto power = powm(closed, periods);
-  if (!power) {
-    return tl::unexpected(Error(std::move(power.error()).in(std::string(where))));
-  }
-  gains.push_back(detail::product(K, *power));
+  FLYBALL_TRY_IN(where, const auto power, powm(closed, periods));
+  gains.push_back(detail::product(K, power));
   return gains;
 }
 

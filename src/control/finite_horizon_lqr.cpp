@@ -220,10 +220,8 @@ Expected<FiniteHorizonLqr> continuous_finite_horizon_lqr(const MatrixRef& A, con
   const double unit = std::isfinite(sizes) && sizes > 0.0 ? sizes : 1.0;
   G *= unit;
   Q /= unit;
-  auto flow = flow_over(A - product(B, R_N), G, Q, horizon.si() / static_cast<double>(count));
-  if (!flow) {
-    return tl::unexpected(Error(std::move(flow.error()).in(std::string(where))));
-  }
+  FLYBALL_TRY_IN(where, const auto flow,
+                 flow_over(A - product(B, R_N), G, Q, horizon.si() / static_cast<double>(count)));
   const auto unbounded = [&](std::size_t step) {
     return refusal(RiccatiError::singular, where, "S")
         .got("without bound within the horizon")
@@ -232,10 +230,10 @@ Expected<FiniteHorizonLqr> continuous_finite_horizon_lqr(const MatrixRef& A, con
             "reward states")
         .with("step", static_cast<double>(step));
   };
-  if (!*flow) {
-    return tl::unexpected(unbounded(count));
+  if (!flow) {
+    return unbounded(count);
   }
-  const Flow& map = **flow;
+  const Flow& map = *flow;
   FiniteHorizonLqr design;
   design.K.resize(count + 1);
   design.S.resize(count + 1);
@@ -248,7 +246,7 @@ Expected<FiniteHorizonLqr> continuous_finite_horizon_lqr(const MatrixRef& A, con
           Eigen::MatrixXd::Identity(n, n) + product(map.beta, S), map.alpha, &rcond);
       S = symmetrized(map.gamma + transposed_product(map.alpha, product(S, solved)));
       if (!finite || !(rcond > 1e-15) || !S.allFinite()) {
-        return tl::unexpected(unbounded(k));
+        return unbounded(k);
       }
     }
     design.S[k] = S * unit;

@@ -95,13 +95,10 @@ Expected<ImplicitModel> implicit_model_following(const MatrixRef& A, const Matri
   FLYBALL_CHECK(Checks(where)
                     .shape(B_ref, C.rows(), B_ref.cols(), "B_ref", "followed states x inputs")
                     .finite(B_ref, "B_ref"));
-  const auto K = following_gain(A, B, C, A_ref, *Q.get(), *R.get(), cost);
-  if (!K) {
-    return tl::unexpected(Error(Error(K.error()).in(std::string(where))));
-  }
+  FLYBALL_TRY_IN(where, const auto K, following_gain(A, B, C, A_ref, *Q.get(), *R.get(), cost));
   const Eigen::MatrixXd reach = detail::product(C, B);
-  ImplicitModel model{*K, detail::solve_least_squares(reach, B_ref), std::move(cost),
-                      detail::eigenvalues_of(A - detail::product(B, *K)), 0.0};
+  ImplicitModel model{K, detail::solve_least_squares(reach, B_ref), std::move(cost),
+                      detail::eigenvalues_of(A - detail::product(B, K)), 0.0};
   model.mismatch =
       (detail::product(C, A) - detail::product(A_ref, C) - detail::product(reach, model.K)).norm();
   return model;

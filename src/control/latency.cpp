@@ -38,11 +38,8 @@ Expected<Eigen::MatrixXd> compensate_latency(const MatrixRef& K, const MatrixRef
   constexpr std::string_view where = "compensate_latency";
   FLYBALL_CHECK(check_gain(K, A, B, latency));
   FLYBALL_CHECK(check_positive(period.si(), where, "period", "s"));
-  auto power = powm(closed_loop(A, B, K), latency.si() / period.si());
-  if (!power) {
-    return tl::unexpected(Error(std::move(power.error()).in(std::string(where))));
-  }
-  return detail::product(K, *power);
+  FLYBALL_TRY_IN(where, const auto power, powm(closed_loop(A, B, K), latency.si() / period.si()));
+  return detail::product(K, power);
 }
 
 namespace detail {

@@ -4,17 +4,18 @@
 
 #include <flyball/math/riccati/riccati.hpp>
 
+#include "control/weights.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
 namespace flyball {
 
-namespace {
+namespace detail {
 
-constexpr std::string_view where = "lqr";
-
-Expected<LqrDesign<>> solve(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
-                            const Weight& R, const Eigen::MatrixXd* N) {
+Expected<LqrDesign<>> solve_lqr(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
+                                const Weight& R, const Eigen::MatrixXd* N, TimeDomain domain) {
+  const bool continuous = domain == TimeDomain::continuous;
+  const std::string_view where = continuous ? "continuous_lqr" : "lqr";
   if (!Q.get() || !R.get()) {
     return tl::unexpected((Q.get() ? R : Q).get().error());
   }
@@ -31,16 +32,16 @@ Expected<LqrDesign<>> solve(const MatrixRef& A, const MatrixRef& B, const Weight
                       return N == nullptr ? Expected<void>{}
                                           : check_shape(*N, n, m, where, "N", "states x inputs");
                     }));
-  auto solution =
-      N == nullptr ? dare(A, B, weight_Q, weight_R) : dare(A, B, weight_Q, weight_R, *N);
-  if (!solution) {
-    return tl::unexpected(Error(std::move(solution.error()).in(std::string(where))));
-  }
-  return LqrDesign<>{std::move(solution->K), std::move(solution->X), std::move(solution->poles),
-                     solution->residual, solution->condition};
+  const auto solve = [&](const auto&... cross) {
+    return continuous ? care(A, B, weight_Q, weight_R, cross...)
+                      : dare(A, B, weight_Q, weight_R, cross...);
+  };
+  FLYBALL_TRY_IN(where, auto solution, N == nullptr ? solve() : solve(*N));
+  return LqrDesign<>{std::move(solution.K), std::move(solution.X), std::move(solution.poles),
+                     solution.residual, solution.condition};
 }
 
-}  // namespace
+}  // namespace detail
 
 Expected<Eigen::MatrixXd> bryson(std::span<const double> tolerances, double rho) {
   constexpr std::string_view name = "bryson";
@@ -80,13 +81,13 @@ Expected<Eigen::MatrixXd> bryson(std::initializer_list<double> tolerances, doubl
 
 Expected<LqrDesign<>> lqr(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
                           const Weight& R) {
-  return solve(A, B, Q, R, nullptr);
+  return detail::solve_lqr(A, B, Q, R, nullptr, TimeDomain::discrete);
 }
 
 Expected<LqrDesign<>> lqr(const MatrixRef& A, const MatrixRef& B, const Weight& Q, const Weight& R,
                           const MatrixRef& N) {
   const Eigen::MatrixXd cross = N;
-  return solve(A, B, Q, R, &cross);
+  return detail::solve_lqr(A, B, Q, R, &cross, TimeDomain::discrete);
 }
 
 #define FLYBALL_STATES_INPUTS_OUTPUTS(States, Inputs, Outputs)                                     \

@@ -70,11 +70,8 @@ class Bench {
 
   /// Simulates and notes what was seen; what was decided is filled in by whoever decides.
   [[nodiscard]] Expected<TuningStep*> attempt(const PidGains& gains) {
-    auto response = simulate_pid(plant_, gains, scenario_);
-    if (!response) {
-      return tl::unexpected(Error(std::move(response.error()).in(std::string(where))));
-    }
-    TuningStep step{gains, response->metrics, jitter_of(*response, scenario_.settings)};
+    FLYBALL_TRY_IN(where, const auto response, simulate_pid(plant_, gains, scenario_));
+    TuningStep step{gains, response.metrics, jitter_of(response, scenario_.settings)};
     step.seen = seen_in(step.metrics, step.jitter);
     steps_.push_back(std::move(step));
     return &steps_.back();

@@ -205,11 +205,9 @@ Expected<PolePlacement<>> place_in_units(const MatrixRef& A, const MatrixRef& B,
                      {units, units.cwiseQuotient(balanced)}};
   const detail::ControllableStaircase form = detail::controllable_staircase(plant.A, plant.B);
   PolePlacement<> placed;
-  auto moved = detail::poles_to_move(form, units, wanted, placed.uncontrollable);
-  if (!moved) {
-    return tl::unexpected(std::move(moved).error().in(std::string(where)));
-  }
-  const Part part = controllable_part(plant, form, *moved);
+  FLYBALL_TRY_IN(where, const auto moved,
+                 detail::poles_to_move(form, units, wanted, placed.uncontrollable));
+  const Part part = controllable_part(plant, form, moved);
   const std::optional<Candidate> found = best_candidate(plant, part, form, poles);
   if (found && !found->determined) {
     return tl::unexpected(

@@ -60,9 +60,8 @@ Expected<RobustnessGrid> robustness_grid(const MatrixRef& A, const MatrixRef& B,
                                          const DiscreteSystem<>& model, const MatrixRef& K,
                                          const MatrixRef& K_e, Time delay,
                                          const RobustnessOptions& options) {
-  if (auto checked = observer_regulator_loop(A, B, C, model, K, K_e, delay); !checked) {
-    return tl::unexpected(Error(std::move(checked.error()).in(std::string(where))));
-  }
+  FLYBALL_TRY_IN(where, [[maybe_unused]] const auto nominal,
+                 observer_regulator_loop(A, B, C, model, K, K_e, delay));
   FLYBALL_CHECK(check_factors(options.inertia, "inertia"));
   FLYBALL_CHECK(check_factors(options.gain, "gain"));
   FLYBALL_TRY(const auto B_pinv, pseudoinverse(model.B));

@@ -3,9 +3,15 @@
 #include <string_view>
 
 #include <flyball/control/integral_control.hpp>
+#include <flyball/systems/analysis.hpp>
 
 /// What the designs with quadratic costs have in common.
 namespace flyball::detail {
+
+/// `lqr` and `continuous_lqr`. @param N  The cross weight, none where it is null.
+[[nodiscard]] Expected<LqrDesign<>> solve_lqr(const MatrixRef& A, const MatrixRef& B,
+                                              const Weight& Q, const Weight& R,
+                                              const Eigen::MatrixXd* N, TimeDomain domain);
 
 /// The matrix of a weight, or its maker's error; symmetric, of the given size.
 [[nodiscard]] Expected<Eigen::MatrixXd> weight_of(const Weight& weight, Eigen::Index size,

@@ -11,9 +11,7 @@ Expected<void> check_kalman_filter(const MatrixRef& A, const MatrixRef& B, const
                                    const Covariance& R, const Covariance& P0) {
   constexpr std::string_view where = "KalmanFilter";
   for (const Covariance* covariance : {&Q, &R, &P0}) {
-    if (!covariance->get()) {
-      return tl::unexpected(covariance->get().error());
-    }
+    FLYBALL_CHECK(covariance->get());
   }
   FLYBALL_CHECK(check_system(A, B, C, D, where));
   FLYBALL_CHECK(check_positive(period.si(), where, "period", "s"));

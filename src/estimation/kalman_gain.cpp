@@ -88,19 +88,17 @@ Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const
                     .shape(noise_R, p, p, "R", "outputs x outputs"));
 
   auto dual = dare(A.transpose(), C.transpose(), noise_Q, noise_R);
-  if (!dual) {
-    Error error = std::move(dual.error()).in(std::string(where));
-    if (error.is(RiccatiError::not_stabilizable)) {
-      return tl::unexpected(Error(
-          std::move(error)
-              .about("the dual (Aᵀ, Cᵀ)")
-              .hint("no output shows this mode, so nothing corrects it; measure a state that it "
-                    "moves")));
-    }
-    return tl::unexpected(std::move(error));
+  if (!dual && dual.error().is(RiccatiError::not_stabilizable)) {
+    return tl::unexpected(
+        std::move(dual)
+            .error()
+            .in(std::string(where))
+            .about("the dual (Aᵀ, Cᵀ)")
+            .hint("no output shows this mode, so nothing corrects it; measure a state that it "
+                  "moves"));
   }
-
-  const auto filter = corrected(A, C, noise_Q, noise_R, dual->X);
+  FLYBALL_TRY_IN(where, const auto solution, std::move(dual));
+  const auto filter = corrected(A, C, noise_Q, noise_R, solution.X);
   if (!filter) {
     return refusal(RiccatiError::singular, where, "C P Cᵀ + R")
         .got("singular")
@@ -111,9 +109,9 @@ Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const
   gain.L = product(DoubleDoubleMatrix(A), filter->update.K).rounded();
   gain.P_prior = detail::symmetrized(filter->P.rounded());
   gain.P_posterior = detail::symmetrized(filter->update.P.rounded());
-  gain.poles = dual->poles;
-  gain.residual = dual->residual;
-  gain.condition = dual->condition;
+  gain.poles = solution.poles;
+  gain.residual = solution.residual;
+  gain.condition = solution.condition;
   return gain;
 }
 

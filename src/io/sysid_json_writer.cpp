@@ -28,9 +28,7 @@ Expected<void> check_run(const io::Run& run, std::span<const io::Column> columns
           .expected(fmt::format("one value a row ({})", run.time.size()));
     }
     for (const double value : values) {
-      if (Expected<void> ok = check_finite(value, "to_sysid_json", run.name); !ok) {
-        return ok;
-      }
+      FLYBALL_CHECK(check_finite(value, "to_sysid_json", run.name));
     }
   }
   return {};
@@ -43,9 +41,7 @@ Expected<std::string> to_sysid_json(const SysIdJson& log) {
   std::string text = "{";
   const char* separator = "\n";
   for (const io::Run& run : log.runs) {
-    if (Expected<void> ok = check_run(run, columns); !ok) {
-      return tl::unexpected(std::move(ok).error());
-    }
+    FLYBALL_CHECK(check_run(run, columns));
     text += fmt::format("{}  {}: [", separator, json_quoted(run.name));
     separator = ",\n";
     for (std::size_t i = 0; i < run.time.size(); ++i) {
@@ -73,11 +69,7 @@ Expected<std::string> to_sysid_json(const SysIdJson& log) {
     separator = ",\n";
   }
   if (log.units_per_rotation) {
-    if (Expected<void> ok =
-            check_finite(*log.units_per_rotation, "to_sysid_json", "units_per_rotation");
-        !ok) {
-      return tl::unexpected(std::move(ok).error());
-    }
+    FLYBALL_CHECK(check_finite(*log.units_per_rotation, "to_sysid_json", "units_per_rotation"));
     text += fmt::format("{}  \"unitsPerRotation\": {}", separator,
                         json_number(*log.units_per_rotation));
   }

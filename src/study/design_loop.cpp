@@ -139,14 +139,9 @@ Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
         .expected(fmt::format("one value a state: {}", fmt::join(labels(model.states), ", ")));
   }
   LoopDesign loop;
-  auto Q = bryson(tolerances);
-  auto R = bryson({controller.input_tolerance});
-  if (!Q || !R) {
-    return tl::unexpected(!Q ? Q.error() : R.error());
-  }
-  loop.Q = *Q;
-  loop.R = *R;
-  FLYBALL_TRY(auto regulator, lqr(plant, *Q, *R));
+  FLYBALL_TRY(loop.Q, bryson(tolerances));
+  FLYBALL_TRY(loop.R, bryson({controller.input_tolerance}));
+  FLYBALL_TRY(auto regulator, lqr(plant, loop.Q, loop.R));
   loop.K = regulator.K;
   loop.poles = regulator.poles;
 
@@ -157,10 +152,7 @@ Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
     const Time whole(std::round(delay.si() / plant.period.si()) * plant.period.si());
     delayed = compensate_latency(loop.K, plant.A, plant.B, plant.period, whole);
   }
-  if (!delayed) {
-    return tl::unexpected(std::move(delayed).error());
-  }
-  loop.K_delayed = *delayed;
+  FLYBALL_TRY(loop.K_delayed, std::move(delayed));
 
   const double sigma = measurement_std(job);
   FLYBALL_TRY(auto observer,
