@@ -2,6 +2,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/diagnose.hpp"
 #include "core/format.hpp"
 #include "identification/channels.hpp"
 #include "identification/statistics.hpp"
@@ -198,12 +199,10 @@ void mend_signs(PreparedRecording& prepared) {
       for (PreparedRun& run : prepared.runs) {
         negate(position_right ? run.run.velocity : run.run.position);
       }
-      prepared.diagnostics.push_back(
-          {"sign_mismatch", Severity::warning,
-           detail::format("position and velocity have opposite signs (velocity is {:.2f} times the "
-                          "derivative of position); the {} disagrees with the voltage and was "
-                          "negated",
-                          ratio, position_right ? "velocity" : "position")});
+      warn(prepared.diagnostics, "sign_mismatch",
+           "position and velocity have opposite signs (velocity is {:.2f} times the derivative of "
+           "position); the {} disagrees with the voltage and was negated",
+           ratio, position_right ? "velocity" : "position");
       refresh_derived_columns(prepared);
     }
   }
@@ -232,13 +231,10 @@ void mend_signs(PreparedRecording& prepared) {
     for (const std::size_t i : mismatched) {
       negate(prepared.runs[i].run.voltage);
     }
-    prepared.diagnostics.push_back(
-        {"sign_mismatch", Severity::warning,
-         detail::format(
-             "the voltage column carries no sign: it is positive in all {} tests, but the "
-             "mechanism moves backwards in {} of them ({} rows); the voltage was negated "
-             "there",
-             moved, mismatched.size(), rows)});
+    warn(prepared.diagnostics, "sign_mismatch",
+         "the voltage column carries no sign: it is positive in all {} tests, but the mechanism "
+         "moves backwards in {} of them ({} rows); the voltage was negated there",
+         moved, mismatched.size(), rows);
     return;
   }
   if (mismatched.size() == moved) {
@@ -247,14 +243,12 @@ void mend_signs(PreparedRecording& prepared) {
       negate(run.run.velocity);
       run.direction = -run.direction;
     }
-    prepared.diagnostics.push_back(
-        {"sign_mismatch", Severity::warning,
-         detail::format(
-             "inverted encoder: positive voltage moves the encoder backwards in all {} "
-             "tests that moved ({} rows); position and velocity were negated, so gravity "
-             "and zero refer to the negated position. Invert the encoder or the motor in "
-             "the robot's code before using the gains",
-             moved, rows)});
+    warn(
+        prepared.diagnostics, "sign_mismatch",
+        "inverted encoder: positive voltage moves the encoder backwards in all {} tests that moved "
+        "({} rows); position and velocity were negated, so gravity and zero refer to the negated "
+        "position. Invert the encoder or the motor in the robot's code before using the gains",
+        moved, rows);
     refresh_derived_columns(prepared);
     return;
   }
@@ -263,14 +257,11 @@ void mend_signs(PreparedRecording& prepared) {
     negate(prepared.runs[i].run.voltage);
     names += (names.empty() ? "" : ", ") + std::string(to_string(prepared.runs[i].run.kind));
   }
-  prepared.diagnostics.push_back(
-      {"sign_mismatch", Severity::warning,
-       detail::format(
-           "voltage and motion have opposite signs in {} of {} tests ({}; {} rows), as if "
-           "the encoder or the motor had been inverted between tests; the voltage was given "
-           "the sign of the motion there, as the reference analyser does. Record these "
-           "tests again",
-           mismatched.size(), moved, names, rows)});
+  warn(prepared.diagnostics, "sign_mismatch",
+       "voltage and motion have opposite signs in {} of {} tests ({}; {} rows), as if the encoder "
+       "or the motor had been inverted between tests; the voltage was given the sign of the motion "
+       "there, as the reference analyser does. Record these tests again",
+       mismatched.size(), moved, names, rows);
 }
 
 void drop_coarse_velocity(PreparedRecording& prepared) {
@@ -282,12 +273,10 @@ void drop_coarse_velocity(PreparedRecording& prepared) {
     return;
   }
   prepared.has_velocity = false;
-  prepared.diagnostics.push_back(
-      {"coarse_velocity", Severity::warning,
-       detail::format(
-           "the velocity column has steps of {:.3g} {}/s at a top speed of {:.3g}; only the "
-           "position is used",
-           prepared.velocity_quantum, prepared.unit, prepared.top_speed)});
+  warn(prepared.diagnostics, "coarse_velocity",
+       "the velocity column has steps of {:.3g} {}/s at a top speed of {:.3g}; only the position "
+       "is used",
+       prepared.velocity_quantum, prepared.unit, prepared.top_speed);
 }
 
 void check_velocity_scale(PreparedRecording& prepared) {

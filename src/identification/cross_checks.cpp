@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "core/format.hpp"
+#include "core/diagnose.hpp"
 #include "identification/cross_checks.hpp"
 #include "identification/statistics.hpp"
 
@@ -127,12 +127,10 @@ void compare_channels(OutputErrorProblem& problem, const RobustFit& best, const 
   const double difference = by_velocity->log_kA - by_position->log_kA;
   const double spread = std::hypot(by_position->standard_error, by_velocity->standard_error);
   if (std::abs(difference) > 0.15 && std::abs(difference) > 3.0 * spread) {
-    diagnostics.push_back(
-        {"channels_disagree", Severity::warning,
-         detail::format(
-             "kA is {:.3g} from the position alone but {:.3g} from the velocity alone; the "
-             "velocity's filter is not the moving average that the fit supposes",
-             std::exp(by_position->log_kA), std::exp(by_velocity->log_kA))});
+    warn(diagnostics, "channels_disagree",
+         "kA is {:.3g} from the position alone but {:.3g} from the velocity alone; the velocity's "
+         "filter is not the moving average that the fit supposes",
+         std::exp(by_position->log_kA), std::exp(by_velocity->log_kA));
   }
 }
 
@@ -157,12 +155,10 @@ void compare_repeats(const FeedforwardFit& fit, std::vector<Diagnostic>& diagnos
   }
   for (const auto& [kind, range] : extremes) {
     if (range.first > 0.0 && range.second / range.first > 1.1) {
-      diagnostics.push_back(
-          {"repeats_disagree", Severity::warning,
-           detail::format(
-               "two {} tests differ in speed by a factor {:.2f} under the same voltage; was "
-               "the mechanism changed between them? Identify them apart",
-               to_string(kind), range.second / range.first)});
+      warn(diagnostics, "repeats_disagree",
+           "two {} tests differ in speed by a factor {:.2f} under the same voltage; was the "
+           "mechanism changed between them? Identify them apart",
+           to_string(kind), range.second / range.first);
     }
   }
 }
@@ -179,14 +175,12 @@ void detect_elasticity(const PreparedRecording& prepared, const FeedforwardFit& 
     const double measured = overshoot(fit.runs[i].time, {first, last}, run.direction);
     const double simulated = overshoot(fit.runs[i].time, fit.runs[i].velocity_hat, run.direction);
     if (measured > 1.15 * std::max(1.0, simulated)) {
-      diagnostics.push_back(
-          {"elastic", Severity::warning,
-           detail::format(
-               "{}: the speed overshoots by {:.0f} % after the step and falls again, the "
-               "simulated one by {:.0f} %; backlash or elasticity, which the model lacks, "
-               "limits how fast a controller may be",
-               to_string(run.run.kind), 100.0 * (measured - 1.0),
-               100.0 * (std::max(1.0, simulated) - 1.0))});
+      warn(diagnostics, "elastic",
+           "{}: the speed overshoots by {:.0f} % after the step and falls again, the simulated one "
+           "by {:.0f} %; backlash or elasticity, which the model lacks, limits how fast a "
+           "controller may be",
+           to_string(run.run.kind), 100.0 * (measured - 1.0),
+           100.0 * (std::max(1.0, simulated) - 1.0));
     }
   }
 }

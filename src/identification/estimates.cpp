@@ -2,6 +2,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/diagnose.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "identification/estimates.hpp"
@@ -165,49 +166,40 @@ void report_fit(const PreparedRecording& prepared, const FeedforwardFit& fit,
                 std::vector<Diagnostic>& diagnostics) {
   const std::string& unit = fit.unit;
   if (!fit.kA.determined) {
-    diagnostics.push_back({"kA_not_determined", Severity::warning,
-                           detail::format("kA is below {:.3g} V·s²/{} but not determined: {}",
-                                          fit.kA.upper_bound, unit, fit.kA.reason)});
+    warn(diagnostics, "kA_not_determined", "kA is below {:.3g} V·s²/{} but not determined: {}",
+         fit.kA.upper_bound, unit, fit.kA.reason);
   }
   if (!fit.kS.determined) {
-    diagnostics.push_back(
-        {"kS_indistinguishable", Severity::info,
-         detail::format("kS is below {:.3g} V: {}", fit.kS.upper_bound, fit.kS.reason)});
+    note(diagnostics, "kS_indistinguishable", "kS is below {:.3g} V: {}", fit.kS.upper_bound,
+         fit.kS.reason);
   }
   if (fit.kG && !fit.kG->determined) {
-    diagnostics.push_back(
-        {"kG_indistinguishable", Severity::warning,
-         detail::format("|kG| is below {:.3g} V: {}", fit.kG->upper_bound, fit.kG->reason)});
+    warn(diagnostics, "kG_indistinguishable", "|kG| is below {:.3g} V: {}", fit.kG->upper_bound,
+         fit.kG->reason);
   }
   if (prepared.has_velocity && fit.averaging_width > 0.03 && fit.velocity_delay > 0.0) {
-    diagnostics.push_back(
-        {"velocity_filtered", Severity::info,
-         detail::format(
-             "the velocity column is averaged over about {:.0f} ms; a controller that uses "
-             "it sees the velocity {:.0f} ms late",
-             1e3 * fit.averaging_width, 1e3 * fit.velocity_delay)});
+    note(diagnostics, "velocity_filtered",
+         "the velocity column is averaged over about {:.0f} ms; a controller that uses it sees the "
+         "velocity {:.0f} ms late",
+         1e3 * fit.averaging_width, 1e3 * fit.velocity_delay);
   }
   if (prepared.has_position && prepared.has_velocity &&
       std::abs(fit.velocity_delay - 0.5 * fit.averaging_width - fit.position_delay) > 0.015) {
-    diagnostics.push_back(
-        {"channel_skew", Severity::info,
-         detail::format(
-             "position is {:.0f} ms and velocity {:.0f} ms older than the voltage of the "
-             "same row (averaging taken off); the fit accounts for it",
-             1e3 * fit.position_delay, 1e3 * (fit.velocity_delay - 0.5 * fit.averaging_width))});
+    note(diagnostics, "channel_skew",
+         "position is {:.0f} ms and velocity {:.0f} ms older than the voltage of the same row "
+         "(averaging taken off); the fit accounts for it",
+         1e3 * fit.position_delay, 1e3 * (fit.velocity_delay - 0.5 * fit.averaging_width));
   } else if (prepared.has_position && fit.position_delay > 0.015) {
-    diagnostics.push_back(
-        {"channel_delay", Severity::info,
-         detail::format("the encoder's values are {:.0f} ms older than the voltage of "
-                        "the same row; the fit accounts for it",
-                        1e3 * fit.position_delay)});
+    note(diagnostics, "channel_delay",
+         "the encoder's values are {:.0f} ms older than the voltage of the same row; the fit "
+         "accounts for it",
+         1e3 * fit.position_delay);
   }
   if (fit.velocity_nrmse > 0.2) {
-    diagnostics.push_back(
-        {"poor_fit", Severity::warning,
-         detail::format("the simulated velocity misses {:.0f} % of the measured one's spread (R² = "
-                        "{:.3f}): the mechanism does more than the model says",
-                        100.0 * fit.velocity_nrmse, fit.r_squared)});
+    warn(diagnostics, "poor_fit",
+         "the simulated velocity misses {:.0f} % of the measured one's spread (R² = {:.3f}): the "
+         "mechanism does more than the model says",
+         100.0 * fit.velocity_nrmse, fit.r_squared);
   }
 }
 

@@ -8,6 +8,7 @@
 
 #include <flyball/core/argument.hpp>
 
+#include "core/diagnose.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "identification/channels.hpp"
@@ -199,9 +200,7 @@ void report_rows(const RowDefects& defects, std::vector<Diagnostic>& diagnostics
   const auto tell = [&](std::size_t count, std::string code, std::string_view what,
                         std::string_view done) {
     if (count > 0) {
-      diagnostics.push_back(
-          {std::move(code), Severity::warning,
-           detail::format("{} of {} rows {}; {}", count, defects.total, what, done)});
+      warn(diagnostics, std::move(code), "{} of {} rows {}; {}", count, defects.total, what, done);
     }
   };
   tell(defects.not_finite, "non_finite_rows", "hold NaN or infinity", "they were dropped");
@@ -250,14 +249,11 @@ void choose_channels(PreparedRecording& prepared) {
 void report_repeats(PreparedRecording& prepared) {
   const double share = repeated_share(prepared.runs);
   if (share > 0.2) {
-    prepared.diagnostics.push_back(
-        {"repeated_rows", Severity::info,
-         detail::format(
-             "{:.0f} % of the rows repeat the encoder value before (rows every {:.1f} ms, "
-             "new values every {:.1f} ms); only rows with new values are compared with the "
-             "simulation",
-             100.0 * share, 1e3 * prepared.row_period,
-             1e3 * std::max(prepared.position_refresh_period, prepared.velocity_refresh_period))});
+    note(prepared.diagnostics, "repeated_rows",
+         "{:.0f} % of the rows repeat the encoder value before (rows every {:.1f} ms, new values "
+         "every {:.1f} ms); only rows with new values are compared with the simulation",
+         100.0 * share, 1e3 * prepared.row_period,
+         1e3 * std::max(prepared.position_refresh_period, prepared.velocity_refresh_period));
   }
 }
 
@@ -268,9 +264,8 @@ void report_missing_tests(PreparedRecording& prepared) {
         std::any_of(prepared.runs.begin(), prepared.runs.end(),
                     [kind](const PreparedRun& run) { return run.run.kind == kind; });
     if (!present) {
-      prepared.diagnostics.push_back(
-          {"missing_test", Severity::warning,
-           detail::format("the {} test is missing from the log", to_string(kind))});
+      warn(prepared.diagnostics, "missing_test", "the {} test is missing from the log",
+           to_string(kind));
     }
   }
 }
@@ -287,13 +282,11 @@ void report_travel(PreparedRecording& prepared) {
   }
   constexpr double turn = 2.0 * std::numbers::pi;
   if (travel > turn) {
-    prepared.diagnostics.push_back(
-        {"travel_exceeds_turn", Severity::warning,
-         detail::format(
-             "the arm's position spans {:.1f} rad ({:.1f} turns) in one test: it looks like "
-             "the motor's angle, not the arm's; gravity cannot be found and all gains are per "
-             "radian of that angle. Give the gearing to the encoder",
-             travel, travel / turn)});
+    warn(prepared.diagnostics, "travel_exceeds_turn",
+         "the arm's position spans {:.1f} rad ({:.1f} turns) in one test: it looks like the "
+         "motor's angle, not the arm's; gravity cannot be found and all gains are per radian of "
+         "that angle. Give the gearing to the encoder",
+         travel, travel / turn);
   }
 }
 

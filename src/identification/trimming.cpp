@@ -2,7 +2,7 @@
 #include <cmath>
 #include <string>
 
-#include "core/format.hpp"
+#include "core/diagnose.hpp"
 #include "identification/statistics.hpp"
 #include "identification/trimming.hpp"
 
@@ -80,13 +80,11 @@ void keep_longest_stretch(PreparedRun& prepared, double longest_gap,
     }
   }
   if (gaps > 0) {
-    diagnostics.push_back(
-        {"gaps", Severity::warning,
-         detail::format(
-             "{}: {} gap{} in time (the widest {:.0f} ms); only the longest stretch without "
-             "one is used ({} of {} rows)",
-             to_string(prepared.run.kind), gaps, gaps == 1 ? "" : "s", 1e3 * widest,
-             best_last - best_first, prepared.last - prepared.first)});
+    warn(diagnostics, "gaps",
+         "{}: {} gap{} in time (the widest {:.0f} ms); only the longest stretch without one is "
+         "used ({} of {} rows)",
+         to_string(prepared.run.kind), gaps, gaps == 1 ? "" : "s", 1e3 * widest,
+         best_last - best_first, prepared.last - prepared.first);
     prepared.starts_at_rest = prepared.starts_at_rest && best_first == prepared.first;
     prepared.first = best_first;
     prepared.last = best_last;
@@ -150,12 +148,11 @@ void mark_window(PreparedRun& prepared, PreparedRecording& recording,
     };
     if (stalls(i) && run.time[end - 1] - run.time[i] > stalled &&
         lasts(run.time, i, end, stalled, stalls)) {
-      recording.diagnostics.push_back(
-          {"hit_stop", Severity::warning,
-           detail::format("{}: the mechanism stalls under {:.2f} V after {:.2f} s (a stop or a "
-                          "blockage); what follows and the {:.0f} ms before are not used",
-                          name, std::abs(run.voltage[i]), run.time[i] - run.time.front(),
-                          1e3 * options.stall_margin)});
+      warn(recording.diagnostics, "hit_stop",
+           "{}: the mechanism stalls under {:.2f} V after {:.2f} s (a stop or a blockage); what "
+           "follows and the {:.0f} ms before are not used",
+           name, std::abs(run.voltage[i]), run.time[i] - run.time.front(),
+           1e3 * options.stall_margin);
       end = std::max(begin, lower_index(run.time, run.time[i] - options.stall_margin));
       break;
     }
@@ -174,15 +171,13 @@ void mark_window(PreparedRun& prepared, PreparedRecording& recording,
   if (duration < (ramp ? minimum_ramp : minimum_step)) {
     prepared.moved = false;
     prepared.last = prepared.first;
-    recording.diagnostics.push_back(
-        {ramp ? "short_quasistatic_test" : "short_dynamic_test", Severity::warning,
-         detail::format("{}: only {:.2f} s of motion, too short to use", name, duration)});
+    warn(recording.diagnostics, ramp ? "short_quasistatic_test" : "short_dynamic_test",
+         "{}: only {:.2f} s of motion, too short to use", name, duration);
   } else if (!ramp && duration < short_step) {
-    recording.diagnostics.push_back(
-        {"short_dynamic_test", Severity::warning,
-         detail::format("{}: only {:.2f} s of acceleration; kA may not be determined. Give the "
-                        "mechanism more travel or a lower voltage",
-                        name, duration)});
+    warn(recording.diagnostics, "short_dynamic_test",
+         "{}: only {:.2f} s of acceleration; kA may not be determined. Give the mechanism more "
+         "travel or a lower voltage",
+         name, duration);
   }
 }
 
@@ -250,13 +245,11 @@ void trim_runs(PreparedRecording& prepared, const PreparationOptions& options) {
       const auto [low, high] = std::minmax_element(shown.begin(), shown.end());
       range = *high - *low;
     }
-    prepared.diagnostics.push_back(
-        {"no_motion", Severity::warning,
-         detail::format(
-             "{}: no motion under up to {:.2f} V ({} spans {:.3g} {}); the test is not used",
-             to_string(run.run.kind), top_of(run.run.voltage, 1.0),
-             prepared.has_position ? "position" : "velocity", range,
-             prepared.has_position ? prepared.unit : prepared.unit + "/s")});
+    warn(prepared.diagnostics, "no_motion",
+         "{}: no motion under up to {:.2f} V ({} spans {:.3g} {}); the test is not used",
+         to_string(run.run.kind), top_of(run.run.voltage, 1.0),
+         prepared.has_position ? "position" : "velocity", range,
+         prepared.has_position ? prepared.unit : prepared.unit + "/s");
   }
 }
 

@@ -13,6 +13,7 @@
 #include <flyball/core/quantity.hpp>
 #include <flyball/io/file.hpp>
 
+#include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "io/csv_table.hpp"
 #include "io/signals.hpp"
@@ -82,15 +83,12 @@ class Reader {
       FLYBALL_CHECK(read_table());
     }
     if (bad_times_ > 0) {
-      log_.diagnostics.push_back(
-          {"malformed_rows", Severity::warning,
-           fmt::format("{} without a time dropped", io::counted(bad_times_, "row"))});
+      warn(log_.diagnostics, "malformed_rows", "{} without a time dropped",
+           io::counted(bad_times_, "row"));
     }
     if (bad_cells_ > 0) {
-      log_.diagnostics.push_back(
-          {"non_numeric_cells", Severity::warning,
-           fmt::format("{} in columns of numbers held words and were dropped",
-                       io::counted(bad_cells_, "cell"))});
+      warn(log_.diagnostics, "non_numeric_cells",
+           "{} in columns of numbers held words and were dropped", io::counted(bad_cells_, "cell"));
     }
     io::tidy(log_);
     if (log_.signals.empty() && log_.texts.empty()) {
@@ -122,8 +120,7 @@ class Reader {
     }
     first_row_ = headless ? 0 : 1;
     if (headless) {
-      log_.diagnostics.push_back(
-          {"no_header", Severity::warning, "the table has no header; its columns are numbered"});
+      warn(log_.diagnostics, "no_header", "the table has no header; its columns are numbered");
     }
     return {};
   }
@@ -162,11 +159,9 @@ class Reader {
       }
       last = value;
     }
-    log_.diagnostics.push_back(
-        {"assumed_time_column", Severity::warning,
-         fmt::format(
-             "no column is named Timestamp, Time or t; the first, \"{}\", is taken for time",
-             io::printable(headers_[0].name, 40))});
+    warn(log_.diagnostics, "assumed_time_column",
+         "no column is named Timestamp, Time or t; the first, \"{}\", is taken for time",
+         io::printable(headers_[0].name, 40));
     return std::size_t{0};
   }
 
@@ -179,10 +174,9 @@ class Reader {
     if (unit && unit->dimension == Dimension::time) {
       return unit->factor;
     }
-    log_.diagnostics.push_back(
-        {"unknown_time_unit", Severity::warning,
-         fmt::format("the time column's unit \"{}\" is not a unit of time; seconds are assumed",
-                     io::printable(header.unit, 20))});
+    warn(log_.diagnostics, "unknown_time_unit",
+         "the time column's unit \"{}\" is not a unit of time; seconds are assumed",
+         io::printable(header.unit, 20));
     return 1.0;
   }
 

@@ -6,8 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
-
+#include "core/diagnose.hpp"
 #include "io/signals.hpp"
 #include "io/text.hpp"
 
@@ -83,18 +82,16 @@ void tidy(Log& log) {
   std::erase_if(log.signals, [](const Signal& s) { return s.time.empty(); });
   std::erase_if(log.texts, [](const TextSignal& t) { return t.time.empty(); });
   if (non_finite.samples > 0) {
-    log.diagnostics.push_back(
-        {"non_finite_rows", Severity::warning,
-         fmt::format("{} of {} (such as {}) held NaN or infinity and were dropped",
-                     counted(non_finite.samples, "sample"), counted(non_finite.channels, "channel"),
-                     printable(non_finite.example))});
+    warn(log.diagnostics, "non_finite_rows",
+         "{} of {} (such as {}) held NaN or infinity and were dropped",
+         counted(non_finite.samples, "sample"), counted(non_finite.channels, "channel"),
+         printable(non_finite.example));
   }
   if (unsorted.samples > 0) {
-    log.diagnostics.push_back(
-        {"unsorted_time", Severity::warning,
-         fmt::format("time runs backwards {} in {} (such as {}); each was sorted by time",
-                     counted(unsorted.samples, "time"), counted(unsorted.channels, "channel"),
-                     printable(unsorted.example))});
+    warn(log.diagnostics, "unsorted_time",
+         "time runs backwards {} in {} (such as {}); each was sorted by time",
+         counted(unsorted.samples, "time"), counted(unsorted.channels, "channel"),
+         printable(unsorted.example));
   }
 }
 

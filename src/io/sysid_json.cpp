@@ -13,6 +13,7 @@
 
 #include <flyball/io/log_error.hpp>
 
+#include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "io/signals.hpp"
 #include "io/sysid_columns.hpp"
@@ -32,10 +33,6 @@ Refusal not_sysid(const std::string& source, std::string got) {
       .got(std::move(got))
       .expected("an object with slow-forward, slow-backward, fast-forward and fast-backward")
       .hint("give the sysid_data….json that the logger wrote");
-}
-
-void warn(SysIdJson& log, std::string code, std::string message) {
-  log.diagnostics.push_back({std::move(code), Severity::warning, std::move(message)});
 }
 
 /// Which layout the rows have: by their width, and 9 columns by what else the file says.
@@ -113,9 +110,8 @@ void tell_missing(SysIdJson& log, const SysIdRows& handler) {
       if (!present) {
         log.missing.emplace_back(run_names[i]);
       }
-      warn(log, "missing_run",
-           fmt::format("the test {} {}", run_names[i],
-                       present ? "has no usable row" : "is not in the file"));
+      warn(log.diagnostics, "missing_run", "the test {} {}", run_names[i],
+           present ? "has no usable row" : "is not in the file");
     }
   }
   const bool legacy = log.layout == SysIdJson::Layout::characterization_2019 ||
@@ -135,10 +131,9 @@ void tell_missing(SysIdJson& log, const SysIdRows& handler) {
     tell("unitsPerRotation", "positions cannot be scaled from rotations by the file alone");
   }
   if (legacy) {
-    log.diagnostics.push_back(
-        {"frc_characterization", Severity::info,
-         fmt::format("a drive log of frc-characterization {}, the forerunner of SysId",
-                     log.layout == SysIdJson::Layout::characterization_2019 ? "2019" : "2020")});
+    note(log.diagnostics, "frc_characterization",
+         "a drive log of frc-characterization {}, the forerunner of SysId",
+         log.layout == SysIdJson::Layout::characterization_2019 ? "2019" : "2020");
   }
 }
 
@@ -200,11 +195,9 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
   const std::size_t columns = common_width(handler);
   log.layout = layout_of(handler, columns, truncated);
   if (truncated) {
-    warn(
-        log, "truncated_log",
-        fmt::format("the file ends in the middle, after {} bytes; the complete rows before the cut "
-                    "are used",
-                    text.size()));
+    warn(log.diagnostics, "truncated_log",
+         "the file ends in the middle, after {} bytes; the complete rows before the cut are used",
+         text.size());
   }
   Dropped dropped;
   dropped.other_width = handler.odd_rows;
@@ -216,26 +209,22 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
     }
   }
   if (dropped.non_finite > 0) {
-    warn(log, "non_finite_rows",
-         fmt::format("{} with null, NaN or infinity dropped",
-                     io::counted(dropped.non_finite, "row")));
+    warn(log.diagnostics, "non_finite_rows", "{} with null, NaN or infinity dropped",
+         io::counted(dropped.non_finite, "row"));
   }
   if (dropped.other_width > 0) {
-    warn(log, "malformed_rows",
-         fmt::format("{} without exactly {} numbers dropped",
-                     io::counted(dropped.other_width, "row"),
-                     columns == 0 ? std::string("4, 9 or 10") : std::to_string(columns)));
+    warn(log.diagnostics, "malformed_rows", "{} without exactly {} numbers dropped",
+         io::counted(dropped.other_width, "row"),
+         columns == 0 ? std::string("4, 9 or 10") : std::to_string(columns));
   }
   if (dropped.backward > 0) {
-    warn(log, "unsorted_time",
-         fmt::format("time runs backwards {}; the rows were sorted",
-                     io::counted(dropped.backward, "time")));
+    warn(log.diagnostics, "unsorted_time", "time runs backwards {}; the rows were sorted",
+         io::counted(dropped.backward, "time"));
   }
   if (!handler.unknown_keys.empty()) {
-    log.diagnostics.push_back(
-        {"unknown_keys", Severity::info,
-         fmt::format("{} not used, such as \"{}\"", io::counted(handler.unknown_keys.size(), "key"),
-                     io::printable(handler.unknown_keys.front(), 30))});
+    note(log.diagnostics, "unknown_keys", "{} not used, such as \"{}\"",
+         io::counted(handler.unknown_keys.size(), "key"),
+         io::printable(handler.unknown_keys.front(), 30));
   }
   if (log.runs.empty()) {
     Error error = refusal(LogError::no_data, source, "the SysId JSON")

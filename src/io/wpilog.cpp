@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "io/signals.hpp"
 #include "io/text.hpp"
@@ -206,10 +207,8 @@ class Reader {
   }
 
   bool stop(std::string code, std::string_view what) {
-    log_.diagnostics.push_back(
-        {std::move(code), Severity::warning,
-         fmt::format("byte {} of {} {}; the {} before it are used", at_, bytes_.size(), what,
-                     io::counted(data_records_, "record"))});
+    warn(log_.diagnostics, std::move(code), "byte {} of {} {}; the {} before it are used", at_,
+         bytes_.size(), what, io::counted(data_records_, "record"));
     return false;
   }
 
@@ -333,8 +332,7 @@ class Reader {
 
   void tell(std::size_t count, std::string code, std::string_view noun, std::string_view what) {
     if (count > 0) {
-      log_.diagnostics.push_back({std::move(code), Severity::warning,
-                                  fmt::format("{} {}", io::counted(count, noun), what)});
+      warn(log_.diagnostics, std::move(code), "{} {}", io::counted(count, noun), what);
     }
   }
 
@@ -360,9 +358,8 @@ class Reader {
         }
         list += fmt::format("{}{} {}", list.empty() ? "" : ", ", count, io::printable(type, 40));
       }
-      log_.diagnostics.push_back({"skipped_channels", Severity::info,
-                                  fmt::format("{} of types that are not decoded: {}",
-                                              io::counted(log_.skipped.size(), "channel"), list)});
+      note(log_.diagnostics, "skipped_channels", "{} of types that are not decoded: {}",
+           io::counted(log_.skipped.size(), "channel"), list);
     }
     io::tidy(log_);
     if (log_.signals.empty() && log_.texts.empty()) {

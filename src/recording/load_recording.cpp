@@ -11,6 +11,7 @@
 #include <flyball/core/text.hpp>
 #include <flyball/io/log.hpp>
 
+#include "core/diagnose.hpp"
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "recording/channel_names.hpp"
@@ -28,10 +29,6 @@ using identification::TestRun;
 using mechanisms::MechanismKind;
 
 constexpr std::string_view where = "recording";
-
-void assume(LoadedRecording& loaded, std::string message) {
-  loaded.diagnostics.push_back({"assumed", Severity::info, std::move(message)});
-}
 
 struct OutputScale {
   double factor = 1.0;  // SI a recorded unit
@@ -124,94 +121,84 @@ Expected<LoadedRecording> from_sysid_json(const Log& log, const LogSelection& se
   if (unit.empty()) {
     if (sysid.units.empty()) {
       unit = "Rotations";
-      assume(loaded, "the log does not name its unit: positions are taken as rotations");
+      note(loaded.diagnostics, "assumed",
+           "the log does not name its unit: positions are taken as rotations");
     } else {
       unit = sysid.units;
       scale *= sysid.units_per_rotation.value_or(1.0);
     }
   }
-  auto output = output_scale(unit, scale, kind);
-  if (!output) {
-    return tl::unexpected(std::move(output).error().in(log.source));
-  }
-  scale_runs(loaded.recording, output->factor);
-  loaded.recording.unit = output->unit;
+  FLYBALL_TRY_IN(log.source, auto output, output_scale(unit, scale, kind));
+  scale_runs(loaded.recording, output.factor);
+  loaded.recording.unit = output.unit;
   loaded.recording.mechanism = kind;
   return loaded;
 }
 
 Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& selection,
                                         LoadedRecording loaded) {
-  auto tests = find_tests(log, selection.state_channel);
-  if (!tests) {
-    return tl::unexpected(std::move(tests).error().in(log.source));
-  }
-  loaded.subject = tests->subject;
-  if (const std::string reason = drivetrain_reason(log, *tests, selection); !reason.empty()) {
+  FLYBALL_TRY_IN(log.source, auto tests, find_tests(log, selection.state_channel));
+  loaded.subject = tests.subject;
+  if (const std::string reason = drivetrain_reason(log, tests, selection); !reason.empty()) {
     loaded.refusal = refusal(RecordingError::drivetrain, log.source, "mechanism")
                          .got("a drivetrain: " + reason)
                          .expected("a flywheel, an elevator or an arm")
                          .hint(
                              "drivetrains are not supported yet; if it is another mechanism, say "
                              "which with --mechanism");
-    if (const auto channels = one_side(log, *tests)) {
-      loaded.recording.runs =
-          join_channels(*channels, tests->windows.empty() ? split_by_voltage(*channels->voltage)
-                                                          : tests->windows);
+    if (const auto channels = one_side(log, tests)) {
+      loaded.recording.runs = join_channels(
+          *channels, tests.windows.empty() ? split_by_voltage(*channels->voltage) : tests.windows);
     }
     return loaded;
   }
 
-  auto channels = find_channels(log, *tests, selection);
-  if (!channels) {
-    return tl::unexpected(std::move(channels).error().in(log.source));
-  }
-  if (tests->windows.empty()) {
-    tests->windows = split_by_voltage(*channels->voltage);
-    if (tests->windows.empty()) {
-      return refusal(RecordingError::no_tests, log.source, channels->voltage->name)
+  FLYBALL_TRY_IN(log.source, auto channels, find_channels(log, tests, selection));
+  if (tests.windows.empty()) {
+    tests.windows = split_by_voltage(*channels.voltage);
+    if (tests.windows.empty()) {
+      return refusal(RecordingError::no_tests, log.source, channels.voltage->name)
           .got("never driven, and no channel names the running test")
           .hint("record the voltage that was applied, or name the channel with --state");
     }
-    assume(loaded, fmt::format("no channel names the running test: {} tests were told apart by the "
-                               "voltage",
-                               tests->windows.size()));
+    note(loaded.diagnostics, "assumed",
+         "no channel names the running test: {} tests were told apart by the voltage",
+         tests.windows.size());
   }
-  assume(loaded,
-         fmt::format("voltage from \"{}\", position from {}, velocity from {}",
-                     channels->voltage->name,
-                     channels->position ? "\"" + channels->position->name + "\"" : "nowhere",
-                     channels->velocity ? "\"" + channels->velocity->name + "\"" : "nowhere"));
-  loaded.recording.runs = join_channels(*channels, tests->windows);
+  note(loaded.diagnostics, "assumed", "voltage from \"{}\", position from {}, velocity from {}",
+       channels.voltage->name,
+       channels.position ? "\"" + channels.position->name + "\"" : "nowhere",
+       channels.velocity ? "\"" + channels.velocity->name + "\"" : "nowhere");
+  loaded.recording.runs = join_channels(channels, tests.windows);
   if (loaded.recording.runs.empty()) {
-    return refusal(RecordingError::no_tests, log.source, tests->state_name)
+    return refusal(RecordingError::no_tests, log.source, tests.state_name)
         .got("without a test in which the mechanism was recorded");
   }
   // Unit: said by the person, else by the position's or the velocity's channel, else rotations.
   std::string unit = selection.unit;
-  if (unit.empty() && channels->position && parse_unit(channels->position->unit) &&
-      !channels->position->unit.empty()) {
-    unit = channels->position->unit;
+  if (unit.empty() && channels.position && parse_unit(channels.position->unit) &&
+      !channels.position->unit.empty()) {
+    unit = channels.position->unit;
   }
-  if (unit.empty() && channels->velocity) {
-    unit = position_unit_of_velocity(channels->velocity->unit);
+  if (unit.empty() && channels.velocity) {
+    unit = position_unit_of_velocity(channels.velocity->unit);
   }
   if (unit.empty()) {
     unit = "Rotation";
-    assume(loaded,
-           "the log does not name the position's unit: rotations are assumed (say it with --unit)");
+    note(loaded.diagnostics, "assumed",
+         "the log does not name the position's unit: rotations are assumed (say it with --unit)");
   }
   std::optional<MechanismKind> kind = selection.mechanism;
   const auto parsed_unit = parse_unit(unit);
   if (!kind) {
-    kind = kind_from_name(tests->subject + " " +
-                          (channels->voltage ? channels->voltage->name : std::string()));
+    kind = kind_from_name(tests.subject + " " +
+                          (channels.voltage ? channels.voltage->name : std::string()));
     if (kind) {
-      assume(loaded, fmt::format("the names in the log say that it is {} {}",
-                                 *kind == MechanismKind::flywheel ? "a" : "an", to_string(*kind)));
+      note(loaded.diagnostics, "assumed", "the names in the log say that it is {} {}",
+           *kind == MechanismKind::flywheel ? "a" : "an", to_string(*kind));
     } else if (parsed_unit && parsed_unit->dimension == Dimension::length) {
       kind = MechanismKind::elevator;
-      assume(loaded, "positions are lengths: an elevator is assumed");
+      note(loaded.diagnostics, "assumed", "positions are lengths: an elevator is assumed");
     }
   }
   if (!kind) {
@@ -220,14 +207,11 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
                          unit))
         .hint("say it with --mechanism arm or --mechanism flywheel");
   }
-  auto output = output_scale(unit, selection.scale, kind);
-  if (!output) {
-    return tl::unexpected(std::move(output).error().in(log.source));
-  }
+  FLYBALL_TRY_IN(log.source, auto output, output_scale(unit, selection.scale, kind));
   // A velocity may be in another unit than its position ("RPM" beside "Rotation").
-  double velocity_factor = output->factor;
-  if (channels->velocity && !channels->velocity->unit.empty() && selection.unit.empty()) {
-    const auto rate = parse_unit(channels->velocity->unit);
+  double velocity_factor = output.factor;
+  if (channels.velocity && !channels.velocity->unit.empty() && selection.unit.empty()) {
+    const auto rate = parse_unit(channels.velocity->unit);
     const bool same_kind =
         rate && parsed_unit &&
         ((rate->dimension == Dimension::angular_velocity &&
@@ -239,11 +223,11 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
   }
   for (TestRun& run : loaded.recording.runs) {
     for (double& v : run.velocity) {
-      v *= velocity_factor / output->factor;
+      v *= velocity_factor / output.factor;
     }
   }
-  scale_runs(loaded.recording, output->factor);
-  loaded.recording.unit = output->unit;
+  scale_runs(loaded.recording, output.factor);
+  loaded.recording.unit = output.unit;
   loaded.recording.mechanism = kind;
   return loaded;
 }

@@ -6,6 +6,7 @@
 
 #include <flyball/systems/interconnection.hpp>
 
+#include "core/diagnose.hpp"
 #include "core/try.hpp"
 
 namespace flyball::study {
@@ -99,8 +100,7 @@ Expected<ModelAnalysis> analyze(const ModelFile& model) {
       analysis.sampled = *std::move(sampled);
     } else {
       // The continuous system is what was asked about.
-      analysis.model.notes.push_back(
-          {"not_sampled", Severity::warning, "as sampled: " + to_string(sampled.error())});
+      warn(analysis.model.notes, "not_sampled", "as sampled: {}", to_string(sampled.error()));
     }
   }
   FLYBALL_TRY(auto steps, step_responses(model, analysis.modes));

@@ -11,6 +11,7 @@
 #include <flyball/study/project.hpp>
 #include <flyball/study/simulate_design.hpp>
 
+#include "core/diagnose.hpp"
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "study/design_steps.hpp"
@@ -27,17 +28,15 @@ constexpr std::string_view where = "design";
 void fill_defaults(DesignJob& job, std::vector<Diagnostic>& diagnostics) {
   if (!job.controller.delay) {
     job.controller.delay = 0.0;
-    diagnostics.push_back({"assumed", Severity::info,
-                           "no delay was given: the loop is designed for none (set "
-                           "controller.delay if the sensor is late)"});
+    note(diagnostics, "assumed",
+         "no delay was given: the loop is designed for none (set controller.delay if the sensor is "
+         "late)");
   }
   if (!job.estimator.measurement_std) {
     job.estimator.measurement_std = measurement_std(job);
-    diagnostics.push_back(
-        {"assumed", Severity::info,
-         fmt::format("the sensor's noise is taken as {} {}{} a sample",
-                     format_number(*job.estimator.measurement_std, 3), job.plant.unit,
-                     job.plant.kind == MechanismKind::flywheel ? "/s" : "")});
+    note(diagnostics, "assumed", "the sensor's noise is taken as {} {}{} a sample",
+         format_number(*job.estimator.measurement_std, 3), job.plant.unit,
+         job.plant.kind == MechanismKind::flywheel ? "/s" : "");
   }
 }
 
@@ -83,12 +82,10 @@ Expected<LoopDesign> search_tolerances(const LinearModel& model, DesignJob& job,
     words.push_back(
         fmt::format("{} for {}", format_number(best_tolerances[k], 3), label(model.states[k])));
   }
-  diagnostics.push_back(
-      {"assumed", Severity::info,
-       fmt::format(
-           "no tolerances were given: with {} the loop is the stiffest that keeps a gain margin of "
-           "2, a phase margin of 45° and ±20 % of inertia and gain",
-           fmt::join(words, ", "))});
+  note(diagnostics, "assumed",
+       "no tolerances were given: with {} the loop is the stiffest that keeps a gain margin of 2, "
+       "a phase margin of 45° and ±20 % of inertia and gain",
+       fmt::join(words, ", "));
   job.controller.state_tolerance = std::move(best_tolerances);
   return *std::move(best);
 }
@@ -98,14 +95,12 @@ void add_margin_warnings(const LoopDesign& loop, const DesignJob& job,
   if (!loop.margins.stable || is_comfortable(loop)) {
     return;
   }
-  diagnostics.push_back(
-      {"thin_margins", Severity::warning,
-       fmt::format("the tolerances leave a gain margin of {}, a phase margin of {}° and {} over "
-                   "±20 % of inertia and gain with {} ms of delay; looser tolerances are safer",
-                   format_number(loop.margins.gain_margin_up, 3),
-                   format_number(loop.margins.phase_margin, 3),
-                   loop.robustness.all_stable ? "stability" : "no stability",
-                   format_number(1e3 * job.controller.delay.value_or(0.0), 3))});
+  warn(diagnostics, "thin_margins",
+       "the tolerances leave a gain margin of {}, a phase margin of {}° and {} over ±20 % of "
+       "inertia and gain with {} ms of delay; looser tolerances are safer",
+       format_number(loop.margins.gain_margin_up, 3), format_number(loop.margins.phase_margin, 3),
+       loop.robustness.all_stable ? "stability" : "no stability",
+       format_number(1e3 * job.controller.delay.value_or(0.0), 3));
 }
 
 Expected<void> simulate_response(DesignResult& result) {
@@ -149,26 +144,23 @@ Expected<DesignResult> design(const DesignJob& requested) {
   if (!chosen && result.velocity_servo && job.controller.state_tolerance.size() == 2) {
     job.controller.state_tolerance.resize(1);
   }
-  auto loop = chosen ? search_tolerances(model, job, result.diagnostics)
-                     : design_loop(model, job, job.controller.state_tolerance);
-  if (!loop) {
-    return tl::unexpected(std::move(loop).error());
-  }
-  if (!loop->margins.stable) {
+  FLYBALL_TRY(const LoopDesign loop, chosen
+                                         ? search_tolerances(model, job, result.diagnostics)
+                                         : design_loop(model, job, job.controller.state_tolerance));
+  if (!loop.margins.stable) {
     return refusal(DesignError::margins_lost, where, "the loop")
         .got(fmt::format("unstable with its delay of {} ms",
                          format_number(1e3 * job.controller.delay.value_or(0.0), 3)))
         .hint("loosen controller.state_tolerance, or leave it out to have it chosen")
-        .with("spectral_radius", loop->margins.spectral_radius);
+        .with("spectral_radius", loop.margins.spectral_radius);
   }
   if (!chosen) {
-    add_margin_warnings(*loop, job, result.diagnostics);
+    add_margin_warnings(loop, job, result.diagnostics);
   }
-  if (loop->whole_periods) {
-    result.diagnostics.push_back(
-        {"delay_rounded", Severity::warning,
+  if (loop.whole_periods) {
+    warn(result.diagnostics, "delay_rounded",
          "the delay was compensated in whole periods: the closed loop has a negative real pole, of "
-         "which no real fraction of a period exists"});
+         "which no real fraction of a period exists");
   }
 
   result.states = model.states;
@@ -177,16 +169,16 @@ Expected<DesignResult> design(const DesignJob& requested) {
   result.A = model.discrete.A;
   result.B = model.discrete.B;
   result.C = model.discrete.C;
-  result.Q = loop->Q;
-  result.R = loop->R;
-  result.K = loop->K;
-  result.K_delayed = loop->K_delayed;
-  result.poles = loop->poles;
-  result.kalman_gain = loop->kalman_gain;
-  result.estimator_poles = loop->estimator_poles;
-  result.inversion = loop->inversion;
+  result.Q = loop.Q;
+  result.R = loop.R;
+  result.K = loop.K;
+  result.K_delayed = loop.K_delayed;
+  result.poles = loop.poles;
+  result.kalman_gain = loop.kalman_gain;
+  result.estimator_poles = loop.estimator_poles;
+  result.inversion = loop.inversion;
 
-  const StabilityMargins& margins = loop->margins;
+  const StabilityMargins& margins = loop.margins;
   double crossover = 0.0;
   for (const Crossover& crossing : margins.gain_crossovers) {
     crossover = std::max(crossover, crossing.frequency);
@@ -197,15 +189,15 @@ Expected<DesignResult> design(const DesignJob& requested) {
                     .delay_margin = margins.delay_margin,
                     .disk_margin = margins.disk_margin,
                     .crossover = crossover};
-  for (const RobustnessCase& point : loop->robustness.cases) {
+  for (const RobustnessCase& point : loop.robustness.cases) {
     result.robustness.push_back({.inertia_factor = point.inertia,
                                  .gain_factor = point.gain,
                                  .stable = point.stable,
                                  .spectral_radius = point.spectral_radius,
                                  .overshoot = point.overshoot});
   }
-  result.robust = loop->robustness.all_stable;
-  result.worst_overshoot = loop->robustness.worst_overshoot;
+  result.robust = loop.robustness.all_stable;
+  result.worst_overshoot = loop.robustness.worst_overshoot;
 
   result.paste = paste_gains(job.plant, result.K_delayed);
   FLYBALL_CHECK(simulate_response(result));

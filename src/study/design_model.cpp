@@ -15,6 +15,7 @@
 #include <flyball/systems/discretize.hpp>
 #include <flyball/systems/linearize.hpp>
 
+#include "core/diagnose.hpp"
 #include "core/try.hpp"
 
 namespace flyball::study {
@@ -86,10 +87,9 @@ Expected<void> add_observer(ModelRegulator& regulator, const ModelJob& job,
   regulator.kalman_gain = filter.K;
   regulator.estimator_poles = filter.poles;
   if (!assumed.empty()) {
-    regulator.diagnostics.push_back(
-        {"assumed", Severity::info,
-         fmt::format("the readings' noise is taken as {} a sample (simulation.noise says another)",
-                     fmt::join(assumed, ", "))});
+    note(regulator.diagnostics, "assumed",
+         "the readings' noise is taken as {} a sample (simulation.noise says another)",
+         fmt::join(assumed, ", "));
   }
   return {};
 }
@@ -167,13 +167,11 @@ Expected<ModelRegulator> regulate(const ModelJob& job) {
   const std::vector<double> states = tolerances(job.state_tolerance, model.states());
   const std::vector<double> inputs = tolerances(job.input_tolerance, model.inputs());
   if (job.state_tolerance.empty() || job.input_tolerance.empty()) {
-    regulator.diagnostics.push_back(
-        {"assumed", Severity::info,
-         fmt::format("no tolerance is given for {}: one of each unit is taken (set "
-                     "controller.tolerance)",
-                     !job.input_tolerance.empty()   ? "the states"
-                     : !job.state_tolerance.empty() ? "the inputs"
-                                                    : "states and inputs")});
+    note(regulator.diagnostics, "assumed",
+         "no tolerance is given for {}: one of each unit is taken (set controller.tolerance)",
+         !job.input_tolerance.empty()   ? "the states"
+         : !job.state_tolerance.empty() ? "the inputs"
+                                        : "states and inputs");
   }
   FLYBALL_TRY(regulator.Q, bryson(states));
   FLYBALL_TRY(regulator.R, bryson(inputs));
@@ -195,8 +193,7 @@ Expected<ModelRegulator> regulate(const ModelJob& job) {
     if (margins) {
       regulator.margins = *std::move(margins);
     } else {
-      regulator.diagnostics.push_back(
-          {"no_margins", Severity::warning, "margins: " + to_string(margins.error())});
+      warn(regulator.diagnostics, "no_margins", "margins: {}", to_string(margins.error()));
     }
   }
   return regulator;

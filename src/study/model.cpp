@@ -6,6 +6,7 @@
 #include <flyball/study/analyze.hpp>
 #include <flyball/systems/linearize.hpp>
 
+#include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "solve/json_object.hpp"
 #include "solve/row.hpp"
@@ -105,12 +106,10 @@ void note_what_is_left_out(const PlantDescription& plant, std::vector<Diagnostic
     left_out.push_back(fmt::format("gravity (kG = {} V)", format_number(gains.kG, 3)));
   }
   if (!left_out.empty()) {
-    notes.push_back(
-        {"left_out", Severity::info,
-         fmt::format("{} {} no part of a linear model; the feedforward of `flyball "
-                     "design` cancels {}",
-                     left_out.size() == 2 ? left_out[0] + " and " + left_out[1] : left_out[0],
-                     left_out.size() == 2 ? "are" : "is", left_out.size() == 2 ? "them" : "it")});
+    note(notes, "left_out",
+         "{} {} no part of a linear model; the feedforward of `flyball design` cancels {}",
+         left_out.size() == 2 ? left_out[0] + " and " + left_out[1] : left_out[0],
+         left_out.size() == 2 ? "are" : "is", left_out.size() == 2 ? "them" : "it");
   }
 }
 
@@ -167,9 +166,8 @@ Expected<ModelFile> linearized(const ModelJob& job) {
   model.inputs = names.inputs;
   model.outputs = names.outputs;
   if (!point.is_equilibrium) {
-    model.notes.push_back(
-        {"no_equilibrium", Severity::warning,
-         "the point is " + describe(point, names) + "; the linear model leaves that motion out"});
+    warn(model.notes, "no_equilibrium", "the point is {}; the linear model leaves that motion out",
+         describe(point, names));
   }
   model.point = std::move(point);
   return model;

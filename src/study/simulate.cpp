@@ -15,6 +15,7 @@
 #include <flyball/simulation/mechanism_plant.hpp>
 #include <flyball/systems/model_step.hpp>
 
+#include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "study/simulation_record.hpp"
 
@@ -329,10 +330,9 @@ Expected<ModelDesign> design_model(const ModelJob& job) {
       run.initial(i) += share / std::sqrt(made.Q(i, i));
     }
     run.initial_is_given = true;
-    result.regulator.diagnostics.push_back(
-        {"assumed", Severity::info,
+    note(result.regulator.diagnostics, "assumed",
          "the simulation begins a fifth of each tolerance beside the point (simulation.initial "
-         "says another)"});
+         "says another)");
   }
   if (!job.run.duration_is_given) {
     // Eight time constants of the slowest pole.
