@@ -111,42 +111,35 @@ std::string nearest_unit(std::string_view text, std::optional<Dimension> of = st
   return nearest_name(canonical(text), names);
 }
 
-std::string_view example(Dimension dimension) {
-  switch (dimension) {
-    case dimensionless:
-      return "0.5";
-    case mass:
-      return "\"8 kg\" or \"18 lb\"";
-    case length:
-      return "\"2.54 cm\" or \"1 in\"";
-    case time:
-      return "\"20 ms\"";
-    case angle:
-      return "\"15 deg\"";
-    case velocity:
-      return "\"1.5 m/s\"";
-    case angular_velocity:
-      return "\"3000 rpm\" or \"10 rad/s\"";
-    case acceleration:
-      return "\"2 m/s^2\"";
-    case angular_acceleration:
-      return "\"20 rad/s^2\"";
-    case force:
-      return "\"10 N\"";
-    case torque:
-      return "\"2.4 N m\"";
-    case moment_of_inertia:
-      return "\"0.01 kg m^2\"";
-    case voltage:
-      return "\"12 V\"";
-    case current:
-      return "\"40 A\"";
-    case resistance:
-      return "\"15 mOhm\"";
-    case frequency:
-      return "\"50 Hz\"";
-  }
-  return "";
+/// What a dimension is called, the SI unit to print it in, and how a quantity of it is written; in
+/// the order of the enum.
+struct DimensionTexts {
+  std::string_view name;
+  std::string_view si_unit;
+  std::string_view example;
+};
+constexpr DimensionTexts dimension_texts[] = {
+    {"plain number", "", "0.5"},
+    {"mass", "kg", "\"8 kg\" or \"18 lb\""},
+    {"length", "m", "\"2.54 cm\" or \"1 in\""},
+    {"time", "s", "\"20 ms\""},
+    {"angle", "rad", "\"15 deg\""},
+    {"velocity", "m/s", "\"1.5 m/s\""},
+    {"angular velocity", "rad/s", "\"3000 rpm\" or \"10 rad/s\""},
+    {"acceleration", "m/s^2", "\"2 m/s^2\""},
+    {"angular acceleration", "rad/s^2", "\"20 rad/s^2\""},
+    {"force", "N", "\"10 N\""},
+    {"torque", "N m", "\"2.4 N m\""},
+    {"moment of inertia", "kg m^2", "\"0.01 kg m^2\""},
+    {"voltage", "V", "\"12 V\""},
+    {"current", "A", "\"40 A\""},
+    {"resistance", "Ohm", "\"15 mOhm\""},
+    {"frequency", "Hz", "\"50 Hz\""},
+};
+
+constexpr DimensionTexts texts_of(Dimension dimension) {
+  const auto index = static_cast<std::size_t>(dimension);
+  return index < std::size(dimension_texts) ? dimension_texts[index] : DimensionTexts{};
 }
 
 std::string_view trim(std::string_view text) {
@@ -166,79 +159,11 @@ std::string article(Dimension dimension) {
 }  // namespace
 
 std::string_view to_string(Dimension dimension) {
-  switch (dimension) {
-    case dimensionless:
-      return "plain number";
-    case mass:
-      return "mass";
-    case length:
-      return "length";
-    case time:
-      return "time";
-    case angle:
-      return "angle";
-    case velocity:
-      return "velocity";
-    case angular_velocity:
-      return "angular velocity";
-    case acceleration:
-      return "acceleration";
-    case angular_acceleration:
-      return "angular acceleration";
-    case force:
-      return "force";
-    case torque:
-      return "torque";
-    case moment_of_inertia:
-      return "moment of inertia";
-    case voltage:
-      return "voltage";
-    case current:
-      return "current";
-    case resistance:
-      return "resistance";
-    case frequency:
-      return "frequency";
-  }
-  return "";
+  return texts_of(dimension).name;
 }
 
 std::string_view si_unit(Dimension dimension) {
-  switch (dimension) {
-    case dimensionless:
-      return "";
-    case mass:
-      return "kg";
-    case length:
-      return "m";
-    case time:
-      return "s";
-    case angle:
-      return "rad";
-    case velocity:
-      return "m/s";
-    case angular_velocity:
-      return "rad/s";
-    case acceleration:
-      return "m/s^2";
-    case angular_acceleration:
-      return "rad/s^2";
-    case force:
-      return "N";
-    case torque:
-      return "N m";
-    case moment_of_inertia:
-      return "kg m^2";
-    case voltage:
-      return "V";
-    case current:
-      return "A";
-    case resistance:
-      return "Ohm";
-    case frequency:
-      return "Hz";
-  }
-  return "";
+  return texts_of(dimension).si_unit;
 }
 
 Expected<Unit> parse_unit(std::string_view text) {
@@ -259,7 +184,7 @@ Expected<double> parse_quantity(std::string_view text, Dimension dimension, std:
   const auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), number,
                                              std::chars_format::general);
   const auto expected = [&] {
-    return detail::format("{} such as {}", article(dimension), example(dimension));
+    return detail::format("{} such as {}", article(dimension), texts_of(dimension).example);
   };
   if (status != std::errc{} || end == digits.data() || trimmed.starts_with("+-")) {
     return tl::unexpected(Error(status == std::errc::result_out_of_range ? ArgumentError::not_finite

@@ -266,41 +266,27 @@ SiDimension power(const SiDimension& x, double exponent) noexcept {
 }
 
 SiDimension si_dimension(Dimension dimension) noexcept {
-  switch (dimension) {
-    case Dimension::dimensionless:
-      return {};
-    case Dimension::mass:
-      return {{1}};
-    case Dimension::length:
-      return {{0, 1}};
-    case Dimension::time:
-      return {{0, 0, 1}};
-    case Dimension::angle:
-      return {{0, 0, 0, 0, 0, 1}};
-    case Dimension::velocity:
-      return {{0, 1, -1}};
-    case Dimension::angular_velocity:
-      return {{0, 0, -1, 0, 0, 1}};
-    case Dimension::acceleration:
-      return {{0, 1, -2}};
-    case Dimension::angular_acceleration:
-      return {{0, 0, -2, 0, 0, 1}};
-    case Dimension::force:
-      return {{1, 1, -2}};
-    case Dimension::torque:
-      return {{1, 2, -2}};
-    case Dimension::moment_of_inertia:
-      return {{1, 2}};
-    case Dimension::voltage:
-      return {{1, 2, -3, -1}};
-    case Dimension::current:
-      return {{0, 0, 0, 1}};
-    case Dimension::resistance:
-      return {{1, 2, -3, -2}};
-    case Dimension::frequency:
-      return {{0, 0, -1}};
-  }
-  return {};
+  // kg m s A K rad, in the order of the enum.
+  static constexpr std::array<double, 6> exponents[] = {
+      {},                   // plain number
+      {1},                  // mass
+      {0, 1},               // length
+      {0, 0, 1},            // time
+      {0, 0, 0, 0, 0, 1},   // angle
+      {0, 1, -1},           // velocity
+      {0, 0, -1, 0, 0, 1},  // angular velocity
+      {0, 1, -2},           // acceleration
+      {0, 0, -2, 0, 0, 1},  // angular acceleration
+      {1, 1, -2},           // force
+      {1, 2, -2},           // torque
+      {1, 2},               // moment of inertia
+      {1, 2, -3, -1},       // voltage
+      {0, 0, 0, 1},         // current
+      {1, 2, -3, -2},       // resistance
+      {0, 0, -1},           // frequency
+  };
+  const auto index = static_cast<std::size_t>(dimension);
+  return index < std::size(exponents) ? SiDimension{exponents[index]} : SiDimension{};
 }
 
 std::string to_text(const SiDimension& dimension) {

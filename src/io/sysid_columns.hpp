@@ -21,15 +21,6 @@ inline constexpr std::array<Column, 9> columns_drive = {
     &Run::time,           &Run::voltage,        &Run::right_voltage,
     &Run::position,       &Run::right_position, &Run::velocity,
     &Run::right_velocity, &Run::angle,          &Run::angle_rate};
-inline constexpr std::array<Column, 9> columns_2019 = {&Run::time,
-                                                       nullptr,
-                                                       nullptr,
-                                                       &Run::voltage,
-                                                       &Run::right_voltage,
-                                                       &Run::position,
-                                                       &Run::right_position,
-                                                       &Run::velocity,
-                                                       &Run::right_velocity};
 inline constexpr std::array<Column, 10> columns_2020 = {&Run::time,
                                                         nullptr,
                                                         nullptr,
@@ -48,7 +39,7 @@ inline constexpr std::array<Column, 10> columns_2020 = {&Run::time,
     case SysIdJson::Layout::drive:
       return columns_drive;
     case SysIdJson::Layout::characterization_2019:
-      return columns_2019;
+      return std::span(columns_2020).first(9);  // without the angle
     case SysIdJson::Layout::characterization_2020:
       return columns_2020;
   }
