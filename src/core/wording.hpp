@@ -42,6 +42,10 @@ namespace flyball::text {
 /// Control characters (among them the escape that colours a terminal) as '?', except the newline.
 [[nodiscard]] std::string printable(std::string_view text);
 
+/// The pieces between separators; one at the end ends the last piece.
+[[nodiscard]] std::vector<std::string_view> split(std::string_view text,
+                                                  std::string_view separator);
+
 /// Words joined as "a, b and c".
 [[nodiscard]] std::string enumerate(const std::vector<std::string>& words);
 

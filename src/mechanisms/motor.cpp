@@ -11,6 +11,7 @@
 
 #include "core/format.hpp"
 #include "core/try.hpp"
+#include "core/wording.hpp"
 
 namespace flyball::mechanisms {
 
@@ -51,10 +52,8 @@ std::string fold(std::string_view text) {
 
 std::vector<std::string> folded_names(const MotorTableEntry& entry) {
   std::vector<std::string> names{fold(entry.name)};
-  for (std::string_view rest = entry.aliases; !rest.empty();) {
-    const std::size_t end = std::min(rest.find(','), rest.size());
-    names.push_back(fold(rest.substr(0, end)));
-    rest.remove_prefix(std::min(end + 1, rest.size()));
+  for (const std::string_view alias : text::split(entry.aliases, ",")) {
+    names.push_back(fold(alias));
   }
   return names;
 }

@@ -104,12 +104,8 @@ std::string render(const Findings& findings, const TerminalStyle& style) {
 
 std::string render(const Code& code, const TerminalStyle& style) {
   std::string out = std::string(indent) + bold(code.title, style) + "\n";
-  std::size_t at = 0;
-  while (at < code.text.size()) {
-    const std::size_t end = std::min(code.text.find('\n', at), code.text.size());
-    const std::string_view line = std::string_view(code.text).substr(at, end - at);
+  for (const std::string_view line : text::split(code.text, "\n")) {
     out += line.empty() ? "\n" : std::string(indent) + printable(line) + "\n";
-    at = end + 1;
   }
   return out;
 }

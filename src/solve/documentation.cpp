@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "core/wording.hpp"
 #include "solve/shape.hpp"
 
 namespace flyball::solve {
@@ -26,7 +27,7 @@ std::string type_of(const Field& field) {
       return "list of texts";
     case FieldType::choice: {
       std::string listed;
-      for (const std::string_view choice : words_of_choice(field.choices)) {
+      for (const std::string_view choice : text::split(field.choices, " ")) {
         listed += fmt::format("{}\"{}\"", listed.empty() ? "" : ", ", choice);
       }
       return listed;

@@ -10,6 +10,7 @@
 #include <flyball/core/text.hpp>
 
 #include "core/try.hpp"
+#include "core/wording.hpp"
 #include "solve/json_value.hpp"
 #include "solve/problem.hpp"
 #include "solve/shape.hpp"
@@ -214,7 +215,7 @@ Expected<std::string_view> ProblemReader::choice(const Field& field, const Json&
     return tl::unexpected(malformed(field, kind_of(json), "a text"));
   }
   const std::string& text = json.get_ref<const std::string&>();
-  const std::vector<std::string_view> choices = words_of_choice(field.choices);
+  const std::vector<std::string_view> choices = text::split(field.choices, " ");
   const auto found = std::find(choices.begin(), choices.end(), text);
   if (found != choices.end()) {
     return *found;

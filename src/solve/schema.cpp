@@ -3,6 +3,7 @@
 
 #include <flyball/solve/documentation.hpp>
 
+#include "core/wording.hpp"
 #include "solve/shape.hpp"
 
 namespace flyball::solve {
@@ -37,7 +38,7 @@ Json type_of(const Field& field, bool problem) {
     case FieldType::texts:
       return list_of({{"type", "string"}});
     case FieldType::choice:
-      return {{"enum", words_of_choice(field.choices)}};
+      return {{"enum", text::split(field.choices, " ")}};
     case FieldType::matrix:
       return problem ? any_of(reference("matrix"), reference("number")) : reference("matrix");
     case FieldType::samples:
@@ -70,7 +71,7 @@ Json object_of(const std::vector<Field>& fields, bool problem) {
     if (problem && field.absent == Absent::number) {
       property["default"] = field.otherwise;
     } else if (problem && field.absent == Absent::first_choice) {
-      property["default"] = words_of_choice(field.choices).front();
+      property["default"] = text::split(field.choices, " ").front();
     }
     properties[std::string(field.name)] = std::move(property);
     if (field.absent == Absent::refused) {

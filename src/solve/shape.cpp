@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "core/try.hpp"
+#include "core/wording.hpp"
 #include "solve/shape.hpp"
 
 namespace flyball::solve {
@@ -22,15 +23,13 @@ std::string_view word_of(std::string_view size) {
 /// "states x inputs"; "states + outputs"; empty where a letter has no word.
 std::string words_of(std::string_view size) {
   std::string words;
-  while (!size.empty()) {
-    const std::size_t plus = size.find('+');
-    const std::string_view word = word_of(size.substr(0, plus));
+  for (const std::string_view letter : text::split(size, "+")) {
+    const std::string_view word = word_of(letter);
     if (word.empty()) {
       return {};
     }
     words += words.empty() ? "" : " + ";
     words += word;
-    size = plus == std::string_view::npos ? std::string_view() : size.substr(plus + 1);
   }
   return words;
 }
@@ -45,18 +44,14 @@ std::string meaning_of(const Field& field) {
 
 Index Sizes::value_of(std::string_view size) const {
   Index sum = 0;
-  while (!size.empty()) {
-    const std::size_t plus = size.find('+');
-    const char first = size.front();
-    Index term = first - '0';
-    if (first >= 'a' && first <= 'z') {
-      term = known_[static_cast<std::size_t>(first - 'a')];
-    }
+  for (const std::string_view part : text::split(size, "+")) {
+    const char first = part.front();
+    const Index term =
+        first >= 'a' && first <= 'z' ? known_[static_cast<std::size_t>(first - 'a')] : first - '0';
     if (term < 0) {
       return -1;
     }
     sum += term;
-    size = plus == std::string_view::npos ? std::string_view() : size.substr(plus + 1);
   }
   return sum;
 }
@@ -101,16 +96,6 @@ std::string shape_of(const Field& field) {
     default:
       return {};
   }
-}
-
-std::vector<std::string_view> words_of_choice(std::string_view choices) {
-  std::vector<std::string_view> words;
-  while (!choices.empty()) {
-    const std::size_t space = choices.find(' ');
-    words.push_back(choices.substr(0, space));
-    choices = space == std::string_view::npos ? std::string_view() : choices.substr(space + 1);
-  }
-  return words;
 }
 
 }  // namespace flyball::solve

@@ -36,7 +36,4 @@ class Sizes {
 /// "n x m", "n", or nothing for what has no shape.
 [[nodiscard]] std::string shape_of(const Field& field);
 
-/// "continuous" and "discrete" of "continuous discrete".
-[[nodiscard]] std::vector<std::string_view> words_of_choice(std::string_view choices);
-
 }  // namespace flyball::solve

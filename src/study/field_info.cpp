@@ -9,6 +9,7 @@
 
 #include <flyball/study/project.hpp>
 
+#include "core/wording.hpp"
 #include "study/field.hpp"
 #include "study/mechanism_parts.hpp"
 #include "study/read_value.hpp"
@@ -158,10 +159,8 @@ Json schema_of(const Field& field, const std::string& description) {
       schema["additionalProperties"] = {{"type", {"string", "number"}}};
       break;
   }
-  for (std::size_t start = 0; start < field.choices.size();) {
-    const std::size_t end = std::min(field.choices.find(", ", start), field.choices.size());
-    schema["enum"].push_back(field.choices.substr(start, end - start));
-    start = end + 2;
+  for (const std::string_view choice : text::split(field.choices, ", ")) {
+    schema["enum"].push_back(choice);
   }
   return schema;
 }

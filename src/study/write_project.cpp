@@ -5,6 +5,7 @@
 
 #include <flyball/study/project.hpp>
 
+#include "core/wording.hpp"
 #include "study/field.hpp"
 #include "study/read_value.hpp"
 
@@ -87,10 +88,8 @@ std::string write_project(const Project& project, std::string_view heading,
   const Document& document = project_document();
   const auto signals = document.signals(&project);
   std::string text;
-  for (std::size_t start = 0; start < heading.size();) {
-    const std::size_t end = std::min(heading.find('\n', start), heading.size());
-    text += fmt::format("# {}\n", heading.substr(start, end - start));
-    start = end + 1;
+  for (const std::string_view line : text::split(heading, "\n")) {
+    text += fmt::format("# {}\n", line);
   }
   for (const Section& section : document.sections) {
     const void* object = find(section, &project);

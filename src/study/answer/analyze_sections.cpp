@@ -140,15 +140,12 @@ std::string owners(const ModeReach& mode, const std::vector<std::string>& states
 void add_reach(Section& section, const ReachAnalysis& analysis, const std::string& words, Tone tone,
                const std::vector<std::string>& states) {
   bool first = true;
-  for (std::size_t from = 0; from < words.size();) {
-    const std::size_t end = std::min(words.find('\n', from), words.size());
-    const std::string line = words.substr(from, end - from);
+  for (const std::string_view line : text::split(words, "\n")) {
     const bool of_a_mode = line.starts_with("mode ") || line.find(" the mode ") != line.npos;
     if (!of_a_mode) {
       section.blocks.emplace_back(Paragraph{capitalized(line) + ".", first ? tone : Tone::plain});
     }
     first = false;
-    from = end + 1;
   }
   Table table;
   table.header = {"mode", "distance", "mostly of"};

@@ -31,14 +31,13 @@ std::string folded(std::string_view text) {
 std::string aliases_of(const std::string& name) {
   std::string others;
   for (const mechanisms::MotorTableEntry& entry : mechanisms::motor_table()) {
-    std::size_t at = 0;
-    while (entry.name == name && at < entry.aliases.size()) {
-      const std::size_t end = std::min(entry.aliases.find(',', at), entry.aliases.size());
-      const std::string_view alias = entry.aliases.substr(at, end - at);
+    if (entry.name != name) {
+      continue;
+    }
+    for (const std::string_view alias : text::split(entry.aliases, ",")) {
       if (folded(alias) != folded(name)) {
         others += (others.empty() ? "" : ", ") + std::string(alias);
       }
-      at = end + 1;
     }
   }
   return others;
