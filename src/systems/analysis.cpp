@@ -12,6 +12,7 @@
 #include "math/dense/dense.hpp"
 #include "systems/balance.hpp"
 #include "systems/modes.hpp"
+#include "systems/timed.hpp"
 
 namespace flyball {
 
@@ -244,7 +245,7 @@ Expected<Equilibrium> equilibrium(const ContinuousSystem<>& system, const Eigen:
 Expected<Equilibrium> equilibrium(const DiscreteSystem<>& system, const Eigen::VectorXd& u) {
   FLYBALL_CHECK(check_system(system, "equilibrium"));
   const Index n = system.A.rows();
-  return rest(MatrixXd::Identity(n, n) - system.A, {system.A, system.B, system.C, system.D}, u);
+  return rest(MatrixXd::Identity(n, n) - system.A, detail::bare(system), u);
 }
 
 Expected<LyapunovCertificate> lyapunov_certificate(const MatrixRef& A, const MatrixRef& Q,

@@ -1,6 +1,7 @@
 #include <flyball/systems/augment.hpp>
 
 #include "core/try.hpp"
+#include "systems/timed.hpp"
 
 namespace flyball {
 
@@ -52,16 +53,12 @@ Expected<ContinuousSystem<>> with_outputs(const ContinuousSystem<>& plant, const
   return augmented;
 }
 
-ContinuousSystem<> bare(const DiscreteSystem<>& s) {
-  return {s.A, s.B, s.C, s.D};
-}
-
 /// The period is checked after the rest: both are needed.
 Expected<DiscreteSystem<>> timed(Expected<ContinuousSystem<>> augmented, Time period,
                                  std::string_view where) {
   FLYBALL_TRY(auto system, std::move(augmented));
   FLYBALL_CHECK(check_positive(period.si(), where, "period", "s"));
-  return DiscreteSystem<>{system.A, system.B, system.C, system.D, period};
+  return detail::timed(system, period);
 }
 
 }  // namespace
@@ -116,7 +113,7 @@ Expected<ContinuousSystem<>> augment_bias(const ContinuousSystem<>& plant, const
 }
 Expected<DiscreteSystem<>> augment_bias(const DiscreteSystem<>& plant, const MatrixRef& B_bias,
                                         const MatrixRef& C_bias) {
-  return timed(biased(bare(plant), B_bias, C_bias, 1.0), plant.period, "augment_bias");
+  return timed(biased(detail::bare(plant), B_bias, C_bias, 1.0), plant.period, "augment_bias");
 }
 
 Expected<ContinuousSystem<>> augment_output(const ContinuousSystem<>& plant,
@@ -125,7 +122,7 @@ Expected<ContinuousSystem<>> augment_output(const ContinuousSystem<>& plant,
 }
 Expected<DiscreteSystem<>> augment_output(const DiscreteSystem<>& plant, const MatrixRef& C_more,
                                           const MatrixRef& D_more) {
-  return timed(with_outputs(bare(plant), C_more, D_more), plant.period, "augment_output");
+  return timed(with_outputs(detail::bare(plant), C_more, D_more), plant.period, "augment_output");
 }
 
 }  // namespace flyball

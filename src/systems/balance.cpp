@@ -92,4 +92,10 @@ MatrixXd scaled_state_matrix(const MatrixRef& A, const SystemScaling& scaling) {
   return scaling.states.cwiseInverse().asDiagonal() * A * scaling.states.asDiagonal();
 }
 
+ContinuousSystem<> scaled_system(const ContinuousSystem<>& system, const SystemScaling& scaling) {
+  return {scaled_state_matrix(system.A, scaling),
+          scaling.states.cwiseInverse().asDiagonal() * system.B,
+          system.C * scaling.states.asDiagonal(), system.D};
+}
+
 }  // namespace flyball::detail

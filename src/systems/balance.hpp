@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include <flyball/core/argument.hpp>
+#include <flyball/systems/system.hpp>
 
 namespace flyball::detail {
 
@@ -21,5 +22,9 @@ struct SystemScaling {
 
 /// diag(states)⁻¹ A diag(states).
 [[nodiscard]] Eigen::MatrixXd scaled_state_matrix(const MatrixRef& A, const SystemScaling& scaling);
+
+/// The system in the scaled states x'; its inputs and outputs keep their units.
+[[nodiscard]] ContinuousSystem<> scaled_system(const ContinuousSystem<>& system,
+                                               const SystemScaling& scaling);
 
 }  // namespace flyball::detail

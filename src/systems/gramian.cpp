@@ -93,9 +93,7 @@ Expected<MatrixXd> gramian_factor(const MatrixRef& A, const MatrixRef& B, TimeDo
 Expected<GramianFactors> gramian_factors(const ContinuousSystem<>& system, TimeDomain domain,
                                          std::string_view where) {
   const SystemScaling scaling = scaling_of(system.A, system.B, system.C);
-  const MatrixXd A = scaled_state_matrix(system.A, scaling);
-  const MatrixXd B = scaling.states.cwiseInverse().asDiagonal() * system.B;
-  const MatrixXd C = system.C * scaling.states.asDiagonal();
+  const auto [A, B, C, D] = scaled_system(system, scaling);
   FLYBALL_TRY(auto reach, gramian_factor(A, B, domain, where));
   FLYBALL_TRY(auto sight, gramian_factor(A.transpose(), C.transpose(), domain, where));
   return GramianFactors{scaling.states, std::move(reach), std::move(sight)};

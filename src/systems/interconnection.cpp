@@ -8,20 +8,18 @@
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "systems/balance.hpp"
+#include "systems/timed.hpp"
 
 namespace flyball {
 
 namespace {
 
+using detail::bare;
 using detail::product;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Continuous = ContinuousSystem<>;
 using Discrete = DiscreteSystem<>;
-
-Continuous bare(const Discrete& s) {
-  return {s.A, s.B, s.C, s.D};
-}
 
 MatrixXd diagonal(const MatrixXd& first, const MatrixXd& second) {
   MatrixXd both = MatrixXd::Zero(first.rows() + second.rows(), first.cols() + second.cols());
@@ -141,7 +139,7 @@ Expected<Discrete> discrete(const Discrete& first, const Discrete& second, std::
         .hint("resample one of them");
   }
   return connect(bare(first), bare(second)).map([&](const Continuous& both) {
-    return Discrete{both.A, both.B, both.C, both.D, first.period};
+    return detail::timed(both, first.period);
   });
 }
 
@@ -163,12 +161,10 @@ Expected<Continuous> unity_feedback(const Continuous& forward, FeedbackSign sign
 Expected<Eigen::MatrixXcd> evaluate(const Continuous& system, std::complex<double> point) {
   constexpr std::string_view where = "transfer_at";
   FLYBALL_CHECK(Checks(where).finite(point.real(), "the point").finite(point.imag(), "the point"));
-  const detail::SystemScaling scaling = detail::scaling_of(system.A, system.B, system.C);
-  Eigen::MatrixXcd shifted =
-      -detail::scaled_state_matrix(system.A, scaling).cast<std::complex<double>>();
+  const auto [A, B, C, D] =
+      detail::scaled_system(system, detail::scaling_of(system.A, system.B, system.C));
+  Eigen::MatrixXcd shifted = -A.cast<std::complex<double>>();
   shifted.diagonal().array() += point;
-  const MatrixXd B = scaling.states.cwiseInverse().asDiagonal() * system.B;
-  const MatrixXd C = system.C * scaling.states.asDiagonal();
   double rcond = 0.0;
   const Eigen::MatrixXcd x = detail::solve_complex(shifted, B.cast<std::complex<double>>(), &rcond);
   if (rcond == 0.0 || !x.allFinite()) {
@@ -177,7 +173,7 @@ Expected<Eigen::MatrixXcd> evaluate(const Continuous& system, std::complex<doubl
         .with("point", std::vector<double>{point.real(), point.imag()});
   }
   return Eigen::MatrixXcd(detail::complex_product(C.cast<std::complex<double>>(), x) +
-                          system.D.cast<std::complex<double>>());
+                          D.cast<std::complex<double>>());
 }
 
 }  // namespace
@@ -220,7 +216,7 @@ Expected<Continuous> feedback(const Continuous& forward, FeedbackSign sign) {
 Expected<Discrete> feedback(const Discrete& forward, FeedbackSign sign) {
   FLYBALL_CHECK(check_system(forward, "feedback"));
   return unity_feedback(bare(forward), sign).map([&](const Continuous& loop) {
-    return Discrete{loop.A, loop.B, loop.C, loop.D, forward.period};
+    return detail::timed(loop, forward.period);
   });
 }
 

@@ -29,10 +29,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double relative_accuracy = 1e-10;
 
 ContinuousSystem<> scaled(const ContinuousSystem<>& system) {
-  const detail::SystemScaling scaling = detail::scaling_of(system.A, system.B, system.C);
-  return {detail::scaled_state_matrix(system.A, scaling),
-          scaling.states.cwiseInverse().asDiagonal() * system.B,
-          system.C * scaling.states.asDiagonal(), system.D};
+  return detail::scaled_system(system, detail::scaling_of(system.A, system.B, system.C));
 }
 
 double largest_singular_value(const MatrixXd& M) {

@@ -10,26 +10,22 @@
 #include "systems/balance.hpp"
 #include "systems/gramian_factor.hpp"
 #include "systems/staircase.hpp"
+#include "systems/timed.hpp"
 
 namespace flyball {
 
 namespace {
 
 using Complex = std::complex<double>;
+using detail::bare;
 using detail::product;
+using detail::timed;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Continuous = ContinuousSystem<>;
 using Discrete = DiscreteSystem<>;
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-
-Continuous bare(const Discrete& s) {
-  return {s.A, s.B, s.C, s.D};
-}
-Discrete timed(const Continuous& s, Time period) {
-  return {s.A, s.B, s.C, s.D, period};
-}
 
 Expected<Continuous> transform(const Continuous& system, const MatrixRef& T) {
   constexpr std::string_view where = "similarity_transform";
@@ -77,13 +73,11 @@ Expected<Continuous> companion(const Continuous& given, SystemError failure,
                        : "one column: the form is of a single input");
   }
   const detail::SystemScaling scaling = detail::scaling_of(given.A, given.B, given.C);
+  const auto [A_balanced, B, C, D] = detail::scaled_system(given, scaling);
   // Time in the unit of the fastest mode keeps the powers of A within range.
-  const MatrixXd A_balanced = detail::scaled_state_matrix(given.A, scaling);
   const double rate =
       A_balanced.norm() > 0.0 ? std::exp2(std::round(std::log2(A_balanced.norm()))) : 1.0;
   const MatrixXd A = A_balanced / rate;
-  const MatrixXd B = scaling.states.cwiseInverse().asDiagonal() * given.B;
-  const MatrixXd C = given.C * scaling.states.asDiagonal();
   const double size_B = B.norm() > 0.0 ? B.norm() : 1.0;
 
   // x'₁ = qᵀx with qᵀAᵏB = 0 for k < n - 1 and 1 for the last; the others are its derivatives.
@@ -178,8 +172,8 @@ Expected<BalancedRealization<Continuous>> truncate(const System& given, TimeDoma
   return found;
 }
 
-Expected<BalancedRealization<Discrete>> timed(Expected<BalancedRealization<Continuous>> found,
-                                              Time period) {
+Expected<BalancedRealization<Discrete>> timed_realization(
+    Expected<BalancedRealization<Continuous>> found, Time period) {
   return std::move(found).map([&](BalancedRealization<Continuous>&& s) {
     return BalancedRealization<Discrete>{timed(s.system, period), std::move(s.hankel),
                                          std::move(s.T), std::move(s.T_inverse), s.error_bound};
@@ -197,9 +191,7 @@ Expected<MinimalRealization<Continuous>> minimal(const Continuous& system, doubl
   const Index n = system.A.rows();
   const double small = tolerance > 0.0 ? tolerance : 100.0 * epsilon * static_cast<double>(n);
   const detail::SystemScaling scaling = detail::scaling_of(system.A, system.B, system.C);
-  const MatrixXd A = detail::scaled_state_matrix(system.A, scaling);
-  const MatrixXd B = scaling.states.cwiseInverse().asDiagonal() * system.B;
-  const MatrixXd C = system.C * scaling.states.asDiagonal();
+  const auto [A, B, C, D] = detail::scaled_system(system, scaling);
 
   const detail::ReachedPart reach = detail::reached_part_of(A, B, small, {A.norm(), B.norm()});
   const Index r = reach.A.rows();
@@ -268,8 +260,8 @@ Expected<BalancedRealization<Continuous>> balanced_realization(const Continuous&
   return truncate(system, TimeDomain::continuous, 0, true, "balanced_realization");
 }
 Expected<BalancedRealization<Discrete>> balanced_realization(const Discrete& system) {
-  return timed(truncate(system, TimeDomain::discrete, 0, true, "balanced_realization"),
-               system.period);
+  return timed_realization(truncate(system, TimeDomain::discrete, 0, true, "balanced_realization"),
+                           system.period);
 }
 
 Expected<BalancedRealization<Continuous>> balanced_truncation(const Continuous& system,
@@ -277,8 +269,8 @@ Expected<BalancedRealization<Continuous>> balanced_truncation(const Continuous& 
   return truncate(system, TimeDomain::continuous, order, false, "balanced_truncation");
 }
 Expected<BalancedRealization<Discrete>> balanced_truncation(const Discrete& system, Index order) {
-  return timed(truncate(system, TimeDomain::discrete, order, false, "balanced_truncation"),
-               system.period);
+  return timed_realization(
+      truncate(system, TimeDomain::discrete, order, false, "balanced_truncation"), system.period);
 }
 
 Expected<MinimalRealization<Continuous>> minimal_realization(const Continuous& system,

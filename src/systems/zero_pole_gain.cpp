@@ -108,10 +108,7 @@ ContinuousSystem<> realized(const Section& section) {
 }  // namespace
 
 std::optional<ZeroPoleGain> zero_pole_gain(const ContinuousSystem<>& system) {
-  const SystemScaling scaling = scaling_of(system.A, system.B, system.C);
-  const MatrixXd A = scaled_state_matrix(system.A, scaling);
-  const MatrixXd b0 = scaling.states.cwiseInverse().asDiagonal() * system.B;
-  const MatrixXd c0 = system.C * scaling.states.asDiagonal();
+  const auto [A, b0, c0, d0] = scaled_system(system, scaling_of(system.A, system.B, system.C));
 
   ZeroPoleGain zpk;
   const Eigen::VectorXcd poles = eigenvalues_of(A);
@@ -125,7 +122,7 @@ std::optional<ZeroPoleGain> zero_pole_gain(const ContinuousSystem<>& system) {
   MatrixXd F = A;
   MatrixXd b = b0;
   MatrixXd c = c0;
-  double d = system.D(0, 0);
+  double d = d0(0, 0);
   const double unit_b = b0.norm();
   const double tolerance = 1e3 * epsilon * static_cast<double>(A.rows());
   double gain = 1.0;
