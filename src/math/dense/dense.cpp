@@ -2,7 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <Eigen/QR>
 
 #include "math/dense/balance_columns.hpp"
 #include "math/dense/dense.hpp"
@@ -47,26 +46,12 @@ MatrixXd solve_symmetric(const MatrixRef& A, const MatrixRef& B) {
   return A.ldlt().solve(B);
 }
 
-MatrixXd solve_least_squares(const MatrixRef& A, const MatrixRef& B) {
-  return A.completeOrthogonalDecomposition().solve(B);
-}
-
 std::optional<MatrixXd> cholesky_of(const MatrixRef& S) {
   const Eigen::LLT<MatrixXd> llt(S);
   if (llt.info() != Eigen::Success) {
     return std::nullopt;
   }
   return MatrixXd(llt.matrixL());
-}
-
-OrthogonalTriangular full_qr(const MatrixRef& A) {
-  const Eigen::HouseholderQR<MatrixXd> qr(A);
-  return {qr.householderQ(), qr.matrixQR().triangularView<Eigen::Upper>()};
-}
-
-OrthogonalTriangular pivoted_qr(const MatrixRef& A) {
-  const Eigen::ColPivHouseholderQR<MatrixXd> qr(A);
-  return {qr.householderQ(), qr.matrixQR().triangularView<Eigen::Upper>()};
 }
 
 Eigen::VectorXd balance_of(const MatrixRef& A) {
