@@ -93,4 +93,77 @@ inline Reflection reflection_of(double p, double q, double r) {
   return {p * inverse_s, q * inverse_s, r * inverse_s, q * inverse_p, r * inverse_p, -s * scale};
 }
 
+/// (c0 c1 c2) ← (c0 c1 c2)(I - (x y z)ᵀ(1 q r)) on the first `rows` rows and the rest of the last
+/// vector; `last`: c2 and z are not there.
+inline __attribute__((always_inline)) void reflect_columns(double* M, int ld, int rows,
+                                                           const Reflection& turn, bool last) {
+  const auto [x, y, z, q, r, top] = turn;
+  if (last) {
+    for (int i = 0; i < rows; i += 4) {
+      Vector4& c0 = *reinterpret_cast<Vector4*>(M + i);
+      Vector4& c1 = *reinterpret_cast<Vector4*>(M + i + ld);
+      const Vector4 t = x * c0 + y * c1;
+      c0 -= t;
+      c1 -= t * q;
+    }
+    return;
+  }
+  for (int i = 0; i < rows; i += 4) {
+    Vector4& c0 = *reinterpret_cast<Vector4*>(M + i);
+    Vector4& c1 = *reinterpret_cast<Vector4*>(M + i + ld);
+    Vector4& c2 = *reinterpret_cast<Vector4*>(M + i + 2 * ld);
+    const Vector4 t = x * c0 + y * c1 + z * c2;
+    c0 -= t;
+    c1 -= t * q;
+    c2 -= t * r;
+  }
+}
+
+/// One sweep of the block from row `low` to row `end`: the bulge is chased to its lower end.
+/// @param stop          The rows are turned in the columns before this one.
+/// @param turn_columns  Turns the columns from k on: called with k, the reflection, and whether it
+///                      is the last one, of two columns.
+template <class TurnColumns>
+inline __attribute__((always_inline)) void sweep(int ld, double* H, const Bulge& bulge, int low,
+                                                 int end, int stop,
+                                                 const TurnColumns& turn_columns) {
+  const auto h = [=](int i, int j) -> double& { return H[i + j * ld]; };
+  auto [m, p, q, r] = bulge;
+  for (int k = m; k < end; ++k) {
+    const bool last = k == end - 1;
+    if (k != m) {
+      p = h(k, k - 1);
+      q = h(k + 1, k - 1);
+      r = last ? 0.0 : h(k + 2, k - 1);
+    }
+    const Reflection turn = reflection_of(p, q, r);
+    if (k != m) {
+      h(k, k - 1) = turn.top;
+      h(k + 1, k - 1) = 0.0;
+      if (!last) {
+        h(k + 2, k - 1) = 0.0;
+      }
+    } else if (low != m) {
+      h(k, k - 1) = -h(k, k - 1);
+    }
+    if (last) {
+      for (int j = k; j < stop; ++j) {
+        double* const column = &h(k, j);
+        const double t = column[0] + turn.q * column[1];
+        column[0] -= t * turn.x;
+        column[1] -= t * turn.y;
+      }
+    } else {
+      for (int j = k; j < stop; ++j) {
+        double* const column = &h(k, j);
+        const double t = column[0] + turn.q * column[1] + turn.r * column[2];
+        column[0] -= t * turn.x;
+        column[1] -= t * turn.y;
+        column[2] -= t * turn.z;
+      }
+    }
+    turn_columns(k, turn, last);
+  }
+}
+
 }  // namespace flyball::detail::FLYBALL_VARIANT

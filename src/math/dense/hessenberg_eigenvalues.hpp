@@ -117,67 +117,13 @@ inline bool eigenvalues(Size<N> size, double* H, std::complex<double>* lambda) {
       w = -0.4375 * s * s;
     }
     ++iteration;
-    auto [m, p, q, r] = start_of_sweep(ld, H, low, end, x, y, w);
-    for (int i = m + 2; i <= end; ++i) {
-      h(i, i - 2) = 0.0;
-      if (i > m + 2) {
-        h(i, i - 3) = 0.0;
-      }
-    }
     // Whole vectors of rows: those above `low` and below `end` belong to other blocks, whose
     // eigenvalues do not depend on these columns; the others below the bulge are zero.
     const int first = low / 4 * 4;
-    for (int k = m; k < end; ++k) {
-      const bool last = k == end - 1;
-      if (k != m) {
-        p = h(k, k - 1);
-        q = h(k + 1, k - 1);
-        r = last ? 0.0 : h(k + 2, k - 1);
-      }
-      const Reflection turn = reflection_of(p, q, r);
-      if (k != m) {
-        h(k, k - 1) = turn.top;
-      } else if (low != m) {
-        h(k, k - 1) = -h(k, k - 1);
-      }
-      x = turn.x;
-      y = turn.y;
-      q = turn.q;
-      r = turn.r;
-      const double z = turn.z;
-      if (last) {
-        for (int j = k; j <= end; ++j) {
-          const double t = h(k, j) + q * h(k + 1, j);
-          h(k, j) -= t * x;
-          h(k + 1, j) -= t * y;
-        }
-        for (int i = first; i <= end; i += 4) {
-          Vector4& c0 = *reinterpret_cast<Vector4*>(&h(i, k));
-          Vector4& c1 = *reinterpret_cast<Vector4*>(&h(i, k + 1));
-          const Vector4 t = x * c0 + y * c1;
-          c0 -= t;
-          c1 -= t * q;
-        }
-      } else {
-        for (int j = k; j <= end; ++j) {
-          double* column = &h(k, j);
-          const double t = column[0] + q * column[1] + r * column[2];
-          column[0] -= t * x;
-          column[1] -= t * y;
-          column[2] -= t * z;
-        }
-        const int stop = std::min(end, k + 3);
-        for (int i = first; i <= stop; i += 4) {
-          Vector4& c0 = *reinterpret_cast<Vector4*>(&h(i, k));
-          Vector4& c1 = *reinterpret_cast<Vector4*>(&h(i, k + 1));
-          Vector4& c2 = *reinterpret_cast<Vector4*>(&h(i, k + 2));
-          const Vector4 t = x * c0 + y * c1 + z * c2;
-          c0 -= t;
-          c1 -= t * q;
-          c2 -= t * r;
-        }
-      }
-    }
+    sweep(ld, H, start_of_sweep(ld, H, low, end, x, y, w), low, end, end + 1,
+          [=](int k, const Reflection& turn, bool last) {
+            reflect_columns(H + first + k * ld, ld, std::min(end, k + 3) + 1 - first, turn, last);
+          });
   }
   return true;
 }

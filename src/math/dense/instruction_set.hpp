@@ -4,8 +4,22 @@
 // and fused multiply-add, in the namespaces `baseline` and `wide`; which of them runs is asked for
 // when running.
 
+/// FLYBALL_KERNEL(void exponential(…)): a kernel's declaration, in both namespaces.
+#define FLYBALL_KERNEL(...) \
+  namespace baseline {      \
+  __VA_ARGS__;              \
+  }                         \
+  namespace wide {          \
+  __VA_ARGS__;              \
+  }
+
+/// FLYBALL_RUN_KERNEL(exponential, …): what the variant for this processor answers.
 #if defined(__x86_64__) && !defined(__AVX2__)
 #define FLYBALL_WIDE_VECTORS
+#define FLYBALL_RUN_KERNEL(kernel, ...) \
+  (has_wide_vectors() ? wide::kernel(__VA_ARGS__) : baseline::kernel(__VA_ARGS__))
+#else
+#define FLYBALL_RUN_KERNEL(kernel, ...) baseline::kernel(__VA_ARGS__)
 #endif
 
 namespace flyball::detail {

@@ -154,20 +154,6 @@ inline void standardize(int n, int ld, double* T, double* U, int k) {
   }
 }
 
-/// (c0 c1 c2) ← (c0 c1 c2)(I - (x y z)ᵀ(1 q r)) on rows 0..stop, whole vectors.
-inline __attribute__((always_inline)) void reflect_columns(double* M, int ld, int stop, double x,
-                                                           double y, double z, double q, double r) {
-  for (int i = 0; i <= stop; i += 4) {
-    Vector4& c0 = *reinterpret_cast<Vector4*>(M + i);
-    Vector4& c1 = *reinterpret_cast<Vector4*>(M + i + ld);
-    Vector4& c2 = *reinterpret_cast<Vector4*>(M + i + 2 * ld);
-    const Vector4 t = x * c0 + y * c1 + z * c2;
-    c0 -= t;
-    c1 -= t * q;
-    c2 -= t * r;
-  }
-}
-
 /// H (upper Hessenberg) ← real Schur form with standardised 2x2 blocks, U ← U times the
 /// transformation, by the double-shift QR iteration (Martin, Peters and Wilkinson, Numerische
 /// Mathematik 14 (1970): hqr2). False where 30 iterations an eigenvalue do not suffice.
@@ -201,60 +187,12 @@ inline bool real_schur(int n, int ld, double* H, double* U) {
       w = -0.4375 * s * s;
     }
     ++iteration;
-    auto [m, p, q, r] = start_of_sweep(ld, H, low, end, x, y, w);
-    for (int k = m; k < end; ++k) {
-      const bool last = k == end - 1;
-      if (k != m) {
-        p = h(k, k - 1);
-        q = h(k + 1, k - 1);
-        r = last ? 0.0 : h(k + 2, k - 1);
-      }
-      const Reflection turn = reflection_of(p, q, r);
-      if (k != m) {
-        h(k, k - 1) = turn.top;
-        h(k + 1, k - 1) = 0.0;
-        if (!last) {
-          h(k + 2, k - 1) = 0.0;
-        }
-      } else if (low != m) {
-        h(k, k - 1) = -h(k, k - 1);
-      }
-      x = turn.x;
-      y = turn.y;
-      q = turn.q;
-      r = turn.r;
-      const double z = turn.z;
-      // Rows below the bulge and below `end` are zero in these columns: whole vectors.
-      if (last) {
-        for (int j = k; j < n; ++j) {
-          double* const column = &h(k, j);
-          const double t = column[0] + q * column[1];
-          column[0] -= t * x;
-          column[1] -= t * y;
-        }
-        const auto reflect_two = [=](double* M, int stop) {
-          for (int i = 0; i <= stop; i += 4) {
-            Vector4& c0 = *reinterpret_cast<Vector4*>(M + i + k * ld);
-            Vector4& c1 = *reinterpret_cast<Vector4*>(M + i + (k + 1) * ld);
-            const Vector4 t = x * c0 + y * c1;
-            c0 -= t;
-            c1 -= t * q;
-          }
-        };
-        reflect_two(H, end);
-        reflect_two(U, n - 1);
-      } else {
-        for (int j = k; j < n; ++j) {
-          double* const column = &h(k, j);
-          const double t = column[0] + q * column[1] + r * column[2];
-          column[0] -= t * x;
-          column[1] -= t * y;
-          column[2] -= t * z;
-        }
-        reflect_columns(H + k * ld, ld, std::min(end, k + 3), x, y, z, q, r);
-        reflect_columns(U + k * ld, ld, n - 1, x, y, z, q, r);
-      }
-    }
+    // Rows below the bulge and below `end` are zero in these columns: whole vectors.
+    sweep(ld, H, start_of_sweep(ld, H, low, end, x, y, w), low, end, n,
+          [=](int k, const Reflection& turn, bool last) {
+            reflect_columns(H + k * ld, ld, std::min(end, k + 3) + 1, turn, last);
+            reflect_columns(U + k * ld, ld, n, turn, last);
+          });
   }
   return true;
 }
