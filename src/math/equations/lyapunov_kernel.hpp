@@ -30,15 +30,8 @@ inline constexpr int lyapunov_stack_states = 20;
 /// operator's gain vouches for the result, else the answer is meaningless.
 [[nodiscard]] bool solve_stable_lyapunov(const LyapunovData& data, LyapunovAnswer& answer);
 
-namespace baseline {
-[[nodiscard]] bool solve_stable_lyapunov(const LyapunovData& data, LyapunovAnswer& answer,
-                                         double* memory, int* pivots);
-}
-#ifdef FLYBALL_WIDE_VECTORS
-namespace wide {
-[[nodiscard]] bool solve_stable_lyapunov(const LyapunovData& data, LyapunovAnswer& answer,
-                                         double* memory, int* pivots);
-}
-#endif
+FLYBALL_KERNEL([[nodiscard]] bool solve_stable_lyapunov(const LyapunovData& data,
+                                                        LyapunovAnswer& answer, double* memory,
+                                                        int* pivots))
 
 }  // namespace flyball::detail

@@ -43,15 +43,7 @@ inline constexpr int sylvester_stack_size = 16;
 /// zeros to whole vectors, A, X, F and R to the same; `work` holds two matrices as X.
 void sylvester_residual(const SylvesterData& padded, const double* X, double* R, double* work);
 
-namespace baseline {
-[[nodiscard]] bool solve_sylvester(const SylvesterData& data, SylvesterAnswer& answer,
-                                   double* memory);
-}
-#ifdef FLYBALL_WIDE_VECTORS
-namespace wide {
-[[nodiscard]] bool solve_sylvester(const SylvesterData& data, SylvesterAnswer& answer,
-                                   double* memory);
-}
-#endif
+FLYBALL_KERNEL([[nodiscard]] bool solve_sylvester(const SylvesterData& data,
+                                                  SylvesterAnswer& answer, double* memory))
 
 }  // namespace flyball::detail

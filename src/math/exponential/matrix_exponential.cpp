@@ -17,13 +17,7 @@ using Eigen::MatrixXd;
 namespace detail {
 
 void exponential(int n, const double* A, double* E, double* memory) {
-#ifdef FLYBALL_WIDE_VECTORS
-  if (has_wide_vectors()) {
-    wide::exponential(n, A, E, memory);
-    return;
-  }
-#endif
-  baseline::exponential(n, A, E, memory);
+  FLYBALL_RUN_KERNEL(exponential, n, A, E, memory);
 }
 
 }  // namespace detail

@@ -17,13 +17,6 @@ inline constexpr int exponential_workspace(int n) {
 /// Up to this many states the workspace fits the stack.
 inline constexpr int exponential_stack_states = 20;
 
-namespace baseline {
-void exponential(int n, const double* A, double* E, double* memory);
-}
-#ifdef FLYBALL_WIDE_VECTORS
-namespace wide {
-void exponential(int n, const double* A, double* E, double* memory);
-}
-#endif
+FLYBALL_KERNEL(void exponential(int n, const double* A, double* E, double* memory))
 
 }  // namespace flyball::detail

@@ -15,12 +15,7 @@ bool solve_riccati_quickly(const RiccatiData& data, RiccatiAnswer& answer) {
     memory = doubles.get();
     pivots = integers.get();
   }
-#ifdef FLYBALL_WIDE_VECTORS
-  if (has_wide_vectors()) {
-    return wide::solve_riccati(data, answer, memory, pivots);
-  }
-#endif
-  return baseline::solve_riccati(data, answer, memory, pivots);
+  return FLYBALL_RUN_KERNEL(solve_riccati, data, answer, memory, pivots);
 }
 
 }  // namespace flyball::detail

@@ -32,15 +32,7 @@ inline constexpr int kernel_workspace(int n, int m) {
 
 /// The kernel compiled for the instruction sets of every processor and of those with 256-bit
 /// vectors; `memory` and `pivots` are null where the stack serves.
-namespace baseline {
-[[nodiscard]] bool solve_riccati(const RiccatiData& data, RiccatiAnswer& answer, double* memory,
-                                 int* pivots);
-}
-#ifdef FLYBALL_WIDE_VECTORS
-namespace wide {
-[[nodiscard]] bool solve_riccati(const RiccatiData& data, RiccatiAnswer& answer, double* memory,
-                                 int* pivots);
-}
-#endif
+FLYBALL_KERNEL([[nodiscard]] bool solve_riccati(const RiccatiData& data, RiccatiAnswer& answer,
+                                                double* memory, int* pivots))
 
 }  // namespace flyball::detail

@@ -133,14 +133,10 @@ bool riccati_residual(const RiccatiData& data, const double* X, const double* K,
   }
   Sum* const T = S + size * size;
 #ifdef FLYBALL_WIDE_VECTORS
-  static const bool wide =
-      __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
-  if (wide) {
-    residual_wide(data, X, K, F, S, T);
-    return true;
-  }
-#endif
+  (has_wide_vectors() ? residual_wide : residual_baseline)(data, X, K, F, S, T);
+#else
   residual_baseline(data, X, K, F, S, T);
+#endif
   return true;
 }
 
