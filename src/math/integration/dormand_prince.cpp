@@ -61,7 +61,7 @@ double OdeProblem::first_step(double t, const VectorXd& x, const VectorXd& f0) {
   return h > 0.0 ? h : h0;
 }
 
-Expected<void> check_step(const OdeProblem& problem, const OdeState& state, bool was_not_finite) {
+Expected<double> next_time(const OdeProblem& problem, const OdeState& state, bool was_not_finite) {
   const std::vector<double> x(state.x.data(), state.x.data() + state.x.size());
   if (problem.statistics.steps + problem.statistics.rejected >= problem.max_steps) {
     return refusal(IntegrationError::too_many_steps, "integrate")
@@ -72,7 +72,8 @@ Expected<void> check_step(const OdeProblem& problem, const OdeState& state, bool
   }
   if (state.step > 10.0 * std::numeric_limits<double>::epsilon() * std::abs(state.t) &&
       state.step > std::numeric_limits<double>::min()) {
-    return {};
+    const bool last = state.step >= std::abs(problem.t_end - state.t);
+    return last ? problem.t_end : state.t + problem.direction * state.step;
   }
   if (was_not_finite) {
     return refusal(IntegrationError::not_finite, "integrate", "f(t, x)")
@@ -94,10 +95,7 @@ Expected<void> DormandPrinceStepper::step(OdeProblem& problem, OdeState& state) 
   std::array<VectorXd, 7> k;
   k[0] = state.f;
   while (true) {
-    FLYBALL_CHECK(check_step(problem, state, was_not_finite));
-    const double left = std::abs(problem.t_end - state.t);
-    const bool last = state.step >= left;
-    const double t_next = last ? problem.t_end : state.t + problem.direction * state.step;
+    FLYBALL_TRY(const double t_next, next_time(problem, state, was_not_finite));
     const double h = t_next - state.t;
 
     VectorXd stage;

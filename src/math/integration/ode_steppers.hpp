@@ -101,8 +101,8 @@ class RadauStepper {
   double previous_error_ = 0.0;  ///< 0: none.
 };
 
-/// The error of a step that became too small, or of one too many.
-[[nodiscard]] Expected<void> check_step(const OdeProblem& problem, const OdeState& state,
-                                        bool was_not_finite);
+/// Where the next step ends, or the error of one that became too small, or of one too many.
+[[nodiscard]] Expected<double> next_time(const OdeProblem& problem, const OdeState& state,
+                                         bool was_not_finite);
 
 }  // namespace flyball::detail

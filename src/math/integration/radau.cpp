@@ -217,10 +217,7 @@ Expected<void> RadauStepper::step(OdeProblem& problem, OdeState& state) {
   bool rejected = false;
   bool was_not_finite = !J_->allFinite();
   while (true) {
-    FLYBALL_CHECK(check_step(problem, state, was_not_finite));
-    const double left = std::abs(problem.t_end - state.t);
-    const bool last = state.step >= left;
-    const double t_next = last ? problem.t_end : state.t + problem.direction * state.step;
+    FLYBALL_TRY(const double t_next, next_time(problem, state, was_not_finite));
     const double h = t_next - state.t;
     const double length = std::abs(h);
 
