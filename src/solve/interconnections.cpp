@@ -24,20 +24,10 @@ Outcome connect_both(const Problem& problem, std::string_view first, std::string
              : write(connect(sampled(problem, one), sampled(problem, other)));
 }
 
-Outcome solve_series(const Problem& problem, JsonWriter& answer) {
-  return connect_both(problem, "first", "second", answer,
-                      [](const auto& first, const auto& second) { return series(first, second); });
-}
-
-Outcome solve_parallel(const Problem& problem, JsonWriter& answer) {
-  return connect_both(
-      problem, "first", "second", answer,
-      [](const auto& first, const auto& second) { return parallel(first, second); });
-}
-
-Outcome solve_append(const Problem& problem, JsonWriter& answer) {
-  return connect_both(problem, "first", "second", answer,
-                      [](const auto& first, const auto& second) { return append(first, second); });
+/// A row's function for two systems that are called first and second.
+template <auto connect>
+Outcome solve_pair(const Problem& problem, JsonWriter& answer) {
+  return connect_both(problem, "first", "second", answer, connect);
 }
 
 Outcome solve_feedback(const Problem& problem, JsonWriter& answer) {
@@ -56,28 +46,27 @@ Outcome solve_feedback(const Problem& problem, JsonWriter& answer) {
 std::vector<Kind> interconnection_kinds() {
   using namespace field;
   const std::vector<Field> time{or_first(domain), any_period};
+  constexpr std::string_view two =
+      R"({"first": {"A": [[-1]], "B": [[1]]}, "second": {"A": [[-2]], "B": [[2]]}})";
   return {
       {"series", "the first system's outputs as the second one's inputs: G₂G₁",
        std::vector{system("first", "a", "m", "q", "the system at the input"),
                    system("second", "b", "q", "p", "the system at the output")} +
            time,
-       answered_system("a+b", "m", "p"),
-       R"({"first": {"A": [[-1]], "B": [[1]]}, "second": {"A": [[-2]], "B": [[2]]}})",
-       &solve_series},
+       answered_system("a+b", "m", "p"), two,
+       &solve_pair<[](const auto& a, const auto& b) { return series(a, b); }>},
       {"parallel", "both systems on the same inputs, their outputs added: G₁ + G₂",
        std::vector{system("first", "a", "m", "p", "one system"),
                    system("second", "b", "m", "p", "the other")} +
            time,
-       answered_system("a+b", "m", "p"),
-       R"({"first": {"A": [[-1]], "B": [[1]]}, "second": {"A": [[-2]], "B": [[2]]}})",
-       &solve_parallel},
+       answered_system("a+b", "m", "p"), two,
+       &solve_pair<[](const auto& a, const auto& b) { return parallel(a, b); }>},
       {"append", "both systems side by side, inputs and outputs stacked: diag(G₁, G₂)",
        std::vector{system("first", "a", "m", "p", "whose inputs and outputs come first"),
                    system("second", "b", "u", "y", "whose inputs and outputs come last")} +
            time,
-       answered_system("a+b", "m+u", "p+y"),
-       R"({"first": {"A": [[-1]], "B": [[1]]}, "second": {"A": [[-2]], "B": [[2]]}})",
-       &solve_append},
+       answered_system("a+b", "m+u", "p+y"), two,
+       &solve_pair<[](const auto& a, const auto& b) { return append(a, b); }>},
       {"feedback", "a system with its outputs led back to its inputs: (I ± G₁G₂)⁻¹G₁",
        std::vector{system("forward", "a", "m", "p", "the system from input to output"),
                    optional(system("back", "b", "p", "m",

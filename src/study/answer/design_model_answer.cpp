@@ -16,39 +16,19 @@ using text::number;
 constexpr double thin_gain_margin = 1.7;    ///< Below the classical rules of thumb 2 and 30°.
 constexpr double thin_phase_margin = 30.0;  ///< deg
 
-/// A row a gain, a column a state, with their units.
-Table gain_table(const ModelDesign& result) {
-  const ModelDescription& names = result.job.model.names();
+/// A gain, each row and each column under its coordinate's name and unit.
+Table gain_table(std::string caption, std::string corner, const Eigen::MatrixXd& gain,
+                 const std::vector<Coordinate>& rows, const std::vector<Coordinate>& columns) {
   Table table;
-  table.caption = "Feedback, u = u* + K (r − x)";
-  table.header = {"K"};
-  for (const Coordinate& state : names.states) {
-    table.header.push_back(label(state));
+  table.caption = std::move(caption);
+  table.header = {std::move(corner)};
+  for (const Coordinate& column : columns) {
+    table.header.push_back(label(column));
   }
-  for (std::size_t i = 0; i < names.inputs.size(); ++i) {
-    std::vector<Value> row{label(names.inputs[i])};
-    for (std::size_t k = 0; k < names.states.size(); ++k) {
-      row.emplace_back(number(
-          result.regulator.K_delayed(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k))));
-    }
-    table.rows.push_back(std::move(row));
-  }
-  return table;
-}
-
-Table estimator_table(const ModelDesign& result) {
-  const ModelDescription& names = result.job.model.names();
-  Table table;
-  table.caption = "Observer, x̂ = x̂⁻ + L (y − C x̂⁻)";
-  table.header = {"L"};
-  for (const Coordinate& output : names.outputs) {
-    table.header.push_back(label(output));
-  }
-  for (std::size_t i = 0; i < names.states.size(); ++i) {
-    std::vector<Value> row{label(names.states[i])};
-    for (std::size_t k = 0; k < names.outputs.size(); ++k) {
-      row.emplace_back(number(result.regulator.kalman_gain(static_cast<Eigen::Index>(i),
-                                                           static_cast<Eigen::Index>(k))));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    std::vector<Value> row{label(rows[i])};
+    for (const double entry : gain.row(static_cast<Eigen::Index>(i))) {
+      row.emplace_back(number(entry));
     }
     table.rows.push_back(std::move(row));
   }
@@ -68,9 +48,12 @@ std::string poles_text(const Eigen::VectorXcd& poles) {
 Section controller_section(const ModelDesign& result) {
   const ModelRegulator& regulator = result.regulator;
   Section section{"controller", "Controller", {}};
-  section.blocks.emplace_back(gain_table(result));
+  const ModelDescription& names = result.job.model.names();
+  section.blocks.emplace_back(gain_table("Feedback, u = u* + K (r − x)", "K", regulator.K_delayed,
+                                         names.inputs, names.states));
   if (regulator.observer) {
-    section.blocks.emplace_back(estimator_table(result));
+    section.blocks.emplace_back(gain_table("Observer, x̂ = x̂⁻ + L (y − C x̂⁻)", "L",
+                                           regulator.kalman_gain, names.states, names.outputs));
   }
   Facts facts;
   facts.add("period", text::seconds(result.job.period));
