@@ -146,7 +146,9 @@ ExpectedAll<Project> read(std::string_view text, const std::string& name,
   }
   if (formulas) {
     project.model_job = model_job(document, project);
-    project.plant_error = refusal(ProjectError::wrong_value, name, "[model]")
+    project.plant_error = Error(ProjectError::wrong_value)
+                              .in(name)
+                              .about("[model]")
                               .got("a model by formula")
                               .expected("a [mechanism] for this command");
   }
