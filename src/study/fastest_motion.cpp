@@ -64,16 +64,15 @@ Expected<FastestMotion> fastest_motion(const DesignJob& job) {
   }
   const double top = budget.top_velocity_volts();
   if (!(top > 0.0)) {
-    const Error error = refusal(DesignError::no_motion_possible, "design");
     if (budget.holding < budget.limit) {
-      return refusal(error, {}, "the battery")
+      return refusal(DesignError::no_motion_possible, "design", "the battery")
           .got(fmt::format("left with {} V under its sag, less a tenth for feedback",
                            format_number(budget.under_sag())))
           .expected(
               fmt::format("above the {} V of friction and gravity", format_number(budget.holding)))
           .hint("lower battery.resistance or raise battery.open_circuit_voltage");
     }
-    return refusal(error, {}, "friction and gravity")
+    return refusal(DesignError::no_motion_possible, "design", "friction and gravity")
         .got(fmt::format("{} V together", format_number(budget.holding)))
         .expected(fmt::format("below {} V, so that a tenth is left for feedback",
                               format_number(budget.limit)))

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <flyball/math/derivatives/differentiation.hpp>
+
 namespace flyball {
 namespace {
 
