@@ -5,6 +5,7 @@
 
 #include "math/dense/balance_columns.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/ordinary_units.hpp"
 
 namespace flyball::detail {
 
@@ -34,6 +35,9 @@ MatrixXd symmetrized(const MatrixRef& M) {
 }
 
 MatrixXd solve_linear(const MatrixRef& A, const MatrixRef& B, double* rcond) {
+  if (const int unit = unit_of(A); unit != 0) {
+    return times_power(solve_linear(times_power(A, -unit), B, rcond), -unit);
+  }
   const Eigen::PartialPivLU<MatrixXd> lu(A);
   if (rcond != nullptr) {
     const double smallest = lu.matrixLU().diagonal().cwiseAbs().minCoeff();
@@ -55,6 +59,9 @@ std::optional<MatrixXd> cholesky_of(const MatrixRef& S) {
 }
 
 Eigen::VectorXd balance_of(const MatrixRef& A) {
+  if (const int unit = unit_of(A); unit != 0) {
+    return balance_of(times_power(A, -unit));
+  }
   const Index n = A.rows();
   Eigen::VectorXd d = Eigen::VectorXd::Ones(n);
   MatrixXd balanced = A;

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 
 #include "math/dense/dense.hpp"
+#include "math/dense/ordinary_units.hpp"
 
 namespace flyball::detail {
 
@@ -16,6 +17,9 @@ MatrixXcd complex_product(const ComplexMatrixRef& A, const ComplexMatrixRef& B) 
 }
 
 MatrixXcd solve_complex(const ComplexMatrixRef& A, const ComplexMatrixRef& B, double* rcond) {
+  if (const int unit = unit_of(A); unit != 0) {
+    return times_power(solve_complex(times_power(A, -unit), B, rcond), -unit);
+  }
   const Eigen::PartialPivLU<MatrixXcd> lu(A);
   if (rcond != nullptr) {
     const double smallest = lu.matrixLU().diagonal().cwiseAbs().minCoeff();
@@ -25,6 +29,14 @@ MatrixXcd solve_complex(const ComplexMatrixRef& A, const ComplexMatrixRef& B, do
 }
 
 ComplexSchur complex_schur_of_complex(const ComplexMatrixRef& A) {
+  if (const int unit = unit_of(A); unit != 0) {
+    ComplexSchur schur = complex_schur_of_complex(times_power(A, -unit));
+    schur.T = times_power(schur.T, unit);
+    return schur;
+  }
+  if (!A.allFinite()) {
+    return {A, A, false};
+  }
   const Eigen::ComplexSchur<MatrixXcd> schur(A);
   return {schur.matrixT(), schur.matrixU(), schur.info() == Eigen::Success};
 }
@@ -34,8 +46,11 @@ ComplexSchur complex_schur_of(const MatrixRef& A) {
 }
 
 Eigen::VectorXcd eigenvalues_of_complex(const ComplexMatrixRef& A) {
-  const Eigen::ComplexSchur<MatrixXcd> schur(A, false);
-  if (schur.info() != Eigen::Success) {
+  if (const int unit = unit_of(A); unit != 0) {
+    return times_power(eigenvalues_of_complex(times_power(A, -unit)), unit);
+  }
+  Eigen::ComplexSchur<MatrixXcd> schur(A.rows());
+  if (!A.allFinite() || schur.compute(A, false).info() != Eigen::Success) {
     return Eigen::VectorXcd::Constant(A.rows(), std::numeric_limits<double>::quiet_NaN());
   }
   return schur.matrixT().diagonal();

@@ -5,6 +5,7 @@
 
 #include "math/dense/dense.hpp"
 #include "math/dense/dense_reduction.hpp"
+#include "math/dense/ordinary_units.hpp"
 
 namespace flyball::detail {
 
@@ -47,12 +48,20 @@ Eigen::VectorXd bidiagonal_of(MatrixXd M) {
 }  // namespace
 
 MatrixXd triangle_of(const MatrixRef& A) {
+  if (const int unit = unit_of(A); unit != 0) {
+    return times_power(triangle_of(times_power(A, -unit)), unit);
+  }
   const Eigen::HouseholderQR<MatrixXd> qr(A);
   const Index rows = std::min(A.rows(), A.cols());
   return qr.matrixQR().topRows(rows).triangularView<Eigen::Upper>();
 }
 
 Hessenberg hessenberg_of(const MatrixRef& A) {
+  if (const int unit = unit_of(A); unit != 0) {
+    Hessenberg form = hessenberg_of(times_power(A, -unit));
+    form.H = times_power(form.H, unit);
+    return form;
+  }
   const Eigen::HessenbergDecomposition<MatrixXd> decomposition(A);
   return {decomposition.matrixH(), decomposition.matrixQ()};
 }

@@ -1,18 +1,26 @@
+#include <cmath>
 #include <limits>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 
 #include "math/dense/dense.hpp"
+#include "math/dense/ordinary_units.hpp"
 
 namespace flyball::detail {
 
 using Eigen::MatrixXd;
 
 Eigensystem eigensystem_of(const MatrixRef& A) {
+  if (const int unit = unit_of(A); unit != 0) {
+    Eigensystem system = eigensystem_of(times_power(A, -unit));
+    system.values = times_power(system.values, unit);
+    return system;
+  }
   const Eigen::VectorXd d = balance_of(A);
-  const Eigen::EigenSolver<MatrixXd> solver(d.cwiseInverse().asDiagonal() * A * d.asDiagonal());
-  if (solver.info() != Eigen::Success) {
+  Eigen::EigenSolver<MatrixXd> solver(A.rows());
+  if (!A.allFinite() ||
+      solver.compute(d.cwiseInverse().asDiagonal() * A * d.asDiagonal()).info() != Eigen::Success) {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     return {Eigen::VectorXcd::Constant(A.rows(), nan),
             Eigen::MatrixXcd::Constant(A.rows(), A.cols(), nan)};
@@ -26,21 +34,42 @@ Eigen::VectorXcd eigenvalues_of(const MatrixRef& A) {
   if (A.rows() == 0) {
     return {};
   }
+  if (const int unit = unit_of(A); unit != 0) {
+    return times_power(eigenvalues_of(times_power(A, -unit)), unit);
+  }
   const Eigen::VectorXd d = balance_of(A);
-  const Eigen::EigenSolver<MatrixXd> solver(d.cwiseInverse().asDiagonal() * A * d.asDiagonal(),
-                                            false);
-  if (solver.info() != Eigen::Success) {
+  Eigen::EigenSolver<MatrixXd> solver(A.rows());
+  if (!A.allFinite() ||
+      solver.compute(d.cwiseInverse().asDiagonal() * A * d.asDiagonal(), false).info() !=
+          Eigen::Success) {
     return Eigen::VectorXcd::Constant(A.rows(), std::numeric_limits<double>::quiet_NaN());
   }
   return solver.eigenvalues();
 }
 
 SymmetricEigensystem symmetric_eigensystem_of(const MatrixRef& S) {
+  if (const int unit = unit_of(S); unit != 0) {
+    SymmetricEigensystem system = symmetric_eigensystem_of(times_power(S, -unit));
+    system.values = times_power(system.values, unit);
+    return system;
+  }
+  if (!S.allFinite()) {
+    const MatrixXd none = MatrixXd::Constant(S.rows(), S.cols(), std::nan(""));
+    return {none.col(0), none};
+  }
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(S);
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
 RealSchur real_schur_of(const MatrixRef& A) {
+  if (const int unit = unit_of(A); unit != 0) {
+    RealSchur schur = real_schur_of(times_power(A, -unit));
+    schur.T = times_power(schur.T, unit);
+    return schur;
+  }
+  if (!A.allFinite()) {
+    return {A, A, false};
+  }
   const Eigen::RealSchur<MatrixXd> schur(A);
   return {schur.matrixT(), schur.matrixU(), schur.info() == Eigen::Success};
 }

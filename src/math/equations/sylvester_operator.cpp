@@ -118,7 +118,7 @@ SylvesterOperator::Pair SylvesterOperator::closest_pair() const {
                                      : a_.uncertainty * std::abs(b) + b_.uncertainty * std::abs(a);
       const double distance = gap == 0.0 ? 0.0 : gap / (epsilon * size + blur);
       if (distance < pair.distance) {
-        pair = {a, b, distance, gap / size};
+        pair = {a, b, distance, gap == 0.0 ? 0.0 : gap / size};
       }
     }
   }

@@ -30,7 +30,10 @@ inline void exponential_2x2(const double* A, double* E) {
   const double d = A[3];
   const double mean = 0.5 * a + 0.5 * d;
   const double half = 0.5 * a - 0.5 * d;
-  const double discriminant = difference_of_products(half, half, -b, c);
+  // Of huge entries the products are formed in another unit.
+  const bool huge = !(std::abs(half) + std::abs(mean) + std::abs(b) + std::abs(c) < 1e150);
+  const double unit = huge ? 0x1p-520 : 1.0;
+  const double discriminant = difference_of_products(half * unit, half * unit, -b * unit, c * unit);
   double f = 0.0;
   double diagonal = 0.0;
   if (b == 0.0 || c == 0.0) {
@@ -42,16 +45,18 @@ inline void exponential_2x2(const double* A, double* E) {
     return;
   }
   if (discriminant >= 0.0) {
-    const double delta = std::sqrt(discriminant);
+    const double delta = std::sqrt(discriminant) / unit;
     // The eigenvalue of larger magnitude is free of cancellation; the other is det / it.
     const double large = mean >= 0.0 ? mean + delta : mean - delta;
     // Below one no eigenvalue is stiff, and the two must rather agree on δ: it may be rounding.
-    const double small =
-        std::abs(large) < 1.0 ? 2.0 * mean - large : difference_of_products(a, d, b, c) / large;
+    const double small = std::abs(large) < 1.0
+                             ? 2.0 * mean - large
+                             : difference_of_products(a * unit, d * unit, b * unit, c * unit) /
+                                   (large * unit) / unit;
     f = divided_difference(large, small);
     diagonal = 0.5 * (std::exp(large) + std::exp(small));
   } else {
-    const double omega = std::sqrt(-discriminant);
+    const double omega = std::sqrt(-discriminant) / unit;
     const double scale = std::exp(mean);
     f = scale * (std::sin(omega) / omega);
     diagonal = scale * std::cos(omega);

@@ -190,11 +190,18 @@ class Exponential {
       set_identity(V_);
       return 0;
     }
-    // Powers up to the tenth must not overflow while the order is chosen.
-    const int prescale = norm > 1e25 ? static_cast<int>(std::ceil(std::log2(norm / 1e25))) : 0;
-    if (prescale > 0) {
+    // Powers up to the tenth must not overflow while the order is chosen, nor the sums of columns.
+    int prescale = 0;
+    if (!(norm < 1e300)) {
+      prescale = 900;
       scale(A_, std::ldexp(1.0, -prescale));
       norm = norm1(A_);
+    }
+    if (norm > 1e25) {
+      const int halvings = static_cast<int>(std::ceil(std::log2(norm / 1e25)));
+      scale(A_, std::ldexp(1.0, -halvings));
+      norm = norm1(A_);
+      prescale += halvings;
     }
     square(A2_, A_, A_);
     // ‖A‖ bounds every ‖Aᵏ‖^(1/k), and where it serves, no squaring can be called for.

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <numbers>
 #include <string>
 #include <vector>
 
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/ordinary_units.hpp"
 #include "math/exponential/triangular_function.hpp"
 
 namespace flyball {
@@ -49,11 +51,12 @@ Triangularized triangularize(const MatrixRef& A) {
     triangular = M.col(j).tail(M.rows() - j - 1).isZero(0.0);
   }
   if (triangular) {
+    // Its eigenvalues are exact, however small.
     form.schur = {M.cast<Complex>(), MatrixXcd::Identity(M.rows(), M.cols()), true};
   } else {
     form.schur = detail::complex_schur_of(M);
+    form.zero = 1e-15 * static_cast<double>(A.rows()) * detail::norm1(M);
   }
-  form.zero = 1e-15 * static_cast<double>(A.rows()) * detail::norm1(M);
   return form;
 }
 
@@ -140,16 +143,52 @@ Expected<MatrixXd> fractional_power(const MatrixRef& given, double f, std::strin
   return lower ? MatrixXd(result.transpose()) : result;
 }
 
-/// A⁻¹, solved in balanced units.
+/// A⁻¹, solved in balanced units and with rows of one size.
 Expected<MatrixXd> inverse_of(const MatrixRef& A, std::string_view where) {
   const Eigen::VectorXd d = detail::balance_of(A);
-  const MatrixXd M = d.cwiseInverse().asDiagonal() * A * d.asDiagonal();
+  MatrixXd M = d.cwiseInverse().asDiagonal() * A * d.asDiagonal();
+  MatrixXd rhs = MatrixXd::Identity(A.rows(), A.cols());
+  for (Index i = 0; i < M.rows(); ++i) {
+    const double largest = M.row(i).cwiseAbs().maxCoeff();
+    const int exponent = largest > 0.0 && std::isfinite(largest) ? std::ilogb(largest) : 0;
+    M.row(i) = detail::times_power(M.row(i), -exponent);
+    rhs(i, i) = std::ldexp(1.0, -exponent);
+  }
   double rcond = 0.0;
-  const MatrixXd inverse = detail::solve_linear(M, MatrixXd::Identity(A.rows(), A.cols()), &rcond);
+  const MatrixXd inverse = detail::solve_linear(M, rhs, &rcond);
   if (!(rcond > 0.0) || !inverse.allFinite()) {
     return refusal(MatrixFunctionError::singular, where, "A").with("reciprocal condition", rcond);
   }
   return MatrixXd(d.asDiagonal() * inverse * d.cwiseInverse().asDiagonal());
+}
+
+/// log(A / 2^unit), whose errors speak of A's eigenvalues.
+Expected<MatrixXd> logarithm(const MatrixRef& A, int unit) {
+  constexpr std::string_view where = "logm";
+  // Near the identity A - I has digits that the Schur form of A would round away.
+  const MatrixXd X = A - MatrixXd::Identity(A.rows(), A.cols());
+  if (detail::norm1(X) <= detail::near_identity) {
+    return detail::logarithm_near_identity(X);
+  }
+  const bool lower = is_lower_triangular(A);
+  const Triangularized form = lower ? triangularize(MatrixXd(A.transpose())) : triangularize(A);
+  if (!form.schur.converged) {
+    return no_answer(MatrixFunctionError::no_real_logarithm, where,
+                     "a matrix whose eigenvalues cannot be found", 0.0);
+  }
+  for (const Complex& lambda : form.schur.T.diagonal()) {
+    if (lambda == 0.0 || (lambda.real() <= 0.0 && std::abs(lambda.imag()) <= form.zero)) {
+      const bool zero = std::abs(lambda) <= form.zero;
+      return no_answer(MatrixFunctionError::no_real_logarithm, where,
+                       zero ? "a singular matrix" : "a negative real eigenvalue",
+                       lambda * std::ldexp(1.0, unit));
+    }
+  }
+  MatrixXd L = form.assemble(detail::triangular_logarithm(form.schur.T));
+  if (!L.allFinite()) {
+    return refusal(MatrixFunctionError::overflow, where);
+  }
+  return lower ? MatrixXd(L.transpose()) : L;
 }
 
 }  // namespace
@@ -166,31 +205,17 @@ ErrorInfo error_info(MatrixFunctionError code) {
 }
 
 Expected<MatrixXd> logm(const MatrixRef& A) {
-  constexpr std::string_view where = "logm";
-  FLYBALL_CHECK(Checks(where).square(A, "A").finite(A, "A"));
-  // Near the identity A - I has digits that the Schur form of A would round away.
-  const MatrixXd X = A - MatrixXd::Identity(A.rows(), A.cols());
-  if (detail::norm1(X) <= detail::near_identity) {
-    return detail::logarithm_near_identity(X);
+  FLYBALL_CHECK(Checks("logm").square(A, "A").finite(A, "A"));
+  if (detail::unit_of(A) != 0) {
+    // Between the largest and the smallest, so that neither is lost.
+    const double least =
+        (A.array() == 0.0).select(A.cwiseAbs().maxCoeff(), A.cwiseAbs()).minCoeff();
+    const int unit = (std::ilogb(A.cwiseAbs().maxCoeff()) + std::ilogb(least)) / 2;
+    FLYBALL_TRY(MatrixXd L, logarithm(detail::times_power(A, -unit), unit));
+    L.diagonal().array() += unit * std::numbers::ln2;
+    return L;
   }
-  const bool lower = is_lower_triangular(A);
-  const Triangularized form = lower ? triangularize(MatrixXd(A.transpose())) : triangularize(A);
-  if (!form.schur.converged) {
-    return no_answer(MatrixFunctionError::no_real_logarithm, where,
-                     "a matrix whose eigenvalues cannot be found", 0.0);
-  }
-  for (const Complex& lambda : form.schur.T.diagonal()) {
-    if (lambda == 0.0 || (lambda.real() <= 0.0 && std::abs(lambda.imag()) <= form.zero)) {
-      const bool zero = std::abs(lambda) <= form.zero;
-      return no_answer(MatrixFunctionError::no_real_logarithm, where,
-                       zero ? "a singular matrix" : "a negative real eigenvalue", lambda);
-    }
-  }
-  MatrixXd L = form.assemble(detail::triangular_logarithm(form.schur.T));
-  if (!L.allFinite()) {
-    return refusal(MatrixFunctionError::overflow, where);
-  }
-  return lower ? MatrixXd(L.transpose()) : L;
+  return logarithm(A, 0);
 }
 
 Expected<MatrixXd> powm(const MatrixRef& A, double power) {

@@ -1,15 +1,26 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
+
 namespace flyball::detail {
 
-/// A Padé approximant of exp of order m: the numerator's coefficients, the norm up to which it is
-/// exact to rounding (Higham 2005; Al-Mohy and Higham 2009, Table 3.1), and log₂ of the inverse of
-/// the backward error's first coefficient, binomial(2m, m) (2m + 1)!.
+/// A Padé approximant of exp of order m: the numerator's coefficients, divided by the first so that
+/// rows and columns of zeros leave those of the identity to the last bit, the norm up to which it
+/// is exact to rounding (Higham 2005; Al-Mohy and Higham 2009, Table 3.1), and log₂ of the inverse
+/// of the backward error's first coefficient, binomial(2m, m) (2m + 1)!.
 struct Pade {
   int order;
   double theta;
   double log2_inverse_error;
   double b[14];
+
+  constexpr Pade(int m, double reach, double log2_error, std::array<double, 14> coefficients)
+      : order(m), theta(reach), log2_inverse_error(log2_error), b{} {
+    for (std::size_t k = 0; k < coefficients.size(); ++k) {
+      b[k] = coefficients[k] / coefficients[0];
+    }
+  }
 };
 inline constexpr Pade pade[5] = {
     {3, 1.495585217958292e-2, 16.62113611327464, {120.0, 60.0, 12.0, 1.0}},

@@ -65,7 +65,9 @@ Complex divided_difference_of_powers(const Complex& a, const Complex& b, double 
 /// The diagonal and the first superdiagonal of T^s.
 void restore_power(const MatrixXcd& T, double s, MatrixXcd& P) {
   for (Index i = 0; i < T.rows(); ++i) {
-    P(i, i) = std::exp(s * logarithm(T(i, i)));
+    const Complex lambda = T(i, i);
+    P(i, i) = lambda.imag() == 0.0 && lambda.real() > 0.0 ? std::pow(lambda.real(), s)
+                                                          : std::exp(s * logarithm(lambda));
     if (i + 1 < T.rows()) {
       P(i, i + 1) = T(i, i + 1) * divided_difference_of_powers(T(i, i), T(i + 1, i + 1), s);
     }

@@ -160,5 +160,40 @@ TEST(MatrixExponential, HugeDecayUnderflowsToZero) {
   }
 }
 
+// exp(A) is answered or refused whatever A's finite entries: with entries near the largest double
+// the number of squarings had overflowed.
+TEST(MatrixExponential, HugeEntries) {
+  constexpr double huge = 1.7e308;
+  for (int n = 2; n <= 9; ++n) {
+    // Nilpotent: exp(A) = I + A + A²/2 + …, of which one entry alone is left in the corner.
+    Eigen::MatrixXd corner = Eigen::MatrixXd::Zero(n, n);
+    corner(n - 1, 0) = huge;
+    EXPECT_EQ(expm(corner).value(), corner + Eigen::MatrixXd::Identity(n, n)) << n;
+    Eigen::MatrixXd chain = Eigen::MatrixXd::Zero(n, n);
+    chain.diagonal(-1).setConstant(huge);
+    EXPECT_EQ(expm(chain).has_value(), n == 2) << n;
+    // All modes decay at once.
+    const Eigen::MatrixXd decay =
+        Eigen::MatrixXd::Constant(n, n, 1.0) - huge * Eigen::MatrixXd::Identity(n, n);
+    EXPECT_LE(expm(decay).value().norm(), 1e-300) << n;
+    const auto beyond = expm(Eigen::MatrixXd::Constant(n, n, huge));
+    ASSERT_FALSE(beyond.has_value()) << n;
+    EXPECT_TRUE(beyond.error().is(MatrixExponentialError::overflow));
+  }
+}
+
+// A column of zeros leaves that of the identity to the last bit, and a stiff motor's position its
+// digits for any number of squarings: SciPy 1.15 keeps 7e-15 of this one.
+TEST(MatrixExponential, IntegratorBesideStiffModes) {
+  Eigen::Matrix4d M = Eigen::Matrix4d::Zero();
+  M.row(0) << 0.0, 1.0, 0.0, 0.0;
+  M.row(1) << 0.0, -0.01, 5000.0, 0.0;
+  M.row(2) << 0.0, -20.0, -50000.0, 1.0;
+  const Eigen::MatrixXd E = expm(1e6 * M).value();
+  EXPECT_EQ(E.col(0), Eigen::Vector4d::UnitX());
+  EXPECT_NEAR(E(0, 1) / 0.4975124378109453, 1.0, 5e-14);
+  EXPECT_NEAR(E(0, 2) / 0.04975124378109453, 1.0, 5e-14);
+}
+
 }  // namespace
 }  // namespace flyball

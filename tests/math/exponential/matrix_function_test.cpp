@@ -205,5 +205,40 @@ TEST(MatrixPower, IsTheExponentialOfTheLogarithm) {
   }
 }
 
+// A triangular matrix has its eigenvalues as written: none of them is zero for being small.
+TEST(MatrixPower, SmallEigenvaluesOfATriangle) {
+  for (const double small : {1e-9, 1e-17, 1e-30, 1e-100, 1e-300}) {
+    const Eigen::Matrix2d D = Eigen::Vector2d(1.0 / small, small).asDiagonal();
+    for (const double p : {0.1, -0.5, 0.7, -1.0}) {
+      const Eigen::MatrixXd X = powm(D, p).value();
+      EXPECT_NEAR(X(0, 0) / std::pow(1.0 / small, p), 1.0, 1e-14) << small << ", " << p;
+      EXPECT_NEAR(X(1, 1) / std::pow(small, p), 1.0, 1e-14) << small << ", " << p;
+    }
+    // [1 1; 0 s]^p has (1 - s^p)/(1 - s) in its corner.
+    const Eigen::Matrix2d T{{1.0, 1.0}, {0.0, small}};
+    const Eigen::MatrixXd X = powm(T, 0.1).value();
+    EXPECT_NEAR(X(1, 1) / std::pow(small, 0.1), 1.0, 1e-14) << small;
+    EXPECT_NEAR(X(0, 1), (1.0 - std::pow(small, 0.1)) / (1.0 - small), 1e-14) << small;
+    const Eigen::MatrixXd transposed = powm(T.transpose(), 0.1).value();
+    EXPECT_EQ(transposed, X.transpose());
+  }
+}
+
+// log(s A) = log A + log s for any s; subnormal entries have a logarithm as others do.
+TEST(MatrixLogarithm, OfAnySize) {
+  const Eigen::Matrix2d A{{3.0, 1.0}, {1.0, 2.0}};
+  const Eigen::MatrixXd L = logm(A).value();
+  for (const int unit : {-1074, -1050, -600, 300, 1020}) {
+    Eigen::MatrixXd expected = L;
+    expected.diagonal().array() += unit * std::log(2.0);
+    const Eigen::MatrixXd scaled = A * std::ldexp(1.0, unit / 2) * std::ldexp(1.0, unit - unit / 2);
+    EXPECT_LE((logm(scaled).value() - expected).norm(), 1e-15 * expected.norm()) << unit;
+  }
+  const Eigen::Matrix2d negative{{3.0, 7.0}, {3.0, 5.0}};
+  const auto none = logm(negative * 5e-324);
+  ASSERT_FALSE(none.has_value());
+  EXPECT_TRUE(none.error().is(MatrixFunctionError::no_real_logarithm));
+}
+
 }  // namespace
 }  // namespace flyball
