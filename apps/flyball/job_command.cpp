@@ -1,0 +1,33 @@
+#include <memory>
+
+#include "answer.hpp"
+#include "job_command.hpp"
+
+namespace flyball::app {
+
+CLI::App* add_job_command(CLI::App& program, Invocation& invocation, const JobCommand& command,
+                          bool project) {
+  struct Options {
+    CommonOptions common;
+    JobInput input;
+  };
+  auto options = std::make_shared<Options>();
+  options->common.typed = invocation.typed;
+  CLI::App* added = program.add_subcommand(command.name, command.help);
+  added->footer(command.footer);
+  added->add_option(command.file, options->input.path, command.file_help)->required();
+  if (project) {
+    added->add_option("PROJECT", options->input.project, "A project file (TOML)");
+  }
+  add_field_options(*added, command.job, options->input.given);
+  add_common_options(*added, options->common, command.report);
+  added->callback([options, command, &invocation] {
+    options->input.schema = std::string("flyball.") + command.name + "/1";
+    const auto answer = command.run(options->input);
+    invocation.status = answer ? tell(*answer, options->common, command.reports_unasked)
+                               : fail(answer.error(), options->common, options->input.schema);
+  });
+  return added;
+}
+
+}  // namespace flyball::app
