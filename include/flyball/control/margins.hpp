@@ -25,7 +25,7 @@ struct PlantInputLoop {
 
 /// Full-state feedback: L(z) = K (z I - A_d)⁻¹ B_d z^{-delay/T}.
 /// @param A, B  Continuous plant, one input. @param K  1 x n, designed for the period.
-/// @errors ArgumentError for shapes, entries, period and delay.
+/// @errors ArgumentError for shapes, entries, period and delay, of at most 250 periods.
 [[nodiscard]] Expected<PlantInputLoop> state_feedback_loop(const MatrixRef& A, const MatrixRef& B,
                                                            const MatrixRef& K, Time period,
                                                            Time delay);
