@@ -268,6 +268,8 @@ Expected<ClosedLoopResult> simulate_closed_loop(SimulatedPlant& plant, ControlLa
   for (Index k = 0; k < periods; ++k) {
     const double time = static_cast<double>(k) * T;
     plant.output(actuators.applied(), y);
+    FLYBALL_CHECK(detail::check_answer("output", description.outputs, y, plant.state(),
+                                       actuators.applied(), where, time));
     measured = y;
     for (std::size_t i = 0; i < sensors.size(); ++i) {
       measured(static_cast<Index>(i)) = sensors[i].read();

@@ -16,6 +16,46 @@ constexpr std::string_view where = "ModelPlant";
 
 }  // namespace
 
+Error explained(Error error, const AnyModel& model, FunctionRef<Eigen::VectorXd(double)> input,
+                std::string_view where) {
+  double t = 0.0;
+  Eigen::VectorXd x;
+  for (const Evidence& evidence : error.evidence()) {
+    if (evidence.name == "t" && evidence.values.size() == 1) {
+      t = evidence.values.front();
+    } else if (evidence.name == "x") {
+      x = Eigen::VectorXd::Map(evidence.values.data(),
+                               static_cast<Eigen::Index>(evidence.values.size()));
+    }
+  }
+  if (x.size() != model.states()) {
+    return std::move(error).in(std::string(where));
+  }
+  const Eigen::VectorXd slope = model.derivative(x, input(t));
+  if (error.is(IntegrationError::not_finite)) {
+    // Where it stopped the model still has numbers; a little ahead it has not.
+    double h = 0.0;
+    for (int i = 0; i < 10; ++i, h = std::max(10.0 * h, 1e-9)) {
+      if (auto checked = model.check(x + h * slope, input(t + h), where, t + h); !checked) {
+        return std::move(checked).error();
+      }
+    }
+  }
+  if (error.is(IntegrationError::step_underflow) || error.is(IntegrationError::not_finite)) {
+    Eigen::Index i = 0;
+    (slope.array().abs() / (1.0 + x.array().abs())).maxCoeff(&i);
+    const Coordinate& state = model.names().states[static_cast<std::size_t>(i)];
+    error =
+        std::move(error)
+            .about("the state " + state.name)
+            .got(detail::format("{}{}{} at t = {} s, where it changes faster than steps can follow",
+                                format_number(x(i)), state.unit.empty() ? "" : " ", state.unit,
+                                format_number(t)))
+            .hint("it runs away, or its derivative jumps there: end before, or change the model");
+  }
+  return std::move(error).in(std::string(where));
+}
+
 ModelPlant::ModelPlant(const AnyModel& model, const MatrixRef& x0,
                        const ModelIntegration& integration)
     : stepper_(model), integration_(integration), x_(x0) {}
@@ -39,9 +79,14 @@ Expected<void> ModelPlant::advance(double time, const VectorIn& u, double durati
   if (integration_.accuracy > 0.0) {
     const IntegrationOptions options{.relative_tolerance = integration_.accuracy,
                                      .absolute_tolerance = integration_.accuracy};
-    FLYBALL_TRY(const auto solution, integrate(with_input(stepper_.model(), Eigen::VectorXd(u)),
-                                               time, x_, time + duration, options));
-    x_ = solution.final_state();
+    const Eigen::VectorXd held = u;
+    const auto solution =
+        integrate(with_input(stepper_.model(), held), time, x_, time + duration, options);
+    if (!solution) {
+      return tl::unexpected(
+          explained(solution.error(), stepper_.model(), [&](double) { return held; }, where));
+    }
+    x_ = solution->final_state();
     return {};
   }
   const double steps = std::ceil(duration / integration_.max_step.si());
@@ -53,21 +98,6 @@ Expected<void> ModelPlant::advance(double time, const VectorIn& u, double durati
     }
   }
   return {};
-}
-
-/// The model's own error where the integration found no way on, so that it names the coordinate.
-Expected<void> ModelPlant::failed(const Error& error, const VectorIn& u) const {
-  double time = 0.0;
-  for (const Evidence& evidence : error.evidence()) {
-    if (evidence.name == "t" && evidence.values.size() == 1) {
-      time = evidence.values.front();
-    } else if (evidence.name == "x" &&
-               static_cast<Eigen::Index>(evidence.values.size()) == x_.size()) {
-      const auto x = Eigen::VectorXd::Map(evidence.values.data(), x_.size());
-      FLYBALL_CHECK(stepper_.model().check(x, u, where, time));
-    }
-  }
-  return tl::unexpected(error);
 }
 
 /// What is not finite in the step that began at `before_`: the model there, or what came of it.

@@ -59,6 +59,7 @@ Expected<ModelEquilibrium> find_equilibrium(const AnyModel& model, const MatrixR
   constexpr int most_iterations = 100;
   constexpr double tolerance = 1e-13;
   constexpr double shortest = 1e-10;
+  constexpr double farthest = 1e6;  // where a step by a Jacobian that is nearly singular lands
   ModelEquilibrium at{.x = x, .u = u};
   const Eigen::Index n = at.x.size();
   const auto refuse = [&](SearchError code, const Eigen::VectorXd& f) {
@@ -74,6 +75,9 @@ Expected<ModelEquilibrium> find_equilibrium(const AnyModel& model, const MatrixR
     at.derivative = local.f;
     if (!local.finite()) {
       return refuse(SearchError::not_finite, local.f);
+    }
+    if (((at.x - x).array().abs() > farthest * (1.0 + x.array().abs())).any()) {
+      return refuse(SearchError::no_convergence, local.f);
     }
     if ((local.f.array().abs() <= tolerance * local.scale(at.x, at.u)).all()) {
       return without_dust(model, std::move(at));

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 
+#include <flyball/core/function_ref.hpp>
 #include <flyball/systems/model_step.hpp>
 
 namespace flyball {
@@ -40,6 +41,12 @@ struct ModelIntegration {
   double accuracy = 0.0;
 };
 
+/// An error of `integrate` about a model, in the model's words: which derivative is no number
+/// where the integration ends, or which state changes faster than steps can follow, and when.
+/// @param input  u at a time. @param where  The function's name.
+[[nodiscard]] Error explained(Error error, const AnyModel& model,
+                              FunctionRef<Eigen::VectorXd(double)> input, std::string_view where);
+
 /// A plant that is any model, integrated.
 class ModelPlant final : public SimulatedPlant {
  public:
@@ -62,7 +69,6 @@ class ModelPlant final : public SimulatedPlant {
  private:
   ModelPlant(const AnyModel& model, const MatrixRef& x0, const ModelIntegration& integration);
 
-  [[nodiscard]] Expected<void> failed(const Error& error, const VectorIn& u) const;
   [[nodiscard]] Expected<void> not_finite(double time, const VectorIn& u) const;
 
   ModelStepper stepper_;
