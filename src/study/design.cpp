@@ -199,6 +199,11 @@ Expected<DesignResult> design(const DesignJob& requested) {
   result.robust = loop.robustness.all_stable;
   result.worst_overshoot = loop.robustness.worst_overshoot;
 
+  if (!job.plant.motor && job.battery.resistance != BatteryOptions{}.resistance) {
+    warn(result.diagnostics, "not_used",
+         "battery.resistance is not used: without a motor no current is known (set "
+         "mechanism.motor)");
+  }
   result.paste = paste_gains(job.plant, result.K_delayed);
   FLYBALL_CHECK(simulate_response(result));
   return result;

@@ -100,9 +100,20 @@ Expected<OperatingPoint> operating_point(const ModelJob& job) {
   FLYBALL_CHECK(job.model.check(job.x, job.u, "point"));
   OperatingPoint point{.x = job.x, .u = job.u, .derivative = {}};
   if (job.find_equilibrium) {
-    FLYBALL_TRY(auto found, find_equilibrium(job.model, job.x, job.u));
-    point.x = found.x;
-    point.u = found.u;
+    auto found = find_equilibrium(job.model, job.x, job.u);
+    if (!found) {
+      Error error = std::move(found).error();
+      if (const auto other =
+              find_equilibrium(job.model, job.x, job.u, EquilibriumBy::states_and_inputs)) {
+        const ModelDescription& names = job.model.names();
+        error = std::move(error).hint(
+            fmt::format("with other inputs one is at {} with {}: write them in point.at",
+                        values_of(names.states, other->x), values_of(names.inputs, other->u)));
+      }
+      return tl::unexpected(std::move(error));
+    }
+    point.x = found->x;
+    point.u = found->u;
   }
   point.derivative = job.model.derivative(point.x, point.u);
   point.is_equilibrium = is_equilibrium(job.model, point.x, point.u);

@@ -35,7 +35,10 @@ enum class FieldType {
 };
 
 /// What a number must be, each of a list.
-enum class Range { any, not_negative, positive };
+enum class Range { any, not_zero, not_negative, positive };
+
+/// What a key or a section is about; what is about the other kind of file is refused.
+enum class Subject { any, mechanism, model };
 
 /// TOML's largest whole number.
 constexpr long long largest_whole = std::numeric_limits<long long>::max();
@@ -87,8 +90,9 @@ struct Field {
   std::string_view choices = {};  ///< Of a text: the known words, separated by a comma and a space.
   Expected<void> (*check)(const std::string& text) = nullptr;  ///< Of a text.
   bool required = false;                                       ///< Wherever the section is written.
-  std::string_view option = {};   ///< Of the command line, if not the key; "-" for none.
-  std::string_view metavar = {};  ///< What the option takes, if not the dimension's name.
+  std::string_view option = {};    ///< Of the command line, if not the key; "-" for none.
+  std::string_view metavar = {};   ///< What the option takes, if not the dimension's name.
+  Subject subject = Subject::any;  ///< If not its section's.
 
   // What few rows say.
   constexpr Field without(std::string_view what_holds) const {
@@ -102,6 +106,7 @@ struct Field {
   constexpr Field called(std::string_view name) const { return with(&Field::option, name); }
   constexpr Field no_option() const { return with(&Field::option, "-"); }
   constexpr Field takes(std::string_view what) const { return with(&Field::metavar, what); }
+  constexpr Field of(Subject what) const { return with(&Field::subject, what); }
 
  private:
   template <class Member>
@@ -172,6 +177,7 @@ struct Section {
   void* (*within)(void* document, bool create);
   std::string_view summary;          ///< For the docs page.
   std::string_view needed_for = {};  ///< Completes "…, which `it` needs": why keys are required.
+  Subject subject = Subject::any;
 };
 
 /// Everything that a file may say, for the struct that holds it.

@@ -86,6 +86,15 @@ std::string metavar(const Field& field) {
 /// The example as a shell takes it.
 std::string typed(const Field& field) {
   std::string example(field.example);
+  if (field.type == FieldType::map) {  // { u = "2 N m" } is 'u=2 N m'
+    std::erase_if(example, [](char c) { return c == '"' || c == '{' || c == '}'; });
+    for (const std::string_view gap : {" =", "= ", ", "}) {
+      for (std::size_t at = 0; (at = example.find(gap, at)) != std::string::npos;) {
+        example.erase(at + gap.find(' '), 1);
+      }
+    }
+    return fmt::format("'{}'", example.substr(1, example.size() - 2));
+  }
   std::erase_if(example,
                 [](char c) { return std::string_view("[]\" ").find(c) != std::string_view::npos; });
   return example;
@@ -121,14 +130,16 @@ Json schema_of(const Field& field, const std::string& description) {
   Json schema = {{"description", description}};
   const bool plain = field.dimension.of == FieldDimension::fixed &&
                      field.dimension.dimension == Dimension::dimensionless;
-  Json quantity = {
-      {"type", "string"},
-      {"pattern", field.range == Range::any ? "^\\s*[-+]?\\.?[0-9]" : "^\\s*\\+?\\.?[0-9]"}};
+  Json quantity = {{"type", "string"},
+                   {"pattern", field.range < Range::not_negative ? "^\\s*[-+]?\\.?[0-9]"
+                                                                 : "^\\s*\\+?\\.?[0-9]"}};
   switch (field.type) {
     case FieldType::quantity:
       if (plain) {
         schema["type"] = "number";
-        if (field.range != Range::any) {
+        if (field.range == Range::not_zero) {
+          schema["not"] = {{"const", 0}};
+        } else if (field.range != Range::any) {
           schema[field.range == Range::positive ? "exclusiveMinimum" : "minimum"] = 0;
         }
       } else {

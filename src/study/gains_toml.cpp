@@ -46,7 +46,7 @@ void describe(const PlantDescription& plant, Project& project) {
   const auto known = mechanisms::motor(motor.name, motor.count);
   project.parts.motor_count = motor.count;
   project.parts.gearing = plant.gearing;
-  if (plant.drum_radius > 0.0) {
+  if (plant.kind == MechanismKind::elevator && plant.drum_radius > 0.0) {
     project.parts.drum_radius = Length(plant.drum_radius);
   }
   if (known && known->R == motor.R && known->Kt == motor.Kt && known->Kv == motor.Kv) {

@@ -8,4 +8,8 @@ namespace flyball::study {
 /// @param project  As read, section by section.
 [[nodiscard]] std::optional<ModelJob> model_job(TomlDocument& document, const Project& project);
 
+/// What [simulation] says of a mechanism: its states are position and velocity, its input is
+/// voltage.
+[[nodiscard]] ModelRun mechanism_run(TomlDocument& document, const Project& project);
+
 }  // namespace flyball::study

@@ -97,7 +97,7 @@ void take_parts(TomlDocument& document, Project& project) {
     plant.nominal_voltage = motor->nominal_voltage;
     plant.motor = *std::move(motor);
   } else {
-    document.refuse(part_section, "motor", std::move(motor).error(), TomlDocument::Fault::value);
+    document.refuse(part_section, "motor", std::move(motor).error());
   }
 }
 
@@ -119,11 +119,44 @@ void make_plant(TomlDocument& document, Project& project) {
     if (auto made = row.make(project.parts, plant); !made) {
       // The mechanism's function names a part as its key does.
       const std::string part = made.error().subject();
-      document.refuse(part_section, given(part) ? part : "type", std::move(made).error(),
-                      TomlDocument::Fault::value);
+      document.refuse(part_section, given(part) ? part : "type", std::move(made).error());
     }
   }
   take_gains(project.gains, plant);
+  project.mechanism_run = mechanism_run(document, project);
+}
+
+/// What means nothing for a kind of mechanism.
+void refuse_other_kinds(TomlDocument& document, const MechanismRow& row) {
+  const auto refuse = [&](std::string_view section, std::string_view key, std::string hint) {
+    if (document.has(section, key)) {
+      document.refuse(section, key,
+                      Error(ProjectError::wrong_value)
+                          .about(document.name(section, key))
+                          .got(fmt::format("without meaning for this {}", to_string(row.kind)))
+                          .hint(std::move(hint)),
+                      TomlDocument::Fault::key);
+    }
+  };
+  const auto needs = [](const MechanismRow& one, std::string_view key) {
+    return std::find(one.needs.begin(), one.needs.end(), key) != one.needs.end();
+  };
+  for (const Field& field : section_of(part_section).fields) {
+    if (!needs(row, field.key) &&
+        std::any_of(mechanism_rows().begin(), mechanism_rows().end(),
+                    [&](const MechanismRow& other) { return needs(other, field.key); })) {
+      refuse(part_section, field.key, fmt::format("it is made of {}", fmt::join(row.needs, ", ")));
+    }
+  }
+  if (row.kind == mechanisms::MechanismKind::flywheel) {
+    refuse("gains", "kG", "gravity does not turn it");
+  }
+  if (row.kind != mechanisms::MechanismKind::arm) {
+    refuse("gains", "angle_offset", "it is of an arm");
+  }
+  if (document.has("gains", "kV") && !document.has(part_section, "motor")) {
+    refuse(part_section, "motor_count", "say which motor, or leave it out");
+  }
 }
 
 /// What says what the mechanism is: a file; a log, and a file of that mechanism; a log alone.
@@ -138,7 +171,7 @@ ExpectedAll<Project> read(std::string_view text, const std::string& name,
   document.read(project_document(), &project);
   auto& type = project.parts.type;
   const auto& logged = project.log.mechanism;
-  const bool formulas = document.has("", "model");
+  const bool formulas = document.subject() == Subject::model;
   if (source != Source::log && document.is_toml() && !formulas && !document.writes(part_section)) {
     document.miss("", part_section,
                   "begin with [mechanism] and type = \"elevator\", \"arm\" or \"flywheel\", or "
@@ -157,8 +190,10 @@ ExpectedAll<Project> read(std::string_view text, const std::string& name,
                     Error(ProjectError::wrong_value)
                         .about(document.name("log", "mechanism"))
                         .got(std::string(to_string(*logged)))
-                        .expected(fmt::format("the type in [mechanism], {}", to_string(*type))),
-                    TomlDocument::Fault::value);
+                        .expected(fmt::format("the type in [mechanism], {}", to_string(*type))));
+  }
+  if (type) {
+    refuse_other_kinds(document, mechanism_row(*type));
   }
   if (!document.errors()) {
     take_parts(document, project);

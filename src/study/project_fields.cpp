@@ -6,6 +6,7 @@
 
 #include <flyball/study/project.hpp>
 
+#include "core/try.hpp"
 #include "study/field.hpp"
 #include "study/mechanism_parts.hpp"
 
@@ -17,9 +18,21 @@ using enum Dimension;
 using enum Range;
 using Of = FieldDimension;
 using recording::LogSelection;
+using Subject::mechanism;
+using Subject::model;
 
 Expected<void> check_kind(const std::string& text) {
   return mechanisms::parse_mechanism_kind(text).map([](auto) {});
+}
+
+Expected<void> check_position_unit(const std::string& text) {
+  const auto unit = parse_unit(text);
+  const bool fits = unit && (unit->dimension == length || unit->dimension == angle);
+  return fits ? Expected<void>()
+              : refusal(ArgumentError::wrong_unit, {}, "the position's unit")
+                    .got(unit ? fmt::format("\"{}\", a {}", text, to_string(unit->dimension))
+                              : fmt::format("\"{}\", which is not known", text))
+                    .expected("of a length or an angle, such as \"m\" or \"rotations\"");
 }
 
 Expected<void> check_motor(const std::string& text) {
@@ -99,9 +112,10 @@ constexpr std::array log_fields{
         .takes("KIND"),
     text("unit", at<&LogSelection::unit>(), "\"rotations\"",
          "Unit of the recorded position (rad, deg, m, in, …)")
+        .checked(check_position_unit)
         .without("what the log says")
         .takes("UNIT"),
-    quantity("scale", at<&LogSelection::scale>(), dimensionless, any, "0.1",
+    quantity("scale", at<&LogSelection::scale>(), dimensionless, not_zero, "0.1",
              "Multiplies recorded positions and velocities; 1/gearing for a motor's encoder, "
              "metres per rotation for an elevator recorded in rotations")
         .takes("NUMBER"),
@@ -128,11 +142,14 @@ constexpr std::array controller_fields{
     list("state_tolerance", at<&ControllerOptions::state_tolerance>(), Of::states, positive,
          "[\"2 cm\", \"0.4 m/s\"]", "Largest acceptable error of each state (Bryson's rule)")
         .without("as tight as leaves a gain margin of 2, a phase margin of 45° and ±20 % of "
-                 "inertia and gain"),
+                 "inertia and gain")
+        .of(mechanism),
     quantity("input_tolerance", at<&ControllerOptions::input_tolerance>(), voltage, positive,
-             "\"12 V\"", "Largest acceptable voltage (Bryson's rule)"),
+             "\"12 V\"", "Largest acceptable voltage (Bryson's rule)")
+        .of(mechanism),
     quantity("max_voltage", at<&ControllerOptions::max_voltage>(), voltage, positive, "\"12 V\"",
-             "Limit of the voltage"),
+             "Limit of the voltage")
+        .of(mechanism),
     quantity("delay", at<&ControllerOptions::delay>(), time, not_negative, "\"10 ms\"",
              "Delay from sensing to acting")
         .without("what the log shows, else none"),
@@ -140,13 +157,16 @@ constexpr std::array controller_fields{
         "{ theta = \"5 deg\", omega = \"1 rad/s\", u = \"2 N m\" }",
         "Of a model by formula: largest acceptable error of each state and size of each input "
         "(Bryson's rule)")
-        .without("one of each"),
+        .without("one of each")
+        .of(model),
     map("limit", at<&ControllerOptions::named, &NamedControl::limit>(), "{ u = \"3 N m\" }",
         "Of a model by formula: largest size of inputs")
-        .without("none"),
+        .without("none")
+        .of(model),
     map("reference", at<&ControllerOptions::named, &NamedControl::reference>(),
         "{ theta = \"170 deg\" }", "Of a model by formula: the state that the loop goes to")
-        .without("the point")};
+        .without("the point")
+        .of(model)};
 
 constexpr std::array estimator_fields{
     quantity("measurement_std", at<&EstimatorOptions::measurement_std>(), Of::output, positive,
@@ -172,13 +192,16 @@ constexpr std::array battery_fields{
 constexpr std::array profile_fields{
     quantity("goal", at<&DesignJob::profile, &ProfileOptions::goal>(), Of::output, any, "\"0.8 m\"",
              "Where the simulated motion ends")
-        .without("1 m, 90°, or three quarters of top speed"),
+        .without("1 m, 90°, or three quarters of top speed")
+        .of(mechanism),
     quantity("max_velocity", at<&DesignJob::profile, &ProfileOptions::max_velocity>(), Of::rate,
              positive, "\"1.5 m/s\"", "Limit of the trapezoid's velocity")
-        .without("the fastest that the motor can follow"),
+        .without("the fastest that the motor can follow")
+        .of(mechanism),
     quantity("max_acceleration", at<&DesignJob::profile, &ProfileOptions::max_acceleration>(),
              Of::acceleration, positive, "\"4 m/s^2\"", "Limit of the trapezoid's acceleration")
-        .without("the fastest that the motor can follow"),
+        .without("the fastest that the motor can follow")
+        .of(mechanism),
     whole("seed", at<&DesignJob::seed>(), 0, largest_whole, "1", "Seed of the simulation's noise")};
 
 constexpr std::array model_fields{
@@ -231,51 +254,56 @@ constexpr std::array simulation_fields{
              "Time between the rows of an open loop's record")
         .without("a thousandth of the duration"),
     quantity("accuracy", at<&SimulationSection::accuracy>(), dimensionless, positive, "1e-8",
-             "Relative accuracy of a step of an open loop")
-        .without("1e-8"),
+             "Relative accuracy of a step of the integration")
+        .without("1e-8")
+        .of(model),
     flag("closed_loop", at<&SimulationSection::closed_loop>(), "true",
          "Whether the controller acts: LQR about the point")
-        .without("false; of a mechanism true"),
+        .without("false; of a mechanism without input true"),
     map("initial", at<&SimulationSection::initial>(), "{ theta = \"10 deg\" }",
-        "The states at the start")
-        .without("the point"),
+        "The states at the start; a mechanism's are position and velocity")
+        .without("the point; of a mechanism zero"),
     map("input", at<&SimulationSection::input>(), "{ u = \"if(t < 1, 0.5, 0)\" }",
         "The inputs of an open loop: a value with its unit, or a formula of the time t in seconds "
-        "and the parameters, in SI")
-        .without("the point"),
+        "and the parameters, in SI; a mechanism's is voltage")
+        .without("the point; of a mechanism zero"),
     map("noise", at<&SimulationSection::noise>(), "{ theta = \"0.1 deg\" }",
         "Standard deviation of each reading of an output, in a closed loop")
-        .without("none"),
+        .without("none")
+        .of(model),
     map("resolution", at<&SimulationSection::resolution>(), "{ theta = \"0.1 deg\" }",
         "Smallest step of an output's readings, in a closed loop")
         .called("reading-step")
-        .without("none")};
+        .without("none")
+        .of(model)};
 
 constexpr std::array sections{
     Section{"mechanism", mechanism_fields, &within<&Project::parts>,
-            "What the mechanism is, and the parts it is made of.", "every mechanism"},
+            "What the mechanism is, and the parts it is made of.", "every mechanism", mechanism},
     Section{"mechanism.motor", motor_fields,
             &within<&Project::parts, &MechanismParts::custom_motor>,
-            "In place of a motor's name, its numbers.", "a custom motor"},
+            "In place of a motor's name, its numbers.", "a custom motor", mechanism},
     Section{"model", model_fields, &within<&Project::model>,
-            "A model by formula, in place of a mechanism."},
+            "A model by formula, in place of a mechanism.", "", model},
     Section{"point", point_fields, &within<&Project::point>,
-            "Where a model by formula is linearised, and held by its controller."},
+            "Where a model by formula is linearised, and held by its controller.", "", model},
     Section{"simulation", simulation_fields, &within<&Project::simulation>,
             "What `flyball simulate` does."},
     Section{"gains", gains_fields, &within<&Project::gains>,
             "Feedforward gains that are known, in place of those that follow from the parts. With "
-            "kV no part is needed."},
+            "kV no part is needed.",
+            "", mechanism},
     Section{"log", log_fields, &within<&Project::log>,
-            "What `flyball identify` and `flyball tune` cannot find out from the log."},
+            "What `flyball identify` and `flyball tune` cannot find out from the log.", "",
+            mechanism},
     Section{"controller", controller_fields, &within<&Project::job, &DesignJob::controller>,
             "What the loop has to do."},
     Section{"estimator", estimator_fields, &within<&Project::job, &DesignJob::estimator>,
-            "How far the sensor and the model are trusted."},
+            "How far the sensor and the model are trusted.", "", mechanism},
     Section{"sensor", sensor_fields, &within<&Project::job, &DesignJob::sensor>,
-            "The sensor of the simulation."},
+            "The sensor of the simulation.", "", mechanism},
     Section{"battery", battery_fields, &within<&Project::job, &DesignJob::battery>,
-            "The battery whose voltage sags in the simulation; needs a motor."},
+            "The battery whose voltage sags in the simulation; needs a motor.", "", mechanism},
     Section{"profile", profile_fields, &within<&Project::job>, "The motion that is simulated."}};
 
 std::optional<SignalDimensions> signals(const void* document) {

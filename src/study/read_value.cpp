@@ -46,14 +46,17 @@ Expected<double> in_range(double value, Range range, Dimension dimension, const 
         .got(format_number(value))
         .expected("a finite number");
   }
-  if (range == Range::any || value > 0.0 || (range == Range::not_negative && value == 0.0)) {
+  const bool zero = range == Range::not_negative;
+  if (range == Range::any || value > 0.0 || (value == 0.0 && zero) ||
+      (value < 0.0 && range == Range::not_zero)) {
     return value;
   }
-  const bool zero = range == Range::not_negative;
   return tl::unexpected(Error(zero ? ArgumentError::out_of_range : ArgumentError::not_positive)
                             .about(name)
                             .got(to_text(value, dimension))
-                            .expected(zero ? "zero or greater" : "greater than zero"));
+                            .expected(zero                       ? "zero or greater"
+                                      : range == Range::not_zero ? "other than zero"
+                                                                 : "greater than zero"));
 }
 
 Expected<double> quantity(const toml::node& node, Range range, Dimension dimension,
@@ -183,6 +186,7 @@ void insert_text(toml::table& table, const Field& field, std::string_view text) 
       for (int depth = 0; end < text.size() && (depth > 0 || text[end] != ','); ++end) {
         depth += text[end] == '(' ? 1 : text[end] == ')' ? -1 : 0;
       }
+      start = std::min(text.find_first_not_of(' ', start), end);
       const std::string_view part = text.substr(start, end - start);
       const std::size_t equals = std::min(part.find('='), part.size());
       values->insert_or_assign(part.substr(0, equals),

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <tuple>
 
 #include <fmt/format.h>
 
@@ -13,6 +12,7 @@
 #include <flyball/math/integration/adaptive.hpp>
 #include <flyball/simulation/closed_loop.hpp>
 #include <flyball/simulation/mechanism_plant.hpp>
+#include <flyball/study/simulate_design.hpp>
 #include <flyball/systems/model_step.hpp>
 
 #include "core/diagnose.hpp"
@@ -26,14 +26,14 @@ namespace {
 constexpr std::string_view where = "simulate";
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// The record of a model: its columns in the order of the description.
-Simulation described(const ModelJob& job) {
-  const ModelDescription& names = job.model.names();
-  Simulation result{.name = names.name, .path = job.path};
-  result.closed_loop = job.run.closed_loop;
-  result.seed = job.run.seed;
+/// What is simulated, and the columns of its record, in the order of the description.
+Simulation described(const ModelDescription& names, const std::string& path, const ModelRun& run,
+                     bool outputs_are_states) {
+  Simulation result{
+      .name = names.name, .path = path, .closed_loop = run.closed_loop, .seed = run.seed};
   const auto shown = [](const std::vector<Coordinate>& coordinates, std::string_view truth,
                         std::string_view estimate, std::string_view reference) {
     std::vector<ShownSignal> all;
@@ -47,11 +47,16 @@ Simulation described(const ModelJob& job) {
   };
   result.states = shown(names.states, "", "estimated_", "reference_");
   result.inputs = shown(names.inputs, "applied_", "commanded_", "-");
-  if (!job.outputs_are_states) {
+  if (!outputs_are_states) {
     result.outputs = shown(names.outputs, "output_", "-", "measured_");
   }
-  result.limits.assign(job.limit.begin(), job.limit.end());
+  result.limits.assign(names.inputs.size(), std::numeric_limits<double>::infinity());
   return result;
+}
+
+/// What is given, and of the rest what holds otherwise.
+VectorXd or_else(const VectorXd& given, const VectorXd& otherwise) {
+  return given.size() == 0 ? otherwise : VectorXd(given.array().isNaN().select(otherwise, given));
 }
 
 /// The regulator in the loop, about its point.
@@ -104,63 +109,99 @@ class Regulating {
   VectorXd output_{};
 };
 
-/// An error of the integration says which state has no derivative, where that is the reason.
-Refusal named(Error error, const ModelJob& job) {
-  double t = 0.0;
-  VectorXd x;
-  for (const Evidence& evidence : error.evidence()) {
-    if (evidence.name == "t" && evidence.values.size() == 1) {
-      t = evidence.values.front();
-    } else if (evidence.name == "x") {
-      x = VectorXd::Map(evidence.values.data(), static_cast<Index>(evidence.values.size()));
-    }
+/// An open loop, row by row.
+struct Rows {
+  std::vector<double> time{};
+  MatrixXd x{}, u{}, y{};
+};
+
+Expected<Rows> rows_of(const ModelDescription& names, const ModelRun& run) {
+  const double step = run.step.value_or(1e-3 * run.duration);
+  const auto count = [](const std::vector<Coordinate>& list) {
+    return static_cast<Index>(list.size());
+  };
+  FLYBALL_TRY(const Index steps,
+              steps_of(run.duration, step,
+                       count(names.states) + count(names.inputs) + count(names.outputs)));
+  Rows rows{.x = MatrixXd(count(names.states), steps + 1),
+            .u = MatrixXd(count(names.inputs), steps + 1),
+            .y = MatrixXd(count(names.outputs), steps + 1)};
+  for (Index k = 0; k < steps; ++k) {
+    rows.time.push_back(static_cast<double>(k) * step);
   }
-  if (error.is(IntegrationError::not_finite) && x.size() == job.model.states()) {
-    // Where it stopped the model still has numbers; a little ahead it has not.
-    const VectorXd slope = job.model.derivative(x, job.run.input(t));
-    double h = 0.0;
-    for (int i = 0; i < 10; ++i, h = std::max(10.0 * h, 1e-9)) {
-      if (auto checked = job.model.check(x + h * slope, job.run.input(t + h), where, t + h);
-          !checked) {
-        return Refusal(std::move(checked).error());
-      }
-    }
-  }
-  return Refusal(std::move(error).in(std::string(where)));
+  rows.time.push_back(run.duration);
+  return rows;
 }
 
-/// A mechanism at a constant voltage.
-Expected<Simulation> mechanism_open_loop(const Project& project, double voltage,
-                                         MechanismState state) {
-  const PlantDescription& plant = project.job.plant;
-  FLYBALL_TRY(const auto truth, MechanismPlant::create(plant.kind, plant.gains));
-  const double duration = project.simulation.duration.value_or(2.0);
-  const double step = project.simulation.step.value_or(1e-3 * duration);
-  FLYBALL_TRY(const Index steps, steps_of(duration, step));
-  std::vector<double> time, position, velocity;
-  for (Index k = 0; k <= steps; ++k) {
-    time.push_back(static_cast<double>(k) * step);
-    position.push_back(state.position);
-    velocity.push_back(state.velocity);
-    state = truth.step(state, voltage, step);
-  }
-  Simulation result{.name = std::string(to_string(plant.kind)), .path = project.path};
-  result.duration = duration;
-  result.series = TimeSeries(time);
-  const std::string unit = plant.unit;
-  FLYBALL_CHECK(result.series.add("position", unit, std::move(position)));
-  FLYBALL_CHECK(result.series.add("velocity", unit + "/s", std::move(velocity)));
-  FLYBALL_CHECK(result.series.add("voltage", "V", std::vector<double>(time.size(), voltage)));
-  result.states = {{{"position", unit}, "position", "", ""},
-                   {{"velocity", unit + "/s"}, "velocity", "", ""}};
-  result.inputs = {{{"voltage", "V"}, "voltage", "", ""}};
-  result.limits = {std::numeric_limits<double>::infinity()};
+Expected<Simulation> recorded(Simulation result, Rows rows) {
+  result.closed_loop = false;
+  result.duration = rows.time.back();
+  result.series = TimeSeries(std::move(rows.time));
+  const auto add = [&](const std::vector<ShownSignal>& shown,
+                       const MatrixXd& values) -> Expected<void> {
+    for (std::size_t i = 0; i < shown.size(); ++i) {
+      const VectorXd row = values.row(static_cast<Index>(i));
+      FLYBALL_CHECK(
+          result.series.add(shown[i].truth, shown[i].signal.unit, {row.begin(), row.end()}));
+    }
+    return {};
+  };
+  FLYBALL_CHECK(add(result.states, rows.x));
+  FLYBALL_CHECK(add(result.outputs, rows.y));
+  FLYBALL_CHECK(add(result.inputs, rows.u));
   summarize(result);
   return result;
 }
 
+MechanismState mechanism_state(const ModelRun& run) {
+  const VectorXd state = or_else(run.initial, VectorXd::Zero(2));
+  return {state(0), state(1)};
+}
+
+/// A mechanism at a voltage over time, exact while that is constant.
+Expected<Simulation> mechanism_open_loop(const Project& project) {
+  const PlantDescription& plant = project.job.plant;
+  const ModelRun& run = project.mechanism_run;
+  FLYBALL_TRY(const auto truth, MechanismPlant::create(plant.kind, plant.gains));
+  const ModelDescription names{
+      .name = std::string(to_string(plant.kind)),
+      .states = {{"position", plant.unit}, {"velocity", plant.unit + "/s"}},
+      .inputs = {{"voltage", "V"}}};
+  FLYBALL_TRY(Rows rows, rows_of(names, run));
+  MechanismState state = mechanism_state(run);
+  const double longest = std::max(1e-3, 1e-5 * run.duration);  // s, of one voltage
+  for (Index k = 0; k < rows.x.cols(); ++k) {
+    const double t = rows.time[static_cast<std::size_t>(k)];
+    rows.x.col(k) << state.position, state.velocity;
+    rows.u.col(k) = run.input(t);
+    FLYBALL_CHECK(flyball::detail::check_point(names, rows.x.col(k), rows.u.col(k), where, t));
+    const double step =
+        k + 1 < rows.x.cols() ? rows.time[static_cast<std::size_t>(k) + 1] - t : 0.0;
+    const double parts = std::ceil(step / longest - 1e-9);
+    for (double i = 0.0; i < parts; ++i) {
+      const double middle = t + (i + 0.5) * step / parts;
+      const VectorXd voltage = run.input(middle);
+      FLYBALL_CHECK(flyball::detail::check_point(names, rows.x.col(k), voltage, where, middle));
+      state = truth.step(state, voltage(0), step / parts);
+    }
+  }
+  return recorded(described(names, project.path, run, true), std::move(rows));
+}
+
 Expected<Simulation> mechanism_closed_loop(const Project& project) {
+  const ModelRun& run = project.mechanism_run;
   FLYBALL_TRY(auto designed, design(project.job));
+  if (run.duration_is_given || !run.initial.array().isNaN().all()) {
+    FLYBALL_TRY(
+        auto tried,
+        simulate_design(
+            designed,
+            {.measurement_noise = designed.job.estimator.measurement_std.value_or(0.0),
+             .seed = designed.job.seed,
+             .initial = mechanism_state(run),
+             .duration = run.duration_is_given ? std::optional(run.duration) : std::nullopt}));
+    designed.response = std::move(tried.series);
+  }
   const PlantDescription& plant = designed.job.plant;
   Simulation result{.name = std::string(to_string(plant.kind)), .path = project.path};
   result.closed_loop = true;
@@ -182,22 +223,21 @@ Expected<Simulation> mechanism_closed_loop(const Project& project) {
   return result;
 }
 
-/// A value of [simulation] for a mechanism. @param value  Takes what it says.
-Expected<void> take(const NamedTexts& said, std::string_view key,
-                    std::initializer_list<std::tuple<std::string_view, Dimension, double*>> known) {
-  for (const NamedText& one : said) {
-    const auto found = std::find_if(known.begin(), known.end(), [&](const auto& entry) {
-      return std::get<0>(entry) == one.name;
-    });
-    const std::string name = fmt::format("simulation.{}.{}", key, one.name);
-    if (found == known.end()) {
-      return refusal(ArgumentError::unknown_name, {}, name)
-          .got("nothing that the mechanism has")
-          .hint(key == "input" ? "its input is voltage" : "its states are position and velocity");
+/// What [simulation] says for the other kind of loop is not lost without a word.
+void tell_unused(const SimulationSection& said, Simulation& result) {
+  const auto tell = [&](std::string_view key, bool is_said) {
+    if (is_said) {
+      warn(result.diagnostics, "not_used", "simulation.{} is of {} loop and not used in this one",
+           key, result.closed_loop ? "an open" : "a closed");
     }
-    FLYBALL_TRY(*std::get<2>(*found), parse_quantity(one.text, std::get<1>(*found), name));
+  };
+  if (result.closed_loop) {
+    tell("input", !said.input.empty());
+    tell("step", said.step.has_value());
+  } else {
+    tell("noise", !said.noise.empty());
+    tell("resolution", !said.resolution.empty());
   }
-  return {};
 }
 
 }  // namespace
@@ -205,65 +245,58 @@ Expected<void> take(const NamedTexts& said, std::string_view key,
 Expected<Simulation> simulate_open_loop(const ModelJob& job) {
   const ModelRun& run = job.run;
   const AnyModel& model = job.model;
-  const double step = run.step.value_or(1e-3 * run.duration);
-  FLYBALL_TRY(const Index steps, steps_of(run.duration, step));
-  FLYBALL_CHECK(model.check(run.initial, run.input(0.0), where, 0.0));
+  VectorXd initial = or_else(run.initial, job.x);
+  if (job.find_equilibrium && run.initial.array().isNaN().any()) {
+    FLYBALL_TRY(const auto point, operating_point(job));
+    initial = or_else(run.initial, point.x);
+  }
+  FLYBALL_TRY(Rows rows, rows_of(model.names(), run));
+  FLYBALL_CHECK(model.check(initial, run.input(0.0), where, 0.0));
   constexpr double most_of_the_run = 0.02;  // so that no step jumps over a pulse of an input
+  constexpr double most_numbers = 4e6;      // that the steps may keep
+  const double most_steps =
+      std::clamp(most_numbers / static_cast<double>(model.states()), 1e4, 1e6);
   const IntegrationOptions options{.relative_tolerance = run.accuracy,
                                    .absolute_tolerance = run.accuracy,
                                    .max_step = most_of_the_run * run.duration,
-                                   .max_steps = 1'000'000};
-  auto solution = integrate(with_input(model, run.input), 0.0, run.initial, run.duration, options);
+                                   .max_steps = static_cast<int>(most_steps)};
+  auto solution = integrate(with_input(model, run.input), 0.0, initial, run.duration, options);
   if (!solution) {
-    return named(std::move(solution).error(), job);
+    Error error = explained(std::move(solution).error(), model, run.input, where);
+    if (error.is(IntegrationError::too_many_steps)) {
+      error = std::move(error)
+                  .about("the end of the simulation")
+                  .got(fmt::format("not reached in {} steps", format_number(most_steps, 7)))
+                  .hint("simulate for less time, or with a larger simulation.accuracy");
+    }
+    return tl::unexpected(std::move(error));
   }
-  Simulation result = described(job);
-  result.closed_loop = false;
-  result.duration = run.duration;
-  const ModelDescription& names = model.names();
-  std::vector<double> time(static_cast<std::size_t>(steps) + 1);
-  Eigen::MatrixXd x(model.states(), steps + 1);
-  Eigen::MatrixXd u(model.inputs(), steps + 1);
-  Eigen::MatrixXd y(model.outputs(), steps + 1);
-  for (Index k = 0; k <= steps; ++k) {
-    const double t = k == steps ? run.duration : static_cast<double>(k) * step;
-    time[static_cast<std::size_t>(k)] = t;
-    x.col(k) = solution->at(t);
-    u.col(k) = run.input(t);
-    y.col(k) = model.output(x.col(k), u.col(k));
-    if (!y.col(k).allFinite()) {
-      FLYBALL_CHECK(model.check(x.col(k), u.col(k), where, t));
+  for (Index k = 0; k < rows.x.cols(); ++k) {
+    const double t = rows.time[static_cast<std::size_t>(k)];
+    rows.x.col(k) = solution->at(t);
+    rows.u.col(k) = run.input(t);
+    rows.y.col(k) = model.output(rows.x.col(k), rows.u.col(k));
+    if (!rows.y.col(k).allFinite()) {
+      FLYBALL_CHECK(model.check(rows.x.col(k), rows.u.col(k), where, t));
     }
   }
-  result.series = TimeSeries(std::move(time));
-  const auto add = [&](std::string_view prefix, const std::vector<Coordinate>& coordinates,
-                       const Eigen::MatrixXd& rows) -> Expected<void> {
-    for (std::size_t i = 0; i < coordinates.size(); ++i) {
-      const Eigen::VectorXd row = rows.row(static_cast<Index>(i));
-      FLYBALL_CHECK(result.series.add(std::string(prefix) + coordinates[i].name,
-                                      coordinates[i].unit, {row.begin(), row.end()}));
-    }
-    return {};
-  };
-  FLYBALL_CHECK(add("", names.states, x));
-  if (!job.outputs_are_states) {
-    FLYBALL_CHECK(add("output_", names.outputs, y));
-  }
-  FLYBALL_CHECK(add("applied_", names.inputs, u));
-  summarize(result);
-  return result;
+  return recorded(described(model.names(), job.path, run, job.outputs_are_states), std::move(rows));
 }
 
 Expected<Simulation> simulate_closed_loop(const ModelJob& job, const ModelRegulator& regulator) {
   const ModelRun& run = job.run;
   const AnyModel& model = job.model;
-  FLYBALL_TRY(const Index periods, steps_of(run.duration, job.period));
-  VectorXd reference = job.reference;
-  for (Index i = 0; i < reference.size(); ++i) {
-    reference(i) = std::isnan(reference(i)) ? regulator.point.x(i) : reference(i);
+  if (run.duration < job.period) {
+    return refusal(ArgumentError::out_of_range, where, "simulation.duration")
+        .got(fmt::format("{} s", format_number(run.duration)))
+        .expected(
+            fmt::format("at least a period of the controller, {} s", format_number(job.period)));
   }
+  FLYBALL_TRY(
+      const Index periods,
+      steps_of(run.duration, job.period, 3 * (model.states() + model.inputs() + model.outputs())));
   ClosedLoop loop{.period = Time(job.period),
-                  .reference = reference.replicate(1, periods + 1),
+                  .reference = or_else(job.reference, regulator.point.x).replicate(1, periods + 1),
                   .record_step = Time(job.period),
                   .seed = run.seed};
   for (std::size_t i = 0; i < run.noise.size(); ++i) {
@@ -272,50 +305,43 @@ Expected<Simulation> simulate_closed_loop(const ModelJob& job, const ModelRegula
   for (Index i = 0; i < job.limit.size(); ++i) {
     loop.actuators.push_back({.min = -job.limit(i), .max = job.limit(i), .delay = Time(job.delay)});
   }
-  FLYBALL_TRY(auto plant,
-              ModelPlant::create(model, run.initial_is_given ? run.initial : regulator.point.x,
-                                 {.accuracy = run.accuracy}));
+  FLYBALL_TRY(auto plant, ModelPlant::create(model, or_else(run.initial, regulator.point.x),
+                                             {.accuracy = run.accuracy}));
   FLYBALL_TRY(auto law, Regulating::create(job, regulator));
   auto looped = flyball::simulate_closed_loop(plant, law, loop);
   if (!looped) {
-    return named(std::move(looped).error(), job);
+    return tl::unexpected(std::move(looped).error().in(std::string(where)));
   }
-  Simulation result = described(job);
+  Simulation result = described(model.names(), job.path, run, job.outputs_are_states);
   result.closed_loop = true;
   result.period = job.period;
-  result.duration = run.duration;
+  result.limits.assign(job.limit.begin(), job.limit.end());
   result.series = std::move(looped->series);
+  result.duration = result.series.time().back();
   result.diagnostics = regulator.diagnostics;
   summarize(result);
   return result;
 }
 
 ExpectedAll<Simulation> simulate(const Project& project) {
-  if (project.model_job) {
+  const auto run = [&]() -> Expected<Simulation> {
+    if (!project.model_job) {
+      return project.mechanism_run.closed_loop ? mechanism_closed_loop(project)
+                                               : mechanism_open_loop(project);
+    }
     const ModelJob& job = *project.model_job;
     if (!job.run.closed_loop) {
       return simulate_open_loop(job);
     }
     FLYBALL_TRY(const auto regulator, regulate(job));
     return simulate_closed_loop(job, regulator);
-  }
-  if (project.plant_error) {
+  };
+  if (!project.model_job && project.plant_error) {
     return tl::unexpected(*project.plant_error);
   }
-  const SimulationSection& said = project.simulation;
-  if (said.input.empty()) {
-    return mechanism_closed_loop(project);
-  }
-  double voltage = 0.0;
-  MechanismState state;
-  const bool turns = project.job.plant.unit == "rad";
-  const Dimension position = turns ? Dimension::angle : Dimension::length;
-  const Dimension velocity = turns ? Dimension::angular_velocity : Dimension::velocity;
-  FLYBALL_CHECK(take(said.input, "input", {{"voltage", Dimension::voltage, &voltage}}));
-  FLYBALL_CHECK(
-      take(said.initial, "initial",
-           {{"position", position, &state.position}, {"velocity", velocity, &state.velocity}}));
-  return mechanism_open_loop(project, voltage, state);
+  FLYBALL_TRY(auto result, run());
+  tell_unused(project.simulation, result);
+  return result;
 }
 
 Expected<ModelDesign> design_model(const ModelJob& job) {
@@ -323,13 +349,9 @@ Expected<ModelDesign> design_model(const ModelJob& job) {
   ModelDesign result{.job = job, .regulator = std::move(regulator), .simulation = {}};
   const ModelRegulator& made = result.regulator;
   ModelRun& run = result.job.run;
-  if (!run.initial_is_given) {
+  if (run.initial.array().isNaN().all()) {
     constexpr double share = 0.2;
-    run.initial = made.point.x;
-    for (Index i = 0; i < run.initial.size(); ++i) {
-      run.initial(i) += share / std::sqrt(made.Q(i, i));
-    }
-    run.initial_is_given = true;
+    run.initial = made.point.x.array() + share * made.Q.diagonal().array().rsqrt();
     note(result.regulator.diagnostics, "assumed",
          "the simulation begins a fifth of each tolerance beside the point (simulation.initial "
          "says another)");

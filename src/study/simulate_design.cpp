@@ -34,16 +34,18 @@ namespace {
 constexpr double hold = 0.5;  // s after the motion, to see it settle
 constexpr double most_periods = 1e6;
 
-double periods_of(const DesignResult& design) {
-  return std::ceil((design.motion.duration + hold) / design.job.controller.period);
+double periods_of(const DesignResult& design, std::optional<double> duration) {
+  return std::ceil(duration.value_or(design.motion.duration + hold) / design.job.controller.period -
+                   1e-9);
 }
 
 }  // namespace
 
-std::vector<MotionState> reference_of(const DesignResult& design) {
+std::vector<MotionState> reference_of(const DesignResult& design, std::optional<double> duration) {
   const double T = design.job.controller.period;
   const double goal = design.motion.goal;
-  const auto rows = static_cast<std::size_t>(std::min(periods_of(design), most_periods)) + 1;
+  const auto rows =
+      static_cast<std::size_t>(std::min(periods_of(design, duration), most_periods)) + 1;
   std::vector<MotionState> reference(rows);
   if (design.job.plant.kind == MechanismKind::flywheel) {
     // A flywheel's motion is a ramp of its velocity.
@@ -68,12 +70,15 @@ Expected<MechanismResponse> simulate_design(const DesignResult& design, const De
   FLYBALL_CHECK(Checks(where)
                     .positive(trial.inertia_factor, "inertia_factor")
                     .positive(trial.gain_factor, "gain_factor")
+                    .positive(trial.duration.value_or(1.0), "duration", "s")
                     .not_negative(trial.measurement_noise, "measurement_noise"));
-  if (const double periods = periods_of(design); !(periods <= most_periods)) {
+  if (const double periods = periods_of(design, trial.duration); !(periods <= most_periods)) {
     return refusal(ArgumentError::out_of_range, where, "the motion")
         .got(fmt::format("{} periods of controller.period long", format_number(periods, 3)))
         .expected(fmt::format("at most {} of them", format_number(most_periods, 7)))
-        .hint("bring profile.goal nearer, raise profile.max_velocity, or lengthen the period");
+        .hint(
+            "bring profile.goal nearer, raise profile.max_velocity, shorten the duration or "
+            "lengthen the period");
   }
   const DesignJob& designed = design.job;
   MechanismLoop loop;
@@ -90,7 +95,8 @@ Expected<MechanismResponse> simulate_design(const DesignResult& design, const De
   loop.truth.sensor.resolution = designed.sensor.resolution;
   loop.truth.sensor.noise = trial.measurement_noise;
   loop.truth.sensor.delay = Time(designed.controller.delay.value_or(0.0));
-  loop.reference = reference_of(design);
+  loop.reference = reference_of(design, trial.duration);
+  loop.initial = trial.initial;
   loop.seed = trial.seed;
   return simulate_mechanism(loop);
 }

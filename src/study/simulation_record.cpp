@@ -76,13 +76,14 @@ void summarize(Simulation& result) {
   }
 }
 
-Expected<Eigen::Index> steps_of(double duration, double step) {
-  constexpr double most_rows = 1e6;
+Expected<Eigen::Index> steps_of(double duration, double step, Eigen::Index columns) {
+  constexpr double most_numbers = 2e7;
+  const double most_rows = std::min(1e6, most_numbers / static_cast<double>(columns));
   const double count = std::max(1.0, std::round(duration / step));
   if (!(count <= most_rows)) {
     return refusal(ArgumentError::out_of_range, "simulate", "the record")
         .got(fmt::format("{} rows long", format_number(count)))
-        .expected("at most a million rows")
+        .expected(fmt::format("at most {} rows", format_number(most_rows, 7)))
         .hint("simulate for less time, or in longer steps");
   }
   return static_cast<Eigen::Index>(count);

@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 
 #include <flyball/core/text.hpp>
-#include <flyball/math/expression/formula.hpp>
 
 #include "core/try.hpp"
 #include "study/read_value.hpp"
@@ -14,8 +13,6 @@
 namespace flyball::study {
 
 namespace {
-
-constexpr std::size_t most_errors = 20;
 
 struct Split {
   std::string_view parent;  // empty for a section of the root
@@ -28,21 +25,6 @@ Split split(std::string_view section) {
                                        : Split{section.substr(0, dot), section.substr(dot + 1)};
 }
 
-// The characters of a line, each with all its bytes; what is no text is a question mark, so that a
-// file cannot write on the terminal what it likes.
-std::vector<std::string> characters(std::string_view line) {
-  std::vector<std::string> all;
-  for (const char c : line) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (!all.empty() && byte >= 0x80 && byte < 0xc0) {
-      all.back() += c;
-    } else {
-      all.emplace_back(1, byte == '\t' ? ' ' : byte < 0x20 || byte == 0x7f ? '?' : c);
-    }
-  }
-  return all;
-}
-
 }  // namespace
 
 TomlDocument::TomlDocument(std::string_view text, std::string file)
@@ -51,10 +33,15 @@ TomlDocument::TomlDocument(std::string_view text, std::string file)
     root_ = toml::parse(text, file_);
   } catch (const toml::parse_error& problem) {
     is_toml_ = false;
+    std::string hint(problem.description());
+    if (const std::size_t saw = hint.find("saw '");
+        saw != std::string::npos && static_cast<unsigned char>(hint[saw + 5]) >= 0x80) {
+      hint += "; a name with such a letter stands in quotes";
+    } else if (hint.find("could not determine value type") != std::string::npos) {
+      hint += "; texts, quantities and formulas stand in quotes";
+    }
     found_.push_back({problem.source(),
-                      Error(ProjectError::syntax)
-                          .in(place(problem.source()))
-                          .hint(std::string(problem.description())),
+                      Error(ProjectError::syntax).in(place(problem.source())).hint(std::move(hint)),
                       true,
                       {}});
   }
@@ -69,12 +56,22 @@ void TomlDocument::apply(std::span<const Override> overrides, std::span<const Se
         if (known.back() != option) {
           continue;
         }
+        options_[name_of(section.name, field.key)] = option;
+        if (field.type == FieldType::map && text.find('=') == std::string::npos) {
+          found_.push_back({{},
+                            Error(ProjectError::wrong_value)
+                                .about(option)
+                                .got(fmt::format("\"{}\"", text))
+                                .expected("NAME=VALUE,…"),
+                            true,
+                            {}});
+          continue;
+        }
         // No section of a section has options.
         const auto [place, inserted] = root_.insert(section.name, toml::table{});
         if (toml::table* keys = place->second.as_table()) {
           insert_text(*keys, field, text);
         }
-        options_[name_of(section.name, field.key)] = option;
       }
     }
     if (std::find(known.begin(), known.end(), option) == known.end()) {
@@ -103,6 +100,9 @@ void TomlDocument::read(const Document& document, void* into) {
   check_names(root_, "", names);
   for (const Section& section : document.sections) {
     const auto [parent, key] = split(section.name);
+    if (writes(section.name) && refuse_other(section, nullptr)) {
+      continue;
+    }
     if (const toml::table* keys = table(section.name)) {
       read_section(section, *keys, document, into);
     } else if (const toml::node* other = node(parent, key); other != nullptr && parent.empty()) {
@@ -111,8 +111,7 @@ void TomlDocument::read(const Document& document, void* into) {
              Error(ProjectError::wrong_type)
                  .about(std::string(key))
                  .got("no section")
-                 .expected(fmt::format("a section, written [{}]", section.name)),
-             Fault::value);
+                 .expected(fmt::format("a section, written [{}]", section.name)));
     }
   }
 }
@@ -135,6 +134,9 @@ void TomlDocument::read_section(const Section& section, const toml::table& keys,
       }
       continue;
     }
+    if (refuse_other(section, &field)) {
+      continue;
+    }
     const bool is_section = std::any_of(
         document.sections.begin(), document.sections.end(),
         [&](const Section& other) { return other.name == name_of(section.name, field.key); });
@@ -146,14 +148,6 @@ void TomlDocument::read_section(const Section& section, const toml::table& keys,
     if (const toml::table* texts = value->as_table();
         texts != nullptr && field.type == FieldType::map) {
       field.access.set(object, named_texts(name_of(section.name, field.key), *texts));
-      continue;
-    }
-    if (dimensions.empty() && has("", "model")) {
-      refuse(section.name, field.key,
-             Error(ProjectError::wrong_value)
-                 .about(called)
-                 .got("for a mechanism")
-                 .hint("[model] has its names in tables: tolerance, limit, noise, resolution"));
       continue;
     }
     if (dimensions.empty()) {
@@ -170,10 +164,35 @@ void TomlDocument::read_section(const Section& section, const toml::table& keys,
       field.access.set(object, *read);
     } else {
       for (const QuotedError& wrong : read.error().all()) {
-        refuse(section.name, field.key, wrong, Fault::value);
+        refuse(section.name, field.key, wrong);
       }
     }
   }
+}
+
+bool TomlDocument::refuse_other(const Section& section, const Field* field) {
+  const Subject of =
+      field != nullptr && field->subject != Subject::any ? field->subject : section.subject;
+  if (of == Subject::any || of == subject()) {
+    return false;
+  }
+  const auto [parent, name] = split(section.name);
+  const std::string_view key = field != nullptr ? field->key : name;
+  const std::string_view within = field != nullptr ? section.name : parent;
+  if (field != nullptr || parent.empty()) {
+    refuse(within, key,
+           Error(ProjectError::wrong_value)
+               .about(this->name(within, key))
+               .got(of == Subject::model ? "for a model by formula" : "for a mechanism")
+               .hint(of == Subject::model
+                         ? "the file has no [model]; a mechanism has state_tolerance, max_voltage, "
+                           "[sensor] and [profile]"
+                     : section.subject == Subject::any
+                         ? "[model] has its names in tables: tolerance, limit, reference, initial"
+                         : "a file has [model] or [mechanism], not both"),
+           Fault::key);
+  }
+  return true;
 }
 
 NamedTexts TomlDocument::named_texts(const std::string& section, const toml::table& keys) {
@@ -197,8 +216,7 @@ NamedTexts TomlDocument::named_texts(const std::string& section, const toml::tab
              Error(ProjectError::wrong_type)
                  .about(name(section, key->str()))
                  .got("no text")
-                 .expected("a text in quotes"),
-             Fault::value);
+                 .expected("a text in quotes"));
       continue;
     }
     texts.push_back({std::string(key->str()), std::move(text)});
@@ -229,108 +247,6 @@ void TomlDocument::check_names(const toml::table& names, std::string_view sectio
   }
 }
 
-void TomlDocument::refuse(std::string_view section, std::string_view key, Error error,
-                          Fault fault) {
-  const toml::table* keys = table(section);
-  toml::source_region source = source_of(section);
-  auto option = options_.find(name_of(section, key));
-  if (option == options_.end()) {
-    option = options_.find(section);  // of a table whose keys a person chooses
-  }
-  if (option != options_.end()) {
-    error = std::move(error).in(option->second == error.subject() ? "" : option->second);
-    found_.push_back({{}, std::move(error), true, {}});
-    return;
-  }
-  if (keys != nullptr && keys->contains(key)) {
-    source = fault == Fault::key ? keys->find(key)->first.source() : keys->get(key)->source();
-  }
-  found_.push_back({source, std::move(error).in(place(source)), true, {}});
-}
-
-void TomlDocument::refuse_part(std::string_view section, std::string_view key, Error error) {
-  const toml::node* value = node(section, key);
-  const auto evidence = [&](std::string_view of) {
-    for (const Evidence& one : error.evidence()) {
-      if (one.name == of && one.values.size() == 1) {
-        return static_cast<std::size_t>(one.values.front());
-      }
-    }
-    return std::string::npos;
-  };
-  const std::size_t offset = evidence("offset");
-  if (value == nullptr || !value->is_string() || offset == std::string::npos) {
-    refuse(section, key, std::move(error));
-    return;
-  }
-  const std::string text = *value->value_exact<std::string>();
-  toml::source_region source = value->source();
-  const std::string_view line = line_of(source.begin.line);
-  // Where the text stands in the file as it is, between quotes, its parts have places of their own.
-  const std::vector<std::string> all = characters(line);
-  const std::size_t begin = std::min<std::size_t>(source.begin.column, all.size());
-  const std::vector<std::string> written = characters(text);
-  const bool as_it_is =
-      source.begin.line != 0 && begin + written.size() < all.size() &&
-      std::equal(written.begin(), written.end(), all.begin() + static_cast<std::ptrdiff_t>(begin));
-  if (!as_it_is) {
-    const std::string lines = expression::caret_lines(text, error);
-    refuse(section, key, std::move(error), Fault::value);
-    found_.back().excerpt = lines;
-    return;
-  }
-  const auto count = [&](std::size_t from, std::size_t bytes) {
-    return static_cast<toml::source_index>(
-        characters(std::string_view(text).substr(std::min(from, text.size()), bytes)).size());
-  };
-  source.begin.column = source.begin.column + 1 + count(0, offset);
-  source.end = source.begin;
-  source.end.column += std::max<toml::source_index>(count(offset, evidence("length")), 1);
-  found_.push_back({source, std::move(error).in(place(source)), true, {}});
-}
-
-Error TomlDocument::missing(std::string_view section, std::string_view key,
-                            std::string hint) const {
-  return refusal(ProjectError::missing_key, place(source_of(section)), name(section, key))
-      .got("missing")
-      .hint(std::move(hint));
-}
-
-void TomlDocument::miss(std::string_view section, std::string_view key, std::string hint) {
-  if (std::find(meant_.begin(), meant_.end(), name_of(section, key)) != meant_.end()) {
-    return;
-  }
-  found_.push_back({source_of(section), missing(section, key, std::move(hint)), false, {}});
-}
-
-std::optional<Errors> TomlDocument::errors() const {
-  if (found_.empty()) {
-    return std::nullopt;
-  }
-  std::vector<const Found*> sorted;
-  for (const Found& found : found_) {
-    sorted.push_back(&found);
-  }
-  std::stable_sort(sorted.begin(), sorted.end(), [](const Found* a, const Found* b) {
-    return std::tie(a->source.begin.line, a->source.begin.column) <
-           std::tie(b->source.begin.line, b->source.begin.column);
-  });
-  std::vector<QuotedError> all;
-  for (const Found* found : sorted) {
-    if (all.size() == most_errors) {
-      all.push_back({Error(ProjectError::more_errors)
-                         .in(file_)
-                         .with("number", static_cast<double>(sorted.size() - most_errors)),
-                     {}});
-      break;
-    }
-    all.push_back({found->error, !found->excerpt.empty() ? found->excerpt
-                                 : found->quote          ? excerpt(found->source)
-                                                         : ""});
-  }
-  return Errors(std::move(all));
-}
-
 const toml::table* TomlDocument::table(std::string_view section) const {
   if (section.empty()) {
     return &root_;
@@ -345,53 +261,21 @@ const toml::node* TomlDocument::node(std::string_view section, std::string_view 
   return keys == nullptr ? nullptr : keys->get(key);
 }
 
-toml::source_region TomlDocument::source_of(std::string_view section) const {
-  const toml::table* keys = table(section);
-  return keys == nullptr ? root_.source() : keys->source();
-}
-
 bool TomlDocument::writes(std::string_view section) const {
   const auto [parent, name] = split(section);
   const toml::node* found = node(parent, name);
   return found != nullptr && found->source().begin.line != 0;
 }
 
-std::string TomlDocument::place(const toml::source_region& source) const {
-  return source.begin.line == 0
-             ? file_
-             : fmt::format("{}:{}:{}", file_, source.begin.line, source.begin.column);
+bool TomlDocument::is_new(std::string_view section, std::string_view key) const {
+  const toml::table* keys = table(section);
+  return keys != nullptr && keys->contains(key) && keys->find(key)->first.source().begin.line == 0;
 }
 
 std::string TomlDocument::name(std::string_view section, std::string_view key) const {
   std::string full = name_of(section, key);
   const auto option = options_.find(full);
   return option == options_.end() ? full : option->second;
-}
-
-std::string_view TomlDocument::line_of(toml::source_index number) const {
-  std::string_view rest = text_;
-  for (toml::source_index line = 1; line < number; ++line) {
-    rest.remove_prefix(std::min(rest.find('\n'), rest.size() - 1) + 1);
-  }
-  return rest.substr(0, rest.find_first_of("\r\n"));
-}
-
-std::string TomlDocument::excerpt(const toml::source_region& source) const {
-  if (source.begin.line == 0) {
-    return "";
-  }
-  const std::vector<std::string> line = characters(line_of(source.begin.line));
-  // Of a long line, what stands about the place.
-  constexpr std::size_t widest = 100;
-  const std::size_t at = std::min<std::size_t>(source.begin.column - 1, line.size());
-  const std::size_t first = line.size() > widest && at > widest / 2 ? at - widest / 2 : 0;
-  const std::span<const std::string> shown =
-      std::span(line).subspan(first, std::min(widest, line.size() - first));
-  const bool one_line = source.end.line == source.begin.line && source.end.column > at + 1;
-  const std::size_t length = one_line ? source.end.column - 1 - at : 1;
-  return fmt::format("{:>5} | {}\n{:>5} | {}{}", source.begin.line, fmt::join(shown, ""), "",
-                     std::string(at - first, ' '),
-                     std::string(std::clamp<std::size_t>(length, 1, widest), '^'));
 }
 
 }  // namespace flyball::study

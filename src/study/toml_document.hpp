@@ -33,6 +33,12 @@ class TomlDocument {
   [[nodiscard]] bool is_toml() const { return is_toml_; }
   /// Whether the file has a section, or what is none in its place; not only the command line.
   [[nodiscard]] bool writes(std::string_view section) const;
+  /// What the file is about: a model if it has one.
+  [[nodiscard]] Subject subject() const {
+    return writes("model") ? Subject::model : Subject::mechanism;
+  }
+  /// Whether a key is the command line's alone.
+  [[nodiscard]] bool is_new(std::string_view section, std::string_view key) const;
   [[nodiscard]] bool has(std::string_view section, std::string_view key) const {
     return node(section, key) != nullptr;
   }
@@ -44,7 +50,7 @@ class TomlDocument {
   enum class Fault { key, value };
   /// Keeps an error with the place of what is wrong in the file, or its option.
   void refuse(std::string_view section, std::string_view key, Error error,
-              Fault fault = Fault::key);
+              Fault fault = Fault::value);
   /// The same of a part of a text: evidence `offset` and `length`, in bytes, say which.
   void refuse_part(std::string_view section, std::string_view key, Error error);
   /// An error about a key that should be there, with the section's place.
@@ -72,6 +78,8 @@ class TomlDocument {
   [[nodiscard]] std::string excerpt(const toml::source_region& source) const;
   /// The texts of a table, in the order of the file; what is no text is refused.
   [[nodiscard]] NamedTexts named_texts(const std::string& section, const toml::table& keys);
+  /// Refuses what is about the other kind of file. @return Whether it was.
+  bool refuse_other(const Section& section, const Field* field);
   void check_names(const toml::table& names, std::string_view section,
                    std::span<const std::string_view> known);
   void read_section(const Section& section, const toml::table& keys, const Document& document,

@@ -87,6 +87,8 @@ std::string write_project(const Project& project, std::string_view heading,
                           std::span<const KeyComment> comments) {
   const Document& document = project_document();
   const auto signals = document.signals(&project);
+  const Subject subject = project.model.states.empty() ? Subject::mechanism : Subject::model;
+  const auto is_other = [&](Subject of) { return of != Subject::any && of != subject; };
   std::string text;
   for (const std::string_view line : text::split(heading, "\n")) {
     text += fmt::format("# {}\n", line);
@@ -95,11 +97,14 @@ std::string write_project(const Project& project, std::string_view heading,
     const void* object = find(section, &project);
     const bool wanted = sections.empty() ||
                         std::find(sections.begin(), sections.end(), section.name) != sections.end();
-    if (object == nullptr || !wanted) {
+    if (object == nullptr || !wanted || is_other(section.subject)) {
       continue;
     }
     std::string lines;
     for (const Field& field : section.fields) {
+      if (is_other(field.subject)) {
+        continue;
+      }
       const std::string value = written(field.access.get(object), dimensions_of(field, signals));
       const auto comment = std::find_if(comments.begin(), comments.end(), [&](const auto& entry) {
         return entry.key == name_of(section.name, field.key);

@@ -45,7 +45,16 @@ TEST_F(Command, SimulatesAMechanism) {
   EXPECT_GT(Json::parse(open.out).at("states")[0].at("final").get<double>(), 0.1);
   const Answer wrong = run("simulate " + example("elevator.toml") + " --input volts=6V");
   EXPECT_EQ(wrong.status, 2);
-  EXPECT_TRUE(holds(wrong.err, "its input is voltage")) << wrong.err;
+  EXPECT_TRUE(holds(wrong.err, "\"volts\" is not an input; there are voltage")) << wrong.err;
+}
+
+TEST_F(Command, RefusesOptionsOfAMechanismForAModel) {
+  for (const char* command : {"simulate", "analyze", "design"}) {
+    const Answer answer =
+        run(std::string(command) + " " + example("pendulum.toml") + " --mass 3kg");
+    EXPECT_EQ(answer.status, 2) << command;
+    EXPECT_TRUE(holds(answer.err, "--mass is for a mechanism")) << answer.err;
+  }
 }
 
 TEST_F(Command, AnalysesAndRegulatesAModelByFormula) {

@@ -44,7 +44,9 @@ FieldValue any_value(const Field& field, std::size_t states) {
       return values;
     }
     case FieldType::text:
-      return field.key == "motor" ? std::string("Kraken X60 FOC") : any_text();
+      return field.key == "motor"  ? std::string("Kraken X60 FOC")
+             : field.key == "unit" ? std::string("rotations")
+                                   : any_text();
     case FieldType::whole:
       return *rc::gen::inRange<long long>(field.least, 1LL << 62);
     case FieldType::flag:
@@ -56,14 +58,27 @@ FieldValue any_value(const Field& field, std::size_t states) {
   return {};
 }
 
+/// Whether a key means something for a kind of mechanism.
+bool is_of(const MechanismRow& row, const Section& section, const Field& field) {
+  const auto needs = [&](const MechanismRow& one) {
+    return std::find(one.needs.begin(), one.needs.end(), field.key) != one.needs.end();
+  };
+  if (section.name == "mechanism") {
+    return needs(row) || std::none_of(mechanism_rows().begin(), mechanism_rows().end(), needs);
+  }
+  return field.subject != Subject::model &&
+         (field.key != "kG" || row.kind != mechanisms::MechanismKind::flywheel) &&
+         (field.key != "angle_offset" || row.kind == mechanisms::MechanismKind::arm);
+}
+
 /// Any values in any fields, as far as they make a mechanism.
 Project any_project(mechanisms::MechanismKind kind) {
   Project project;
-  const std::size_t states = mechanism_row(kind).signals.states.size();
+  const MechanismRow& row = mechanism_row(kind);
+  const std::size_t states = row.signals.states.size();
   const bool custom = *rc::gen::arbitrary<bool>();
   for (const Section& section : project_document().sections) {
-    const bool of_a_model = section.name == "model" || section.name == "point";
-    if (of_a_model || (section.name == "mechanism.motor" && !custom)) {
+    if (section.subject == Subject::model || (section.name == "mechanism.motor" && !custom)) {
       continue;
     }
     void* object = section.within(&project, true);
@@ -71,13 +86,17 @@ Project any_project(mechanisms::MechanismKind kind) {
       const bool is_kind = !field.choices.empty();
       const bool motor_name = field.key == "motor" && custom;
       if (!motor_name && !is_kind && (field.required || *rc::gen::arbitrary<bool>()) &&
-          field.type != FieldType::map) {
+          field.type != FieldType::map && is_of(row, section, field)) {
         field.access.set(object, any_value(field, states));
       }
     }
   }
   project.parts.type = kind;
-  project.parts.motor_count = *rc::gen::inRange(1, 5);
+  if (custom || !project.parts.motor.empty()) {
+    project.parts.motor_count = *rc::gen::inRange(1, 5);
+  } else {
+    project.parts.motor_count.reset();
+  }
   if (project.parts.mass == Mass(0.0)) {
     project.parts.mass.reset();  // of an arm alone
   }

@@ -45,7 +45,7 @@ struct SimulationSection {
   std::optional<double> duration{};  ///< s
   std::optional<double> step{};      ///< s, between the rows of the record.
   std::optional<double> accuracy{};  ///< Relative, of an open loop.
-  bool closed_loop = false;
+  std::optional<bool> closed_loop{};
   NamedTexts initial{}, input{}, noise{}, resolution{};
 };
 
@@ -71,8 +71,7 @@ struct ModelRun {
   std::optional<double> step{};
   double accuracy = 1e-8;
   bool closed_loop = false;
-  Eigen::VectorXd initial{};      ///< n; where it starts.
-  bool initial_is_given = false;  ///< If not, it is the point.
+  Eigen::VectorXd initial{};  ///< n, where it starts; NaN: the point.
   InputSignals input{};
   std::vector<double> noise{};       ///< Standard deviation of a reading of each output.
   std::vector<double> resolution{};  ///< Smallest step of a reading of each output.

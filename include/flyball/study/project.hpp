@@ -71,7 +71,8 @@ struct Project {
   DesignJob job;  ///< Its plant comes from the parts and the gains.
   /// Why the file does not define a mechanism, if it does not: all that is missing.
   std::optional<Errors> plant_error{};
-  std::optional<ModelJob> model_job{};  ///< What a file with [model] describes.
+  std::optional<ModelJob> model_job{};          ///< What a file with [model] describes.
+  ModelRun mechanism_run{.closed_loop = true};  ///< What [simulation] says of a mechanism.
 };
 
 /// Reads a project file. @param overrides  They are checked like the file's own values.

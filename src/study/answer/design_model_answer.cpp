@@ -214,7 +214,7 @@ Answer answer_of(const ModelDesign& result) {
       json.add("R", regulator.R);
     });
     json.object("simulation", [&] { write_simulation(json, result.simulation); });
-    json.add("diagnostics", regulator.diagnostics);
+    json.add("diagnostics", result.simulation.diagnostics);
   });
   answer.json = std::move(json).text();
   Document& document = answer.document;
@@ -222,8 +222,8 @@ Answer answer_of(const ModelDesign& result) {
   document.verdict = verdict_of(result);
   document.sections = {point_section(regulator.point, names), plant_section(result),
                        controller_section(result), simulation_section(result.simulation)};
-  if (!regulator.diagnostics.empty()) {
-    document.sections.push_back(diagnostics_section(regulator.diagnostics));
+  if (!result.simulation.diagnostics.empty()) {
+    document.sections.push_back(diagnostics_section(result.simulation.diagnostics));
   }
   document.origins.add("model", result.job.path);
   document.origins.add("seed", fmt::to_string(result.job.run.seed));
