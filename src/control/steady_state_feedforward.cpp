@@ -7,6 +7,7 @@
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/ordinary_units.hpp"
 
 namespace flyball {
 
@@ -25,7 +26,17 @@ Expected<SteadyStateFeedforward<>> solve(const MatrixRef& A, const MatrixRef& B,
   balance << A, B, C, D;
   Eigen::MatrixXd target = Eigen::MatrixXd::Zero(n + p, p);
   target.bottomRows(p).setIdentity();
-  const Eigen::MatrixXd N = detail::solve_least_squares(balance, target);
+  // Columns of a size that would hide the others: their unknowns in other units.
+  Eigen::VectorXi units(n + m);
+  Eigen::MatrixXd scaled = balance;
+  for (Eigen::Index j = 0; j < n + m; ++j) {
+    units(j) = detail::unit_of(balance.col(j));
+    scaled.col(j) = detail::times_power(balance.col(j), -units(j));
+  }
+  Eigen::MatrixXd N = detail::solve_least_squares(scaled, target);
+  for (Eigen::Index j = 0; j < n + m; ++j) {
+    N.row(j) = detail::times_power(N.row(j), -units(j));
+  }
   const Eigen::MatrixXd rest = detail::product(balance, N) - target;
   const Eigen::MatrixXd terms = balance.cwiseAbs() * N.cwiseAbs();
   for (Eigen::Index j = 0; j < p; ++j) {

@@ -8,6 +8,7 @@
 
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/equations/sylvester_operator.hpp"
 #include "math/extended/double_double.hpp"
 
 namespace flyball {
@@ -56,7 +57,8 @@ std::optional<Filter> corrected(const MatrixRef& A, const MatrixRef& C, const Ei
   for (int step = 0; step < most_steps && update; ++step) {
     const DoubleDoubleMatrix predicted = add_product(q, 1.0, product(a, update->P), a.transpose());
     const DoubleDoubleMatrix loop = add_product(a, -1.0, product(a, update->K), c);
-    const auto missing = discrete_lyapunov(loop.rounded(), sum(predicted, -1.0, p).rounded());
+    const auto missing =
+        detail::discrete_lyapunov_correction(loop.rounded(), sum(predicted, -1.0, p).rounded());
     if (!missing || !(missing->X.norm() <= small * P.norm())) {
       break;
     }

@@ -22,8 +22,11 @@ TEST(SolveSystems, H2Norm) {
 
 // An answer that overflows is no answer; where infinity says something it stays.
 TEST(SolveSystems, WhatOverflowsIsRefused) {
-  EXPECT_EQ(refusal("steady-state-feedforward", R"({"A":[[1]],"B":[[1e200]],"C":[[1]]})"),
+  EXPECT_EQ(refusal("steady-state-feedforward", R"({"A":[[1]],"B":[[1e-310]],"C":[[1]]})"),
             "overflow");
+  EXPECT_EQ(
+      entry(answer("steady-state-feedforward", R"({"A":[[1]],"B":[[1e200]],"C":[[1]]})"), "N_u"),
+      -1e-200);
   const Json analysis =
       answer("analyze", R"({"A":[[-1]],"B":[[0]],"C":[[1]],"domain":"continuous"})");
   EXPECT_EQ(analysis.at("controllability_condition"), "inf");

@@ -49,7 +49,8 @@ struct Problem {
   MatrixXd A;
   std::optional<MatrixXd> B;
   MatrixXd F;
-  bool symmetric;  ///< X is to be so to the last bit.
+  bool symmetric;       ///< X is to be so to the last bit.
+  bool coarse = false;  ///< Its first digits are what is wanted: as a correction of another.
 };
 
 /// Neither huge nor tiny: the squares of such numbers are sums' terms without a loss.
@@ -219,7 +220,7 @@ Expected<LinearMatrixSolution> solve_carefully(const Problem& given, std::string
       return;
     }
     const detail::BackwardError its = equation.backward_error(units.there(X), p.F);
-    if (its.strict < error.strict && holds(InOtherUnits(given, false), X)) {
+    if (its.strict < error.strict && (given.coarse || holds(InOtherUnits(given, false), X))) {
       best = {X, its.in_context, solution.condition};
       error = its;
     }
@@ -255,7 +256,7 @@ Expected<LinearMatrixSolution> solve_carefully(const Problem& given, std::string
 }
 
 Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A, const MatrixRef& Q,
-                                              std::string_view where) {
+                                              std::string_view where, bool coarse = false) {
   FLYBALL_CHECK(Checks(where)
                     .square(A, "A")
                     .shape(Q, A.rows(), A.rows(), "Q", "states x states")
@@ -264,7 +265,7 @@ Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A,
   const bool symmetric = Q == Q.transpose();
   const MatrixXd F = -Q;
   if (!is_ordinary(A) || !is_ordinary(Q)) {
-    return solve_carefully({domain, A, std::nullopt, F, symmetric}, where);
+    return solve_carefully({domain, A, std::nullopt, F, symmetric, coarse}, where);
   }
   LinearMatrixSolution solution;
   if (is_symmetric_but_for_rounding(Q) && A.outerStride() == A.rows() &&
@@ -283,7 +284,7 @@ Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A,
   if (solve_quickly(domain, A, nullptr, F, symmetric, solution)) {
     return solution;
   }
-  return solve_carefully({domain, A, std::nullopt, F, symmetric}, where);
+  return solve_carefully({domain, A, std::nullopt, F, symmetric, coarse}, where);
 }
 
 Expected<LinearMatrixSolution> solve_sylvester(Domain domain, const MatrixRef& A,
@@ -325,6 +326,15 @@ Expected<LinearMatrixSolution> lyapunov(const MatrixRef& A, const MatrixRef& Q) 
 Expected<LinearMatrixSolution> discrete_lyapunov(const MatrixRef& A, const MatrixRef& Q) {
   return solve_lyapunov(Domain::discrete, A, Q, "discrete_lyapunov");
 }
+
+namespace detail {
+
+Expected<LinearMatrixSolution> discrete_lyapunov_correction(const MatrixRef& A,
+                                                            const MatrixRef& Q) {
+  return solve_lyapunov(Domain::discrete, A, Q, "discrete_lyapunov", true);
+}
+
+}  // namespace detail
 
 Expected<LinearMatrixSolution> sylvester(const MatrixRef& A, const MatrixRef& B,
                                          const MatrixRef& C) {
