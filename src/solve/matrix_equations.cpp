@@ -7,6 +7,7 @@
 
 #include "core/try.hpp"
 #include "solve/row.hpp"
+#include "solve/sensitivity.hpp"
 
 // Matrix equations and functions of matrices.
 namespace flyball::solve {
@@ -62,19 +63,29 @@ Outcome solve_sylvester(const Problem& problem, JsonWriter& answer) {
                       answer);
 }
 
-Outcome write_matrix(Expected<MatrixXd> solved, JsonWriter& answer) {
-  FLYBALL_TRY(const MatrixXd& X, std::move(solved));
+/// The X that `function` makes of A, and what A's last digits do to it.
+template <class Function>
+Outcome write_function(const Problem& problem, Function&& function, JsonWriter& answer) {
+  const MatrixXd& A = problem.matrix("A");
+  FLYBALL_TRY(const MatrixXd X, function(A));
+  FLYBALL_TRY(const double error, error_of([&](int draw) {
+                return function(in_its_last_digits(A, draw)).map([&](const MatrixXd& other) {
+                  return relative_difference(X, other);
+                });
+              }));
   answer.add("X", X);
+  answer.add("relative_error", error);
   return {};
 }
 
 template <auto Function>
 Outcome solve_function(const Problem& problem, JsonWriter& answer) {
-  return write_matrix(Function(problem.matrix("A")), answer);
+  return write_function(problem, Function, answer);
 }
 
 Outcome solve_powm(const Problem& problem, JsonWriter& answer) {
-  return write_matrix(powm(problem.matrix("A"), problem.number("power")), answer);
+  const double power = problem.number("power");
+  return write_function(problem, [power](const MatrixRef& A) { return powm(A, power); }, answer);
 }
 
 }  // namespace
@@ -95,7 +106,8 @@ std::vector<Kind> matrix_equation_kinds() {
   const std::vector<Field> sylvester_answer{matrix("X", "a", "b", "the solution"), field::residual,
                                             field::condition};
   const std::vector<Field> square{matrix("A", "n", "n", "square")};
-  const std::vector<Field> function_answer{matrix("X", "n", "n", "the function of A")};
+  const std::vector<Field> function_answer{matrix("X", "n", "n", "the function of A"),
+                                           field::error};
   return {
       {"dare", "AᵀXA - X - (AᵀXB + N)(R + BᵀXB)⁻¹(BᵀXA + Nᵀ) + Q = 0 for X", riccati,
        riccati_answer,

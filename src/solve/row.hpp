@@ -120,6 +120,8 @@ inline constexpr Field any_period = or_number(period, 1.0);
 
 inline constexpr Field residual =
     number("residual", "", "what is left of the equation over the sum of its terms' norms");
+inline constexpr Field error = number(
+    "relative_error", "", "how much the last digits of the data move the answer, relative to it");
 inline constexpr Field condition = unbounded(number(
     "condition", "", "how much relative errors of the data grow in the answer, an estimate"));
 

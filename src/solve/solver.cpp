@@ -17,6 +17,8 @@ using Json = nlohmann::json;
 ErrorInfo error_info(SolveError code) {
   static constexpr flyball::detail::ErrorRow rows[] = {
       {"overflow", "the answer is too large for a double", ErrorKind::no_answer},
+      {"not_determined", "the last digits of the data decide about the answer",
+       ErrorKind::no_answer},
   };
   return flyball::detail::info_of(code, "solve", rows);
 }

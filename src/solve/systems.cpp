@@ -11,6 +11,7 @@
 
 #include "core/try.hpp"
 #include "solve/row.hpp"
+#include "solve/sensitivity.hpp"
 #include "solve/structure_answer.hpp"
 
 // Systems: conversions and what they are like.
@@ -37,7 +38,17 @@ Outcome solve_c2d(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const auto conversion, conversion_of(problem));
   FLYBALL_TRY(const auto discrete,
               convert_to_discrete(plant, period, conversion.method, conversion.prewarp));
+  FLYBALL_TRY(const double error, error_of([&](int draw) {
+                const ContinuousSystem<> other{in_its_last_digits(plant.A, draw),
+                                               in_its_last_digits(plant.B, draw), plant.C, plant.D};
+                return convert_to_discrete(other, period, conversion.method, conversion.prewarp)
+                    .map([&](const auto& moved) {
+                      return std::max(relative_difference(discrete.A, moved.A),
+                                      relative_difference(discrete.B, moved.B));
+                    });
+              }));
   write_system(discrete, answer);
+  answer.add("relative_error", error);
   if (problem.has("Q")) {
     FLYBALL_TRY(const auto noise, discretize(plant.A, ProcessDensity{problem.matrix("Q")}, period));
     answer.add("Q", noise);
@@ -157,7 +168,8 @@ std::vector<Kind> system_kinds() {
                optional(matrix("Q", "n", "n", "density of process noise", "state² s")),
                optional(matrix("R", "p", "p", "density of measurement noise", "output² s"))},
        answered_system("n", "m", "p") +
-           std::vector{optional(matrix("Q", "n", "n", "its covariance a sample (7.8)", "state²")),
+           std::vector{field::error,
+                       optional(matrix("Q", "n", "n", "its covariance a sample (7.8)", "state²")),
                        optional(matrix("R", "p", "p", "its covariance a sample (7.9)", "output²"))},
        R"({"A": [[0, 1], [0, -2]], "B": [[0], [3]], "T": 0.02, "Q": [[0, 0], [0, 1]], "R": [[1, 0], [0, 1]]})",
        &solve_c2d},

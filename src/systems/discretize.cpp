@@ -23,8 +23,8 @@ Expected<DiscretizedMatrices> discretize_zoh(const MatrixRef& A, const MatrixRef
   // exp([A B; 0 0] T) depends on the scale of B only through its upper right block, which is linear
   // in B: with B scaled to A's size, B cannot force squarings that A does not need.
   const double T = period.si();
-  const double size_A = A.cwiseAbs().rowwise().sum().maxCoeff();
-  const double size_B = m == 0 ? 0.0 : B.cwiseAbs().rowwise().sum().maxCoeff();
+  const double size_A = A.cwiseAbs().maxCoeff();
+  const double size_B = m == 0 ? 0.0 : B.cwiseAbs().maxCoeff();
   const double target = std::max(size_A, 1.0 / T);
   const double scale =
       size_B > 0.0 ? std::exp2(std::round(std::log2(target) - std::log2(size_B))) : 1.0;

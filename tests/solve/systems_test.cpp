@@ -229,5 +229,25 @@ TEST(SolveSystems, InterconnectionsAreRefused) {
       "not_positive");
 }
 
+// What the last digits of the data do to an answer is told, and where they decide there is none:
+// the angle of 1e20 rad has no digit behind the point.
+TEST(SolveSystems, AnswersTellTheirError) {
+  const auto rotation = [](const char* angle) {
+    return std::string(R"({"A":[[0,)") + angle + R"(],[-)" + angle + R"(,0]]})";
+  };
+  EXPECT_LT(number(answer("expm", rotation("1")), "relative_error"), 1e-15);
+  const double error = number(answer("expm", rotation("1e9")), "relative_error");
+  EXPECT_GT(error, 1e-8);
+  EXPECT_LT(error, 1e-6);
+  EXPECT_EQ(refusal("expm", rotation("1e20")), "not_determined");
+  EXPECT_EQ(refusal("c2d", R"({"A":[[0,1],[-1,0]],"B":[[0],[1]],"T":1e20})"), "not_determined");
+  // A stiff motor for eleven days, in 60 digits.
+  const Json motor = answer("c2d", R"({"A":[[0,1,0],[0,-0.01,5000],[0,-20,-50000]],)"
+                                   R"("B":[[0],[0],[100000]],"T":1000000})");
+  EXPECT_LT(number(motor, "relative_error"), 1e-14);
+  EXPECT_NEAR(entry(motor, "B") / 4975121902.9227, 1.0, 1e-13);
+  EXPECT_EQ(entry(motor, "A"), 1.0);
+}
+
 }  // namespace
 }  // namespace flyball::solve

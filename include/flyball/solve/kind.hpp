@@ -66,7 +66,8 @@ struct Kind {
 
 /// Why a problem whose fields are as they must be has no answer, beside what its function says.
 enum class SolveError {
-  overflow,  ///< A number of the answer is beyond the range of a double (no_answer).
+  overflow,        ///< A number of the answer is beyond the range of a double (no_answer).
+  not_determined,  ///< The last digits of the data move the answer by more than 1e-4 of it.
 };
 [[nodiscard]] ErrorInfo error_info(SolveError code);
 
