@@ -28,4 +28,17 @@ template <class Derived>
   return (M * std::ldexp(1.0, half)) * std::ldexp(1.0, exponent - half);
 }
 
+/// M_ij 2^(row_i + column_j + all).
+[[nodiscard]] inline Eigen::MatrixXd times_powers(const Eigen::MatrixXd& M,
+                                                  const Eigen::VectorXi& row,
+                                                  const Eigen::VectorXi& column, int all) {
+  Eigen::MatrixXd scaled(M.rows(), M.cols());
+  for (Eigen::Index j = 0; j < M.cols(); ++j) {
+    for (Eigen::Index i = 0; i < M.rows(); ++i) {
+      scaled(i, j) = std::ldexp(M(i, j), row(i) + column(j) + all);
+    }
+  }
+  return scaled;
+}
+
 }  // namespace flyball::detail

@@ -7,6 +7,7 @@
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/ordinary_units.hpp"
 #include "math/equations/lyapunov_kernel.hpp"
 #include "math/equations/sylvester_kernel.hpp"
 #include "math/equations/sylvester_operator.hpp"
@@ -17,6 +18,7 @@ namespace {
 
 using detail::Domain;
 using detail::SylvesterOperator;
+using detail::times_powers;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -63,18 +65,6 @@ bool is_ordinary(const MatrixRef& M) {
 int exponent_of(const MatrixRef& M) {
   const double largest = M.cwiseAbs().maxCoeff();
   return largest > 0.0 ? std::ilogb(largest) : 0;
-}
-
-/// M_ij 2^(row_i + column_j + all).
-MatrixXd times_powers(const MatrixXd& M, const Eigen::VectorXi& row, const Eigen::VectorXi& column,
-                      int all) {
-  MatrixXd scaled(M.rows(), M.cols());
-  for (Index j = 0; j < M.cols(); ++j) {
-    for (Index i = 0; i < M.rows(); ++i) {
-      scaled(i, j) = std::ldexp(M(i, j), row(i) + column(j) + all);
-    }
-  }
-  return scaled;
 }
 
 /// The exponents of the powers of two that balance M, whatever its size.

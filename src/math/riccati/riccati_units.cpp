@@ -4,6 +4,7 @@
 
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/ordinary_units.hpp"
 #include "math/riccati/riccati_robust.hpp"
 
 namespace flyball::detail {
@@ -75,17 +76,6 @@ Units best_units(const RiccatiProblem& p) {
   };
   return {rounded(0, n), rounded(n, m), rounded(weight, 1)(0),
           p.continuous ? rounded(rate, 1)(0) : 0};
-}
-
-/// M_ij 2^(row_i + column_j + all).
-MatrixXd times_powers(const MatrixXd& M, const VectorXi& row, const VectorXi& column, int all) {
-  MatrixXd scaled(M.rows(), M.cols());
-  for (Index j = 0; j < M.cols(); ++j) {
-    for (Index i = 0; i < M.rows(); ++i) {
-      scaled(i, j) = std::ldexp(M(i, j), row(i) + column(j) + all);
-    }
-  }
-  return scaled;
 }
 
 /// The power of two of the largest entry.
