@@ -1,10 +1,46 @@
 #include <flyball/estimation/kalman_filter.tpp>
 
+#include <cmath>
+#include <string>
+
+#include "core/format.hpp"
 #include "core/try.hpp"
 
 namespace flyball {
 
 namespace detail {
+
+namespace {
+
+/// Whether the factors of P that are not negative are all of it.
+Expected<void> check_covariance(const Eigen::MatrixXd& P, std::string_view where,
+                                std::string_view name) {
+  constexpr double rounding = 1e-8;
+  const Eigen::VectorXd variances = P.diagonal();
+  Eigen::MatrixXd U;
+  Eigen::VectorXd d;
+  ud_factorize(P, U, d);
+  Eigen::MatrixXd product(P.rows(), P.cols());
+  ud_product(U, d, product);
+  for (Eigen::Index j = 0; j < P.cols(); ++j) {
+    if (!(std::abs(variances(j)) <= largest_variance)) {
+      return refusal(ArgumentError::out_of_range, where, detail::format("{}({}, {})", name, j, j))
+          .got(format_number(variances(j)))
+          .expected("a variance of at most 1e200");
+    }
+    for (Eigen::Index i = 0; i <= j; ++i) {
+      const double size = std::sqrt(std::abs(variances(i))) * std::sqrt(std::abs(variances(j)));
+      if (!(std::abs(product(i, j) - P(i, j)) <= rounding * size)) {
+        return refusal(ArgumentError::out_of_range, where, name)
+            .got(detail::format("negative in some direction: row {} and column {} show it", i, j))
+            .expected("positive semidefinite, as every covariance is");
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace
 
 Expected<void> check_kalman_filter(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
                                    const MatrixRef& D, Time period, const Covariance& Q,
@@ -30,7 +66,10 @@ Expected<void> check_kalman_filter(const MatrixRef& A, const MatrixRef& B, const
       .finite(P, "P0")
       .symmetric(Q0, "Q")
       .symmetric(R0, "R")
-      .symmetric(P, "P0");
+      .symmetric(P, "P0")
+      .also([&] { return check_covariance(Q0, where, "Q"); })
+      .also([&] { return check_covariance(R0, where, "R"); })
+      .also([&] { return check_covariance(P, where, "P0"); });
 }
 
 }  // namespace detail

@@ -6,15 +6,25 @@ namespace flyball {
 
 /// How an update ended.
 enum class UpdateStatus {
-  updated,              ///< The measurement is in the estimate.
-  not_finite,           ///< The measurement has a NaN or an infinity; it was left out.
+  updated,  ///< The measurement is in the estimate.
+  /// The measurement has a NaN, an infinity or what is beyond `largest_signal`, or would take the
+  /// estimate beyond it; it was left out.
+  not_finite,
   singular_innovation,  ///< C P Cᵀ + R is not positive definite; the measurement was left out.
 };
 
 /// The Kalman filter of a discrete plant. Theorem 9.6.3.
 ///
-/// Run-time object: noexcept, bounded, and for sizes known at compile time allocation-free. A size
-/// that the library does not ship needs <flyball/estimation/kalman_filter.tpp>.
+/// The covariance is carried as P = U D Uᵀ (Bierman and Thornton), so that it is symmetric and
+/// positive semidefinite whatever P0, Q and R are to each other: with R > 0 no finite measurement
+/// is refused. Correlated noises (R with entries beside the diagonal) are made independent once,
+/// and the measurements are then taken one after the other.
+///
+/// Run-time object: noexcept, bounded, finite whatever comes, and for sizes known at compile time
+/// allocation-free. A size that the library does not ship needs
+/// <flyball/estimation/kalman_filter.tpp>.
+/// Source: book, Theorem 9.6.3; Bierman, "Factorization Methods for Discrete Sequential Estimation"
+/// (1977), chapters 5 and 6.
 template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic, int Outputs = Eigen::Dynamic>
 class KalmanFilter {
  public:
@@ -27,7 +37,8 @@ class KalmanFilter {
 
   /// A filter that starts at x_hat = 0 with the error covariance P0.
   /// @param Q, R  Covariances per sample, n x n and p x p. @param P0  n x n.
-  /// @errors ArgumentError for shapes, entries and asymmetry.
+  /// @errors ArgumentError for shapes, entries and asymmetry; out_of_range for a covariance that is
+  ///         not positive semidefinite or has a variance beyond largest_signal².
   [[nodiscard]] static Expected<KalmanFilter> create(const Plant& plant, const Covariance& Q,
                                                      const Covariance& R, const Covariance& P0);
 
@@ -37,30 +48,43 @@ class KalmanFilter {
   [[nodiscard]] static Expected<KalmanFilter> steady_state(const Plant& plant, const Covariance& Q,
                                                            const Covariance& R);
 
-  /// x_hat = A x_hat + B u, P = A P Aᵀ + Q (9.20, 9.21).
-  void predict(const InputVector& u) noexcept;
+  /// x_hat = A x_hat + B u, P = A P Aᵀ + Q (9.20, 9.21). The factors D of P stay at 1e-200 at
+  /// least.
+  /// @param u  An input that is not a finite number counts as zero.
+  /// @return  Whether u was used and x_hat and P have moved: what would grow beyond
+  /// `largest_signal`
+  ///          (P: its square) stays where it is.
+  bool predict(const InputVector& u) noexcept;
 
-  /// Corrects with a measurement of now (9.22 to 9.24, Joseph's form), keeping P symmetric.
+  /// Corrects with a measurement of now (9.22 to 9.24).
   /// @param y  The measurement. @param u  The input at the time of it; only D uses it.
   UpdateStatus update(const OutputVector& y, const InputVector& u) noexcept;
 
   [[nodiscard]] const StateVector& x_hat() const noexcept { return x_hat_; }
   [[nodiscard]] const StateMatrix& P() const noexcept { return P_; }
   /// Starts again from x_hat; P stays unless it is given.
-  void reset(const StateVector& x_hat) noexcept { x_hat_ = x_hat; }
-  void reset(const StateVector& x_hat, const StateMatrix& P) noexcept {
-    x_hat_ = x_hat;
-    P_ = P;
-  }
+  /// @return  Whether they were taken: those that are not finite are not.
+  bool reset(const StateVector& x_hat) noexcept;
+  /// @param P  Symmetric, positive semidefinite; of another the part that is negative is left out.
+  bool reset(const StateVector& x_hat, const StateMatrix& P) noexcept;
 
  private:
-  KalmanFilter(const Plant& plant, StateMatrix Q, OutputMatrix R, StateMatrix P);
+  KalmanFilter(const Plant& plant, const StateMatrix& Q, const OutputMatrix& R,
+               const StateMatrix& P);
+  /// Takes new factors of P unless a variance is beyond the largest one.
+  bool take(const StateMatrix& U, const StateVector& d) noexcept;
 
-  Plant plant_;
-  StateMatrix Q_;
-  OutputMatrix R_;
+  Plant plant_;  ///< C and D of the independent measurements.
+  StateMatrix Q_factor_;
+  StateVector Q_variance_;
+  OutputMatrix R_factor_;
+  OutputVector R_variance_;
+  bool independent_;  ///< R is diagonal.
+  bool feedthrough_;  ///< D is not zero.
   StateVector x_hat_;
   StateMatrix P_;
+  StateMatrix U_;
+  StateVector d_;
 };
 
 /// `KalmanFilter::create` with the sizes of the plant.

@@ -1,9 +1,8 @@
 #pragma once
 
-#include <cmath>
-#include <utility>
-
+#include <flyball/core/signal.hpp>
 #include <flyball/estimation/kalman_filter.hpp>
+#include <flyball/estimation/ud_factors.hpp>
 
 namespace flyball {
 
@@ -15,60 +14,21 @@ namespace detail {
                                                  Time period, const Covariance& Q,
                                                  const Covariance& R, const Covariance& P0);
 
-/// S = L Lᵀ in the lower triangle; false if S is not positive definite to within rounding.
-template <class Matrix>
-[[nodiscard]] bool cholesky(Matrix& S) noexcept {
-  for (Eigen::Index j = 0; j < S.rows(); ++j) {
-    double pivot = S(j, j);
-    const double size = pivot;
-    for (Eigen::Index k = 0; k < j; ++k) {
-      pivot -= S(j, k) * S(j, k);
-    }
-    if (!(pivot > 1e-14 * size) || !std::isfinite(pivot)) {
-      return false;
-    }
-    S(j, j) = std::sqrt(pivot);
-    for (Eigen::Index i = j + 1; i < S.rows(); ++i) {
-      double entry = S(i, j);
-      for (Eigen::Index k = 0; k < j; ++k) {
-        entry -= S(i, k) * S(j, k);
-      }
-      S(i, j) = entry / S(j, j);
-    }
-  }
-  return true;
-}
-
-/// X <- X (L Lᵀ)⁻¹, row by row.
-template <class Factor, class Matrix>
-void solve_right(const Factor& L, Matrix& X) noexcept {
-  const Eigen::Index p = L.rows();
-  for (Eigen::Index row = 0; row < X.rows(); ++row) {
-    for (Eigen::Index i = 0; i < p; ++i) {
-      for (Eigen::Index k = 0; k < i; ++k) {
-        X(row, i) -= L(i, k) * X(row, k);
-      }
-      X(row, i) /= L(i, i);
-    }
-    for (Eigen::Index i = p; i-- > 0;) {
-      for (Eigen::Index k = i + 1; k < p; ++k) {
-        X(row, i) -= L(k, i) * X(row, k);
-      }
-      X(row, i) /= L(i, i);
-    }
-  }
-}
-
 }  // namespace detail
 
 template <int States, int Inputs, int Outputs>
-KalmanFilter<States, Inputs, Outputs>::KalmanFilter(const Plant& plant, StateMatrix Q,
-                                                    OutputMatrix R, StateMatrix P)
-    : plant_(plant),
-      Q_(std::move(Q)),
-      R_(std::move(R)),
-      x_hat_(StateVector::Zero(plant.A.rows())),
-      P_(std::move(P)) {}
+KalmanFilter<States, Inputs, Outputs>::KalmanFilter(const Plant& plant, const StateMatrix& Q,
+                                                    const OutputMatrix& R, const StateMatrix& P)
+    : plant_(plant), x_hat_(StateVector::Zero(plant.A.rows())), P_(P) {
+  detail::ud_factorize(Q, Q_factor_, Q_variance_);
+  detail::ud_factorize(R, R_factor_, R_variance_);
+  detail::ud_factorize(P, U_, d_);
+  detail::ud_product(U_, d_, P_);
+  independent_ = R_factor_.isIdentity(0.0);
+  feedthrough_ = !plant.D.isZero(0.0);
+  detail::ud_solve(R_factor_, plant_.C);
+  detail::ud_solve(R_factor_, plant_.D);
+}
 
 template <int States, int Inputs, int Outputs>
 auto KalmanFilter<States, Inputs, Outputs>::create(const Plant& plant, const Covariance& Q,
@@ -95,39 +55,91 @@ auto KalmanFilter<States, Inputs, Outputs>::steady_state(const Plant& plant, con
 }
 
 template <int States, int Inputs, int Outputs>
-void KalmanFilter<States, Inputs, Outputs>::predict(const InputVector& u) noexcept {
-  const StateVector predicted = plant_.A * x_hat_ + plant_.B * u;
-  x_hat_ = predicted;
-  const StateMatrix AP = plant_.A * P_;
-  P_.noalias() = AP * plant_.A.transpose();
-  P_ += Q_;
+bool KalmanFilter<States, Inputs, Outputs>::take(const StateMatrix& U,
+                                                 const StateVector& d) noexcept {
+  StateMatrix P = U;
+  detail::ud_product(U, d, P);
+  bool bounded = true;
+  for (Eigen::Index i = 0; i < d.size(); ++i) {
+    bounded = bounded & (P(i, i) <= detail::largest_variance);
+  }
+  if (bounded) {
+    U_ = U;
+    d_ = d;
+    P_ = P;
+  }
+  return bounded;
+}
+
+template <int States, int Inputs, int Outputs>
+bool KalmanFilter<States, Inputs, Outputs>::predict(const InputVector& u) noexcept {
+  InputVector known = u;
+  detail::keep_signals(known);
+  const StateVector predicted = plant_.A * x_hat_ + plant_.B * known;
+  const bool moved = is_signal(predicted);
+  if (moved) {
+    x_hat_ = predicted;
+  }
+  StateMatrix U = U_;
+  StateVector d = d_;
+  detail::ud_predict(plant_.A, Q_factor_, Q_variance_, U, d);
+  return take(U, d) && moved && is_signal(u);
 }
 
 template <int States, int Inputs, int Outputs>
 UpdateStatus KalmanFilter<States, Inputs, Outputs>::update(const OutputVector& y,
                                                            const InputVector& u) noexcept {
-  if (!y.allFinite()) {
+  if (!is_signal(y) || (feedthrough_ && !is_signal(u))) {
     return UpdateStatus::not_finite;
   }
-  // K = P Cᵀ S⁻¹ with S = C P Cᵀ + R
-  Eigen::Matrix<double, States, Outputs> K = P_ * plant_.C.transpose();
-  OutputMatrix S = plant_.C * K + R_;
-  if (!detail::cholesky(S)) {
-    return UpdateStatus::singular_innovation;
+  OutputVector z = y;
+  if (!independent_) {
+    detail::ud_solve(R_factor_, z);
   }
-  detail::solve_right(S, K);
-
-  const OutputVector innovation = y - plant_.C * x_hat_ - plant_.D * u;
-  x_hat_ += K * innovation;
-
-  // P = (I - K C) P (I - K C)ᵀ + K R Kᵀ
-  StateMatrix I_KC = -K * plant_.C;
-  I_KC.diagonal().array() += 1.0;
-  const StateMatrix left = I_KC * P_;
-  const Eigen::Matrix<double, States, Outputs> KR = K * R_;
-  const StateMatrix posterior = left * I_KC.transpose() + KR * K.transpose();
-  P_ = 0.5 * (posterior + posterior.transpose());
+  if (feedthrough_) {
+    z -= plant_.D * u;
+  }
+  StateMatrix U = U_;
+  StateVector d = d_;
+  StateVector x_hat = x_hat_;
+  StateVector b = x_hat_;
+  for (Eigen::Index j = 0; j < z.size(); ++j) {
+    const double r = R_variance_(j);
+    const double variance = detail::ud_correct(plant_.C.row(j), r, U, d, b);
+    // Without noise, what the sensors before this one have left may be rounding alone.
+    constexpr double rounding = 1e-14;
+    if (!(variance > 0.0) ||
+        (r == 0.0 && j > 0 &&
+         variance <= rounding * plant_.C.row(j).dot(P_ * plant_.C.row(j).transpose()))) {
+      return UpdateStatus::singular_innovation;
+    }
+    const double innovation = z(j) - plant_.C.row(j).dot(x_hat);
+    x_hat += b * (innovation / variance);
+  }
+  if (!is_signal(x_hat) || !take(U, d)) {
+    return UpdateStatus::not_finite;
+  }
+  x_hat_ = x_hat;
   return UpdateStatus::updated;
+}
+
+template <int States, int Inputs, int Outputs>
+bool KalmanFilter<States, Inputs, Outputs>::reset(const StateVector& x_hat) noexcept {
+  const bool usable = is_signal(x_hat);
+  if (usable) {
+    x_hat_ = x_hat;
+  }
+  return usable;
+}
+
+template <int States, int Inputs, int Outputs>
+bool KalmanFilter<States, Inputs, Outputs>::reset(const StateVector& x_hat,
+                                                  const StateMatrix& P) noexcept {
+  StateMatrix U = U_;
+  StateVector d = d_;
+  detail::ud_factorize(P, U, d);
+  const bool usable = (P.array().abs() <= detail::largest_variance).all();
+  return usable && is_signal(x_hat) && take(U, d) && reset(x_hat);
 }
 
 }  // namespace flyball
