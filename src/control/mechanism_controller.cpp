@@ -102,7 +102,7 @@ double MechanismController<States>::update(double measurement, const MotionState
   const bool flywheel = feedforward_.kind() == mechanisms::MechanismKind::flywheel;
   const double rate =
       flywheel ? (r_next.velocity - r.velocity) / regulator_.plant().period.si() : r.velocity;
-  const double y = measurement + delay_ * rate;
+  const double y = delay_ > 0.0 ? measurement + delay_ * rate : measurement;
   const double direction = r.velocity != 0.0 ? r.velocity : r_next.velocity;
   const double extra = feedforward_.disturbance(r.position, direction);
   const double rail =
@@ -142,6 +142,10 @@ double MechanismController<Eigen::Dynamic>::update(double measurement, const Mot
 
 void MechanismController<Eigen::Dynamic>::reset(const MotionState& state) noexcept {
   std::visit([&](auto& sized) { sized.reset(state); }, sized_);
+}
+
+bool MechanismController<Eigen::Dynamic>::measured() const noexcept {
+  return std::visit([](const auto& sized) { return sized.measured(); }, sized_);
 }
 
 double MechanismController<Eigen::Dynamic>::voltage() const noexcept {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <flyball/core/argument.hpp>
+#include <flyball/core/signal.hpp>
 
 #include "core/try.hpp"
 
@@ -12,10 +13,9 @@ namespace flyball {
 namespace {
 
 /// Beyond this a term is cut, so that a sum of terms cannot be infinity less infinity.
-constexpr double huge = 1e300;
-
 double cut(double term) noexcept {
-  return std::clamp(term, -huge, huge);
+  const double below = term < largest_signal ? term : largest_signal;
+  return below > -largest_signal ? below : -largest_signal;
 }
 
 Expected<void> check_limits(double low, double high, std::string_view name) {
@@ -75,14 +75,14 @@ double Pid::wrapped(double difference) const noexcept {
 }
 
 double Pid::limited_integral(double value) const noexcept {
-  return cut(std::clamp(value, settings_.integral_min, settings_.integral_max));
+  return detail::limited(value, settings_.integral_min, settings_.integral_max);
 }
 
 double Pid::calculate(double measurement, double reference, double feedforward) noexcept {
   const PidGains& gains = settings_.gains;
   const double T = settings_.period;
-  const double added = std::isfinite(feedforward) ? feedforward : 0.0;
-  const bool known = std::isfinite(measurement) && std::isfinite(reference);
+  const double added = detail::signal_or_zero(feedforward);
+  const bool known = is_signal(measurement) && is_signal(reference);
   double step = 0.0;
   double before_limits = integral_;
   if (known) {
@@ -97,7 +97,7 @@ double Pid::calculate(double measurement, double reference, double feedforward) 
     if (std::abs(error_) > settings_.integral_zone) {
       integral_ = limited_integral(0.0);
     } else {
-      step = cut(gains.ki * T * error_);
+      step = cut(cut(gains.ki * T) * error_);
     }
     before_limits = cut(gains.kp * error_) + derivative_ + integral_;
   } else {
@@ -119,7 +119,7 @@ double Pid::calculate(double measurement, double reference, double feedforward) 
   const double held = limited_integral(integral_ + step);
   wanted += held - (integral_ + step);
   integral_ = held;
-  output_ = cut(std::clamp(wanted, settings_.output_min, settings_.output_max));
+  output_ = detail::limited(wanted, settings_.output_min, settings_.output_max);
   saturated_ = output_ != wanted;
   if (settings_.anti_windup == AntiWindup::back_calculation && gains.ki != 0.0 && known) {
     integral_ = limited_integral(integral_ + tracking_gain_ * (output_ - wanted));
@@ -134,8 +134,8 @@ bool Pid::set_gains(const PidGains& gains) noexcept {
   if (gains.ki == 0.0) {
     integral_ = limited_integral(0.0);
   } else {
-    const double change = cut((settings_.gains.kp - gains.kp) * error_) +
-                          cut((settings_.gains.kd - gains.kd) * rate_);
+    const double change = cut(settings_.gains.kp * error_) - cut(gains.kp * error_) +
+                          cut(settings_.gains.kd * rate_) - cut(gains.kd * rate_);
     integral_ = limited_integral(integral_ + change);
   }
   settings_.gains = gains;
@@ -149,7 +149,7 @@ void Pid::reset() noexcept {
 }
 
 void Pid::reset(double integral) noexcept {
-  integral_ = limited_integral(std::isfinite(integral) ? integral : 0.0);
+  integral_ = limited_integral(detail::signal_or_zero(integral));
   error_ = 0.0;
   before_ = 0.0;
   rate_ = 0.0;

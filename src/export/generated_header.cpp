@@ -119,7 +119,8 @@ std::string reset_function(const LoopProgram& program) {
       "  /// and again after a time without control; the next `update` predicts from here with no\n"
       "  /// voltage. @param {} {}{}\n"
       "  void reset({}) noexcept {{\n"
-      "    x_hat_ = {{{}{}}};\n"
+      "    const State x{{{{{}{}}}}};\n"
+      "    x_hat_ = usable(x) ? x : x_hat_;\n"
       "    u_model_ = 0.0;\n"
       "    command_ = 0.0;\n"
       "  }}\n\n",
@@ -139,8 +140,8 @@ std::string extra_lines(const LoopProgram& program) {
         program.speed);
   }
   const std::string gravity = !program.gravity ? ""
-                              : program.arm()  ? "kG * std::cos(r[0] + angle_offset)"
-                                               : "kG";
+                              : program.arm() ? "usable_or_zero(kG * std::cos(r[0] + angle_offset))"
+                                              : "kG";
   const std::string sum = gravity.empty()    ? (program.friction ? "friction" : "0.0")
                           : program.friction ? gravity + " + friction"
                                              : gravity;
@@ -150,7 +151,7 @@ std::string extra_lines(const LoopProgram& program) {
 std::string update_function(const LoopProgram& program) {
   std::string text = fmt::format(
       "  /// One period.\n"
-      "  /// @param measurement  {}, {}; one that is not finite is left out.\n"
+      "  /// @param measurement  {}, {}; one that is not finite is left out, see measured().\n"
       "  /// @param r, r_next  The reference now and one period later.\n"
       "  /// @param battery_voltage  V, measured; {}.\n"
       "  /// @return The voltage for the motor, V, within ±max_voltage and {}.\n"
@@ -174,13 +175,15 @@ std::string update_function(const LoopProgram& program) {
     text += fmt::format("    x[{}] = {};\n", i, program.prediction[i]);
   }
   text +=
-      "    if (std::isfinite(y)) {\n"
-      "      const double innovation = y - x[0];\n";
+      "    x_hat_ = usable(x) ? x : x_hat_;\n"
+      "    x = x_hat_;\n"
+      "    const double innovation = y - x[0];\n";
   for (Index i = 0; i < program.states; ++i) {
-    text += fmt::format("      x[{0}] += kalman_gain[{0}] * innovation;\n", i);
+    text += fmt::format("    x[{0}] += kalman_gain[{0}] * innovation;\n", i);
   }
   text +=
-      "    }\n    x_hat_ = x;\n\n"
+      "    measured_ = usable(y) && usable(x);\n"
+      "    x_hat_ = measured_ ? x : x_hat_;\n\n"
       "    // The reference one period on, less where the plant would drift from this one.\n"
       "    State demand{};\n    State error{};\n";
   for (std::size_t i = 0; i < program.demand.size(); ++i) {
@@ -188,7 +191,8 @@ std::string update_function(const LoopProgram& program) {
                         program.error[i]);
   }
   text += extra_lines(program);
-  text += fmt::format("    const double feedforward = {} + extra;\n", program.inversion);
+  text += fmt::format("    const double feedforward = usable_or_zero({}) + extra;\n",
+                      program.inversion);
   text += fmt::format(
       "    double u = {} + feedforward;\n"
       "    u = std::isnan(u) ? 0.0 : u;\n",
@@ -246,12 +250,27 @@ Expected<std::string> generate_header(const MechanismControllerDesign& design,
   text += update_function(program);
   text += command_function(program);
   text +=
+      "  /// Whether the last measurement is in the estimate.\n"
+      "  bool measured() const noexcept { return measured_; }\n"
       "  /// The estimate after the last `update`.\n"
       "  const State& x_hat() const noexcept { return x_hat_; }\n\n"
       " private:\n"
       "  static double limited(double value, double limit) noexcept {\n"
       "    return value < -limit ? -limit : value > limit ? limit : value;\n"
-      "  }\n\n";
+      "  }\n"
+      "  // What is beyond no robot's numbers counts as not finite.\n"
+      "  static bool usable(double value) noexcept { return std::abs(value) <= 1e100; }\n"
+      "  static bool usable(const State& x) noexcept {\n"
+      "    return ";
+  for (Index i = 0; i < program.states; ++i) {
+    text += fmt::format("{}usable(x[{}])", i == 0 ? "" : " && ", i);
+  }
+  text +=
+      ";\n"
+      "  }\n"
+      "  static double usable_or_zero(double value) noexcept { return usable(value) ? value : 0.0; "
+      "}\n"
+      "\n";
   if (program.compensates) {
     text +=
         "  static double believable(double measured) noexcept {\n"
@@ -264,6 +283,7 @@ Expected<std::string> generate_header(const MechanismControllerDesign& design,
       "  State x_hat_{};\n"
       "  double u_model_ = 0.0;  // V, what the model saw of the last answer\n"
       "  double command_ = 0.0;  // V\n"
+      "  bool measured_ = false;\n"
       "};\n";
   return text;
 }

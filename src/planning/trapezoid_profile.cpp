@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <flyball/core/signal.hpp>
+
 namespace flyball {
 
 TrapezoidProfile::TrapezoidProfile(const MotionLimits& limits, const MotionState& start,
@@ -11,8 +13,8 @@ TrapezoidProfile::TrapezoidProfile(const MotionLimits& limits, const MotionState
   const double v_max = limits.velocity;
   const double a = limits.acceleration;
   const bool usable = v_max > 0.0 && a > 0.0 && std::isfinite(v_max) && std::isfinite(a) &&
-                      std::isfinite(start.position) && std::isfinite(start.velocity) &&
-                      std::isfinite(goal.position) && std::isfinite(goal.velocity);
+                      is_signal(start.position) && is_signal(start.velocity) &&
+                      is_signal(goal.position) && is_signal(goal.velocity);
   if (!usable) {
     goal_.position = std::isfinite(goal.position) ? goal.position : 0.0;
     goal_.velocity = 0.0;

@@ -79,7 +79,8 @@ TEST(KalmanCovariance, AnIgnorantStartIsTheLineThroughTheMeasurements) {
   EXPECT_NEAR(filter.P()(1, 1) / (2e-6 / 4e-4), 1.0, 1e-9);
 }
 
-// The defining equations (9.20 to 9.24, Joseph's form) in long double, with noises that are correlated.
+// The defining equations (9.20 to 9.24, Joseph's form) in long double, with noises that are
+// correlated.
 TEST(KalmanCovariance, IsThatOfTheBook) {
   Random random(11);
   const auto draw = [&](Eigen::Index rows, Eigen::Index columns) {
@@ -154,6 +155,31 @@ TEST(KalmanCovariance, TwoSensorsOfOneStateAreBothTaken) {
   EXPECT_NEAR(filter.x_hat()(0), 2.0, 1e-9);
   EXPECT_NEAR(filter.P()(0, 0), 5e-7, 1e-15);
   EXPECT_EQ(filter.P()(1, 1), 1e20);
+}
+
+// Both without noise: after the first one, what is left of the second one's variance is rounding,
+// and an estimate that trusted it could be anything.
+TEST(KalmanCovariance, TwoEqualSensorsWithoutNoiseAreSingular) {
+  Random random(13);
+  for (int run = 0; run < 200; ++run) {
+    DiscreteSystem<3, 1, 2> plant;
+    plant.A.setIdentity();
+    plant.B.setZero();
+    plant.C.row(0) << random.normal(), random.normal(), random.normal();
+    plant.C.row(1) = 3.0 * plant.C.row(0);
+    plant.D.setZero();
+    plant.period = Time(1.0);
+    const Eigen::Matrix3d F = Eigen::Matrix3d::NullaryExpr([&] { return random.normal(); });
+    auto filter =
+        kalman_filter(plant, Eigen::Matrix3d(Eigen::Matrix3d::Zero()),
+                      Eigen::Matrix2d(Eigen::Matrix2d::Zero()), Eigen::Matrix3d(F * F.transpose()))
+            .value();
+    const Eigen::Matrix3d P = filter.P();
+    ASSERT_EQ(filter.update(Eigen::Vector2d(1.0, 1.0), Scalar(0.0)),
+              UpdateStatus::singular_innovation);
+    ASSERT_TRUE(filter.x_hat().isZero(0.0));
+    ASSERT_EQ(filter.P(), P);
+  }
 }
 
 TEST(KalmanCovariance, Errors) {

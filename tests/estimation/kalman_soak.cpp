@@ -27,9 +27,9 @@ template <int States>
 bool is_covariance(const Eigen::Matrix<double, States, States>& P) {
   bool good = true;
   for (int i = 0; i < States; ++i) {
-    good = good & (P(i, i) >= 0.0) & (P(i, i) <= 1e200);
+    good = good && P(i, i) >= 0.0 && P(i, i) <= 1e200;
     for (int j = 0; j < i; ++j) {
-      good = good & (P(i, j) == P(j, i)) & (P(i, j) * P(i, j) <= P(i, i) * P(j, j));
+      good = good && P(i, j) == P(j, i) && P(i, j) * P(i, j) <= P(i, i) * P(j, j);
     }
   }
   return good;

@@ -35,6 +35,7 @@ struct Output {
   double voltage = 0.0;
   double command = 0.0;
   double estimate = 0.0;  ///< Sum of x_hat.
+  bool measured = false;
 };
 
 /// A loop of the tests: one of all mechanisms with every choice that a design has.
@@ -108,7 +109,8 @@ std::vector<Input> inputs_of(const MechanismResponse& response, MechanismKind ki
 /// Sensors that fail, batteries that cannot be, references that jump.
 std::vector<Input> odd_inputs() {
   constexpr double inf = std::numeric_limits<double>::infinity();
-  const std::array odd{0.0, -1.0, 1e9, -1e9, inf, -inf, std::nan(""), 5e-324, 3.0, 121.0};
+  const std::array odd{0.0,  -1.0,  1e9,    -1e9,    inf,      -inf,   std::nan(""), 5e-324,
+                       1e99, 1e154, -1e154, 1.7e308, -1.7e308, -1e300, 3.0,          121.0};
   Random random(3);
   const auto pick = [&](double usual) {
     return random.uniform() < 0.2 ? odd[random.bits() % odd.size()] : usual;
@@ -117,8 +119,8 @@ std::vector<Input> odd_inputs() {
   for (int k = 0; k < 150; ++k) {
     const double velocity = random.uniform() < 0.2 ? 0.0 : random.normal();
     inputs.push_back({pick(random.normal()),
-                      {random.normal(), velocity},
-                      {random.normal(), random.normal()},
+                      {k % 7 == 3 ? pick(random.normal()) : random.normal(), velocity},
+                      {random.normal(), k % 5 == 2 ? pick(random.normal()) : random.normal()},
                       pick(11.0)});
   }
   return inputs;
@@ -201,7 +203,7 @@ static int run() {
     double sum = 0.0;
     for (const double x : loop.x_hat()) { sum += x; }
     armed = false;
-    std::printf("%a %a %a\n", u, loop.command(), sum);
+    std::printf("%a %a %a %d\n", u, loop.command(), sum, loop.measured() ? 1 : 0);
   }
   return 0;
 }
@@ -248,9 +250,10 @@ std::vector<Output> run(const Scratch& scratch, const std::string& name,
   std::string u;
   std::string command;
   std::string estimate;
-  while (answers >> u >> command >> estimate) {
+  bool measured = false;
+  while (answers >> u >> command >> estimate >> measured) {
     outputs.push_back({std::strtod(u.c_str(), nullptr), std::strtod(command.c_str(), nullptr),
-                       std::strtod(estimate.c_str(), nullptr)});
+                       std::strtod(estimate.c_str(), nullptr), measured});
   }
   return outputs;
 }
@@ -288,6 +291,7 @@ void expect_one_loop(const std::vector<Loop>& loops, const std::string& compiler
           expect_same(outputs[k].command, controller.command(), "command", name, k));
       ASSERT_NO_FATAL_FAILURE(
           expect_same(outputs[k].estimate, controller.x_hat().sum(), "estimate", name, k));
+      ASSERT_EQ(outputs[k].measured, controller.measured()) << name << " at " << k;
       if (k < recorded) {
         ASSERT_EQ(u, (*response.series.find("voltage"))[k]) << name << " at " << k;
         ASSERT_EQ(controller.command(), (*response.series.find("command"))[k]) << name;

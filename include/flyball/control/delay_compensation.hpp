@@ -38,7 +38,8 @@ namespace flyball {
 
 /// State feedback on a delayed state with the gains of (B.12), through the start and after it.
 ///
-/// Run-time object: noexcept; for sizes known at compile time, `calculate` does not allocate.
+/// Run-time object: noexcept, finite and within the limits whatever comes; for sizes known at
+/// compile time, `calculate` does not allocate.
 template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic>
 class DelayCompensatedFeedback {
  public:
@@ -66,8 +67,7 @@ class DelayCompensatedFeedback {
     u.noalias() += gains_[step_] * error;
     step_ += step_ + 1 < gains_.size() ? 1 : 0;
     for (Eigen::Index i = 0; i < u.size(); ++i) {
-      const double wanted = u(i) == u(i) ? u(i) : 0.0;
-      u(i) = wanted < u_min_(i) ? u_min_(i) : wanted > u_max_(i) ? u_max_(i) : wanted;
+      u(i) = detail::limited(u(i), u_min_(i), u_max_(i));
     }
     return u;
   }
@@ -96,9 +96,9 @@ class DelayCompensatedFeedback {
 ///
 /// (B.10) assumes that those were -Kx; this remembers them, so that limits, feedforwards and the
 /// start need no special case, and a loop with u = K (r - predict(x)) has exactly the poles of the
-/// loop without delay, whole periods or not. Run-time object: noexcept; for sizes known at compile
-/// time nothing allocates after `create`. Cost of a prediction: two products an input that is on
-/// its way.
+/// loop without delay, whole periods or not. Run-time object: noexcept, finite whatever comes; for
+/// sizes known at compile time nothing allocates after `create`. Cost of a prediction: two products
+/// an input that is on its way.
 template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic>
 class DelayPredictor {
  public:
@@ -131,24 +131,29 @@ class DelayPredictor {
   }
 
   /// @param x  The state as measured (or estimated): `latency` before the input that is computed
-  /// now acts. @return The state at that time.
+  /// now acts. @return The state at that time. Entries of x that are NaN count as zero: leave out a
+  /// measurement that is not there before this, as an observer does; what is beyond
+  /// `largest_signal` is cut to it.
   [[nodiscard]] StateVector predict(const StateVector& x) const noexcept {
     // x_{j+1} = A x_j + B_0 u_{j-d} + B_1 u_{j-d-1} over the whole periods, then the fraction.
-    StateVector state = x;
+    StateVector state = within(x);
     const std::size_t count = applied_.size();
     for (std::size_t j = 0; j + 1 < count; ++j) {
       const InputVector& older = applied_[(next_ + j) % count];
       const InputVector& newer = applied_[(next_ + j + 1) % count];
-      state = (A_ * state + B_0_ * newer + B_1_ * older).eval();
+      state = within(A_ * state + B_0_ * newer + B_1_ * older);
     }
     const InputVector& last = applied_[(next_ + count - 1) % count];
-    return A_rest_ * state + B_rest_ * last;
+    return within(A_rest_ * state + B_rest_ * last);
   }
 
-  /// The input that was sent now.
-  void sent(const InputVector& u) noexcept {
+  /// The input that was sent now. @return  Whether it can be one: what is not finite is remembered
+  /// as zero.
+  bool sent(const InputVector& u) noexcept {
     applied_[next_] = u;
+    detail::keep_signals(applied_[next_]);
     next_ = (next_ + 1) % applied_.size();
+    return is_signal(u);
   }
 
   /// Nothing is on its way.
@@ -159,6 +164,14 @@ class DelayPredictor {
   }
 
  private:
+  [[nodiscard]] static StateVector within(const StateVector& x) noexcept {
+    StateVector state = x;
+    for (Eigen::Index i = 0; i < state.size(); ++i) {
+      state(i) = detail::cut(x(i));
+    }
+    return state;
+  }
+
   DelayPredictor(const DelayedInputMatrices& delayed, const DiscretizedMatrices& rest)
       : A_(delayed.A),
         B_0_(delayed.B_0),

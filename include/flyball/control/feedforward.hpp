@@ -1,5 +1,6 @@
 #pragma once
 
+#include <flyball/core/signal.hpp>
 #include <flyball/math/dense/linear_algebra.hpp>
 #include <flyball/mechanisms/mechanism.hpp>
 #include <flyball/systems/system.hpp>
@@ -22,7 +23,8 @@ class LinearPlantInversion {
   LinearPlantInversion(const StateMatrix& A, const InverseMatrix& B_pinv)
       : A_(A), B_pinv_(B_pinv) {}
 
-  /// @param r  The reference now. @param r_next  The reference one period later. @return u.
+  /// @param r  The reference now. @param r_next  The reference one period later.
+  /// @return u; zero where it is not a finite number (see largest_signal).
   [[nodiscard]] InputVector calculate(const StateVector& r,
                                       const StateVector& r_next) const noexcept;
 
@@ -57,9 +59,10 @@ class SimpleFeedforward {
                                                           const mechanisms::FeedforwardGains& gains,
                                                           Time period);
 
-  /// Gravity, V: 0, kG, or kG cos(position + angle_offset) (6.9.3, 6.11.3).
+  /// Gravity, V: 0, kG, or kG cos(position + angle_offset) (6.9.3, 6.11.3); 0 at a position that is
+  /// not a finite number.
   [[nodiscard]] double gravity(double position) const noexcept {
-    return gains_.gravity_voltage(kind_, position);
+    return detail::signal_or_zero(gains_.gravity_voltage(kind_, position));
   }
   /// Static friction, V: kS sgn(velocity), zero at rest.
   [[nodiscard]] double friction(double velocity) const noexcept {
@@ -70,21 +73,24 @@ class SimpleFeedforward {
     return gravity(position) + friction(velocity);
   }
 
-  /// kS sgn(v) + kV v + kA a + gravity, V. @param position  m or rad; only arms use it.
+  /// kS sgn(v) + kV v + kA a + gravity, V; zero where that is not a finite number (see
+  /// largest_signal). @param position  m or rad; only arms use it.
   [[nodiscard]] double calculate(double position, double velocity,
                                  double acceleration) const noexcept {
-    return disturbance(position, velocity) + gains_.kV * velocity + gains_.kA * acceleration;
+    return detail::signal_or_zero(disturbance(position, velocity) + gains_.kV * velocity +
+                                  gains_.kA * acceleration);
   }
 
   /// The voltage that, held for one period, takes the velocity exactly from `velocity` to
   /// `next_velocity`: disturbance + (v_{k+1} - A_d v_k)/B_d with A_d = e^{-kV/kA T} and
-  /// B_d = (1 - A_d)/kV; kA = 0 leaves kV v_{k+1}.
+  /// B_d = (1 - A_d)/kV; kA = 0 leaves kV v_{k+1}. Zero where it is not a finite number.
   /// Source: book, Theorem 7.8.1 on the model of 14.2.
   [[nodiscard]] double calculate_discrete(double position, double velocity,
                                           double next_velocity) const noexcept {
     // Friction is of the motion that is asked for: at the start of one, the next velocity's.
     const double direction = velocity != 0.0 ? velocity : next_velocity;
-    return disturbance(position, direction) + next_gain_ * next_velocity - gain_ * velocity;
+    return detail::signal_or_zero(disturbance(position, direction) + next_gain_ * next_velocity -
+                                  gain_ * velocity);
   }
 
   [[nodiscard]] const mechanisms::FeedforwardGains& gains() const noexcept { return gains_; }

@@ -9,7 +9,9 @@ auto LinearPlantInversion<States, Inputs>::calculate(const StateVector& r,
                                                      const StateVector& r_next) const noexcept
     -> InputVector {
   const StateVector demand = r_next - A_ * r;
-  return B_pinv_ * demand;
+  InputVector u = B_pinv_ * demand;
+  detail::keep_signals(u);
+  return u;
 }
 
 }  // namespace flyball

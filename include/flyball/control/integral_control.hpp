@@ -1,6 +1,7 @@
 #pragma once
 
 #include <flyball/control/lqr.hpp>
+#include <flyball/core/signal.hpp>
 
 namespace flyball {
 
@@ -64,8 +65,9 @@ template <int States, int Inputs, int Outputs>
 /// State feedback with integral action and input limits, u = clamp(K (r - x) - K_I x_I + u_ff).
 ///
 /// While an input is at a limit, the integral does not move further into it. Run-time object:
-/// noexcept; allocation-free for sizes known at compile time. An output error that is not finite
-/// leaves the integral where it is.
+/// noexcept, finite and within the limits whatever comes; allocation-free for sizes known at
+/// compile time. An output error that is not finite, or that would take the integral beyond
+/// `largest_signal`, leaves it where it is.
 template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic, int Outputs = Eigen::Dynamic>
 class IntegralStateFeedback {
  public:
@@ -95,21 +97,29 @@ class IntegralStateFeedback {
     InputVector u = u_ff;
     u.noalias() += K_ * (r - x);
     u.noalias() -= K_I_ * x_I_;
-    bool hold = !y_error.allFinite();
+    const OutputVector integral = x_I_ + period_ * y_error;
+    bool hold = !is_signal(integral);
     for (Eigen::Index i = 0; i < u.size(); ++i) {
-      const double wanted = u(i) == u(i) ? u(i) : 0.0;
-      u(i) = wanted < u_min_(i) ? u_min_(i) : wanted > u_max_(i) ? u_max_(i) : wanted;
-      const double beyond = wanted - u(i);
-      hold = hold || (beyond != 0.0 && -K_I_.row(i).dot(y_error) * beyond > 0.0);
+      const double wanted = u(i);
+      u(i) = detail::limited(wanted, u_min_(i), u_max_(i));
+      const double way = -K_I_.row(i).dot(y_error);
+      hold = hold || (wanted > u(i) && way > 0.0) || (wanted < u(i) && way < 0.0);
     }
     if (!hold) {
-      x_I_ += period_ * y_error;
+      x_I_ = integral;
     }
     return u;
   }
 
-  /// Starts again with a given integral, usually zero.
-  void reset(const OutputVector& x_I) noexcept { x_I_ = x_I; }
+  /// Starts again with a given integral, usually zero. @return  Whether it was taken: one that is
+  /// not finite is not.
+  bool reset(const OutputVector& x_I) noexcept {
+    const bool usable = is_signal(x_I);
+    if (usable) {
+      x_I_ = x_I;
+    }
+    return usable;
+  }
   [[nodiscard]] const OutputVector& integral() const noexcept { return x_I_; }
   [[nodiscard]] const Gain& K() const noexcept { return K_; }
   [[nodiscard]] const IntegralGain& K_I() const noexcept { return K_I_; }

@@ -18,8 +18,10 @@ namespace flyball {
 /// where extra is what the linear model does not hold, such as gravity and friction: it is added
 /// before the limits, and the observer is told only what the linear model saw.
 ///
-/// Run-time object: noexcept, finite for finite input, and for sizes known at compile time
-/// allocation-free. Source: book, Theorems 7.7.1, 7.8.1 and 9.6.3.
+/// Run-time object: noexcept, and for sizes known at compile time allocation-free. Whatever comes,
+/// u is finite and within its limits, and the estimate stays finite: a measurement, feedforward or
+/// `extra` that is not a finite number, or beyond `largest_signal`, is left out, and a reference
+/// that is not asks for nothing, u = 0. Source: book, Theorems 7.7.1, 7.8.1 and 9.6.3.
 template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic, int Outputs = Eigen::Dynamic>
 class Lqg {
  public:
@@ -40,7 +42,7 @@ class Lqg {
                                             const InputVector& u_max);
 
   /// One period. @param r  The reference now. @param r_next  One period later.
-  /// @param y  The measurement of now; one that is not finite is left out.
+  /// @param y  The measurement of now; one that is not finite is left out, see `measured`.
   /// @param extra  What to add for what is not in the linear model, V.
   /// @return u, V.
   [[nodiscard]] InputVector step(const StateVector& r, const StateVector& r_next,
@@ -49,7 +51,8 @@ class Lqg {
                                  const OutputVector& y) noexcept;
   /// The same with a measured rail: no more voltage is asked for than the rail has, so that the
   /// observer knows what the motor sees. Send `VoltageCompensation::command(u, rail)` to it.
-  /// @param rail_voltage  V, > 0; `VoltageCompensation::rail` makes a measurement believable.
+  /// @param rail_voltage  V; one that is not positive counts as not measured.
+  /// `VoltageCompensation::rail` makes a measurement believable.
   [[nodiscard]] InputVector step(const StateVector& r, const StateVector& r_next,
                                  const OutputVector& y, const InputVector& extra,
                                  double rail_voltage) noexcept;
@@ -58,10 +61,14 @@ class Lqg {
   void set_angle(int state, double turn) noexcept { feedback_.set_angle(state, turn); }
 
   /// Starts again at an estimate, as after a time without control: the next step predicts from it.
-  void reset(const StateVector& x_hat) noexcept {
-    observer_.reset(x_hat);
+  /// @return  Whether it was taken: one that is not finite is not.
+  bool reset(const StateVector& x_hat) noexcept {
     u_model_.setZero();
+    return observer_.reset(x_hat);
   }
+
+  /// Whether the measurement of the last step is in the estimate.
+  [[nodiscard]] bool measured() const noexcept { return measured_; }
 
   [[nodiscard]] const StateVector& x_hat() const noexcept { return observer_.x_hat(); }
   /// The input of the last step less `extra`: what the linear model saw.
@@ -82,6 +89,7 @@ class Lqg {
   StateFeedback<States, Inputs> feedback_;
   LinearPlantInversion<States, Inputs> inversion_;
   InputVector u_model_;
+  bool measured_ = false;
 };
 
 /// `Lqg::create` with the sizes of the plant and one limit for every input: |u| <= u_limit.

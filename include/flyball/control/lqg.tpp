@@ -64,13 +64,17 @@ auto Lqg<States, Inputs, Outputs>::step(const StateVector& r, const StateVector&
                                         const OutputVector& y, const InputVector& extra,
                                         double rail_voltage) noexcept -> InputVector {
   observer_.predict(u_model_);
-  observer_.update(y, u_model_);
-  const InputVector u_ff = inversion_.calculate(r, r_next) + extra;
+  measured_ = observer_.update(y, u_model_);
+  u_model_ = extra;
+  detail::keep_signals(u_model_);
+  const InputVector u_ff = inversion_.calculate(r, r_next) + u_model_;
   InputVector u = feedback_.calculate(observer_.x_hat(), r, u_ff);
-  for (Eigen::Index i = 0; i < u.size(); ++i) {
-    u(i) = std::clamp(u(i), -rail_voltage, rail_voltage);
+  if (rail_voltage > 0.0) {
+    for (Eigen::Index i = 0; i < u.size(); ++i) {
+      u(i) = std::clamp(u(i), -rail_voltage, rail_voltage);
+    }
   }
-  u_model_ = u - extra;
+  u_model_ = u - u_model_;
   return u;
 }
 

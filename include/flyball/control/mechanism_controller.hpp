@@ -41,8 +41,8 @@ struct MechanismControllerDesign {
 /// loop of the `export` domain does the same arithmetic in the same order.
 ///
 /// Run-time object: noexcept, allocation-free (with Eigen::Dynamic too, which holds one of the
-/// others), bounded; voltage and command are finite and within their limits whatever the
-/// measurement and the rail, for references that are finite.
+/// others), bounded; voltage and command are finite and within their limits whatever comes, as
+/// those of `Lqg`.
 /// @tparam States  1, 2, or Eigen::Dynamic for the one that the design has.
 /// Source: book, Theorems 6.9.1, 6.10.1, 6.11.1, 7.7.1, 7.8.1, 9.6.3 and 14.3.2.
 template <int States = Eigen::Dynamic>
@@ -59,16 +59,19 @@ class MechanismController {
       const MechanismControllerDesign& design);
 
   /// One period. @param measurement  Of the velocity (flywheel), else of the position; one that is
-  /// not finite is left out. @param r, r_next  The reference now and one period later; a flywheel's
-  /// is its velocity. @param rail_voltage  V, measured; an unbelievable one counts as nominal.
+  /// not finite is left out, see `measured`. @param r, r_next  The reference now and one period
+  /// later; a flywheel's is its velocity. @param rail_voltage  V, measured; an unbelievable one
+  /// counts as nominal.
   /// @return The motor's voltage, V.
   double update(double measurement, const MotionState& r, const MotionState& r_next,
                 double rail_voltage) noexcept;
 
   /// Starts again at a state, as after a time without control: the next update predicts from it.
-  /// @param state  A flywheel's is its velocity.
+  /// @param state  A flywheel's is its velocity. One that is not finite leaves the estimate.
   void reset(const MotionState& state) noexcept;
 
+  /// Whether the measurement of the last update is in the estimate.
+  [[nodiscard]] bool measured() const noexcept { return regulator_.measured(); }
   /// The last answer of `update`, V at the motor.
   [[nodiscard]] double voltage() const noexcept { return voltage_; }
   /// What to send to a controller that scales by the rail, V of nominal_voltage: the last answer
@@ -112,6 +115,7 @@ class MechanismController<Eigen::Dynamic> {
   /// Starts again at a state.
   void reset(const MotionState& state) noexcept;
 
+  [[nodiscard]] bool measured() const noexcept;   ///< Whether the last measurement was used.
   [[nodiscard]] double voltage() const noexcept;  ///< V, the last answer.
   [[nodiscard]] double command() const noexcept;  ///< V, to be sent.
   [[nodiscard]] double limit() const noexcept;    ///< V, of |voltage| in the last update.

@@ -58,10 +58,11 @@ struct PidSettings {
 /// The first call after `create` or `reset` has no derivative: there is no sample before it.
 ///
 /// Run-time object: no allocation, noexcept, about ten nanoseconds a call. The output is finite
-/// and within its limits whatever the input. A measurement, reference or feedforward that is not
-/// finite counts as not there: without a measurement or reference the proportional and derivative
-/// terms are zero and the integral holds, so that a sensor's drop-out neither winds the controller
-/// up nor kicks when it ends; a feedforward that is not finite counts as zero.
+/// and within its limits whatever the input and the gains. A measurement, reference or feedforward
+/// that is not finite, or beyond `largest_signal`, counts as not there: without a measurement or
+/// reference the proportional and derivative terms are zero and the integral holds, so that a
+/// sensor's drop-out neither winds the controller up nor kicks when it ends; a feedforward that is
+/// not finite counts as zero.
 ///
 /// Source: book, chapter 2. Åström and Hägglund, "Advanced PID Control" (2006), chapter 3.
 class Pid {

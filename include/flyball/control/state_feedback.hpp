@@ -2,11 +2,14 @@
 
 #include <Eigen/Core>
 
+#include <flyball/core/signal.hpp>
+
 namespace flyball {
 
 /// State feedback with input limits: u = clamp(K (r - x) + u_ff, u_min, u_max) (7.15).
 ///
-/// Run-time object: noexcept and, for sizes known at compile time, allocation-free.
+/// Run-time object: noexcept, finite and within the limits whatever comes, and, for sizes known at
+/// compile time, allocation-free.
 template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic>
 class StateFeedback {
  public:
@@ -14,7 +17,8 @@ class StateFeedback {
   using InputVector = Eigen::Matrix<double, Inputs, 1>;
   using Gain = Eigen::Matrix<double, Inputs, States>;
 
-  /// @param K  m x n. @param u_min, u_max  Limits of each input, V; infinite for none.
+  /// @param K  m x n. @param u_min, u_max  Limits of each input, V; infinite for
+  /// none but ±largest_signal.
   StateFeedback(const Gain& K, const InputVector& u_min, const InputVector& u_max)
       : K_(K), u_min_(u_min), u_max_(u_max), modulus_(StateVector::Zero(K.cols())) {}
 
@@ -65,15 +69,15 @@ class VoltageCompensation {
     return !believable ? nominal_ : measured < nominal_ / 3.0 ? nominal_ / 3.0 : measured;
   }
 
-  /// V_cmd for a wanted motor voltage (6.23), limited to the whole rail: |V_cmd| <= V_nominal.
+  /// V_cmd for a wanted motor voltage (6.23), limited to the whole rail: |V_cmd| <= V_nominal; zero
+  /// for NaN.
   [[nodiscard]] constexpr double command(double voltage, double rail_voltage) const noexcept {
-    const double command = voltage * (nominal_ / rail(rail_voltage));
-    return command > nominal_ ? nominal_ : command < -nominal_ ? -nominal_ : command;
+    return detail::limited(voltage * (nominal_ / rail(rail_voltage)), -nominal_, nominal_);
   }
 
-  /// What the motor sees of a command (6.24).
+  /// What the motor sees of a command (6.24), zero for one that is not a finite number.
   [[nodiscard]] constexpr double motor_voltage(double command, double rail_voltage) const noexcept {
-    return command * (rail(rail_voltage) / nominal_);
+    return detail::signal_or_zero(command) * (rail(rail_voltage) / nominal_);
   }
 
   [[nodiscard]] constexpr double nominal_voltage() const noexcept { return nominal_; }

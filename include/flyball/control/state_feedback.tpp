@@ -10,9 +10,7 @@ template <int States, int Inputs>
 auto StateFeedback<States, Inputs>::clamp(const InputVector& u) const noexcept -> InputVector {
   InputVector limited = u;
   for (Eigen::Index i = 0; i < limited.size(); ++i) {
-    double value = std::isnan(u(i)) ? 0.0 : u(i);
-    value = value < u_min_(i) ? u_min_(i) : value;
-    limited(i) = value > u_max_(i) ? u_max_(i) : value;
+    limited(i) = detail::limited(u(i), u_min_(i), u_max_(i));
   }
   return limited;
 }

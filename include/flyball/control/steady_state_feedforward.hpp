@@ -23,10 +23,13 @@ struct SteadyStateFeedforward {
   Eigen::Matrix<double, Inputs, Outputs> N_u;  ///< m x p, outputs to inputs (C.2).
   Eigen::Matrix<double, Inputs, States> K_ff;  ///< m x n, N_u N_x⁺, states' reference to input.
 
-  /// u_ff = K_ff r (C.4), (C.6). Allocation-free for sizes known at compile time.
+  /// u_ff = K_ff r (C.4), (C.6), zero where that is not a finite number. Allocation-free for sizes
+  /// known at compile time.
   [[nodiscard]] Eigen::Matrix<double, Inputs, 1> calculate(
       const Eigen::Matrix<double, States, 1>& r) const noexcept {
-    return K_ff * r;
+    Eigen::Matrix<double, Inputs, 1> u_ff = K_ff * r;
+    detail::keep_signals(u_ff);
+    return u_ff;
   }
 };
 

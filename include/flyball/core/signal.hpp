@@ -13,7 +13,7 @@ inline constexpr double largest_signal = 1e100;
 
 /// Whether |value| <= largest_signal; false for NaN.
 [[nodiscard]] constexpr bool is_signal(double value) noexcept {
-  return value <= largest_signal && value >= -largest_signal;
+  return __builtin_fabs(value) <= largest_signal;
 }
 /// Whether that holds for every entry.
 template <class Derived>
@@ -52,6 +52,10 @@ void keep_signals(Eigen::MatrixBase<Derived>& values) noexcept {
 /// An input within its limits, of which infinite ones count as largest_signal; NaN is the one
 /// nearest to zero.
 [[nodiscard]] constexpr double limited(double value, double low, double high) noexcept {
+  const double within = value < low ? low : value > high ? high : value;
+  if (is_signal(within)) {
+    return within;
+  }
   const double wanted = cut(value);
   return wanted < low ? low : wanted > high ? high : wanted;
 }

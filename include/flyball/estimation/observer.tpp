@@ -1,24 +1,47 @@
 #pragma once
 
+#include <flyball/core/signal.hpp>
 #include <flyball/estimation/observer.hpp>
 
 namespace flyball {
 
 template <int States, int Inputs, int Outputs>
-void Observer<States, Inputs, Outputs>::predict(const InputVector& u) noexcept {
-  const StateVector predicted = plant_.A * x_hat_ + plant_.B * u;
-  x_hat_ = predicted;
+bool Observer<States, Inputs, Outputs>::take(const StateVector& x_hat) noexcept {
+  const bool usable = is_signal(x_hat);
+  if (usable) {
+    x_hat_ = x_hat;
+  }
+  return usable;
+}
+
+template <int States, int Inputs, int Outputs>
+bool Observer<States, Inputs, Outputs>::predict(const InputVector& u) noexcept {
+  StateVector predicted = plant_.A * x_hat_;
+  const bool used = is_signal(u);
+  if (used) {
+    predicted.noalias() += plant_.B * u;
+  } else {
+    InputVector known = u;
+    detail::keep_signals(known);
+    predicted.noalias() += plant_.B * known;
+  }
+  return take(predicted) && used;
 }
 
 template <int States, int Inputs, int Outputs>
 bool Observer<States, Inputs, Outputs>::update(const OutputVector& y,
                                                const InputVector& u) noexcept {
-  if (!y.allFinite()) {
+  if (!is_signal(y)) {
     return false;
   }
-  const OutputVector innovation = y - plant_.C * x_hat_ - plant_.D * u;
-  x_hat_ += K_ * innovation;
-  return true;
+  OutputVector innovation = y;
+  innovation.noalias() -= plant_.C * x_hat_;
+  if (feedthrough_) {
+    innovation.noalias() -= plant_.D * u;
+  }
+  StateVector corrected = x_hat_;
+  corrected.noalias() += K_ * innovation;
+  return take(corrected);
 }
 
 }  // namespace flyball

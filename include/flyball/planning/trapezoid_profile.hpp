@@ -20,9 +20,9 @@ struct MotionLimits {
 ///
 /// A start (or goal) above the velocity limit is braked down (or accelerated up) to, at the
 /// acceleration limit; everything between keeps both limits. Run-time object: noexcept,
-/// allocation-free, and finite for whatever it is given: a limit that is not positive and finite
-/// gives a profile that is at the goal from the start.
-/// Source: book, section 15.1.3.
+/// allocation-free, and finite for whatever it is given: a limit that is not positive and finite,
+/// or a state that is not finite or beyond `largest_signal`, gives a profile that is at the goal
+/// from the start. Source: book, section 15.1.3.
 class TrapezoidProfile {
  public:
   /// @param start  Where it is (its acceleration is ignored). @param goal  Where it is to be.
