@@ -179,6 +179,57 @@ TEST(SimulateMechanism, DelaysTheVoltage) {
   EXPECT_NEAR(column(late, "motor_voltage")[2], column(late, "command")[0], 1e-9);
 }
 
+/// The error of the mechanism in the middle of a steady motion, m or rad/s.
+double error_on_the_way(const MechanismLoop& job, const char* state) {
+  const MechanismResponse result = simulate_mechanism(job).value();
+  const std::string reference = std::string("reference_") + state;
+  const std::size_t row = result.series.rows() / 2;
+  return column(result, state)[row] - column(result, reference.c_str())[row];
+}
+
+// A measurement that is 15 ms old shows the carriage 15 ms · 1 m/s behind where it is. Moved along
+// the reference by the same 15 ms it causes no error; not moved, the loop puts the carriage ahead
+// by that much, and moved although it is fresh, behind by that much.
+TEST(SimulateMechanism, MovesALateMeasurementAlongTheReference) {
+  MechanismLoop job = elevator_job();
+  job.controller.gains.kS = job.truth.gains.kS = 0.0;
+  job.reference.clear();
+  for (int k = 0; k < 150; ++k) {
+    job.reference.push_back({0.02 * k, 1.0, 0.0});
+  }
+  job.initial = {0.0, 1.0};
+  const auto error = [&](Time age, Time moved) {
+    job.truth.sensor.delay = age;
+    job.controller.measurement_delay = moved;
+    return error_on_the_way(job, "position");
+  };
+  EXPECT_NEAR(error(0_ms, 0_ms), 0.0, 1e-6);
+  EXPECT_NEAR(error(15_ms, 15_ms), 0.0, 1e-6);
+  EXPECT_NEAR(error(15_ms, 0_ms), 0.015, 1e-3);
+  EXPECT_NEAR(error(0_ms, 15_ms), -0.015, 1e-3);
+}
+
+// A flywheel's measurement is moved by its acceleration: 15 ms · 100 rad/s².
+TEST(SimulateMechanism, MovesALateVelocityAlongTheRamp) {
+  MechanismLoop job;
+  job.controller =
+      controller(MechanismKind::flywheel, flywheel_gains,
+                 dynamic<1>(mechanisms::flywheel(flywheel_gains).value()), {1.0}, {3.0}, 0.1);
+  job.truth.gains = flywheel_gains;
+  for (int k = 0; k < 150; ++k) {
+    job.reference.push_back({0.0, 2.0 * k, 100.0});
+  }
+  const auto error = [&](Time age, Time moved) {
+    job.truth.sensor.delay = age;
+    job.controller.measurement_delay = moved;
+    return error_on_the_way(job, "velocity");
+  };
+  const double late = error(15_ms, 0_ms);
+  EXPECT_GT(late, 0.5);
+  EXPECT_LT(std::abs(error(15_ms, 15_ms)), 0.02 * late);
+  EXPECT_NEAR(error(0_ms, 15_ms), -late, 0.02 * late);
+}
+
 TEST(SimulateMechanism, IsDeterministic) {
   MechanismLoop job = elevator_job();
   job.truth.sensor = {.resolution = 1e-4, .noise = 1e-3, .delay = 10_ms, .refresh = 20_ms};

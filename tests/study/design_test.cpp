@@ -219,6 +219,35 @@ TEST(Design, ExportsItsLoopAndItsConstants) {
   EXPECT_EQ(exports::paste_constants(constants).size(), 6u);
 }
 
+// The sensor of the simulation is as late as the design says, and the controller makes up for it:
+// with either of the two left out the mechanism is off by the way of one delay at cruise.
+TEST(SimulateDesign, TheDelayIsInTheSensorAndMadeUpFor) {
+  DesignJob job = elevator_job();
+  job.controller.delay = 0.030;
+  job.plant.gains.kS = 0.0;
+  const auto result = design(job);
+  ASSERT_TRUE(result) << to_string(result.error());
+  const auto response = simulate_design(*result, {});
+  ASSERT_TRUE(response) << to_string(response.error());
+  const auto& time = response->series.time();
+  const auto& position = *response->series.find("position");
+  const auto& measurement = *response->series.find("measurement");
+  const auto& velocity = *response->series.find("reference_velocity");
+  const double cruise = result->motion.max_velocity;
+  double off = 0.0;
+  int rows = 0;
+  for (std::size_t k = 0; k + 1 < time.size(); ++k) {
+    if (velocity[k] == cruise && velocity[k + 1] == cruise && k > 1 && velocity[k - 2] == cruise) {
+      off =
+          std::max(off, std::abs(position[k] - (*response->series.find("reference_position"))[k]));
+      EXPECT_NEAR(position[k] - measurement[k], 0.030 * cruise, 0.003 * cruise);
+      ++rows;
+    }
+  }
+  EXPECT_GT(rows, 5);
+  EXPECT_LT(off, 0.3 * 0.030 * cruise);
+}
+
 TEST(SimulateDesign, IsDeterministicAndSeeded) {
   const auto result = design(arm_job());
   ASSERT_TRUE(result) << to_string(result.error());
