@@ -65,17 +65,51 @@ Expected<Equilibrium> rest(const MatrixXd& balance, const ContinuousSystem<>& sy
 
 namespace detail {
 
-JudgedEigenvalues judged_eigenvalues(const MatrixRef& A, TimeDomain domain, double blur) {
+namespace {
+
+/// The power of two that brings the largest entry of M between 2^low and 2^high, zero where it is
+/// there.
+int shift_into(const MatrixXd& M, int low, int high) {
+  const double largest = M.cwiseAbs().maxCoeff();
+  const int exponent = largest > 0.0 ? std::ilogb(largest) : low;
+  return exponent < low ? low - exponent : exponent > high ? high - exponent : 0;
+}
+
+MatrixXd shifted(const MatrixXd& M, int exponent) {
+  return exponent == 0 ? M
+                       : MatrixXd(M.unaryExpr([&](double x) { return std::ldexp(x, exponent); }));
+}
+
+Eigen::VectorXcd shifted(const Eigen::VectorXcd& values, int exponent) {
+  return exponent == 0 ? values : Eigen::VectorXcd(values.unaryExpr([&](const Complex& x) {
+    return Complex(std::ldexp(x.real(), exponent), std::ldexp(x.imag(), exponent));
+  }));
+}
+
+}  // namespace
+
+JudgedEigenvalues judged_eigenvalues(const MatrixRef& A, TimeDomain domain, double blur,
+                                     int exponent) {
   const Index n = A.rows();
   JudgedEigenvalues judged;
   if (n == 0) {
     return judged;
   }
-  const Eigen::VectorXd d = balance_of(A);
-  const MatrixXd balanced = d.cwiseInverse().asDiagonal() * A * d.asDiagonal();
+  // Sums must not overflow, nor what is small but counts vanish, before the states have their
+  // units; then products must not.
+  const MatrixXd given = A;
+  const int before = shift_into(given, -900, 980);
+  MatrixXd balanced = shifted(given, before);
+  const Eigen::VectorXd d = balance_of(balanced);
+  balanced = d.cwiseInverse().asDiagonal() * balanced * d.asDiagonal();
+  const int after = shift_into(balanced, -300, 300);
+  balanced = shifted(balanced, after);
+  const int back = -before - after;
+  blur = std::ldexp(blur, -back);
   const Eigensystem system = eigensystem_of(balanced);
-  judged.values = system.values;
-  if (!system.values.allFinite()) {
+  judged.of_A = shifted(system.values, back);
+  judged.values = shifted(system.values, back + exponent);
+  if (!judged.values.allFinite()) {
     judged.converged = false;
     return judged;
   }
@@ -100,11 +134,14 @@ JudgedEigenvalues judged_eigenvalues(const MatrixRef& A, TimeDomain domain, doub
     const double condition = rows.row(k).norm();
     const double most = std::sqrt(epsilon) * std::max(balanced.norm(), 1e-300);
     judged.uncertainty(k) =
-        blur + (exact                      ? epsilon * std::abs(judged.values(k))
+        blur + (exact                      ? epsilon * std::abs(system.values(k))
                 : std::isfinite(condition) ? std::min(rounding * condition, 10.0 * most)
                                            : most);
-    const double by = excess(judged.values(k), domain);
-    const double margin = judged.uncertainty(k);
+    const double margin_scaled = judged.uncertainty(k);
+    judged.uncertainty(k) = std::ldexp(margin_scaled, back + exponent);
+    const bool continuous = domain == TimeDomain::continuous;
+    const double by = excess(continuous ? system.values(k) : judged.values(k), domain);
+    const double margin = continuous ? margin_scaled : judged.uncertainty(k);
     judged.verdicts.push_back(by < -margin  ? Stability::stable
                               : by > margin ? Stability::unstable
                                             : Stability::marginal);
@@ -124,9 +161,9 @@ JudgedEigenvalues judged_eigenvalues(const MatrixRef& A, TimeDomain domain, doub
     const double near = 100.0 * std::sqrt(epsilon) * balanced.norm();
     Complex mean = 0.0;
     for (Index j = 0; j < n; ++j) {
-      if (std::abs(judged.values(j) - judged.values(k)) <= near) {
+      if (std::abs(system.values(j) - system.values(k)) <= near) {
         ++same;
-        mean += judged.values(j);
+        mean += system.values(j);
       }
     }
     if (same == 1) {
@@ -192,8 +229,9 @@ Expected<ModalAnalysis> analyze_modes(const MatrixRef& A, TimeDomain domain, Tim
       mode.damping_ratio = 1.0;
     } else {
       mode.natural_frequency = std::abs(mode.s);
+      const double size = std::max(std::abs(mode.s.real()), std::abs(mode.s.imag()));
       mode.damping_ratio =
-          mode.natural_frequency > 0.0 ? -mode.s.real() / mode.natural_frequency : 0.0;
+          size > 0.0 ? -(mode.s.real() / size) / std::abs(Complex(mode.s / size)) : 0.0;
       mode.time_constant = mode.s.real() == 0.0 ? infinity : -1.0 / mode.s.real();
     }
     if (mode.stability == Stability::marginal) {

@@ -10,10 +10,11 @@
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/dense_reduction.hpp"
-#include "systems/balance.hpp"
+#include "math/dense/pair_scaling.hpp"
 #include "systems/mode_distance.hpp"
 #include "systems/modes.hpp"
 #include "systems/staircase.hpp"
+#include "systems/sure_reach.hpp"
 
 namespace flyball {
 
@@ -21,6 +22,7 @@ namespace {
 
 using Complex = std::complex<double>;
 using detail::product;
+using detail::transposed_product;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
@@ -101,112 +103,223 @@ struct Verdict {
   bool hidden_decay = true;
 };
 
+/// The pair in units in which its entries are near one, and the part of it to which paths lead.
+struct ScaledPair {
+  ScaledPair(const MatrixRef& A_given, const MatrixRef& B_given)
+      : units(detail::pair_scaling_of(A_given, B_given)),
+        A(detail::scaled_A(A_given, units)),
+        B(detail::scaled_B(B_given, units)),
+        on_paths(detail::states_on_paths(A_given, B_given)) {
+    for (Index i = 0, k = 0; i < A.rows(); ++i) {
+      if (k < static_cast<Index>(on_paths.size()) && on_paths[static_cast<std::size_t>(k)] == i) {
+        ++k;
+      } else {
+        off_paths.push_back(i);
+      }
+    }
+  }
+
+  detail::PairScaling units;
+  MatrixXd A;
+  MatrixXd B;
+  std::vector<Index> on_paths;
+  std::vector<Index> off_paths;
+};
+
+/// The staircase of a part that is known to be reached: what rounding would call nothing counts.
+detail::Staircase whole_staircase(const MatrixXd& A, const MatrixXd& B) {
+  detail::Staircase stairs = detail::staircase_of(A, B, 0.0);
+  if (stairs.rank < A.rows()) {
+    stairs.stairs.push_back(A.rows() - stairs.rank);
+    stairs.A = transposed_product(stairs.Q, product(A, stairs.Q));
+    stairs.B = transposed_product(stairs.Q, B);
+    stairs.rank = A.rows();
+  }
+  return stairs;
+}
+
+/// w'ᵀx' in the states' own units, of norm 1.
+Eigen::VectorXd in_given_units(const Eigen::VectorXd& w, const Eigen::VectorXi& units) {
+  int largest = std::numeric_limits<int>::min();
+  for (Index i = 0; i < w.size(); ++i) {
+    if (w(i) != 0.0) {
+      largest = std::max(largest, std::ilogb(w(i)) - units(i));
+    }
+  }
+  Eigen::VectorXd given = Eigen::VectorXd::Zero(w.size());
+  for (Index i = 0; i < w.size(); ++i) {
+    given(i) = w(i) == 0.0 ? 0.0 : std::ldexp(w(i), -units(i) - largest);
+  }
+  const double length = given.norm();
+  return length > 0.0 ? Eigen::VectorXd(given / length) : given;
+}
+
+double condition_of(MatrixXd krylov_matrix) {
+  const double largest = krylov_matrix.size() > 0 ? krylov_matrix.cwiseAbs().maxCoeff() : 0.0;
+  if (!krylov_matrix.allFinite() || !(largest > 0.0)) {
+    return infinity;
+  }
+  krylov_matrix /= largest;
+  const Eigen::VectorXd sizes = detail::coarse_singular_values_of(krylov_matrix);
+  const double smallest = sizes(sizes.size() - 1);
+  return smallest > 0.0 ? sizes(0) / smallest : infinity;
+}
+
+/// In units in which A and B are of one size; of an A of 2^exponent, far from one, only where the
+/// equation lets that size be taken out.
+Eigen::VectorXd gramian_eigenvalues(const MatrixXd& A, const MatrixXd& B, int exponent,
+                                    TimeDomain domain) {
+  constexpr int far = 200;
+  const bool near = std::abs(exponent) <= far;
+  if (!near && domain == TimeDomain::discrete) {
+    return {};
+  }
+  const double unit = near ? std::ldexp(1.0, exponent) : 1.0;
+  const MatrixXd BB = unit * unit * detail::product_transposed(B, B);
+  const auto gramian =
+      domain == TimeDomain::continuous ? lyapunov(unit * A, BB) : discrete_lyapunov(unit * A, BB);
+  if (!gramian) {
+    return {};
+  }
+  const Eigen::VectorXd values =
+      detail::symmetric_eigensystem_of(detail::symmetrized(gramian->X)).values;
+  return near
+             ? values
+             : Eigen::VectorXd(values.unaryExpr([&](double x) { return std::ldexp(x, exponent); }));
+}
+
+Error no_eigenvalues(std::string_view where) {
+  return Error(SystemError::no_convergence)
+      .in(std::string(where))
+      .about("the eigenvalues of A")
+      .hint("scale its rows and columns to like magnitudes");
+}
+
 Expected<Verdict> analyze(const MatrixRef& A_given, const MatrixRef& B_given, TimeDomain domain,
                           std::string_view where) {
   const Index n = A_given.rows();
-  const detail::SystemScaling scaling = detail::scaling_of(A_given, B_given, MatrixXd::Zero(0, n));
-  const MatrixXd A = detail::scaled_state_matrix(A_given, scaling);
-  const MatrixXd B =
-      scaling.inputs * MatrixXd(scaling.states.cwiseInverse().asDiagonal() * B_given);
+  const ScaledPair pair(A_given, B_given);
+  const int exponent = pair.units.time;
+  const MatrixXd A = pair.A(pair.on_paths, pair.on_paths);
+  const MatrixXd B = pair.B(pair.on_paths, Eigen::all);
 
   Verdict verdict;
   ReachAnalysis& reach = verdict.reach;
   reach.order = n;
   reach.tolerance = 100.0 * epsilon * static_cast<double>(n);
-  const double size = std::max(std::hypot(A.norm(), B.norm()), 1e-300);
-
-  const detail::Staircase stairs = detail::staircase_of(A, B, reach.tolerance);
-  reach.stairs = stairs.stairs;
-  reach.rank = stairs.rank;
   Eigen::VectorXcd all;
-  const std::vector<Eigen::VectorXd> shares = participations(A, all);
+  const std::vector<Eigen::VectorXd> shares = participations(pair.A, all);
   if (!all.allFinite()) {
-    return refusal(SystemError::no_convergence, where, "the eigenvalues of A")
-        .hint("scale its rows and columns to like magnitudes");
+    return tl::unexpected(no_eigenvalues(where));
   }
   const auto share_of = [&](Complex lambda) {
     Index nearest = 0;
     (all.array() - lambda).abs().minCoeff(&nearest);
     return shares[static_cast<std::size_t>(nearest)];
   };
+  const auto add_hidden = [&](const detail::JudgedEigenvalues& hidden, double distance) {
+    for (Index k = 0; k < hidden.values.size(); ++k) {
+      reach.modes.push_back({hidden.values(k), false, distance,
+                             hidden.verdicts[static_cast<std::size_t>(k)],
+                             share_of(hidden.of_A(k))});
+    }
+    verdict.hidden_decay = verdict.hidden_decay && hidden.stability == Stability::stable;
+  };
 
-  const Index r = stairs.rank;
-  const MatrixXd A_u = stairs.A.bottomRightCorner(n - r, n - r);
+  // Where no path leads nothing was turned or rounded.
+  const detail::JudgedEigenvalues apart =
+      detail::judged_eigenvalues(pair.A(pair.off_paths, pair.off_paths), domain, 0.0, exponent);
+  add_hidden(apart, 0.0);
+
+  const double size = std::max(std::hypot(A.norm(), B.norm()), 1e-300);
   // The blocks have been turned out of A.
   const double blur = 10.0 * epsilon * static_cast<double>(n) * A.norm();
-  const detail::JudgedEigenvalues hidden = detail::judged_eigenvalues(A_u, domain, blur);
-  for (Index k = 0; k < hidden.values.size(); ++k) {
-    reach.modes.push_back({hidden.values(k), false, stairs.largest_rest,
-                           hidden.verdicts[static_cast<std::size_t>(k)],
-                           share_of(hidden.values(k))});
+  detail::Staircase stairs = detail::staircase_of(A, B, reach.tolerance);
+  bool sure = false;
+  if (stairs.rank < A.rows()) {
+    sure = detail::surely_reached(A_given(pair.on_paths, pair.on_paths),
+                                  B_given(pair.on_paths, Eigen::all), reach.tolerance) ||
+           detail::reached_at_every_speed(A, B);
+    if (sure) {
+      stairs = whole_staircase(A, B);
+    }
   }
-  verdict.hidden_decay = n == r || hidden.stability == Stability::stable;
-
+  const Index r = stairs.rank;
+  const Index rest = A.rows() - r;
+  const detail::JudgedEigenvalues hidden =
+      detail::judged_eigenvalues(stairs.A.bottomRightCorner(rest, rest), domain, blur, exponent);
   const MatrixXd A_r = stairs.A.topLeftCorner(r, r);
   const MatrixXd B_r = stairs.B.topRows(r);
-  const detail::JudgedEigenvalues seen = detail::judged_eigenvalues(A_r, domain, blur);
-  if (!hidden.converged || !seen.converged) {
-    return refusal(SystemError::no_convergence, where, "the eigenvalues of A");
+  const detail::JudgedEigenvalues seen = detail::judged_eigenvalues(A_r, domain, blur, exponent);
+  if (!apart.converged || !hidden.converged || !seen.converged) {
+    return tl::unexpected(no_eigenvalues(where));
   }
+  add_hidden(hidden, stairs.largest_rest);
+
   const detail::ModeDistance distances(A_r, B_r);
+  std::vector<double> distance_of;
   std::vector<Complex> missed;
-  double last = 0.0;
   for (Index k = 0; k < seen.values.size(); ++k) {
-    const Complex lambda = seen.values(k);
-    const bool conjugate = k > 0 && lambda == std::conj(seen.values(k - 1)) && lambda.imag() != 0.0;
-    const double distance =
-        conjugate ? last : distances.near(lambda, reach.tolerance * size).value / size;
-    last = distance;
-    const Stability stability = seen.verdicts[static_cast<std::size_t>(k)];
-    const bool reached = distance > reach.tolerance;
-    reach.modes.push_back({lambda, reached, distance, stability, share_of(lambda)});
-    if (!reached) {
+    const Complex lambda = seen.of_A(k);
+    const bool conjugate = k > 0 && lambda == std::conj(seen.of_A(k - 1)) && lambda.imag() != 0.0;
+    const double distance = conjugate ? distance_of.back()
+                                      : distances.near(lambda, reach.tolerance * size).value / size;
+    distance_of.push_back(distance);
+    if (!(distance > reach.tolerance)) {
       missed.push_back(lambda);
-      --reach.rank;
-      verdict.hidden_decay = verdict.hidden_decay && stability == Stability::stable;
     }
+  }
+  if (!missed.empty() && rest == 0) {
+    sure = sure ||
+           detail::surely_reached(A_given(pair.on_paths, pair.on_paths),
+                                  B_given(pair.on_paths, Eigen::all), reach.tolerance) ||
+           detail::reached_at_every_speed(A, B);
+  }
+  if (sure) {
+    missed.clear();
+  }
+  for (Index k = 0; k < seen.values.size(); ++k) {
+    const double distance = distance_of[static_cast<std::size_t>(k)];
+    const Stability stability = seen.verdicts[static_cast<std::size_t>(k)];
+    const bool reached = sure || distance > reach.tolerance;
+    reach.modes.push_back({seen.values(k), reached, distance, stability, share_of(seen.of_A(k))});
+    verdict.hidden_decay = verdict.hidden_decay && (reached || stability == Stability::stable);
   }
   std::stable_sort(reach.modes.begin(), reach.modes.end(),
                    [](const ModeReach& a, const ModeReach& b) {
                      return a.reached != b.reached ? !a.reached : a.distance < b.distance;
                    });
+  reach.stairs = stairs.stairs;
+  reach.rank = r - static_cast<Index>(missed.size());
 
-  // What the staircase left over, and the left vectors of modes that only their own test found.
-  MatrixXd directions(n, n - r + static_cast<Index>(missed.size()));
-  directions.leftCols(n - r) = stairs.Q.rightCols(n - r);
+  // Where no path leads, what the staircase left over, and the left vectors of modes that only
+  // their own test found.
+  MatrixXd directions(A.rows(), rest + static_cast<Index>(missed.size()));
+  directions.leftCols(rest) = stairs.Q.rightCols(rest);
   for (std::size_t k = 0; k < missed.size(); ++k) {
     const Eigen::VectorXcd left = distances.at(missed[k]).left;
     const MatrixXd part = missed[k].imag() < 0.0 ? MatrixXd(left.imag()) : MatrixXd(left.real());
-    directions.col(n - r + static_cast<Index>(k)) = product(stairs.Q.leftCols(r), part);
+    directions.col(rest + static_cast<Index>(k)) = product(stairs.Q.leftCols(r), part);
   }
-  reach.hidden = scaling.states.cwiseInverse().asDiagonal() * directions;
-  for (Index k = 0; k < reach.hidden.cols(); ++k) {
-    const double length = reach.hidden.col(k).norm();
-    if (length > 0.0) {
-      reach.hidden.col(k) /= length;
-    }
+  reach.hidden = MatrixXd::Zero(n, n - reach.rank);
+  const auto off = static_cast<Index>(pair.off_paths.size());
+  for (Index k = 0; k < off; ++k) {
+    reach.hidden(pair.off_paths[static_cast<std::size_t>(k)], k) = 1.0;
+  }
+  for (Index k = 0; k < directions.cols(); ++k) {
+    Eigen::VectorXd w = Eigen::VectorXd::Zero(n);
+    w(pair.on_paths) = directions.col(k);
+    reach.hidden.col(off + k) = in_given_units(w, pair.units.states);
   }
 
-  const double unit = A.norm() > 0.0 ? A.norm() : 1.0;
   if (B.cols() > 0) {
-    const Eigen::VectorXd sizes = detail::coarse_singular_values_of(krylov_factor(A / unit, B));
+    const double unit = pair.A.norm() > 0.0 ? pair.A.norm() : 1.0;
+    const Eigen::VectorXd sizes =
+        detail::coarse_singular_values_of(krylov_factor(pair.A / unit, pair.B));
     reach.matrix_rank = numerical_rank(sizes, static_cast<double>(n) * epsilon);
   }
-  const MatrixXd raw = krylov_factor(A_given, B_given);
-  if (raw.cols() > 0 && raw.allFinite()) {
-    const Eigen::VectorXd raw_sizes = detail::coarse_singular_values_of(raw);
-    const double smallest = raw_sizes(raw_sizes.size() - 1);
-    reach.matrix_condition = smallest > 0.0 ? raw_sizes(0) / smallest : infinity;
-  } else {
-    reach.matrix_condition = infinity;
-  }
-  const MatrixXd BB = detail::product_transposed(B, B);
-  const auto gramian =
-      domain == TimeDomain::continuous ? lyapunov(A, BB) : discrete_lyapunov(A, BB);
-  if (gramian) {
-    reach.gramian_eigenvalues =
-        detail::symmetric_eigensystem_of(detail::symmetrized(gramian->X)).values;
-  }
+  reach.matrix_condition = condition_of(krylov_factor(A_given, B_given));
+  reach.gramian_eigenvalues = gramian_eigenvalues(pair.A, pair.B, exponent, domain);
   return verdict;
 }
 

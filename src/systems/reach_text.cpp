@@ -18,12 +18,15 @@ std::string name_of(Index k, std::span<const std::string> names) {
 
 /// "x1", "0.71 x1 - 0.71 x2".
 std::string combination(const Eigen::VectorXd& w, std::span<const std::string> names) {
-  const double largest = w.cwiseAbs().maxCoeff();
+  const double largest = w.size() > 0 ? w.cwiseAbs().maxCoeff() : 0.0;
   std::vector<Index> parts;
   for (Index k = 0; k < w.size(); ++k) {
     if (std::abs(w(k)) > 1e-6 * largest) {
       parts.push_back(k);
     }
+  }
+  if (parts.empty()) {
+    return "no state";
   }
   if (parts.size() == 1) {
     return name_of(parts.front(), names);

@@ -67,15 +67,18 @@ struct ObservabilityAnalysis : ReachAnalysis {
 
 /// Which modes and states the inputs move, and how strongly.
 ///
-/// A, B are balanced by powers of two first, so that the units of states and inputs do not decide.
-/// The verdict is that of the orthogonal staircase, completed by the test of each mode: the rank of
-/// (6.37) alone fails at a dozen states.
+/// Time, states and inputs are measured in units first in which the entries of A and B are near
+/// one (powers of two), so that units do not decide, whatever the entries' sizes. The verdict is
+/// that of the orthogonal staircase, completed by the test of each mode: the rank of (6.37) alone
+/// fails at a dozen states. Where which entries are zero already forces every mode to be reached,
+/// as in a chain or a companion matrix, no rounding is held against it, though a mode's distance
+/// may be as small.
 ///
 /// @param A  n x n. @param B  n x m. @param domain  Decides which modes decay by themselves.
 /// @errors ArgumentError for shapes and entries; SystemError::no_convergence.
 /// Cost: O(n³) for the verdict, O(n²m) a mode for the distances; allocates.
 /// Source: book, 6.12.1 to 6.12.4; Van Dooren, IEEE Trans. Automatic Control 26 (1981); Paige, same
-/// volume.
+/// volume; Mayeda and Yamada, SIAM J. Control Optim. 17 (1979).
 [[nodiscard]] Expected<ControllabilityAnalysis> analyze_controllability(const MatrixRef& A,
                                                                         const MatrixRef& B,
                                                                         TimeDomain domain);

@@ -1,0 +1,218 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "math/dense/pair_scaling.hpp"
+
+namespace flyball::detail {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr double none = -std::numeric_limits<double>::infinity();
+
+MatrixXd logarithms(const MatrixRef& M) {
+  return M.unaryExpr([](double x) { return x == 0.0 ? none : std::log2(std::abs(x)); });
+}
+
+/// Σ 2^x, by the largest x.
+class Sum {
+ public:
+  void add(double x) {
+    if (x == none) {
+      return;
+    }
+    if (x > largest_) {
+      sum_ = largest_ == none ? 1.0 : 1.0 + sum_ * std::exp2(largest_ - x);
+      largest_ = x;
+    } else {
+      sum_ += std::exp2(x - largest_);
+    }
+  }
+  [[nodiscard]] double logarithm() const {
+    return largest_ == none ? none : largest_ + std::log2(sum_);
+  }
+
+ private:
+  double largest_ = none;
+  double sum_ = 0.0;
+};
+
+/// A, B by their logarithms, and the units that have been found.
+struct Pair {
+  MatrixXd a, b;
+  Eigen::VectorXd e, f;
+
+  [[nodiscard]] double A(Index i, Index j) const { return a(i, j) + e(j) - e(i); }
+  [[nodiscard]] double B(Index i, Index j) const { return b(i, j) + f(j) - e(i); }
+
+  [[nodiscard]] double size() const {
+    Sum all;
+    for (Index j = 0; j < a.cols(); ++j) {
+      for (Index i = 0; i < a.rows(); ++i) {
+        all.add(A(i, j));
+      }
+    }
+    return all.logarithm() == none ? 0.0 : all.logarithm();
+  }
+
+  void scale_inputs(double size) {
+    const double share = std::log2(std::max(1.0, static_cast<double>(b.cols())));
+    for (Index j = 0; j < b.cols(); ++j) {
+      Sum column;
+      for (Index i = 0; i < b.rows(); ++i) {
+        column.add(b(i, j) - e(i));
+      }
+      f(j) = column.logarithm() == none ? 0.0 : size - column.logarithm() - share;
+    }
+  }
+
+  /// Each state in the unit in which what first reaches it from the inputs is of the size that
+  /// cycles of one or two states show whatever the units are: far units are left behind at once.
+  void start() {
+    const Index n = a.rows();
+    double cycle = none;
+    for (Index j = 0; j < n; ++j) {
+      for (Index i = 0; i <= j; ++i) {
+        cycle = std::max(cycle, 0.5 * (a(i, j) + a(j, i)));
+      }
+    }
+    cycle = cycle == none ? 0.0 : cycle;
+    std::vector<bool> seen(static_cast<std::size_t>(n), false);
+    std::vector<Index> queue;
+    const auto visit = [&](Index i, double unit) {
+      if (!seen[static_cast<std::size_t>(i)]) {
+        seen[static_cast<std::size_t>(i)] = true;
+        e(i) = unit - cycle;
+        queue.push_back(i);
+      }
+    };
+    const auto spread = [&](std::size_t from) {
+      for (std::size_t k = from; k < queue.size(); ++k) {
+        const Index j = queue[k];
+        for (Index i = 0; i < n; ++i) {
+          if (a(i, j) != none) {
+            visit(i, a(i, j) + e(j));
+          }
+        }
+      }
+    };
+    for (Index j = 0; j < b.cols(); ++j) {
+      double shift = none;  // The unit of an input that moves a known state.
+      for (Index i = 0; i < n && shift == none; ++i) {
+        if (b(i, j) != none && seen[static_cast<std::size_t>(i)]) {
+          shift = e(i) + cycle - b(i, j);
+        }
+      }
+      const std::size_t from = queue.size();
+      for (Index i = 0; i < n; ++i) {
+        if (b(i, j) != none) {
+          visit(i, b(i, j) + (shift == none ? 0.0 : shift));
+        }
+      }
+      spread(from);
+    }
+    for (Index i = 0; i < n; ++i) {
+      const std::size_t from = queue.size();
+      visit(i, cycle);
+      spread(from);
+    }
+  }
+
+  /// The unit of state i moved by whole powers of two; whether it was.
+  bool balance(Index i, double size) {
+    Sum row;
+    Sum column;
+    for (Index j = 0; j < a.cols(); ++j) {
+      if (j != i) {
+        row.add(A(i, j));
+        column.add(A(j, i));
+      }
+    }
+    for (Index j = 0; j < b.cols(); ++j) {
+      row.add(B(i, j));
+    }
+    const double rows = row.logarithm();
+    const double columns = column.logarithm();
+    if (rows == none && columns == none) {
+      return false;
+    }
+    const double step = std::round(rows == none      ? size - columns
+                                   : columns == none ? rows - size
+                                                     : 0.5 * (rows - columns));
+    // A factor of two must gain 5 %.
+    const double apart = std::abs(rows - columns);
+    if (step == 0.0 || (rows != none && columns != none && std::abs(step) == 1.0 &&
+                        std::exp2(1.0 - apart) + 0.5 > 0.95 * (1.0 + std::exp2(-apart)))) {
+      return false;
+    }
+    e(i) += step;
+    return true;
+  }
+};
+
+int whole(double exponent) {
+  return static_cast<int>(std::lround(exponent));
+}
+
+}  // namespace
+
+PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B) {
+  constexpr int sweeps = 200;
+  constexpr double ordinary = 100.0;
+  const Index n = A.rows();
+  Pair pair{logarithms(A), logarithms(B), Eigen::VectorXd::Zero(n),
+            Eigen::VectorXd::Zero(B.cols())};
+  const auto far = [&](const MatrixXd& M) {
+    return (M.array() != none && M.array().abs() > ordinary).any();
+  };
+  if (far(pair.a) || far(pair.b)) {
+    pair.start();
+    pair.e = pair.e.array().round();
+  }
+  double size = pair.size();
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    pair.scale_inputs(size);
+    bool changed = false;
+    for (Index k = 0; k < n; ++k) {
+      changed = pair.balance(k, size) || changed;
+    }
+    if (!changed) {
+      break;
+    }
+    size = pair.size();
+  }
+  PairScaling scaling{Eigen::VectorXi(n), Eigen::VectorXi::Zero(B.cols()), whole(size)};
+  for (Index i = 0; i < n; ++i) {
+    scaling.states(i) = whole(pair.e(i));
+  }
+  // B' gets the norm of A', each of its columns an equal share.
+  const double norm = scaled_A(A, scaling).norm();
+  const double share =
+      (norm > 0.0 ? norm : 1.0) / std::sqrt(std::max(1.0, static_cast<double>(B.cols())));
+  for (Index j = 0; j < B.cols(); ++j) {
+    scaling.inputs(j) = whole(pair.f(j) - size);
+  }
+  const Eigen::VectorXd columns = scaled_B(B, scaling).colwise().norm();
+  for (Index j = 0; j < B.cols(); ++j) {
+    scaling.inputs(j) += columns(j) > 0.0 ? whole(std::log2(share / columns(j))) : 0;
+  }
+  return scaling;
+}
+
+MatrixXd scaled_A(const MatrixRef& A, const PairScaling& scaling) {
+  return MatrixXd::NullaryExpr(A.rows(), A.cols(), [&](Index i, Index j) {
+    return std::ldexp(A(i, j), scaling.states(j) - scaling.states(i) - scaling.time);
+  });
+}
+
+MatrixXd scaled_B(const MatrixRef& B, const PairScaling& scaling) {
+  return MatrixXd::NullaryExpr(B.rows(), B.cols(), [&](Index i, Index j) {
+    return std::ldexp(B(i, j), scaling.inputs(j) - scaling.states(i));
+  });
+}
+
+}  // namespace flyball::detail

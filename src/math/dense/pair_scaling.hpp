@@ -1,0 +1,31 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include <flyball/core/argument.hpp>
+
+/// Units in which a pair (A, B) of any finite entries has entries near one, as powers of two, so
+/// that neither overflow nor rounding can come from them.
+namespace flyball::detail {
+
+/// x = diag(2^states) x', u = diag(2^inputs) u', t = 2^-time t': A = 2^time D A' D⁻¹, and B' has
+/// the size of A'.
+struct PairScaling {
+  Eigen::VectorXi states;
+  Eigen::VectorXi inputs;
+  int time = 0;
+};
+
+/// The units in which row and column of each state in [A B; 0 0] are of like size, without the
+/// diagonal (Osborne's iteration, on logarithms); each input's and time's own unit make the largest
+/// entry of its column and of A' one. A state that
+/// acts on nothing, or on which nothing acts, takes the unit in which what it has is of A's size.
+/// Cost: O(n (n + m)) a sweep, at most 200.
+/// Source: Osborne, "On pre-conditioning of matrices", J. ACM 7 (1960).
+[[nodiscard]] PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B);
+
+/// A', B' of the above.
+[[nodiscard]] Eigen::MatrixXd scaled_A(const MatrixRef& A, const PairScaling& scaling);
+[[nodiscard]] Eigen::MatrixXd scaled_B(const MatrixRef& B, const PairScaling& scaling);
+
+}  // namespace flyball::detail
