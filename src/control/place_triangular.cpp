@@ -96,7 +96,7 @@ std::optional<PlacedLoop> place_triangular(const PlacementProblem& problem) {
   const Eigen::Index n = problem.A.rows();
   // The columns of an orthogonal Q from the left: A q - Q t - p q must lie in the range of B, [0 I]
   // of it vanish.
-  Eigen::MatrixXd Q(n, 0);
+  Eigen::MatrixXd Q(n, n);
   Eigen::MatrixXd complement = Eigen::MatrixXd::Identity(n, n);
   Eigen::MatrixXd T = Eigen::MatrixXd::Zero(n, n);
   const Eigen::Index unreached = n - problem.rank;
@@ -107,7 +107,7 @@ std::optional<PlacedLoop> place_triangular(const PlacementProblem& problem) {
     Eigen::MatrixXcd M(unreached, n);
     M.leftCols(free) = product(problem.A.bottomRows(unreached), complement).cast<Complex>() -
                        pole * complement.bottomRows(unreached).cast<Complex>();
-    M.rightCols(j) = -Q.bottomRows(unreached).cast<Complex>();
+    M.rightCols(j) = -Q.bottomLeftCorner(unreached, j).cast<Complex>();
     const Columns columns = next_columns(null_space_of(M), free, pole);
     if (!std::isfinite(columns.departure)) {
       return std::nullopt;
@@ -128,8 +128,7 @@ std::optional<PlacedLoop> place_triangular(const PlacementProblem& problem) {
         turned.col(k) = -turned.col(k);
       }
     }
-    Q.conservativeResize(Eigen::NoChange, j + width);
-    Q.rightCols(width) = turned.leftCols(width);
+    Q.middleCols(j, width) = turned.leftCols(width);
     complement = turned.rightCols(free - width);
     j += width;
   }

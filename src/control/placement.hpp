@@ -104,15 +104,18 @@ struct StateUnits {
 /// Where a gain puts the poles, in the order of those that were asked for.
 struct Reached {
   Eigen::VectorXcd poles;
-  double condition = infinite;   ///< Of the unit eigenvectors, in the units that were given.
-  double pole_error = infinite;  ///< The largest distance from the pole that was asked for.
+  double condition = infinite;  ///< Of the unit eigenvectors, in the units that were given.
+  /// The largest distance from the pole p that was asked for, with what may be wrong with it,
+  /// relative to |p|, or to the size of A and the poles where p is nothing beside it.
+  double pole_error = infinite;
   /// The largest of these in units of max(1, |p|) times the pole's own condition, 1/|yᴴx| for unit
   /// left and right eigenvectors: in the plant's units or in balanced ones, where it is smaller.
   double misplaced = infinite;
   Eigen::MatrixXcd left;   ///< Rows yᴴ, in the order of the poles, and
   Eigen::MatrixXcd right;  ///< columns x: yᴴx = 1.
 
-  [[nodiscard]] bool accepted() const { return misplaced <= 1e-8; }
+  /// No condition excuses a pole that is a tenth off.
+  [[nodiscard]] bool accepted() const { return misplaced <= 1e-8 && pole_error <= 0.1; }
 };
 
 /// The poles of A - B K, which is exact: with a basis X in which it is nearly triangular (or with
@@ -135,18 +138,24 @@ struct Reached {
 [[nodiscard]] std::vector<std::size_t> matched(const Eigen::VectorXcd& wanted,
                                                const Eigen::VectorXcd& got);
 
+/// Units of the plant as it is for messages: the states', and time's as a power of two.
+struct GivenUnits {
+  Eigen::VectorXd states;
+  int time = 0;
+};
+
 /// The poles that are left for the controllable part once each mode that stays has taken its own;
-/// the error if one finds none.
+/// the error if one finds none, or if a real mode would take one of a pair.
 [[nodiscard]] Expected<Eigen::VectorXcd> poles_to_move(const ControllableStaircase& form,
-                                                       const Eigen::VectorXd& units,
+                                                       const GivenUnits& units,
                                                        const Eigen::VectorXcd& wanted,
                                                        std::vector<std::complex<double>>& staying);
 
 /// The answer for a pair that is uncontrollable to rounding, though no step of its staircase shows
 /// it: the product of several couplings can be smaller than any. It names the mode that is reached
 /// least among those that are not wanted.
-[[nodiscard]] Error weakest_mode(const MatrixRef& A, const MatrixRef& B,
-                                 const Eigen::VectorXd& units, const Eigen::VectorXcd& wanted);
+[[nodiscard]] Error weakest_mode(const MatrixRef& A, const MatrixRef& B, const GivenUnits& units,
+                                 const Eigen::VectorXcd& wanted);
 
 /// An orthonormal basis of {v : M v = 0} for an M of full row rank, rows < columns.
 [[nodiscard]] Eigen::MatrixXcd null_space_of(const ComplexMatrixRef& M);

@@ -6,11 +6,13 @@
 #include <string>
 
 #include <flyball/core/random.hpp>
+#include <flyball/systems/controllability.hpp>
 
 #include "control/placement.hpp"
 #include "core/error_rows.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
+#include "math/dense/pair_scaling.hpp"
 
 namespace flyball {
 
@@ -20,8 +22,12 @@ using Complex = std::complex<double>;
 constexpr std::string_view where = "place";
 
 /// Real poles first, then pairs side by side with their conjugates made exact.
-Expected<Eigen::VectorXcd> paired(const Eigen::VectorXcd& poles) {
+/// @param time  The poles are in units of 2^time; messages are not.
+Expected<Eigen::VectorXcd> paired(const Eigen::VectorXcd& poles, int time) {
   constexpr double conjugate = 1e-10;
+  const auto given = [&](Complex pole) {
+    return std::vector<double>{std::ldexp(pole.real(), time), std::ldexp(pole.imag(), time)};
+  };
   std::vector<Complex> upper;
   std::vector<Complex> lower;
   std::vector<Complex> sorted;
@@ -39,18 +45,14 @@ Expected<Eigen::VectorXcd> paired(const Eigen::VectorXcd& poles) {
     });
     if (partner == lower.end() ||
         std::abs(*partner - std::conj(pole)) > conjugate * std::max(1.0, std::abs(pole))) {
-      return refusal(PolePlacementError::not_conjugate, where, "poles")
-          .hint("add the conjugate of each complex pole")
-          .with("pole", {pole.real(), pole.imag()});
+      return refusal(PolePlacementError::not_conjugate, where, "poles").hint("add the conjugate of each complex pole").with("pole", given(pole));
     }
     lower.erase(partner);
     sorted.push_back(pole);
     sorted.push_back(std::conj(pole));
   }
   if (!lower.empty()) {
-    return refusal(PolePlacementError::not_conjugate, where, "poles")
-        .hint("add the conjugate of each complex pole")
-        .with("pole", {lower.front().real(), lower.front().imag()});
+    return refusal(PolePlacementError::not_conjugate, where, "poles").hint("add the conjugate of each complex pole").with("pole", given(lower.front()));
   }
   return Eigen::VectorXcd(
       Eigen::Map<const Eigen::VectorXcd>(sorted.data(), static_cast<Eigen::Index>(sorted.size())));
@@ -194,31 +196,43 @@ std::optional<Candidate> best_candidate(const Scaled& plant, const Part& part,
   return better ? other : chosen;
 }
 
+bool surely_controllable(const MatrixRef& A, const MatrixRef& B) {
+  const auto reach = analyze_controllability(A, B, TimeDomain::continuous);
+  return reach && reach->controllable;
+}
+
 /// The gain found with each state measured in its unit, for the plant in the units it came in.
 Expected<PolePlacement<>> place_in_units(const MatrixRef& A, const MatrixRef& B,
                                          const Eigen::VectorXcd& wanted,
                                          const Eigen::VectorXcd& poles,
                                          const Eigen::VectorXd& units,
-                                         const Eigen::VectorXd& balanced) {
+                                         const Eigen::VectorXd& balanced, int time) {
   const Scaled plant{units.cwiseInverse().asDiagonal() * A * units.asDiagonal(),
                      units.cwiseInverse().asDiagonal() * B,
                      {units, units.cwiseQuotient(balanced)}};
   const detail::ControllableStaircase form = detail::controllable_staircase(plant.A, plant.B);
   PolePlacement<> placed;
   FLYBALL_TRY_IN(where, const auto moved,
-                 detail::poles_to_move(form, units, wanted, placed.uncontrollable));
+                 detail::poles_to_move(form, {units, time}, wanted, placed.uncontrollable));
   const Part part = controllable_part(plant, form, moved);
   const std::optional<Candidate> found = best_candidate(plant, part, form, poles);
-  if (found && !found->determined) {
+  // Rounding of the plant would make another gain: because a mode hangs on it alone, or because so
+  // many poles are one.
+  if (found && !found->determined && !surely_controllable(plant.A, plant.B)) {
     return tl::unexpected(
-        detail::weakest_mode(plant.A, plant.B, units, wanted).in(std::string(where)));
+        detail::weakest_mode(plant.A, plant.B, {units, time}, wanted).in(std::string(where)));
   }
   if (!found || !found->reached.accepted()) {
     const detail::Reached reached = found ? found->reached : detail::Reached{};
-    return refusal(PolePlacementError::not_reached, where, "(A, B)")
-        .hint("it is nearly uncontrollable: ask for poles nearer to those of A")
-        .with("largest distance of a pole from its place", reached.pole_error)
-        .with("condition of the eigenvectors", reached.condition);
+    return tl::unexpected(
+        Error(PolePlacementError::not_reached)
+            .in(std::string(where))
+            .about("(A, B)")
+            .hint(
+                "it is nearly uncontrollable, or these poles are nearly one: ask for poles nearer "
+                "to those of A, or further apart")
+            .with("largest relative distance of a pole from its place", reached.pole_error)
+            .with("condition of the eigenvectors", reached.condition));
   }
   placed.K = found->K * units.cwiseInverse().asDiagonal();
   placed.poles = found->reached.poles;
@@ -241,6 +255,62 @@ Eigen::VectorXd units_with_inputs(const MatrixRef& A, const MatrixRef& B,
     both.col(j) *= length > 0.0 ? size / length : 0.0;
   }
   return detail::balance_of(both).head(n).cwiseProduct(balanced);
+}
+
+/// Units in which nothing is far from one. Where all entries are ordinary those that were given
+/// stay, but for time if the poles are far from one.
+detail::PairScaling working_units(const MatrixRef& A, const MatrixRef& B,
+                                  const Eigen::VectorXcd& poles) {
+  constexpr int far = 100;
+  constexpr int slow = -10;
+  constexpr int fast = 30;
+  const auto is_far = [](double x) { return x != 0.0 && std::abs(std::ilogb(x)) > far; };
+  const Eigen::VectorXd sizes = poles.real().cwiseAbs().cwiseMax(poles.imag().cwiseAbs());
+  const double largest = sizes.maxCoeff();
+  const bool all = A.unaryExpr(is_far).any() || B.unaryExpr(is_far).any() || is_far(largest);
+  detail::PairScaling units{Eigen::VectorXi::Zero(A.rows()), Eigen::VectorXi::Zero(B.cols()), 0};
+  if (all) {
+    units = detail::pair_scaling_of(A, B);
+  }
+  if (largest > 0.0) {
+    const int exponent = std::ilogb(largest);
+    if (all) {
+      units.time = std::max(units.time, exponent);
+    } else if (exponent < slow || exponent > fast) {
+      units.time = exponent;
+    }
+  }
+  return units;
+}
+
+Eigen::VectorXcd in_units_of(const Eigen::VectorXcd& poles, int exponent) {
+  return poles.unaryExpr([&](const Complex& p) {
+    return Complex(std::ldexp(p.real(), exponent), std::ldexp(p.imag(), exponent));
+  });
+}
+
+/// Entries and poles are near one, in units of 2^time per second.
+Expected<PolePlacement<>> place_near_one(const MatrixRef& A, const MatrixRef& B,
+                                         const Eigen::VectorXcd& poles, int time) {
+  FLYBALL_TRY(auto wanted, paired(poles, time));
+  // Coarse units can hide a coupling, or cost digits: then all states are made of one size. What
+  // only inputs scale shows in units that balance them too.
+  constexpr double coarse = 1e4;
+  const Eigen::VectorXd as_given = Eigen::VectorXd::Ones(A.rows());
+  const Eigen::VectorXd balanced = detail::balance_of(A);
+  const bool first = balanced.maxCoeff() > coarse * balanced.minCoeff();
+  auto placed = place_in_units(A, B, wanted, poles, first ? balanced : as_given, balanced, time);
+  if (!placed) {
+    for (const Eigen::VectorXd& units :
+         {first ? as_given : balanced, units_with_inputs(A, B, balanced)}) {
+      if (units != (first ? balanced : as_given)) {
+        if (auto again = place_in_units(A, B, wanted, poles, units, balanced, time)) {
+          return again;
+        }
+      }
+    }
+  }
+  return placed;
 }
 
 Expected<void> check_arguments(const MatrixRef& A, const MatrixRef& B,
@@ -279,23 +349,28 @@ ErrorInfo error_info(PolePlacementError code) {
 Expected<PolePlacement<>> place(const MatrixRef& A, const MatrixRef& B,
                                 const Eigen::VectorXcd& poles) {
   FLYBALL_CHECK(check_arguments(A, B, poles));
-  FLYBALL_TRY(auto wanted, paired(poles));
-  // Coarse units can hide a coupling, or cost digits: then all states are made of one size. What
-  // only inputs scale shows in units that balance them too.
-  constexpr double coarse = 1e4;
-  const Eigen::VectorXd as_given = Eigen::VectorXd::Ones(A.rows());
-  const Eigen::VectorXd balanced = detail::balance_of(A);
-  const bool first = balanced.maxCoeff() > coarse * balanced.minCoeff();
-  auto placed = place_in_units(A, B, wanted, poles, first ? balanced : as_given, balanced);
-  if (!placed) {
-    for (const Eigen::VectorXd& units :
-         {first ? as_given : balanced, units_with_inputs(A, B, balanced)}) {
-      if (units != (first ? balanced : as_given)) {
-        if (auto again = place_in_units(A, B, wanted, poles, units, balanced)) {
-          return again;
-        }
-      }
+  const detail::PairScaling units = working_units(A, B, poles);
+  if (units.time == 0 && units.states.isZero() && units.inputs.isZero()) {
+    return place_near_one(A, B, poles, 0);
+  }
+  FLYBALL_TRY(auto placed, place_near_one(detail::scaled_A(A, units), detail::scaled_B(B, units),
+                                          in_units_of(poles, -units.time), units.time));
+  placed.poles = in_units_of(placed.poles, units.time);
+  bool held = placed.poles.allFinite();
+  for (Eigen::Index j = 0; j < placed.K.cols(); ++j) {
+    for (Eigen::Index i = 0; i < placed.K.rows(); ++i) {
+      const int exponent = units.inputs(i) + units.time - units.states(j);
+      const double entry = std::ldexp(placed.K(i, j), exponent);
+      held = held && std::ldexp(entry, -exponent) == placed.K(i, j);
+      placed.K(i, j) = entry;
     }
+  }
+  if (!held) {
+    return tl::unexpected(Error(PolePlacementError::not_reached)
+                              .in(std::string(where))
+                              .about("K")
+                              .got("beyond the range of doubles")
+                              .hint("measure states and inputs in other units"));
   }
   return placed;
 }

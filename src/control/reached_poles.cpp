@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "control/placement.hpp"
+#include "math/extended/extended_eigenvalues.hpp"
 
 namespace flyball::detail {
 
@@ -13,6 +14,73 @@ using Complex = std::complex<double>;
 
 double scale_of(Complex pole) {
   return std::max(1.0, std::abs(pole));
+}
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+/// What the errors of poles are relative to: a pole that is nothing beside the plant and the other
+/// poles is judged as zero, by their size.
+Eigen::VectorXd pole_scales(const Eigen::VectorXcd& wanted, const Eigen::MatrixXd& A) {
+  double size = std::max(A.norm(), wanted.cwiseAbs().maxCoeff());
+  size = size > 0.0 ? size : 1.0;
+  const double nothing = 100.0 * epsilon * static_cast<double>(wanted.size()) * size;
+  return wanted.cwiseAbs().unaryExpr([&](double p) { return p > nothing ? p : size; });
+}
+
+/// The eigenvalues of a matrix that is similar to A - B K, and how far each may be from A - B K's.
+struct Spectrum {
+  Eigen::VectorXcd values;
+  Eigen::VectorXd uncertainty;
+};
+
+/// How far rounding of `unit` times a matrix of this norm moves eigenvalues of this condition; a
+/// defective one has none, and moves by a root.
+Eigen::VectorXd moved_by(double unit, double norm, const Eigen::VectorXd& condition) {
+  const auto n = static_cast<double>(condition.size());
+  const double most = norm * std::pow(unit * n, 1.0 / n);
+  return condition.unaryExpr([&](double k) {
+    const double moved = unit * n * norm * k;
+    return moved < most ? moved : most;
+  });
+}
+
+/// In doubles where they tell the poles to 1e-10 of their scales; else in twice their precision.
+Spectrum spectrum_of(const DoubleDoubleMatrix& similar, const Eigensystem& system,
+                     const Eigen::MatrixXcd& rows, const Eigen::VectorXd& formed,
+                     const Eigen::VectorXd& scales) {
+  constexpr double enough = 1e-10;
+  constexpr double extended_unit = 1e-31;
+  const Eigen::MatrixXd rounded = similar.rounded();
+  const Eigen::VectorXd d = balance_of(rounded);
+  const double norm = (d.cwiseInverse().asDiagonal() * rounded * d.asDiagonal()).norm();
+  const Eigen::VectorXd condition =
+      (rows * d.asDiagonal())
+          .rowwise()
+          .norm()
+          .cwiseProduct(
+              (d.cwiseInverse().asDiagonal() * system.vectors).colwise().norm().transpose());
+  Spectrum spectrum{system.values, moved_by(epsilon, norm, condition)};
+  if (spectrum.uncertainty.maxCoeff() <= enough * scales.minCoeff()) {
+    return spectrum;
+  }
+  DoubleDoubleMatrix balanced = similar;
+  for (Eigen::MatrixXd* part : {&balanced.hi, &balanced.lo}) {
+    *part = d.cwiseInverse().asDiagonal() * *part * d.asDiagonal();
+  }
+  const auto values = extended_eigenvalues_of(balanced);
+  if (!values) {
+    return spectrum;
+  }
+  const std::vector<std::size_t> order = matched(system.values, *values);
+  const Eigen::VectorXd bounds = moved_by(extended_unit, norm, condition);
+  const double most = norm * std::pow(extended_unit * static_cast<double>(condition.size()),
+                                      1.0 / static_cast<double>(condition.size()));
+  for (Eigen::Index k = 0; k < system.values.size(); ++k) {
+    spectrum.values(k) = (*values)(static_cast<Eigen::Index>(order[static_cast<std::size_t>(k)]));
+    const double from_forming = extended_unit * formed(k);
+    spectrum.uncertainty(k) = bounds(k) + (from_forming < most ? from_forming : most);
+  }
+  return spectrum;
 }
 
 /// Real and imaginary parts of the eigenvectors of A - B K in doubles; the identity where they are
@@ -41,8 +109,9 @@ std::vector<std::size_t> matched(const Eigen::VectorXcd& wanted, const Eigen::Ve
   std::vector<Pair> pairs;
   for (Eigen::Index i = 0; i < wanted.size(); ++i) {
     for (Eigen::Index j = 0; j < got.size(); ++j) {
-      pairs.push_back({std::abs(wanted(i) - got(j)) / scale_of(wanted(i)),
-                       static_cast<std::size_t>(i), static_cast<std::size_t>(j)});
+      const double distance = std::abs(wanted(i) - got(j)) / scale_of(wanted(i));
+      pairs.push_back({std::isnan(distance) ? infinite : distance, static_cast<std::size_t>(i),
+                       static_cast<std::size_t>(j)});
     }
   }
   std::stable_sort(pairs.begin(), pairs.end(),
@@ -69,23 +138,23 @@ Reached reached_by(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
   const DoubleDoubleMatrix driven = product(DoubleDoubleMatrix(K), X);
   const DoubleDoubleMatrix moved =
       add_product(product(DoubleDoubleMatrix(A), X), -1.0, DoubleDoubleMatrix(B), driven);
-  const Eigen::MatrixXd similar = product(inverse, moved).rounded();
-  if (!similar.allFinite()) {
+  const DoubleDoubleMatrix exact = product(inverse, moved);
+  const Eigen::MatrixXd similar = exact.rounded();
+  if (!similar.allFinite() || !exact.all_finite()) {
     return reached;
   }
   Eigensystem system = eigensystem_of(similar);
   if (!system.values.allFinite()) {
     // The QR iteration can stall on what rounding leaves of a nilpotent matrix.
-    const double rounding = 1e-3 * std::numeric_limits<double>::epsilon() * similar.norm();
+    const double rounding = 1e-3 * epsilon * similar.norm();
     system = eigensystem_of((similar.array().abs() > rounding).select(similar, 0.0));
   }
   if (!system.values.allFinite()) {
     return reached;
   }
+  const Eigen::MatrixXcd rows = solve_complex(system.vectors, Eigen::MatrixXcd::Identity(n, n));
   const Eigen::MatrixXcd right = complex_product(X.rounded().cast<Complex>(), system.vectors);
-  const Eigen::MatrixXcd left =
-      complex_product(solve_complex(system.vectors, Eigen::MatrixXcd::Identity(n, n)),
-                      inverse.rounded().cast<Complex>());
+  const Eigen::MatrixXcd left = complex_product(rows, inverse.rounded().cast<Complex>());
   // In the units that the plant came in, unit columns.
   Eigen::MatrixXcd given = units.given.asDiagonal() * right;
   const Eigen::VectorXd sizes = given.colwise().norm();
@@ -97,25 +166,35 @@ Reached reached_by(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
   const Eigen::VectorXd balanced_sizes = (units.balanced.asDiagonal() * right).colwise().norm();
   const Eigen::VectorXd balanced_left =
       (left * units.balanced.cwiseInverse().asDiagonal()).rowwise().norm();
+  // Of each pole, |yᴴ|(|A||x| + |B||Kx|) + |yᴴB||K||x|: what rounding makes of A - B K here.
+  const Eigen::MatrixXd x = right.cwiseAbs();
+  const Eigen::MatrixXd fed = complex_product(K.cast<Complex>(), right).cwiseAbs();
+  const Eigen::MatrixXd y = left.cwiseAbs();
+  const Eigen::MatrixXd y_B = complex_product(left, B.cast<Complex>()).cwiseAbs();
+  const Eigen::MatrixXd terms = product(A.cwiseAbs(), x) + product(B.cwiseAbs(), fed);
+  const Eigen::VectorXd formed =
+      y.transpose().cwiseProduct(terms).colwise().sum().transpose() +
+      y_B.transpose().cwiseProduct(product(K.cwiseAbs(), x)).colwise().sum().transpose();
+  const Eigen::VectorXd scales = pole_scales(
+      wanted, units.balanced.asDiagonal() * A * units.balanced.cwiseInverse().asDiagonal());
+  const Spectrum spectrum = spectrum_of(exact, system, rows, formed, scales);
   reached.poles.resize(n);
   reached.left.resize(n, n);
   reached.right.resize(n, n);
   reached.pole_error = 0.0;
   reached.misplaced = K.allFinite() ? 0.0 : infinite;
-  const std::vector<std::size_t> order = matched(wanted, system.values);
+  const std::vector<std::size_t> order = matched(wanted, spectrum.values);
   for (Eigen::Index i = 0; i < n; ++i) {
     const auto k = static_cast<Eigen::Index>(order[static_cast<std::size_t>(i)]);
-    reached.poles(i) = system.values(k);
+    reached.poles(i) = spectrum.values(k);
     reached.left.row(i) = left.row(k);
     reached.right.col(i) = right.col(k);
     double sensitivity = std::min(given_left.row(k).norm(), balanced_left(k) * balanced_sizes(k));
     sensitivity = std::isfinite(sensitivity) ? std::max(1.0, sensitivity) : infinite;
     const double error = std::abs(reached.poles(i) - wanted(i));
-    reached.pole_error = std::max(reached.pole_error, error);
-    const double off = error / (scale_of(wanted(i)) * sensitivity);
-    // No condition excuses an error of the plant's size.
-    const bool lost = !(error <= std::max(scale_of(wanted(i)), A.norm()));
-    reached.misplaced = std::max(reached.misplaced, lost ? infinite : off);
+    const double relative = (error + spectrum.uncertainty(k)) / scales(i);
+    reached.pole_error = std::isnan(relative) ? infinite : std::max(reached.pole_error, relative);
+    reached.misplaced = std::max(reached.misplaced, error / (scale_of(wanted(i)) * sensitivity));
   }
   // Nor one that makes a loop unstable of which stable poles were asked, in continuous time or in
   // discrete: with one input and thirty states rounding K can.

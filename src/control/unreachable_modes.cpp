@@ -16,8 +16,8 @@ namespace {
 using Complex = std::complex<double>;
 
 /// The answer to poles that leave out a mode yᴴx on which no input acts, yᴴ A = λ yᴴ, yᴴ B = 0.
-Refusal uncontrollable_mode(const Eigen::VectorXcd& y, const Eigen::VectorXd& units, Complex mode) {
-  Eigen::VectorXd share = y.cwiseAbs().cwiseQuotient(units);
+Refusal uncontrollable_mode(const Eigen::VectorXcd& y, const GivenUnits& units, Complex mode) {
+  Eigen::VectorXd share = y.cwiseAbs().cwiseQuotient(units.states);
   share /= share.maxCoeff();
   std::string states;
   for (Eigen::Index i = 0; i < share.size(); ++i) {
@@ -27,7 +27,7 @@ Refusal uncontrollable_mode(const Eigen::VectorXcd& y, const Eigen::VectorXd& un
   }
   return refusal(PolePlacementError::not_controllable, {}, "(A, B)")
       .hint("keep this mode among the poles, or give it an input")
-      .with("mode", {mode.real(), mode.imag()})
+      .with("mode", {std::ldexp(mode.real(), units.time), std::ldexp(mode.imag(), units.time)})
       .with("states it lives in (counted from 0)", states);
 }
 
@@ -39,8 +39,7 @@ double kept_within(Complex mode, double along) {
 
 }  // namespace
 
-Expected<Eigen::VectorXcd> poles_to_move(const ControllableStaircase& form,
-                                         const Eigen::VectorXd& units,
+Expected<Eigen::VectorXcd> poles_to_move(const ControllableStaircase& form, const GivenUnits& units,
                                          const Eigen::VectorXcd& wanted,
                                          std::vector<Complex>& staying) {
   const Eigen::Index n = form.A.rows();
@@ -51,33 +50,61 @@ Expected<Eigen::VectorXcd> poles_to_move(const ControllableStaircase& form,
   const Eigen::MatrixXd A_u = form.A.bottomRightCorner(rest, rest);
   const Eigensystem right = eigensystem_of(A_u);
   const Eigensystem left = eigensystem_of(A_u.transpose());
-  const std::vector<std::size_t> order = matched(right.values, wanted);
-  std::vector<bool> stays(static_cast<std::size_t>(n), false);
+  const std::vector<std::size_t> left_of = matched(right.values, left.values);
+  const auto vector_of = [&](Eigen::Index i) {
+    return left.vectors.col(static_cast<Eigen::Index>(left_of[static_cast<std::size_t>(i)]));
+  };
+  const auto error_of = [&](Eigen::Index i) {
+    return uncontrollable_mode(form.Q.rightCols(rest).cast<Complex>() * vector_of(i), units,
+                               right.values(i));
+  };
+  // A real mode takes a real pole, one of a pair one of a pair: else what is left has no gain. Two
+  // modes may take both of a pair that is as near to them as rounding.
+  constexpr Eigen::Index nothing = -1;
+  std::vector<Eigen::Index> taken_by(static_cast<std::size_t>(n), nothing);
   for (Eigen::Index i = 0; i < rest; ++i) {
     const Complex mode = right.values(i);
-    const std::size_t match = order[static_cast<std::size_t>(i)];
-    Eigen::Index same = 0;
-    (left.values.array() - mode).abs().minCoeff(&same);
-    const double along =
-        std::abs((left.vectors.col(same).transpose() * right.vectors.col(i)).value());
-    if (!(std::abs(wanted(static_cast<Eigen::Index>(match)) - mode) <= kept_within(mode, along))) {
-      return uncontrollable_mode(form.Q.rightCols(rest).cast<Complex>() * left.vectors.col(same),
-                                 units, mode);
+    const double along = std::abs((vector_of(i).transpose() * right.vectors.col(i)).value());
+    const double within = kept_within(mode, along);
+    Eigen::Index best = nothing;
+    double least = infinite;
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const double distance = std::abs(wanted(j) - mode);
+      const bool other_kind = (wanted(j).imag() == 0.0) != (mode.imag() == 0.0);
+      const double cost = distance + (other_kind ? 2.0 * within : 0.0);
+      if (taken_by[static_cast<std::size_t>(j)] == nothing && distance <= within && cost < least) {
+        best = j;
+        least = cost;
+      }
     }
-    stays[match] = true;
-    staying.push_back(mode);
+    if (best == nothing) {
+      return error_of(i);
+    }
+    taken_by[static_cast<std::size_t>(best)] = i;
+    staying.emplace_back(std::ldexp(mode.real(), units.time), std::ldexp(mode.imag(), units.time));
   }
   Eigen::VectorXcd moved(form.controllable);
   Eigen::Index count = 0;
-  for (Eigen::Index i = 0; i < n; ++i) {
-    if (!stays[static_cast<std::size_t>(i)]) {
-      moved(count++) = wanted(i);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const Eigen::Index by = taken_by[static_cast<std::size_t>(j)];
+    if (wanted(j).imag() != 0.0) {
+      const Eigen::Index other = taken_by[static_cast<std::size_t>(j + 1)];
+      if ((by == nothing) != (other == nothing)) {
+        return error_of(std::max(by, other));
+      }
+      if (by == nothing) {
+        moved.segment(count, 2) = wanted.segment(j, 2);
+        count += 2;
+      }
+      ++j;
+    } else if (by == nothing) {
+      moved(count++) = wanted(j);
     }
   }
   return moved;
 }
 
-Error weakest_mode(const MatrixRef& A, const MatrixRef& B, const Eigen::VectorXd& units,
+Error weakest_mode(const MatrixRef& A, const MatrixRef& B, const GivenUnits& units,
                    const Eigen::VectorXcd& wanted) {
   const Eigen::Index n = A.rows();
   Eigen::MatrixXd B_unit = B;

@@ -111,6 +111,7 @@ Outcome solve_place(const Problem& problem, JsonWriter& answer) {
   answer.add("K", placed.K);
   answer.add("poles", Eigen::VectorXcd(placed.poles));
   answer.add("condition", placed.condition);
+  answer.add("pole_error", placed.pole_error);
   return {};
 }
 
@@ -170,7 +171,9 @@ std::vector<Kind> regulator_kinds() {
        "the gain with which A - BK has given eigenvalues (7.6)",
        {A, B, complex_list("poles", "n", "where they are to be")},
        {gain, complex_list("poles", "n", "where they are with this K, in the same order"),
-        unbounded(number("condition", "", "how much a relative error of A - BK moves a pole"))},
+        unbounded(number("condition", "", "how much a relative error of A - BK moves a pole")),
+        number("pole_error", "",
+               "no pole is further from its place, relative to its size; at most 0.1")},
        R"({"A": [[0, 1], [0, 0]], "B": [[0], [1]], "poles": [[-1, 1], [-1, -1]]})",
        &solve_place},
   };

@@ -129,9 +129,11 @@ std::vector<Index> states_on_paths(const MatrixRef& A, const MatrixRef& B) {
       queue.push_back(i);
     }
   };
-  for (Index i = 0; i < n; ++i) {
-    if ((B.row(i).array() != 0.0).any()) {
-      visit(i);
+  for (Index j = 0; j < B.cols(); ++j) {
+    for (Index i = 0; i < n; ++i) {
+      if (B(i, j) != 0.0) {
+        visit(i);
+      }
     }
   }
   for (std::size_t k = 0; k < queue.size(); ++k) {

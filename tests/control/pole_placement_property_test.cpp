@@ -225,7 +225,7 @@ TEST(PlaceProperty, TooFewInputs) {
     EXPECT_LT(misplaced(problem.A, problem.B, placed->K, problem.poles),
               1e-8 + 1e-17 * problem.B.norm() * placed->K.norm());
     EXPECT_GE(placed->pole_error * (1.0 + 1e-12),
-              (placed->poles - problem.poles).cwiseAbs().maxCoeff());
+              (placed->poles - problem.poles).cwiseQuotient(problem.poles).cwiseAbs().maxCoeff());
   }
   EXPECT_GE(refused, 1);
   ::testing::Test::RecordProperty("refused", refused);

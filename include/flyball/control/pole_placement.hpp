@@ -14,7 +14,8 @@ namespace flyball {
 enum class PolePlacementError {
   not_conjugate,     ///< A complex pole without its conjugate: no real gain has such poles.
   not_controllable,  ///< A mode that no input reaches is not among the poles that were asked for.
-  not_reached,       ///< No gain was found that places the poles well enough once it is rounded.
+  not_reached,       ///< No gain of doubles was found that places the poles: the best one leaves
+                     ///< one a tenth of its size off, or further than its condition explains.
 };
 [[nodiscard]] ErrorInfo error_info(PolePlacementError code);
 
@@ -23,14 +24,17 @@ template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic>
 struct PolePlacement {
   Eigen::Matrix<double, Inputs, States> K;  ///< Inputs x states, gain of u = K (r - x).
   /// Eigenvalues of A - B K for the K above, in the order of the poles that were asked for. Twice
-  /// the working precision goes into A - B K: in doubles a large K would hide them.
+  /// the working precision goes into A - B K, and into its eigenvalues where doubles do not tell
+  /// them to 1e-10: in doubles a large K would hide them.
   Eigen::Matrix<std::complex<double>, States, 1> poles;
   /// ‖V‖ ‖V⁻¹‖ of the closed loop's unit eigenvectors: how much a relative error of A - B K moves
   /// a pole. Infinite (or above 1e8) where the closed loop cannot be diagonalised.
   double condition = 0.0;
-  /// The largest distance of a reached pole from the one that was asked for. It grows with
-  /// `condition`, and is the n-th root of the rounding error for a pole repeated n times in one
-  /// chain.
+  /// The largest distance of a reached pole from the p that was asked for, relative to |p|, with
+  /// what may be wrong with the reached one: an upper bound. A p below 100 n ε of the size of A
+  /// (balanced) and of all poles is judged as zero, relative to that size. At most 0.1. It grows
+  /// with `condition`, and is the n-th root of the rounding error for a pole repeated n times in
+  /// one chain.
   double pole_error = 0.0;
   /// Modes of A that no input reaches and which therefore stay: all were among the poles.
   std::vector<std::complex<double>> uncontrollable;
@@ -63,7 +67,9 @@ struct PolePlacement {
 ///         not_conjugate naming the pole; not_controllable with the mode that no input reaches, or
 ///         by rounding of A and B only, and the states that it lives in, if `poles` does not
 ///         contain it; not_reached if a pole of A - B K is further than 1e-8 max(1, |p|) times its
-///         own condition (in given units or balanced ones) from its place, or no longer stable.
+///         own condition (in given units or balanced ones) from its place, if `pole_error`
+///         would be above 0.1, if a pole is no longer stable, or if K is beyond the range of
+///         doubles.
 /// Cost: with several inputs O(n³) a sweep over the eigenvectors, at most 60, and O(n³ rank B)
 /// once; O(n⁴) for a triangular form (one input, poles repeated more often than rank B). Allocates.
 ///

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <optional>
+
+#include "math/extended/double_double.hpp"
+
+namespace flyball::detail {
+
+/// The eigenvalues of M to rounding of its 31 digits, in pairs of exact conjugates; nothing where
+/// the iteration does not end. M should be balanced: the rounding is that of its norm.
+/// Cost: O(n³), at most 60 steps an eigenvalue; some hundred times that of doubles.
+/// Source: Martin and Wilkinson, "Similarity reduction of a general matrix to Hessenberg form",
+/// Numerische Mathematik 12 (1968) (elmhes), and "The modified LR algorithm for complex Hessenberg
+/// matrices" (comlr), with rotations for eliminations.
+[[nodiscard]] std::optional<Eigen::VectorXcd> extended_eigenvalues_of(const DoubleDoubleMatrix& M);
+
+}  // namespace flyball::detail
