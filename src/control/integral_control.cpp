@@ -41,7 +41,9 @@ Expected<void> check_trackable(const MatrixRef& A, const MatrixRef& B, const Mat
           "state")
       .with("outputs", static_cast<double>(p))
       .with("inputs", static_cast<double>(B.cols()))
-      .with("smallest singular value of [A - I, B; C, D], rows and columns scaled", smallest);
+      .with(std::string("smallest singular value of ") +
+                (e == 0.0 ? "[A, B; C, D]" : "[A - I, B; C, D]") + ", rows and columns scaled",
+            smallest);
 }
 
 }  // namespace

@@ -36,9 +36,12 @@ Expected<LqrDesign<>> solve_lqr(const MatrixRef& A, const MatrixRef& B, const We
     return continuous ? care(A, B, weight_Q, weight_R, cross...)
                       : dare(A, B, weight_Q, weight_R, cross...);
   };
-  FLYBALL_TRY_IN(where, auto solution, N == nullptr ? solve() : solve(*N));
-  return LqrDesign<>{std::move(solution.K), std::move(solution.X), std::move(solution.poles),
-                     solution.residual, solution.condition};
+  auto solution = N == nullptr ? solve() : solve(*N);
+  if (!solution) {
+    return tl::unexpected(regulator_error(std::move(solution).error(), A, B, domain, where));
+  }
+  return LqrDesign<>{std::move(solution->K), std::move(solution->X), std::move(solution->poles),
+                     solution->residual, solution->condition};
 }
 
 }  // namespace detail

@@ -45,14 +45,18 @@ Expected<Eigen::VectorXcd> paired(const Eigen::VectorXcd& poles, int time) {
     });
     if (partner == lower.end() ||
         std::abs(*partner - std::conj(pole)) > conjugate * std::max(1.0, std::abs(pole))) {
-      return refusal(PolePlacementError::not_conjugate, where, "poles").hint("add the conjugate of each complex pole").with("pole", given(pole));
+      return refusal(PolePlacementError::not_conjugate, where, "poles")
+          .hint("add the conjugate of each complex pole")
+          .with("pole", given(pole));
     }
     lower.erase(partner);
     sorted.push_back(pole);
     sorted.push_back(std::conj(pole));
   }
   if (!lower.empty()) {
-    return refusal(PolePlacementError::not_conjugate, where, "poles").hint("add the conjugate of each complex pole").with("pole", given(lower.front()));
+    return refusal(PolePlacementError::not_conjugate, where, "poles")
+        .hint("add the conjugate of each complex pole")
+        .with("pole", given(lower.front()));
   }
   return Eigen::VectorXcd(
       Eigen::Map<const Eigen::VectorXcd>(sorted.data(), static_cast<Eigen::Index>(sorted.size())));

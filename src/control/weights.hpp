@@ -18,6 +18,12 @@ namespace flyball::detail {
                                                   std::string_view where, std::string_view name,
                                                   std::string_view meaning);
 
+/// What `care` or `dare` refuses, said by a regulator, with reasons that hold: a mode is out of
+/// reach only where the pair's own analysis, which knows no units, says so; R is singular, and a
+/// mode on the boundary, only if the evidence does.
+[[nodiscard]] Error regulator_error(Error error, const MatrixRef& A, const MatrixRef& B,
+                                    TimeDomain domain, std::string_view where);
+
 /// [x; x_I]₊ = [A 0; -h C  e I][x; x_I] + [B; -h D] u: h = T and e = 1 sampled, h = 1 and e = 0
 /// not.
 struct IntegralPlant {

@@ -1,9 +1,10 @@
 #include <flyball/estimation/covariance.hpp>
 
-#include <flyball/core/argument.hpp>
+#include <cmath>
 
 #include "core/format.hpp"
 #include "core/try.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball {
 
@@ -26,6 +27,39 @@ Expected<Eigen::MatrixXd> standard_deviations(std::span<const double> sigmas) {
 
 Expected<Eigen::MatrixXd> standard_deviations(std::initializer_list<double> sigmas) {
   return standard_deviations(std::span<const double>(sigmas.begin(), sigmas.size()));
+}
+
+Expected<void> check_covariance(const MatrixRef& S, std::string_view where, std::string_view name) {
+  constexpr double rounding = 1e-12;
+  FLYBALL_CHECK(Checks(where).finite(S, name).symmetric(S, name));
+  const Eigen::Index n = S.rows();
+  if (n == 0) {
+    return {};
+  }
+  // Correlations: in units in which each variance is one.
+  Eigen::MatrixXd correlation = Eigen::MatrixXd::Zero(n, n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (S(i, i) > 0.0 && S(j, j) > 0.0) {
+        correlation(i, j) = S(i, j) / std::sqrt(S(i, i)) / std::sqrt(S(j, j));
+      } else if (i == j && S(i, i) < 0.0) {
+        correlation(i, i) = -1.0;
+      } else if (S(i, j) != 0.0) {
+        correlation(i, j) = S(i, j) > 0.0 ? 1.0 : -1.0;  // Without a variance of its own.
+      }
+    }
+  }
+  const double least =
+      detail::symmetric_eigensystem_of(detail::symmetrized(correlation)).values.minCoeff();
+  if (least >= -rounding * static_cast<double>(n)) {
+    return {};
+  }
+  return tl::unexpected(Error(ArgumentError::not_positive)
+                            .in(std::string(where))
+                            .about(std::string(name))
+                            .got("no covariance: along some direction its variance is negative")
+                            .expected("positive semidefinite")
+                            .with("that variance, of variances scaled to one", least));
 }
 
 }  // namespace flyball

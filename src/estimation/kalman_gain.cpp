@@ -5,7 +5,9 @@
 
 #include <flyball/math/equations/matrix_equation.hpp>
 #include <flyball/math/riccati/riccati.hpp>
+#include <flyball/systems/controllability.hpp>
 
+#include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/equations/sylvester_operator.hpp"
@@ -74,7 +76,74 @@ std::optional<Filter> corrected(const MatrixRef& A, const MatrixRef& C, const Ei
   return Filter{std::move(p), std::move(*update)};
 }
 
+Error with_mode(Error error, std::complex<double> mode) {
+  return std::move(error)
+      .with("eigenvalue", {mode.real(), mode.imag()})
+      .with("magnitude", std::abs(mode));
+}
+
+Error no_inverse(std::string_view where) {
+  return Error(RiccatiError::singular)
+      .in(std::string(where))
+      .about("C P Cᵀ + R")
+      .got("singular")
+      .hint("give each output a noise of its own in R");
+}
+
+/// What the dual's Riccati equation refuses, in words of the filter; the reason is looked for in
+/// (A, C) itself, whose verdict does not depend on units.
+Error filter_error(const Error& dual, const MatrixRef& A, const MatrixRef& C,
+                   std::string_view where) {
+  const std::string name(where);
+  const auto sight = analyze_observability(A, C, TimeDomain::discrete);
+  if (sight && !sight->detectable) {
+    for (const ModeReach& mode : sight->modes) {
+      if (!mode.reached && mode.stability != Stability::stable) {
+        return with_mode(
+            Error(KalmanGainError::not_detectable)
+                .in(name)
+                .about("(A, C)")
+                .hint("nothing corrects this mode; measure a state that it moves, or take it out "
+                      "of the model"),
+            mode.eigenvalue);
+      }
+    }
+  }
+  if (dual.is(RiccatiError::singular)) {
+    return no_inverse(where);
+  }
+  if (dual.is(RiccatiError::no_stabilizing_solution)) {
+    Error error = Error(KalmanGainError::undriven_mode)
+                      .in(name)
+                      .about("Q")
+                      .hint(
+                          "give this mode some process noise, so that its measurements go on to "
+                          "count, or take it out of the model");
+    for (const Evidence& evidence : dual.evidence()) {
+      error = Error(std::move(error).with(evidence.name, evidence.values));
+    }
+    return error;
+  }
+  if (dual.is(RiccatiError::no_convergence) || dual.is(RiccatiError::not_stabilizable)) {
+    return Error(RiccatiError::no_convergence)
+        .in(name)
+        .about("P")
+        .hint(
+            "measure states and outputs in units in which the entries of A, C, Q and R are near "
+            "one");
+  }
+  return Error(dual).in(name);
+}
+
 }  // namespace
+
+ErrorInfo error_info(KalmanGainError code) {
+  static constexpr detail::ErrorRow rows[] = {
+      {"not_detectable", "a mode that is not stable is shown by no output", ErrorKind::no_answer},
+      {"undriven_mode", "no noise drives a mode on the unit circle", ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "kalman_gain", rows);
+}
 
 Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const Covariance& Q,
                                    const Covariance& R) {
@@ -89,22 +158,20 @@ Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const
                     .shape(noise_Q, n, n, "Q", "states x states")
                     .shape(noise_R, p, p, "R", "outputs x outputs"));
 
+  FLYBALL_CHECK(Checks(where)
+                    .finite(A, "A")
+                    .finite(C, "C")
+                    .also([&] { return check_covariance(noise_Q, where, "Q"); })
+                    .also([&] { return check_covariance(noise_R, where, "R"); }));
+
   auto dual = dare(A.transpose(), C.transpose(), noise_Q, noise_R);
-  if (!dual && dual.error().is(RiccatiError::not_stabilizable)) {
-    return tl::unexpected(
-        std::move(dual)
-            .error()
-            .in(std::string(where))
-            .about("the dual (Aᵀ, Cᵀ)")
-            .hint("no output shows this mode, so nothing corrects it; measure a state that it "
-                  "moves"));
+  if (!dual) {
+    return tl::unexpected(filter_error(dual.error(), A, C, where));
   }
-  FLYBALL_TRY_IN(where, const auto solution, std::move(dual));
+  const RiccatiSolution& solution = *dual;
   const auto filter = corrected(A, C, noise_Q, noise_R, solution.X);
   if (!filter) {
-    return refusal(RiccatiError::singular, where, "C P Cᵀ + R")
-        .got("singular")
-        .hint("give each output a noise of its own in R");
+    return tl::unexpected(no_inverse(where));
   }
   KalmanGain<> gain;
   gain.K = filter->update.K.rounded();

@@ -123,6 +123,25 @@ TEST(ContinuousLqr, Errors) {
       continuous_lqr(Eigen::Matrix2d(Eigen::Vector2d(1.0, -1.0).asDiagonal()), B, I, r);
   EXPECT_TRUE(unreachable.error().is(RiccatiError::not_stabilizable));
   EXPECT_EQ(unreachable.error().where(), "continuous_lqr");
+  // An input of 1e±200 reaches what one of 1 does: whatever fails, that is not the reason.
+  const Eigen::MatrixXd chain{{0.0, 1.0}, {0.0, 0.0}};
+  for (const double size : {1e-200, 1e-160, 1e160, 1e200}) {
+    const auto far = continuous_lqr(chain, size * B, I, r);
+    EXPECT_FALSE(!far && far.error().is(RiccatiError::not_stabilizable)) << size;
+    const auto sampled = lqr(chain, size * B, I, r);
+    EXPECT_FALSE(!sampled && sampled.error().is(RiccatiError::not_stabilizable)) << size;
+  }
+}
+
+// The plant's zero is at s = 0: the evidence is that of continuous time.
+TEST(ContinuousLqr, IntegralsOfWhatCannotBeHeld) {
+  const ContinuousSystem<> plant{-Eigen::MatrixXd::Identity(1, 1), Eigen::MatrixXd::Ones(1, 1),
+                                 Eigen::MatrixXd::Ones(1, 1), -Eigen::MatrixXd::Ones(1, 1)};
+  const auto design =
+      continuous_lqi(plant, Eigen::MatrixXd::Identity(2, 2), Eigen::MatrixXd::Identity(1, 1));
+  ASSERT_FALSE(design.has_value());
+  EXPECT_TRUE(design.error().is(IntegralControlError::not_trackable));
+  EXPECT_NE(to_string(design.error()).find("[A, B; C, D]"), std::string::npos);
 }
 
 }  // namespace

@@ -29,6 +29,24 @@ TEST(SolveDesigns, PlaceIsRefused) {
 }
 
 // dx/dt = u with Q = R = 1: the poles are the stable roots of s⁴ - s² + 1, s² + √3 s + 1.
+// How far a pole is from its place is part of the answer; three equal ones and one input are moved
+// by the cube root of rounding.
+TEST(SolveDesigns, PlaceSaysWhatWasReached) {
+  const Json placed =
+      answer("place", R"({"A":[[0,1,0],[0,0,1],[0,0,0]],"B":[[0],[0],[1]],"poles":[-7,-7,-7]})");
+  EXPECT_GT(placed.at("pole_error").get<double>(), 0.0);
+  EXPECT_LT(placed.at("pole_error").get<double>(), 1e-4);
+}
+
+TEST(SolveDesigns, KalmanIsRefusedInItsOwnWords) {
+  const Json negative = answer("kalman", R"({"A":[[0.5]],"C":[[1]],"Q":[[1]],"R":[[-0.1]]})");
+  EXPECT_EQ(negative.at("error").at("code"), "not_positive");
+  const Json unseen =
+      answer("kalman", R"({"A":[[1.5,0],[0,0.5]],"C":[[0,1]],"Q":[[1,0],[0,1]],"R":[[1]]})");
+  EXPECT_EQ(unseen.at("error").at("code"), "not_detectable");
+  EXPECT_EQ(unseen.at("error").at("eigenvalue").at(0), 1.5);
+}
+
 TEST(SolveDesigns, Lqi) {
   const std::string plant = R"({"A":[[0]],"B":[[1]],"C":[[1]],"Q":[[1,0],[0,1]],"R":[[1]])";
   const Json continuous = answer("lqi", plant + "}");

@@ -2,7 +2,9 @@
 
 #include <initializer_list>
 #include <span>
+#include <string_view>
 
+#include <flyball/core/argument.hpp>
 #include <flyball/core/matrix_argument.hpp>
 
 namespace flyball {
@@ -16,5 +18,14 @@ using Covariance = MatrixArgument<struct CovarianceTag>;
 /// @errors ArgumentError::out_of_range (negative), not_finite, each naming the entry; empty.
 [[nodiscard]] Expected<Eigen::MatrixXd> standard_deviations(std::span<const double> sigmas);
 [[nodiscard]] Expected<Eigen::MatrixXd> standard_deviations(std::initializer_list<double> sigmas);
+
+/// Whether a matrix can be a covariance: finite, symmetric, and without a negative variance in any
+/// direction, each entry judged in the units of its row and column (by 1e-12).
+/// @param S  Square. @param where  The function's name. @param name  The argument's name.
+/// @errors ArgumentError::not_finite, not_symmetric; not_positive with the direction's variance,
+///         relative to those of its entries.
+/// Cost: O(n³), allocates.
+[[nodiscard]] Expected<void> check_covariance(const MatrixRef& S, std::string_view where,
+                                              std::string_view name);
 
 }  // namespace flyball

@@ -9,6 +9,13 @@
 
 namespace flyball {
 
+/// Why there is no steady-state filter.
+enum class KalmanGainError {
+  not_detectable,  ///< A mode that does not decay by itself is shown by no output.
+  undriven_mode,   ///< A mode on the unit circle that no noise drives: its gain goes to zero.
+};
+[[nodiscard]] ErrorInfo error_info(KalmanGainError code);
+
 /// The steady state of a Kalman filter.
 template <int States = Eigen::Dynamic, int Outputs = Eigen::Dynamic>
 struct KalmanGain {
@@ -27,9 +34,10 @@ struct KalmanGain {
 /// @param A  n x n, discrete. @param C  p x n.
 /// @param Q  n x n, process noise covariance per sample. @param R  p x p, measurement noise
 ///           covariance per sample.
-/// @errors ArgumentError for shapes, entries and asymmetry; the error of a covariance's maker;
-///         RiccatiError as `dare` of (Aᵀ, Cᵀ): not_stabilizable there means that (A, C) is not
-///         detectable, with the mode that no output shows.
+/// @errors ArgumentError for shapes, entries, asymmetry, and not_positive for a Q or R that is no
+///         covariance; the error of a covariance's maker; KalmanGainError::not_detectable with the
+///         mode that no output shows, undriven_mode with that mode; RiccatiError::singular where
+///         C P Cᵀ + R has no inverse, no_convergence where no answer could be verified.
 /// P, K, L and P⁺ are right to their last digit where the Riccati equation determines them: its
 /// solution is corrected and used in twice the working precision.
 /// Cost: one Riccati solution and a Lyapunov equation for each correction; allocates. Source: book,
