@@ -20,6 +20,7 @@ void add_analyze_command(CLI::App& program, Invocation& invocation) {
   add_job_command(
       program, invocation,
       {.name = "analyze",
+       .schema = "flyball.analyze/2",
        .help = "Say what a linear system is like: poles, controllability, observability, gains",
        .footer = "MODEL is a project file of a mechanism (TOML, see flyball design --help), or "
                  "JSON with A "

@@ -106,6 +106,11 @@ int fail(const Errors& errors, const CommonOptions& options, const std::string& 
   if (options.json) {
     print(refusal_json(schema, errors));
   }
+  for (const Diagnostic& diagnostic : errors.diagnostics()) {
+    if (diagnostic.severity != Severity::info) {
+      warn(diagnostic.message);
+    }
+  }
   for (const QuotedError& error : errors.all()) {
     std::string text = to_string(error);
     if (!error.excerpt.empty()) {

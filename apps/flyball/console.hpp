@@ -1,5 +1,6 @@
 #pragma once
 
+#include <new>
 #include <optional>
 #include <span>
 #include <string>
@@ -46,6 +47,18 @@ void print(const std::string& text);
 /// Tells what is wrong: words on standard error and, with --json, an object on standard output.
 /// @return The exit status, of the first error.
 int fail(const Errors& errors, const CommonOptions& options, const std::string& schema);
+
+/// What a command's `run` answers, also where there is not enough memory for its input.
+/// @return The exit status.
+template <class Run>
+int guarded(const Run& run, const CommonOptions& options, const std::string& schema,
+            const std::string& input) {
+  try {
+    return run();
+  } catch (const std::bad_alloc&) {
+    return fail(not_enough_memory(input), options, schema);
+  }
+}
 
 /// Where a report goes: --out, or `flyball-report` unless --json was asked for.
 [[nodiscard]] std::optional<std::string> report_folder(const CommonOptions& options,

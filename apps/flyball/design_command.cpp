@@ -13,7 +13,7 @@ ExpectedAll<Answer> run(JobInput& input) {
     return tl::unexpected(project.error());
   }
   if (project->model_job) {
-    input.schema = "flyball.design_model/1";
+    input.schema = "flyball.design_model/2";
     return study::design_model(*project->model_job).map([](const auto& result) {
       return study::answer_of(result);
     });
@@ -32,6 +32,7 @@ void add_design_command(CLI::App& program, Invocation& invocation) {
   CLI::App* command = add_job_command(
       program, invocation,
       {.name = "design",
+       .schema = "flyball.design/2",
        .help = "Design a controller from a project file: mass, gearing and motors, or gains",
        .footer = "PROJECT.toml, for example:\n"
                  "  [mechanism]\n"

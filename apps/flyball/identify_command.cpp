@@ -7,7 +7,7 @@ namespace flyball::app {
 namespace {
 
 ExpectedAll<Answer> run(JobInput& input) {
-  const auto job = study::identify_job(input.path, input.given);
+  const auto job = study::identify_job(input.path, input.project, input.given);
   if (!job) {
     return tl::unexpected(job.error());
   }
@@ -20,17 +20,20 @@ void add_identify_command(CLI::App& program, Invocation& invocation) {
   add_job_command(
       program, invocation,
       {.name = "identify",
+       .schema = "flyball.identify/1",
        .help = "Identify kS, kV, kA and kG of a mechanism from a log of it moving",
        .footer =
            "LOG is a SysId JSON, a WPILOG or a CSV with the four characterisation tests "
            "(quasistatic\n"
-           "and dynamic, forward and reverse). What the log does not say is detected and told.",
+           "and dynamic, forward and reverse). What the log does not say is detected and told.\n"
+           "PROJECT.toml may say the rest in [log], and the kind of mechanism in [mechanism].",
        .job = study::JobKind::identify,
        .file = "LOG",
        .file_help = "The log",
        .report = "Write the report into this folder",
        .reports_unasked = false,
-       .run = &run});
+       .run = &run},
+      true);
 }
 
 }  // namespace flyball::app

@@ -22,10 +22,14 @@ CLI::App* add_job_command(CLI::App& program, Invocation& invocation, const JobCo
   add_field_options(*added, command.job, options->input.given);
   add_common_options(*added, options->common, command.report);
   added->callback([options, command, &invocation] {
-    options->input.schema = std::string("flyball.") + command.name + "/1";
-    const auto answer = command.run(options->input);
-    invocation.status = answer ? tell(*answer, options->common, command.reports_unasked)
-                               : fail(answer.error(), options->common, options->input.schema);
+    JobInput& input = options->input;
+    input.schema = command.schema;
+    const auto run = [&] {
+      const auto answer = command.run(input);
+      return answer ? tell(*answer, options->common, command.reports_unasked)
+                    : fail(answer.error(), options->common, input.schema);
+    };
+    invocation.status = guarded(run, options->common, input.schema, input.path);
   });
   return added;
 }

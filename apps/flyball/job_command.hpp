@@ -23,6 +23,7 @@ struct JobInput {
 /// A command that reads a file, runs a job and tells its answer.
 struct JobCommand {
   const char* name;
+  const char* schema;  ///< Of its answers (docs/schemas.md).
   const char* help;
   const char* footer;
   study::JobKind job;

@@ -77,7 +77,7 @@ int run(int argc, char** argv) {
   flyball::app::add_solve_command(program, invocation);
 
   if (const std::string unknown = unknown_command(program, argc, argv); !unknown.empty()) {
-    std::fprintf(stderr, "flyball: %s\n", unknown.c_str());
+    std::fprintf(stderr, "flyball: %s\n", flyball::shortened(unknown).c_str());
     return flyball::app::bad_input;
   }
   try {
@@ -92,7 +92,7 @@ int run(int argc, char** argv) {
     const auto commands = program.get_subcommands();
     const std::string command = commands.empty() ? "" : commands.front()->get_name();
     std::fprintf(stderr, "flyball: %s%s%s\n", command.c_str(), command.empty() ? "" : ": ",
-                 problem.what());
+                 flyball::shortened(problem.what()).c_str());
     std::fprintf(stderr, "`flyball%s%s --help` tells what it takes.\n", command.empty() ? "" : " ",
                  command.c_str());
     return flyball::app::bad_input;

@@ -42,7 +42,10 @@ void add_motors_command(CLI::App& program, Invocation& invocation) {
   command->add_option("NAME", options->name,
                       "One motor; case, spaces and punctuation do not matter (krakenX60foc)");
   command->add_flag("--json", options->common.json, "Answer one JSON object on one line");
-  command->callback([options, &invocation] { invocation.status = run(*options); });
+  command->callback([options, &invocation] {
+    invocation.status =
+        guarded([&] { return run(*options); }, options->common, schema, "the motors");
+  });
 }
 
 }  // namespace flyball::app

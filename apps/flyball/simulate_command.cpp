@@ -18,6 +18,7 @@ void add_simulate_command(CLI::App& program, Invocation& invocation) {
   add_job_command(
       program, invocation,
       {.name = "simulate",
+       .schema = "flyball.simulate/1",
        .help = "Simulate a project: a model by formula or a mechanism, open or closed loop",
        .footer = "PROJECT.toml, for example:\n"
                  "  [model]\n"

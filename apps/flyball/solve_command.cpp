@@ -1,6 +1,7 @@
 #include <cstdio>
 #include <iostream>
 #include <memory>
+#include <new>
 #include <string>
 
 #include <flyball/solve/documentation.hpp>
@@ -71,13 +72,17 @@ bool is_one_object(const std::string& text) {
   return one;
 }
 
+int refuse(const Error& error) {
+  tell(error);
+  print(solve::Solver::error_json(error));
+  return bad_input;
+}
+
 /// Answers what stands on standard input.
 int answer_all(const std::string& kind) {
   const auto solver = solve::Solver::create(kind);
   if (!solver) {
-    tell(solver.error());
-    print(solve::Solver::error_json(solver.error()));
-    return bad_input;
+    return refuse(solver.error());
   }
   std::ios::sync_with_stdio(false);
   Stream stream(*solver);
@@ -167,8 +172,13 @@ void add_solve_command(CLI::App& program, Invocation& invocation) {
                     "Print the JSON Schema of all problems and answers");
   command->add_flag("--markdown", options->markdown, "Print docs/solve.md")->group("");
   command->add_option("KIND", options->kind, "Which kind of problem");
-  command->callback(
-      [options, command, &invocation] { invocation.status = run(*options, *command); });
+  command->callback([options, command, &invocation] {
+    try {
+      invocation.status = run(*options, *command);
+    } catch (const std::bad_alloc&) {  // while reading; a problem is answered where it is solved
+      invocation.status = refuse(not_enough_memory("standard input"));
+    }
+  });
 }
 
 }  // namespace flyball::app

@@ -20,6 +20,7 @@ void add_tune_command(CLI::App& program, Invocation& invocation) {
   add_job_command(
       program, invocation,
       {.name = "tune",
+       .schema = "flyball.tune/2",
        .help = "From a log to a proven controller: identify, design, simulate, report, C++",
        .footer = "LOG is a SysId JSON, a WPILOG or a CSV with the four characterisation tests.\n"
                  "PROJECT.toml may set [log], [controller], [estimator], [sensor], [battery], "

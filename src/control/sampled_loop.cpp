@@ -27,12 +27,11 @@ Expected<void> check_loop(const PlantInputLoop& loop, std::string_view where) {
                     .shape(loop.B_c, q, p, "B_c")
                     .shape(loop.C_c, 1, q, "C_c")
                     .shape(loop.D_c, 1, p, "D_c", "1 x outputs"));
-  constexpr double most_periods = 250.0;  // each is a state of the sampled loop
-  if (loop.delay.si() > most_periods * loop.period.si()) {
+  if (loop.delay.si() > most_delay_periods * loop.period.si()) {
     return refusal(ArgumentError::out_of_range, where, "the delay")
         .got(format_number(loop.delay.si()) + " s")
-        .expected(format_number(most_periods) + " periods or less, " +
-                  format_number(most_periods * loop.period.si()) + " s");
+        .expected(format_number(most_delay_periods) + " periods or less, " +
+                  format_number(most_delay_periods * loop.period.si()) + " s");
   }
   return Checks(where)
       .finite(loop.A, "A")

@@ -2,6 +2,9 @@
 
 #include <utility>
 
+#include <flyball/core/errors.hpp>
+#include <flyball/core/text.hpp>
+
 #include "core/error_rows.hpp"
 #include "core/format.hpp"
 
@@ -60,7 +63,7 @@ Error&& Error::with(std::string name, std::initializer_list<double> values) && {
 }
 
 Error&& Error::with(std::string name, std::string text) && {
-  evidence_.push_back({std::move(name), {}, std::move(text)});
+  evidence_.push_back({std::move(name), {}, shortened(text)});
   return std::move(*this);
 }
 
@@ -100,7 +103,21 @@ std::string to_string(const Error& error) {
     }
     text += ")";
   }
-  return text;
+  return shortened(text);
+}
+
+Error not_enough_memory(std::string_view what) {
+  return Error(MemoryError::not_enough_memory)
+      .about("there")
+      .got(detail::format("not enough memory for {}", what))
+      .hint("give less at once, or free some");
+}
+
+ErrorInfo error_info(MemoryError code) {
+  static constexpr detail::ErrorRow rows[] = {
+      {"not_enough_memory", "the machine has not enough memory", ErrorKind::environment},
+  };
+  return detail::info_of(code, "memory", rows);
 }
 
 ErrorInfo error_info(ArgumentError code) {

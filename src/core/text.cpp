@@ -15,7 +15,63 @@ std::string lower(std::string_view text) {
   return out;
 }
 
+bool continues(char c) {
+  return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
+}
+
+/// Both ends of a word without blanks: those of a path say the most.
+std::string ends_of(std::string_view word) {
+  constexpr std::size_t longest = 240;
+  constexpr std::size_t tail = 40;
+  if (word.size() <= longest) {
+    return std::string(word);
+  }
+  std::size_t from = word.size() - tail;
+  while (from < word.size() && continues(word[from])) {
+    ++from;
+  }
+  return cut(word, longest - tail).append(word.substr(from));
+}
+
 }  // namespace
+
+std::string cut(std::string_view text, std::size_t most) {
+  std::size_t at = 0;
+  for (std::size_t count = 0; at < text.size(); ++count) {
+    if (count == most) {
+      return std::string(text.substr(0, at)) + "…";
+    }
+    ++at;
+    while (at < text.size() && continues(text[at])) {
+      ++at;
+    }
+  }
+  return std::string(text);
+}
+
+std::string shortened(std::string_view message) {
+  constexpr std::size_t longest_quotation = 80;
+  constexpr std::size_t longest = 4000;
+  std::string text;
+  bool quoted = false;
+  for (std::size_t at = 0; at < message.size();) {
+    const char c = message[at];
+    if (c == '"' || c == ' ' || c == '\n') {
+      quoted = c == '"' ? !quoted : quoted;
+      text += c;
+      ++at;
+      if (!quoted || c != '"') {
+        continue;
+      }
+    }
+    const std::size_t end =
+        std::min(message.find_first_of(quoted ? "\"" : "\" \n", at), message.size());
+    const std::string_view part = message.substr(at, end - at);
+    text += quoted ? cut(part, longest_quotation) : ends_of(part);
+    at = end;
+  }
+  return cut(text, longest);
+}
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);

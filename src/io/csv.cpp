@@ -162,6 +162,7 @@ class Reader {
     warn(log_.diagnostics, "assumed_time_column",
          "no column is named Timestamp, Time or t; the first, \"{}\", is taken for time",
          io::printable(headers_[0].name, 40));
+    log_.diagnostics.back().place = Place{table_.lines[0], 1};
     return std::size_t{0};
   }
 
@@ -177,6 +178,7 @@ class Reader {
     warn(log_.diagnostics, "unknown_time_unit",
          "the time column's unit \"{}\" is not a unit of time; seconds are assumed",
          io::printable(header.unit, 20));
+    log_.diagnostics.back().place = Place{table_.lines[0], 1};
     return 1.0;
   }
 

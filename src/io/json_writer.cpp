@@ -51,11 +51,11 @@ std::string refusal_json(std::string_view schema, const Errors& errors) {
   JsonWriter json;
   json.object([&] {
     json.add("schema", schema);
-    json.add("error", static_cast<const Error&>(errors));
+    json.add("error", errors.all().front());
     if (errors.all().size() > 1) {
       json.add("errors", errors.all());
     }
-    json.add("diagnostics", std::vector<Diagnostic>());
+    json.add("diagnostics", errors.diagnostics());
   });
   return std::move(json).text();
 }
@@ -126,11 +126,29 @@ void JsonWriter::write(const Eigen::VectorXcd& values) {
   });
 }
 
-void JsonWriter::write(const Error& error) {
+void JsonWriter::write(const Coordinate& coordinate) {
+  object([&] {
+    add("name", coordinate.name);
+    add("unit", coordinate.unit);
+  });
+}
+
+void JsonWriter::add(const std::optional<Place>& place) {
+  if (place) {
+    add("line", place->line);
+    add("column", place->column);
+  }
+}
+
+void JsonWriter::write(const Error& error, const std::optional<Place>& place) {
   object([&] {
     std::vector<std::string_view> names{"code", "message"};
     add("code", error.code());
     add("message", to_string(error));
+    if (place) {
+      add(place);
+      names.insert(names.end(), {"line", "column"});
+    }
     for (const Evidence& evidence : error.evidence()) {
       if (std::find(names.begin(), names.end(), evidence.name) != names.end()) {
         continue;
@@ -152,6 +170,7 @@ void JsonWriter::write(const Diagnostic& diagnostic) {
     add("code", diagnostic.code);
     add("severity", to_string(diagnostic.severity));
     add("message", diagnostic.message);
+    add(diagnostic.place);
   });
 }
 

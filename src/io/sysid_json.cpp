@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <flyball/io/json_text.hpp>
 #include <flyball/io/log_error.hpp>
 
 #include "core/diagnose.hpp"
@@ -177,6 +178,12 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
                                           : std::string_view(handler.error_text).substr(detail + 2),
                                       120));
   }
+  if (const auto repeated = repeated_key(text)) {
+    return refusal(LogError::malformed, io::place(source, text, repeated->at), "the JSON")
+        .got(fmt::format("an object with the key \"{}\" twice", io::printable(repeated->key)))
+        .expected("an object with each key once")
+        .hint("take one of them out");
+  }
   if (!handler.top_is_object) {
     return not_sysid(source, "a list or a single value");
   }
@@ -198,6 +205,7 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
     warn(log.diagnostics, "truncated_log",
          "the file ends in the middle, after {} bytes; the complete rows before the cut are used",
          text.size());
+    log.diagnostics.back().place = place_of(text, text.size());
   }
   Dropped dropped;
   dropped.other_width = handler.odd_rows;

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include <flyball/io/json_text.hpp>
+
 #include "io/text.hpp"
 
 namespace flyball::io {
@@ -102,10 +104,8 @@ std::optional<double> parse_number(std::string_view text) {
 }
 
 std::string place(const std::string& source, std::string_view text, std::size_t offset) {
-  const std::string_view before = text.substr(0, std::min(offset, text.size()));
-  const auto line = 1 + std::count(before.begin(), before.end(), '\n');
-  const std::size_t line_start = before.rfind('\n') + 1;  // npos + 1 is 0
-  return fmt::format("{}:{}:{}", source, line, before.size() - line_start + 1);
+  const auto [line, column] = place_of(text, offset);
+  return fmt::format("{}:{}:{}", source, line, column);
 }
 
 std::string printable(std::string_view text, std::size_t max_bytes) {

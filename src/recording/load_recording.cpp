@@ -247,7 +247,7 @@ ErrorInfo error_info(RecordingError code) {
   return detail::info_of(code, "recording", rows);
 }
 
-Expected<LoadedRecording> recording_from_log(const Log& log, const LogSelection& selection) {
+ExpectedAll<LoadedRecording> recording_from_log(const Log& log, const LogSelection& selection) {
   if (!std::isfinite(selection.scale) || selection.scale == 0.0) {
     return refusal(ArgumentError::out_of_range, where, "scale")
         .got(fmt::format("{}", selection.scale))
@@ -269,14 +269,18 @@ Expected<LoadedRecording> recording_from_log(const Log& log, const LogSelection&
         error = std::move(error).with(diagnostic.code, diagnostic.message);
       }
     }
-    return tl::unexpected(std::move(error));
+    result = tl::unexpected(std::move(error));
   }
-  return result;
+  if (!result) {
+    return tl::unexpected(Errors(std::move(result).error()).after(log.diagnostics));
+  }
+  return *std::move(result);
 }
 
-Expected<LoadedRecording> load_recording(const std::string& path, const LogSelection& selection) {
-  return read_log(path).and_then(
-      [&](const Log& log) { return recording_from_log(log, selection); });
+ExpectedAll<LoadedRecording> load_recording(const std::string& path,
+                                            const LogSelection& selection) {
+  FLYBALL_TRY(const Log log, read_log(path));
+  return recording_from_log(log, selection);
 }
 
 }  // namespace flyball::recording

@@ -93,6 +93,16 @@ void tell_fields(std::string& text, const std::vector<Field>& fields) {
   }
 }
 
+/// @param line  With a place for the letter and one for what it counts.
+std::string lines_of(std::span<const Letter> letters,
+                     fmt::format_string<char, std::string_view> line) {
+  std::string text;
+  for (const auto& [letter, counts] : letters) {
+    text += fmt::format(line, char{letter}, std::string_view(counts));
+  }
+  return text;
+}
+
 constexpr std::string_view introduction = R"(# flyball solve
 
 `flyball solve KIND` reads problems on standard input and answers each on one line of standard output: one JSON
@@ -121,8 +131,8 @@ echo '{"A": [[0, 1, 0, 0], [0, -0.1, 3, 0], [0, 0, 0, 1], [0, -0.5, 30, 0]], "B"
 for example `jq .K`.
 
 `residual` is what is left of the equation over the sum of its terms' norms; `condition` times it estimates the relative
-error of the answer. Letters are sizes: n states, m inputs, p outputs, k samples; equal letters of one kind are equal
-sizes. A field in brackets may be left out.
+error of the answer. A field in brackets may be left out. Letters are sizes, equal letters of one kind are equal sizes:
+
 )";
 
 /// A cell of a table must not end it.
@@ -164,14 +174,15 @@ std::string help_of(const Kind& kind) {
   text += "\nIts answer has\n";
   tell_fields(text, kind.answer);
   text += fmt::format(
-      "\nLetters are sizes: n states, m inputs, p outputs, k samples; equal letters, equal sizes.\n"
+      "\nA letter is a size, equal letters are equal sizes:\n{}"
       "A field in brackets may be left out.\n\n  echo '{}' |\n    flyball solve {}\n",
-      kind.example, kind.name);
+      lines_of(letters_of(kind), "  {}  {}\n"), kind.example, kind.name);
   return text;
 }
 
 std::string markdown() {
   std::string page(introduction);
+  page += lines_of(all_letters(), "- `{}` {}\n");
   std::string_view section;
   for (const Kind& kind : kinds()) {
     if (kind.section != section) {

@@ -186,7 +186,7 @@ std::vector<Kind> feedforward_kinds() {
         unbounded(number("disk_phase", "deg", "its rotation")),
         unbounded(number("disk_frequency", "rad/s", "where ‖S - T‖ is largest")),
         list("gain_crossovers", "g", "rad/s", "where the loop gain is 1"),
-        list("phase_crossovers", "h", "rad/s", "where it is real and negative")},
+        list("phase_crossovers", "f", "rad/s", "where it is real and negative")},
        R"({"A": [[0, 1], [0, -2]], "B": [[0], [3]], "K": [[20, 3]], "T": 0.02})",
        &solve_margins},
   };

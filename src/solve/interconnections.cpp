@@ -50,8 +50,8 @@ std::vector<Kind> interconnection_kinds() {
       R"({"first": {"A": [[-1]], "B": [[1]]}, "second": {"A": [[-2]], "B": [[2]]}})";
   return {
       {"series", "the first system's outputs as the second one's inputs: G₂G₁",
-       std::vector{system("first", "a", "m", "q", "the system at the input"),
-                   system("second", "b", "q", "p", "the system at the output")} +
+       std::vector{system("first", "a", "m", "c", "the system at the input"),
+                   system("second", "b", "c", "p", "the system at the output")} +
            time,
        answered_system("a+b", "m", "p"), two,
        &solve_pair<[](const auto& a, const auto& b) { return series(a, b); }>},

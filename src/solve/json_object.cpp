@@ -1,7 +1,10 @@
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
+
+#include <flyball/io/json_text.hpp>
 
 #include "core/try.hpp"
 #include "solve/json_object.hpp"
@@ -38,10 +41,14 @@ int depth_of(std::string_view text) {
 }
 
 Refusal malformed(std::string_view where, std::string_view what, std::string got,
-                  std::string expected) {
-  return refusal(ArgumentError::malformed, where, "the " + std::string(what))
-      .got(std::move(got))
-      .expected(std::move(expected));
+                  std::string expected, std::optional<Place> place = {}) {
+  Refusal refused = refusal(ArgumentError::malformed, where, "the " + std::string(what))
+                        .got(std::move(got))
+                        .expected(std::move(expected));
+  return place ? std::move(refused)
+                     .with("line", static_cast<double>(place->line))
+                     .with("column", static_cast<double>(place->column))
+               : std::move(refused);
 }
 
 /// What is wrong at a byte, counted from 1 and one past the end for a text that ends too soon.
@@ -49,11 +56,7 @@ std::string complaint(std::string_view text, std::size_t byte) {
   if (byte > text.size()) {
     return text.find_first_not_of(" \t\r\n") == std::string_view::npos ? "empty" : "cut off";
   }
-  const std::string_view before = text.substr(0, byte - 1);
-  const auto line = std::count(before.begin(), before.end(), '\n') + 1;
-  const std::size_t column = before.size() - (before.rfind('\n') + 1) + 1;
-  return line == 1 ? fmt::format("not JSON from character {} on", column)
-                   : fmt::format("not JSON from line {}, character {} on", line, column);
+  return "not JSON";
 }
 
 }  // namespace
@@ -70,9 +73,15 @@ Expected<Json> parse_object(std::string_view text, std::string_view where, std::
     if (!object.is_object()) {
       return malformed(where, what, kind_of(object), example);
     }
+    if (const auto repeated = repeated_key(text)) {
+      return malformed(where, what,
+                       fmt::format("an object with the key \"{}\" twice", repeated->key),
+                       "an object with each key once", place_of(text, repeated->at));
+    }
     return object;
   } catch (const Json::parse_error& problem) {
-    return malformed(where, what, complaint(text, problem.byte), example);
+    return malformed(where, what, complaint(text, problem.byte), example,
+                     place_of(text, problem.byte - 1));
   } catch (const Json::exception&) {
     return malformed(where, what, "not to be read: a number is beyond 1.8e308",
                      "numbers that a double holds");

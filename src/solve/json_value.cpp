@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <flyball/core/text.hpp>
+
 #include "solve/json_value.hpp"
 
 namespace flyball::solve {
@@ -38,11 +40,8 @@ std::string kind_of(const Json& value) {
   if (value.is_structured()) {
     return value.is_array() ? fmt::format("a list of {}", value.size()) : "an object";
   }
-  std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
-  if (text.size() > 40) {
-    text = text.substr(0, 37) + "...";
-  }
-  return fmt::format("{} ({})", value.type_name(), text);
+  const std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return fmt::format("{} ({})", value.type_name(), cut(text, 40));
 }
 
 bool read_number(const Json& value, double& number) {

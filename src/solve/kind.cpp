@@ -69,7 +69,7 @@ Expected<const Kind*> find_kind(std::string_view name) {
   }
   const std::string nearest = nearest_name(name, names);
   return refusal(ArgumentError::unknown_name, "solve", "kind of problem")
-      .got("\"" + std::string(name.substr(0, 40)) + "\"")
+      .got("\"" + std::string(name) + "\"")
       .expected(fmt::format("one of {}", fmt::join(names, ", ")))
       .hint(nearest.empty() ? "" : "did you mean \"" + nearest + "\"?");
 }

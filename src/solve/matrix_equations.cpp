@@ -98,12 +98,12 @@ std::vector<Kind> matrix_equation_kinds() {
       complex_list("poles", "n", "eigenvalues of A - BK"), field::residual, field::condition};
   const std::vector<Field> lyapunov_fields{matrix("A", "n", "n", "square"),
                                            matrix("Q", "n", "n", "symmetric")};
-  const std::vector<Field> sylvester_fields{matrix("A", "a", "a", "square"),
-                                            matrix("B", "b", "b", "square"),
-                                            matrix("C", "a", "b", "the right-hand side")};
+  const std::vector<Field> sylvester_fields{matrix("A", "i", "i", "square"),
+                                            matrix("B", "j", "j", "square"),
+                                            matrix("C", "i", "j", "the right-hand side")};
   const std::vector<Field> linear_answer{matrix("X", "n", "n", "the solution"), field::residual,
                                          field::condition};
-  const std::vector<Field> sylvester_answer{matrix("X", "a", "b", "the solution"), field::residual,
+  const std::vector<Field> sylvester_answer{matrix("X", "i", "j", "the solution"), field::residual,
                                             field::condition};
   const std::vector<Field> square{matrix("A", "n", "n", "square")};
   const std::vector<Field> function_answer{matrix("X", "n", "n", "the function of A"),

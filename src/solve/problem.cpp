@@ -39,7 +39,7 @@ constexpr std::array<Field, 4> fields_of_system(const Field& system) {
 }
 
 std::string in_quotes(std::string_view text) {
-  return fmt::format("\"{}\"", text.substr(0, 40));
+  return fmt::format("\"{}\"", text);
 }
 
 }  // namespace
@@ -118,7 +118,7 @@ Expected<void> ProblemReader::check_names(std::span<const Field> fields) const {
     if (field.absent == Absent::refused && find(field.name) == nullptr) {
       return tl::unexpected(
           malformed(field, "left out",
-                    fmt::format("there, as are all of {}", fmt::join(names_of(false), ", "))));
+                    fmt::format("there; a problem needs {}", fmt::join(names_of(false), ", "))));
     }
   }
   return {};

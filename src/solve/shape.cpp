@@ -1,3 +1,7 @@
+#include <algorithm>
+#include <array>
+#include <iterator>
+
 #include <fmt/format.h>
 
 #include "core/try.hpp"
@@ -10,26 +14,34 @@ using Eigen::Index;
 
 namespace {
 
-/// What a letter counts, in words; nothing for those that only say which sizes agree.
-std::string_view word_of(std::string_view size) {
-  return size == "n"   ? "states"
-         : size == "m" ? "inputs"
-         : size == "p" ? "outputs"
-         : size == "k" ? "samples"
-         : size == "1" ? "1"
-                       : "";
-}
+constexpr std::array letters{Letter{'n', "states"},
+                             Letter{'m', "inputs"},
+                             Letter{'p', "outputs"},
+                             Letter{'k', "samples"},
+                             Letter{'a', "states of the first system (forward)"},
+                             Letter{'b', "states of the second system (back)"},
+                             Letter{'c', "signals from the first system to the second"},
+                             Letter{'u', "inputs of the second system"},
+                             Letter{'y', "outputs of the second system"},
+                             Letter{'s', "states of the loop"},
+                             Letter{'r', "states that are kept"},
+                             Letter{'d', "states with those of the delay"},
+                             Letter{'h', "modes that are hidden"},
+                             Letter{'g', "gain crossovers"},
+                             Letter{'f', "phase crossovers"},
+                             Letter{'q', "inputs of the reference model"},
+                             Letter{'i', "rows of A"},
+                             Letter{'j', "rows of B"}};
 
-/// "states x inputs"; "states + outputs"; empty where a letter has no word.
+/// "states x inputs"; "states + outputs".
 std::string words_of(std::string_view size) {
   std::string words;
-  for (const std::string_view letter : text::split(size, "+")) {
-    const std::string_view word = word_of(letter);
-    if (word.empty()) {
-      return {};
-    }
+  for (const std::string_view term : text::split(size, "+")) {
+    const auto letter = std::find_if(letters.begin(), letters.end(), [&](const Letter& known) {
+      return term == std::string_view(&known.letter, 1);
+    });
     words += words.empty() ? "" : " + ";
-    words += word;
+    words += letter == letters.end() ? term : letter->counts;
   }
   return words;
 }
@@ -37,10 +49,28 @@ std::string words_of(std::string_view size) {
 std::string meaning_of(const Field& field) {
   const std::string rows = words_of(field.rows);
   const std::string columns = words_of(field.columns);
-  return rows.empty() || columns.empty() ? std::string() : fmt::format("{} x {}", rows, columns);
+  return fmt::format("{} x {}", rows, columns);
 }
 
 }  // namespace
+
+std::span<const Letter> all_letters() {
+  return letters;
+}
+
+std::vector<Letter> letters_of(const Kind& kind) {
+  std::string sizes;
+  for (const std::vector<Field>& fields : {kind.fields, kind.answer}) {
+    for (const Field& field : fields) {
+      sizes.append(field.rows).append(field.columns).append(field.outputs);
+    }
+  }
+  std::vector<Letter> used;
+  std::copy_if(letters.begin(), letters.end(), std::back_inserter(used), [&](const Letter& letter) {
+    return sizes.find(letter.letter) != std::string::npos;
+  });
+  return used;
+}
 
 Index Sizes::value_of(std::string_view size) const {
   Index sum = 0;

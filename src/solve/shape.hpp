@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +11,15 @@
 
 /// The shapes of fields: letters that stand for sizes.
 namespace flyball::solve {
+
+/// What a letter counts in the shapes of fields, whatever the kind.
+struct Letter {
+  char letter;
+  std::string_view counts;
+};
+[[nodiscard]] std::span<const Letter> all_letters();
+/// Those of a kind's fields.
+[[nodiscard]] std::vector<Letter> letters_of(const Kind& kind);
 
 /// What the letters of one problem stand for, as far as its fields have said.
 class Sizes {

@@ -1,6 +1,7 @@
 #include <flyball/solve/solver.hpp>
 
 #include <algorithm>
+#include <new>
 #include <utility>
 
 #include <flyball/io/json_writer.hpp>
@@ -68,6 +69,25 @@ Answer refused(const Json* id, const Error& error) {
   return {end(std::move(answer)), false, error.kind()};
 }
 
+Answer answer_to(const Json& object, const Json* id, const Kind& kind) {
+  const auto problem = Problem::read(object, kind.fields, kind.name);
+  if (!problem) {
+    return refused(id, problem.error());
+  }
+  JsonWriter answer = begin(id);
+  if (const Expected<void> outcome = kind.function(*problem, answer); !outcome) {
+    return refused(id, outcome.error());
+  }
+  const bool all_finite = answer.all_finite();
+  std::string json = end(std::move(answer));
+  if (!all_finite) {
+    if (const auto checked = check_answer(json, kind); !checked) {
+      return refused(id, checked.error());
+    }
+  }
+  return {std::move(json), true, ErrorKind::no_answer};
+}
+
 }  // namespace
 
 Expected<Solver> Solver::create(std::string_view kind) {
@@ -83,28 +103,19 @@ bool Solver::is_complete(std::string_view text) {
 }
 
 Answer Solver::solve(std::string_view text) const {
-  const auto object = parse_object(text, kind_->name, "problem");
-  if (!object) {
-    return refused(nullptr, object.error());
-  }
-  const auto found = object->find("id");
-  const Json* const id = found == object->end() ? nullptr : &*found;
-  const auto problem = Problem::read(*object, kind_->fields, kind_->name);
-  if (!problem) {
-    return refused(id, problem.error());
-  }
-  JsonWriter answer = begin(id);
-  if (const Expected<void> outcome = kind_->function(*problem, answer); !outcome) {
-    return refused(id, outcome.error());
-  }
-  const bool all_finite = answer.all_finite();
-  std::string json = end(std::move(answer));
-  if (!all_finite) {
-    if (const auto checked = check_answer(json, *kind_); !checked) {
-      return refused(id, checked.error());
+  Expected<Json> object{};
+  const Json* id = nullptr;
+  try {
+    object = parse_object(text, kind_->name, "problem");
+    if (!object) {
+      return refused(nullptr, object.error());
     }
+    const auto found = object->find("id");
+    id = found == object->end() ? nullptr : &*found;
+    return answer_to(*object, id, *kind_);
+  } catch (const std::bad_alloc&) {
+    return refused(id, not_enough_memory("this problem"));
   }
-  return {std::move(json), true, ErrorKind::no_answer};
 }
 
 }  // namespace flyball::solve

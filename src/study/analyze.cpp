@@ -8,6 +8,7 @@
 
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
+#include "study/told.hpp"
 
 namespace flyball::study {
 
@@ -81,9 +82,7 @@ void add_gains(ModelAnalysis& analysis) {
   }
 }
 
-}  // namespace
-
-Expected<ModelAnalysis> analyze(const ModelFile& model) {
+Expected<ModelAnalysis> analysis_of(const ModelFile& model) {
   const bool continuous = model.domain == TimeDomain::continuous;
   if (!continuous && !model.period) {
     return refusal(ArgumentError::malformed, "analyze", "period")
@@ -107,6 +106,16 @@ Expected<ModelAnalysis> analyze(const ModelFile& model) {
   analysis.steps = std::move(steps);
   add_gains(analysis);
   return analysis;
+}
+
+}  // namespace
+
+ExpectedAll<ModelAnalysis> analyze(const ModelFile& model) {
+  if (auto analysis = analysis_of(model)) {
+    return *std::move(analysis);
+  } else {
+    return refused("analyze", std::move(analysis).error(), model.notes);
+  }
 }
 
 }  // namespace flyball::study

@@ -16,6 +16,7 @@
 #include "core/try.hpp"
 #include "study/design_steps.hpp"
 #include "study/field.hpp"
+#include "study/told.hpp"
 
 namespace flyball::study {
 
@@ -113,23 +114,13 @@ Expected<void> simulate_response(DesignResult& result) {
   return {};
 }
 
-}  // namespace
-
-ErrorInfo error_info(DesignError code) {
-  static constexpr flyball::detail::ErrorRow rows[] = {
-      {"gravity_too_strong", "the motor cannot hold the mechanism", ErrorKind::no_answer},
-      {"no_motion_possible", "the motor cannot move the mechanism", ErrorKind::no_answer},
-      {"margins_lost", "the loop cannot be made robust", ErrorKind::no_answer},
-  };
-  return flyball::detail::info_of(code, "design", rows);
-}
-
-Expected<DesignResult> design(const DesignJob& requested) {
+/// @param result  What is there when it fails tells what was noticed.
+Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
   FLYBALL_CHECK(check_ranges(project_of(requested), where));
-  DesignResult result;
   result.job = requested;
   DesignJob& job = result.job;
   fill_defaults(job, result.diagnostics);
+  FLYBALL_CHECK(check_delay(*job.controller.delay, job.controller.period, where));
 
   FLYBALL_TRY(auto motion, fastest_motion(job));
   result.motion = motion;
@@ -206,6 +197,25 @@ Expected<DesignResult> design(const DesignJob& requested) {
   }
   result.paste = paste_gains(job.plant, result.K_delayed);
   FLYBALL_CHECK(simulate_response(result));
+  return {};
+}
+
+}  // namespace
+
+ErrorInfo error_info(DesignError code) {
+  static constexpr flyball::detail::ErrorRow rows[] = {
+      {"gravity_too_strong", "the motor cannot hold the mechanism", ErrorKind::no_answer},
+      {"no_motion_possible", "the motor cannot move the mechanism", ErrorKind::no_answer},
+      {"margins_lost", "the loop cannot be made robust", ErrorKind::no_answer},
+  };
+  return flyball::detail::info_of(code, "design", rows);
+}
+
+ExpectedAll<DesignResult> design(const DesignJob& job) {
+  DesignResult result;
+  if (auto done = design_into(result, job); !done) {
+    return refused(where, std::move(done).error(), std::move(result.diagnostics));
+  }
   return result;
 }
 

@@ -19,6 +19,7 @@
 
 #include "core/try.hpp"
 #include "study/design_steps.hpp"
+#include "study/told.hpp"
 
 // The plant, and the loop that a choice of tolerances gives.
 namespace flyball::study {
@@ -102,7 +103,8 @@ Expected<LinearModel> linear_model(const PlantDescription& plant, double period)
     take(model, built);
     model.states = {position, velocity};
   }
-  FLYBALL_TRY(auto discrete, discretize_zoh(model.A, model.B, Time(period)));
+  FLYBALL_TRY(auto discrete,
+              told_of("controller.period", discretize_zoh(model.A, model.B, Time(period))));
   model.discrete = {discrete.A, discrete.B, model.C, zero, Time(period)};
   return model;
 }
@@ -134,13 +136,13 @@ Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
   const DiscreteSystem<>& plant = model.discrete;
   const Time delay(controller.delay.value_or(0.0));
   if (static_cast<Eigen::Index>(tolerances.size()) != plant.A.rows()) {
-    return refusal(ArgumentError::wrong_shape, "design", "state_tolerance")
+    return refusal(ArgumentError::wrong_shape, "design", "controller.state_tolerance")
         .got(fmt::format("{} values long", tolerances.size()))
         .expected(fmt::format("one value a state: {}", fmt::join(labels(model.states), ", ")));
   }
   LoopDesign loop;
-  FLYBALL_TRY(loop.Q, bryson(tolerances));
-  FLYBALL_TRY(loop.R, bryson({controller.input_tolerance}));
+  FLYBALL_TRY(loop.Q, told_of("controller.state_tolerance", bryson(tolerances)));
+  FLYBALL_TRY(loop.R, told_of("controller.input_tolerance", bryson({controller.input_tolerance})));
   FLYBALL_TRY(auto regulator, lqr(plant, loop.Q, loop.R));
   loop.K = regulator.K;
   loop.poles = regulator.poles;
@@ -152,11 +154,13 @@ Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
     const Time whole(std::round(delay.si() / plant.period.si()) * plant.period.si());
     delayed = compensate_latency(loop.K, plant.A, plant.B, plant.period, whole);
   }
-  FLYBALL_TRY(loop.K_delayed, std::move(delayed));
+  FLYBALL_TRY(loop.K_delayed, told_of("controller.delay", std::move(delayed)));
 
   const double sigma = measurement_std(job);
-  FLYBALL_TRY(auto observer,
-              kalman_gain(plant, process_covariance(model, job), standard_deviations({sigma})));
+  FLYBALL_TRY(auto observer, told_of("the observer",
+                                     kalman_gain(plant, process_covariance(model, job),
+                                                 standard_deviations({sigma})),
+                                     "raise estimator.model_std, or leave it out"));
   loop.kalman_gain = observer.K;
   loop.estimator_poles = observer.poles;
 

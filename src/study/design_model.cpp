@@ -17,6 +17,7 @@
 
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
+#include "study/told.hpp"
 
 namespace flyball::study {
 
@@ -56,7 +57,8 @@ Expected<Eigen::MatrixXd> delayed_gain(const ModelRegulator& regulator, Time del
 /// and inputs that err by a tenth of theirs.
 Expected<void> add_observer(ModelRegulator& regulator, const ModelJob& job,
                             const std::vector<double>& state_tolerance,
-                            const std::vector<double>& input_tolerance) {
+                            const std::vector<double>& input_tolerance,
+                            std::vector<Diagnostic>& noticed) {
   const DiscreteSystem<>& plant = regulator.plant;
   const Eigen::Map<const Eigen::VectorXd> states(state_tolerance.data(),
                                                  static_cast<Eigen::Index>(state_tolerance.size()));
@@ -82,12 +84,13 @@ Expected<void> add_observer(ModelRegulator& regulator, const ModelJob& job,
   const Eigen::MatrixXd G = share_of_input * plant.B * inputs.asDiagonal();
   Eigen::MatrixXd Q = G * G.transpose();
   Q.diagonal() += (share_of_state * states).cwiseAbs2();
-  FLYBALL_TRY(auto filter, kalman_gain(plant, Q, R));
+  FLYBALL_TRY(auto filter, told_of("the observer", kalman_gain(plant, Q, R),
+                                   "measure more of the model in [model.outputs]"));
   regulator.observer = true;
   regulator.kalman_gain = filter.K;
   regulator.estimator_poles = filter.poles;
   if (!assumed.empty()) {
-    note(regulator.diagnostics, "assumed",
+    note(noticed, "assumed",
          "the readings' noise is taken as {} a sample (simulation.noise says another)",
          fmt::join(assumed, ", "));
   }
@@ -151,7 +154,11 @@ std::string describe(const OperatingPoint& point, const ModelDescription& model)
   return text;
 }
 
-Expected<ModelRegulator> regulate(const ModelJob& job) {
+namespace {
+
+/// @param noticed  So far; there too when it fails.
+Expected<ModelRegulator> regulator_of(const ModelJob& job, std::vector<Diagnostic>& noticed) {
+  FLYBALL_CHECK(check_delay(job.delay, job.period, where));
   const AnyModel& model = job.model;
   if (model.inputs() == 0) {
     return refusal(ArgumentError::empty, where, "inputs")
@@ -167,7 +174,7 @@ Expected<ModelRegulator> regulate(const ModelJob& job) {
   }
   FLYBALL_TRY(auto linear, linearize(model, point.x, point.u));
   const Time period(job.period);
-  FLYBALL_TRY(auto plant, discretize(linear, period));
+  FLYBALL_TRY(auto plant, told_of("controller.period", discretize(linear, period)));
   ModelRegulator regulator{.point = std::move(point),
                            .linear = std::move(linear),
                            .plant = std::move(plant),
@@ -178,21 +185,21 @@ Expected<ModelRegulator> regulate(const ModelJob& job) {
   const std::vector<double> states = tolerances(job.state_tolerance, model.states());
   const std::vector<double> inputs = tolerances(job.input_tolerance, model.inputs());
   if (job.state_tolerance.empty() || job.input_tolerance.empty()) {
-    note(regulator.diagnostics, "assumed",
+    note(noticed, "assumed",
          "no tolerance is given for {}: one of each unit is taken (set controller.tolerance)",
          !job.input_tolerance.empty()   ? "the states"
          : !job.state_tolerance.empty() ? "the inputs"
                                         : "states and inputs");
   }
-  FLYBALL_TRY(regulator.Q, bryson(states));
-  FLYBALL_TRY(regulator.R, bryson(inputs));
+  FLYBALL_TRY(regulator.Q, told_of("controller.tolerance", bryson(states)));
+  FLYBALL_TRY(regulator.R, told_of("controller.tolerance", bryson(inputs)));
   FLYBALL_TRY(auto gains, lqr(regulator.plant, regulator.Q, regulator.R));
   regulator.K = gains.K;
   regulator.poles = gains.poles;
   const Time delay(job.delay);
-  FLYBALL_TRY(regulator.K_delayed, delayed_gain(regulator, delay));
+  FLYBALL_TRY(regulator.K_delayed, told_of("controller.delay", delayed_gain(regulator, delay)));
   if (!job.outputs_are_states) {
-    FLYBALL_CHECK(add_observer(regulator, job, states, inputs));
+    FLYBALL_CHECK(add_observer(regulator, job, states, inputs, noticed));
   }
   if (model.inputs() == 1) {
     const ContinuousSystem<>& open = regulator.linear;
@@ -204,10 +211,22 @@ Expected<ModelRegulator> regulate(const ModelJob& job) {
     if (margins) {
       regulator.margins = *std::move(margins);
     } else {
-      warn(regulator.diagnostics, "no_margins", "margins: {}", to_string(margins.error()));
+      warn(noticed, "no_margins", "margins: {}", to_string(margins.error()));
     }
   }
   return regulator;
+}
+
+}  // namespace
+
+ExpectedAll<ModelRegulator> regulate(const ModelJob& job) {
+  std::vector<Diagnostic> noticed;
+  auto regulator = regulator_of(job, noticed);
+  if (!regulator) {
+    return refused(where, std::move(regulator).error(), std::move(noticed));
+  }
+  regulator->diagnostics = std::move(noticed);
+  return *std::move(regulator);
 }
 
 }  // namespace flyball::study

@@ -100,14 +100,16 @@ std::string typed(const Field& field) {
   return example;
 }
 
+/// Sections, or single keys of them.
 Names sections_of(JobKind job) {
   static constexpr std::array<std::string_view, 9> all{"log",       "mechanism", "controller",
                                                        "estimator", "sensor",    "battery",
                                                        "profile",   "mechanism", "gains"};
   static constexpr std::array<std::string_view, 8> design{
       "mechanism", "gains", "controller", "estimator", "sensor", "battery", "profile", "point"};
-  static constexpr std::array<std::string_view, 5> analyze{"mechanism", "gains", "controller",
-                                                           "model", "point"};
+  static constexpr std::array<std::string_view, 8> analyze{
+      "mechanism", "gains.kS",          "gains.kV", "gains.kA",
+      "gains.kG",  "controller.period", "model",    "point"};
   static constexpr std::array<std::string_view, 10> simulate{
       "simulation", "point",  "model",     "mechanism", "gains",
       "controller", "sensor", "estimator", "battery",   "profile"};
@@ -199,9 +201,11 @@ Json schema_of(const Section& section) {
 
 std::vector<FieldInfo> fields_of(JobKind job) {
   std::vector<FieldInfo> all;
-  for (const std::string_view name : sections_of(job)) {
+  for (const std::string_view part : sections_of(job)) {
+    const std::string_view name = part.substr(0, part.find('.'));
     for (const Field& field : section_of(name).fields) {
-      if (std::string option = option_of(field); !option.empty()) {
+      std::string option = option_of(field);
+      if (!option.empty() && (part == name || part == name_of(name, field.key))) {
         all.push_back({.section = std::string(name),
                        .key = std::string(field.key),
                        .option = std::move(option),

@@ -12,7 +12,7 @@ std::vector<Diagnostic> IdentifyResult::diagnostics() const {
   return all;
 }
 
-Expected<IdentifyResult> identify(const IdentifyJob& job) {
+ExpectedAll<IdentifyResult> identify(const IdentifyJob& job) {
   FLYBALL_TRY(auto source, load_recording(job.log, job.selection));
   if (source.refusal) {
     identification::FitReport refused{

@@ -12,6 +12,7 @@
 
 #include "core/try.hpp"
 #include "study/named_values.hpp"
+#include "study/read_value.hpp"
 
 namespace flyball::study {
 
@@ -55,6 +56,7 @@ Expected<double> named_value(const std::string& text, const std::string& called,
             .got(text)
             .expected(positive ? "greater than zero" : "zero or greater"));
   }
+  FLYBALL_CHECK(check_size(si, called));
   return si;
 }
 

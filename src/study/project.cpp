@@ -109,7 +109,7 @@ void make_plant(TomlDocument& document, Project& project) {
   plant.unit = mechanisms::position_unit(row.kind);
   std::vector<QuotedError> missing;
   for (MissingKey& key : missing_parts(document, row)) {
-    missing.push_back({document.missing(key.section, key.key, std::move(key.hint)), {}});
+    missing.push_back(document.missing(key.section, key.key, std::move(key.hint)));
   }
   if (!missing.empty()) {
     project.plant_error = Errors(std::move(missing));
@@ -258,12 +258,6 @@ ExpectedAll<DesignJob> design_job(const std::string& project, std::span<const Ov
   return std::move(read.job);
 }
 
-ExpectedAll<IdentifyJob> identify_job(const std::string& log, std::span<const Override> overrides) {
-  return read("", "", overrides, Source::log).map([&](Project said) {
-    return IdentifyJob{.log = log, .selection = std::move(said.log)};
-  });
-}
-
 ExpectedAll<TuneJob> tune_job(const std::string& log, const std::string& project,
                               std::span<const Override> overrides) {
   FLYBALL_TRY(auto said, project.empty() ? read("", "", overrides, Source::log)
@@ -274,6 +268,13 @@ ExpectedAll<TuneJob> tune_job(const std::string& log, const std::string& project
     job.identification.selection.mechanism = said.parts.type;
   }
   return job;
+}
+
+ExpectedAll<IdentifyJob> identify_job(const std::string& log, const std::string& project,
+                                      std::span<const Override> overrides) {
+  return tune_job(log, project, overrides).map([](TuneJob job) {
+    return std::move(job.identification);
+  });
 }
 
 }  // namespace flyball::study

@@ -294,8 +294,9 @@ constexpr std::array sections{
             "kV no part is needed.",
             "", mechanism},
     Section{"log", log_fields, &within<&Project::log>,
-            "What `flyball identify` and `flyball tune` cannot find out from the log.", "",
-            mechanism},
+            "What `flyball identify LOG PROJECT.toml` and `flyball tune LOG PROJECT.toml` cannot "
+            "find out from the log.",
+            "", mechanism},
     Section{"controller", controller_fields, &within<&Project::job, &DesignJob::controller>,
             "What the loop has to do."},
     Section{"estimator", estimator_fields, &within<&Project::job, &DesignJob::estimator>,

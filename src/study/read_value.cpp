@@ -46,6 +46,7 @@ Expected<double> in_range(double value, Range range, Dimension dimension, const 
         .got(format_number(value))
         .expected("a finite number");
   }
+  FLYBALL_CHECK(check_size(value, name));
   const bool zero = range == Range::not_negative;
   if (range == Range::any || value > 0.0 || (value == 0.0 && zero) ||
       (value < 0.0 && range == Range::not_zero)) {
@@ -63,14 +64,14 @@ Expected<double> quantity(const toml::node& node, Range range, Dimension dimensi
                           const std::string& name) {
   const auto number = node.value_exact<double>();
   const auto whole = node.value_exact<long long>();
-  if (node.is_string()) {
+  if (node.is_string() && dimension != Dimension::dimensionless) {
     FLYBALL_TRY(const double value,
                 parse_quantity(*node.value<std::string_view>(), dimension, name));
     return in_range(value, range, dimension, name);
   }
   if (dimension == Dimension::dimensionless) {
     return number || whole ? in_range(*node.value<double>(), range, dimension, name)
-                           : wrong_type(node, name, "a plain number");
+                           : wrong_type(node, name, "a plain number, without quotes");
   }
   const std::string unit(si_unit(dimension));
   if (number || whole) {
@@ -114,8 +115,10 @@ ExpectedAll<FieldValue> list(const toml::node& node, Range range,
   return values;
 }
 
-std::optional<long long> whole_number(std::string_view text) {
-  long long value = 0;
+/// What is a number and nothing else.
+template <class Number>
+std::optional<Number> number_in(std::string_view text) {
+  Number value = 0;
   const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
   return status == std::errc{} && end == text.data() + text.size() ? std::optional(value)
                                                                    : std::nullopt;
@@ -201,13 +204,29 @@ void insert_text(toml::table& table, const Field& field, std::string_view text) 
       start = end + 1;
     }
     table.insert_or_assign(field.key, std::move(values));
-  } else if (const auto number = whole_number(text); field.type == FieldType::whole && number) {
+  } else if (const auto whole = number_in<long long>(text);
+             field.type == FieldType::whole && whole) {
+    table.insert_or_assign(field.key, *whole);
+  } else if (const auto number = number_in<double>(text);
+             field.type == FieldType::quantity && number) {
     table.insert_or_assign(field.key, *number);
   } else if (field.type == FieldType::flag && (text == "true" || text == "false")) {
     table.insert_or_assign(field.key, text == "true");
   } else {
     table.insert_or_assign(field.key, std::string(text));
   }
+}
+
+Expected<void> check_size(double value, const std::string& called) {
+  constexpr double least = 1e-100;
+  constexpr double most = 1e100;
+  const double size = std::abs(value);
+  if (size == 0.0 || (size >= least && size <= most)) {
+    return {};
+  }
+  return refusal(ArgumentError::out_of_range, {}, called)
+      .got(format_number(value))
+      .expected("of a size from 1e-100 to 1e100 in SI units, or zero");
 }
 
 Expected<void> check_ranges(const Project& project, std::string_view where) {

@@ -19,6 +19,10 @@ namespace flyball::study {
                                                  std::span<const Dimension> dimensions,
                                                  const std::string& name);
 
+/// Nothing that a project describes is so large or so small that its square has no double.
+/// @errors ArgumentError::out_of_range.
+[[nodiscard]] Expected<void> check_size(double value, const std::string& called);
+
 /// The node that a text of the command line stands for.
 void insert_text(toml::table& table, const Field& field, std::string_view text);
 

@@ -18,6 +18,7 @@
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "study/simulation_record.hpp"
+#include "study/told.hpp"
 
 namespace flyball::study {
 
@@ -188,19 +189,19 @@ Expected<Simulation> mechanism_open_loop(const Project& project) {
   return recorded(described(names, project.path, run, true), std::move(rows));
 }
 
-Expected<Simulation> mechanism_closed_loop(const Project& project) {
+ExpectedAll<Simulation> mechanism_closed_loop(const Project& project) {
   const ModelRun& run = project.mechanism_run;
   FLYBALL_TRY(auto designed, design(project.job));
   if (run.duration_is_given || !run.initial.array().isNaN().all()) {
-    FLYBALL_TRY(
-        auto tried,
-        simulate_design(
-            designed,
-            {.measurement_noise = designed.job.estimator.measurement_std.value_or(0.0),
-             .seed = designed.job.seed,
-             .initial = mechanism_state(run),
-             .duration = run.duration_is_given ? std::optional(run.duration) : std::nullopt}));
-    designed.response = std::move(tried.series);
+    auto tried = simulate_design(
+        designed, {.measurement_noise = designed.job.estimator.measurement_std.value_or(0.0),
+                   .seed = designed.job.seed,
+                   .initial = mechanism_state(run),
+                   .duration = run.duration_is_given ? std::optional(run.duration) : std::nullopt});
+    if (!tried) {
+      return refused(where, std::move(tried).error(), std::move(designed.diagnostics));
+    }
+    designed.response = std::move(tried->series);
   }
   const PlantDescription& plant = designed.job.plant;
   Simulation result{.name = std::string(to_string(plant.kind)), .path = project.path};
@@ -283,7 +284,9 @@ Expected<Simulation> simulate_open_loop(const ModelJob& job) {
   return recorded(described(model.names(), job.path, run, job.outputs_are_states), std::move(rows));
 }
 
-Expected<Simulation> simulate_closed_loop(const ModelJob& job, const ModelRegulator& regulator) {
+namespace {
+
+Expected<Simulation> closed_loop(const ModelJob& job, const ModelRegulator& regulator) {
   const ModelRun& run = job.run;
   const AnyModel& model = job.model;
   if (run.duration < job.period) {
@@ -323,11 +326,23 @@ Expected<Simulation> simulate_closed_loop(const ModelJob& job, const ModelRegula
   return result;
 }
 
+}  // namespace
+
+ExpectedAll<Simulation> simulate_closed_loop(const ModelJob& job, const ModelRegulator& regulator) {
+  if (auto simulation = closed_loop(job, regulator)) {
+    return *std::move(simulation);
+  } else {
+    return refused(where, std::move(simulation).error(), regulator.diagnostics);
+  }
+}
+
 ExpectedAll<Simulation> simulate(const Project& project) {
-  const auto run = [&]() -> Expected<Simulation> {
+  const auto run = [&]() -> ExpectedAll<Simulation> {
+    if (!project.model_job && project.mechanism_run.closed_loop) {
+      return mechanism_closed_loop(project);
+    }
     if (!project.model_job) {
-      return project.mechanism_run.closed_loop ? mechanism_closed_loop(project)
-                                               : mechanism_open_loop(project);
+      return mechanism_open_loop(project);
     }
     const ModelJob& job = *project.model_job;
     if (!job.run.closed_loop) {
@@ -344,7 +359,7 @@ ExpectedAll<Simulation> simulate(const Project& project) {
   return result;
 }
 
-Expected<ModelDesign> design_model(const ModelJob& job) {
+ExpectedAll<ModelDesign> design_model(const ModelJob& job) {
   FLYBALL_TRY(auto regulator, regulate(job));
   ModelDesign result{.job = job, .regulator = std::move(regulator), .simulation = {}};
   const ModelRegulator& made = result.regulator;

@@ -54,8 +54,8 @@ class TomlDocument {
   /// The same of a part of a text: evidence `offset` and `length`, in bytes, say which.
   void refuse_part(std::string_view section, std::string_view key, Error error);
   /// An error about a key that should be there, with the section's place.
-  [[nodiscard]] Error missing(std::string_view section, std::string_view key,
-                              std::string hint) const;
+  [[nodiscard]] QuotedError missing(std::string_view section, std::string_view key,
+                                    std::string hint) const;
   /// The same, kept; not of a key that stands there misspelt, which is told.
   void miss(std::string_view section, std::string_view key, std::string hint);
 
@@ -74,6 +74,7 @@ class TomlDocument {
   [[nodiscard]] const toml::node* node(std::string_view section, std::string_view key) const;
   [[nodiscard]] toml::source_region source_of(std::string_view section) const;
   [[nodiscard]] std::string place(const toml::source_region& source) const;
+  [[nodiscard]] static std::optional<Place> place_in_file(const toml::source_region& source);
   [[nodiscard]] std::string_view line_of(toml::source_index number) const;
   [[nodiscard]] std::string excerpt(const toml::source_region& source) const;
   /// The texts of a table, in the order of the file; what is no text is refused.

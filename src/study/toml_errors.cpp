@@ -93,13 +93,16 @@ void TomlDocument::refuse_part(std::string_view section, std::string_view key, E
   found_.push_back({source, std::move(error).in(place(source)), true, {}});
 }
 
-Error TomlDocument::missing(std::string_view section, std::string_view key,
-                            std::string hint) const {
-  return Error(ProjectError::missing_key)
-      .in(place(source_of(section)))
-      .about(name(section, key))
-      .got("missing")
-      .hint(std::move(hint));
+QuotedError TomlDocument::missing(std::string_view section, std::string_view key,
+                                  std::string hint) const {
+  const toml::source_region source = source_of(section);
+  return {Error(ProjectError::missing_key)
+              .in(place(source))
+              .about(name(section, key))
+              .got("missing")
+              .hint(std::move(hint)),
+          {},
+          place_in_file(source)};
 }
 
 void TomlDocument::miss(std::string_view section, std::string_view key, std::string hint) {
@@ -130,9 +133,11 @@ std::optional<Errors> TomlDocument::errors() const {
                      {}});
       break;
     }
-    all.push_back({found->error, !found->excerpt.empty() ? found->excerpt
-                                 : found->quote          ? excerpt(found->source)
-                                                         : ""});
+    all.push_back({found->error,
+                   !found->excerpt.empty() ? found->excerpt
+                   : found->quote          ? excerpt(found->source)
+                                           : "",
+                   place_in_file(found->source)});
   }
   return Errors(std::move(all));
 }
@@ -146,6 +151,11 @@ std::string TomlDocument::place(const toml::source_region& source) const {
   return source.begin.line == 0
              ? file_
              : fmt::format("{}:{}:{}", file_, source.begin.line, source.begin.column);
+}
+
+std::optional<Place> TomlDocument::place_in_file(const toml::source_region& source) {
+  const toml::source_position& at = source.begin;
+  return at.line == 0 ? std::nullopt : std::optional<Place>({at.line, at.column});
 }
 
 std::string_view TomlDocument::line_of(toml::source_index number) const {

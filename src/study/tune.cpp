@@ -26,7 +26,7 @@ PlantDescription plant_from_fit(const identification::FeedforwardFit& fit) {
   return plant;
 }
 
-Expected<TuneResult> tune(const TuneJob& job) {
+ExpectedAll<TuneResult> tune(const TuneJob& job) {
   FLYBALL_TRY(auto identified, identify(job.identification));
   TuneResult result{.identification = std::move(identified), .design = std::nullopt};
   if (!result.identification.report.fit) {

@@ -23,7 +23,7 @@ class AnalyzeCommand : public Command {
     EXPECT_EQ(json.status, 2);
     const Json refusal = Json::parse(json.out, nullptr, false);
     ASSERT_FALSE(refusal.is_discarded()) << json.out;
-    EXPECT_EQ(refusal.at("schema"), "flyball.analyze/1");
+    EXPECT_EQ(refusal.at("schema"), "flyball.analyze/2");
     EXPECT_EQ(refusal.at("error").at("code"), code) << json.out;
     EXPECT_EQ(files(), before);
   }
@@ -44,11 +44,11 @@ TEST_F(AnalyzeCommand, AJsonModel) {
   EXPECT_EQ(files(), 1U);
 
   const Json json = Json::parse(run("analyze model.json --json").out);
-  EXPECT_EQ(json.at("schema"), "flyball.analyze/1");
+  EXPECT_EQ(json.at("schema"), "flyball.analyze/2");
   EXPECT_EQ(json.at("domain"), "continuous");
   EXPECT_EQ(json.at("poles"), Json::parse("[[0.0, 0.0], [-2.0, 0.0]]"));
   EXPECT_TRUE(json.at("controllable").get<bool>());
-  EXPECT_EQ(json.at("outputs"), Json::parse(R"j(["position (m)"])j"));
+  EXPECT_EQ(json.at("outputs").at(0).at("name"), "position");
   EXPECT_FALSE(json.contains("dc_gain")) << "it integrates";
   EXPECT_FALSE(json.contains("sampled")) << "nobody named a period";
 }
@@ -66,7 +66,9 @@ TEST_F(AnalyzeCommand, TheMechanismOfAProject) {
   EXPECT_EQ(json.at("A"), designed.at("plant").at("A_continuous"));
   EXPECT_EQ(json.at("sampled").at("A"), designed.at("plant").at("A"));
   EXPECT_EQ(json.at("sampled").at("B"), designed.at("plant").at("B"));
-  EXPECT_EQ(json.at("states"), Json::parse(R"j(["position (m)", "velocity (m/s)"])j"));
+  EXPECT_EQ(
+      json.at("states"),
+      Json::parse(R"j([{"name": "position", "unit": "m"}, {"name": "velocity", "unit": "m/s"}])j"));
   EXPECT_EQ(json.at("inputs"), Json::parse(R"j(["voltage (V)"])j"));
   EXPECT_EQ(json.at("T"), 0.02);
   const double pole = json.at("poles").at(1).at(0).get<double>();
@@ -146,7 +148,7 @@ TEST_F(AnalyzeCommand, ModelsThatAreWrong) {
     expect_refused("m.json", code, words);
   };
   refused("{\"A\": [[1]]", "malformed", "m.json: the model is cut off");
-  refused("{\"A\": [[1]],\n \"B\": [[1]],,}", "malformed", "not JSON from line 2, character 13 on");
+  refused("{\"A\": [[1]],\n \"B\": [[1]],,}", "malformed", "(line = 2, column = 13)");
   refused("[[1]]", "malformed", "a list of 1");
   refused(R"({"A": [[1]]})", "malformed", "m.json: B is left out");
   refused(R"({"A": [[1]], "B": [[1]], "stats": ["x"]})", "unknown_name",

@@ -277,5 +277,84 @@ TEST_F(BadInput, FoldersThatAreNotOurs) {
   EXPECT_FALSE(answer.out.empty());
 }
 
+// Whatever is echoed of an input is cut, in words and in JSON.
+TEST_F(BadInput, TextsOfAnyLength) {
+  const std::string text(100'000, 'x');
+  const auto expect_short = [&](const std::string& arguments,
+                                const std::string& input = "/dev/null") {
+    const Answer answer = run(arguments, input);
+    EXPECT_EQ(answer.status, 2) << arguments.substr(0, 80) << answer.err.substr(0, 500);
+    EXPECT_LT(answer.out.size() + answer.err.size(), 6000U) << arguments.substr(0, 80);
+    EXPECT_FALSE(holds(answer.out + answer.err, std::string(300, 'x'))) << arguments.substr(0, 80);
+  };
+  for (const std::string& line :
+       {"[" + text + "]\n", "[mechanism]\n" + text + " = 1\n",
+        "[mechanism]\ntype = \"" + text + "\"\n",
+        "[mechanism]\ntype = \"arm\"\nmotor = \"" + text + "\"\nmass = \"" + text +
+            "\"\ngearing = \"" + text + "\"\nmotor_count = \"" + text + "\"\n",
+        "[mechanism]\ntype = \"arm\"\nmass = \"1 " + text + "\"\n",
+        "[model]\nstates = { " + text + " = \"" + text + "\" }\n[model.derivative]\n" + text +
+            " = \"y" + text + "+\"\n"}) {
+    write("long.toml", line);
+    expect_short("design long.toml --json");
+  }
+  for (const std::string& option : {"--delay ", "--", "--tolerance ", "--motor "}) {
+    expect_short("design " + example("elevator.toml") + " --json " + option + text);
+  }
+  for (const std::string& problem : {"{\"" + text + "\": 1}", "{\"A\": \"" + text + "\"}",
+                                     "{\"A\": [[\"" + text + "\"]]}", text}) {
+    write("long.json", problem);
+    expect_short("solve expm", "long.json");
+    expect_short("analyze long.json --json");
+    expect_short("identify long.json --json");
+  }
+  expect_short("motors --json " + text);
+  expect_short("solve " + text);
+  expect_short("book " + text + " --json");
+  expect_short(text);
+  expect_short("design --json " + text);
+}
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which need all addresses
+TEST_F(BadInput, NotEnoughMemory) {
+  std::string zeros = "0";
+  for (int k = 0; k < 3'000'000; ++k) {
+    zeros += ",0";
+  }
+  write("huge.json", "{\"id\": 7, \"A\": [[" + zeros + "]], \"B\": [[1]]}\n");
+  const std::string limited = "--version >/dev/null; ulimit -v 100000; '" FLYBALL_COMMAND "' ";
+  const Answer analyzed = run(limited + "analyze huge.json --json");
+  EXPECT_EQ(analyzed.status, 2);
+  Json json = Json::parse(analyzed.out, nullptr, false);
+  ASSERT_FALSE(json.is_discarded()) << analyzed.out << analyzed.err;
+  EXPECT_EQ(json.at("schema"), "flyball.analyze/2");
+  EXPECT_EQ(json.at("error").at("code"), "not_enough_memory");
+  EXPECT_TRUE(holds(analyzed.err, "not enough memory for huge.json")) << analyzed.err;
+  const Answer solved = run(limited + "solve expm", "huge.json");
+  EXPECT_EQ(solved.status, 2);
+  json = Json::parse(solved.out, nullptr, false);
+  ASSERT_FALSE(json.is_discarded()) << solved.out << solved.err;
+  EXPECT_EQ(json.at("error").at("code"), "not_enough_memory");
+}
+#endif
+
+TEST_F(BadInput, AKeyThatStandsTwice) {
+  write("twice.json", "{\"A\": [[1]], \"B\": [[1]],\n \"A\": [[2]]}");
+  expect("analyze twice.json", 2, "twice.json: the model is an object with the key \"A\" twice");
+  std::string log = contents(FLYBALL_EXAMPLES "/logs/elevator.json");
+  log.insert(log.rfind('}'), ", \"fast-forward\": []");
+  write("log.json", log);
+  expect_log("log.json", 2, "malformed", "the key \"fast-forward\" twice");
+}
+
+TEST_F(BadInput, ARefusedDesignTellsWhatWasNoticed) {
+  project(with(good_elevator, "\"8 kg\"", "\"80000 kg\""));
+  const Answer answer = run("design project.toml --json");
+  EXPECT_EQ(answer.status, 1);
+  const Json json = Json::parse(answer.out);
+  ASSERT_FALSE(json.at("diagnostics").empty()) << answer.out;
+  EXPECT_EQ(json.at("diagnostics").at(0).at("code"), "assumed");
+}
+
 }  // namespace
 }  // namespace flyball::test

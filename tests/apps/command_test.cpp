@@ -105,7 +105,7 @@ TEST_F(Command, TheNextReportReplacesTheLast) {
 TEST_F(Command, JsonWritesNoReportUnlessAsked) {
   const Answer answer = run("design " + example("elevator.toml") + " --json");
   ASSERT_EQ(answer.status, 0) << answer.err;
-  EXPECT_EQ(Json::parse(answer.out).at("schema"), "flyball.design/1");
+  EXPECT_EQ(Json::parse(answer.out).at("schema"), "flyball.design/2");
   EXPECT_EQ(files(), 0U);
 }
 

@@ -62,12 +62,12 @@ TEST_F(Command, AnalysesAndRegulatesAModelByFormula) {
   ASSERT_EQ(analysis.status, 0) << analysis.err;
   const Json model = Json::parse(analysis.out);
   EXPECT_EQ(model.at("stability"), "unstable");
-  EXPECT_EQ(model.at("states")[1], "theta (rad)");
+  EXPECT_EQ(model.at("states")[1], Json({{"name", "theta"}, {"unit", "rad"}}));
   EXPECT_TRUE(model.at("point").at("is_equilibrium").get<bool>());
   const Answer design = run("design " + example("cart_pole.toml") + " --json");
   ASSERT_EQ(design.status, 0) << design.err;
   const Json json = Json::parse(design.out);
-  EXPECT_EQ(json.at("schema"), "flyball.design_model/1");
+  EXPECT_EQ(json.at("schema"), "flyball.design_model/2");
   EXPECT_EQ(json.at("K")[0].size(), 4U);
   EXPECT_EQ(json.at("kalman_gain").size(), 4U);
   EXPECT_NEAR(json.at("simulation").at("states")[0].at("final").get<double>(), 0.5, 0.02);

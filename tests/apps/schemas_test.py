@@ -91,6 +91,50 @@ def check_answers(folder):
     check_answer(["analyze", "discrete.json"], 0, folder)
 
 
+def check_motors(folder):
+    check_answer(["motors"], 0, folder)
+    check_answer(["motors", "NEO"], 0, folder)
+    check_answer(["motors", "nothing"], 2, folder)
+
+
+def check_places(folder):
+    """Every error of a file has its line and column."""
+    (folder / "place.toml").write_text('[mechanism]\ntype = "elevator"\nmass = 8\n  gearng = 2\n')
+    errors = answer(["design", "place.toml"], 2, folder)["errors"]
+    places = {(error["code"], error["line"], error["column"]) for error in errors}
+    if not {("wrong_unit", 3, 8), ("unknown_key", 4, 3)} <= places:
+        failures.append(f"places: {errors}")
+
+
+def check_reader_and_schema(folder):
+    """What the reader says of a value, the schema says too: each key with values of every type."""
+    schema = json.loads((schemas / "project.schema.json").read_text())
+    values = {"1": 1, "1.5": 1.5, '"10"': "10", '"x"': "x", '""': "", "true": True, "[]": [], "[1]": [1]}
+    base = '[mechanism]\ntype = "elevator"\n'
+    for section, told in schema["properties"].items():
+        if section in ("model", "point", "simulation"):
+            continue
+        for key in told["properties"]:
+            if key in ("type", "motor", "tolerance", "limit", "reference", "mechanism"):
+                continue
+            for text, value in values.items():
+                head = base if section == "mechanism" else f"{base}[{section}]\n"
+                (folder / "one.toml").write_text(f"{head}{key} = {text}\n")
+                done = subprocess.run([command, "analyze", "one.toml", "--json"], cwd=folder,
+                                      capture_output=True, text=True)
+                document = json.loads(done.stdout)
+                errors = document.get("errors", [document["error"]] if "error" in document else [])
+                name = f"{section}.{key} "
+                refused = any(f": {name}is " in e["message"] and "is missing" not in e["message"]
+                              for e in errors)
+                project = {"mechanism": {"type": "elevator"}}
+                project.setdefault(section, {})[key] = value
+                wrong = not validator("project").is_valid(project)
+                # A text with a number is the schema's limit: units are the reader's.
+                if refused != wrong and not (refused and isinstance(value, str) and not wrong):
+                    failures.append(f"{name}= {text}: reader {refused}, schema {wrong}: {errors}")
+
+
 def check_refusals(folder):
     wrong = folder / "wrong.toml"
     wrong.write_text('[mechanism]\ntype = "elevator"\nmass = 8\ngearng = 2\n')
@@ -130,6 +174,9 @@ def check_project_schema():
 with tempfile.TemporaryDirectory() as name:
     check_answers(pathlib.Path(name))
     check_refusals(pathlib.Path(name))
+    check_motors(pathlib.Path(name))
+    check_places(pathlib.Path(name))
+    check_reader_and_schema(pathlib.Path(name))
 check_project_schema()
 for failure in failures[:20]:
     print(failure, file=sys.stderr)

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include <flyball/core/diagnostic.hpp>
+#include <flyball/core/errors.hpp>
 
 namespace flyball {
 
@@ -85,6 +85,27 @@ TEST(Error, PutsAllPartsTogether) {
   ASSERT_EQ(error.evidence().size(), 1U);
   EXPECT_EQ(error.evidence()[0].name, "pressure");
   EXPECT_EQ(error.evidence()[0].values, std::vector<double>{2.0});
+}
+
+TEST(Error, DoesNotEchoWhatIsTooLong) {
+  const std::string text(100'000, 'x');
+  const Error error =
+      Error(KettleError::empty).about("water").got('"' + text + '"').with("t", text);
+  EXPECT_LT(to_string(error).size(), 500U);
+  EXPECT_LT(error.evidence().front().text.size(), 300U);
+}
+
+TEST(Errors, TellWhatWasNoticedBeforeThem) {
+  const Errors errors =
+      Errors(Error(KettleError::empty)).after({{"b", Severity::info, "B"}}).after({{"a"}});
+  ASSERT_EQ(errors.diagnostics().size(), 2U);
+  EXPECT_EQ(errors.diagnostics().front().code, "a");
+  EXPECT_TRUE(errors.is(KettleError::empty));
+  const Error error = not_enough_memory("a.json");
+  EXPECT_EQ(to_string(error),
+            "there is not enough memory for a.json; give less at once, or free some");
+  EXPECT_EQ(error.code(), "not_enough_memory");
+  EXPECT_EQ(error.kind(), ErrorKind::environment);
 }
 
 TEST(Error, KnowsItsCodeAndKind) {

@@ -37,6 +37,33 @@ RC_GTEST_PROP(EditDistance, IsAMetric, ()) {
 constexpr std::array<std::string_view, 5> names{"drum_radius", "gearing", "mass", "motor",
                                                 "motor_count"};
 
+TEST(Cut, KeepsWholeCharacters) {
+  EXPECT_EQ(cut("speed", 5), "speed");
+  EXPECT_EQ(cut("speeds", 5), "speed…");
+  EXPECT_EQ(cut("ωωω", 2), "ωω…");  // two bytes each
+  EXPECT_EQ(cut("", 0), "");
+}
+
+TEST(Shortened, CutsWhatIsQuotedLongWordsAndTheWhole) {
+  const std::string word(100'000, 'a');
+  const std::string plain = "p.toml:1:2: mechanism.mass is \"8 m\", a length; it must be a mass";
+  EXPECT_EQ(shortened(plain), plain);
+  EXPECT_EQ(shortened("mass is \"" + word + "\", a mass"),
+            "mass is \"" + word.substr(0, 80) + "…\", a mass");
+  std::string greek;
+  for (int i = 0; i < 81; ++i) {
+    greek += "ω";
+  }
+  EXPECT_EQ(shortened('"' + greek + '"'), '"' + greek.substr(0, 160) + "…\"");
+  EXPECT_EQ(shortened("/home/" + word + "/log.json: cut"),
+            "/home/" + word.substr(0, 194) + "…" + word.substr(0, 30) + "/log.json: cut");
+  std::string many;
+  for (int i = 0; i < 10'000; ++i) {
+    many += "x\" ";
+  }
+  EXPECT_LT(shortened(many).size(), 4010U);
+}
+
 TEST(NearestName, FindsTheNameMeant) {
   EXPECT_EQ(nearest_name("drum_raduis", names), "drum_radius");
   EXPECT_EQ(nearest_name("Gearing", names), "gearing");

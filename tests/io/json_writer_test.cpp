@@ -105,6 +105,25 @@ TEST(JsonWriter, AnErrorHasCodeMessageAndItsEvidenceOnce) {
   EXPECT_EQ(json.size(), 5U);
 }
 
+TEST(JsonWriter, APlaceIsLineAndColumn) {
+  EXPECT_EQ(text_of(std::vector<Diagnostic>{{"cut", Severity::info, "c", Place{3, 7}}}),
+            R"([{"code":"cut","severity":"info","message":"c","line":3,"column":7}])");
+  const QuotedError error{Error(ArgumentError::empty).with("line", 1.0), {}, Place{4, 5}};
+  const auto json = nlohmann::json::parse(text_of(error));
+  EXPECT_EQ(json["line"], 4);
+  EXPECT_EQ(json["column"], 5);
+  const auto refusal = nlohmann::json::parse(
+      refusal_json("s", Errors({error, error}).after({{"noticed", Severity::warning, "w"}})));
+  EXPECT_EQ(refusal["error"]["line"], 4);
+  EXPECT_EQ(refusal["errors"][1]["column"], 5);
+  EXPECT_EQ(refusal["diagnostics"][0]["code"], "noticed");
+}
+
+TEST(JsonWriter, ACoordinateIsNameAndUnit) {
+  EXPECT_EQ(text_of(std::vector<Coordinate>{{"speed", "m/s"}, {"x"}}),
+            R"([{"name":"speed","unit":"m/s"},{"name":"x","unit":""}])");
+}
+
 TEST(JsonWriter, ADiagnostic) {
   EXPECT_EQ(text_of(std::vector<Diagnostic>{{"repeated_rows", Severity::warning, "75 %"}}),
             R"([{"code":"repeated_rows","severity":"warning","message":"75 %"}])");

@@ -126,7 +126,7 @@ TEST(Diagnostics, OfAnIdentification) {
 TEST(Diagnostics, OfARefusedIdentification) {
   const Answer answer = study::answer_of(noted(refused_result()));
   ASSERT_TRUE(answer.refusal);
-  expect_nothing_lost(answer, {"source", "fit"});
+  expect_nothing_lost(answer, {"source", "fit", "design"});
 }
 
 TEST(Diagnostics, OfADesign) {
@@ -145,7 +145,8 @@ TEST(Diagnostics, OfATuningWithoutADesign) {
   expect_nothing_lost(study::answer_of(no_fit), {"source", "fit"});
   study::TuneResult refused = tune_result(MechanismKind::elevator);
   refused.identification = noted(std::move(refused.identification));
-  refused.design = tl::unexpected(Error(study::DesignError::gravity_too_strong).in("design"));
+  refused.design = tl::unexpected(Errors(Error(study::DesignError::gravity_too_strong).in("design"))
+                                      .after(of_every_severity("design")));
   const Answer answer = study::answer_of(refused);
   ASSERT_TRUE(answer.refusal && answer.refusal->is(study::DesignError::gravity_too_strong));
   expect_nothing_lost(answer, {"source", "fit"});

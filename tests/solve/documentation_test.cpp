@@ -241,6 +241,16 @@ TEST(SolveTable, HelpNamesEveryField) {
     for (const Field& field : kind.answer) {
       EXPECT_FALSE(field.help.empty()) << kind.name << "." << field.name;
     }
+    for (const std::vector<Field>& fields : {kind.fields, kind.answer}) {
+      for (const Field& field : fields) {
+        for (const char c : std::string().append(field.rows).append(field.columns)) {
+          if (c >= 'a' && c <= 'z') {
+            EXPECT_NE(help.find(std::string("\n  ") + c + "  "), std::string::npos)
+                << kind.name << "." << field.name << ": what is " << c << "?";
+          }
+        }
+      }
+    }
     EXPECT_NE(help.find(kind.example), std::string::npos) << kind.name;
     EXPECT_NE(list_of_kinds().find(kind.help), std::string::npos) << kind.name;
   }

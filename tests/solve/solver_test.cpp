@@ -131,6 +131,17 @@ TEST(Solve, RefusesBadInput) {
   EXPECT_EQ(refusal("gramians", R"({"A":[[1]],"B":[[1]],"C":[[1]],"domain":"z"})"), "unknown_name");
   EXPECT_EQ(refusal("simulate", R"({"A":[[1]],"B":[[1]],"u":[[1]],"domain":"continuous"})"),
             "malformed");
+  const Json twice = answer("expm", "{\"A\": [[1]],\n  \"A\": [[2]]}").at("error");
+  EXPECT_EQ(twice.at("code"), "malformed");
+  EXPECT_EQ(twice.at("message"),
+            "expm: the problem is an object with the key \"A\" twice; it must be an object with "
+            "each key once "
+            "(line = 2, column = 3)");
+  EXPECT_EQ(twice.at("line"), 2);
+  EXPECT_EQ(twice.at("column"), 3);
+  EXPECT_EQ(answer("expm", "{\"A\":\n x}").at("error").at("line"), 2);
+  EXPECT_EQ(answer("dare", R"({"A":[[1]],"B":[[1]],"Q":[[1]]})").at("error").at("message"),
+            "dare: R is left out; it must be there; a problem needs A, B, Q, R");
   EXPECT_EQ(Solver::create("dear").error().code(), "unknown_name");
 }
 

@@ -192,6 +192,39 @@ TEST(Design, PastesTheSameGainsInOtherUnits) {
 }
 
 // A motion of more periods than anyone wants to see is refused before it is simulated.
+// Whoever wrote a file does not know the library's functions.
+TEST(Design, IsRefusedInTheWordsOfTheFile) {
+  const auto refusal = [](void (*change)(DesignJob&)) {
+    DesignJob job = elevator_job();
+    change(job);
+    const auto result = design(job);
+    return result ? std::string("designed") : to_string(result.error());
+  };
+  EXPECT_EQ(refusal([](DesignJob& job) { job.controller.delay = 1e3; }),
+            "design: controller.delay is 1000 s; it must be in [0, 2]");
+  EXPECT_TRUE(refusal([](DesignJob& job) {
+                job.sensor.resolution = 1e200;
+              }).starts_with("design: sensor.resolution is 1e+200; it must be of a size"));
+  EXPECT_TRUE(refusal([](DesignJob& job) {
+                job.controller.state_tolerance = {1e-200, 1.0};
+              }).starts_with("design: controller.state_tolerance is 1e-200; it must be of a size"));
+  EXPECT_TRUE(refusal([](DesignJob& job) {
+                job.estimator.model_std = {0.0, 0.0};
+              }).starts_with("design: the observer"));
+  EXPECT_TRUE(refusal([](DesignJob& job) {
+                job.profile.max_velocity = 1e-9;
+              }).starts_with("design: the motion is "));
+}
+
+TEST(Design, ARefusalTellsWhatWasNoticed) {
+  DesignJob job = elevator_job();
+  job.plant.gains.kG = 13.0;
+  const auto result = design(job);
+  ASSERT_FALSE(result);
+  ASSERT_EQ(result.error().diagnostics().size(), 1U);
+  EXPECT_EQ(result.error().diagnostics().front().code, "assumed");
+}
+
 TEST(Design, RefusesAMotionWithoutEnd) {
   auto job = arm_job();
   job.profile.max_velocity = 1e-9;

@@ -238,6 +238,15 @@ TEST(Fields, EveryOptionOfAJobIsItsOwnAndSaysWhatItTakes) {
   EXPECT_EQ(period->absent, "20 ms");  // ControllerOptions{}.period
 }
 
+TEST(Fields, AnalyzeOffersNoOptionThatChangesNothing) {
+  for (const FieldInfo& field : fields_of(JobKind::analyze)) {
+    EXPECT_TRUE(field.section == "mechanism" || field.section == "gains" ||
+                field.section == "model" || field.section == "point" || field.option == "--period")
+        << field.option;
+    EXPECT_NE(field.option, "--angle-offset");
+  }
+}
+
 TEST(Fields, EveryKindOfMechanismNeedsKeysThatThereAre) {
   for (const MechanismRow& row : mechanism_rows()) {
     for (const std::string_view key : row.needs) {

@@ -83,7 +83,10 @@ TEST(Project, RefusesMeaninglessValues) {
   refused("10.0", "0", error_info(ArgumentError::not_positive));
   refused("10.0", "-4", error_info(ArgumentError::not_positive));
   refused("10.0", "nan", error_info(ArgumentError::not_finite));
-  refused("10.0", "\"ten\"", error_info(ArgumentError::malformed));
+  refused("10.0", "\"ten\"", error_info(ProjectError::wrong_type));
+  refused("10.0", "\"10\"", error_info(ProjectError::wrong_type));  // the schema says number
+  refused("10.0", "1e200", error_info(ArgumentError::out_of_range));
+  refused("\"8 kg\"", "\"1e-200 kg\"", error_info(ArgumentError::out_of_range));
   refused("\"NEO\"", "\"NE0\"", error_info(ArgumentError::unknown_name));
   refused("\"NEO\"", "\"Kraken\"", error_info(ArgumentError::ambiguous_name));
   refused("motor_count = 2", "motor_count = 0", error_info(ProjectError::wrong_value));
@@ -184,9 +187,13 @@ TEST(Project, AJobWithoutAFileTakesItsOptions) {
   EXPECT_EQ(to_string(unknown.error()),
             "--state-tolerance is in a unit that the mechanism decides, which is not known; say "
             "which with --mechanism");
-  const auto turret = identify_job("a.json", std::vector<Override>{{"--mechanism", "turret"}});
+  const auto turret = identify_job("a.json", "", std::vector<Override>{{"--mechanism", "turret"}});
   ASSERT_FALSE(turret);
   EXPECT_EQ(turret.error().where(), "--mechanism");
+  const auto ten = tune_job("arm.json", "", std::vector<Override>{{"--gearing", "ten"}});
+  ASSERT_FALSE(ten);
+  EXPECT_EQ(to_string(ten.error()),
+            "--gearing is \"ten\"; it must be a plain number, without quotes");
 }
 
 TEST(Project, TheLogIsOfTheMechanismOfTheFile) {

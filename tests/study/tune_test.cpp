@@ -82,7 +82,7 @@ TEST(Tune, GoesFromALogToAProvenController) {
   EXPECT_NEAR(*design.job.controller.delay, std::max(0.0, fit.position_delay), 1e-12);
 
   const auto json = nlohmann::json::parse(to_json(*result));
-  EXPECT_EQ(json["schema"], "flyball.tune/1");
+  EXPECT_EQ(json["schema"], "flyball.tune/2");
   EXPECT_EQ(json["identification"]["schema"], "flyball.identify/1");
   EXPECT_EQ(json["identification"]["gains"]["kV"]["value"].get<double>(), fit.kV.value);
   EXPECT_EQ(json["identification"]["gains"]["kV"]["unit"], "V·s/rad");

@@ -25,7 +25,7 @@ struct PlantInputLoop {
 
 /// Full-state feedback: L(z) = K (z I - A_d)⁻¹ B_d z^{-delay/T}.
 /// @param A, B  Continuous plant, one input. @param K  1 x n, designed for the period.
-/// @errors ArgumentError for shapes, entries, period and delay, of at most 250 periods.
+/// @errors ArgumentError for shapes, entries, period and delay, of at most `most_delay_periods`.
 [[nodiscard]] Expected<PlantInputLoop> state_feedback_loop(const MatrixRef& A, const MatrixRef& B,
                                                            const MatrixRef& K, Time period,
                                                            Time delay);
@@ -38,6 +38,9 @@ struct PlantInputLoop {
 [[nodiscard]] Expected<PlantInputLoop> observer_regulator_loop(
     const MatrixRef& A, const MatrixRef& B, const MatrixRef& C, const DiscreteSystem<>& model,
     const MatrixRef& K, const MatrixRef& K_e, Time delay);
+
+/// The longest delay of a sampled loop: each period of it is a state.
+inline constexpr double most_delay_periods = 250.0;
 
 /// A frequency where the loop gain crosses |L| = 1 or the negative real axis.
 struct Crossover {

@@ -19,7 +19,7 @@ struct AnswerFile {
 /// What a job answers, in the form in which it can be shown, written and sent: whoever renders it
 /// (flyball/report) need not know the job.
 struct Answer {
-  std::string schema{};             ///< Of `json`, such as "flyball.design/1" (docs/schemas.md).
+  std::string schema{};             ///< Of `json`, such as "flyball.design/2" (docs/schemas.md).
   std::string json{};               ///< One object on one line; numbers round-trip.
   Document document{};              ///< The same for people.
   std::vector<Figure> figures{};    ///< Each names the section of the document it stands in.

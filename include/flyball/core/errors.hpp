@@ -1,17 +1,29 @@
 #pragma once
 
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include <flyball/core/diagnostic.hpp>
 #include <flyball/core/expected.hpp>
 
 namespace flyball {
+
+/// What the machine refused.
+enum class MemoryError {
+  not_enough_memory,  ///< An allocation failed.
+};
+[[nodiscard]] ErrorInfo error_info(MemoryError code);
+/// For whoever catches std::bad_alloc. @param what  Completes "there is not enough memory for …".
+[[nodiscard]] Error not_enough_memory(std::string_view what);
 
 /// An error of a text, with the lines at fault as they stand and a caret below; empty if a look at
 /// them says nothing.
 struct QuotedError : Error {
   std::string excerpt{};
+  std::optional<Place> place{};
 };
 
 /// Everything that is wrong with one input, in its order. As an error it is the first of them, so
@@ -25,8 +37,17 @@ class Errors : public Error {
 
   [[nodiscard]] const std::vector<QuotedError>& all() const noexcept { return all_; }
 
+  /// What was noticed before the error, which nobody else can tell once there is no result.
+  [[nodiscard]] const std::vector<Diagnostic>& diagnostics() const noexcept { return diagnostics_; }
+  /// With that, in front of what is there.
+  [[nodiscard]] Errors after(std::vector<Diagnostic> noticed) && {
+    diagnostics_.insert(diagnostics_.begin(), noticed.begin(), noticed.end());
+    return std::move(*this);
+  }
+
  private:
   std::vector<QuotedError> all_;
+  std::vector<Diagnostic> diagnostics_{};
 };
 
 /// A result, or all the reasons why there is none. What readers of files return.

@@ -7,6 +7,13 @@
 
 namespace flyball {
 
+/// At most that many characters of a UTF-8 text, whole ones; "…" says that there were more.
+[[nodiscard]] std::string cut(std::string_view text, std::size_t most);
+
+/// A message in which what it quotes is cut to 80 characters, a word of 240 or more to its two
+/// ends, and the whole to 4000: what comes from outside may be of any length.
+[[nodiscard]] std::string shortened(std::string_view message);
+
 /// Levenshtein's distance: the fewest insertions, deletions and substitutions between two texts.
 [[nodiscard]] std::size_t edit_distance(std::string_view a, std::string_view b);
 

@@ -11,6 +11,7 @@
 
 #include <Eigen/Core>
 
+#include <flyball/core/coordinate.hpp>
 #include <flyball/core/diagnostic.hpp>
 #include <flyball/core/errors.hpp>
 
@@ -65,9 +66,13 @@ class JsonWriter {
   void write(const Eigen::VectorXcd& values);
   void write(std::span<const double> values);
   /// Code, message and the evidence by its names.
-  void write(const Error& error);
-  /// Code, severity and message.
+  void write(const Error& error) { write(error, std::nullopt); }
+  /// The same, and line and column where there is a place.
+  void write(const QuotedError& error) { write(error, error.place); }
+  /// Code, severity, message, and line and column where there is a place.
   void write(const Diagnostic& diagnostic);
+  /// {"name": …, "unit": …}, the unit empty where there is none.
+  void write(const Coordinate& coordinate);
   void write(const std::string& text) { write(std::string_view(text)); }
   void write(const char* text) { write(std::string_view(text)); }
   void write(const std::vector<double>& values) { write(std::span<const double>(values)); }
@@ -132,6 +137,8 @@ class JsonWriter {
 
  private:
   void separate();
+  void write(const Error& error, const std::optional<Place>& place);
+  void add(const std::optional<Place>& place);
 
   std::string text_;
   bool all_finite_ = true;
@@ -143,7 +150,7 @@ class JsonWriter {
 /// A text in quotes, escaped.
 [[nodiscard]] std::string json_quoted(std::string_view text);
 
-/// A refusal: {"schema": …, "error": {"code", "message", …evidence}, "diagnostics": []}, and
+/// A refusal: {"schema": …, "error": {"code", "message", …evidence}, "diagnostics": […]}, and
 /// `errors` with all of them where there are several.
 [[nodiscard]] std::string refusal_json(std::string_view schema, const Errors& errors);
 

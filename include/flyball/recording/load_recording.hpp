@@ -5,7 +5,7 @@
 #include <vector>
 
 #include <flyball/core/diagnostic.hpp>
-#include <flyball/core/expected.hpp>
+#include <flyball/core/errors.hpp>
 #include <flyball/identification/recording.hpp>
 
 namespace flyball {
@@ -51,11 +51,11 @@ struct LoadedRecording {
 /// Reads a log and finds the tests in it: channels by name, type and unit; runs by the test state;
 /// channels are joined by time onto the voltage's clock.
 /// @errors LogError, FileError, RecordingError.
-[[nodiscard]] Expected<LoadedRecording> load_recording(const std::string& path,
-                                                       const LogSelection& selection = {});
+[[nodiscard]] ExpectedAll<LoadedRecording> load_recording(const std::string& path,
+                                                          const LogSelection& selection = {});
 
 /// The same from a log in memory.
-[[nodiscard]] Expected<LoadedRecording> recording_from_log(const Log& log,
-                                                           const LogSelection& selection = {});
+[[nodiscard]] ExpectedAll<LoadedRecording> recording_from_log(const Log& log,
+                                                              const LogSelection& selection = {});
 
 }  // namespace flyball::recording

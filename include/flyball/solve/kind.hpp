@@ -39,7 +39,7 @@ struct Field {
   std::string_view name;
   FieldType type = FieldType::number;
   /// Sizes as letters, numbers and sums ("n", "1", "n+p"): equal letters of one problem are equal
-  /// sizes. n states, m inputs, p outputs, k samples.
+  /// sizes. What each counts is a table in src/solve/shape.cpp.
   std::string_view rows{};
   std::string_view columns{};
   std::string_view outputs{};  ///< Of a system, whose states are `rows` and inputs `columns`.

@@ -78,7 +78,7 @@ struct ModelAnalysis : StructureAnalysis {
 
 /// Poles, controllability and observability, gains and step responses of a model.
 /// @errors ArgumentError for the system and for a discrete one without a period; those of
-///         analyze_structure; that of the step responses' discretisation.
-[[nodiscard]] Expected<ModelAnalysis> analyze(const ModelFile& model);
+///         analyze_structure; that of the step responses' discretisation. With the model's notes.
+[[nodiscard]] ExpectedAll<ModelAnalysis> analyze(const ModelFile& model);
 
 }  // namespace flyball::study

@@ -19,15 +19,15 @@ namespace flyball::study {
 
 /// Plant, gains, poles, feedforward, margins, the robustness grid, the fastest trapezoid, constants
 /// to paste; the closed loop's response; gains.toml (a project file), the generated header. Schema
-/// "flyball.design/1".
+/// "flyball.design/2".
 [[nodiscard]] Answer answer_of(const DesignResult& result);
 
 /// Both. If the fit or the design was refused, what there is and the reason. Schema
-/// "flyball.tune/1".
+/// "flyball.tune/2".
 [[nodiscard]] Answer answer_of(const TuneResult& result);
 
 /// A linear system: what it is, its poles, what can be moved and seen, gains, what sampling makes
-/// of it; pole map and step responses. Schema "flyball.analyze/1".
+/// of it; pole map and step responses. Schema "flyball.analyze/2".
 [[nodiscard]] Answer answer_of(const ModelAnalysis& result);
 
 /// The answer's JSON alone (docs/schemas.md).

@@ -8,7 +8,7 @@
 
 #include <flyball/core/coordinate.hpp>
 #include <flyball/core/diagnostic.hpp>
-#include <flyball/core/expected.hpp>
+#include <flyball/core/errors.hpp>
 #include <flyball/core/time_series.hpp>
 #include <flyball/export/constants.hpp>
 #include <flyball/mechanisms/mechanism.hpp>
@@ -152,8 +152,8 @@ struct DesignResult {
 /// feedforward, margins, robustness grid, and a simulated trapezoid with noise, quantisation, delay
 /// and battery sag.
 /// @errors ArgumentError for meaningless options; RiccatiError when no controller exists;
-///         DesignError.
-[[nodiscard]] Expected<DesignResult> design(const DesignJob& job);
+///         DesignError. With what was noticed before.
+[[nodiscard]] ExpectedAll<DesignResult> design(const DesignJob& job);
 
 /// Why a well-formed job has no design.
 enum class DesignError {

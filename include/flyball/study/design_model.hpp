@@ -1,7 +1,7 @@
 #pragma once
 
 #include <flyball/control/margins.hpp>
-#include <flyball/core/diagnostic.hpp>
+#include <flyball/core/errors.hpp>
 #include <flyball/study/model_job.hpp>
 #include <flyball/systems/equilibrium.hpp>
 
@@ -41,7 +41,7 @@ struct ModelRegulator {
 /// Linearises, discretises, and designs LQR with Bryson's rule and, where the outputs are not the
 /// states, a Kalman filter.
 /// @errors ArgumentError for a point that is no equilibrium, for a model without input;
-///         RiccatiError where there is no controller.
-[[nodiscard]] Expected<ModelRegulator> regulate(const ModelJob& job);
+///         RiccatiError where there is no controller. With what was noticed before.
+[[nodiscard]] ExpectedAll<ModelRegulator> regulate(const ModelJob& job);
 
 }  // namespace flyball::study

@@ -28,6 +28,6 @@ struct IdentifyResult {
 /// Runs the job. An error means that the log could not be read as a recording at all; a fit that
 /// was refused is in `report.fit`.
 /// @errors as `recording::load_recording`.
-[[nodiscard]] Expected<IdentifyResult> identify(const IdentifyJob& job);
+[[nodiscard]] ExpectedAll<IdentifyResult> identify(const IdentifyJob& job);
 
 }  // namespace flyball::study

@@ -113,10 +113,11 @@ struct KeyComment {
 /// @errors as `read_project`, and Project::plant_error.
 [[nodiscard]] ExpectedAll<DesignJob> design_job(const std::string& project,
                                                 std::span<const Override> overrides = {});
-/// @errors as `read_project`, without a file.
-[[nodiscard]] ExpectedAll<IdentifyJob> identify_job(const std::string& log,
-                                                    std::span<const Override> overrides = {});
 /// @param project  May be empty: no file. @errors as `read_project`.
+[[nodiscard]] ExpectedAll<IdentifyJob> identify_job(const std::string& log,
+                                                    const std::string& project,
+                                                    std::span<const Override> overrides = {});
+/// The same.
 [[nodiscard]] ExpectedAll<TuneJob> tune_job(const std::string& log, const std::string& project,
                                             std::span<const Override> overrides = {});
 

@@ -50,8 +50,8 @@ struct Simulation {
 
 /// A model with its regulator, sampled each period.
 /// @errors As `check_model`, naming state and time; ArgumentError.
-[[nodiscard]] Expected<Simulation> simulate_closed_loop(const ModelJob& job,
-                                                        const ModelRegulator& regulator);
+[[nodiscard]] ExpectedAll<Simulation> simulate_closed_loop(const ModelJob& job,
+                                                           const ModelRegulator& regulator);
 
 /// What a project's [simulation] asks for: of a model an open loop or, with closed_loop, that of
 /// its regulator; of a mechanism the designed loop on its motion or, with an input, an open loop at
@@ -71,10 +71,10 @@ struct ModelDesign {
 };
 
 /// @errors As `regulate` and `simulate_closed_loop`.
-[[nodiscard]] Expected<ModelDesign> design_model(const ModelJob& job);
+[[nodiscard]] ExpectedAll<ModelDesign> design_model(const ModelJob& job);
 
 /// The point, the linear model, gains, poles, margins, and the loop on the model itself. Schema
-/// "flyball.design_model/1".
+/// "flyball.design_model/2".
 [[nodiscard]] Answer answer_of(const ModelDesign& result);
 
 }  // namespace flyball::study

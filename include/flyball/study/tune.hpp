@@ -14,11 +14,11 @@ struct TuneJob {
 /// Both results. When the fit was refused there is no design; its error is in the identification.
 struct TuneResult {
   IdentifyResult identification;
-  std::optional<Expected<DesignResult>> design{};
+  std::optional<ExpectedAll<DesignResult>> design{};
 };
 
 /// @errors as `identify`.
-[[nodiscard]] Expected<TuneResult> tune(const TuneJob& job);
+[[nodiscard]] ExpectedAll<TuneResult> tune(const TuneJob& job);
 
 /// The plant that a fit hands on: its gains; kA only if it is determined (else its upper bound).
 [[nodiscard]] PlantDescription plant_from_fit(const identification::FeedforwardFit& fit);

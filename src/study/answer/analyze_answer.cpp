@@ -28,14 +28,14 @@ std::string to_json(const ModelAnalysis& analysis) {
   const ModelFile& model = analysis.model;
   JsonWriter answer;
   answer.open('{');
-  answer.add("schema", "flyball.analyze/1");
+  answer.add("schema", "flyball.analyze/2");
   answer.add("domain", model.domain == TimeDomain::continuous ? "continuous" : "discrete");
   if (model.period) {
     answer.add("T", model.period->si());
   }
-  answer.add("states", labels(model.states));
-  answer.add("inputs", labels(model.inputs));
-  answer.add("outputs", labels(model.outputs));
+  answer.add("states", model.states);
+  answer.add("inputs", model.inputs);
+  answer.add("outputs", model.outputs);
   answer.add("A", model.system.A);
   answer.add("B", model.system.B);
   answer.add("C", model.system.C);
@@ -63,7 +63,7 @@ std::string to_json(const ModelAnalysis& analysis) {
 }
 
 Answer answer_of(const ModelAnalysis& result) {
-  return {.schema = "flyball.analyze/1",
+  return {.schema = "flyball.analyze/2",
           .json = to_json(result),
           .document = document_of(result),
           .figures = figures_of(result),

@@ -92,7 +92,7 @@ void write_design(JsonWriter& json, const DesignResult& result) {
   json.add("unit", plant.unit);
   json.add("period", result.job.controller.period);
   json.add("delay", result.job.controller.delay.value_or(0.0));
-  json.add("states", labels(result.states));
+  json.add("states", result.states);
   json.add("input", result.velocity_servo ? "velocity" : "voltage");
   json.add("K", result.K);
   json.add("K_delay_compensated", result.K_delayed);
@@ -120,7 +120,7 @@ void write_design(JsonWriter& json, const DesignResult& result) {
 std::string to_json(const DesignResult& result) {
   JsonWriter json;
   json.object([&] {
-    json.add("schema", "flyball.design/1");
+    json.add("schema", "flyball.design/2");
     write_design(json, result);
   });
   return std::move(json).text();
@@ -172,7 +172,7 @@ void add_design_files(Answer& answer, const DesignResult& result,
 }
 
 Answer answer_of(const DesignResult& result) {
-  Answer answer{.schema = "flyball.design/1", .json = to_json(result)};
+  Answer answer{.schema = "flyball.design/2", .json = to_json(result)};
   Document& document = answer.document;
   document.title = text::capitalized(to_string(result.job.plant.kind)) + " controller";
   document.verdict = verdict_of(result);

@@ -180,14 +180,14 @@ void write_point(JsonWriter& json, const OperatingPoint& point) {
 Answer answer_of(const ModelDesign& result) {
   const ModelDescription& names = result.job.model.names();
   const ModelRegulator& regulator = result.regulator;
-  Answer answer{.schema = "flyball.design_model/1"};
+  Answer answer{.schema = "flyball.design_model/2"};
   JsonWriter json;
   json.object([&] {
     json.add("schema", answer.schema);
     json.add("model", names.name);
-    json.add("states", labels(names.states));
-    json.add("inputs", labels(names.inputs));
-    json.add("outputs", labels(names.outputs));
+    json.add("states", names.states);
+    json.add("inputs", names.inputs);
+    json.add("outputs", names.outputs);
     json.add("period", result.job.period);
     json.add("delay", result.job.delay);
     write_point(json, regulator.point);

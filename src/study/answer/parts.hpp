@@ -59,7 +59,7 @@ void add_design_files(Answer& answer, const DesignResult& result,
 
 /// The object of "flyball.identify/1".
 void write_identification(JsonWriter& json, const IdentifyResult& result);
-/// The members of "flyball.design/1", without the schema.
+/// The members of "flyball.design/2", without the schema.
 void write_design(JsonWriter& json, const DesignResult& result);
 
 /// Its kind, motors, gearing, drum and gains.

@@ -19,6 +19,16 @@ std::optional<Error> refusal_of(const TuneResult& result) {
   return result.design && !*result.design ? std::optional(result.design->error()) : std::nullopt;
 }
 
+/// Of the log and of the design, made or refused.
+std::vector<Diagnostic> diagnostics_of(const TuneResult& result) {
+  std::vector<Diagnostic> all = result.identification.diagnostics();
+  if (result.design) {
+    append(all,
+           *result.design ? (*result.design)->diagnostics : result.design->error().diagnostics());
+  }
+  return all;
+}
+
 Verdict verdict_of(const TuneResult& result) {
   Verdict verdict = verdict_of(result.identification);
   if (const DesignResult* design = design_in(result)) {
@@ -39,7 +49,7 @@ std::string to_json(const TuneResult& result) {
   const DesignResult* design = design_in(result);
   JsonWriter json;
   json.object([&] {
-    json.add("schema", "flyball.tune/1");
+    json.add("schema", "flyball.tune/2");
     if (const auto refusal = refusal_of(result)) {
       json.add("error", *refusal);
     }
@@ -48,7 +58,7 @@ std::string to_json(const TuneResult& result) {
     if (design != nullptr) {
       json.object("design", [&] { write_design(json, *design); });
     } else {
-      json.add("diagnostics", result.identification.diagnostics());
+      json.add("diagnostics", diagnostics_of(result));
     }
   });
   return std::move(json).text();
@@ -56,15 +66,13 @@ std::string to_json(const TuneResult& result) {
 
 Answer answer_of(const TuneResult& result) {
   Answer answer = answer_of(result.identification);
-  answer.schema = "flyball.tune/1";
+  answer.schema = "flyball.tune/2";
   answer.json = to_json(result);
   answer.refusal = refusal_of(result);
   Document& document = answer.document;
   document.verdict = verdict_of(result);
+  document.sections.pop_back();  // of the log's diagnostics alone
   if (const DesignResult* design = design_in(result)) {
-    std::vector<Diagnostic> diagnostics = result.identification.diagnostics();
-    append(diagnostics, design->diagnostics);
-    document.sections.pop_back();
     append(document.sections, design_sections(*design));
     document.origins.add("seed", fmt::to_string(design->job.seed));
     append(answer.figures, figures_of(*design));
@@ -72,14 +80,13 @@ Answer answer_of(const TuneResult& result) {
     answer.files.clear();
     add_design_files(answer, *design, fit ? &*fit : nullptr);
     append(answer.files, data_files(result.identification));
-    document.sections.push_back(diagnostics_section(std::move(diagnostics)));
   } else if (result.design) {
-    document.sections.insert(
-        document.sections.end() - 1,
+    document.sections.push_back(
         {"controller",
          "Controller",
          {Paragraph{"No controller: " + to_string(result.design->error()) + ".", Tone::bad}}});
   }
+  document.sections.push_back(diagnostics_section(diagnostics_of(result)));
   return answer;
 }
 

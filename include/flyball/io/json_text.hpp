@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <flyball/core/diagnostic.hpp>
+
+namespace flyball {
+
+/// Line and column of a byte of a text. @param offset  In bytes; past the end is the end.
+[[nodiscard]] Place place_of(std::string_view text, std::size_t offset);
+
+/// A key that an object has again.
+struct RepeatedKey {
+  std::string key;
+  std::size_t at = 0;  ///< The byte that the second begins at.
+};
+
+/// The first of them in a JSON text, also in one that is cut off; of two values that one key has a
+/// reader would take either. Objects more than 64 brackets deep are not looked at.
+/// Cost: O(size) and a copy of the keys.
+[[nodiscard]] std::optional<RepeatedKey> repeated_key(std::string_view json);
+
+}  // namespace flyball

@@ -1,0 +1,87 @@
+#include <flyball/io/json_text.hpp>
+
+#include <algorithm>
+#include <unordered_set>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+namespace flyball {
+
+namespace {
+
+/// A bracket that is open.
+struct Open {
+  bool object = false;
+  std::unordered_set<std::string> keys{};
+};
+
+/// Where a string ends, behind its quotes. @param at  Where it begins.
+std::size_t end_of_string(std::string_view json, std::size_t at) {
+  for (++at; at < json.size() && json[at] != '"'; ++at) {
+    at += json[at] == '\\' ? 1 : 0;
+  }
+  return std::min(at + 1, json.size());
+}
+
+/// What a string says: "\\u0041" is "A".
+std::string said_by(std::string_view quoted) {
+  if (quoted.find('\\') != std::string_view::npos) {
+    const nlohmann::json value = nlohmann::json::parse(quoted, nullptr, false);
+    if (value.is_string()) {
+      return value.get<std::string>();
+    }
+  }
+  return std::string(quoted.substr(1, quoted.size() - std::min<std::size_t>(quoted.size(), 2)));
+}
+
+}  // namespace
+
+Place place_of(std::string_view text, std::size_t offset) {
+  const std::string_view before = text.substr(0, std::min(offset, text.size()));
+  const auto lines = std::count(before.begin(), before.end(), '\n');
+  const std::string_view line = before.substr(before.rfind('\n') + 1);  // npos + 1 is 0
+  const auto characters = std::count_if(line.begin(), line.end(), [](char c) {
+    return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
+  });
+  return {static_cast<std::size_t>(lines) + 1, static_cast<std::size_t>(characters) + 1};
+}
+
+std::optional<RepeatedKey> repeated_key(std::string_view json) {
+  constexpr std::size_t deepest = 64;
+  std::vector<Open> open;
+  std::size_t too_deep = 0;
+  bool key_follows = false;
+  for (std::size_t at = 0; at < json.size(); ++at) {
+    const char c = json[at];
+    if (c == '"') {
+      const std::size_t end = end_of_string(json, at);
+      if (key_follows) {
+        std::string key = said_by(json.substr(at, end - at));
+        if (!open.back().keys.insert(key).second) {
+          return RepeatedKey{std::move(key), at};
+        }
+      }
+      key_follows = false;
+      at = end - 1;
+    } else if (c == '{' || c == '[') {
+      too_deep += open.size() == deepest ? 1 : 0;
+      if (too_deep == 0) {
+        open.push_back({c == '{', {}});
+      }
+      key_follows = too_deep == 0 && c == '{';
+    } else if (c == '}' || c == ']') {
+      if (too_deep > 0) {
+        --too_deep;
+      } else if (!open.empty()) {
+        open.pop_back();
+      }
+      key_follows = false;
+    } else if (c == ',') {
+      key_follows = too_deep == 0 && !open.empty() && open.back().object;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace flyball

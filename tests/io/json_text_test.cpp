@@ -1,0 +1,42 @@
+#include <flyball/io/json_text.hpp>
+
+#include <gtest/gtest.h>
+
+namespace flyball {
+namespace {
+
+TEST(PlaceOf, CountsLinesAndCharacters) {
+  const auto expect = [](std::string_view text, std::size_t offset, std::size_t line,
+                         std::size_t column) {
+    const Place place = place_of(text, offset);
+    EXPECT_EQ(place.line, line) << text << offset;
+    EXPECT_EQ(place.column, column) << text << offset;
+  };
+  expect("", 0, 1, 1);
+  expect("ab\ncd", 4, 2, 2);
+  expect("ab\ncd", 99, 2, 3);
+  expect("ωω=", 4, 1, 3);
+}
+
+TEST(RepeatedKey, IsFoundInEachObjectAlone) {
+  const auto at = [](std::string_view json) {
+    const auto found = repeated_key(json);
+    return found ? static_cast<int>(found->at) : -1;
+  };
+  EXPECT_EQ(at(R"({"A":1,"B":1})"), -1);
+  EXPECT_EQ(at(R"({"A":1,"A":1})"), 7);
+  EXPECT_EQ(at(R"({"A":{"A":1},"B":{"A":1}})"), -1);
+  EXPECT_EQ(at(R"({"A":{"B":1,"B":2}})"), 12);
+  EXPECT_EQ(at(R"([{"A":1},{"A":1}])"), -1);
+  EXPECT_EQ(at(R"({"A":["A","A"],"C":"A"})"), -1);  // values
+  EXPECT_EQ(at(R"({"A":",\"A\":","B":1})"), -1);    // in a text
+  EXPECT_EQ(at(R"({"A":1,"\u0041":1})"), 7);        // the same letter
+  EXPECT_EQ(at(R"({"A":1,"A)"), 7);                 // cut off
+  EXPECT_EQ(at(R"(}]"A":1,"A":1)"), -1);
+  const std::string deep(1'000'000, '[');
+  EXPECT_EQ(at(deep + R"({"A":1,"A":1})"), -1);
+  EXPECT_EQ(repeated_key(R"({"x":1,"x":2})")->key, "x");
+}
+
+}  // namespace
+}  // namespace flyball
