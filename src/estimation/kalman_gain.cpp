@@ -10,7 +10,7 @@
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
-#include "math/equations/sylvester_operator.hpp"
+#include "math/equations/lyapunov_correction.hpp"
 #include "math/extended/double_double.hpp"
 
 namespace flyball {

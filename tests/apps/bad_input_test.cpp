@@ -298,7 +298,7 @@ TEST_F(BadInput, TextsOfAnyLength) {
     write("long.toml", line);
     expect_short("design long.toml --json");
   }
-  for (const std::string& option : {"--delay ", "--", "--tolerance ", "--motor "}) {
+  for (const char* const option : {"--delay ", "--", "--tolerance ", "--motor "}) {
     expect_short("design " + example("elevator.toml") + " --json " + option + text);
   }
   for (const std::string& problem : {"{\"" + text + "\": 1}", "{\"A\": \"" + text + "\"}",

@@ -149,7 +149,8 @@ TEST(Html, ARefusedLogIsShownWithItsReasonOnTop) {
 
 TEST(Html, ADesignThatIsRefusedKeepsTheIdentification) {
   study::TuneResult result = tune_result(MechanismKind::elevator);
-  result.design = tl::unexpected(Error(study::DesignError::gravity_too_strong).in("design"));
+  result.design =
+      tl::unexpected(Errors(Error(study::DesignError::gravity_too_strong).in("design")));
   const std::string page = page_of(result);
   expect_well_formed(page);
   EXPECT_TRUE(has(page, "No controller"));

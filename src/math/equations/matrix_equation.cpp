@@ -8,6 +8,7 @@
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
+#include "math/equations/lyapunov_correction.hpp"
 #include "math/equations/lyapunov_kernel.hpp"
 #include "math/equations/sylvester_kernel.hpp"
 #include "math/equations/sylvester_operator.hpp"

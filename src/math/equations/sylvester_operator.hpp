@@ -7,7 +7,6 @@
 
 #include <flyball/core/argument.hpp>
 #include <flyball/core/expected.hpp>
-#include <flyball/math/equations/matrix_equation.hpp>
 
 namespace flyball::detail {
 
@@ -102,10 +101,5 @@ struct KroneckerSolution {
 /// Nothing for more than a hundred unknowns.
 [[nodiscard]] std::optional<KroneckerSolution> solve_kronecker(const SylvesterOperator& equation,
                                                                const Eigen::MatrixXd& F);
-
-/// `discrete_lyapunov` for a correction of another solution, of which the first digits do: whether
-/// it satisfies the equation beside sums that cancel is not asked.
-[[nodiscard]] Expected<LinearMatrixSolution> discrete_lyapunov_correction(const MatrixRef& A,
-                                                                          const MatrixRef& Q);
 
 }  // namespace flyball::detail
