@@ -20,7 +20,7 @@ Eigen::MatrixXd in_its_last_digits(const Eigen::MatrixXd& M, int draw) {
 double relative_difference(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   const double largest = a.size() == 0 ? 0.0 : a.cwiseAbs().maxCoeff();
   const double change = a.size() == 0 ? 0.0 : (a - b).cwiseAbs().maxCoeff();
-  return change == 0.0 ? 0.0 : change / largest;
+  return largest > 0.0 ? change / largest : change;
 }
 
 Expected<double> check_determined(double error) {

@@ -15,7 +15,7 @@ namespace flyball::solve {
 /// what rounding of the data alone does.
 [[nodiscard]] Eigen::MatrixXd in_its_last_digits(const Eigen::MatrixXd& M, int draw);
 
-/// The largest entry of a - b beside that of a.
+/// The largest entry of a - b beside that of a, where a is not zero.
 [[nodiscard]] double relative_difference(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
 /// The error, where it is small enough for an answer.

@@ -102,8 +102,13 @@ Expected<ModelAnalysis> analysis_of(const ModelFile& model) {
       warn(analysis.model.notes, "not_sampled", "as sampled: {}", to_string(sampled.error()));
     }
   }
-  FLYBALL_TRY(auto steps, step_responses(model, analysis.modes));
-  analysis.steps = std::move(steps);
+  if (auto steps = step_responses(model, analysis.modes)) {
+    analysis.steps = *std::move(steps);
+  } else {
+    // What the system is like does not hang on whether its responses have doubles.
+    warn(analysis.model.notes, "no_responses", "without step responses: {}",
+         to_string(steps.error()));
+  }
   add_gains(analysis);
   return analysis;
 }

@@ -98,7 +98,7 @@ JudgedEigenvalues judged_eigenvalues(const MatrixRef& A, TimeDomain domain, doub
   // Sums must not overflow, nor what is small but counts vanish, before the states have their
   // units; then products must not.
   const MatrixXd given = A;
-  const int before = shift_into(given, -900, 980);
+  const int before = shift_into(given, -900, 1022 - std::ilogb(static_cast<double>(n)));
   MatrixXd balanced = shifted(given, before);
   const Eigen::VectorXd d = balance_of(balanced);
   balanced = d.cwiseInverse().asDiagonal() * balanced * d.asDiagonal();

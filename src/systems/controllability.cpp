@@ -213,9 +213,14 @@ Expected<Verdict> analyze(const MatrixRef& A_given, const MatrixRef& B_given, Ti
     return tl::unexpected(no_eigenvalues(where));
   }
   const auto share_of = [&](Complex lambda) {
-    Index nearest = 0;
-    (all.array() - lambda).abs().minCoeff(&nearest);
-    return shares[static_cast<std::size_t>(nearest)];
+    std::size_t nearest = 0;
+    for (std::size_t k = 0; k < shares.size(); ++k) {
+      if (std::abs(all(static_cast<Index>(k)) - lambda) <
+          std::abs(all(static_cast<Index>(nearest)) - lambda)) {
+        nearest = k;
+      }
+    }
+    return shares[nearest];
   };
   const auto add_hidden = [&](const detail::JudgedEigenvalues& hidden, double distance) {
     for (Index k = 0; k < hidden.values.size(); ++k) {
@@ -229,6 +234,9 @@ Expected<Verdict> analyze(const MatrixRef& A_given, const MatrixRef& B_given, Ti
   // Where no path leads nothing was turned or rounded.
   const detail::JudgedEigenvalues apart =
       detail::judged_eigenvalues(pair.A(pair.off_paths, pair.off_paths), domain, 0.0, exponent);
+  if (!apart.converged) {
+    return tl::unexpected(no_eigenvalues(where));
+  }
   add_hidden(apart, 0.0);
 
   const double size = std::max(std::hypot(A.norm(), B.norm()), 1e-300);
@@ -251,7 +259,7 @@ Expected<Verdict> analyze(const MatrixRef& A_given, const MatrixRef& B_given, Ti
   const MatrixXd A_r = stairs.A.topLeftCorner(r, r);
   const MatrixXd B_r = stairs.B.topRows(r);
   const detail::JudgedEigenvalues seen = detail::judged_eigenvalues(A_r, domain, blur, exponent);
-  if (!apart.converged || !hidden.converged || !seen.converged) {
+  if (!hidden.converged || !seen.converged) {
     return tl::unexpected(no_eigenvalues(where));
   }
   add_hidden(hidden, stairs.largest_rest);

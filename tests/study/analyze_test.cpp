@@ -1,4 +1,5 @@
 #include <flyball/study/analyze.hpp>
+#include <flyball/study/answer.hpp>
 
 #include <cmath>
 
@@ -85,6 +86,18 @@ TEST(Analyze, WhatCannotBeSampledIsNoted) {
       analyze(parse_model(R"({"A":[[1000]],"B":[[1]],"T":1})", "m").value()).value();
   EXPECT_FALSE(analysis.sampled);
   EXPECT_EQ(analysis.model.notes.at(0).code, "not_sampled");
+}
+
+// Entries whose responses have no doubles: what the system is like is told without them.
+TEST(Analyze, ResponsesBeyondDoublesAreNoted) {
+  for (const char* text :
+       {R"({"A":[[0,1e160],[0,0]],"B":[[0],[1]]})", R"({"A":[[0,0],[1.7e308,0]],"B":[[1],[1]]})"}) {
+    const auto analysis = analyze(parse_model(text, "m").value());
+    ASSERT_TRUE(analysis.has_value()) << text;
+    EXPECT_TRUE(analysis->controllability.controllable) << text;
+    const Answer answer = answer_of(*analysis);
+    EXPECT_FALSE(answer.json.empty());
+  }
 }
 
 TEST(Analyze, NamesOutputsByTheirStates) {

@@ -59,8 +59,9 @@ std::optional<MatrixXd> cholesky_of(const MatrixRef& S) {
 }
 
 Eigen::VectorXd balance_of(const MatrixRef& A) {
-  if (const int unit = unit_of(A); unit != 0) {
-    return balance_of(times_power(A, -unit));
+  // The sums of rows and columns must be finite; more would take the smallest entries away.
+  if (A.size() > 0 && A.cwiseAbs().maxCoeff() > 0x1p1000 && A.allFinite()) {
+    return balance_of(times_power(A, -24));
   }
   const Index n = A.rows();
   Eigen::VectorXd d = Eigen::VectorXd::Ones(n);

@@ -11,21 +11,34 @@ namespace flyball::detail {
 
 using Eigen::MatrixXd;
 
-Eigensystem eigensystem_of(const MatrixRef& A) {
-  if (const int unit = unit_of(A); unit != 0) {
-    Eigensystem system = eigensystem_of(times_power(A, -unit));
-    system.values = times_power(system.values, unit);
-    return system;
+namespace {
+
+/// D⁻¹AD with the powers of two d that balance it, in the unit that makes its entries ordinary.
+struct Balanced {
+  explicit Balanced(const MatrixRef& A)
+      : d(balance_of(A)), M(d.cwiseInverse().asDiagonal() * A * d.asDiagonal()), unit(unit_of(M)) {
+    if (unit != 0) {
+      M = times_power(M, -unit);
+    }
   }
-  const Eigen::VectorXd d = balance_of(A);
+
+  Eigen::VectorXd d;
+  MatrixXd M;
+  int unit;
+};
+
+}  // namespace
+
+Eigensystem eigensystem_of(const MatrixRef& A) {
+  const Balanced balanced(A);
   Eigen::EigenSolver<MatrixXd> solver(A.rows());
-  if (!A.allFinite() ||
-      solver.compute(d.cwiseInverse().asDiagonal() * A * d.asDiagonal()).info() != Eigen::Success) {
+  if (!balanced.M.allFinite() || solver.compute(balanced.M).info() != Eigen::Success) {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     return {Eigen::VectorXcd::Constant(A.rows(), nan),
             Eigen::MatrixXcd::Constant(A.rows(), A.cols(), nan)};
   }
-  Eigensystem system{solver.eigenvalues(), d.asDiagonal() * solver.eigenvectors()};
+  Eigensystem system{times_power(solver.eigenvalues(), balanced.unit),
+                     balanced.d.asDiagonal() * solver.eigenvectors()};
   system.vectors.colwise().normalize();
   return system;
 }
@@ -34,17 +47,12 @@ Eigen::VectorXcd eigenvalues_of(const MatrixRef& A) {
   if (A.rows() == 0) {
     return {};
   }
-  if (const int unit = unit_of(A); unit != 0) {
-    return times_power(eigenvalues_of(times_power(A, -unit)), unit);
-  }
-  const Eigen::VectorXd d = balance_of(A);
+  const Balanced balanced(A);
   Eigen::EigenSolver<MatrixXd> solver(A.rows());
-  if (!A.allFinite() ||
-      solver.compute(d.cwiseInverse().asDiagonal() * A * d.asDiagonal(), false).info() !=
-          Eigen::Success) {
+  if (!balanced.M.allFinite() || solver.compute(balanced.M, false).info() != Eigen::Success) {
     return Eigen::VectorXcd::Constant(A.rows(), std::numeric_limits<double>::quiet_NaN());
   }
-  return solver.eigenvalues();
+  return times_power(solver.eigenvalues(), balanced.unit);
 }
 
 SymmetricEigensystem symmetric_eigensystem_of(const MatrixRef& S) {

@@ -214,7 +214,7 @@ std::optional<Eigen::VectorXcd> extended_eigenvalues_of(const DoubleDoubleMatrix
   Square<Real> real(n);
   for (Index i = 0; i < n; ++i) {
     for (Index j = 0; j < n; ++j) {
-      real(i, j) = {M.hi(i, j), M.lo(i, j)};
+      real(i, j) = Real{M.hi(i, j)} + Real{M.lo(i, j)};
     }
   }
   reduce(real, n);

@@ -74,11 +74,16 @@ std::vector<Figure> figures_of(const ModelAnalysis& result) {
   if (result.sampled) {
     figures.push_back(pole_figure("sampling", result.sampled->modes, false));
   }
-  figures.push_back(step_figure(result));
+  if (!result.steps.empty()) {
+    figures.push_back(step_figure(result));
+  }
   return figures;
 }
 
 std::vector<AnswerFile> data_files(const ModelAnalysis& result) {
+  if (result.steps.empty()) {
+    return {};
+  }
   TimeSeries series(list(result.steps.front().time));
   for (std::size_t input = 0; input < result.steps.size(); ++input) {
     for (std::size_t output = 0; output < result.model.outputs.size(); ++output) {
