@@ -176,11 +176,13 @@ PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B) {
   double size = pair.size();
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     pair.scale_inputs(size);
+    const Eigen::VectorXd before = pair.e;
     bool changed = false;
     for (Index k = 0; k < n; ++k) {
       changed = pair.balance(k, size) || changed;
     }
-    if (!changed) {
+    // One step of all states together only changes the inputs' units.
+    if (!changed || ((pair.e - before).array() == pair.e(0) - before(0)).all()) {
       break;
     }
     size = pair.size();
