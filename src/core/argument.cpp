@@ -1,5 +1,6 @@
 #include <flyball/core/argument.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/format.hpp"
@@ -71,10 +72,13 @@ Expected<void> check_finite(double value, std::string_view where, std::string_vi
 
 Expected<void> check_symmetric(const MatrixRef& M, std::string_view where, std::string_view name) {
   FLYBALL_CHECK(check_square(M, where, name));
-  const double limit = 1e-10 * M.cwiseAbs().maxCoeff();
+  constexpr double rounding = 1e-10;
   for (Eigen::Index j = 0; j < M.cols(); ++j) {
     for (Eigen::Index i = 0; i < j; ++i) {
-      if (!(std::abs(M(i, j) - M(j, i)) <= limit)) {
+      // Beside what the two have to do with: an entry of another unit says nothing about them.
+      const double size = std::max({std::abs(M(i, j)), std::abs(M(j, i)),
+                                    std::sqrt(std::abs(M(i, i))) * std::sqrt(std::abs(M(j, j)))});
+      if (!(std::abs(M(i, j) - M(j, i)) <= rounding * size)) {
         return refusal(ArgumentError::not_symmetric, where, name)
             .got(detail::format(
                 "not symmetric: entries ({0}, {1}) and ({1}, {0}) are {2:.17g} and {3:.17g}", i, j,

@@ -178,7 +178,13 @@ Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const
   gain.L = product(DoubleDoubleMatrix(A), filter->update.K).rounded();
   gain.P_prior = detail::symmetrized(filter->P.rounded());
   gain.P_posterior = detail::symmetrized(filter->update.P.rounded());
-  gain.poles = solution.poles;
+  // Of this K: where the outputs say the same thing without noise, K is not the only one.
+  gain.poles = detail::eigenvalues_of(
+      add_product(DoubleDoubleMatrix(A), -1.0, DoubleDoubleMatrix(gain.L), DoubleDoubleMatrix(C))
+          .rounded());
+  if (!(gain.poles.cwiseAbs().maxCoeff() < 1.0)) {
+    gain.poles = solution.poles;
+  }
   gain.residual = solution.residual;
   gain.condition = solution.condition;
   return gain;

@@ -57,8 +57,20 @@ Expected<Continuous> transform(const Continuous& system, const MatrixRef& T) {
         .expected("invertible")
         .with("reciprocal condition", rcond);
   }
-  return Continuous{solved.leftCols(n), solved.rightCols(system.B.cols()), product(system.C, T),
-                    system.D};
+  // T A' = A T and T B' = B by their largest entries, in the units that were given.
+  const auto holds = [&](const MatrixXd& made, const MatrixXd& wanted) {
+    const MatrixXd back = product(T, made);
+    const double terms = product(T.cwiseAbs(), made.cwiseAbs()).cwiseAbs().maxCoeff();
+    return back.allFinite() && (back - wanted).cwiseAbs().maxCoeff() <= 1e-10 * terms;
+  };
+  const MatrixXd A = solved.leftCols(n);
+  const MatrixXd B = solved.rightCols(system.B.cols());
+  if (!holds(A, product(system.A, T)) || (B.size() > 0 && !holds(B, system.B))) {
+    return refusal(SystemError::singular_transform, where, "T")
+        .got("of entries too far apart for sixteen digits")
+        .with("reciprocal condition", rcond);
+  }
+  return Continuous{A, B, product(system.C, T), system.D};
 }
 
 /// For a single input. @param failure  What to say if the form does not exist.

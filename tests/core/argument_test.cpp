@@ -71,11 +71,15 @@ TEST(CheckSymmetric, ToleratesWhatTenPrintedDigitsLose) {
   Eigen::MatrixXd M(2, 2);
   M << 1e6, 2.0, 2.0, 3.0;
   EXPECT_TRUE(check_symmetric(M, "lqr", "Q").has_value());
-  // The limit is relative to the largest entry: 1e-10·1e6 = 1e-4.
-  M(0, 1) = 2.00009;
+  // The limit is relative to √(M_ii M_jj), whatever their units: 1e-10 √3e6 = 1.732e-7.
+  M(0, 1) = 2.0 + 1.7e-7;
   EXPECT_TRUE(check_symmetric(M, "lqr", "Q").has_value());
-  M(0, 1) = 2.00011;
+  M(0, 1) = 2.0 + 1.8e-7;
   EXPECT_FALSE(check_symmetric(M, "lqr", "Q").has_value());
+  // An entry of another unit does not hide it.
+  Eigen::MatrixXd wide(3, 3);
+  wide << 1e20, 0.0, 0.0, 0.0, 2.0, -1.77, 0.0, 0.0, 0.5;
+  EXPECT_FALSE(check_symmetric(wide, "dare", "R").has_value());
   M(0, 1) = 2.5;
   expect_error(check_symmetric(M, "lqr", "Q"), ArgumentError::not_symmetric,
                "lqr: Q is not symmetric: entries (0, 1) and (1, 0) are 2.5 and 2; it must be "

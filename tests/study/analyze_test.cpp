@@ -1,9 +1,10 @@
 #include <flyball/study/analyze.hpp>
-#include <flyball/study/answer.hpp>
 
 #include <cmath>
 
 #include <gtest/gtest.h>
+
+#include <flyball/study/answer.hpp>
 
 namespace flyball::study {
 namespace {

@@ -33,7 +33,7 @@ using MatrixRef = Eigen::Ref<const Eigen::MatrixXd>;
 [[nodiscard]] Expected<void> check_finite(double value, std::string_view where,
                                           std::string_view name);
 
-/// |M - Mᵀ| within 1e-10 of the largest entry of M, which is what survives a print with ten digits.
+/// |M_ij - M_ji| within 1e-10 of both and of √|M_ii M_jj|, as ten printed digits keep it.
 /// @errors ArgumentError::not_symmetric with the offending pair as evidence.
 [[nodiscard]] Expected<void> check_symmetric(const MatrixRef& M, std::string_view where,
                                              std::string_view name);

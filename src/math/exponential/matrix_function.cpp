@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <flyball/math/exponential/matrix_exponential.hpp>
+
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -84,6 +86,18 @@ bool is_lower_triangular(const MatrixRef& A) {
   return A.cols() > 1;
 }
 
+/// Whether two matrices that should be one differ by rounding, beside their largest entry.
+bool agree(const MatrixXd& made, const MatrixRef& wanted) {
+  constexpr double share = 1e-9;
+  return made.allFinite() &&
+         (made - wanted).cwiseAbs().maxCoeff() <= share * wanted.cwiseAbs().maxCoeff();
+}
+
+Refusal not_accurate(std::string_view where) {
+  return refusal(MatrixFunctionError::not_accurate, where, "A")
+      .got("of entries too far apart for sixteen digits");
+}
+
 /// A^f, 0 < f < 1.
 Expected<MatrixXd> fractional_power(const MatrixRef& given, double f, std::string_view where) {
   const bool lower = is_lower_triangular(given);
@@ -134,11 +148,14 @@ Expected<MatrixXd> fractional_power(const MatrixRef& given, double f, std::strin
   const auto size = [&](const MatrixXd& M) {
     return detail::norm1(form.d.cwiseInverse().asDiagonal() * M * form.d.asDiagonal());
   };
-  if (!result.allFinite() ||
-      !(size(detail::product(result, power(1.0 - f)) - A) <= 1e-7 * size(A))) {
+  const MatrixXd back = detail::product(result, power(1.0 - f));
+  if (!result.allFinite() || !(size(back - A) <= 1e-7 * size(A))) {
     return tl::unexpected(no_answer(MatrixFunctionError::no_real_power, where,
                                     "not real: an eigenvalue near zero is defective", smallest)
                               .hint("round the power to a whole number"));
+  }
+  if (!agree(back, A)) {
+    return not_accurate(where);
   }
   return lower ? MatrixXd(result.transpose()) : result;
 }
@@ -159,7 +176,23 @@ Expected<MatrixXd> inverse_of(const MatrixRef& A, std::string_view where) {
   if (!(rcond > 0.0) || !inverse.allFinite()) {
     return refusal(MatrixFunctionError::singular, where, "A").with("reciprocal condition", rcond);
   }
-  return MatrixXd(d.asDiagonal() * inverse * d.cwiseInverse().asDiagonal());
+  const MatrixXd X = d.asDiagonal() * inverse * d.cwiseInverse().asDiagonal();
+  // Entry by entry, beside the terms.
+  const MatrixXd left = detail::product(A, X) - MatrixXd::Identity(A.rows(), A.cols());
+  const MatrixXd terms = detail::product(A.cwiseAbs(), X.cwiseAbs());
+  if (!X.allFinite() || !(left.array().abs() <= 1e-9 * terms.array().max(1.0)).all()) {
+    return not_accurate(where);
+  }
+  return X;
+}
+
+/// That e^L is A.
+Expected<void> confirm(const MatrixRef& A, const MatrixXd& L) {
+  const auto back = expm(L);
+  if (!back || !agree(*back, A)) {
+    return not_accurate("logm");
+  }
+  return {};
 }
 
 /// log(A / 2^unit), whose errors speak of A's eigenvalues.
@@ -200,6 +233,7 @@ ErrorInfo error_info(MatrixFunctionError code) {
        ErrorKind::no_answer},
       {"singular", "a negative power needs a matrix with an inverse", ErrorKind::no_answer},
       {"overflow", "the answer exceeds the largest double", ErrorKind::no_answer},
+      {"not_accurate", "no answer was found that could be confirmed", ErrorKind::no_answer},
   };
   return detail::info_of(code, "matrix_function", rows);
 }
@@ -211,11 +245,15 @@ Expected<MatrixXd> logm(const MatrixRef& A) {
     const double least =
         (A.array() == 0.0).select(A.cwiseAbs().maxCoeff(), A.cwiseAbs()).minCoeff();
     const int unit = (std::ilogb(A.cwiseAbs().maxCoeff()) + std::ilogb(least)) / 2;
-    FLYBALL_TRY(MatrixXd L, logarithm(detail::times_power(A, -unit), unit));
+    const MatrixXd scaled = detail::times_power(A, -unit);
+    FLYBALL_TRY(MatrixXd L, logarithm(scaled, unit));
+    FLYBALL_CHECK(confirm(scaled, L));
     L.diagonal().array() += unit * std::numbers::ln2;
     return L;
   }
-  return logarithm(A, 0);
+  FLYBALL_TRY(MatrixXd L, logarithm(A, 0));
+  FLYBALL_CHECK(confirm(A, L));
+  return L;
 }
 
 Expected<MatrixXd> powm(const MatrixRef& A, double power) {

@@ -62,15 +62,19 @@ bool is_ordinary(double size) {
 
 /// The same answer as check_symmetric without its message; S finite.
 bool symmetric(const double* S, int n) {
-  double largest = 0.0;
-  double difference = 0.0;
   for (int j = 0; j < n; ++j) {
-    for (int i = 0; i <= j; ++i) {
-      largest = std::max({largest, std::abs(S[i + j * n]), std::abs(S[j + i * n])});
-      difference = std::max(difference, std::abs(S[i + j * n] - S[j + i * n]));
+    for (int i = 0; i < j; ++i) {
+      const double above = S[i + j * n];
+      const double below = S[j + i * n];
+      if (above != below &&
+          !(std::abs(above - below) <= 1e-10 * std::max({std::abs(above), std::abs(below),
+                                                         std::sqrt(std::abs(S[i + i * n])) *
+                                                             std::sqrt(std::abs(S[j + j * n]))}))) {
+        return false;
+      }
     }
   }
-  return difference <= 1e-10 * largest;
+  return true;
 }
 
 }  // namespace

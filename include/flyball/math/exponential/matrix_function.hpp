@@ -13,6 +13,7 @@ enum class MatrixFunctionError {
   no_real_power,      ///< A real eigenvalue is negative, or a zero one is defective.
   singular,           ///< A negative power of a matrix without an inverse.
   overflow,           ///< An entry of the answer exceeds the largest double.
+  not_accurate,       ///< What was found does not lead back to A: entries too far apart.
 };
 [[nodiscard]] ErrorInfo error_info(MatrixFunctionError code);
 
@@ -25,7 +26,7 @@ enum class MatrixFunctionError {
 /// @param A  n x n, without eigenvalues on the closed negative real axis.
 /// @return   log A, n x n, real.
 /// @errors   ArgumentError::wrong_shape, empty, not_finite; MatrixFunctionError::no_real_logarithm
-///           with the offending eigenvalue.
+///           with the offending eigenvalue; not_accurate where e^X is not A to 1e-9.
 /// Cost: 25 n³ complex operations for the Schur form, n³/3 for each root and fraction. Allocates.
 ///
 /// Source: Al-Mohy and Higham, "Improved inverse scaling and squaring algorithms for the matrix
