@@ -3,46 +3,16 @@
 #include <limits>
 
 #include <flyball/control/margins.hpp>
-#include <flyball/systems/response.hpp>
+#include <flyball/control/running_loop.hpp>
 
-#include "control/sampled_loop.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
-#include "math/dense/dense.hpp"
 
 namespace flyball {
 
 namespace {
 
 constexpr std::string_view where = "robustness_grid";
-
-// Overshoot and steady error of the step response to the first reference, which enters the input
-// through F = K + B⁺(I - A), and the observer through the input.
-Expected<void> judge_step(const detail::SampledLoop& loop, const Eigen::MatrixXd& C,
-                          const DiscreteSystem<>& model, double feedforward,
-                          RobustnessCase& result) {
-  const Eigen::MatrixXd M = loop.closed(1.0);
-  Eigen::MatrixXd drive = Eigen::MatrixXd::Zero(M.rows(), 1);
-  drive.topRows(loop.delayed_states()) = loop.delayed_B() * feedforward;
-  drive.bottomRows(model.A.rows()) = model.B * feedforward;
-  Eigen::MatrixXd output = Eigen::MatrixXd::Zero(1, M.rows());
-  output.leftCols(loop.plant_states()) = C.row(0);
-
-  const Eigen::MatrixXd I_M = Eigen::MatrixXd::Identity(M.rows(), M.cols()) - M;
-  const double final_value = output.row(0).dot(detail::solve_linear(I_M, drive).col(0));
-
-  // Until what is left of the transient is below 1e-9, within reason.
-  constexpr double most_samples = 20000.0;
-  const double decay = std::log(std::clamp(result.spectral_radius, 1e-3, 1.0 - 1e-12));
-  const auto steps =
-      static_cast<Eigen::Index>(std::min(std::log(1e-9) / decay + 10.0, most_samples));
-  FLYBALL_TRY(const auto response,
-              step_response({M, drive, output, Eigen::MatrixXd::Zero(1, 1), model.period}, 0,
-                            ResponseTimes{model.period, steps + 1}));
-  result.overshoot = std::max(0.0, (response.y / final_value).maxCoeff() - 1.0);
-  result.steady_error = final_value - 1.0;
-  return {};
-}
 
 Expected<void> check_factors(const std::vector<double>& factors, std::string_view name) {
   if (factors.empty()) {
@@ -66,6 +36,7 @@ Expected<RobustnessGrid> robustness_grid(const MatrixRef& A, const MatrixRef& B,
   FLYBALL_CHECK(check_factors(options.gain, "gain"));
   FLYBALL_TRY(const auto B_pinv, pseudoinverse(model.B));
   const Eigen::Index n = model.A.rows();
+  // A step of the first reference enters the input through F = K + B⁺ (I - A).
   const Eigen::MatrixXd F = K + B_pinv.X * (Eigen::MatrixXd::Identity(n, n) - model.A);
 
   RobustnessGrid grid;
@@ -76,13 +47,15 @@ Expected<RobustnessGrid> robustness_grid(const MatrixRef& A, const MatrixRef& B,
       Eigen::MatrixXd true_B = B * gain;
       true_A.bottomRows(1) /= inertia;
       true_B.bottomRows(1) /= inertia;
-      FLYBALL_TRY(auto loop, observer_regulator_loop(true_A, true_B, C, model, K, K_e, delay));
-      FLYBALL_TRY(auto sampled, detail::SampledLoop::create(loop));
+      const ContinuousSystem<> truth{true_A, true_B, C, Eigen::MatrixXd::Zero(C.rows(), 1)};
+      FLYBALL_TRY_IN(where, const auto loop, running_loop(truth, model, K, K_e, delay));
       RobustnessCase result{.inertia = inertia, .gain = gain};
-      result.spectral_radius = detail::spectral_radius(sampled.closed(1.0));
+      result.spectral_radius = std::abs(loop.poles(0));
       result.stable = result.spectral_radius < 1.0;
       if (result.stable) {
-        FLYBALL_CHECK(judge_step(sampled, C, model, F(0, 0), result));
+        FLYBALL_TRY_IN(where, const auto step, step_of(loop, F.leftCols(1)));
+        result.overshoot = step.metrics.overshoot;
+        result.steady_error = step.final_value - 1.0;
       } else {
         result.overshoot = std::numeric_limits<double>::infinity();
         result.steady_error = std::numeric_limits<double>::infinity();

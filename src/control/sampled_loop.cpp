@@ -15,6 +15,43 @@ double spectral_radius(const Eigen::MatrixXd& M) {
   return M.size() == 0 ? 0.0 : eigenvalues_of(M).cwiseAbs().maxCoeff();
 }
 
+PlantInputLoop feedback_loop(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
+                             Time period, Time delay) {
+  const Eigen::Index n = A.rows();
+  return {A,
+          B,
+          Eigen::MatrixXd::Identity(n, n),
+          period,
+          delay,
+          Eigen::MatrixXd(0, 0),
+          Eigen::MatrixXd(0, n),
+          Eigen::MatrixXd(K.rows(), 0),
+          K};
+}
+
+PlantInputLoop observer_loop(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
+                             const DiscreteSystem<>& model, const MatrixRef& K,
+                             const MatrixRef& K_e, Time delay) {
+  // With the prediction q = x_hat⁻: x_hat = q + K_e (y - C q), u = -K x_hat, q⁺ = A x_hat + B u.
+  const Eigen::Index n = model.A.rows();
+  const Eigen::MatrixXd I_KC = Eigen::MatrixXd::Identity(n, n) - K_e * model.C;
+  const Eigen::MatrixXd A_BK = model.A - model.B * K;
+  return {A, B, C, model.period, delay, A_BK * I_KC, A_BK * K_e, K * I_KC, K * K_e};
+}
+
+Expected<void> check_delay(const PlantInputLoop& loop, std::string_view where) {
+  FLYBALL_CHECK(Checks(where)
+                    .positive(loop.period.si(), "period", "s")
+                    .not_negative(loop.delay.si(), "delay", "s"));
+  if (loop.delay.si() > most_delay_periods * loop.period.si()) {
+    return refusal(ArgumentError::out_of_range, where, "the delay")
+        .got(format_number(loop.delay.si()) + " s")
+        .expected(format_number(most_delay_periods) + " periods or less, " +
+                  format_number(most_delay_periods * loop.period.si()) + " s");
+  }
+  return {};
+}
+
 Expected<void> check_loop(const PlantInputLoop& loop, std::string_view where) {
   FLYBALL_CHECK(check_square(loop.A, where, "A"));
   const Eigen::Index n = loop.A.rows();
@@ -27,12 +64,6 @@ Expected<void> check_loop(const PlantInputLoop& loop, std::string_view where) {
                     .shape(loop.B_c, q, p, "B_c")
                     .shape(loop.C_c, 1, q, "C_c")
                     .shape(loop.D_c, 1, p, "D_c", "1 x outputs"));
-  if (loop.delay.si() > most_delay_periods * loop.period.si()) {
-    return refusal(ArgumentError::out_of_range, where, "the delay")
-        .got(format_number(loop.delay.si()) + " s")
-        .expected(format_number(most_delay_periods) + " periods or less, " +
-                  format_number(most_delay_periods * loop.period.si()) + " s");
-  }
   return Checks(where)
       .finite(loop.A, "A")
       .finite(loop.B, "B")
@@ -41,15 +72,14 @@ Expected<void> check_loop(const PlantInputLoop& loop, std::string_view where) {
       .finite(loop.B_c, "B_c")
       .finite(loop.C_c, "C_c")
       .finite(loop.D_c, "D_c")
-      .positive(loop.period.si(), "period", "s")
-      .not_negative(loop.delay.si(), "delay", "s");
+      .also([&] { return check_delay(loop, where); });
 }
 
 Expected<SampledLoop> SampledLoop::create(const PlantInputLoop& loop, Time further_delay) {
   const Time delay(loop.delay.si() + further_delay.si());
   FLYBALL_TRY(auto parts, discretize_delayed_input(loop.A, loop.B, loop.period, delay));
   const Eigen::Index p = loop.C.rows();
-  const ContinuousSystem<> plant{loop.A, loop.B, loop.C, Eigen::MatrixXd::Zero(p, 1)};
+  const ContinuousSystem<> plant{loop.A, loop.B, loop.C, Eigen::MatrixXd::Zero(p, loop.B.cols())};
   FLYBALL_TRY(auto delayed, discretize_with_input_delay(plant, loop.period, delay));
   SampledLoop sampled;
   sampled.A_ = std::move(parts.A);
@@ -107,18 +137,9 @@ Eigen::MatrixXd SampledLoop::closed(double gain) const {
 
 Expected<PlantInputLoop> state_feedback_loop(const MatrixRef& A, const MatrixRef& B,
                                              const MatrixRef& K, Time period, Time delay) {
-  const Eigen::Index n = A.rows();
-  PlantInputLoop loop{A,
-                      B,
-                      Eigen::MatrixXd::Identity(n, n),
-                      period,
-                      delay,
-                      Eigen::MatrixXd(0, 0),
-                      Eigen::MatrixXd(0, n),
-                      Eigen::MatrixXd(1, 0),
-                      K};
   constexpr std::string_view where = "state_feedback_loop";
-  FLYBALL_CHECK(check_shape(K, 1, n, where, "K", "1 x states"));
+  FLYBALL_CHECK(check_shape(K, 1, A.rows(), where, "K", "1 x states"));
+  PlantInputLoop loop = detail::feedback_loop(A, B, K, period, delay);
   return detail::check_loop(loop, where).map([&] { return std::move(loop); });
 }
 
@@ -140,10 +161,7 @@ Expected<PlantInputLoop> observer_regulator_loop(const MatrixRef& A, const Matri
         .got("not zero")
         .expected("zero: a measurement that contains the input closes a second loop");
   }
-  // With the prediction q = x_hat⁻: x_hat = q + K_e (y - C q), u = -K x_hat, q⁺ = A x_hat + B u.
-  const Eigen::MatrixXd I_KC = Eigen::MatrixXd::Identity(n, n) - K_e * model.C;
-  const Eigen::MatrixXd A_BK = model.A - model.B * K;
-  PlantInputLoop loop{A, B, C, model.period, delay, A_BK * I_KC, A_BK * K_e, K * I_KC, K * K_e};
+  PlantInputLoop loop = detail::observer_loop(A, B, C, model, K, K_e, delay);
   return detail::check_loop(loop, where).map([&] { return std::move(loop); });
 }
 

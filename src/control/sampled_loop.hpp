@@ -23,6 +23,7 @@ class SampledLoop {
   [[nodiscard]] Eigen::Index plant_states() const noexcept { return A_.rows(); }
   /// States of `closed` before the controller's.
   [[nodiscard]] Eigen::Index delayed_states() const noexcept { return delayed_A_.rows(); }
+  [[nodiscard]] const Eigen::MatrixXd& delayed_A() const noexcept { return delayed_A_; }
   [[nodiscard]] const Eigen::MatrixXd& delayed_B() const noexcept { return delayed_B_; }
   [[nodiscard]] const Eigen::MatrixXd& A() const noexcept { return A_; }
   [[nodiscard]] const Eigen::MatrixXd& A_c() const noexcept { return A_c_; }
@@ -37,6 +38,15 @@ class SampledLoop {
   Eigen::MatrixXd delayed_A_, delayed_B_;
 };
 
+/// The loops of margins.hpp, with any number of inputs and unchecked.
+[[nodiscard]] PlantInputLoop feedback_loop(const MatrixRef& A, const MatrixRef& B,
+                                           const MatrixRef& K, Time period, Time delay);
+[[nodiscard]] PlantInputLoop observer_loop(const MatrixRef& A, const MatrixRef& B,
+                                           const MatrixRef& C, const DiscreteSystem<>& model,
+                                           const MatrixRef& K, const MatrixRef& K_e, Time delay);
+
+/// A period, and a delay that is not too many of them.
+[[nodiscard]] Expected<void> check_delay(const PlantInputLoop& loop, std::string_view where);
 [[nodiscard]] Expected<void> check_loop(const PlantInputLoop& loop, std::string_view where);
 
 [[nodiscard]] double spectral_radius(const Eigen::MatrixXd& M);
