@@ -33,6 +33,9 @@ ExpectedAll<TuneResult> tune(const TuneJob& job) {
     return result;
   }
   const identification::FeedforwardFit& fit = *result.identification.report.fit;
+  std::vector<Diagnostic> more = contradictions(fit, job.design.plant);
+  std::vector<Diagnostic>& told = result.identification.report.diagnostics;
+  told.insert(told.end(), more.begin(), more.end());
 
   DesignJob design_job = job.design;
   PlantDescription plant = plant_from_fit(fit);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -9,6 +10,7 @@
 #include <flyball/io/sysid_json.hpp>
 #include <flyball/simulation/characterization.hpp>
 #include <flyball/study/answer.hpp>
+#include <flyball/study/project.hpp>
 
 namespace flyball::study {
 namespace {
@@ -90,6 +92,88 @@ TEST(Tune, GoesFromALogToAProvenController) {
   for (const char* key : {"kalman_gain", "poles", "feedforward", "margins"}) {
     EXPECT_TRUE(json["design"].contains(key)) << key;
   }
+}
+
+// A log of kV = 4.0 beside a project of 2 NEO, 10:1 on a drum of an inch, whose kV is 7.81: the
+// ratio, and what makes it 1/2. A project of the same mechanism is not complained of.
+TEST(Tune, ALogThatContradictsItsProjectIsWarnedOf) {
+  CharacterizationOptions session;
+  session.mechanism = MechanismKind::elevator;
+  session.kS = 0.15;
+  session.kV = 4.0;
+  session.kA = 0.05;
+  session.kG = 0.46;
+  session.resolution = 1e-4;
+  session.travel_low = 0.0;
+  session.travel_high = 2.0;
+  const SessionFile file(session, "Elevator", "flyball_tune_test_contradiction.json");
+  const auto warning = [&](const std::string& drum_radius) -> std::string {
+    const std::string project =
+        (std::filesystem::temp_directory_path() / "flyball_tune_test_contradiction.toml").string();
+    std::ofstream(project) << "[mechanism]\ntype = \"elevator\"\nmotor = \"NEO\"\nmotor_count = "
+                              "2\ngearing = 10.0\nmass = \"8 kg\"\ndrum_radius = \""
+                           << drum_radius << "\"\n";
+    const auto job = tune_job(file.path(), project);
+    std::filesystem::remove(project);
+    EXPECT_TRUE(job) << to_string(job.error());
+    const auto result = tune(*job);
+    EXPECT_TRUE(result) << to_string(result.error());
+    for (const Diagnostic& diagnostic : result->identification.diagnostics()) {
+      if (diagnostic.code == "project_contradicts_log") {
+        EXPECT_EQ(diagnostic.severity, Severity::warning);
+        EXPECT_NE(to_json(*result).find("project_contradicts_log"), std::string::npos);
+        return diagnostic.message;
+      }
+    }
+    return "";
+  };
+  const std::string text = warning("1 in");
+  for (const char* part : {"kV = 4", "7.81", "by motor and gearing", "0.51", "drum_radius is half",
+                           "the gearing is 5.1"}) {
+    EXPECT_NE(text.find(part), std::string::npos) << part << " in: " << text;
+  }
+  EXPECT_EQ(warning("5 cm"), "");
+}
+
+// Each factor has its own cause; what no factor explains is the gearing's.
+TEST(Tune, AContradictionNamesItsLikelyCause) {
+  constexpr double turn = 2.0 * 3.141592653589793;
+  identification::FeedforwardFit fit;
+  fit.mechanism = MechanismKind::arm;
+  PlantDescription said;
+  said.kind = MechanismKind::arm;
+  said.gains = {.kV = 1.0, .kA = 0.1, .kG = 0.5};
+  said.motor = mechanisms::motor("NEO", 1).value();
+  said.gearing = 40.0;
+  const auto cause = [&](double ratio) -> std::string {
+    fit.kV.value = ratio;
+    fit.kA.value = 0.1;
+    const auto found = contradictions(fit, said);
+    return found.empty() ? "" : found.front().message;
+  };
+  const auto contains = [](const std::string& text, const char* part) {
+    return text.find(part) != std::string::npos;
+  };
+  EXPECT_EQ(cause(1.1), "");
+  EXPECT_TRUE(contains(cause(turn), "rotations taken for radians")) << cause(turn);
+  EXPECT_TRUE(contains(cause(1.0 / turn), "radians taken for rotations"));
+  EXPECT_TRUE(contains(cause(turn / 360.0), "degrees taken for radians"));
+  EXPECT_TRUE(contains(cause(1.0 / 40.0), "before the gearing of 40"));
+  EXPECT_TRUE(contains(cause(1.5), "the gearing is 60 and not 40, or the motor is another"));
+  said.unit = "m";
+  said.kind = fit.mechanism = MechanismKind::elevator;
+  said.drum_radius = 0.0254;
+  EXPECT_TRUE(contains(cause(2.0), "diameter"));
+  EXPECT_TRUE(contains(cause(1.0 / 39.37), "inches taken for metres"));
+  // kV agrees: what hangs on the mass is held against it with more patience.
+  fit.kG = identification::GainEstimate{.value = 0.1};
+  EXPECT_TRUE(contains(cause(1.0), "kG")) << cause(1.0);
+  EXPECT_TRUE(contains(cause(1.0), "counterweight"));
+  fit.kG->value = 0.4;
+  EXPECT_EQ(cause(1.0), "");
+  fit.kA.determined = true;
+  said.gains.kV = 0.0;
+  EXPECT_EQ(cause(3.0), "");
 }
 
 TEST(Tune, ARefusedLogHasNoDesignAndSaysWhy) {

@@ -8,7 +8,9 @@ namespace flyball::study {
 /// Identify a mechanism from a log, then design its controller.
 struct TuneJob {
   IdentifyJob identification;
-  DesignJob design;  ///< Its plant, and a delay that is not given, come from the log.
+  /// Its plant, and a delay that is not given, come from the log; where its plant has gains of its
+  /// own (motor and gearing, or [gains]), the log's are held against them.
+  DesignJob design;
 };
 
 /// Both results. When the fit was refused there is no design; its error is in the identification.
@@ -19,6 +21,12 @@ struct TuneResult {
 
 /// @errors as `identify`.
 [[nodiscard]] ExpectedAll<TuneResult> tune(const TuneJob& job);
+
+/// Warnings where a log's gains are not those of the project's motor, gearing and mass, each with
+/// their ratio and its likely cause.
+/// @param said  The project's plant; without gains nothing is compared.
+[[nodiscard]] std::vector<Diagnostic> contradictions(const identification::FeedforwardFit& fit,
+                                                     const PlantDescription& said);
 
 /// The plant that a fit hands on: its gains; kA only if it is determined (else its upper bound).
 [[nodiscard]] PlantDescription plant_from_fit(const identification::FeedforwardFit& fit);
