@@ -201,7 +201,7 @@ TEST(Design, IsRefusedInTheWordsOfTheFile) {
     return result ? std::string("designed") : to_string(result.error());
   };
   EXPECT_EQ(refusal([](DesignJob& job) { job.controller.delay = 1e3; }),
-            "design: controller.delay is 1000 s; it must be in [0, 2]");
+            "design: controller.delay is 1000 s; it must be in [0, 5]");
   EXPECT_TRUE(refusal([](DesignJob& job) {
                 job.sensor.resolution = 1e200;
               }).starts_with("design: sensor.resolution is 1e+200; it must be of a size"));
