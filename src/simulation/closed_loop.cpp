@@ -304,8 +304,10 @@ Expected<ClosedLoopResult> simulate_closed_loop(SimulatedPlant& plant, ControlLa
       for (double change = actuators.next_change(); change < from + h - rounding;
            change = actuators.next_change()) {
         const double until = std::clamp(change - from, done, h);
-        FLYBALL_CHECK(advance(from + done, until - done));
-        done = until;
+        if (until - done > rounding) {  // else it is at the end of a step, up to rounding
+          FLYBALL_CHECK(advance(from + done, until - done));
+          done = until;
+        }
         actuators.change(change);
       }
       FLYBALL_CHECK(advance(from + done, h - done));
