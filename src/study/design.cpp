@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <flyball/study/project.hpp>
 #include <flyball/study/simulate_design.hpp>
@@ -41,67 +41,54 @@ void fill_defaults(DesignJob& job, std::vector<Diagnostic>& diagnostics) {
   }
 }
 
-// Of tolerances from tight to loose, takes those that leave comfortable margins and the stiffest
-// loop. The tightest comfortable ones may not be the best: the compensation of a long delay (B.12)
-// turns an aggressive gain into nearly none.
-Expected<LoopDesign> search_tolerances(const LinearModel& model, DesignJob& job,
-                                       std::vector<Diagnostic>& diagnostics) {
-  const std::vector<double> start =
-      default_tolerances(job.plant, static_cast<std::size_t>(model.A.rows()));
-  constexpr int steps = 40;
-  constexpr double step = 1.25;
-  std::optional<LoopDesign> best;
-  std::vector<double> best_tolerances;
-  std::optional<Error> last;
-  double factor = 1.0;
-  for (int i = 0; i < steps; ++i, factor *= step) {
-    std::vector<double> tolerances = start;
-    for (double& tolerance : tolerances) {
-      tolerance *= factor;
-    }
-    auto loop = design_loop(model, job, tolerances);
-    if (!loop) {
-      last = std::move(loop).error();
-      continue;
-    }
-    if (is_comfortable(*loop) && (!best || loop->K_delayed(0, 0) > best->K_delayed(0, 0))) {
-      best = *std::move(loop);
-      best_tolerances = std::move(tolerances);
-    }
+// What the grid varies, in words.
+std::string varied(const PlantDescription& plant) {
+  if (plant.kA_determined) {
+    return "±20 % of inertia and gain";
   }
-  if (!best && last) {
-    return tl::unexpected(*std::move(last));
-  }
-  if (!best) {
-    return refusal(DesignError::margins_lost, where, "the loop")
-        .got(fmt::format("without margins at any tolerance with a delay of {} ms",
-                         format_number(1e3 * job.controller.delay.value_or(0.0), 3)))
-        .hint("shorten the delay or the period");
-  }
-  std::vector<std::string> words;
-  for (std::size_t k = 0; k < best_tolerances.size(); ++k) {
-    words.push_back(
-        fmt::format("{} for {}", format_number(best_tolerances[k], 3), label(model.states[k])));
-  }
+  return plant.kA_upper_bound > 0.0
+             ? fmt::format("±20 % of gain with a kA from 0 to {} V·s²/{}",
+                           format_number(plant.kA_upper_bound, 3), plant.unit)
+             : std::string("±20 % of gain without inertia");
+}
+
+void tell_tolerances(const LoopDesign& loop, const LinearModel& model, const DesignJob& job,
+                     std::vector<Diagnostic>& diagnostics) {
   note(diagnostics, "assumed",
        "no tolerances were given: with {} the loop is the stiffest that keeps a gain margin of 2, "
-       "a phase margin of 45° and ±20 % of inertia and gain",
-       fmt::join(words, ", "));
-  job.controller.state_tolerance = std::move(best_tolerances);
-  return *std::move(best);
+       "a phase margin of 45° and {}",
+       tolerances_text(model, loop.tolerances), varied(job.plant));
 }
 
 void add_margin_warnings(const LoopDesign& loop, const DesignJob& job,
                          std::vector<Diagnostic>& diagnostics) {
-  if (!loop.margins.stable || is_comfortable(loop)) {
+  if (is_comfortable(loop)) {
     return;
   }
   warn(diagnostics, "thin_margins",
-       "the tolerances leave a gain margin of {}, a phase margin of {}° and {} over ±20 % of "
-       "inertia and gain with {} ms of delay; looser tolerances are safer",
+       "the tolerances leave a gain margin of {}, a phase margin of {}° and {} over {} with {} ms "
+       "of delay; looser tolerances are safer",
        format_number(loop.margins.gain_margin_up, 3), format_number(loop.margins.phase_margin, 3),
-       loop.robustness.all_stable ? "stability" : "no stability",
+       loop.robust ? "stability" : "no stability", varied(job.plant),
        format_number(1e3 * job.controller.delay.value_or(0.0), 3));
+}
+
+LoopMargins margins_of(const LoopDesign& loop, bool feedback) {
+  if (!feedback) {
+    constexpr double none = std::numeric_limits<double>::quiet_NaN();
+    return {none, none, none, none, none, none};
+  }
+  const StabilityMargins& margins = loop.margins;
+  double crossover = 0.0;
+  for (const Crossover& crossing : margins.gain_crossovers) {
+    crossover = std::max(crossover, crossing.frequency);
+  }
+  return {.gain_margin = margins.gain_margin_up,
+          .gain_reduction = margins.gain_margin_down,
+          .phase_margin = margins.phase_margin * std::numbers::pi / 180.0,
+          .delay_margin = margins.delay_margin,
+          .disk_margin = margins.disk_margin,
+          .crossover = crossover};
 }
 
 Expected<void> simulate_response(DesignResult& result) {
@@ -128,25 +115,44 @@ Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
   FLYBALL_TRY(auto model, linear_model(job.plant, job.controller.period));
   result.velocity_servo = !job.plant.kA_determined;
   if (result.velocity_servo) {
-    result.diagnostics.push_back(unknown_kA(job.plant.kind));
+    result.diagnostics.push_back(unknown_kA(job.plant));
+    if (!(job.plant.kA_upper_bound > 0.0)) {
+      warn(result.diagnostics, "kA_not_bounded",
+           "nothing is known of kA, not even an upper bound: the loop was checked for a mechanism "
+           "without inertia alone, and a heavy one may overshoot or be unstable (set gains.kA)");
+    }
   }
   const bool chosen = job.controller.state_tolerance.empty();
   // A person's tolerances are per position and velocity; a plant without kA has one state of them.
   if (!chosen && result.velocity_servo && job.controller.state_tolerance.size() == 2) {
     job.controller.state_tolerance.resize(1);
   }
-  FLYBALL_TRY(const LoopDesign loop, chosen
-                                         ? search_tolerances(model, job, result.diagnostics)
-                                         : design_loop(model, job, job.controller.state_tolerance));
-  if (!loop.margins.stable) {
+  FLYBALL_TRY(const LoopDesign loop,
+              chosen ? search_tolerances(model, job, job.controller.state_tolerance)
+                     : design_loop(model, job, job.controller.state_tolerance));
+  if (!loop.stable) {
     return refusal(DesignError::margins_lost, where, "the loop")
         .got(fmt::format("unstable with its delay of {} ms",
                          format_number(1e3 * job.controller.delay.value_or(0.0), 3)))
         .hint("loosen controller.state_tolerance, or leave it out to have it chosen")
         .with("spectral_radius", loop.margins.spectral_radius);
   }
-  if (!chosen) {
+  FLYBALL_TRY(result.no_feedback, why_no_feedback(loop, model, job));
+  result.feedback = result.no_feedback.empty();
+  FLYBALL_TRY(result.loop, behavior_of(loop, model, job));
+  if (!result.feedback) {
+    warn(result.diagnostics, "no_feedback",
+         "there is no feedback, feedforward alone drives the {}: {}; an error of the model stays "
+         "as one of the {}",
+         to_string(job.plant.kind), result.no_feedback,
+         job.plant.kind == MechanismKind::flywheel ? "speed" : "position");
+  } else if (chosen) {
+    tell_tolerances(loop, model, job, result.diagnostics);
+  } else {
     add_margin_warnings(loop, job, result.diagnostics);
+  }
+  if (result.feedback) {
+    FLYBALL_CHECK(tell_cost_of_delay(loop, result.loop, model, job, chosen, result.diagnostics));
   }
   if (loop.whole_periods) {
     warn(result.diagnostics, "delay_rounded",
@@ -169,26 +175,10 @@ Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
   result.estimator_poles = loop.estimator_poles;
   result.inversion = loop.inversion;
 
-  const StabilityMargins& margins = loop.margins;
-  double crossover = 0.0;
-  for (const Crossover& crossing : margins.gain_crossovers) {
-    crossover = std::max(crossover, crossing.frequency);
-  }
-  result.margins = {.gain_margin = margins.gain_margin_up,
-                    .gain_reduction = margins.gain_margin_down,
-                    .phase_margin = margins.phase_margin * std::numbers::pi / 180.0,
-                    .delay_margin = margins.delay_margin,
-                    .disk_margin = margins.disk_margin,
-                    .crossover = crossover};
-  for (const RobustnessCase& point : loop.robustness.cases) {
-    result.robustness.push_back({.inertia_factor = point.inertia,
-                                 .gain_factor = point.gain,
-                                 .stable = point.stable,
-                                 .spectral_radius = point.spectral_radius,
-                                 .overshoot = point.overshoot});
-  }
-  result.robust = loop.robustness.all_stable;
-  result.worst_overshoot = loop.robustness.worst_overshoot;
+  result.margins = margins_of(loop, result.feedback);
+  result.robustness = loop.robustness;
+  result.robust = loop.robust;
+  result.worst_overshoot = loop.worst_overshoot;
 
   if (!job.plant.motor && job.battery.resistance != BatteryOptions{}.resistance) {
     warn(result.diagnostics, "not_used",

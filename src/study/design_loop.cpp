@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -35,6 +36,18 @@ void take(LinearModel& model, const Mechanism& mechanism) {
   model.C = mechanism.C;
 }
 
+/// Theorems 6.9.1, 6.10.1 and 6.11.1.
+Expected<void> build(LinearModel& model, const PlantDescription& plant) {
+  if (plant.kind == MechanismKind::flywheel) {
+    return mechanisms::flywheel(plant.gains).map([&](const auto& built) { take(model, built); });
+  }
+  FLYBALL_TRY(const auto built, plant.kind == MechanismKind::elevator
+                                    ? mechanisms::elevator(plant.gains)
+                                    : mechanisms::arm(plant.gains));
+  take(model, built);
+  return {};
+}
+
 double top_speed(const PlantDescription& plant) {
   return plant.nominal_voltage / plant.gains.kV;
 }
@@ -49,6 +62,18 @@ Eigen::MatrixXd process_covariance(const LinearModel& model, const DesignJob& jo
   constexpr double voltage_std = 0.5;
   const Eigen::MatrixXd Bv = model.discrete.B * voltage_std;
   return Bv * Bv.transpose();
+}
+
+/// The smaller of each margin, with the crossings of the smaller phase margin.
+StabilityMargins worse(const StabilityMargins& a, const StabilityMargins& b) {
+  StabilityMargins worst = a.phase_margin <= b.phase_margin ? a : b;
+  worst.stable = a.stable && b.stable;
+  worst.spectral_radius = std::max(a.spectral_radius, b.spectral_radius);
+  worst.gain_margin_up = std::min(a.gain_margin_up, b.gain_margin_up);
+  worst.gain_margin_down = std::max(a.gain_margin_down, b.gain_margin_down);
+  worst.delay_margin = std::min(a.delay_margin, b.delay_margin);
+  worst.disk_margin = std::min(a.disk_margin, b.disk_margin);
+  return worst;
 }
 
 }  // namespace
@@ -92,29 +117,39 @@ Expected<LinearModel> linear_model(const PlantDescription& plant, double period)
                       Time(period)};
     return model;
   }
-  if (flywheel) {
-    FLYBALL_TRY(auto built, mechanisms::flywheel(plant.gains));
-    take(model, built);
-    model.states = {velocity};
-  } else {
-    FLYBALL_TRY(auto built, plant.kind == MechanismKind::elevator
-                                ? mechanisms::elevator(plant.gains)
-                                : mechanisms::arm(plant.gains));
-    take(model, built);
-    model.states = {position, velocity};
-  }
+  FLYBALL_CHECK(build(model, plant));
+  model.states = flywheel ? std::vector{velocity} : std::vector{position, velocity};
   FLYBALL_TRY(auto discrete,
               told_of("controller.period", discretize_zoh(model.A, model.B, Time(period))));
   model.discrete = {discrete.A, discrete.B, model.C, zero, Time(period)};
   return model;
 }
 
-Diagnostic unknown_kA(MechanismKind kind) {
+Diagnostic unknown_kA(const PlantDescription& plant) {
   return {"kA_not_determined", Severity::info,
-          kind == MechanismKind::flywheel
+          plant.kind == MechanismKind::flywheel
               ? "kA is not known: the flywheel is taken to follow its voltage within a period, and "
                 "feedforward alone drives it"
-              : "kA is not known: the velocity is taken as the input (Theorem 14.3.2)"};
+              : "kA is not known: the velocity is taken to follow the voltage (Theorem 14.3.2)"};
+}
+
+Expected<std::vector<PossiblePlant>> possible_plants(const LinearModel& model,
+                                                     const PlantDescription& plant) {
+  const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(1, 1);
+  std::vector<PossiblePlant> plants{
+      {plant.kA_determined ? plant.gains.kA : 0.0, {model.A, model.B, model.C, zero}}};
+  if (plant.kA_determined || !(plant.kA_upper_bound > 0.0)) {
+    return plants;
+  }
+  for (const double share : {0.25, 0.5, 0.75, 1.0}) {
+    PlantDescription with = plant;
+    with.kA_determined = true;
+    with.gains.kA = share * plant.kA_upper_bound;
+    LinearModel built;
+    FLYBALL_CHECK(build(built, with));
+    plants.push_back({with.gains.kA, {built.A, built.B, built.C, zero}});
+  }
+  return plants;
 }
 
 std::vector<double> default_tolerances(const PlantDescription& plant, std::size_t states) {
@@ -130,7 +165,7 @@ std::vector<double> default_tolerances(const PlantDescription& plant, std::size_
   return tolerances;
 }
 
-Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
+Expected<LoopDesign> feedback_of(const LinearModel& model, const DesignJob& job,
                                  const std::vector<double>& tolerances) {
   const ControllerOptions& controller = job.controller;
   const DiscreteSystem<>& plant = model.discrete;
@@ -141,6 +176,7 @@ Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
         .expected(fmt::format("one value a state: {}", fmt::join(labels(model.states), ", ")));
   }
   LoopDesign loop;
+  loop.tolerances = tolerances;
   FLYBALL_TRY(loop.Q, told_of("controller.state_tolerance", bryson(tolerances)));
   FLYBALL_TRY(loop.R, told_of("controller.input_tolerance", bryson({controller.input_tolerance})));
   FLYBALL_TRY(auto regulator, lqr(plant, loop.Q, loop.R));
@@ -167,20 +203,100 @@ Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
   FLYBALL_TRY(const auto inversion, pseudoinverse(plant.B));
   loop.inversion = inversion.X;
 
-  FLYBALL_TRY(auto opened, observer_regulator_loop(model.A, model.B, model.C, plant, loop.K_delayed,
-                                                   loop.kalman_gain, delay));
-  FLYBALL_TRY(auto margins, stability_margins(opened));
-  loop.margins = std::move(margins);
-  FLYBALL_TRY(auto grid, robustness_grid(model.A, model.B, model.C, plant, loop.K_delayed,
-                                         loop.kalman_gain, delay));
-  loop.robustness = std::move(grid);
   return loop;
+}
+
+Expected<void> judge(LoopDesign& loop, const LinearModel& model, const DesignJob& job,
+                     const DiscreteSystem<>& believed, const Eigen::MatrixXd& K,
+                     const Eigen::MatrixXd& K_e) {
+  const Time delay(job.controller.delay.value_or(0.0));
+  FLYBALL_TRY(const auto plants, possible_plants(model, job.plant));
+  const bool determined = job.plant.kA_determined;
+  for (const PossiblePlant& plant : plants) {
+    const ContinuousSystem<>& truth = plant.system;
+    FLYBALL_TRY(const auto opened,
+                observer_regulator_loop(truth.A, truth.B, truth.C, believed, K, K_e, delay));
+    FLYBALL_TRY(auto margins, stability_margins(opened));
+    const bool first = &plant == &plants.front();
+    loop.stable = first ? margins.stable : loop.stable;
+    loop.margins = first ? std::move(margins) : worse(loop.margins, margins);
+    RobustnessOptions options;
+    if (!determined) {
+      options.inertia = {1.0};  // it is the plant's own
+    }
+    FLYBALL_TRY(const auto grid,
+                robustness_grid(truth.A, truth.B, truth.C, believed, K, K_e, delay, options));
+    for (const RobustnessCase& point : grid.cases) {
+      loop.robustness.push_back(
+          {.inertia_factor = determined ? point.inertia : std::numeric_limits<double>::quiet_NaN(),
+           .kA = plant.kA * point.inertia,
+           .gain_factor = point.gain,
+           .stable = point.stable,
+           .spectral_radius = point.spectral_radius,
+           .overshoot = point.overshoot});
+    }
+    loop.robust = loop.robust && grid.all_stable;
+    loop.worst_overshoot = std::max(loop.worst_overshoot, grid.worst_overshoot);
+  }
+  return {};
+}
+
+Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
+                                 const std::vector<double>& tolerances) {
+  FLYBALL_TRY(auto loop, feedback_of(model, job, tolerances));
+  FLYBALL_CHECK(judge(loop, model, job, model.discrete, loop.K_delayed, loop.kalman_gain));
+  return loop;
+}
+
+std::string tolerances_text(const LinearModel& model, const std::vector<double>& tolerances) {
+  std::vector<std::string> words;
+  for (std::size_t k = 0; k < tolerances.size(); ++k) {
+    words.push_back(
+        fmt::format("{} for {}", format_number(tolerances[k], 3), label(model.states[k])));
+  }
+  return fmt::format("{}", fmt::join(words, ", "));
+}
+
+// The tightest comfortable ones may not be the best: the compensation of a long delay (B.12) turns
+// an aggressive gain into nearly none.
+Expected<LoopDesign> search_tolerances(const LinearModel& model, const DesignJob& job,
+                                       std::vector<double>& tolerances) {
+  const std::vector<double> start =
+      default_tolerances(job.plant, static_cast<std::size_t>(model.A.rows()));
+  constexpr int steps = 40;
+  constexpr double step = 1.25;
+  std::optional<LoopDesign> best;
+  std::optional<Error> last;
+  double factor = 1.0;
+  for (int i = 0; i < steps; ++i, factor *= step) {
+    std::vector<double> tried = start;
+    for (double& tolerance : tried) {
+      tolerance *= factor;
+    }
+    auto loop = design_loop(model, job, tried);
+    if (!loop) {
+      last = std::move(loop).error();
+    } else if (is_comfortable(*loop) && (!best || loop->K_delayed(0, 0) > best->K_delayed(0, 0))) {
+      best = *std::move(loop);
+    }
+  }
+  if (!best && last) {
+    return tl::unexpected(*std::move(last));
+  }
+  if (!best) {
+    return refusal(DesignError::margins_lost, "design", "the loop")
+        .got(fmt::format("without margins at any tolerance with a delay of {} ms",
+                         format_number(1e3 * job.controller.delay.value_or(0.0), 3)))
+        .hint("shorten the delay or the period");
+  }
+  tolerances = best->tolerances;
+  return *std::move(best);
 }
 
 bool is_comfortable(const LoopDesign& loop) {
   const StabilityMargins& margins = loop.margins;
   return margins.stable && margins.gain_margin_up >= 2.0 && margins.phase_margin >= 45.0 &&
-         margins.disk_margin >= 0.5 && loop.robustness.all_stable;
+         margins.disk_margin >= 0.5 && loop.robust;
 }
 
 }  // namespace flyball::study

@@ -8,6 +8,7 @@
 
 #include <flyball/control/latency.hpp>
 #include <flyball/control/lqr.hpp>
+#include <flyball/control/running_loop.hpp>
 #include <flyball/core/argument.hpp>
 #include <flyball/estimation/covariance.hpp>
 #include <flyball/estimation/kalman_gain.hpp>
@@ -17,6 +18,7 @@
 
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
+#include "core/wording.hpp"
 #include "study/told.hpp"
 
 namespace flyball::study {
@@ -93,6 +95,34 @@ Expected<void> add_observer(ModelRegulator& regulator, const ModelJob& job,
     note(noticed, "assumed",
          "the readings' noise is taken as {} a sample (simulation.noise says another)",
          fmt::join(assumed, ", "));
+  }
+  return {};
+}
+
+/// The poles of the loop as it runs; a warning where the delay costs more than half of its speed.
+Expected<void> add_loop_poles(ModelRegulator& regulator, Time delay,
+                              std::vector<Diagnostic>& noticed) {
+  const DiscreteSystem<>& plant = regulator.plant;
+  auto running =
+      running_loop(regulator.linear, plant, regulator.K_delayed, regulator.kalman_gain, delay);
+  if (!running) {
+    warn(noticed, "no_poles", "the loop's poles: {}", to_string(running.error()));
+    return {};
+  }
+  RunningLoop& loop = *running;
+  regulator.loop_poles = std::move(loop.poles);
+  regulator.time_constant = loop.time_constant;
+  FLYBALL_TRY(const auto undelayed,
+              running_loop(regulator.linear, plant, regulator.K, regulator.kalman_gain, Time(0.0)));
+  constexpr double share = 0.5;
+  const double prompt = std::max(undelayed.time_constant, plant.period.si());
+  if (delay.si() > 0.0 && share * loop.time_constant > prompt) {
+    warn(noticed, "delay_costs_speed",
+         "the delay of {} costs {} of the loop's speed, more than half: its slowest time constant "
+         "is {}, that of the same design without delay {}",
+         text::seconds(delay.si()),
+         text::percent(1.0 - undelayed.time_constant / loop.time_constant, 2),
+         text::seconds(loop.time_constant), text::seconds(undelayed.time_constant));
   }
   return {};
 }
@@ -201,6 +231,7 @@ Expected<ModelRegulator> regulator_of(const ModelJob& job, std::vector<Diagnosti
   if (!job.outputs_are_states) {
     FLYBALL_CHECK(add_observer(regulator, job, states, inputs, noticed));
   }
+  FLYBALL_CHECK(add_loop_poles(regulator, delay, noticed));
   if (model.inputs() == 1) {
     const ContinuousSystem<>& open = regulator.linear;
     auto loop = regulator.observer

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <flyball/control/margins.hpp>
@@ -18,7 +19,16 @@ struct LinearModel {
 [[nodiscard]] Expected<LinearModel> linear_model(const PlantDescription& plant, double period);
 
 /// What is done without kA.
-[[nodiscard]] Diagnostic unknown_kA(mechanisms::MechanismKind kind);
+[[nodiscard]] Diagnostic unknown_kA(const PlantDescription& plant);
+
+/// A mechanism that may be the true one.
+struct PossiblePlant {
+  double kA = 0.0;  ///< V·s²/unit
+  ContinuousSystem<> system;
+};
+/// The model's own; without kA those from none (the model) to the upper bound.
+[[nodiscard]] Expected<std::vector<PossiblePlant>> possible_plants(const LinearModel& model,
+                                                                   const PlantDescription& plant);
 
 /// Standard deviation of one reading: as given, or what the resolution and the mechanism suggest.
 [[nodiscard]] double measurement_std(const DesignJob& job);
@@ -29,18 +39,52 @@ struct LinearModel {
 
 /// Feedback, observer and margins for one choice of tolerances.
 struct LoopDesign {
+  std::vector<double> tolerances;
   Eigen::MatrixXd Q, R, K, K_delayed, kalman_gain, inversion;
   Eigen::VectorXcd poles, estimator_poles;
-  StabilityMargins margins;
-  RobustnessGrid robustness;
-  bool whole_periods = false;  ///< The delay had to be rounded to whole periods.
+  StabilityMargins margins;  ///< The worst over the possible plants.
+  std::vector<RobustnessPoint> robustness;
+  bool stable = false;           ///< Whether the loop on the model is.
+  bool robust = true;            ///< Whether all points are stable.
+  double worst_overshoot = 0.0;  ///< Of them.
+  bool whole_periods = false;    ///< The delay had to be rounded to whole periods.
 };
+/// Feedback, its delay compensated, and observer, not judged.
+[[nodiscard]] Expected<LoopDesign> feedback_of(const LinearModel& model, const DesignJob& job,
+                                               const std::vector<double>& tolerances);
+/// The whole.
 [[nodiscard]] Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
                                                const std::vector<double>& tolerances);
+
+/// "0.02 for position (m), 0.4 for velocity (m/s)"
+[[nodiscard]] std::string tolerances_text(const LinearModel& model,
+                                          const std::vector<double>& tolerances);
+
+/// Margins of a regulator with the delay, the worst over what the plant may be, and the grid.
+[[nodiscard]] Expected<void> judge(LoopDesign& loop, const LinearModel& model, const DesignJob& job,
+                                   const DiscreteSystem<>& believed, const Eigen::MatrixXd& K,
+                                   const Eigen::MatrixXd& K_e);
 
 /// Gain margins of at least 2, phase margin of at least 45°, a disk margin of at least 0.5, and
 /// stable over the whole grid.
 [[nodiscard]] bool is_comfortable(const LoopDesign& loop);
+
+/// Of the tolerances that leave comfortable margins those of the stiffest loop.
+[[nodiscard]] Expected<LoopDesign> search_tolerances(const LinearModel& model, const DesignJob& job,
+                                                     std::vector<double>& tolerances);
+
+/// The poles and the step of the loop as it runs.
+[[nodiscard]] Expected<LoopBehavior> behavior_of(const LoopDesign& loop, const LinearModel& model,
+                                                 const DesignJob& job);
+
+/// Warns where the delay costs more than half of the loop's speed, and tells what would be faster.
+[[nodiscard]] Expected<void> tell_cost_of_delay(const LoopDesign& loop, const LoopBehavior& runs,
+                                                const LinearModel& model, const DesignJob& job,
+                                                bool chosen, std::vector<Diagnostic>& diagnostics);
+
+/// Why the gain makes no difference anywhere below Nyquist; empty where it does.
+[[nodiscard]] Expected<std::string> why_no_feedback(const LoopDesign& loop,
+                                                    const LinearModel& model, const DesignJob& job);
 
 /// The fastest trapezoid over a distance that needs no more volts than there are.
 [[nodiscard]] Expected<FastestMotion> fastest_motion(const DesignJob& job);

@@ -199,7 +199,7 @@ ExpectedAll<ModelFile> model_of(const Project& project) {
     model.system = {discrete.A, discrete.B, discrete.C, discrete.D};
   }
   if (!plant.kA_determined) {
-    model.notes.push_back(unknown_kA(plant.kind));
+    model.notes.push_back(unknown_kA(plant));
   }
   note_what_is_left_out(plant, model.notes);
   return model;

@@ -372,10 +372,9 @@ ExpectedAll<ModelDesign> design_model(const ModelJob& job) {
          "says another)");
   }
   if (!job.run.duration_is_given) {
-    // Eight time constants of the slowest pole.
+    // Eight time constants of the slowest pole of the loop as it runs.
     constexpr double time_constants = 8.0;
-    const double slowest = made.poles.cwiseAbs().maxCoeff();
-    const double constant = slowest < 1.0 ? -job.period / std::log(slowest) : job.period;
+    const double constant = std::isfinite(made.time_constant) ? made.time_constant : job.period;
     run.duration = std::clamp(time_constants * constant, 10.0 * job.period, 60.0);
   }
   FLYBALL_TRY(result.simulation, simulate_closed_loop(result.job, made));

@@ -85,6 +85,9 @@ Expected<MechanismResponse> simulate_design(const DesignResult& design, const De
   loop.controller = controller_of(design);
   loop.truth.gains = designed.plant.gains;
   // A larger inertia needs more volts to accelerate; a larger gain fewer volts for everything.
+  if (!designed.plant.kA_determined) {
+    loop.truth.gains.kA = designed.plant.kA_upper_bound;
+  }
   loop.truth.gains.kA *= trial.inertia_factor / trial.gain_factor;
   loop.truth.gains.kV /= trial.gain_factor;
   loop.truth.battery.open_circuit_voltage = designed.battery.open_circuit_voltage;

@@ -1,7 +1,9 @@
 // A model by formula in a project file: what it says, and every way to write it wrongly.
+#include <cmath>
 #include <numbers>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include <flyball/mechanisms/cart_pole.hpp>
 #include <flyball/mechanisms/pendulum.hpp>
@@ -307,6 +309,24 @@ TEST(DesignModel, BalancesWithAnObserver) {
   EXPECT_NEAR(result->simulation.state_summary[0].final, std::numbers::pi, 1e-2);
   // About the top gravity pushes away: ∂ω'/∂θ = +g/l.
   EXPECT_NEAR(result->regulator.linear.A(1, 0), 9.81 / 0.5, 1e-12);
+}
+
+// The poles are of the loop as it runs, as of a mechanism: with observer and delay the slowest is
+// what the simulated deviation decays with, whatever A - B K has.
+TEST(DesignModel, TellsThePolesOfTheLoopThatRuns) {
+  const std::string late = with(pendulum + "[model.outputs]\nangle = \"theta\"\n" + upright,
+                                "period = \"10 ms\"", "period = \"10 ms\"\ndelay = \"60 ms\"");
+  const auto hanging = with(late, "180 deg", "0 deg");
+  const auto result = design_model(*read(hanging).model_job);
+  ASSERT_TRUE(result) << to_string(result.error());
+  const ModelRegulator& regulator = result->regulator;
+  EXPECT_EQ(regulator.loop_poles.size(), 2 + 6 + 2);
+  EXPECT_NEAR(std::abs(regulator.loop_poles(0)), regulator.margins->spectral_radius, 1e-9);
+  EXPECT_NEAR(regulator.time_constant, -0.01 / std::log(std::abs(regulator.loop_poles(0))), 1e-9);
+  const auto json = nlohmann::json::parse(answer_of(*result).json);
+  EXPECT_EQ(json["poles"].size(), 10u);
+  EXPECT_EQ(json["design_poles"].size(), 2u);
+  EXPECT_EQ(json["time_constant"].get<double>(), regulator.time_constant);
 }
 
 TEST(DesignModel, APointThatIsNoEquilibriumIsRefusedWithOneThatIs) {

@@ -77,7 +77,17 @@ struct DesignJob {
   unsigned long long seed = 1;
 };
 
-/// Robustness of the loop broken at the plant input, with the delay in it.
+/// The loop as it runs: plant, delay, observer and feedback; its limits are not in it.
+struct LoopBehavior {
+  Eigen::VectorXcd poles{};               ///< All of its eigenvalues, slowest first.
+  double time_constant = 0.0;             ///< s, of the slowest.
+  std::optional<double> rise_time{};      ///< s, of a small step from 10 % to 90 %.
+  std::optional<double> settling_time{};  ///< s, until it stays within 2 % of its end.
+  double overshoot = 0.0;                 ///< As a share of the step.
+};
+
+/// Robustness of the loop broken at the plant input, with the delay in it. Without a kA the worst
+/// over every kA that was checked. Without feedback there is none: every entry is NaN.
 struct LoopMargins {
   double gain_margin = 0.0;     ///< Ratio > 1 by which the gain may rise; infinity if any.
   double gain_reduction = 0.0;  ///< Ratio < 1 to which the gain may fall; 0 if any.
@@ -89,7 +99,8 @@ struct LoopMargins {
 
 /// One point of the grid over inertia and gain errors.
 struct RobustnessPoint {
-  double inertia_factor = 1.0;  ///< True inertia over the model's.
+  double inertia_factor = 1.0;  ///< True inertia over the model's; NaN where kA is not determined.
+  double kA = 0.0;              ///< V·s²/unit, the true inertia's.
   double gain_factor = 1.0;     ///< True actuator gain over the model's.
   bool stable = false;
   double spectral_radius = 0.0;  ///< Of the closed loop.
@@ -128,11 +139,14 @@ struct DesignResult {
   Eigen::MatrixXd Q, R;           ///< LQR weights (Bryson).
   Eigen::MatrixXd K;              ///< LQR gain, u = K (r - x).
   Eigen::MatrixXd K_delayed;      ///< The gain with the delay compensated (B.12); what is used.
-  Eigen::VectorXcd poles{};       ///< Closed-loop poles of A - B K.
+  Eigen::VectorXcd poles{};       ///< Of A - B K: of the design, which knows no delay.
   Eigen::MatrixXd kalman_gain{};  ///< Filter form (9.22).
   Eigen::VectorXcd estimator_poles{};
   Eigen::MatrixXd inversion{};  ///< B⁺ of the plant inversion u = B⁺ (r' - A r).
 
+  LoopBehavior loop{};        ///< As it runs.
+  bool feedback = true;       ///< Whether the gain makes a difference anywhere below Nyquist.
+  std::string no_feedback{};  ///< Why there is none.
   LoopMargins margins;
   std::vector<RobustnessPoint> robustness{};
   bool robust = false;  ///< Whether every point of the grid is stable.
@@ -150,7 +164,8 @@ struct DesignResult {
 
 /// Runs the job: discretise, LQR by Bryson's rule, delay compensation, steady-state Kalman gain,
 /// feedforward, margins, robustness grid, and a simulated trapezoid with noise, quantisation, delay
-/// and battery sag.
+/// and battery sag. A kA that is not determined is taken to be anything from 0 to its upper bound:
+/// margins and grid are checked over it, and the simulated mechanism has the upper bound.
 /// @errors ArgumentError for meaningless options; RiccatiError when no controller exists;
 ///         DesignError. With what was noticed before.
 [[nodiscard]] ExpectedAll<DesignResult> design(const DesignJob& job);

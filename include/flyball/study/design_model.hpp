@@ -30,7 +30,10 @@ struct ModelRegulator {
   Eigen::MatrixXd Q, R;           ///< Weights (Bryson).
   Eigen::MatrixXd K;              ///< u = u* + K (r - x).
   Eigen::MatrixXd K_delayed;      ///< With the delay compensated (B.12); what is used.
-  Eigen::VectorXcd poles{};       ///< Of A - B K.
+  Eigen::VectorXcd poles{};       ///< Of A - B K: of the design, which knows no delay.
+  Eigen::VectorXcd loop_poles{};  ///< Of the loop as it runs, with observer and delay, slowest
+                                  ///< first; empty where they cannot be told.
+  double time_constant = 0.0;     ///< s, of the slowest; infinite if the loop is not stable.
   bool observer = false;          ///< Whether the outputs are not the states.
   Eigen::MatrixXd kalman_gain{};  ///< Filter form (9.22), if there is an observer.
   Eigen::VectorXcd estimator_poles{};

@@ -5,7 +5,8 @@
 
 namespace flyball::study {
 
-/// The mechanism that a designed loop is tried on, as it differs from the model.
+/// The mechanism that a designed loop is tried on, as it differs from the model. A kA that is not
+/// determined is its upper bound.
 struct DesignTrial {
   double inertia_factor = 1.0;     ///< True inertia over the model's.
   double gain_factor = 1.0;        ///< True actuator gain over the model's.

@@ -49,7 +49,9 @@ void write_robustness(JsonWriter& json, const DesignResult& result) {
     json.add("worst_overshoot", result.worst_overshoot);
     json.list("grid", result.robustness, [&](const RobustnessPoint& point) {
       json.object([&] {
-        json.add({{"inertia_factor", point.inertia_factor}, {"gain_factor", point.gain_factor}});
+        json.add({{"inertia_factor", point.inertia_factor},
+                  {"kA", point.kA},
+                  {"gain_factor", point.gain_factor}});
         json.add("stable", point.stable);
         json.add({{"spectral_radius", point.spectral_radius}, {"overshoot", point.overshoot}});
       });
@@ -93,12 +95,20 @@ void write_design(JsonWriter& json, const DesignResult& result) {
   json.add("period", result.job.controller.period);
   json.add("delay", result.job.controller.delay.value_or(0.0));
   json.add("states", result.states);
-  json.add("input", result.velocity_servo ? "velocity" : "voltage");
+  json.add("input", "voltage");
   json.add("K", result.K);
   json.add("K_delay_compensated", result.K_delayed);
   json.add("kalman_gain", result.kalman_gain);
-  json.add("poles", result.poles);
+  json.add("poles", result.loop.poles);
+  json.add("design_poles", result.poles);
   json.add("estimator_poles", result.estimator_poles);
+  json.object("step", [&] {
+    json.add("time_constant", result.loop.time_constant);
+    json.add("rise_time", result.loop.rise_time);
+    json.add("settling_time", result.loop.settling_time);
+    json.add("overshoot", result.loop.overshoot);
+  });
+  json.add("feedback", result.feedback);
   write_feedforward(json, result);
   write_robustness(json, result);
   write_motion(json, result);
@@ -131,7 +141,13 @@ Verdict verdict_of(const DesignResult& result) {
   const LoopMargins& margins = result.margins;
   if (!result.robust) {
     verdict.add(Tone::bad,
-                "a mechanism that differs by 20 % from its model makes the loop unstable");
+                result.velocity_servo
+                    ? "a mechanism with a kA that is not ruled out, and a gain within 20 % of the "
+                      "model's, makes the loop unstable"
+                    : "a mechanism that differs by 20 % from its model makes the loop unstable");
+  }
+  if (!result.feedback) {
+    verdict.add(Tone::caution, "there is no feedback: " + result.no_feedback);
   }
   if (margins.gain_margin < thin_gain_margin) {
     verdict.add(Tone::caution,
@@ -147,10 +163,12 @@ Verdict verdict_of(const DesignResult& result) {
                             text::percent(result.worst_overshoot, 2)));
   }
   add_warnings(verdict, result.diagnostics, "of the design");
-  verdict.line = verdict.tone == Tone::good ? "The loop is stable and robust."
-                 : verdict.tone == Tone::bad
-                     ? "Do not run this controller as it is."
-                     : "The loop is stable; mind what follows before you run it.";
+  verdict.line =
+      verdict.tone == Tone::good  ? "The loop is stable and robust."
+      : verdict.tone == Tone::bad ? "Do not run this controller as it is."
+      : !result.feedback
+          ? "Feedforward alone drives the mechanism; mind what follows before you run it."
+          : "The loop is stable; mind what follows before you run it.";
   return verdict;
 }
 

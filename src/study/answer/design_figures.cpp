@@ -1,5 +1,6 @@
 // Pictures and tables of a designed loop.
 #include <algorithm>
+#include <cmath>
 #include <functional>
 
 #include <fmt/format.h>
@@ -101,13 +102,15 @@ Figure pole_figure(const DesignResult& result) {
     return std::vector<std::complex<double>>(values.begin(), values.end());
   };
   const std::string title = "Poles in the z plane";
-  return {"controller", "poles", title,
-          "Closed-loop and estimator poles with the unit circle; inside it is stable, nearer to "
-          "the origin is faster.",
-          pole_plot(title,
-                    {{"closed loop", list(result.poles), {}},
-                     {"estimator", list(result.estimator_poles), {}}},
-                    true)};
+  return {
+      "controller", "poles", title,
+      "Poles of the loop as it runs, with observer and delay, beside those of the design and of "
+      "the estimator; inside the unit circle is stable, nearer to the origin is faster.",
+      pole_plot(title,
+                {{"running loop", list(result.loop.poles), {}},
+                 {"undelayed design", list(result.poles), {}},
+                 {"estimator", list(result.estimator_poles), {}}},
+                true)};
 }
 
 }  // namespace
@@ -127,11 +130,13 @@ std::vector<AnswerFile> data_files(const DesignResult& result) {
     files.push_back({"data/closed_loop.csv", to_csv(result.response)});
   }
   if (!result.robustness.empty()) {
-    std::string grid = "inertia_factor,gain_factor,stable,spectral_radius,overshoot\n";
+    std::string grid = "inertia_factor,kA,gain_factor,stable,spectral_radius,overshoot\n";
     for (const RobustnessPoint& point : result.robustness) {
-      grid += fmt::format("{},{},{},{},{}\n", text::exact(point.inertia_factor),
-                          text::exact(point.gain_factor), point.stable ? "true" : "false",
-                          text::exact(point.spectral_radius), text::exact(point.overshoot));
+      grid += fmt::format("{},{},{},{},{},{}\n",
+                          std::isnan(point.inertia_factor) ? "" : text::exact(point.inertia_factor),
+                          text::exact(point.kA), text::exact(point.gain_factor),
+                          point.stable ? "true" : "false", text::exact(point.spectral_radius),
+                          text::exact(point.overshoot));
     }
     files.push_back({"data/robustness.csv", std::move(grid)});
   }

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -36,8 +37,13 @@ Table gain_table(std::string caption, std::string corner, const Eigen::MatrixXd&
 }
 
 std::string poles_text(const Eigen::VectorXcd& poles) {
+  constexpr std::size_t most = 12;
   std::vector<std::string> words;
   for (const std::complex<double>& pole : poles) {
+    if (words.size() == most) {
+      words.emplace_back("faster ones");
+      break;
+    }
     if (pole.imag() >= 0.0) {
       words.push_back(complex_number(pole));
     }
@@ -60,7 +66,11 @@ Section controller_section(const ModelDesign& result) {
   if (result.job.delay > 0.0) {
     facts.add("delay", text::seconds(result.job.delay));
   }
-  facts.add("poles", poles_text(regulator.poles));
+  if (regulator.loop_poles.size() > 0) {
+    facts.add("poles of the loop", poles_text(regulator.loop_poles));
+    facts.add("slowest time constant", text::seconds(regulator.time_constant));
+  }
+  facts.add("poles of A − B K", poles_text(regulator.poles));
   if (regulator.observer) {
     facts.add("observer's poles", poles_text(regulator.estimator_poles));
   }
@@ -96,6 +106,10 @@ Section plant_section(const ModelDesign& result) {
 
 Verdict verdict_of(const ModelDesign& result) {
   Verdict verdict;
+  add_warnings(verdict, result.regulator.diagnostics, "of the design");
+  if (!result.regulator.margins && std::isinf(result.regulator.time_constant)) {
+    verdict.add(Tone::bad, "with its delay the loop is unstable");
+  }
   if (const auto& margins = result.regulator.margins) {
     if (!margins->stable) {
       verdict.add(Tone::bad, "with its delay the loop is unstable");
@@ -126,15 +140,17 @@ Figure pole_figure(const ModelDesign& result) {
   const auto list = [](const Eigen::VectorXcd& values) {
     return std::vector<std::complex<double>>(values.begin(), values.end());
   };
-  std::vector<PolePlotGroup> groups{{"closed loop", list(result.regulator.poles), {}}};
+  std::vector<PolePlotGroup> groups{{"running loop", list(result.regulator.loop_poles), {}},
+                                    {"A − B K", list(result.regulator.poles), {}}};
   if (result.regulator.observer) {
     groups.push_back({"observer", list(result.regulator.estimator_poles), {}});
   }
   const std::string title = "Poles in the z plane";
-  return {"controller", "poles", title,
-          "Poles of the loop and of its observer with the unit circle; inside it is stable, nearer "
-          "to the origin is faster.",
-          pole_plot(title, groups, true)};
+  return {
+      "controller", "poles", title,
+      "Poles of the loop as it runs, with observer and delay, beside those of A − B K and of the "
+      "observer; inside the unit circle is stable, nearer to the origin is faster.",
+      pole_plot(title, groups, true)};
 }
 
 void write_margins(JsonWriter& json, const StabilityMargins& margins) {
@@ -193,7 +209,9 @@ Answer answer_of(const ModelDesign& result) {
     write_point(json, regulator.point);
     json.add("K", regulator.K);
     json.add("K_delay_compensated", regulator.K_delayed);
-    json.add("poles", regulator.poles);
+    json.add("poles", regulator.loop_poles);
+    json.add("time_constant", regulator.time_constant);
+    json.add("design_poles", regulator.poles);
     if (regulator.observer) {
       json.add("kalman_gain", regulator.kalman_gain);
       json.add("estimator_poles", regulator.estimator_poles);

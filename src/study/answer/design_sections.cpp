@@ -32,9 +32,8 @@ Coordinate state_of(const DesignResult& result, Eigen::Index i) {
                                    : Coordinate{.name = fmt::format("x{}", i + 1)};
 }
 
-std::string input_unit(const DesignResult& result) {
-  return result.velocity_servo ? result.job.plant.unit + "/s" : "V";
-}
+/// Of a loop with a long delay the slowest are shown, the others counted.
+constexpr Eigen::Index most_poles = 6;
 
 void add_poles(Table& table, const std::string& which, const Eigen::VectorXcd& poles,
                double period) {
@@ -42,6 +41,10 @@ void add_poles(Table& table, const std::string& which, const Eigen::VectorXcd& p
     const std::complex<double> pole = poles(i);
     if (pole.imag() < 0.0 && i > 0 && std::abs(poles(i - 1) - std::conj(pole)) < 1e-9) {
       continue;  // shown with its conjugate
+    }
+    if (i >= most_poles) {
+      table.rows.push_back({which, fmt::format("{} faster ones", poles.size() - i), "", ""});
+      break;
     }
     const double radius = std::abs(pole);
     const double settles = radius < 1.0 ? -period / std::log(radius) : INFINITY;
@@ -79,18 +82,21 @@ std::vector<double> distinct(const std::vector<RobustnessPoint>& points,
 
 Table robustness_table(const DesignResult& result) {
   const std::vector<double> gains = distinct(result.robustness, &RobustnessPoint::gain_factor);
+  const auto row_factor =
+      result.velocity_servo ? &RobustnessPoint::kA : &RobustnessPoint::inertia_factor;
   Table table;
   table.caption = "Overshoot of a small step if the mechanism is not as it was modelled:";
-  table.header = {"inertia"};
+  table.header = {result.velocity_servo ? fmt::format("kA (V·s²/{})", result.job.plant.unit)
+                                        : "inertia"};
   for (const double gain : gains) {
     table.header.push_back("gain × " + number(gain));
   }
-  for (const double inertia : distinct(result.robustness, &RobustnessPoint::inertia_factor)) {
-    std::vector<Value> row{"× " + number(inertia)};
+  for (const double inertia : distinct(result.robustness, row_factor)) {
+    std::vector<Value> row{(result.velocity_servo ? "" : "× ") + number(inertia)};
     for (const double gain : gains) {
       Value cell("");
       for (const RobustnessPoint& point : result.robustness) {
-        if (point.inertia_factor == inertia && point.gain_factor == gain) {
+        if (point.*row_factor == inertia && point.gain_factor == gain) {
           cell = point.stable ? Value(percent(point.overshoot, 2)) : Value("unstable", Tone::bad);
         }
       }
@@ -111,17 +117,21 @@ double largest(const TimeSeries& series, std::string_view column) {
   return found;
 }
 
+/// The kA that stands for one that is not determined.
+std::string kA_text(const PlantDescription& plant) {
+  return plant.kA_upper_bound > 0.0 ? fmt::format("kA at its upper bound, {} V·s²/{}",
+                                                  number(plant.kA_upper_bound), plant.unit)
+                                    : "no inertia";
+}
+
 Section plant_section(const DesignResult& result) {
   const PlantDescription& plant = result.job.plant;
   Section section{"plant", "Plant", {}};
   Facts facts = plant_facts(plant);
   facts.add("states", enumerate(labels(result.states)));
-  facts.add("input",
-            result.velocity_servo
-                ? fmt::format("velocity ({0}/s); the volts are kS sgn(u) + kV u{1} "
-                              "(Theorem 14.3.2)",
-                              plant.unit, plant.kind == MechanismKind::flywheel ? "" : " + gravity")
-                : "voltage (V)");
+  facts.add("input", result.velocity_servo
+                         ? "voltage (V), which the velocity follows (Theorem 14.3.2)"
+                         : "voltage (V)");
   facts.add("continuous", fmt::format("A = {}, B = {}", matrix(result.A_continuous),
                                       matrix(result.B_continuous)));
   facts.add("discrete",
@@ -137,14 +147,11 @@ Section controller_section(const DesignResult& result) {
   const bool has_gravity = plant.kind != MechanismKind::flywheel;
   const double delay = controller.delay.value_or(0.0);
   Section section{"controller", "Controller", {}};
-  section.blocks.emplace_back(
-      Paragraph{fmt::format("Every {}: u = K (r − x̂) + B⁺ (r_next − A r){}, limited to ±{} V; x̂ is "
-                            "predicted by the plant and corrected by the measured {}.",
-                            seconds(controller.period),
-                            result.velocity_servo ? ", then volts = kV u + kS sgn + gravity"
-                            : has_gravity         ? " + kS sgn(v) + gravity"
-                                                  : " + kS sgn(v)",
-                            number(controller.max_voltage), measured_name(plant.kind))});
+  section.blocks.emplace_back(Paragraph{fmt::format(
+      "Every {}: u = K (r − x̂) + B⁺ (r_next − A r){}, limited to ±{} V; x̂ is "
+      "predicted by the plant and corrected by the measured {}.",
+      seconds(controller.period), has_gravity ? " + kS sgn(v) + gravity" : " + kS sgn(v)",
+      number(controller.max_voltage), measured_name(plant.kind))});
   Table table;
   const bool delayed = result.K_delayed.size() > 0 && delay > 0.0;
   table.header = {"state", "tolerance", "K"};
@@ -174,9 +181,9 @@ Section controller_section(const DesignResult& result) {
   section.blocks.emplace_back(std::move(table));
 
   Facts facts;
-  facts.add("units", fmt::format("K and B⁺: {} per unit of the state; Kalman gain: unit of the "
+  facts.add("units", fmt::format("K and B⁺: V per unit of the state; Kalman gain: unit of the "
                                  "state per {}",
-                                 input_unit(result), controlled_unit(plant)));
+                                 controlled_unit(plant)));
   if (delayed) {
     facts.add("used", fmt::format("the gain for a state that is {} old (B.12)", seconds(delay)));
   } else if (controller.delay) {
@@ -193,15 +200,48 @@ Section controller_section(const DesignResult& result) {
 
   Table poles;
   poles.header = {"poles", "z", "|z|", "time constant"};
-  add_poles(poles, "closed loop", result.poles, controller.period);
+  add_poles(poles, "loop as it runs", result.loop.poles, controller.period);
+  add_poles(poles, delayed ? "design, no delay" : "design", result.poles, controller.period);
   add_poles(poles, "estimator", result.estimator_poles, controller.period);
   section.blocks.emplace_back(std::move(poles));
+
+  Facts step;
+  const auto time = [](const std::optional<double>& value) {
+    return value ? seconds(*value) : std::string("not reached");
+  };
+  step.add("rise time", time(result.loop.rise_time) + ", 10 % to 90 %");
+  step.add("settling time", time(result.loop.settling_time) + ", within 2 %");
+  step.add("overshoot", percent(result.loop.overshoot, 2));
+  section.blocks.emplace_back(Paragraph{fmt::format(
+      "A small step of the loop as it runs, with its {}{}; it reaches no limit:",
+      delayed ? "observer and delay" : "observer",
+      result.velocity_servo ? fmt::format(", on a mechanism with {}", kA_text(plant)) : "")});
+  section.blocks.emplace_back(std::move(step));
   return section;
+}
+
+/// Over which kA the margins are the smallest.
+std::string checked_kA(const DesignResult& result) {
+  const PlantDescription& plant = result.job.plant;
+  if (!result.velocity_servo) {
+    return "";
+  }
+  return plant.kA_upper_bound > 0.0 ? fmt::format(", the smallest over kA from 0 to {} V·s²/{}",
+                                                  number(plant.kA_upper_bound), plant.unit)
+                                    : ", of a mechanism with no inertia";
 }
 
 Section robustness_section(const DesignResult& result) {
   const LoopMargins& margins = result.margins;
   Section section{"robustness", "Robustness", {}};
+  if (!result.feedback) {
+    section.blocks.emplace_back(Paragraph{
+        fmt::format("There is no feedback: {}. Nothing can make the loop unstable, and nothing "
+                    "corrects it: there are no margins.",
+                    result.no_feedback),
+        Tone::caution});
+    return section;
+  }
   Facts facts;
   facts.add(
       "gain margin",
@@ -225,8 +265,8 @@ Section robustness_section(const DesignResult& result) {
                      0.25 * result.job.controller.period));
   facts.add("disk margin", number(margins.disk_margin, 3),
             tone_of_margin(margins.disk_margin, 0.5, 0.3));
-  section.blocks.emplace_back(
-      Paragraph{"Of the loop opened at the plant input, with the delay in it:"});
+  section.blocks.emplace_back(Paragraph{fmt::format(
+      "Of the loop opened at the plant input, with the delay in it{}:", checked_kA(result))});
   section.blocks.emplace_back(std::move(facts));
   if (!result.robustness.empty()) {
     section.blocks.emplace_back(robustness_table(result));
@@ -250,8 +290,10 @@ Section motion_section(const DesignResult& result) {
   facts.add("voltage reserve",
             fmt::format("{} V of {} V kept back for feedback", number(motion.voltage_reserve),
                         number(result.job.controller.max_voltage)));
-  facts.add("simulated", fmt::format("to {} {} in {}", number(motion.goal), controlled_unit(plant),
-                                     seconds(motion.duration)));
+  facts.add("simulated",
+            fmt::format("to {} {} in {}{}", number(motion.goal), controlled_unit(plant),
+                        seconds(motion.duration),
+                        result.velocity_servo ? fmt::format(", with {}", kA_text(plant)) : ""));
   facts.add("tracking error",
             fmt::format("{} {} RMS, {} {} at most", number(result.tracking_error_rms, 3),
                         controlled_unit(plant), number(result.tracking_error_max, 3),

@@ -1,0 +1,194 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <flyball/control/running_loop.hpp>
+#include <flyball/math/dense/linear_algebra.hpp>
+
+#include "core/diagnose.hpp"
+#include "core/try.hpp"
+#include "core/wording.hpp"
+#include "study/design_steps.hpp"
+
+// What a designed loop does when it runs, and what its delay costs.
+namespace flyball::study {
+
+namespace {
+
+using mechanisms::MechanismKind;
+
+// What the loop is shown on: the model; without kA a mechanism with the upper bound.
+Expected<ContinuousSystem<>> shown_plant(const LinearModel& model, const DesignJob& job) {
+  FLYBALL_TRY(auto plants, possible_plants(model, job.plant));
+  return std::move(plants.back().system);
+}
+
+Time delay_of(const DesignJob& job) {
+  return Time(job.controller.delay.value_or(0.0));
+}
+
+// What a step of the first reference adds to the input: the first column of K + B⁺ (I - A).
+Eigen::MatrixXd step_input(const LinearModel& model, const Eigen::MatrixXd& K,
+                           const Eigen::MatrixXd& inversion) {
+  const Eigen::Index n = model.discrete.A.rows();
+  const Eigen::MatrixXd I_A = Eigen::MatrixXd::Identity(n, n) - model.discrete.A;
+  return (K + inversion * I_A).leftCols(1);
+}
+
+std::string margins_text(const StabilityMargins& margins) {
+  return fmt::format("a gain margin of {} and a phase margin of {}°",
+                     format_number(margins.gain_margin_up, 3),
+                     format_number(margins.phase_margin, 3));
+}
+
+/// A regulator that could be had instead.
+struct Alternative {
+  std::vector<double> tolerances;
+  double time_constant = INFINITY;
+  StabilityMargins margins;
+};
+
+// The delay's inputs in the regulator, at the tightest of the tolerances times 1.25^k with
+// comfortable margins.
+Expected<std::optional<Alternative>> with_prediction(const LinearModel& model, const DesignJob& job,
+                                                     const std::vector<double>& tolerances,
+                                                     double slower) {
+  constexpr double most_periods = 25.0;  // each is a state of the regulator
+  const double T = job.controller.period;
+  if (!(delay_of(job).si() <= most_periods * T)) {
+    return std::nullopt;
+  }
+  FLYBALL_TRY(const auto truth, shown_plant(model, job));
+  const ContinuousSystem<> believed{model.A, model.B, model.C, Eigen::MatrixXd::Zero(1, 1)};
+  DesignJob prompt = job;
+  prompt.controller.delay = 0.0;
+  std::vector<double> looser = tolerances;
+  constexpr int steps = 40;
+  constexpr double step = 1.25;
+  for (int i = 0; i < steps; ++i) {
+    FLYBALL_TRY(const auto loop, feedback_of(model, prompt, looser));
+    FLYBALL_TRY(const auto made,
+                predicting_regulator(believed, Time(T), loop.K, loop.kalman_gain, delay_of(job)));
+    FLYBALL_TRY(const auto running,
+                running_loop(truth, made.model, made.K, made.K_e, delay_of(job)));
+    LoopDesign judged;
+    FLYBALL_CHECK(judge(judged, model, job, made.model, made.K, made.K_e));
+    if (is_comfortable(judged)) {
+      return running.time_constant < slower
+                 ? std::optional(Alternative{looser, running.time_constant, judged.margins})
+                 : std::nullopt;
+    }
+    for (double& tolerance : looser) {
+      tolerance *= step;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Expected<LoopBehavior> behavior_of(const LoopDesign& loop, const LinearModel& model,
+                                   const DesignJob& job) {
+  FLYBALL_TRY(const auto truth, shown_plant(model, job));
+  FLYBALL_TRY(auto running,
+              running_loop(truth, model.discrete, loop.K_delayed, loop.kalman_gain, delay_of(job)));
+  LoopBehavior behavior{.poles = running.poles, .time_constant = running.time_constant};
+  if (!std::isfinite(running.time_constant)) {
+    return behavior;
+  }
+  FLYBALL_TRY(const auto step, step_of(running, step_input(model, loop.K_delayed, loop.inversion)));
+  behavior.rise_time = step.metrics.rise_time_10_90;
+  behavior.settling_time = step.metrics.settling_time;
+  behavior.overshoot = step.metrics.overshoot;
+  return behavior;
+}
+
+Expected<void> tell_cost_of_delay(const LoopDesign& loop, const LoopBehavior& runs,
+                                  const LinearModel& model, const DesignJob& job, bool chosen,
+                                  std::vector<Diagnostic>& diagnostics) {
+  const double T = job.controller.period;
+  FLYBALL_TRY(const auto truth, shown_plant(model, job));
+  FLYBALL_TRY(const auto undelayed,
+              running_loop(truth, model.discrete, loop.K, loop.kalman_gain, Time(0.0)));
+  const double prompt = undelayed.time_constant;
+  // Half the speed; nothing faster than a period can be told apart at the samples.
+  constexpr double share = 0.5;
+  const double slower = std::max(prompt, T) / share;
+  if (delay_of(job).si() == 0.0 || !(runs.time_constant > slower)) {
+    return {};
+  }
+  const std::vector<double> start =
+      chosen ? default_tolerances(job.plant, loop.tolerances.size()) : loop.tolerances;
+  std::vector<std::string> faster;
+  const double clearly = share * runs.time_constant;
+  if (!chosen) {
+    std::vector<double> tolerances;
+    if (const auto other = search_tolerances(model, job, tolerances)) {
+      FLYBALL_TRY(const auto behavior, behavior_of(*other, model, job));
+      if (behavior.time_constant < clearly) {
+        faster.push_back(
+            fmt::format("leave controller.state_tolerance out, and the looser {} that "
+                        "are chosen give {}",
+                        tolerances_text(model, tolerances), text::seconds(behavior.time_constant)));
+      }
+    }
+  }
+  if (const auto found = with_prediction(model, job, start, clearly); found && *found) {
+    const std::optional<Alternative>& other = *found;
+    faster.push_back(fmt::format(
+        "a regulator that knows the inputs on their way (DelayPredictor of "
+        "<flyball/control/delay_compensation.hpp>; the exported loop has none) gives {} with "
+        "tolerances of {}, {}",
+        text::seconds(other->time_constant), tolerances_text(model, other->tolerances),
+        margins_text(other->margins)));
+  }
+  warn(diagnostics, "delay_costs_speed",
+       "the delay of {} costs {} of the loop's speed, more than half: its slowest time constant is "
+       "{}, that of the same design without delay {}{}{}",
+       text::seconds(delay_of(job).si()), text::percent(1.0 - prompt / runs.time_constant, 2),
+       text::seconds(runs.time_constant), text::seconds(prompt), faster.empty() ? "" : "; ",
+       fmt::join(faster, "; "));
+  return {};
+}
+
+Expected<std::string> why_no_feedback(const LoopDesign& loop, const LinearModel& model,
+                                      const DesignJob& job) {
+  const double T = job.controller.period;
+  FLYBALL_TRY(const auto opened,
+              observer_regulator_loop(model.A, model.B, model.C, model.discrete, loop.K_delayed,
+                                      loop.kalman_gain, delay_of(job)));
+  // A loop gain below a hundredth changes no error by more than a hundredth.
+  constexpr double no_gain = 0.01;
+  const double nyquist = std::numbers::pi / T;
+  for (double decade = -6.0; decade <= 0.0; decade += 0.125) {
+    FLYBALL_TRY(const auto gain, loop_response(opened, nyquist * std::pow(10.0, decade)));
+    if (std::abs(gain) >= no_gain) {
+      return std::string();
+    }
+  }
+  const PlantDescription& plant = job.plant;
+  if (!plant.kA_determined) {
+    return fmt::format(
+        "kA is not known, so the {} is taken to follow its voltage within a period: "
+        "an error that is measured has passed before a voltage can act on it",
+        to_string(plant.kind));
+  }
+  const double constant = plant.gains.kA / plant.gains.kV;
+  const double late = T + delay_of(job).si();
+  if (constant < late) {
+    return fmt::format(
+        "the {} answers a voltage with a time constant of {}, and a measurement acts "
+        "{} late (period and delay): an error has passed by then",
+        to_string(plant.kind), text::seconds(constant), text::seconds(late));
+  }
+  return fmt::format("the tolerances ask for none: {} beside {} V of input",
+                     tolerances_text(model, loop.tolerances),
+                     format_number(job.controller.input_tolerance, 4));
+}
+
+}  // namespace flyball::study
