@@ -16,12 +16,12 @@ struct Open {
   std::unordered_set<std::string> keys{};
 };
 
-/// Where a string ends, behind its quotes. @param at  Where it begins.
+/// Where a string ends, behind its quotes; npos if it is cut off. @param at  Where it begins.
 std::size_t end_of_string(std::string_view json, std::size_t at) {
   for (++at; at < json.size() && json[at] != '"'; ++at) {
     at += json[at] == '\\' ? 1 : 0;
   }
-  return std::min(at + 1, json.size());
+  return at < json.size() ? at + 1 : std::string_view::npos;
 }
 
 /// What a string says: "\\u0041" is "A".
@@ -32,7 +32,7 @@ std::string said_by(std::string_view quoted) {
       return value.get<std::string>();
     }
   }
-  return std::string(quoted.substr(1, quoted.size() - std::min<std::size_t>(quoted.size(), 2)));
+  return std::string(quoted.substr(1, quoted.size() - 2));
 }
 
 }  // namespace
@@ -56,6 +56,9 @@ std::optional<RepeatedKey> repeated_key(std::string_view json) {
     const char c = json[at];
     if (c == '"') {
       const std::size_t end = end_of_string(json, at);
+      if (end == std::string_view::npos) {
+        break;
+      }
       if (key_follows) {
         std::string key = said_by(json.substr(at, end - at));
         if (!open.back().keys.insert(key).second) {

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <new>
 #include <optional>
 #include <utility>
 
@@ -59,7 +60,31 @@ std::string complaint(std::string_view text, std::size_t byte) {
   return "not JSON";
 }
 
+/// Asks for the memory that the values of a text need at most, and gives it back. The parser itself
+/// would end the process if it found out in the middle: see TakenApart.
+void check_memory(std::string_view text) {
+  constexpr std::size_t small = 65536;
+  constexpr std::size_t each = 4 * sizeof(Json);  // old and new elements of a vector that grows
+  if (text.size() > small) {
+    const auto values = static_cast<std::size_t>(std::count_if(
+        text.begin(), text.end(), [](char c) { return c == ',' || c == '[' || c == '{'; }));
+    ::operator delete(::operator new(text.size() + each * values));
+  }
+}
+
 }  // namespace
+
+void TakenApart::clear(Json& value) noexcept {
+  if (auto* array = value.get_ptr<Json::array_t*>()) {
+    std::for_each(array->begin(), array->end(), &TakenApart::clear);
+    array->clear();
+  } else if (auto* object = value.get_ptr<Json::object_t*>()) {
+    for (auto& member : *object) {
+      clear(member.second);
+    }
+    object->clear();
+  }
+}
 
 Expected<Json> parse_object(std::string_view text, std::string_view where, std::string_view what) {
   constexpr int deepest = 64;
@@ -67,6 +92,7 @@ Expected<Json> parse_object(std::string_view text, std::string_view where, std::
     return malformed(where, what, fmt::format("{} brackets within each other", depth),
                      fmt::format("at most {}", deepest));
   }
+  check_memory(text);
   constexpr const char* example = "one JSON object, such as {\"A\": [[0, 1], [0, -2]], …}";
   try {
     Json object = Json::parse(text);

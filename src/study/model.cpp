@@ -68,7 +68,8 @@ std::span<const solve::Field> model_fields() {
 }
 
 Expected<ModelFile> parse_matrices(std::string_view text, const std::string& name) {
-  FLYBALL_TRY(const auto object, solve::parse_object(text, name, "model"));
+  FLYBALL_TRY(auto object, solve::parse_object(text, name, "model"));
+  const solve::TakenApart taken_apart(object);
   FLYBALL_TRY(const auto fields, solve::Problem::read(object, model_fields(), name));
   ModelFile model;
   model.path = name;

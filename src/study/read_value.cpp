@@ -177,6 +177,12 @@ ExpectedAll<FieldValue> read_value(const Field& field, const toml::node& node,
   return FieldValue{};
 }
 
+/// Whether a field is a number without a unit.
+bool is_plain(const Field& field) {
+  return field.type == FieldType::quantity && field.dimension.of == FieldDimension::fixed &&
+         field.dimension.dimension == Dimension::dimensionless;
+}
+
 void insert_text(toml::table& table, const Field& field, std::string_view text) {
   if (field.type == FieldType::map) {
     // NAME=VALUE,… stands beside the file's own; a comma in parentheses is a formula's.
@@ -207,8 +213,7 @@ void insert_text(toml::table& table, const Field& field, std::string_view text) 
   } else if (const auto whole = number_in<long long>(text);
              field.type == FieldType::whole && whole) {
     table.insert_or_assign(field.key, *whole);
-  } else if (const auto number = number_in<double>(text);
-             field.type == FieldType::quantity && number) {
+  } else if (const auto number = number_in<double>(text); is_plain(field) && number) {
     table.insert_or_assign(field.key, *number);
   } else if (field.type == FieldType::flag && (text == "true" || text == "false")) {
     table.insert_or_assign(field.key, text == "true");

@@ -69,7 +69,7 @@ TEST_F(AnalyzeCommand, TheMechanismOfAProject) {
   EXPECT_EQ(
       json.at("states"),
       Json::parse(R"j([{"name": "position", "unit": "m"}, {"name": "velocity", "unit": "m/s"}])j"));
-  EXPECT_EQ(json.at("inputs"), Json::parse(R"j(["voltage (V)"])j"));
+  EXPECT_EQ(json.at("inputs"), Json::parse(R"j([{"name": "voltage", "unit": "V"}])j"));
   EXPECT_EQ(json.at("T"), 0.02);
   const double pole = json.at("poles").at(1).at(0).get<double>();
   EXPECT_NEAR(json.at("sampled").at("poles").at(1).at(0).get<double>(), std::exp(0.02 * pole),

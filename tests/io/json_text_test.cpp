@@ -31,7 +31,9 @@ TEST(RepeatedKey, IsFoundInEachObjectAlone) {
   EXPECT_EQ(at(R"({"A":["A","A"],"C":"A"})"), -1);  // values
   EXPECT_EQ(at(R"({"A":",\"A\":","B":1})"), -1);    // in a text
   EXPECT_EQ(at(R"({"A":1,"\u0041":1})"), 7);        // the same letter
-  EXPECT_EQ(at(R"({"A":1,"A)"), 7);                 // cut off
+  EXPECT_EQ(at(R"({"A":1,"A":)"), 7);               // cut off
+  EXPECT_EQ(at(R"({"unit":1,"units)"), -1);         // in the key
+  EXPECT_EQ(at(R"({"unit":1,"unit)"), -1);
   EXPECT_EQ(at(R"(}]"A":1,"A":1)"), -1);
   const std::string deep(1'000'000, '[');
   EXPECT_EQ(at(deep + R"({"A":1,"A":1})"), -1);

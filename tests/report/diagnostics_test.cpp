@@ -126,7 +126,7 @@ TEST(Diagnostics, OfAnIdentification) {
 TEST(Diagnostics, OfARefusedIdentification) {
   const Answer answer = study::answer_of(noted(refused_result()));
   ASSERT_TRUE(answer.refusal);
-  expect_nothing_lost(answer, {"source", "fit", "design"});
+  expect_nothing_lost(answer, {"source", "fit"});
 }
 
 TEST(Diagnostics, OfADesign) {
@@ -149,7 +149,7 @@ TEST(Diagnostics, OfATuningWithoutADesign) {
                                       .after(of_every_severity("design")));
   const Answer answer = study::answer_of(refused);
   ASSERT_TRUE(answer.refusal && answer.refusal->is(study::DesignError::gravity_too_strong));
-  expect_nothing_lost(answer, {"source", "fit"});
+  expect_nothing_lost(answer, {"source", "fit", "design"});
 }
 
 TEST(Diagnostics, OfAnAnalysis) {
