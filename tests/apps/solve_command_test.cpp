@@ -203,8 +203,9 @@ TEST_F(SolveCommand, ManyAndLongLines) {
   const Answer answer = run("solve expm", "problems");
   EXPECT_EQ(answer.status, 0);
   EXPECT_EQ(std::count(answer.out.begin(), answer.out.end(), '\n'), 100000);
-  EXPECT_TRUE(
-      answer.out.ends_with("{\"id\":99999,\"X\":[[" + Json(std::exp(99999 % 7)).dump() + "]]}\n"));
+  const std::string last = answer.out.substr(answer.out.rfind('\n', answer.out.size() - 2) + 1);
+  EXPECT_TRUE(last.starts_with("{\"id\":99999,\"X\":[[" + Json(std::exp(99999 % 7)).dump() + "]],"))
+      << last;
 
   std::string row = "1";
   for (int k = 0; k < 5'000'000; ++k) {

@@ -209,7 +209,7 @@ TEST(SolveSystems, InterconnectionsAreRefused) {
   const Json shapes = answer("series", R"({"first":{"A":[[-1,0],[0,-1]],"B":[[1],[1]]},)"
                                        R"("second":{"A":[[-2]],"B":[[2]]}})");
   EXPECT_EQ(shapes.at("error").at("code"), "wrong_shape");
-  EXPECT_EQ(shapes.at("error").at("message"), 
+  EXPECT_EQ(shapes.at("error").at("message"),
             "series: second.B is 1x1; it must be states of the second system (back) x signals "
             "from the first system to the second (1x2)");
   EXPECT_EQ(refusal("parallel", R"({"first":{"A":[[-1]],"B":[[1,1]]},)"

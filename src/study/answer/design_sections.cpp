@@ -272,7 +272,7 @@ Section robustness_section(const DesignResult& result) {
     section.blocks.emplace_back(robustness_table(result));
     section.blocks.emplace_back(
         result.robust ? Paragraph{fmt::format("Stable in the whole grid, worst overshoot {}.",
-                                              percent(result.worst_overshoot, 2)),
+                                              percent(result.worst_overshoot, 3)),
                                   Tone::good}
                       : Paragraph{"Not stable in the whole grid.", Tone::bad});
   }
