@@ -96,6 +96,11 @@ std::string nearest_name(std::string_view wanted, std::span<const std::string_vi
   std::string_view best;
   std::size_t best_distance = std::max<std::size_t>(2, wanted.size() / 3) + 1;
   for (const std::string_view name : names) {
+    // As many letters as one is longer, at least: long texts are not compared letter by letter.
+    if (std::max(name.size(), wanted.size()) - std::min(name.size(), wanted.size()) >=
+        best_distance) {
+      continue;
+    }
     const std::size_t distance = edit_distance(folded, lower(name));
     if (distance < best_distance && distance < name.size()) {
       best_distance = distance;
