@@ -131,8 +131,14 @@ Expected<std::optional<Flow>> flow_over(const Eigen::MatrixXd& A, const Eigen::M
   const Eigen::Index n = A.rows();
   Eigen::MatrixXd H(2 * n, 2 * n);
   H << A, -G, -Q, -A.transpose();
+  const double whole = detail::norm1(H) * h;
+  if (!std::isfinite(whole)) {
+    return refusal(RiccatiError::overflow, "continuous_finite_horizon_lqr", "the Hamiltonian")
+        .got("beyond the range of a double")
+        .hint("choose units in which the numbers are nearer to 1");
+  }
   int doublings = 0;
-  for (double size = detail::norm1(H) * h; size > 0.5; size *= 0.5) {
+  for (double size = whole; size > 0.5; size *= 0.5) {
     ++doublings;
   }
   FLYBALL_TRY(const auto exponential, expm(H * std::ldexp(-h, -doublings)));

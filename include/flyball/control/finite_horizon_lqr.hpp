@@ -50,7 +50,8 @@ struct FiniteHorizonLqr {
 /// @param A, B  Continuous. @param cost  R positive definite. @param horizon  T, s.
 /// @param steps  >= 1.
 /// @errors As the discrete one; RiccatiError::singular where R is not positive definite or S grows
-///         without bound within the horizon (a conjugate point, for an indefinite Q or S_T).
+///         without bound within the horizon (a conjugate point, for an indefinite Q or S_T);
+///         RiccatiError::overflow where A, BR⁻¹Bᵀ or Q exceed a double over a step.
 /// Cost: O(n³) a step and O(n³ log ‖H‖T/steps) once. Source: Davison and Maki, IEEE Trans.
 /// Automatic Control 18 (1973); doubling: Anderson, Int. J. Control 28 (1978).
 [[nodiscard]] Expected<FiniteHorizonLqr> continuous_finite_horizon_lqr(const MatrixRef& A,
