@@ -7,6 +7,7 @@
 
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/extended/double_double.hpp"
 #include "systems/balance.hpp"
 #include "systems/gramian_factor.hpp"
 #include "systems/staircase.hpp"
@@ -46,12 +47,20 @@ Expected<Continuous> transform(const Continuous& system, const MatrixRef& T) {
     unit.col(j) /= columns(j);
   }
   MatrixXd right(n, n + system.B.cols());
-  right << rows.cwiseInverse().asDiagonal() * product(system.A, T),
+  // A T itself may be nothing or too much where A' is neither.
+  right << product(rows.cwiseInverse().asDiagonal() * system.A * rows.asDiagonal(), unit),
       rows.cwiseInverse().asDiagonal() * system.B;
   double rcond = 0.0;
-  const MatrixXd solved =
-      columns.cwiseInverse().asDiagonal() * detail::solve_linear(unit, right, &rcond);
-  if (!(rcond > 10.0 * epsilon) || !solved.allFinite()) {
+  (void)detail::solve_linear(unit, right.leftCols(0), &rcond);
+  // In twice the precision: what is left of each row's equations is little beside the row's terms.
+  const auto fine =
+      detail::solve(detail::DoubleDoubleMatrix(unit), detail::DoubleDoubleMatrix(right));
+  MatrixXd solved =
+      fine ? MatrixXd(columns.cwiseInverse().asDiagonal() * fine->rounded()) : MatrixXd();
+  if (fine) {
+    solved.leftCols(n) *= columns.asDiagonal();
+  }
+  if (!(rcond > 10.0 * epsilon) || !fine || !solved.allFinite()) {
     return refusal(SystemError::singular_transform, where, "T")
         .got("singular")
         .expected("invertible")
