@@ -1,7 +1,7 @@
 #include <algorithm>
-#include <new>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -60,58 +60,112 @@ std::string complaint(std::string_view text, std::size_t byte) {
   return "not JSON";
 }
 
-/// Asks for the memory that the values of a text need at most, and gives it back. The parser itself
-/// would end the process if it found out in the middle: see TakenApart.
-void check_memory(std::string_view text) {
-  constexpr std::size_t small = 65536;
-  constexpr std::size_t each = 4 * sizeof(Json);  // old and new elements of a vector that grows
-  if (text.size() > small) {
-    const auto values = static_cast<std::size_t>(std::count_if(
-        text.begin(), text.end(), [](char c) { return c == ',' || c == '[' || c == '{'; }));
-    ::operator delete(::operator new(text.size() + each * values));
+/// Empties a value from its leaves, so that no destructor meets one that holds something.
+void empty(Json& value) noexcept {
+  if (value.is_structured()) {
+    for (Json& element : value) {
+      empty(element);
+    }
+    value.clear();
   }
 }
+
+/// Builds a value where it will stay.
+class Builder : public nlohmann::json_sax<Json> {
+ public:
+  explicit Builder(Json& root) : root_(root) {}
+
+  bool null() override { return put(nullptr); }
+  bool boolean(bool value) override { return put(value); }
+  bool number_integer(number_integer_t value) override { return put(value); }
+  bool number_unsigned(number_unsigned_t value) override { return put(value); }
+  bool number_float(number_float_t value, const string_t& /*text*/) override { return put(value); }
+  bool string(string_t& value) override { return put(std::move(value)); }
+  bool binary(binary_t& /*value*/) override { return false; }
+  bool start_object(std::size_t /*size*/) override { return start(Json::value_t::object); }
+  bool start_array(std::size_t /*size*/) override { return start(Json::value_t::array); }
+  bool end_object() override { return end(); }
+  bool end_array() override { return end(); }
+  bool key(string_t& name) override {
+    key_ = std::move(name);
+    return true;
+  }
+  bool parse_error(std::size_t byte, const std::string& /*token*/,
+                   const Json::exception& problem) override {
+    byte_ = byte;
+    out_of_range_ = dynamic_cast<const Json::out_of_range*>(&problem) != nullptr;
+    return false;
+  }
+
+  [[nodiscard]] std::size_t byte() const { return byte_; }
+  [[nodiscard]] bool out_of_range() const { return out_of_range_; }
+
+ private:
+  template <class Value>
+  Json& add(Value&& value) {
+    if (open_.empty()) {
+      return root_ = std::forward<Value>(value);
+    }
+    Json& parent = *open_.back();
+    if (parent.is_array()) {
+      parent.push_back(std::forward<Value>(value));
+      return parent.back();
+    }
+    return parent[key_] = std::forward<Value>(value);
+  }
+  template <class Value>
+  bool put(Value&& value) {
+    add(std::forward<Value>(value));
+    return true;
+  }
+  bool start(Json::value_t type) {
+    open_.push_back(&add(Json(type)));
+    return true;
+  }
+  bool end() {
+    open_.pop_back();
+    return true;
+  }
+
+  Json& root_;
+  std::vector<Json*> open_;  ///< A value does not move while something in it is open.
+  std::string key_;
+  std::size_t byte_ = 0;
+  bool out_of_range_ = false;
+};
 
 }  // namespace
 
-void TakenApart::clear(Json& value) noexcept {
-  if (auto* array = value.get_ptr<Json::array_t*>()) {
-    std::for_each(array->begin(), array->end(), &TakenApart::clear);
-    array->clear();
-  } else if (auto* object = value.get_ptr<Json::object_t*>()) {
-    for (auto& member : *object) {
-      clear(member.second);
-    }
-    object->clear();
-  }
+JsonObject::~JsonObject() {
+  empty(value_);
 }
 
-Expected<Json> parse_object(std::string_view text, std::string_view where, std::string_view what) {
+Expected<JsonObject> parse_object(std::string_view text, std::string_view where,
+                                  std::string_view what) {
   constexpr int deepest = 64;
   if (const int depth = depth_of(text); depth > deepest) {
     return malformed(where, what, fmt::format("{} brackets within each other", depth),
                      fmt::format("at most {}", deepest));
   }
-  check_memory(text);
   constexpr const char* example = "one JSON object, such as {\"A\": [[0, 1], [0, -2]], …}";
-  try {
-    Json object = Json::parse(text);
-    if (!object.is_object()) {
-      return malformed(where, what, kind_of(object), example);
+  JsonObject object;
+  Builder builder(object.json());
+  if (!Json::sax_parse(text, &builder)) {
+    if (builder.out_of_range()) {
+      return malformed(where, what, "not to be read: a number is beyond 1.8e308",
+                       "numbers that a double holds");
     }
-    if (const auto repeated = repeated_key(text)) {
-      return malformed(where, what,
-                       fmt::format("an object with the key \"{}\" twice", repeated->key),
-                       "an object with each key once", place_of(text, repeated->at));
-    }
-    return object;
-  } catch (const Json::parse_error& problem) {
-    return malformed(where, what, complaint(text, problem.byte), example,
-                     place_of(text, problem.byte - 1));
-  } catch (const Json::exception&) {
-    return malformed(where, what, "not to be read: a number is beyond 1.8e308",
-                     "numbers that a double holds");
+    return malformed(where, what, complaint(text, builder.byte()), example,
+                     place_of(text, builder.byte() - 1));
   }
+  if (!object.json().is_object()) {
+    return malformed(where, what, kind_of(object.json()), example);
+  }
+  if (const auto repeated = repeated_key(text)) {
+    return malformed(where, what, fmt::format("an object with the key \"{}\" twice", repeated->key),
+                     "an object with each key once", place_of(text, repeated->at));
+  }
+  return object;
 }
 
 }  // namespace flyball::solve

@@ -51,7 +51,8 @@ bool is_bounded(const Json& value) {
 
 /// Refuses an answer in which a number overflowed where its kind's row has no place for that.
 Expected<void> check_answer(const std::string& answer, const Kind& kind) {
-  const Json json = Json::parse(answer);
+  FLYBALL_TRY(const JsonObject object, parse_object(answer, kind.name, "answer"));
+  const Json& json = object.json();
   for (const Field& field : kind.answer) {
     const auto found = json.find(field.name);
     if (!field.unbounded && found != json.end() && !is_bounded(*found)) {
@@ -103,16 +104,17 @@ bool Solver::is_complete(std::string_view text) {
 }
 
 Answer Solver::solve(std::string_view text) const {
-  Expected<Json> object{};
+  Expected<JsonObject> object{};
   const Json* id = nullptr;
   try {
     object = parse_object(text, kind_->name, "problem");
     if (!object) {
       return refused(nullptr, object.error());
     }
-    const auto found = object->find("id");
-    id = found == object->end() ? nullptr : &*found;
-    return answer_to(*object, id, *kind_);
+    const Json& json = object->json();
+    const auto found = json.find("id");
+    id = found == json.end() ? nullptr : &*found;
+    return answer_to(json, id, *kind_);
   } catch (const std::bad_alloc&) {
     return refused(id, not_enough_memory("this problem"));
   }

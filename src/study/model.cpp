@@ -67,10 +67,9 @@ std::span<const solve::Field> model_fields() {
   return fields;
 }
 
-Expected<ModelFile> parse_matrices(std::string_view text, const std::string& name) {
-  FLYBALL_TRY(auto object, solve::parse_object(text, name, "model"));
-  const solve::TakenApart taken_apart(object);
-  FLYBALL_TRY(const auto fields, solve::Problem::read(object, model_fields(), name));
+ExpectedAll<ModelFile> parse_matrices(std::string_view text, const std::string& name) {
+  FLYBALL_TRY(const auto object, solve::parse_object(text, name, "model"));
+  FLYBALL_TRY(const auto fields, solve::Problem::read(object.json(), model_fields(), name));
   ModelFile model;
   model.path = name;
   model.system = fields.system();
