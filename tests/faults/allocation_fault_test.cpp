@@ -1,0 +1,140 @@
+#include <new>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include <flyball/core/function_ref.hpp>
+#include <flyball/core/quantity.hpp>
+#include <flyball/core/unit_algebra.hpp>
+#include <flyball/io/csv.hpp>
+#include <flyball/io/log.hpp>
+#include <flyball/io/sysid_json.hpp>
+#include <flyball/io/wpilog.hpp>
+#include <flyball/math/expression/formula.hpp>
+#include <flyball/solve/solver.hpp>
+#include <flyball/study/analyze.hpp>
+
+#include "faults/allocation_fault.hpp"
+#include "io/examples.hpp"
+
+/// Every allocation of every reader and of every kind of problem fails once, and then for good:
+/// what comes of it is std::bad_alloc or a refusal, no memory is lost, and the next call answers as
+/// if nothing had been.
+namespace flyball::test {
+namespace {
+
+void try_every_allocation(const std::string& what, FunctionRef<std::string()> work) {
+  if (!injects_faults()) {
+    GTEST_SKIP() << "the sanitizers' allocator is left alone";
+  }
+  (void)work();  // what is made once and kept
+  const std::string answer = work();
+  for (const auto memory :
+       {AllocationFault::Memory::comes_back, AllocationFault::Memory::stays_short}) {
+    std::size_t k = 0;
+    for (bool struck = true; struck;) {
+      ++k;
+      const long before = blocks_held();
+      {
+        AllocationFault fault(k, memory);
+        try {
+          (void)work();
+        } catch (const std::bad_alloc&) {
+        }
+        struck = fault.struck();
+      }
+      ASSERT_EQ(blocks_held(), before) << what << ": allocation " << k;
+    }
+    EXPECT_EQ(work(), answer) << what;
+  }
+}
+
+template <class T>
+std::string told(const Expected<T>& result) {
+  return result ? "read" : to_string(result.error());
+}
+
+TEST(AllocationFaults, ReadersOfLogs) {
+  const std::string wpilog = to_wpilog(example_log(4)).value();
+  try_every_allocation("WPILOG", [&] { return told(parse_wpilog(wpilog, "a.wpilog")); });
+  const std::string sysid = to_sysid_json(example_sysid(2)).value();
+  try_every_allocation("SysId JSON", [&] { return told(parse_sysid_json(sysid, "a.json")); });
+  const std::string csv = "Time (s),x [m],state\n0,1,on\n0.1,2,off\n0.2,,\"a, b\"\n";
+  try_every_allocation("CSV", [&] { return told(parse_csv(csv, "a.csv")); });
+  for (const std::string& bytes : {wpilog, sysid, csv, std::string("nothing")}) {
+    try_every_allocation("log", [&] { return told(parse_log(bytes, "a")); });
+  }
+  try_every_allocation("cut", [&] { return told(parse_sysid_json(sysid.substr(0, 90), "a")); });
+}
+
+TEST(AllocationFaults, ReadersOfTexts) {
+  for (const char* text : {"8 kg", "8 stone", "8"}) {
+    try_every_allocation("quantity",
+                         [&] { return told(parse_quantity(text, Dimension::mass, "the mass")); });
+  }
+  try_every_allocation("unit", [] { return told(parse_si_unit("kg m^2/(s^2 rad)")); });
+  for (const char* text : {"-g/l*sin(x) + atan2(x, 1)^2", "g*(x", "x + l", "y + 1"}) {
+    try_every_allocation("formula", [&] {
+      expression::FormulaSet set;
+      set.variables = {{"x", "rad"}};
+      set.parameters = {{"g", "m/s^2", 9.8}, {"l", "m", 0.3}};
+      set.outputs = {{"f", text, ""}};
+      return std::to_string(expression::compile(set).has_value());
+    });
+  }
+}
+
+// Not of project files: toml++ allocates in functions that it declares noexcept, so that memory
+// that runs short there ends the process.
+TEST(AllocationFaults, ReaderOfModels) {
+  for (const char* text : {R"--({"A": [[0, 1], [0, -2]], "B": [[0], [3]], "T": 0.02,
+                              "states": ["x (m)", "v (m/s)"]})--",
+                           R"({"A": [[0, 1], [0, -2]], "B": [[0]]})", "{\"A\": 1e999}"}) {
+    try_every_allocation(text, [&] {
+      const auto model = study::parse_model(text, "a.json");
+      return model ? std::string("read") : to_string(model.error());
+    });
+  }
+}
+
+/// Kinds in whose kernels memory that runs short still ends the process, and what does it there.
+constexpr std::pair<std::string_view, std::string_view> open_kinds[] = {
+    {"gramians", "resizing an Eigen matrix frees it before the new memory is there"},
+    {"h2-norm", "resizing an Eigen matrix frees it before the new memory is there"},
+    {"balanced-realization", "resizing an Eigen matrix frees it before the new memory is there"},
+    {"analyze", "resizing an Eigen matrix frees it before the new memory is there"},
+    {"minimal-realization", "resizing an Eigen matrix frees it before the new memory is there"},
+    {"place", "Eigen's JacobiSVD makes its preconditioner anew in place"},
+    {"plant-inversion", "Eigen's JacobiSVD makes its preconditioner anew in place"},
+    {"finite-horizon-lqr", "copying a tl::expected is noexcept"},
+    {"implicit-model-following", "copying a tl::expected is noexcept"},
+    {"kalman", "copying a tl::expected is noexcept"},
+};
+
+class EveryKind : public testing::TestWithParam<std::size_t> {};
+
+TEST_P(EveryKind, Example) {
+  const solve::Kind& kind = solve::kinds()[GetParam()];
+  for (const auto& [name, why] : open_kinds) {
+    if (kind.name == name) {
+      GTEST_SKIP() << why;
+    }
+  }
+  const solve::Solver solver = solve::Solver::create(kind.name).value();
+  try_every_allocation(std::string(kind.name), [&] { return solver.solve(kind.example).json; });
+}
+
+INSTANTIATE_TEST_SUITE_P(AllocationFaults, EveryKind,
+                         testing::Range(std::size_t{0}, solve::kinds().size()),
+                         [](const testing::TestParamInfo<std::size_t>& kind) {
+                           std::string name(solve::kinds()[kind.param].name);
+                           for (char& c : name) {
+                             c = c == '-' ? '_' : c;
+                           }
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace flyball::test

@@ -1,0 +1,139 @@
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <flyball/io/file.hpp>
+
+#include "faults/file_fault.hpp"
+
+/// Every operation on files fails once, and the process is killed at each: what a reader finds is
+/// the old or the new, and of failures nothing is left behind.
+namespace flyball::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Files = std::map<std::string, std::string>;
+
+class FileFaults : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (fs::temp_directory_path() / "flyball-faults-XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  /// Every file below the folder, and what it holds.
+  [[nodiscard]] Files files() const {
+    Files found;
+    for (const auto& entry : fs::recursive_directory_iterator(folder_)) {
+      if (entry.is_regular_file()) {
+        std::ifstream stream(entry.path(), std::ios::binary);
+        found[fs::relative(entry.path(), folder_).string()] =
+            std::string(std::istreambuf_iterator<char>(stream), {});
+      }
+    }
+    return found;
+  }
+
+  fs::path folder_;
+};
+
+const std::string big_text(200'000, 'x');
+
+Expected<void> write_report(const std::string& path, const std::string& text) {
+  auto report = OutputFolder::create(path);
+  if (!report) {
+    return tl::unexpected(report.error());
+  }
+  for (const char* name : {"index.html", "data/fit.csv"}) {
+    if (auto written = report->write(name, text); !written) {
+      return written;
+    }
+  }
+  return report->commit();
+}
+
+/// A report whose files hold `text`, and nothing that is not whole.
+void expect_whole(const Files& files, const std::string& text, std::size_t k) {
+  EXPECT_EQ(files.count("report/index.html"), 1U) << k;
+  EXPECT_EQ(files.count("report/data/fit.csv"), 1U) << k;
+  EXPECT_EQ(files.count("report/" + std::string(OutputFolder::marker)), 1U) << k;
+  EXPECT_TRUE(files.at("report/index.html") == text) << k;
+  EXPECT_TRUE(files.at("report/data/fit.csv") == text) << k;
+}
+
+TEST_F(FileFaults, AFileIsTheOldOrTheNew) {
+  const std::string path = folder_ / "a.toml";
+  ASSERT_TRUE(write_file_atomically(path, "old"));
+  std::size_t k = 0;
+  for (bool struck = true; struck;) {
+    ++k;
+    Expected<void> written;
+    {
+      FileFault fault(k, FileFault::What::fails);
+      written = write_file_atomically(path, big_text);
+      struck = fault.struck();
+    }
+    if (struck) {
+      ASSERT_FALSE(written) << k;
+      EXPECT_TRUE(written.error().is(FileError::not_writable)) << to_string(written.error());
+      EXPECT_EQ(files(), (Files{{"a.toml", "old"}})) << k;
+    }
+  }
+  EXPECT_GE(k, 4U);  // open, write, rename
+  EXPECT_EQ(files(), (Files{{"a.toml", big_text}}));
+}
+
+TEST_F(FileFaults, AFileThatAKillLeavesIsTheOldOrTheNew) {
+  const std::string path = folder_ / "a.toml";
+  int status = 99;
+  std::size_t k = 0;
+  while (status == 99) {
+    ++k;
+    ASSERT_TRUE(write_file_atomically(path, "old"));
+    const pid_t child = ::fork();
+    if (child == 0) {
+      FileFault fault(k, FileFault::What::kills);
+      ::_exit(write_file_atomically(path, big_text) ? 0 : 1);
+    }
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFEXITED(status)) << k;
+    status = WEXITSTATUS(status);
+    EXPECT_TRUE(files().at("a.toml") == (status == 99 ? "old" : big_text)) << k;
+  }
+  EXPECT_EQ(status, 0);
+  EXPECT_GE(k, 4U);
+}
+
+TEST_F(FileFaults, AReportIsTheOldOrTheNew) {
+  const std::string path = folder_ / "report";
+  ASSERT_TRUE(write_report(path, "old"));
+  const Files before = files();
+  std::size_t k = 0;
+  for (bool struck = true; struck;) {
+    ++k;
+    Expected<void> written;
+    {
+      FileFault fault(k, FileFault::What::fails);
+      written = write_report(path, big_text);
+      struck = fault.struck();
+    }
+    if (struck) {
+      ASSERT_FALSE(written) << k;
+      EXPECT_TRUE(files() == before) << k;
+    }
+  }
+  EXPECT_GE(k, 10U);
+  expect_whole(files(), big_text, k);
+}
+
+}  // namespace
+}  // namespace flyball::test
