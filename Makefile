@@ -15,16 +15,17 @@ help:  ## Show this list
 
 demo:  ## Install what is missing, build the command, tune an example log
 	@scripts/install-deps
-	@$(MAKE) --no-print-directory configure
+	@$(MAKE) --no-print-directory configure TESTS=$(if $(wildcard $(BUILD)/CMakeCache.txt),,OFF)
 	@cmake --build $(BUILD) --parallel $(JOBS) --target flyball_command example_true_versus_identified
 	@scripts/demo
 
 test:  ## Install what is missing, build everything, run every test
-	@scripts/install-deps --dev
 	@$(MAKE) --no-print-directory build
 	@ctest --preset release --parallel $(JOBS)
 
-build: configure  ## Build everything
+build:  ## Install what is missing, build everything
+	@scripts/install-deps --dev
+	@$(MAKE) --no-print-directory configure
 	@cmake --build $(BUILD) --parallel $(JOBS)
 
 bench:  ## Build and run the benchmarks: ratios against named peers
@@ -32,9 +33,11 @@ bench:  ## Build and run the benchmarks: ratios against named peers
 	@scripts/bench $(JOBS)
 
 format:  ## Format every C++ file
+	@scripts/install-deps --dev
 	@scripts/format
 
 format-check:  ## Fail if a C++ file is not formatted
+	@scripts/install-deps --dev
 	@scripts/format --check
 
 lint:  ## clang-tidy over all sources; CHANGED=1: only what differs from main
@@ -51,6 +54,8 @@ install: build  ## Install library and command; PREFIX=... says where
 clean:  ## Remove what was built
 	@rm -rf build docs/html
 
+# The tests need packages that the demo does without; TESTS= leaves them as they were.
+TESTS = ON
 configure:
 	@cmake --preset release --log-level=WARNING $(LAUNCHER) \
-	  -DFLYBALL_BUILD_APPS=ON -DFLYBALL_BUILD_EXAMPLES=ON -DFLYBALL_BUILD_TESTS=ON
+	  -DFLYBALL_BUILD_APPS=ON -DFLYBALL_BUILD_EXAMPLES=ON $(if $(TESTS),-DFLYBALL_BUILD_TESTS=$(TESTS))
