@@ -7,7 +7,7 @@ LAUNCHER := -DCMAKE_CXX_COMPILER_LAUNCHER=ccache
 export CCACHE_SLOPPINESS := pch_defines,time_macros
 endif
 
-.PHONY: help demo test build bench format format-check lint docs install clean configure
+.PHONY: help demo test build bench fuzz format format-check lint docs install clean configure
 .DEFAULT_GOAL := help
 
 help:  ## Show this list
@@ -31,6 +31,10 @@ build:  ## Install what is missing, build everything
 bench:  ## Build and run the benchmarks: ratios against named peers
 	@scripts/install-deps --dev
 	@scripts/bench $(JOBS)
+
+fuzz:  ## Fuzz every reader and kernel; SECONDS=... for each target
+	@scripts/install-deps --dev
+	@scripts/fuzz $(if $(SECONDS),--seconds $(SECONDS))
 
 format:  ## Format every C++ file
 	@scripts/install-deps --dev

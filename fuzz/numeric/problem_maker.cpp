@@ -1,0 +1,294 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "numeric/problem_maker.hpp"
+
+namespace flyball::fuzz {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using nlohmann::json;
+using solve::Absent;
+using solve::Field;
+using solve::FieldType;
+
+namespace {
+
+class Maker {
+ public:
+  explicit Maker(Choices& choices) : choices_(choices), mood_(choices.below(4)) {
+    for (Index& size : sizes_) {
+      size = choices.once_in(64) ? 0 : 1 + static_cast<Index>(choices.below(4));
+      if (choices.once_in(6)) {
+        size = 1 + static_cast<Index>(choices.below(8));
+      }
+    }
+  }
+
+  json object(std::span<const Field> fields) {
+    std::vector<const Field*> there;
+    for (const Field& field : fields) {
+      if (field.absent == Absent::refused || choices_.below(2) == 1) {
+        there.push_back(&field);
+      } else if (field.absent == Absent::identity && field.rows.size() == 1) {
+        size(field.rows) = size_of(field.columns);
+      }
+    }
+    json made = json::object();
+    for (const Field* field : there) {
+      made[std::string(field->name)] = value(*field);
+    }
+    return made;
+  }
+
+ private:
+  Index& size(std::string_view letter) {
+    return sizes_[static_cast<std::size_t>(letter.front() - 'a')];
+  }
+  /// "n", "1", "n+p".
+  Index size_of(std::string_view text) {
+    Index sum = 0;
+    for (const char c : text) {
+      if (c >= 'a' && c <= 'z') {
+        sum += size({&c, 1});
+      } else if (c >= '0' && c <= '9') {
+        sum += c - '0';
+      }
+    }
+    return sum;
+  }
+
+  /// An entry: of the mildest mood a small number, of the wildest anything finite.
+  double entry() {
+    static constexpr std::array palette{
+        0.0,      1.0,     -1.0,     2.0,     0.5,    -3.0,   0.0,     1.0,      // mild
+        2.2e-16,  1e-8,    -1e-16,   1e20,    -1e20,  1e-20,  -1e-20,  1e8,      // wide
+        5e-324,   1e-310,  2.3e-308, 1e154,   -1e154, 1e-154, -1e-154, 1.7e308,  // wild
+        -1.7e308, -5e-324, 1e300,    -1e-300, 1e155,  1e-155, 1e100,   -1e-100};
+    const std::size_t reach = mood_ < 2 ? 8 : mood_ == 2 ? 16 : palette.size();
+    // Half of the entries are no palette's: sums of palette numbers cancel all too well.
+    return choices_.below(2) == 0 ? palette[choices_.below(reach)] : 2.0 * choices_.fraction();
+  }
+
+  MatrixXd entries(Index rows, Index columns) {
+    return MatrixXd::NullaryExpr(rows, columns, [this] { return entry(); });
+  }
+
+  /// D⁻¹ M D where its numbers stay finite.
+  MatrixXd in_other_units(const MatrixXd& M) {
+    const int most = mood_ < 2 ? 6 : mood_ == 2 ? 30 : 200;
+    const Index longest = std::max(M.rows(), M.cols());
+    Eigen::VectorXi power(longest);
+    for (int& p : power) {
+      p = static_cast<int>(std::lround(choices_.fraction() * most));
+    }
+    MatrixXd scaled = M;
+    for (Index j = 0; j < M.cols(); ++j) {
+      for (Index i = 0; i < M.rows(); ++i) {
+        scaled(i, j) *= std::pow(10.0, power(i) - power(j));
+      }
+    }
+    return scaled.allFinite() ? scaled : M;
+  }
+
+  MatrixXd matrix(Index rows, Index columns) {
+    MatrixXd M = MatrixXd::Zero(rows, columns);
+    if (M.size() == 0) {
+      return M;
+    }
+    switch (choices_.below(12)) {
+      case 0:  // zero but for a few
+        M(static_cast<Index>(choices_.below(static_cast<std::size_t>(rows))),
+          static_cast<Index>(choices_.below(static_cast<std::size_t>(columns)))) = entry();
+        break;
+      case 1:  // one number on the diagonal
+        M.diagonal().setConstant(entry());
+        break;
+      case 2:
+        for (double& d : M.diagonal()) {
+          d = entry();
+        }
+        break;
+      case 3:  // companion
+        M.diagonal(columns > 1 ? 1 : 0).setOnes();
+        M.row(rows - 1) = entries(1, columns);
+        break;
+      case 4:  // defective: one block, its eigenvalue, what couples
+        M.diagonal().setConstant(entry());
+        if (columns > 1) {
+          M.diagonal(1).setConstant(entry());
+        }
+        break;
+      case 5:  // repeated rows
+        M = entries(1, columns).replicate(rows, 1);
+        break;
+      case 6:  // rank one
+        M = entries(rows, 1) * entries(1, columns);
+        break;
+      case 7:
+        M = entries(rows, columns).triangularView<Eigen::Upper>();
+        break;
+      case 8:  // a stable one, or one that holds
+        M = entries(rows, columns);
+        M.diagonal().array() -= choices_.one_of({0.0, 1.0, 3.0, 10.0});
+        break;
+      case 9:
+        M = in_other_units(entries(rows, columns));
+        break;
+      default:
+        M = entries(rows, columns);
+        break;
+    }
+    return M.allFinite() ? M : MatrixXd::Zero(rows, columns).eval();
+  }
+
+  MatrixXd symmetric(Index n) {
+    MatrixXd M = matrix(n, n);
+    switch (choices_.below(8)) {
+      case 0:  // not symmetric
+        return M;
+      case 1:  // indefinite
+        M.triangularView<Eigen::StrictlyUpper>() = M.transpose();
+        return M;
+      case 2:
+      case 3:
+        return MatrixXd::Identity(n, n) * std::abs(entry());
+      case 4:
+        M = M.diagonal().cwiseAbs().asDiagonal().toDenseMatrix().eval();
+        return M;
+      default: {
+        const MatrixXd square = M * M.transpose();
+        MatrixXd whole = square;
+        whole.triangularView<Eigen::StrictlyUpper>() = square.transpose();
+        return whole.allFinite() ? whole : MatrixXd::Identity(n, n).eval();
+      }
+    }
+  }
+
+  double number(std::string_view name) {
+    if (choices_.once_in(24)) {
+      return entry();
+    }
+    if (name == "power") {
+      return choices_.one_of({0.5, 2.0, -1.0, 3.0, 0.25, -0.5, 0.3, 1e-3, 17.0, 1e20});
+    }
+    if (name == "tolerance") {
+      return choices_.one_of({0.0, 1e-10, 1e-3, 1.0});
+    }
+    if (mood_ < 2) {
+      return choices_.one_of({0.02, 1.0, 0.1, 0.5, 2.0, 0.03});
+    }
+    return choices_.one_of({0.02, 1.0, 1e-6, 1e6, 1e-3, 1e-300, 1e300, 5e-324, 100.0});
+  }
+
+  double integer() {
+    if (choices_.once_in(40)) {
+      return choices_.one_of({-1.0, 1e9, 1e6, 0.0, -1e9});
+    }
+    return static_cast<double>(choices_.below(9));
+  }
+
+  json rows_of(const MatrixXd& M) {
+    json rows = json::array();
+    for (Index i = 0; i < M.rows(); ++i) {
+      rows.push_back(json(std::vector<double>(M.row(i).begin(), M.row(i).end())));
+    }
+    return rows;
+  }
+
+  json list(const Field& field) {
+    std::vector<double> values(static_cast<std::size_t>(size_of(field.rows)));
+    double sum = 0.0;
+    for (double& value : values) {
+      if (field.name == "pairs") {
+        value = static_cast<double>(choices_.below(4));
+      } else if (field.name == "times") {
+        value = sum += choices_.once_in(16) ? entry() : std::abs(choices_.fraction());
+      } else {
+        value = entry();
+      }
+    }
+    return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); })
+               ? json(values)
+               : json(std::vector<double>(values.size(), 1.0));
+  }
+
+  /// Real numbers and conjugate pairs.
+  json complex_list(Index count) {
+    json made = json::array();
+    const double sign = choices_.below(2) == 0 ? -1.0 : 1.0;
+    const double repeated = std::abs(entry());
+    while (static_cast<Index>(made.size()) < count) {
+      const double re = choices_.once_in(4) ? repeated : std::abs(entry());
+      if (static_cast<Index>(made.size()) + 2 <= count && choices_.below(3) == 0) {
+        const double im = entry();
+        made.push_back({sign * re, im});
+        made.push_back({sign * re, choices_.once_in(32) ? im : -im});
+      } else {
+        made.push_back(sign * re);
+      }
+    }
+    return made;
+  }
+
+  json value(const Field& field) {
+    switch (field.type) {
+      case FieldType::number:
+        return number(field.name);
+      case FieldType::integer:
+        return integer();
+      case FieldType::choice: {
+        std::vector<std::string_view> choices;
+        std::string_view rest = field.choices;
+        for (std::size_t space = rest.find(' '); space != rest.npos; space = rest.find(' ')) {
+          choices.push_back(rest.substr(0, space));
+          rest.remove_prefix(space + 1);
+        }
+        choices.push_back(rest);
+        return std::string(choices[choices_.below(choices.size())]);
+      }
+      case FieldType::samples:
+      case FieldType::matrix: {
+        const Index rows = size_of(field.rows);
+        const bool weight = field.rows == field.columns &&
+                            (field.name[0] == 'Q' || field.name[0] == 'R' || field.name[0] == 'S');
+        return rows_of(weight ? symmetric(rows) : matrix(rows, size_of(field.columns)));
+      }
+      case FieldType::list:
+        return list(field);
+      case FieldType::complex_list:
+        return complex_list(size_of(field.rows));
+      case FieldType::system: {
+        const Index n = size_of(field.rows);
+        const Index m = size_of(field.columns);
+        const Index p = size_of(field.outputs);
+        return {{"A", rows_of(matrix(n, n))},
+                {"B", rows_of(matrix(n, m))},
+                {"C", rows_of(matrix(p, n))},
+                {"D", rows_of(matrix(p, m))}};
+      }
+      case FieldType::texts:
+        return json(std::vector<std::string>(static_cast<std::size_t>(size_of(field.rows)), "x"));
+      default:
+        return nullptr;
+    }
+  }
+
+  Choices& choices_;
+  std::size_t mood_;
+  std::array<Index, 26> sizes_{};
+};
+
+}  // namespace
+
+json make_problem(const solve::Kind& kind, Choices& choices) {
+  return Maker(choices).object(kind.fields);
+}
+
+}  // namespace flyball::fuzz
