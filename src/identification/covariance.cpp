@@ -53,14 +53,18 @@ std::vector<double> residual_times(const OutputErrorProblem& problem, std::size_
                                    Channel channel) {
   const ResidualRun& run = problem.runs()[index];
   const std::vector<double>& time = problem.recording().runs[run.prepared].run.time;
+  // From the bin of the first row that is used: what stands before may be years away.
+  const std::size_t used = problem.recording().runs[run.prepared].first;
+  const double origin =
+      time.front() + bin_width * std::floor((time[used] - time.front()) / bin_width);
   std::vector<double> times;
   if (channel == Channel::position) {
     for (const auto& [from, to] : run.differences) {
-      times.push_back(0.5 * (time[from] + time[to]) - time.front());
+      times.push_back(std::max(0.0, 0.5 * (time[from] + time[to]) - origin));
     }
   } else {
     for (const std::size_t row : run.velocities) {
-      times.push_back(time[row] - time.front());
+      times.push_back(std::max(0.0, time[row] - origin));
     }
   }
   return times;

@@ -246,6 +246,18 @@ void choose_channels(PreparedRecording& prepared) {
   prepared.velocity_refresh_period = refresh_period(prepared.runs, &TestRun::velocity);
 }
 
+/// A mechanism's test lasts seconds: rows that are farther apart have their time in another unit.
+Expected<void> check_row_period(double period) {
+  constexpr double longest = 1.0;
+  if (period <= longest) {
+    return {};
+  }
+  return refusal(ArgumentError::out_of_range, "identify", "the distance of two rows in time")
+      .got(format_number(period) + " s")
+      .expected("at most " + format_number(longest) + " s")
+      .hint("give time in seconds, or name its unit in the header, such as \"time (us)\"");
+}
+
 void report_repeats(PreparedRecording& prepared) {
   const double share = repeated_share(prepared.runs);
   if (share > 0.2) {
@@ -316,6 +328,7 @@ Expected<PreparedRecording> prepare(const Recording& recording, const Preparatio
   report_missing_tests(prepared);
 
   choose_channels(prepared);
+  FLYBALL_CHECK(check_row_period(prepared.row_period));
   refresh_derived_columns(prepared);
   detect_motion(prepared);
   mend_signs(prepared);

@@ -1,12 +1,14 @@
 #include <flyball/io/csv.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <cstddef>
 #include <map>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -166,10 +168,50 @@ class Reader {
     return std::size_t{0};
   }
 
-  /// Seconds per unit of the time column.
-  double time_scale(const Header& header) {
-    if (header.unit.empty()) {
+  /// Seconds per unit of a time column that names none: steps of five and more are no seconds of
+  /// anything that moves.
+  double usual_scale(std::size_t column) {
+    struct Row {
+      double least_step;
+      double scale;
+      std::string_view unit;
+    };
+    static constexpr std::array<Row, 3> rows{
+        {{1e6, 1e-9, "nanoseconds"}, {1e3, 1e-6, "microseconds"}, {5.0, 1e-3, "milliseconds"}}};
+    std::vector<double> steps;
+    std::optional<double> last;
+    for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
+      const std::optional<double> value = number(cell(row, column));
+      if (value && std::isfinite(*value)) {
+        if (last && *value > *last) {
+          steps.push_back(*value - *last);
+        }
+        last = value;
+      }
+    }
+    if (steps.empty()) {
       return 1.0;
+    }
+    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::nth_element(steps.begin(), middle, steps.end());
+    for (const Row& row : rows) {
+      if (*middle >= row.least_step) {
+        warn(log_.diagnostics, "assumed_time_unit",
+             "the time column \"{}\" names no unit and goes in steps of {}; they are taken for {} "
+             "(write \"time (s)\" or \"time (us)\" in the header to say what they are)",
+             io::printable(headers_[column].name, 40), *middle, row.unit);
+        log_.diagnostics.back().place = Place{table_.lines[0], 1};
+        return row.scale;
+      }
+    }
+    return 1.0;
+  }
+
+  /// Seconds per unit of the time column.
+  double time_scale(std::size_t column) {
+    const Header& header = headers_[column];
+    if (header.unit.empty()) {
+      return usual_scale(column);
     }
     const Expected<Unit> unit = parse_unit(header.unit);
     if (unit && unit->dimension == Dimension::time) {
@@ -184,7 +226,7 @@ class Reader {
 
   Expected<void> read_table() {
     FLYBALL_TRY(const std::size_t clock, time_column());
-    const double scale = time_scale(headers_[clock]);
+    const double scale = time_scale(clock);
     std::vector<std::optional<double>> time(table_.rows.size());
     for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
       time[row] = number(cell(row, clock));
@@ -228,7 +270,7 @@ class Reader {
   }
 
   void read_list() {
-    const double scale = time_scale(headers_[0]);
+    const double scale = time_scale(0);
     struct Samples {
       std::vector<double> time;
       std::vector<std::string_view> value;

@@ -32,6 +32,21 @@ TEST(Prepare, FindsRefreshAndResolution) {
   }
 }
 
+TEST(Prepare, RefusesATimeInAnotherUnit) {
+  Recording recording = record(arm);
+  for (TestRun& run : recording.runs) {
+    for (double& time : run.time) {
+      time *= 1e6;
+    }
+  }
+  const auto prepared = prepare(recording);
+  ASSERT_FALSE(prepared);
+  EXPECT_TRUE(prepared.error().is(ArgumentError::out_of_range));
+  EXPECT_EQ(to_string(prepared.error()),
+            "identify: the distance of two rows in time is 5000 s; it must be at most 1 s; give "
+            "time in seconds, or name its unit in the header, such as \"time (us)\"");
+}
+
 TEST(Prepare, TellsRepeatedRows) {
   Recording recording = record(arm, 2);
   for (TestRun& run : recording.runs) {

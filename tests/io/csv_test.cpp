@@ -108,6 +108,26 @@ TEST(Csv, TimeUnitsAndNames) {
   EXPECT_TRUE(has_diagnostic(odd.diagnostics, "unknown_time_unit"));
 }
 
+// A time without a unit whose steps are no seconds of anything that moves.
+TEST(Csv, TheUnitOfTimeIsSeenByItsSteps) {
+  const auto expect = [](const std::string& text, double first, const std::string& unit) {
+    const Log log = parse(text).value();
+    EXPECT_EQ(log.signals[0].time.front(), first) << text;
+    EXPECT_EQ(has_diagnostic(log.diagnostics, "assumed_time_unit"), !unit.empty()) << text;
+    for (const Diagnostic& diagnostic : log.diagnostics) {
+      EXPECT_TRUE(contains(diagnostic.message, "taken for " + unit)) << diagnostic.message;
+    }
+  };
+  expect("timestamp,x\n10000000,1\n10019990,2\n10040039,3\n", 10.0, "microseconds");
+  expect("timestamp,x\n10000,1\n10005,2\n10010,3\n", 10.0, "milliseconds");
+  expect("timestamp,x\n2000000000,1\n2020000000,2\n", 2.0, "nanoseconds");
+  expect("Timestamp,Key,Value\n20000,a,1\n20000,b,1\n40000,a,2\n", 0.02, "microseconds");
+  expect("timestamp,x\n0,1\n4.9,2\n9.8,3\n", 0.0, "");
+  expect("timestamp,x\n7,1\n7.02,2\n900,3\n900.02,4\n", 7.0, "");  // one gap
+  expect("time (s),x\n10000000,1\n10020000,2\n", 1e7, "");
+  expect("time,x\n10000000,1\n", 1e7, "");
+}
+
 TEST(Csv, TheFirstColumnIsTimeOnlyIfItCanBe) {
   EXPECT_TRUE(has_diagnostic(parse("step,x\n0,2\n1,3\n")->diagnostics, "assumed_time_column"));
   EXPECT_TRUE(has_diagnostic(parse("0,2\n1,3\n")->diagnostics, "no_header"));

@@ -62,7 +62,7 @@ struct PreparationOptions {
 /// @param recording  Columns of equal length per run, SI.
 /// @return  The prepared runs and the diagnostics.
 /// @errors ArgumentError::wrong_shape if the columns of a run differ in length or it has neither
-///         position nor velocity.
+///         position nor velocity; out_of_range for rows more than a second apart.
 /// Cost: O(rows log rows); allocates.
 [[nodiscard]] Expected<PreparedRecording> prepare(const Recording& recording,
                                                   const PreparationOptions& options = {});
