@@ -1,8 +1,13 @@
+#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <memory>
 #include <new>
 #include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <flyball/solve/documentation.hpp>
 #include <flyball/solve/solver.hpp>
@@ -30,6 +35,7 @@ class Stream {
     solve::Answer answer = solver_.solve(problem);
     answer.json += '\n';
     std::fwrite(answer.json.data(), 1, answer.json.size(), stdout);
+    written_ = std::fflush(stdout) == 0;  // as they come: whoever asked may wait for it
     ++count_;
     if (!answer.solved) {
       status_ = std::max<int>(status_, answer.kind == ErrorKind::no_answer ? no_answer : bad_input);
@@ -37,39 +43,45 @@ class Stream {
   }
 
   [[nodiscard]] int status() const { return status_; }
+  /// Whether somebody takes the answers.
+  [[nodiscard]] bool good() const { return written_; }
   [[nodiscard]] bool empty() const { return count_ == 0; }
 
  private:
   const solve::Solver& solver_;
   int status_ = success;
+  bool written_ = true;
   long count_ = 0;
 };
 
-/// Calls back with each line of a text.
-template <class F>
-void for_each_line(const std::string& text, const F& f) {
-  for (std::size_t from = 0; from < text.size();) {
-    const std::size_t end = std::min(text.find('\n', from), text.size());
-    f(text.substr(from, end - from));
-    from = end + 1;
+/// Counts the brackets of an object that comes line by line.
+class Brackets {
+ public:
+  /// @return Whether none is open behind the line.
+  bool closed_by(const std::string& line) {
+    for (const char c : line) {
+      if (quoted_) {
+        quoted_ = escaped_ || c != '"';
+        escaped_ = !escaped_ && c == '\\';
+      } else {
+        quoted_ = c == '"';
+        open_ += c == '{' || c == '[' ? 1 : c == '}' || c == ']' ? -1 : 0;
+      }
+    }
+    return open_ <= 0;
   }
-}
 
-/// Whether a text whose first line is not whole is one object over several lines, even a broken
-/// one: the other lines continue as such an object does, and none is a problem of its own.
-bool is_one_object(const std::string& text) {
-  if (solve::Solver::is_complete(text)) {
-    return true;
-  }
-  bool one = text.starts_with('{');
-  bool first = true;
-  for_each_line(text, [&](const std::string& line) {
-    one =
-        one && (first || is_blank(line) ||
-                (std::string_view(" \t}]\"[,-0123456789").find(line[0]) != std::string_view::npos));
-    first = false;
-  });
-  return one;
+ private:
+  long open_ = 0;
+  bool quoted_ = false;
+  bool escaped_ = false;
+};
+
+/// Whether a line may go on an object over several lines, even a broken one, and is no problem of
+/// its own.
+bool continues(const std::string& line) {
+  return is_blank(line) ||
+         std::string_view(" \t}]\"[,-0123456789").find(line[0]) != std::string_view::npos;
 }
 
 int refuse(const Error& error) {
@@ -89,18 +101,26 @@ int answer_all(const std::string& kind) {
   std::string line;
   while (std::getline(std::cin, line) && is_blank(line)) {
   }
-  if (!is_blank(line) && !solve::Solver::is_complete(line)) {
-    line += '\n';
-    line.append(std::istreambuf_iterator<char>(std::cin), {});
-    if (is_one_object(line)) {
-      stream.answer(line);
-    } else {
-      for_each_line(line, [&](const std::string& each) { stream.answer(each); });
-    }
+  // The first object may stand on several lines; those after it are one a line.
+  std::vector<std::string> lines{line};
+  Brackets brackets;
+  const std::size_t begin = std::min(line.find_first_not_of(" \t"), line.size());
+  const bool opens = line.find_first_of("{[", begin) == begin && begin < line.size();
+  bool whole = !opens || brackets.closed_by(line);
+  bool one = true;
+  while (!whole && one && std::getline(std::cin, line)) {
+    lines.push_back(line);
+    one = continues(line);
+    whole = brackets.closed_by(line);
+  }
+  if (one) {
+    stream.answer(fmt::format("{}", fmt::join(lines, "\n")));
   } else {
-    do {
-      stream.answer(line);
-    } while (std::getline(std::cin, line));
+    std::for_each(lines.begin(), lines.end(),
+                  [&](const std::string& each) { stream.answer(each); });
+  }
+  while (stream.good() && std::getline(std::cin, line)) {
+    stream.answer(line);
   }
   if (stream.empty()) {
     tell(Error(ArgumentError::empty)

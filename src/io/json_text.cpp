@@ -47,6 +47,31 @@ Place place_of(std::string_view text, std::size_t offset) {
   return {static_cast<std::size_t>(lines) + 1, static_cast<std::size_t>(characters) + 1};
 }
 
+std::optional<std::string_view> scalar_member(std::string_view json, std::string_view key) {
+  constexpr std::string_view blank = " \t\r\n";
+  int depth = 0;
+  bool key_follows = false;
+  for (std::size_t at = 0; at < json.size(); ++at) {
+    const char c = json[at];
+    depth += c == '{' || c == '[' ? 1 : c == '}' || c == ']' ? -1 : 0;
+    if (c == '"') {
+      const std::size_t end = end_of_string(json, at);
+      if (key_follows && said_by(json.substr(at, end - at)) == key) {
+        json.remove_prefix(std::min(json.find(':', end), json.size() - 1) + 1);
+        json.remove_prefix(std::min(json.find_first_not_of(blank), json.size()));
+        if (json.empty() || json[0] == '{' || json[0] == '[') {
+          return std::nullopt;
+        }
+        return json.substr(
+            0, json[0] == '"' ? end_of_string(json, 0) : json.find_first_of(" \t\r\n,}"));
+      }
+      at = end - 1;
+    }
+    key_follows = depth == 1 && (c == '{' || c == ',' || (key_follows && c != '"'));
+  }
+  return std::nullopt;
+}
+
 std::optional<RepeatedKey> repeated_key(std::string_view json) {
   constexpr std::size_t deepest = 64;
   std::vector<Open> open;

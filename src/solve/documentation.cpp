@@ -105,14 +105,14 @@ std::string lines_of(std::span<const Letter> letters,
 
 constexpr std::string_view introduction = R"(# flyball solve
 
-`flyball solve KIND` reads problems on standard input and answers each on one line of standard output: one JSON
-object, over several lines if it is the only one, or JSON Lines. `flyball solve --list` lists the kinds,
+`flyball solve KIND` reads problems on standard input and answers each on one line of standard output, as soon as it
+is read: JSON Lines, of which the first object may stand on several lines. `flyball solve --list` lists the kinds,
 `flyball solve KIND --help` the fields of one. This page is made of the same table (`flyball solve --markdown`), and so is
 the JSON Schema of all problems and answers, [solve.schema.json](schemas/solve.schema.json) (`flyball solve --schema`).
 
 - Matrices are lists of rows; a number stands for a 1 x 1 matrix. Complex numbers are `[re, im]`, infinities `"inf"` and
   `"-inf"`. Numbers round-trip.
-- A field `id`, any JSON value, is echoed.
+- A field `id`, any JSON value, is echoed, a number or a string to the byte.
 - A problem that cannot be read or solved is answered with `{"error": {"code", "message", …}}`, the evidence beside the
   message; the codes are those of [errors.md](errors.md). The others are answered all the same.
 - Exit status, after the last line: 0 all solved; 1 some problem has no answer (the mathematics says no); 2 some input was

@@ -147,6 +147,9 @@ Expected<JsonObject> parse_object(std::string_view text, std::string_view where,
     return malformed(where, what, fmt::format("{} brackets within each other", depth),
                      fmt::format("at most {}", deepest));
   }
+  if (const std::size_t nul = text.find('\0'); nul != text.npos) {  // which would end it silently
+    return malformed(where, what, "with a NUL in it", "JSON, which has none", place_of(text, nul));
+  }
   constexpr const char* example = "one JSON object, such as {\"A\": [[0, 1], [0, -2]], …}";
   JsonObject object;
   Builder builder(object.json());

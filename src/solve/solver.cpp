@@ -1,9 +1,11 @@
 #include <flyball/solve/solver.hpp>
 
 #include <algorithm>
+#include <exception>
 #include <new>
 #include <utility>
 
+#include <flyball/io/json_text.hpp>
 #include <flyball/io/json_writer.hpp>
 
 #include "core/error_rows.hpp"
@@ -20,18 +22,30 @@ ErrorInfo error_info(SolveError code) {
       {"overflow", "the answer is too large for a double", ErrorKind::no_answer},
       {"not_determined", "the last digits of the data decide about the answer",
        ErrorKind::no_answer},
+      {"defect", "a defect of Flyball", ErrorKind::defect},
   };
   return flyball::detail::info_of(code, "solve", rows);
 }
 
 namespace {
 
+/// The id of a problem as it was written, on one line; empty if it has none.
+std::string id_of(std::string_view text, const Json& problem) {
+  const auto found = problem.find("id");
+  if (found == problem.end()) {
+    return {};
+  }
+  const auto written = scalar_member(text, "id");
+  return written ? std::string(*written)
+                 : found->dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 /// A new answer, open, with the problem's id if it has one.
-JsonWriter begin(const Json* id) {
+JsonWriter begin(const std::string& id) {
   JsonWriter answer;
   answer.open('{');
-  if (id != nullptr) {
-    answer.add_json("id", id->dump(-1, ' ', false, Json::error_handler_t::replace));
+  if (!id.empty()) {
+    answer.add_json("id", id);
   }
   return answer;
 }
@@ -64,13 +78,13 @@ Expected<void> check_answer(const std::string& answer, const Kind& kind) {
   return {};
 }
 
-Answer refused(const Json* id, const Error& error) {
+Answer refused(const std::string& id, const Error& error) {
   JsonWriter answer = begin(id);
   answer.add("error", error);
   return {end(std::move(answer)), false, error.kind()};
 }
 
-Answer answer_to(const Json& object, const Json* id, const Kind& kind) {
+Answer answer_to(const Json& object, const std::string& id, const Kind& kind) {
   const auto problem = Problem::read(object, kind.fields, kind.name);
   if (!problem) {
     return refused(id, problem.error());
@@ -96,27 +110,25 @@ Expected<Solver> Solver::create(std::string_view kind) {
 }
 
 std::string Solver::error_json(const Error& error) {
-  return refused(nullptr, error).json;
-}
-
-bool Solver::is_complete(std::string_view text) {
-  return Json::accept(text);
+  return refused("", error).json;
 }
 
 Answer Solver::solve(std::string_view text) const {
   Expected<JsonObject> object{};
-  const Json* id = nullptr;
+  std::string id;
   try {
     object = parse_object(text, kind_->name, "problem");
     if (!object) {
-      return refused(nullptr, object.error());
+      return refused(id, object.error());
     }
-    const Json& json = object->json();
-    const auto found = json.find("id");
-    id = found == json.end() ? nullptr : &*found;
-    return answer_to(json, id, *kind_);
+    id = id_of(text, object->json());
+    return answer_to(object->json(), id, *kind_);
   } catch (const std::bad_alloc&) {
     return refused(id, not_enough_memory("this problem"));
+  } catch (const std::exception& defect) {  // the other problems are answered all the same
+    return refused(
+        id,
+        Error(SolveError::defect).in(std::string(kind_->name)).with("exception", defect.what()));
   }
 }
 

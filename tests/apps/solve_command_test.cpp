@@ -135,6 +135,47 @@ TEST_F(SolveCommand, ExitStatus) {
   EXPECT_TRUE(holds(none.err, "KIND is left out")) << none.err;
 }
 
+TEST_F(SolveCommand, IdsAreEchoedToTheByte) {
+  for (const char* id : {"0", "-7", "9007199254740993", "18446744073709551615",
+                         "18446744073709551616", "1.50e+3", "-0.0", "1e2", "true", "null", "\"\"",
+                         R"("a\u00e9\ud83d\ude00\/\u0000\"}")", "\"ü\x7f\""}) {
+    for (const char* problem : {R"(,"A":[[0]]})", R"(,"A":0})"}) {
+      write("problems", "{\"id\": " + std::string(id) + problem + "\n");
+      const Answer answer = run("solve expm", "problems");
+      EXPECT_TRUE(answer.out.starts_with("{\"id\":" + std::string(id) + ",") ||
+                  answer.out.starts_with("{\"id\": " + std::string(id) + ","))
+          << answer.out;
+    }
+  }
+}
+
+TEST_F(SolveCommand, ANulIsAnError) {
+  const std::string nul(1, '\0');
+  const std::string good = R"({"A":[[0]]})";
+  const std::vector<Json> answers = solve(
+      "expm", good + nul + "\n" + nul + good + "\n{" + nul + "\"A\":[[0]]}\n" + good + "\n", 2);
+  ASSERT_EQ(answers.size(), 4U);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_EQ(code_of(answers[static_cast<std::size_t>(k)]), "malformed") << k;
+  }
+  EXPECT_EQ(answers[0].at("error").at("column"), 12);
+  EXPECT_TRUE(answers[3].contains("X"));
+}
+
+// An object over several lines is answered when it is whole, whatever follows.
+TEST_F(SolveCommand, TheFirstObjectMayStandOnSeveralLines) {
+  const std::vector<Json> answers = solve(
+      "expm", "\n {\n\"A\": [\n[0, 1],\n[0, 0]],\n\"id\": \"}\\\"{\"}\n{\"A\":[[0]],\"id\":2}\nx\n",
+      2);
+  ASSERT_EQ(answers.size(), 3U);
+  EXPECT_EQ(answers[0].at("id"), "}\"{");
+  EXPECT_EQ(answers[1].at("id"), 2);
+  EXPECT_EQ(code_of(answers[2]), "malformed");
+  const std::vector<Json> broken = solve("expm", "{\"A\":[[0]\n{\"A\":[[0]]}\n", 2);
+  ASSERT_EQ(broken.size(), 2U);
+  EXPECT_TRUE(broken[1].contains("X"));
+}
+
 // What is told of the kinds comes from their rows; the problem that a kind's help shows has an
 // answer.
 TEST_F(SolveCommand, ListAndHelp) {

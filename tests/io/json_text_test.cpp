@@ -40,5 +40,19 @@ TEST(RepeatedKey, IsFoundInEachObjectAlone) {
   EXPECT_EQ(repeated_key(R"({"x":1,"x":2})")->key, "x");
 }
 
+TEST(ScalarMember, IsAsItStands) {
+  const auto of = [](std::string_view json) {
+    return std::string(scalar_member(json, "id").value_or("nothing"));
+  };
+  EXPECT_EQ(of(R"({"id":18446744073709551616,"A":1})"), "18446744073709551616");
+  EXPECT_EQ(of("{ \"A\" : [1, {\"id\": 2}] ,\n\"id\" :\t-1.50e+1 }"), "-1.50e+1");
+  EXPECT_EQ(of(R"({"id":"a\"\u00e9, }"})"), R"("a\"\u00e9, }")");
+  EXPECT_EQ(of(R"({"i\u0064":true})"), "true");
+  EXPECT_EQ(of(R"({"A":"id","B":"id"})"), "nothing");
+  EXPECT_EQ(of(R"({"A":["id",3]})"), "nothing");
+  EXPECT_EQ(of(R"({"id":[1,2]})"), "nothing");
+  EXPECT_EQ(of("{}"), "nothing");
+}
+
 }  // namespace
 }  // namespace flyball

@@ -23,4 +23,9 @@ struct RepeatedKey {
 /// Cost: O(size) and a copy of the keys.
 [[nodiscard]] std::optional<RepeatedKey> repeated_key(std::string_view json);
 
+/// A member of the outermost object as it is written, if it is a number, a word or a string.
+/// @param json  A JSON object without a mistake.
+[[nodiscard]] std::optional<std::string_view> scalar_member(std::string_view json,
+                                                            std::string_view key);
+
 }  // namespace flyball

@@ -68,6 +68,7 @@ struct Kind {
 enum class SolveError {
   overflow,        ///< A number of the answer is beyond the range of a double (no_answer).
   not_determined,  ///< The last digits of the data move the answer by more than 1e-4 of it.
+  defect,          ///< Solving it threw.
 };
 [[nodiscard]] ErrorInfo error_info(SolveError code);
 

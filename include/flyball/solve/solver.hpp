@@ -28,9 +28,6 @@ class Solver {
   /// {"error": {…}}: how an unknown kind is answered.
   [[nodiscard]] static std::string error_json(const Error& error);
 
-  /// Whether a text is one whole JSON value, so that it need not be continued by the next line.
-  [[nodiscard]] static bool is_complete(std::string_view text);
-
  private:
   explicit Solver(const Kind& kind) : kind_(&kind) {}
   const Kind* kind_;
