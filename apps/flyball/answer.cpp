@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <flyball/report/terminal.hpp>
 #include <flyball/report/write_report.hpp>
 
@@ -10,6 +12,10 @@ int tell(const Answer& answer, const CommonOptions& options, bool by_default) {
   if (const auto folder = report_folder(options, by_default)) {
     if (auto report = report::write_report(answer, *folder, {.command = options.typed})) {
       written = *folder;
+      if (const auto& problems = report->problems; !problems.empty()) {
+        warn(fmt::format("{} of the report's {} pictures could not be drawn: {}", problems.size(),
+                         answer.figures.size(), problems.front()));
+      }
     } else if (!options.out.empty()) {
       return fail(report.error(), options, answer.schema);
     } else {

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <flyball/core/text.hpp>
 #include <flyball/io/json_writer.hpp>
 #include <flyball/report/terminal.hpp>
 
@@ -172,7 +173,7 @@ int draw(const Options& options) {
     if (options.common.json) {
       write(json, *figure, *files);
     } else {
-      print(text_of(*figure, *files));
+      print(printable(text_of(*figure, *files)));
     }
   }
   if (options.common.json) {

@@ -4,6 +4,7 @@
 
 #include <unistd.h>
 
+#include <flyball/core/text.hpp>
 #include <flyball/io/json_writer.hpp>
 
 #include "console.hpp"
@@ -117,15 +118,18 @@ int fail(const Errors& errors, const CommonOptions& options, const std::string& 
       // It shows the place, which a formula's error says in bytes, too.
       text = text.substr(0, text.rfind(" (offset = ")) + "\n" + error.excerpt;
     }
-    std::fflush(stdout);
-    std::fprintf(stderr, "flyball: %s\n", text.c_str());
+    say(text);
   }
   return exit_status(errors);
 }
 
-void tell(const Error& error) {
+void say(const std::string& text) {
   std::fflush(stdout);
-  std::fprintf(stderr, "flyball: %s\n", to_string(error).c_str());
+  std::fprintf(stderr, "flyball: %s\n", printable(text).c_str());
+}
+
+void tell(const Error& error) {
+  say(to_string(error));
 }
 
 std::optional<std::string> report_folder(const CommonOptions& options, bool by_default) {
@@ -139,8 +143,7 @@ std::optional<std::string> report_folder(const CommonOptions& options, bool by_d
 }
 
 void warn(const std::string& text) {
-  std::fflush(stdout);
-  std::fprintf(stderr, "flyball: warning: %s\n", text.c_str());
+  say("warning: " + text);
 }
 
 }  // namespace flyball::app

@@ -64,6 +64,9 @@ int guarded(const Run& run, const CommonOptions& options, const std::string& sch
 [[nodiscard]] std::optional<std::string> report_folder(const CommonOptions& options,
                                                        bool by_default);
 
+/// A line of words on standard error; control characters, which a terminal would obey, as '?'.
+void say(const std::string& text);
+
 /// An error's words on standard error.
 void tell(const Error& error);
 

@@ -1,5 +1,7 @@
 #include <memory>
 
+#include <flyball/io/output_folder.hpp>
+
 #include "answer.hpp"
 #include "job_command.hpp"
 
@@ -25,6 +27,12 @@ CLI::App* add_job_command(CLI::App& program, Invocation& invocation, const JobCo
     JobInput& input = options->input;
     input.schema = command.schema;
     const auto run = [&] {
+      // Asked for first: a job is wasted on a folder that cannot be written.
+      if (const std::string& out = options->common.out; !out.empty()) {
+        if (const auto folder = OutputFolder::create(out); !folder) {
+          return fail(folder.error(), options->common, input.schema);
+        }
+      }
       const auto answer = command.run(input);
       return answer ? tell(*answer, options->common, command.reports_unasked)
                     : fail(answer.error(), options->common, input.schema);

@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <new>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,6 +16,7 @@
 
 #include "commands.hpp"
 #include "console.hpp"
+#include "session.hpp"
 
 namespace {
 
@@ -77,7 +79,7 @@ int run(int argc, char** argv) {
   flyball::app::add_solve_command(program, invocation);
 
   if (const std::string unknown = unknown_command(program, argc, argv); !unknown.empty()) {
-    std::fprintf(stderr, "flyball: %s\n", flyball::shortened(unknown).c_str());
+    flyball::app::say(flyball::shortened(unknown));
     return flyball::app::bad_input;
   }
   try {
@@ -91,10 +93,9 @@ int run(int argc, char** argv) {
     }
     const auto commands = program.get_subcommands();
     const std::string command = commands.empty() ? "" : commands.front()->get_name();
-    std::fprintf(stderr, "flyball: %s%s%s\n", command.c_str(), command.empty() ? "" : ": ",
-                 flyball::shortened(problem.what()).c_str());
-    std::fprintf(stderr, "`flyball%s%s --help` tells what it takes.\n", command.empty() ? "" : " ",
-                 command.c_str());
+    flyball::app::say(fmt::format("{}{}{}\n`flyball{}{} --help` tells what it takes.", command,
+                                  command.empty() ? "" : ": ", flyball::shortened(problem.what()),
+                                  command.empty() ? "" : " ", command));
     return flyball::app::bad_input;
   }
   return invocation.status;
@@ -103,12 +104,16 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  int status = flyball::app::bad_input;
   try {
-    return run(argc, argv);
+    flyball::app::begin_session();
+    status = run(argc, argv);
+  } catch (const std::bad_alloc&) {
+    flyball::app::tell(flyball::not_enough_memory("this"));
   } catch (const std::exception& defect) {
-    std::fprintf(stderr, "flyball: a defect of Flyball: %s\n", defect.what());
+    flyball::app::say(std::string("a defect of Flyball: ") + defect.what());
   } catch (...) {
-    std::fputs("flyball: a defect of Flyball\n", stderr);
+    flyball::app::say("a defect of Flyball");
   }
-  return flyball::app::bad_input;
+  return flyball::app::end_session(status);
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/wording.hpp"
+
 namespace flyball {
 
 namespace {
@@ -49,7 +51,24 @@ std::string cut(std::string_view text, std::size_t most) {
   return std::string(text);
 }
 
-std::string shortened(std::string_view message) {
+std::string printable(std::string_view text) {
+  std::string out = text::valid_utf8(text);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(out[i]);
+    if ((byte < 0x20 && out[i] != '\n') || byte == 0x7F) {
+      out[i] = '?';
+    } else if (byte == 0xC2 && i + 1 < out.size() &&
+               static_cast<unsigned char>(out[i + 1]) < 0xA0) {  // C1 controls, U+0080 to U+009F
+      out[i] = '?';
+      out[i + 1] = '?';
+    }
+  }
+  return out;
+}
+
+std::string shortened(std::string_view whole) {
+  const std::string clean = printable(whole);
+  const std::string_view message = clean;
   constexpr std::size_t longest_quotation = 80;
   constexpr std::size_t longest = 4000;
   std::string text;

@@ -127,21 +127,6 @@ std::string valid_utf8(std::string_view text) {
   return out;
 }
 
-std::string printable(std::string_view text) {
-  std::string out = valid_utf8(text);
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    const auto byte = static_cast<unsigned char>(out[i]);
-    if ((byte < 0x20 && out[i] != '\n') || byte == 0x7F) {
-      out[i] = '?';
-    } else if (byte == 0xC2 && i + 1 < out.size() &&
-               static_cast<unsigned char>(out[i + 1]) < 0xA0) {  // C1 controls, U+0080 to U+009F
-      out[i] = '?';
-      out[i + 1] = '?';
-    }
-  }
-  return out;
-}
-
 std::vector<std::string_view> split(std::string_view text, std::string_view separator) {
   std::vector<std::string_view> pieces;
   for (std::size_t start = 0; start < text.size();) {

@@ -8,6 +8,8 @@
 
 #include <Eigen/Core>
 
+#include <flyball/core/text.hpp>
+
 /// How answers say numbers and lists to people, and what makes text from outside harmless.
 namespace flyball::text {
 
@@ -39,8 +41,7 @@ namespace flyball::text {
 /// The text with each byte that is not UTF-8 replaced by U+FFFD.
 [[nodiscard]] std::string valid_utf8(std::string_view text);
 
-/// Control characters (among them the escape that colours a terminal) as '?', except the newline.
-[[nodiscard]] std::string printable(std::string_view text);
+using flyball::printable;
 
 /// The pieces between separators; one at the end ends the last piece.
 [[nodiscard]] std::vector<std::string_view> split(std::string_view text,

@@ -15,6 +15,7 @@
 
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
+#include "io/unfinished.hpp"
 
 namespace flyball {
 namespace {
@@ -194,6 +195,7 @@ Expected<void> write_file_atomically(const std::string& path, std::string_view c
     const int error = device.get() < 0 ? errno : write_all(device.get(), contents);
     return error == 0 ? Expected<void>{} : cannot_write(path, error);
   }
+  const std::lock_guard lock(io::writing());
   std::error_code ignored;
   const std::string target =
       fs::is_symlink(path, ignored) && exists ? fs::canonical(path, ignored).string() : path;

@@ -1,20 +1,66 @@
+#include <flyball/io/output_folder.hpp>
+
+#include <algorithm>
 #include <cerrno>
 #include <filesystem>
 #include <system_error>
 #include <utility>
+#include <vector>
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <flyball/io/file.hpp>
 
 #include "core/try.hpp"
+#include "io/report_marker.hpp"
+#include "io/unfinished.hpp"
 
 namespace flyball {
-namespace {
 
 namespace fs = std::filesystem;
+
+using io::WrittenFile;
+
+struct OutputFolder::Building {
+  Building() { all().push_back(this); }
+  Building(const Building&) = delete;
+  Building& operator=(const Building&) = delete;
+  ~Building() {
+    const std::lock_guard lock(io::writing());
+    remove();
+    std::erase(all(), this);
+    if (lock_file >= 0) {
+      ::close(lock_file);
+    }
+  }
+
+  void remove() noexcept {
+    std::error_code ignored;
+    if (!path.empty()) {
+      fs::remove_all(path, ignored);
+    }
+    for (; !made_parents.empty(); made_parents.pop_back()) {
+      fs::remove(made_parents.back(), ignored);  // removes it only if it is empty
+    }
+  }
+
+  /// Those of this process; under the lock of io::writing().
+  static std::vector<Building*>& all() {
+    static auto& buildings = *new std::vector<Building*>;  // never destroyed: see unfinished.cpp
+    return buildings;
+  }
+
+  std::string path{};
+  std::vector<std::string> made_parents{};  ///< Outermost first.
+  int lock_file = -1;                       ///< Of the folder, locked while its process lives.
+  std::vector<WrittenFile> files{};
+};
+
+namespace {
 
 Refusal not_writable(const std::string& path, const std::string& system) {
   return refusal(FileError::not_writable, path, "the output folder")
@@ -23,11 +69,69 @@ Refusal not_writable(const std::string& path, const std::string& system) {
       .with("system", system);
 }
 
-/// Whether a report may stand at `path`: nothing is there, an empty folder, or an earlier report.
-Expected<void> check_destination(const std::string& path) {
+std::string reason() {
+  return std::generic_category().message(errno);
+}
+
+/// A lock of a folder that the system takes back when the process ends; -1 if another has it.
+int locked(const std::string& folder) {
+  const int file = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+  if (file >= 0 && ::flock(file, LOCK_EX | LOCK_NB) != 0) {
+    ::close(file);
+    return -1;
+  }
+  return file;
+}
+
+/// How the names of temporary folders begin: in the destination, and beside it.
+std::string temporary_inside() {
+  return fmt::format("{}.", OutputFolder::marker);
+}
+std::string temporary_beside(const fs::path& target) {
+  return fmt::format(".{}.flyball-", target.filename().string());
+}
+
+bool is_temporary(const fs::path& path, const std::string& prefix) {
+  constexpr std::size_t unique = 6;  // what mkdtemp adds
+  const std::string name = path.filename().string();
+  return name.size() == prefix.size() + unique && name.starts_with(prefix);
+}
+
+/// Removes the temporary folders that killed processes left.
+void sweep(const fs::path& folder, const std::string& prefix) {
+  std::error_code ignored;
+  std::vector<fs::path> left;
+  for (fs::directory_iterator entry(folder, ignored), end; !ignored && entry != end;
+       entry.increment(ignored)) {
+    if (is_temporary(entry->path(), prefix)) {
+      left.push_back(entry->path());
+    }
+  }
+  for (const fs::path& path : left) {
+    if (const int file = locked(path.string()); file >= 0) {
+      fs::remove_all(path, ignored);
+      ::close(file);
+    }
+  }
+}
+
+Refusal in_use(const std::string& path, std::string what, std::string got, std::string hint) {
+  return refusal(FileError::folder_in_use, path, std::move(what))
+      .got(std::move(got))
+      .hint(std::move(hint));
+}
+
+/// Whether a report may stand at `path`: nothing is there, an empty folder, or an earlier report,
+/// whose files are as they were written.
+Expected<std::vector<WrittenFile>> check_destination(const std::string& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (status.type() == fs::file_type::not_found) {
+    if (fs::is_symlink(path, error)) {
+      return refusal(FileError::not_a_folder, path, "the output folder")
+          .got("a link to a folder that is missing")
+          .hint("make that folder, or remove the link");
+    }
     return {};
   }
   if (status.type() == fs::file_type::none) {
@@ -38,17 +142,76 @@ Expected<void> check_destination(const std::string& path) {
         .got("a file")
         .expected("a folder, or a path where nothing is yet");
   }
-  const bool empty = fs::is_empty(path, error);
+  bool empty = true;
+  for (fs::directory_iterator entry(path, error), end; !error && entry != end;
+       entry.increment(error)) {
+    empty = empty && is_temporary(entry->path(), temporary_inside());
+  }
   if (error) {
     return not_writable(path, error.message());
   }
-  if (!empty && !fs::is_regular_file(fs::path(path) / OutputFolder::marker, error)) {
+  const fs::path marker = fs::path(path) / OutputFolder::marker;
+  if (!empty && fs::symlink_status(marker, error).type() != fs::file_type::regular) {
     return refusal(FileError::folder_in_use, path, "the output folder")
         .got("not empty and not an earlier Flyball report")
         .expected("new, empty, or an earlier report, which is replaced")
         .hint("give another folder, so that nothing of yours is overwritten");
   }
-  return {};
+  std::vector<WrittenFile> earlier = io::read_marker(marker);
+  for (const WrittenFile& file : earlier) {
+    if (io::occupant_of(path, file.name, earlier) == io::Occupant::another) {
+      return in_use((fs::path(path) / file.name).string(), "the file of the earlier report",
+                    "changed since",
+                    "move it elsewhere or give another folder, so that it is not overwritten");
+    }
+  }
+  return earlier;
+}
+
+/// Moves the files of `building` into a folder that is there, and those of an earlier report out of
+/// it. Whenever it is interrupted, the marker lists what is there.
+Expected<void> replace(const fs::path& building, const fs::path& folder,
+                       const std::vector<WrittenFile>& files) {
+  FLYBALL_TRY(const auto earlier, check_destination(folder.string()));
+  for (const WrittenFile& file : files) {
+    if (io::occupant_of(folder, file.name, earlier) == io::Occupant::another) {
+      return in_use((folder / file.name).string(), "the name of a file of the report",
+                    "taken by one that Flyball did not write",
+                    "move it elsewhere or give another folder, so that it is not overwritten");
+    }
+  }
+  std::error_code error;
+  const auto put = [&](const fs::path& name) -> Expected<void> {
+    fs::create_directories((folder / name).parent_path(), error);
+    if (!error) {
+      fs::rename(building / name, folder / name, error);
+    }
+    return error ? not_writable((folder / name).string(), error.message()) : Expected<void>{};
+  };
+  const auto mark = [&](const std::vector<WrittenFile>& listed) {
+    return write_file_atomically((building / OutputFolder::marker).string(),
+                                 io::marker_text(listed))
+        .and_then([&] { return put(OutputFolder::marker); });
+  };
+  std::vector<WrittenFile> both = earlier;
+  both.insert(both.end(), files.begin(), files.end());
+  FLYBALL_CHECK(mark(both));
+  for (const WrittenFile& file : files) {
+    FLYBALL_CHECK(put(file.name));
+  }
+  for (const WrittenFile& file : earlier) {
+    const bool stays = std::any_of(files.begin(), files.end(), [&](const WrittenFile& other) {
+      return other.name == file.name;
+    });
+    if (!stays && io::occupant_of(folder, file.name, earlier) == io::Occupant::ours) {
+      fs::remove(folder / file.name, error);
+      for (fs::path parent = fs::path(file.name).parent_path(); !parent.empty() && !error;
+           parent = parent.parent_path()) {
+        fs::remove(folder / parent, error);  // removes it only if it is empty
+      }
+    }
+  }
+  return mark(files);
 }
 
 }  // namespace
@@ -62,12 +225,15 @@ Expected<OutputFolder> OutputFolder::create(const std::string& path) {
   if (path.empty() || !target.has_filename()) {
     return not_writable(path, "no folder name");
   }
-  if (fs::exists(target, error)) {
+  const bool exists = fs::exists(target, error);
+  if (exists) {
     target = fs::canonical(target, error);
+    sweep(target, temporary_inside());
   }
-  OutputFolder folder;
-  folder.destination_ = target.string();
-  FLYBALL_CHECK(check_destination(folder.destination_));
+  FLYBALL_CHECK(check_destination(target.string()));
+  const std::lock_guard lock(io::writing());
+  OutputFolder folder(std::make_unique<Building>(), target.string());
+  Building& building = *folder.building_;
   std::vector<fs::path> missing;
   for (fs::path parent = target.parent_path(); !fs::exists(parent, error) && !error;
        parent = parent.parent_path()) {
@@ -77,106 +243,93 @@ Expected<OutputFolder> OutputFolder::create(const std::string& path) {
     if (!fs::create_directory(*parent, error)) {
       return not_writable(path, error.message());
     }
-    folder.made_parents_.push_back(parent->string());
+    building.made_parents.push_back(parent->string());
   }
-  std::string pattern =
-      (target.parent_path() / fmt::format(".{}.XXXXXX", target.filename().string())).string();
+  // In the folder itself if it is there: whatever is mounted, it is on the same device then.
+  const std::string beside = temporary_beside(target);
+  if (!exists) {
+    sweep(target.parent_path(), beside);
+  }
+  std::string pattern = exists ? (target / (temporary_inside() + "XXXXXX")).string()
+                               : (target.parent_path() / (beside + "XXXXXX")).string();
   if (::mkdtemp(pattern.data()) == nullptr) {
-    return not_writable(path, std::generic_category().message(errno));
+    return not_writable(path, reason());
   }
-  folder.building_ = pattern;
+  building.path = pattern;
+  building.lock_file = locked(pattern);
   // mkdtemp makes the folder private; a report is as open as the user's other folders.
   const mode_t mask = ::umask(0);
   ::umask(mask);
-  ::chmod(pattern.c_str(), 0777 & ~mask);
+  struct stat status{};
+  ::stat(pattern.c_str(), &status);
+  ::chmod(pattern.c_str(), (0777 & ~mask) | (status.st_mode & S_ISGID));
   return folder;
 }
 
-OutputFolder::OutputFolder(OutputFolder&& other) noexcept
-    : building_(std::exchange(other.building_, {})),
-      destination_(std::move(other.destination_)),
-      made_parents_(std::exchange(other.made_parents_, {})) {}
+OutputFolder::OutputFolder(std::unique_ptr<Building> building, std::string destination)
+    : building_(std::move(building)), destination_(std::move(destination)) {}
+OutputFolder::OutputFolder(OutputFolder&& other) noexcept = default;
+OutputFolder& OutputFolder::operator=(OutputFolder&& other) noexcept = default;
+OutputFolder::~OutputFolder() = default;
 
-OutputFolder& OutputFolder::operator=(OutputFolder&& other) noexcept {
-  if (this != &other) {
-    discard();
-    building_ = std::exchange(other.building_, {});
-    destination_ = std::move(other.destination_);
-    made_parents_ = std::exchange(other.made_parents_, {});
-  }
-  return *this;
+const std::string& OutputFolder::path() const noexcept {
+  static const std::string none;
+  return building_ ? building_->path : none;
 }
 
-OutputFolder::~OutputFolder() {
-  discard();
-}
-
-void OutputFolder::discard() noexcept {
-  std::error_code ignored;
-  if (!building_.empty()) {
-    fs::remove_all(building_, ignored);
-    building_.clear();
-  }
-  for (; !made_parents_.empty(); made_parents_.pop_back()) {
-    fs::remove(made_parents_.back(), ignored);  // removes it only if it is empty
-  }
-}
-
-Expected<void> OutputFolder::write(std::string_view name, std::string_view contents) const {
+Expected<void> OutputFolder::write(std::string_view name, std::string_view contents) {
   const fs::path relative = fs::path(name).lexically_normal();
-  if (building_.empty() || relative.empty() || relative.is_absolute() ||
-      *relative.begin() == "..") {
+  if (!building_ || !io::stays_inside(relative) || name.find('\n') != std::string_view::npos) {
     return refusal(FileError::not_writable, "OutputFolder::write", fmt::format("\"{}\"", name))
         .got("not a name in the folder");
   }
-  const fs::path path = building_ / relative;
+  const std::lock_guard lock(io::writing());
+  const fs::path path = building_->path / relative;
   std::error_code error;
   fs::create_directories(path.parent_path(), error);
   if (error) {
     return not_writable(path.parent_path().string(), error.message());
   }
   // The folder that is being built has a passing name; the person knows the one it will have.
-  return write_file_atomically(path.string(), contents).map_error([&](Error refused) {
+  auto written = write_file_atomically(path.string(), contents).map_error([&](Error refused) {
     return std::move(refused).in((fs::path(destination_) / relative).string());
   });
+  if (written) {
+    std::erase_if(building_->files,
+                  [&](const WrittenFile& file) { return file.name == relative.string(); });
+    building_->files.push_back(io::written_file(relative.string(), contents));
+  }
+  return written;
 }
 
 Expected<void> OutputFolder::commit() {
-  if (building_.empty()) {
+  if (!building_) {
     return not_writable(destination_, "the folder was committed before");
   }
-  Expected<void> ok =
-      write(marker, "Flyball replaces this folder when it writes the next report.\n");
-  if (ok) {
-    ok = check_destination(destination_);
-  }
-  if (!ok) {
-    return ok;
-  }
+  const std::lock_guard lock(io::writing());
+  const Building& building = *building_;
   std::error_code error;
-  if (fs::exists(destination_, error)) {
-    const std::string earlier = building_ + ".earlier";
-    fs::rename(destination_, earlier, error);
+  if (!fs::exists(fs::symlink_status(destination_, error))) {
+    FLYBALL_CHECK(write_file_atomically((fs::path(building.path) / marker).string(),
+                                        io::marker_text(building.files)));
+    fs::rename(building.path, destination_, error);
     if (error) {
       return not_writable(destination_, error.message());
     }
-    fs::rename(building_, destination_, error);
-    if (error) {
-      std::error_code ignored;
-      fs::rename(earlier, destination_, ignored);
-      return not_writable(destination_, error.message());
-    }
-    std::error_code ignored;
-    fs::remove_all(earlier, ignored);
   } else {
-    fs::rename(building_, destination_, error);
-    if (error) {
-      return not_writable(destination_, error.message());
-    }
+    FLYBALL_CHECK(replace(building.path, destination_, building.files));
   }
-  building_.clear();
-  made_parents_.clear();
+  building_->made_parents.clear();
+  building_.reset();
   return {};
+}
+
+void OutputFolder::abandon_all() noexcept {
+  io::writing().lock();  // for ever
+  io::kill_children();
+  for (Building* building : Building::all()) {
+    building->remove();
+  }
 }
 
 }  // namespace flyball

@@ -10,6 +10,7 @@
 #include "core/try.hpp"
 #include "io/plot_script.hpp"
 #include "io/process.hpp"
+#include "io/svg.hpp"
 #include "io/text.hpp"
 
 namespace flyball {
@@ -19,9 +20,10 @@ using io::PictureFormat;
 using io::ProcessResult;
 
 /// The picture that gnuplot makes of a program. No shell, no files of the user's settings (-d).
-Expected<std::string> run_gnuplot(const std::string& script) {
+Expected<std::string> run_gnuplot(const std::string& script, double seconds) {
   // By its path: gnuplot reads a program from "-" byte by byte.
-  ProcessResult result = io::run_process({"gnuplot", "-d", "/dev/stdin"}, script, 30.0);
+  ProcessResult result =
+      io::run_process({"gnuplot", "-d", "/dev/stdin"}, script, {.seconds = seconds});
   std::replace_if(
       result.err.begin(), result.err.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
   const std::string words = io::printable(io::trim(result.err), 400);
@@ -31,6 +33,8 @@ Expected<std::string> run_gnuplot(const std::string& script) {
           .hint("install it (Debian and Ubuntu: apt install gnuplot-nox), or run without pictures");
     case ProcessResult::End::timed_out:
       return refusal(PlotError::timed_out, "plot").with("gnuplot", words);
+    case ProcessResult::End::too_much:
+      return refusal(PlotError::not_a_picture, "plot").with("gnuplot", words);
     case ProcessResult::End::not_started:
     case ProcessResult::End::signalled:
       break;
@@ -89,16 +93,29 @@ std::string tidy_svg(std::string svg, const std::string& title) {
   return svg;
 }
 
+/// Draws, and looks at what came.
 template <class AnyPlot>
-Expected<std::string> svg_of(const AnyPlot& plot) {
-  return io::gnuplot_script(plot, PictureFormat::svg)
-      .and_then(run_gnuplot)
-      .map([&](std::string svg) { return tidy_svg(std::move(svg), plot.title); });
+Expected<std::string> drawn(const AnyPlot& plot, PictureFormat format, double seconds) {
+  FLYBALL_TRY(const std::string script, io::gnuplot_script(plot, format));
+  FLYBALL_TRY(std::string picture, run_gnuplot(script, seconds));
+  const bool vector = format == PictureFormat::svg;
+  if (vector) {
+    picture = tidy_svg(std::move(picture), plot.title);
+  }
+  if (!(vector ? io::is_plain_svg(picture) : picture.starts_with("\x89PNG\r\n\x1A\n"))) {
+    return refusal(PlotError::not_a_picture, "plot");
+  }
+  return picture;
 }
 
 template <class AnyPlot>
-Expected<std::string> png_of(const AnyPlot& plot) {
-  return io::gnuplot_script(plot, PictureFormat::png).and_then(run_gnuplot);
+Expected<std::string> svg_of(const AnyPlot& plot, double seconds) {
+  return drawn(plot, PictureFormat::svg, seconds);
+}
+
+template <class AnyPlot>
+Expected<std::string> png_of(const AnyPlot& plot, double seconds) {
+  return drawn(plot, PictureFormat::png, seconds);
 }
 
 Expected<void> save(const std::string& path, const Expected<std::string>& picture) {
@@ -112,22 +129,23 @@ ErrorInfo error_info(PlotError code) {
   static constexpr detail::ErrorRow rows[] = {
       {"gnuplot_missing", "gnuplot is not installed", ErrorKind::environment},
       {"gnuplot_failed", "gnuplot did not draw the picture", ErrorKind::environment},
-      {"timed_out", "gnuplot did not finish within 30 s", ErrorKind::environment},
+      {"timed_out", "gnuplot did not finish in time", ErrorKind::environment},
+      {"not_a_picture", "what gnuplot answered is no picture", ErrorKind::environment},
   };
   return detail::info_of(code, "plot", rows);
 }
 
-Expected<std::string> render_svg(const Plot& plot) {
-  return svg_of(plot);
+Expected<std::string> render_svg(const Plot& plot, double seconds) {
+  return svg_of(plot, seconds);
 }
-Expected<std::string> render_svg(const SurfacePlot& plot) {
-  return svg_of(plot);
+Expected<std::string> render_svg(const SurfacePlot& plot, double seconds) {
+  return svg_of(plot, seconds);
 }
-Expected<std::string> render_png(const Plot& plot) {
-  return png_of(plot);
+Expected<std::string> render_png(const Plot& plot, double seconds) {
+  return png_of(plot, seconds);
 }
-Expected<std::string> render_png(const SurfacePlot& plot) {
-  return png_of(plot);
+Expected<std::string> render_png(const SurfacePlot& plot, double seconds) {
+  return png_of(plot, seconds);
 }
 
 Expected<void> write_svg(const std::string& path, const Plot& plot) {

@@ -4,6 +4,8 @@
 #include <csignal>
 #include <cstdio>
 #include <memory>
+#include <mutex>
+#include <thread>
 #include <utility>
 
 #include <fcntl.h>
@@ -13,6 +15,7 @@
 #include <unistd.h>
 
 #include "io/process.hpp"
+#include "io/unfinished.hpp"
 
 extern char** environ;
 
@@ -77,42 +80,54 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
   return result;
 }
 
-/// Reads both pipes until they close; false once the time is over.
-bool drain(Pipe& out, Pipe& err, ProcessResult& result, double seconds) {
-  using Clock = std::chrono::steady_clock;
-  const auto deadline = Clock::now() + std::chrono::duration<double>(seconds);
+using Clock = std::chrono::steady_clock;
+
+/// Reads both pipes until they close.
+ProcessResult::End drain(Pipe& out, Pipe& err, ProcessResult& result, Clock::time_point deadline,
+                         std::size_t most_bytes) {
+  constexpr std::size_t most_words = 65536;
   std::array<char, 65536> buffer;
   while (out.reader() >= 0 || err.reader() >= 0) {
     const auto left =
         std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
     if (left.count() <= 0) {
-      return false;
+      return ProcessResult::End::timed_out;
+    }
+    if (result.out.size() > most_bytes) {
+      return ProcessResult::End::too_much;
     }
     std::array<pollfd, 2> watched = {pollfd{out.reader(), POLLIN, 0},
                                      pollfd{err.reader(), POLLIN, 0}};
     if (::poll(watched.data(), watched.size(), static_cast<int>(left.count())) < 0 &&
         errno != EINTR) {
-      return false;
+      return ProcessResult::End::timed_out;
     }
     for (std::size_t i = 0; i < watched.size(); ++i) {
       if (watched[i].revents == 0) {
         continue;
       }
       const ssize_t got = ::read(watched[i].fd, buffer.data(), buffer.size());
-      if (got > 0) {
+      if (got > 0 && (i == 0 || result.err.size() < most_words)) {
         (i == 0 ? result.out : result.err).append(buffer.data(), static_cast<std::size_t>(got));
-      } else if (got == 0 || errno != EINTR) {
+      } else if (got == 0 || (got < 0 && errno != EINTR)) {
         (i == 0 ? out : err).close_reader();
       }
     }
   }
-  return true;
+  return ProcessResult::End::exited;
+}
+
+/// Whether a child has ended; its status is kept for whoever waits for it.
+bool has_ended(pid_t child) {
+  siginfo_t info{};
+  return ::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOWAIT | WNOHANG) != 0 ||
+         info.si_pid == child;
 }
 
 }  // namespace
 
 ProcessResult run_process(const std::vector<std::string>& arguments, std::string_view input,
-                          double seconds) {
+                          const ProcessLimits& limits) {
   ProcessResult result;
   const auto not_started = [&](int error) {
     result.end = error == ENOENT ? ProcessResult::End::not_found : ProcessResult::End::not_started;
@@ -135,26 +150,47 @@ ProcessResult run_process(const std::vector<std::string>& arguments, std::string
   posix_spawn_file_actions_adddup2(&actions, ::fileno(script.get()), STDIN_FILENO);
   posix_spawn_file_actions_adddup2(&actions, out.writer(), STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, err.writer(), STDERR_FILENO);
+  // A group of its own, so that what it starts is killed with it; and the signals that this process
+  // may have blocked.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t none;
+  sigemptyset(&none);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setpgroup(&attributes, 0);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETPGROUP);
   std::vector<std::string> words = arguments;
   std::vector<std::string> environment = clean_environment();
   pid_t child = 0;
-  const int error = ::posix_spawnp(&child, arguments.front().c_str(), &actions, nullptr,
+  std::unique_lock start(starting());
+  const int error = ::posix_spawnp(&child, arguments.front().c_str(), &actions, &attributes,
                                    pointers(words).data(), pointers(environment).data());
   posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attributes);
   if (error != 0) {
     return not_started(error);
   }
   out.close_writer();
   err.close_writer();
-  const bool finished = drain(out, err, result, seconds);
-  if (!finished) {
-    ::kill(child, SIGKILL);
+  const RunningChild running(child);
+  start.unlock();
+  const auto deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                           std::chrono::duration<double>(limits.seconds));
+  result.end = drain(out, err, result, deadline, limits.bytes);
+  // Who closes its output need not end.
+  while (result.end == ProcessResult::End::exited && !has_ended(child)) {
+    result.end =
+        Clock::now() < deadline ? ProcessResult::End::exited : ProcessResult::End::timed_out;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  if (result.end != ProcessResult::End::exited) {
+    ::kill(-child, SIGKILL);
   }
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  if (!finished) {
-    result.end = ProcessResult::End::timed_out;
+  if (result.end != ProcessResult::End::exited) {
+    result.out.clear();
   } else if (WIFSIGNALED(status)) {
     result.end = ProcessResult::End::signalled;
     result.code = WTERMSIG(status);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <thread>
 #include <utility>
 
@@ -9,7 +10,9 @@
 
 namespace flyball::report {
 
-std::vector<Picture> draw(const std::vector<Figure>& figures, bool png) {
+std::vector<Picture> draw(const std::vector<Figure>& figures, bool png, double seconds) {
+  using Clock = std::chrono::steady_clock;
+  const auto end = Clock::now() + std::chrono::duration<double>(seconds);
   std::vector<Picture> pictures(figures.size());
   for (std::size_t i = 0; i < figures.size(); ++i) {
     pictures[i].figure = figures[i];
@@ -21,8 +24,9 @@ std::vector<Picture> draw(const std::vector<Figure>& figures, bool png) {
     for (std::size_t job = next++; job < jobs; job = next++) {
       const bool raster = job >= pictures.size();
       Picture& target = pictures[job % pictures.size()];
+      const double left = std::max(0.0, std::chrono::duration<double>(end - Clock::now()).count());
       Expected<std::string> picture =
-          raster ? render_png(target.figure.plot) : render_svg(target.figure.plot);
+          raster ? render_png(target.figure.plot, left) : render_svg(target.figure.plot, left);
       if (!picture) {
         problems[job] = to_string(picture.error());
       } else if (raster) {
@@ -42,7 +46,7 @@ std::vector<Picture> draw(const std::vector<Figure>& figures, bool png) {
   work();
   workers.clear();
   for (std::size_t i = 0; i < pictures.size(); ++i) {
-    pictures[i].problem = problems[i];
+    pictures[i].problem = !png || !problems[i].empty() ? problems[i] : problems[i + figures.size()];
   }
   return pictures;
 }

@@ -15,8 +15,10 @@ struct Picture {
   std::string problem{};
 };
 
-/// Draws them, a few at a time. @param png  Whether PNGs are wanted too.
-[[nodiscard]] std::vector<Picture> draw(const std::vector<Figure>& figures, bool png);
+/// Draws them, a few at a time. @param png  Whether PNGs are wanted too. @param seconds  What all
+/// of them have together; those that are not drawn then have a problem.
+[[nodiscard]] std::vector<Picture> draw(const std::vector<Figure>& figures, bool png,
+                                        double seconds = 60.0);
 
 /// The page of a document whose pictures are drawn already; they stand at the end of the section
 /// that they name.

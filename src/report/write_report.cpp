@@ -3,16 +3,15 @@
 #include <utility>
 #include <vector>
 
-#include <flyball/io/file.hpp>
+#include <flyball/io/output_folder.hpp>
 
 #include "core/try.hpp"
 #include "report/pictures.hpp"
 
 namespace flyball::report {
 
-Expected<void> write_report(const Answer& answer, const std::string& folder,
-                            const Provenance& provenance) {
-  // Asked for first: drawing is wasted on a folder that cannot be written.
+Expected<WrittenReport> write_report(const Answer& answer, const std::string& folder,
+                                     const Provenance& provenance) {
   FLYBALL_TRY(auto output, OutputFolder::create(folder));
   Provenance made{provenance.command, {}};
   const auto write = [&](const std::string& name, const std::string& contents) {
@@ -24,7 +23,11 @@ Expected<void> write_report(const Answer& answer, const std::string& folder,
     FLYBALL_CHECK(write(file.name, file.contents));
   }
   const std::vector<Picture> pictures = draw(answer.figures, true);
+  WrittenReport report;
   for (const Picture& picture : pictures) {
+    if (!picture.problem.empty()) {
+      report.problems.push_back(picture.problem);
+    }
     const std::string stem = "pictures/" + picture.figure.name;
     if (!picture.svg.empty()) {
       FLYBALL_CHECK(write(stem + ".svg", picture.svg));
@@ -34,7 +37,8 @@ Expected<void> write_report(const Answer& answer, const std::string& folder,
     }
   }
   FLYBALL_CHECK(output.write("index.html", page_of(answer.document, pictures, made)));
-  return output.commit();
+  FLYBALL_CHECK(output.commit());
+  return report;
 }
 
 }  // namespace flyball::report

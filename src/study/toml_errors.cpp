@@ -170,7 +170,9 @@ std::string TomlDocument::excerpt(const toml::source_region& source) const {
   if (source.begin.line == 0) {
     return "";
   }
-  const std::vector<std::string> line = characters(line_of(source.begin.line));
+  std::string text(line_of(source.begin.line));
+  std::replace(text.begin(), text.end(), '\t', ' ');
+  const std::vector<std::string> line = characters(text);
   // Of a long line, what stands about the place.
   constexpr std::size_t widest = 100;
   const std::size_t at = std::min<std::size_t>(source.begin.column - 1, line.size());

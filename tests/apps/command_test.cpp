@@ -97,9 +97,11 @@ TEST_F(Command, AReportSaysWhatWasTyped) {
 TEST_F(Command, TheNextReportReplacesTheLast) {
   const std::string design = "design " + example("elevator.toml") + " --out report";
   ASSERT_EQ(run(design).status, 0);
-  std::ofstream(work() / "report/stale.txt") << "of the last report\n";
-  ASSERT_EQ(run(design).status, 0);
-  EXPECT_FALSE(std::filesystem::exists(work() / "report/stale.txt"));
+  ASSERT_TRUE(std::filesystem::exists(work() / "report/ElevatorLoop.hpp"));
+  std::ofstream(work() / "report/mine.txt") << "a person's\n";
+  ASSERT_EQ(run("analyze " + example("elevator.toml") + " --out report").status, 0);
+  EXPECT_FALSE(std::filesystem::exists(work() / "report/ElevatorLoop.hpp"));
+  EXPECT_TRUE(std::filesystem::exists(work() / "report/mine.txt"));
 }
 
 TEST_F(Command, JsonWritesNoReportUnlessAsked) {

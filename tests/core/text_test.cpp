@@ -64,6 +64,11 @@ TEST(Shortened, CutsWhatIsQuotedLongWordsAndTheWhole) {
   EXPECT_LT(shortened(many).size(), 4010U);
 }
 
+TEST(Printable, HasNoControlCharacters) {
+  EXPECT_EQ(printable("a\x1b[31m\tb\x7f\n\xC2\x9Bω\xFF"), "a?[31m?b?\n??ω\xEF\xBF\xBD");
+  EXPECT_EQ(shortened("\"\x1b[2J\" is not a motor"), "\"?[2J\" is not a motor");
+}
+
 TEST(NearestName, FindsTheNameMeant) {
   EXPECT_EQ(nearest_name("drum_raduis", names), "drum_radius");
   EXPECT_EQ(nearest_name("Gearing", names), "gearing");

@@ -119,6 +119,11 @@ TEST(JsonWriter, APlaceIsLineAndColumn) {
   EXPECT_EQ(refusal["diagnostics"][0]["code"], "noticed");
 }
 
+// A terminal obeys C1 controls and DEL as it does ESC; JSON would let them stand.
+TEST(JsonWriter, NoControlCharacterStandsAsItIs) {
+  EXPECT_EQ(json_quoted("a\x1b\x7f\xC2\x9B\xC2\xA0"), "\"a\\u001b\\u007f\\u009b\xC2\xA0\"");
+}
+
 TEST(JsonWriter, ACoordinateIsNameAndUnit) {
   EXPECT_EQ(text_of(std::vector<Coordinate>{{"speed", "m/s"}, {"x"}}),
             R"([{"name":"speed","unit":"m/s"},{"name":"x","unit":""}])");

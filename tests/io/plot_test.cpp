@@ -1,6 +1,7 @@
 #include <flyball/io/plot.hpp>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -270,6 +271,34 @@ TEST(Plot, WhatGnuplotComplainsAboutIsTold) {
   EXPECT_TRUE(svg.error().is(PlotError::gnuplot_failed));
   EXPECT_TRUE(contains(to_string(svg.error()), "no such terminal"));
   EXPECT_TRUE(contains(to_string(svg.error()), "code = 3"));
+}
+
+/// What a program that pretends to be gnuplot makes of a plot.
+Expected<std::string> drawn_by(const std::string& script, bool png = false) {
+  const TemporaryFolder folder;
+  const std::string fake = folder.put("gnuplot", "#!/bin/sh\nPATH=/usr/bin:/bin\n" + script + "\n");
+  std::filesystem::permissions(fake, std::filesystem::perms::owner_all);
+  const WithPath only(folder.file("."));
+  return png ? render_png(example(3), 0.5) : render_svg(example(3), 0.5);
+}
+
+TEST(Plot, AGnuplotThatHangsIsEnded) {
+  const auto start = std::chrono::steady_clock::now();
+  for (const char* script : {"sleep 100", "sleep 100 & wait", "exec >&- 2>&-; sleep 100", "yes >&2",
+                             "trap '' TERM; sleep 100"}) {
+    EXPECT_TRUE(drawn_by(script).error().is(PlotError::timed_out)) << script;
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(30));
+}
+
+TEST(Plot, WhatIsNoPictureIsNotTaken) {
+  for (const char* script : {"yes", "echo '<svg><script>alert(1)</script></svg>'",
+                             "echo '<svg></svg></div>'", "echo hello"}) {
+    EXPECT_FALSE(drawn_by(script)) << script;
+  }
+  EXPECT_TRUE(drawn_by("yes").error().is(PlotError::not_a_picture));
+  EXPECT_TRUE(drawn_by("echo hello", true).error().is(PlotError::not_a_picture));
+  EXPECT_EQ(drawn_by("echo '<svg></svg>'").value(), "<svg></svg>\n");
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include <flyball/report/write_report.hpp>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -13,6 +14,7 @@
 #include <flyball/study/project.hpp>
 
 #include "fixtures.hpp"
+#include "report/pictures.hpp"
 
 namespace flyball::report {
 namespace {
@@ -50,8 +52,8 @@ class WriteReport : public ::testing::Test {
 
 /// The report of a result's answer.
 template <class Result>
-Expected<void> write(const Result& result, const std::string& folder,
-                     const Provenance& provenance = {}) {
+Expected<WrittenReport> write(const Result& result, const std::string& folder,
+                              const Provenance& provenance = {}) {
   return write_report(study::answer_of(result), folder, provenance);
 }
 
@@ -138,6 +140,32 @@ TEST_F(WriteReport, ARefusedLogIsWrittenToo) {
   EXPECT_EQ(files.count("gains.toml"), 0u);
   const auto json = nlohmann::json::parse(text_of(folder() + "/result.json"));
   EXPECT_TRUE(json.contains("error"));
+}
+
+// One bound for all pictures together, and the report without them.
+TEST_F(WriteReport, AGnuplotThatHangsCostsThePicturesAndABoundedTime) {
+  fs::create_directories(folder("bin"));
+  const std::string fake = folder("bin") + "/gnuplot";
+  std::ofstream(fake) << "#!/bin/sh\nexec /bin/sleep 100\n";
+  fs::permissions(fake, fs::perms::owner_all);
+  const std::string before = ::getenv("PATH");
+  ::setenv("PATH", folder("bin").c_str(), 1);
+  const Answer answer = study::answer_of(design_result(MechanismKind::arm));
+  const auto start = std::chrono::steady_clock::now();
+  const std::vector<Picture> pictures = draw(answer.figures, true, 0.5);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+  std::ofstream(fake, std::ios::trunc) << "#!/bin/sh\nexit 3\n";
+  const auto written = write_report(answer, folder());
+  ::setenv("PATH", before.c_str(), 1);
+  ASSERT_GT(pictures.size(), 2U);
+  for (const Picture& picture : pictures) {
+    EXPECT_TRUE(picture.svg.empty() && picture.png.empty());
+    EXPECT_NE(picture.problem.find("did not finish"), std::string::npos) << picture.problem;
+  }
+  ASSERT_TRUE(written) << to_string(written.error());
+  EXPECT_EQ(written->problems.size(), pictures.size());
+  EXPECT_EQ(files_in(folder()).count("index.html"), 1u);
+  EXPECT_EQ(files_in(folder()).count("pictures/poles.svg"), 0u);
 }
 
 TEST_F(WriteReport, AnEarlierReportIsReplacedAndNothingElse) {

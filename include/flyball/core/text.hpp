@@ -10,8 +10,12 @@ namespace flyball {
 /// At most that many characters of a UTF-8 text, whole ones; "…" says that there were more.
 [[nodiscard]] std::string cut(std::string_view text, std::size_t most);
 
-/// A message in which what it quotes is cut to 80 characters, a word of 240 or more to its two
-/// ends, and the whole to 4000: what comes from outside may be of any length.
+/// Control characters (among them the escape that colours a terminal) as '?', except the newline,
+/// and what is not UTF-8 as U+FFFD.
+[[nodiscard]] std::string printable(std::string_view text);
+
+/// A message, printable, in which what it quotes is cut to 80 characters, a word of 240 or more to
+/// its two ends, and the whole to 4000: what comes from outside may be of any length.
 [[nodiscard]] std::string shortened(std::string_view message);
 
 /// Levenshtein's distance: the fewest insertions, deletions and substitutions between two texts.

@@ -40,47 +40,4 @@ inline constexpr std::size_t default_max_file_bytes = std::size_t{512} << 20;
 [[nodiscard]] Expected<void> write_file_atomically(const std::string& path,
                                                    std::string_view contents);
 
-/// A report folder that appears whole or not at all: it is built under a temporary name beside its
-/// destination and renamed into place by `commit`; without a commit, the destructor removes every
-/// trace.
-///
-/// The folder carries a marker file, `.flyball-report`, by which a later run knows that it may
-/// replace it.
-class OutputFolder {
- public:
-  static constexpr std::string_view marker = ".flyball-report";
-
-  /// @param path  The destination. It may not exist, be empty, or hold an earlier report; missing
-  ///              parents are made.
-  /// @errors FileError::folder_in_use, not_a_folder, not_writable.
-  [[nodiscard]] static Expected<OutputFolder> create(const std::string& path);
-
-  OutputFolder(OutputFolder&& other) noexcept;
-  OutputFolder& operator=(OutputFolder&& other) noexcept;
-  OutputFolder(const OutputFolder&) = delete;
-  OutputFolder& operator=(const OutputFolder&) = delete;
-  ~OutputFolder();
-
-  /// Where to write until `commit`: the temporary folder.
-  [[nodiscard]] const std::string& path() const noexcept { return building_; }
-  /// Where the folder will stand.
-  [[nodiscard]] const std::string& destination() const noexcept { return destination_; }
-
-  /// Writes a file of the report. @param name  Relative, such as "gains.toml" or "data/fit.csv".
-  /// @errors FileError::not_writable, also for a name that leads out of the folder.
-  [[nodiscard]] Expected<void> write(std::string_view name, std::string_view contents) const;
-
-  /// Renames the folder into place. @errors FileError::folder_in_use (somebody filled the
-  /// destination meanwhile), not_writable; the destination is then as it was.
-  [[nodiscard]] Expected<void> commit();
-
- private:
-  OutputFolder() = default;
-  void discard() noexcept;
-
-  std::string building_;  ///< Empty once committed or moved from.
-  std::string destination_;
-  std::vector<std::string> made_parents_;  ///< Outermost first.
-};
-
 }  // namespace flyball

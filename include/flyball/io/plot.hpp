@@ -15,20 +15,22 @@ namespace flyball {
 enum class PlotError {
   gnuplot_missing,  ///< There is no gnuplot on this machine.
   gnuplot_failed,   ///< It refused the picture; its own words are the evidence.
-  timed_out,        ///< It did not finish within 30 s.
+  timed_out,        ///< It did not finish in time.
+  not_a_picture,    ///< It answered something else, or without end.
 };
 [[nodiscard]] ErrorInfo error_info(PlotError code);
 
 /// The `<svg>` element as text, fit for an HTML page or a file.
 /// @errors PlotError, ArgumentError::wrong_shape (columns of unequal length), out_of_range (size,
 /// axes of a map that do not ascend evenly), empty (no panel, no finite value).
+/// Of what gnuplot answers only elements that draw are taken. @param seconds  The time it has.
 /// Cost: starts gnuplot, about 0.1 s.
-[[nodiscard]] Expected<std::string> render_svg(const Plot& plot);
-[[nodiscard]] Expected<std::string> render_svg(const SurfacePlot& plot);
+[[nodiscard]] Expected<std::string> render_svg(const Plot& plot, double seconds = 30.0);
+[[nodiscard]] Expected<std::string> render_svg(const SurfacePlot& plot, double seconds = 30.0);
 
 /// The bytes of a PNG at 1.5 times the size in pixels. @errors As `render_svg`.
-[[nodiscard]] Expected<std::string> render_png(const Plot& plot);
-[[nodiscard]] Expected<std::string> render_png(const SurfacePlot& plot);
+[[nodiscard]] Expected<std::string> render_png(const Plot& plot, double seconds = 30.0);
+[[nodiscard]] Expected<std::string> render_png(const SurfacePlot& plot, double seconds = 30.0);
 
 /// The same into a file, atomically. @errors As `render_svg`, and FileError.
 [[nodiscard]] Expected<void> write_svg(const std::string& path, const Plot& plot);

@@ -1,0 +1,67 @@
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <string>
+#include <system_error>
+#include <thread>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <flyball/io/output_folder.hpp>
+
+#include "commands.hpp"
+#include "console.hpp"
+#include "session.hpp"
+
+namespace flyball::app {
+
+namespace {
+
+/// Those that would end the process: who ignores one, such as nohup, goes on ignoring it.
+sigset_t ending_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction now{};
+    if (::sigaction(signal, nullptr, &now) == 0 && now.sa_handler != SIG_IGN) {
+      sigaddset(&signals, signal);
+    }
+  }
+  return signals;
+}
+
+}  // namespace
+
+void begin_session() {
+  for (const int file : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(file, F_GETFD) == -1) {
+      // The other way round than it is used, so that reading or writing fails.
+      [[maybe_unused]] const int opened =
+          ::open("/dev/null", file == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+    }
+  }
+  const sigset_t signals = ending_signals();
+  ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  std::thread([signals] {
+    int signal = 0;
+    while (::sigwait(&signals, &signal) != 0) {
+    }
+    OutputFolder::abandon_all();
+    std::signal(signal, SIG_DFL);
+    ::pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+    ::kill(::getpid(), signal);
+  }).detach();
+}
+
+int end_session(int status) {
+  errno = 0;
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) {
+    return status;
+  }
+  say("standard output cannot be written" +
+      (errno == 0 ? "" : ": " + std::generic_category().message(errno)));
+  return status == success ? static_cast<int>(bad_input) : status;
+}
+
+}  // namespace flyball::app
