@@ -132,13 +132,14 @@ class DelayMargin {
 
   // Where a crossover could not be followed: the first loss of stability on a grid, halved down.
   [[nodiscard]] double scan(double guess) const {
-    const double most = std::isfinite(guess) ? 1.01 * guess : 64.0 * period_;
+    // Further, each step is an eigenvalue problem of as many stored inputs as periods.
+    const double most = std::min(1.01 * guess, 64.0 * period_);
     const double step = period_ / 16.0;
     for (double from = 0.0; from < most; from += step) {
       if (!stable(from + step)) {
         double low = from;
         double high = from + step;
-        while (high - low > 1e-14 * high) {
+        for (int k = 0; k < 60 && high - low > 1e-14 * high; ++k) {
           const double middle = 0.5 * (low + high);
           (stable(middle) ? low : high) = middle;
         }

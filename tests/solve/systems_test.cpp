@@ -250,5 +250,13 @@ TEST(SolveSystems, AnswersTellTheirError) {
   EXPECT_EQ(entry(motor, "A"), 1.0);
 }
 
+// A guess of a delay margin that is 1e290 periods away is not walked to.
+TEST(SolveSystems, MarginsOfALoopInTinyPeriods) {
+  const Json margins = answer(
+      "margins",
+      R"({"A":[[-10.5]],"B":[[1e155]],"C":[[-0.2],[1e-08],[-1]],"K":[[1.9]],"K_e":[[0,1e8,0]],"T":1e-300})");
+  EXPECT_GT(number(margins, "delay_margin"), 0.0);
+}
+
 }  // namespace
 }  // namespace flyball::solve
