@@ -8,6 +8,7 @@
 
 namespace flyball::report {
 
+/// What a report lacks after it was written.
 struct WrittenReport {
   std::vector<std::string> problems{};  ///< Of the pictures that are not in it, one each.
 };
