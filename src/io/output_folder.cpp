@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <filesystem>
+#include <set>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -168,6 +169,48 @@ Expected<std::vector<WrittenFile>> check_destination(const std::string& path) {
   return earlier;
 }
 
+/// What stood in a folder before files were put there, to be put back unless `done`: a second link
+/// to each beside the new ones, so that at no moment a name is without a file. Where a file system
+/// has no links nothing is kept.
+class Restoring {
+ public:
+  Restoring(fs::path folder, const fs::path& building)
+      : folder_(std::move(folder)), kept_(building / ".kept") {}
+  Restoring(const Restoring&) = delete;
+  Restoring& operator=(const Restoring&) = delete;
+  ~Restoring() {
+    std::error_code error;
+    for (auto name = names_.rbegin(); name != names_.rend(); ++name) {
+      if (fs::exists(kept_ / *name, error)) {
+        fs::create_directories((folder_ / *name).parent_path(), error);
+        fs::rename(kept_ / *name, folder_ / *name, error);
+      } else if (!had_.contains(*name)) {
+        fs::remove(folder_ / *name, error);
+      }
+    }
+  }
+
+  void keep(const fs::path& name) {
+    std::error_code error;
+    if (std::find(names_.begin(), names_.end(), name) != names_.end()) {
+      return;  // of a marker that is written twice the first counts
+    }
+    names_.push_back(name);
+    if (fs::exists(folder_ / name, error)) {
+      had_.insert(name);
+      fs::create_directories((kept_ / name).parent_path(), error);
+      fs::create_hard_link(folder_ / name, kept_ / name, error);
+    }
+  }
+  void done() noexcept { names_.clear(); }
+
+ private:
+  fs::path folder_;
+  fs::path kept_;
+  std::vector<fs::path> names_;
+  std::set<fs::path> had_;
+};
+
 /// Moves the files of `building` into a folder that is there, and those of an earlier report out of
 /// it. Whenever it is interrupted, the marker lists what is there.
 Expected<void> replace(const fs::path& building, const fs::path& folder,
@@ -181,8 +224,10 @@ Expected<void> replace(const fs::path& building, const fs::path& folder,
     }
   }
   std::error_code error;
+  Restoring restoring(folder, building);
   const auto put = [&](const fs::path& name) -> Expected<void> {
     fs::create_directories((folder / name).parent_path(), error);
+    restoring.keep(name);
     if (!error) {
       fs::rename(building / name, folder / name, error);
     }
@@ -204,6 +249,7 @@ Expected<void> replace(const fs::path& building, const fs::path& folder,
       return other.name == file.name;
     });
     if (!stays && io::occupant_of(folder, file.name, earlier) == io::Occupant::ours) {
+      restoring.keep(file.name);
       fs::remove(folder / file.name, error);
       for (fs::path parent = fs::path(file.name).parent_path(); !parent.empty() && !error;
            parent = parent.parent_path()) {
@@ -211,7 +257,9 @@ Expected<void> replace(const fs::path& building, const fs::path& folder,
       }
     }
   }
-  return mark(files);
+  FLYBALL_CHECK(mark(files));
+  restoring.done();
+  return {};
 }
 
 }  // namespace
