@@ -133,7 +133,7 @@ class DelayMargin {
   // Where a crossover could not be followed: the first loss of stability on a grid, halved down.
   [[nodiscard]] double scan(double guess) const {
     // Further, each step is an eigenvalue problem of as many stored inputs as periods.
-    const double most = std::min(1.01 * guess, 64.0 * period_);
+    const double most = std::min(1.01 * guess, 32.0 * period_);
     const double step = period_ / 16.0;
     for (double from = 0.0; from < most; from += step) {
       if (!stable(from + step)) {
