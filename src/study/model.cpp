@@ -155,6 +155,12 @@ ExpectedAll<ModelFile> parse_model(std::string_view text, const std::string& nam
 
 /// A model by formula about its point.
 Expected<ModelFile> linearized(const ModelJob& job) {
+  if (job.model.inputs() == 0) {
+    return refusal(ArgumentError::empty, job.path, "model.inputs")
+        .got("empty")
+        .expected("at least one, such as push = \"N\", for a matrix B")
+        .hint("`flyball simulate` runs the model as it is");
+  }
   FLYBALL_TRY(auto point, operating_point(job));
   ModelFile model;
   FLYBALL_TRY(model.system, linearize(job.model, point.x, point.u));

@@ -360,5 +360,13 @@ TEST(AnalyzeModel, IsLinearizedAboutItsPoint) {
       << aside->notes[0].message;
 }
 
+TEST(AnalyzeModel, NothingToActWithIsNamed) {
+  const auto model =
+      parse_model(with(with(pendulum, "inputs = { u = \"N m\" }\n", ""), " + u/J", ""), "p.toml");
+  ASSERT_FALSE(model);
+  EXPECT_NE(to_string(model.error()).find("model.inputs is empty"), std::string::npos)
+      << to_string(model.error());
+}
+
 }  // namespace
 }  // namespace flyball::study
