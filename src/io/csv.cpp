@@ -18,6 +18,7 @@
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "io/csv_table.hpp"
+#include "io/csv_time.hpp"
 #include "io/signals.hpp"
 #include "io/text.hpp"
 
@@ -50,19 +51,26 @@ Header split_header(std::string_view text) {
 }
 
 bool is_time_name(std::string_view name) {
-  const std::string word = io::lower(name);
-  return word == "timestamp" || word == "time" || word == "t" || word == "seconds" ||
-         word == "elapsed time" || word == "elapsedtime" || word == "times";
+  return io::time_name(name).is_time;
+}
+
+/// Cells in which loggers write that there is no value.
+bool is_blank(std::string_view cell) {
+  if (cell.empty()) {
+    return true;
+  }
+  constexpr std::array<std::string_view, 5> words{"null", "undefined", "n/a", "#n/a", "nil"};
+  return cell.size() <= 9 && std::find(words.begin(), words.end(), io::lower(cell)) != words.end();
 }
 
 /// A cell's value: a number, or true and false as 1 and 0.
-std::optional<double> cell_number(std::string_view cell, bool decimal_comma) {
+std::optional<double> cell_number(std::string_view cell) {
   const std::string word = io::lower(io::trim(cell));
   if (word == "true" || word == "false") {
     return word == "true" ? 1.0 : 0.0;
   }
-  if (decimal_comma && std::count(word.begin(), word.end(), ',') == 1 &&
-      word.find('.') == std::string::npos) {
+  // A comma in a cell of a table that commas separate was quoted: it is a decimal one too.
+  if (std::count(word.begin(), word.end(), ',') == 1 && word.find('.') == std::string::npos) {
     std::string with_point = word;
     std::replace(with_point.begin(), with_point.end(), ',', '.');
     return io::parse_number(with_point);
@@ -102,11 +110,37 @@ class Reader {
   }
 
  private:
-  std::optional<double> number(std::string_view cell) const {
-    return cell_number(cell, table_.delimiter != ',');
+  static std::optional<double> number(std::string_view cell) { return cell_number(cell); }
+
+  /// Lines before the header: a program's name, a date, a line without two cells.
+  void skip_titles() {
+    constexpr std::size_t most = 20;
+    const auto is_header = [](const std::vector<std::string>& cells) {
+      return cells.size() >= 2 && std::any_of(cells.begin(), cells.end(), [](const auto& cell) {
+               return is_time_name(split_header(cell).name);
+             });
+    };
+    const std::size_t end = std::min(most, table_.rows.size());
+    const auto begin = table_.rows.begin();
+    auto header = std::find_if(begin, begin + static_cast<std::ptrdiff_t>(end), is_header);
+    if (header == begin + static_cast<std::ptrdiff_t>(end)) {
+      header = std::find_if(begin, begin + static_cast<std::ptrdiff_t>(end),
+                            [](const auto& cells) { return cells.size() >= 2; });
+    }
+    const auto titles = header - begin;
+    const bool words = std::none_of(begin, header, [](const std::vector<std::string>& cells) {
+      return cells.size() >= 2 && number(cells[0]) && number(cells[1]);
+    });
+    if (titles > 0 && header != begin + static_cast<std::ptrdiff_t>(end) && words) {
+      note(log_.diagnostics, "title_lines", "{} before the header passed over",
+           io::counted(static_cast<std::size_t>(titles), "line"));
+      table_.rows.erase(begin, header);
+      table_.lines.erase(table_.lines.begin(), table_.lines.begin() + titles);
+    }
   }
 
   Expected<void> read_header() {
+    skip_titles();
     if (table_.rows.empty() || table_.rows.front().size() < 2) {
       return refusal(LogError::not_a_log, source_, "the file")
           .got("text without a table")
@@ -114,7 +148,7 @@ class Reader {
     }
     const std::vector<std::string>& first = table_.rows.front();
     const bool headless = std::all_of(first.begin(), first.end(), [&](const std::string& cell) {
-      return io::trim(cell).empty() || number(cell).has_value();
+      return is_blank(io::trim(cell)) || number(cell).has_value();
     });
     for (std::size_t c = 0; c < first.size(); ++c) {
       headers_.push_back(headless ? Header{fmt::format("column {}", c + 1), {}}
@@ -211,7 +245,8 @@ class Reader {
   double time_scale(std::size_t column) {
     const Header& header = headers_[column];
     if (header.unit.empty()) {
-      return usual_scale(column);
+      const std::optional<double> said = io::time_name(header.name).seconds;
+      return said ? *said : usual_scale(column);
     }
     const Expected<Unit> unit = parse_unit(header.unit);
     if (unit && unit->dimension == Dimension::time) {
@@ -228,14 +263,32 @@ class Reader {
     FLYBALL_TRY(const std::size_t clock, time_column());
     const double scale = time_scale(clock);
     std::vector<std::optional<double>> time(table_.rows.size());
+    std::optional<double> first_date;
     for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
       time[row] = number(cell(row, clock));
+      if (!time[row]) {
+        // Dates and times of day, counted from the first.
+        time[row] = io::clock_time(cell(row, clock));
+        first_date = time[row] && !first_date ? time[row] : first_date;
+        time[row] = time[row] ? std::optional((*time[row] - *first_date) / scale) : std::nullopt;
+      }
       if (!time[row] || !std::isfinite(*time[row])) {
         time[row].reset();
         ++bad_times_;
       } else {
         *time[row] *= scale;
       }
+    }
+    if (first_date) {
+      note(log_.diagnostics, "dates",
+           "times are written as dates or times of day; they are counted "
+           "from the first");
+    }
+    if (const std::size_t restarts = io::join_restarts(time); restarts > 0) {
+      note(log_.diagnostics, "time_restarts",
+           "time begins anew {}: each part has a clock of its own; they were put one after the "
+           "other",
+           restarts == 1 ? "once" : fmt::format("{} times", restarts));
     }
     for (std::size_t c = 0; c < headers_.size(); ++c) {
       if (c != clock) {
@@ -250,7 +303,7 @@ class Reader {
     TextSignal text{headers_[column].name, {}, {}};
     for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
       const std::string_view value = cell(row, column);
-      if (value.empty() || !time[row]) {
+      if (is_blank(value) || !time[row]) {
         continue;
       }
       text.time.push_back(*time[row]);
@@ -282,6 +335,9 @@ class Reader {
       const std::optional<double> time = number(cell(row, 0));
       if (!time || !std::isfinite(*time)) {
         ++bad_times_;
+        continue;
+      }
+      if (is_blank(cell(row, 2))) {
         continue;
       }
       const std::string_view key = cell(row, 1);

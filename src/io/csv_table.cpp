@@ -12,17 +12,45 @@
 namespace flyball::io {
 namespace {
 
-/// Tab before semicolon before comma: a comma may also be a decimal point, the others may not.
-char tell_delimiter(std::string_view line) {
+/// Tab before semicolon before comma: a comma may also be a decimal point, the others may not. A
+/// title may hold either, so that most of the first lines have to.
+char tell_delimiter(std::string_view text) {
+  constexpr int looked_at = 20;
+  int lines = 0;
+  int tabs = 0;
+  int semicolons = 0;
   bool quoted = false;
   bool tab = false;
   bool semicolon = false;
-  for (const char c : line) {
+  bool any = false;
+  const auto end_line = [&] {
+    lines += any ? 1 : 0;
+    tabs += tab ? 1 : 0;
+    semicolons += semicolon ? 1 : 0;
+    tab = semicolon = any = false;
+  };
+  for (const char c : text) {
+    if (!quoted && (c == '\n' || c == '\r')) {
+      end_line();
+      if (lines >= looked_at) {
+        break;
+      }
+      continue;
+    }
+    any = true;
     quoted = quoted != (c == '"');
     tab = tab || (!quoted && c == '\t');
     semicolon = semicolon || (!quoted && c == ';');
   }
-  return tab ? '\t' : semicolon ? ';' : ',';
+  end_line();
+  return 2 * tabs > lines ? '\t' : 2 * semicolons > lines ? ';' : ',';
+}
+
+/// The separator of a first line such as "sep=;", which spreadsheets write and read; 0 if it is
+/// none.
+char said_delimiter(std::string_view line) {
+  const bool says = line.size() >= 4 && lower(line.substr(0, 4)) == "sep=";
+  return !says ? '\0' : line.size() > 4 ? line[4] : ',';
 }
 
 class Splitter {
@@ -40,8 +68,15 @@ class Splitter {
         continue;
       }
       if (first) {
-        table_.delimiter = tell_delimiter(text_.substr(at_, line_end - at_));
         first = false;
+        // A tab after "sep=" is blank space, which `line` is without.
+        const char said = said_delimiter(text_.substr(at_, line_end - at_));
+        table_.delimiter = said != '\0' ? said : tell_delimiter(text_.substr(at_));
+        if (said != '\0') {
+          at_ = line_end;
+          skip_line_end();
+          continue;
+        }
       }
       FLYBALL_CHECK(read_row());
     }

@@ -250,6 +250,7 @@ Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
 
 std::vector<TestRun> join_channels(const FoundChannels& channels,
                                    const std::vector<CharacterizationWindow>& windows) {
+  constexpr double longest_gap = 0.9;  // s
   const Signal* clock = channels.voltage;
   for (const Signal* signal : {channels.position, channels.velocity}) {
     if (signal != nullptr && samples_in(*signal, windows) > samples_in(*clock, windows)) {
@@ -260,12 +261,23 @@ std::vector<TestRun> join_channels(const FoundChannels& channels,
   for (const CharacterizationWindow& window : windows) {
     TestRun run;
     run.kind = window.kind;
+    const auto end_run = [&] {
+      if (run.time.size() >= 2) {
+        runs.push_back(run);
+      }
+      run = TestRun{.kind = window.kind};
+    };
     std::size_t voltage_at = 0;
     std::size_t position_at = 0;
     std::size_t velocity_at = 0;
     for (const double t : clock->time) {
       if (t < window.begin || t >= window.end) {
         continue;
+      }
+      // Nothing was recorded for long: another test of the kind began (time began anew), or the
+      // logger stood still.
+      if (!run.time.empty() && t - run.time.back() > longest_gap) {
+        end_run();
       }
       run.time.push_back(t);
       run.voltage.push_back(hold(*channels.voltage, t, voltage_at));
@@ -276,9 +288,7 @@ std::vector<TestRun> join_channels(const FoundChannels& channels,
         run.velocity.push_back(interpolate(*channels.velocity, t, velocity_at));
       }
     }
-    if (run.time.size() >= 2) {
-      runs.push_back(std::move(run));
-    }
+    end_run();
   }
   return runs;
 }

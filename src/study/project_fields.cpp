@@ -35,6 +35,16 @@ Expected<void> check_position_unit(const std::string& text) {
                     .expected("of a length or an angle, such as \"m\" or \"rotations\"");
 }
 
+Expected<void> check_velocity_unit(const std::string& text) {
+  const auto unit = parse_unit(text);
+  const bool fits = unit && (unit->dimension == velocity || unit->dimension == angular_velocity);
+  return fits ? Expected<void>()
+              : refusal(ArgumentError::wrong_unit, {}, "the velocity's unit")
+                    .got(unit ? fmt::format("\"{}\", a {}", text, to_string(unit->dimension))
+                              : fmt::format("\"{}\", which is not known", text))
+                    .expected("of a velocity, such as \"m/s\" or \"RPM\"");
+}
+
 Expected<void> check_motor(const std::string& text) {
   return mechanisms::motor(text).map([](const auto&) {});
 }
@@ -115,9 +125,23 @@ constexpr std::array log_fields{
         .checked(check_position_unit)
         .without("what the log says")
         .takes("UNIT"),
+    text("velocity_unit", at<&LogSelection::velocity_unit>(), "\"RPM\"",
+         "Unit of the recorded velocity (RPM, rad/s, deg/s, m/s, …)")
+        .checked(check_velocity_unit)
+        .without("what the log says")
+        .called("velocity-unit")
+        .takes("UNIT"),
+    flag("no_velocity", at<&LogSelection::no_velocity>(), "true",
+         "Leave the recorded velocity out; the position tells it")
+        .called("no-velocity"),
     quantity("scale", at<&LogSelection::scale>(), dimensionless, not_zero, "0.1",
              "Multiplies recorded positions and velocities; 1/gearing for a motor's encoder, "
              "metres per rotation for an elevator recorded in rotations")
+        .takes("NUMBER"),
+    quantity(
+        "voltage_scale", at<&LogSelection::voltage_scale>(), dimensionless, not_zero, "12",
+        "Volts a recorded unit of voltage; the battery's voltage for a duty cycle from -1 to 1")
+        .called("voltage-scale")
         .takes("NUMBER"),
     text("state", at<&LogSelection::state_channel>(), "\"/SysIdState\"",
          "Channel that names the running test")

@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
@@ -126,6 +127,92 @@ TEST(Csv, TheUnitOfTimeIsSeenByItsSteps) {
   expect("timestamp,x\n7,1\n7.02,2\n900,3\n900.02,4\n", 7.0, "");  // one gap
   expect("time (s),x\n10000000,1\n10020000,2\n", 1e7, "");
   expect("time,x\n10000000,1\n", 1e7, "");
+}
+
+TEST(Csv, TheUnitOfTimeIsInItsName) {
+  for (const auto& [name, scale] : {std::pair{"timestamp_us", 1e-6},
+                                    {"Time_ms", 1e-3},
+                                    {"t_ns", 1e-9},
+                                    {"time_s", 1.0},
+                                    {"TimestampMicros", 1e-6},
+                                    {"elapsed time sec", 1.0}}) {
+    const auto log = parse_csv(std::string(name) + ",x\n0,1\n4,2\n8,3\n", "log.csv");
+    ASSERT_TRUE(log) << to_string(log.error());
+    EXPECT_DOUBLE_EQ(log->signals.at(0).time.at(1), 4.0 * scale) << name;
+    EXPECT_TRUE(log->diagnostics.empty()) << name;
+  }
+  // A name that only ends like a unit.
+  EXPECT_FALSE(parse_csv("status,x\nb,1\na,2\n", "log.csv"));
+}
+
+TEST(Csv, NoValueIsWrittenInManyWays) {
+  const auto log =
+      parse_csv("Timestamp,x,state\n0,null,null\n1,null,none\n2,null,N/A\n3,5,on\n", "a.csv");
+  ASSERT_TRUE(log) << to_string(log.error());
+  ASSERT_EQ(log->signals.size(), 1U);
+  EXPECT_EQ(log->signals[0].value, std::vector<double>{5.0});
+  // "none" is a word: the state of a robot in which no test runs.
+  ASSERT_EQ(log->texts.size(), 1U);
+  EXPECT_EQ(log->texts[0].value, (std::vector<std::string>{"none", "on"}));
+  const auto list = parse_csv("Timestamp,Key,Value\n0,x,null\n1,x,2\n", "a.csv");
+  ASSERT_TRUE(list) << to_string(list.error());
+  EXPECT_EQ(list->signals.at(0).value, std::vector<double>{2.0});
+}
+
+TEST(Csv, LinesBeforeTheHeader) {
+  for (const char* before : {"sep=;\n", "SEP=;\r\n", "Robot log, exported 2025\n\n",
+                             "My log; of today\nsecond\n", "sep=;\nRobot log\n"}) {
+    const auto log = parse_csv(std::string(before) + "Time (s);x\n0,5;1,5\n1,5;2\n", "a.csv");
+    ASSERT_TRUE(log) << before << to_string(log.error());
+    ASSERT_EQ(log->signals.size(), 1U) << before;
+    EXPECT_EQ(log->signals[0].time, (std::vector<double>{0.5, 1.5})) << before;
+    EXPECT_EQ(log->signals[0].value, (std::vector<double>{1.5, 2.0})) << before;
+  }
+}
+
+TEST(Csv, QuotedDecimalCommas) {
+  const auto log = parse_csv("time,x\n\"0,020\",\"1,5\"\n\"0,040\",\"-2,25\"\n", "a.csv");
+  ASSERT_TRUE(log) << to_string(log.error());
+  EXPECT_EQ(log->signals.at(0).time, (std::vector<double>{0.02, 0.04}));
+  EXPECT_EQ(log->signals.at(0).value, (std::vector<double>{1.5, -2.25}));
+}
+
+TEST(Csv, TimesWrittenAsDates) {
+  for (const char* rows : {"2025-02-28T23:59:59.500Z,1\n2025-03-01T00:00:00.250Z,2\n",
+                           "2025-02-28 23:59:59.5,1\n2025-03-01 00:00:00.25,2\n",
+                           "2025-03-01T00:59:59.5+01:00,1\n2025-02-28T23:00:00.25-0100,2\n",
+                           "12:00:00.5,1\n12:00:01.25,2\n"}) {
+    const auto log = parse_csv(std::string("time,x\n") + rows, "a.csv");
+    ASSERT_TRUE(log) << to_string(log.error());
+    ASSERT_EQ(log->signals.at(0).time.size(), 2U) << rows;
+    EXPECT_NEAR(log->signals[0].time[0], 0.0, 1e-9) << rows;
+    EXPECT_NEAR(log->signals[0].time[1], 0.75, 1e-6) << rows;
+  }
+  EXPECT_FALSE(parse_csv("time,x\n2025-13-01T00:00:00,1\n2025-13-01T00:00:01,2\n", "a.csv"));
+}
+
+TEST(Csv, TimeThatBeginsAnewIsPutInOrder) {
+  std::string text = "time (s),x\n";
+  for (int part = 0; part < 3; ++part) {
+    for (int k = 0; k < 50; ++k) {
+      text += fmt::format("{},{}\n", 0.02 * k, part);
+    }
+  }
+  const auto log = parse_csv(text, "a.csv");
+  ASSERT_TRUE(log) << to_string(log.error());
+  const Signal& x = log->signals.at(0);
+  ASSERT_EQ(x.time.size(), 150U);
+  EXPECT_TRUE(std::is_sorted(x.time.begin(), x.time.end()));
+  EXPECT_EQ(x.value[49], 0.0);
+  EXPECT_EQ(x.value[50], 1.0);
+  EXPECT_NEAR(x.time[50] - x.time[49], 2.0, 1e-12);
+  EXPECT_NEAR(x.time[149] - x.time[100], 0.98, 1e-12);
+  ASSERT_EQ(log->diagnostics.size(), 1U);
+  EXPECT_EQ(log->diagnostics[0].code, "time_restarts");
+  // One block of rows that comes late is rows out of order.
+  const auto shuffled = parse_csv("time (s),x\n5,1\n6,2\n7,3\n1,0\n8,4\n9,5\n", "a.csv");
+  ASSERT_TRUE(shuffled) << to_string(shuffled.error());
+  EXPECT_EQ(shuffled->diagnostics.at(0).code, "unsorted_time");
 }
 
 TEST(Csv, TheFirstColumnIsTimeOnlyIfItCanBe) {

@@ -106,10 +106,10 @@ TEST(Recording, ScaleTurnsRotationsIntoMetres) {
 
 TEST(Recording, AVelocityMayHaveAnotherUnitThanItsPosition) {
   Log log = wpilog("Rotation");
-  log.signals[2].unit = "RPM";
+  log.signals[2] = signal("velocity-motor-Wrist", "RPM", [](double) { return 60.0; }, 0.02, 0.004);
   const auto loaded = recording_from_log(log, {.mechanism = MechanismKind::flywheel});
   ASSERT_TRUE(loaded) << to_string(loaded.error());
-  EXPECT_NEAR(loaded->recording.runs[0].velocity[0], two_pi / 60.0, 1e-12);
+  EXPECT_NEAR(loaded->recording.runs[0].velocity[0], two_pi, 1e-12);
   EXPECT_NEAR(loaded->recording.runs[0].position[0], two_pi * loaded->recording.runs[0].time[0],
               1e-9);
 }
@@ -298,6 +298,24 @@ TEST(Recording, ScalesASysIdJsonByItsUnits) {
 
   log.sysid->test.clear();
   EXPECT_EQ(code_of(log, {}), "mechanism_unknown");
+}
+
+// Two tests of one kind whose clocks begin anew are two runs, although no state lies between them.
+TEST(Recording, SilenceEndsARun) {
+  Log log = wpilog("Radian");
+  for (Signal& s : log.signals) {
+    for (std::size_t i = 0; i < s.time.size(); ++i) {
+      s.time[i] += s.time[i] >= 2.0 ? 2.0 : 0.0;
+    }
+  }
+  log.texts[0].time = {0.0, 1.0, 5.0, 6.0, 7.0};
+  const auto loaded = recording_from_log(log, {.mechanism = MechanismKind::arm});
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  ASSERT_EQ(loaded->recording.runs.size(), 3U);
+  EXPECT_EQ(loaded->recording.runs[0].kind, TestKind::quasistatic_forward);
+  EXPECT_EQ(loaded->recording.runs[1].kind, TestKind::quasistatic_forward);
+  EXPECT_LT(loaded->recording.runs[0].time.back(), 2.0);
+  EXPECT_GE(loaded->recording.runs[1].time.front(), 4.0);
 }
 
 }  // namespace

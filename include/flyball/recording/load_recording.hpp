@@ -21,8 +21,11 @@ struct LogSelection {
   std::string voltage_channel{};  ///< Channel names as the log has them.
   std::string position_channel{};
   std::string velocity_channel{};
-  std::string unit{};  ///< Unit of the position channel: "rotations", "m", "deg", …
-  double scale = 1.0;  ///< Multiplies position and velocity: output units a recorded unit.
+  std::string unit{};           ///< Unit of the position channel: "rotations", "m", "deg", …
+  std::string velocity_unit{};  ///< Unit of the velocity channel: "RPM", "deg/s", …
+  bool no_velocity = false;     ///< Leave the velocity channel out; the position tells it.
+  double scale = 1.0;           ///< Multiplies position and velocity: output units a recorded unit.
+  double voltage_scale = 1.0;   ///< Volts a recorded unit of the voltage channel.
 };
 
 /// Why a log cannot be turned into a recording.
@@ -32,7 +35,8 @@ enum class RecordingError {
   no_test_state,      ///< No channel tells which test runs.
   no_channel,         ///< Voltage, or both of position and velocity, are missing.
   ambiguous_channel,  ///< Several mechanisms were recorded; the person has to choose.
-  unit_mismatch,      ///< The unit cannot be one of that mechanism.
+  unit_unknown,       ///< Nothing tells the unit, and none can be assumed.
+  unit_mismatch,      ///< The unit cannot be one of that mechanism, or not of both channels.
   no_tests,           ///< A test state channel without a test.
 };
 [[nodiscard]] ErrorInfo error_info(RecordingError code);

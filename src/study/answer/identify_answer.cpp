@@ -146,6 +146,12 @@ Verdict verdict_of(const IdentifyResult& result) {
   }
   const identification::FeedforwardFit& fit = *result.report.fit;
   Verdict verdict;
+  for (const Diagnostic& found : result.diagnostics()) {
+    if (found.code == "unit_assumed") {
+      verdict.add(Tone::caution, found.message);
+    }
+  }
+  const bool assumed = verdict.tone != Tone::good;
   const auto undetermined = [&](const char* name, const identification::GainEstimate& gain) {
     if (!gain.determined) {
       verdict.add(Tone::caution, fmt::format("the log does not determine {}", name));
@@ -169,7 +175,8 @@ Verdict verdict_of(const IdentifyResult& result) {
                            "The gains can be used: the model explains {} of the measured "
                            "velocity.",
                            text::percent(fit.r_squared))
-                     : "The gains can be used with care.";
+                 : assumed ? "The gains can be used once the unit is confirmed."
+                           : "The gains can be used with care.";
   return verdict;
 }
 

@@ -1,0 +1,119 @@
+#include <fmt/format.h>
+
+#include <flyball/io/log.hpp>
+
+#include "core/diagnose.hpp"
+#include "core/try.hpp"
+#include "recording/channel_names.hpp"
+#include "recording/channels.hpp"
+#include "recording/characterization_windows.hpp"
+#include "recording/recorded_motion.hpp"
+#include "recording/to_si.hpp"
+
+namespace flyball::recording {
+
+using mechanisms::MechanismKind;
+
+Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& selection,
+                                        LoadedRecording loaded) {
+  FLYBALL_TRY_IN(log.source, auto tests, find_tests(log, selection.state_channel));
+  loaded.subject = tests.subject;
+  if (const std::string reason = drivetrain_reason(log, tests, selection); !reason.empty()) {
+    loaded.refusal = refusal(RecordingError::drivetrain, log.source, "mechanism")
+                         .got("a drivetrain: " + reason)
+                         .expected("a flywheel, an elevator or an arm")
+                         .hint(
+                             "drivetrains are not supported yet; if it is another mechanism, say "
+                             "which with --mechanism");
+    if (const auto channels = one_side(log, tests)) {
+      loaded.recording.runs = join_channels(
+          *channels, tests.windows.empty() ? split_by_voltage(*channels->voltage) : tests.windows);
+    }
+    return loaded;
+  }
+
+  FLYBALL_TRY_IN(log.source, auto channels, find_channels(log, tests, selection));
+  if (tests.windows.empty()) {
+    tests.windows = split_by_voltage(*channels.voltage);
+    if (tests.windows.empty()) {
+      return refusal(RecordingError::no_tests, log.source, channels.voltage->name)
+          .got("never driven, and no channel names the running test")
+          .hint("record the voltage that was applied, or name the channel with --state");
+    }
+    note(loaded.diagnostics, "assumed",
+         "no channel names the running test: {} tests were told apart by the voltage",
+         tests.windows.size());
+  }
+  note(loaded.diagnostics, "assumed", "voltage from \"{}\", position from {}, velocity from {}",
+       channels.voltage->name,
+       channels.position ? "\"" + channels.position->name + "\"" : "nowhere",
+       channels.velocity ? "\"" + channels.velocity->name + "\"" : "nowhere");
+  loaded.recording.runs = join_channels(channels, tests.windows);
+  if (loaded.recording.runs.empty()) {
+    return refusal(RecordingError::no_tests, log.source, tests.state_name)
+        .got("without a test in which the mechanism was recorded");
+  }
+  if (selection.no_velocity) {
+    leave_velocity_out(loaded.recording);
+  }
+  const std::optional<double> ratio = velocity_ratio(loaded.recording.runs);
+  RecordedUnits units;
+  FLYBALL_TRY_IN(log.source, units.position, said_unit(selection.unit, false));
+  FLYBALL_TRY_IN(log.source, units.velocity, said_unit(selection.velocity_unit, true));
+  const auto by_channel = [](RecordedUnit& unit, const Signal* signal, bool rate) {
+    if (!unit.known() && signal != nullptr) {
+      unit = unit_of_text(signal->unit, rate, UnitSource::metadata);
+      unit = unit.known() ? unit : unit_in_name(signal->name, rate);
+    }
+  };
+  by_channel(units.position, channels.position, false);
+  by_channel(units.velocity, selection.no_velocity ? nullptr : channels.velocity, true);
+  FLYBALL_TRY_IN(log.source, units, settle_units(units, ratio, loaded.diagnostics));
+  std::optional<MechanismKind> kind = selection.mechanism;
+  if (!kind) {
+    kind = kind_from_name(tests.subject + " " + channels.voltage->name);
+    if (kind) {
+      note(loaded.diagnostics, "assumed", "the names in the log say that it is {} {}",
+           *kind == MechanismKind::flywheel ? "a" : "an", to_string(*kind));
+    } else if (units.position.known() && units.position.linear) {
+      kind = MechanismKind::elevator;
+      note(loaded.diagnostics, "assumed", "positions are lengths: an elevator is assumed");
+    }
+  }
+  if (!kind) {
+    return refusal(RecordingError::mechanism_unknown, log.source, "mechanism")
+        .got(
+            units.position.known()
+                ? fmt::format("not told by the log (positions in \"{}\" fit an arm and a flywheel)",
+                              units.position.text)
+                : "not told by the log, nor is the unit of its positions")
+        .hint(units.position.known()
+                  ? "say it with --mechanism arm or --mechanism flywheel"
+                  : "say both, such as --mechanism arm --unit rotations (or rad, deg, m)");
+  }
+  if (!units.position.known()) {
+    if (kind == MechanismKind::elevator) {
+      return refusal(RecordingError::unit_unknown, log.source, "position unit")
+          .got("not told by the log, and a drum's is not known")
+          .expected("a length for an elevator")
+          .hint(
+              "say it with --unit m (or cm, in, ft); for a motor's rotations, --unit rotations "
+              "and with --scale the metres that one is");
+    }
+    units.position = likely_angle_unit(loaded.recording.runs, ratio, kind);
+    if (!units.velocity.known()) {
+      units.velocity = unit_of_text(units.position.text, true, UnitSource::assumed);
+    }
+    tell_assumed_unit(loaded.diagnostics, units.position);
+  }
+  if (!units.velocity.known()) {
+    units.velocity = unit_of_text(units.position.text, true, units.position.source);
+  }
+  FLYBALL_TRY_IN(log.source, auto output, output_scale(units.position, selection.scale, kind));
+  scale_runs(loaded.recording, output, units.velocity.factor / units.position.factor,
+             selection.voltage_scale);
+  loaded.recording.mechanism = kind;
+  return loaded;
+}
+
+}  // namespace flyball::recording

@@ -1,0 +1,87 @@
+#include <fmt/format.h>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/core/quantity.hpp>
+
+#include "core/diagnose.hpp"
+#include "core/try.hpp"
+#include "recording/to_si.hpp"
+
+namespace flyball::recording {
+
+using identification::Recording;
+using identification::TestRun;
+using mechanisms::MechanismKind;
+
+Expected<OutputScale> output_scale(const RecordedUnit& unit, double scale,
+                                   std::optional<MechanismKind> kind) {
+  if (unit.linear) {
+    if (kind == MechanismKind::arm) {
+      return refusal(RecordingError::unit_mismatch, {}, "position unit")
+          .got(fmt::format("\"{}\", a length", unit.text))
+          .expected("an angle for an arm")
+          .hint("check --mechanism, or say the unit with --unit");
+    }
+    return OutputScale{unit.factor * scale, "m"};
+  }
+  if (kind == MechanismKind::elevator) {
+    if (scale == 1.0) {
+      return refusal(RecordingError::unit_mismatch, {}, "position unit")
+          .got(fmt::format("\"{}\", an angle", unit.text))
+          .expected("a length for an elevator")
+          .hint(fmt::format("say how many metres one of them is with --scale (for rotations the "
+                            "drum's circumference, 2π r; for radians its radius), or the unit that "
+                            "it is in truth with --unit"));
+    }
+    return OutputScale{scale, "m"};
+  }
+  return OutputScale{unit.factor * scale, "rad"};
+}
+
+Expected<RecordedUnit> said_unit(const std::string& text, bool rate) {
+  RecordedUnit unit = unit_of_text(text, rate, UnitSource::said);
+  if (!text.empty() && !unit.known()) {
+    const auto parsed = parse_unit(text);
+    return refusal(RecordingError::unit_mismatch, {}, rate ? "velocity unit" : "position unit")
+        .got(parsed ? fmt::format("\"{}\", a {}", text, to_string(parsed->dimension))
+                    : fmt::format("\"{}\", which is not known", text))
+        .expected(rate ? "RPM, rad/s, deg/s, m/s, in/s or ft/s"
+                       : "rotations, radians, degrees, metres, inches or feet")
+        .hint(rate ? "say it with --velocity-unit" : "say it with --unit");
+  }
+  return unit;
+}
+
+void scale_runs(Recording& recording, const OutputScale& output, double velocity_over_position,
+                double voltage_scale) {
+  const auto scale = [](std::vector<double>& values, double factor) {
+    for (double& value : values) {
+      value *= factor;
+    }
+  };
+  for (TestRun& run : recording.runs) {
+    scale(run.position, output.factor);
+    scale(run.velocity, output.factor * velocity_over_position);
+    scale(run.voltage, voltage_scale);
+  }
+  recording.unit = output.unit;
+}
+
+void leave_velocity_out(Recording& recording) {
+  for (TestRun& run : recording.runs) {
+    if (!run.position.empty()) {
+      run.velocity.clear();
+    }
+  }
+}
+
+void tell_assumed_unit(std::vector<Diagnostic>& notes, const RecordedUnit& unit) {
+  std::vector<Diagnostic> first;
+  warn(first, "unit_assumed",
+       "the log does not tell the unit of its positions, and the data cannot: they are taken for "
+       "{} (say it with --unit); all gains hang on it",
+       unit.text);
+  notes.insert(notes.begin(), first.front());
+}
+
+}  // namespace flyball::recording

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "recording/recorded_units.hpp"
+
+/// From recorded units to a recording in SI.
+namespace flyball::recording {
+
+struct OutputScale {
+  double factor = 1.0;  ///< SI a recorded unit.
+  std::string unit;     ///< "m" or "rad".
+};
+
+/// The SI size of a recorded position unit for a mechanism. @param scale  What the person said.
+/// @errors RecordingError::unit_mismatch.
+[[nodiscard]] Expected<OutputScale> output_scale(const RecordedUnit& unit, double scale,
+                                                 std::optional<mechanisms::MechanismKind> kind);
+
+/// A unit that the person said; unknown if there is none. @errors RecordingError::unit_mismatch.
+[[nodiscard]] Expected<RecordedUnit> said_unit(const std::string& text, bool rate);
+
+/// Brings the runs to SI. @param output  Of the position. @param velocity_over_position  Sizes of
+/// their units, SI.
+void scale_runs(identification::Recording& recording, const OutputScale& output,
+                double velocity_over_position, double voltage_scale);
+
+/// Takes the velocity out where the position tells it too.
+void leave_velocity_out(identification::Recording& recording);
+
+/// Tells first what was assumed and nothing can check.
+void tell_assumed_unit(std::vector<Diagnostic>& notes, const RecordedUnit& unit);
+
+/// The tests of a SysId JSON. @param loaded  With what is known so far.
+[[nodiscard]] Expected<LoadedRecording> from_sysid_json(const Log& log,
+                                                        const LogSelection& selection,
+                                                        LoadedRecording loaded);
+/// The tests of a log of channels.
+[[nodiscard]] Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& selection,
+                                                      LoadedRecording loaded);
+
+}  // namespace flyball::recording
