@@ -1,14 +1,16 @@
 // Monte Carlo of the identification: recordings of known mechanisms, what is recovered of them.
 //
-//   bench_identification [--seeds N] [--seed FIRST] [--only NAME]
+//   bench_identification [--seeds N] [--seed FIRST] [--only MECHANISM] [--family NAME]
 //
-// Per mechanism and gain: median and 90th percentile of the relative error, share of the 95 %
-// intervals that hold the truth, median relative half-width; and the time of a fit.
+// Per family of sessions (clean, and with what real logs have), mechanism and gain: median and 90th
+// percentile of the relative error, share of the 95 % intervals that hold the truth, median
+// relative half-width; and the time of a fit.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -62,52 +64,73 @@ void print(const Tally& tally) {
       100.0 * quantile(tally.widths, 0.5), tally.undetermined);
 }
 
-void run(const scenarios::Truth& truth, std::uint64_t first, std::uint64_t seeds) {
+bool is_diagnosis(const scenarios::Family& family, std::string_view code) {
+  return !code.empty() && (code == family.diagnoses[0] || code == family.diagnoses[1]);
+}
+
+void run(const scenarios::Family& family, const scenarios::Truth& truth, std::uint64_t first,
+         std::uint64_t seeds) {
   std::vector<Tally> tallies{{"kS", truth.kS, {}, {}},
                              {"kV", truth.kV, {}, {}},
                              {"kA", truth.kA, {}, {}},
                              {"kG", truth.kG, {}, {}},
                              {"offset", truth.offset, {}, {}}};
   std::vector<double> seconds;
-  std::vector<double> ols_kA;
   std::size_t refused = 0;
+  std::size_t diagnosed = 0;
+  std::map<std::string, std::size_t> warnings;
   for (std::uint64_t seed = first; seed < first + seeds; ++seed) {
-    const auto recording = flyball::record_characterization(scenarios::session(truth, seed));
+    auto options = scenarios::session(truth, seed);
+    flyball::Random random(seed * 104729 + 5);
+    family.spoil(truth, random, options);
+    const auto recording = flyball::record_characterization(options);
     if (!recording) {
       std::printf("%s\n", to_string(recording.error()).c_str());
       std::exit(1);
     }
     const auto start = std::chrono::steady_clock::now();
-    const auto fit = flyball::identification::fit_feedforward(*recording);
+    const auto report = flyball::identification::identify_feedforward(*recording);
     seconds.push_back(
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-    if (!fit) {
+    bool right = false;
+    for (const flyball::Diagnostic& found : report.diagnostics) {
+      right = right || is_diagnosis(family, found.code);
+      warnings[found.code] += found.severity == flyball::Severity::info ? 0 : 1;
+    }
+    diagnosed += right ? 1 : 0;
+    if (!report.fit) {
       ++refused;
       std::printf("  seed %llu: %s\n", static_cast<unsigned long long>(seed),
-                  to_string(fit.error()).c_str());
+                  to_string(report.fit.error()).c_str());
       continue;
     }
-    tallies[0].add(fit->kS);
-    tallies[1].add(fit->kV);
-    tallies[2].add(fit->kA);
-    if (fit->kG) {
-      tallies[3].add(*fit->kG);
+    const FeedforwardFit& fit = *report.fit;
+    tallies[0].add(fit.kS);
+    tallies[1].add(fit.kV);
+    tallies[2].add(fit.kA);
+    if (fit.kG) {
+      tallies[3].add(*fit.kG);
     }
-    if (fit->angle_offset) {
-      tallies[4].add(*fit->angle_offset);
-    }
-    if (fit->one_step) {
-      ols_kA.push_back(std::abs(fit->one_step->kA / truth.kA - 1.0));
+    if (fit.angle_offset) {
+      tallies[4].add(*fit.angle_offset);
     }
   }
   const auto slowest = std::max_element(seconds.begin(), seconds.end()) - seconds.begin();
-  std::printf(
-      "%s: %llu seeds, %zu refused, %.0f ms a fit (worst %.0f, seed %llu), one-step OLS kA error "
-      "%.0f %%\n",
-      std::string(truth.name).c_str(), static_cast<unsigned long long>(seeds), refused,
-      1e3 * quantile(seconds, 0.5), 1e3 * quantile(seconds, 1.0),
-      static_cast<unsigned long long>(first) + static_cast<unsigned long long>(slowest),
-      100.0 * quantile(ols_kA, 0.5));
+  std::printf("%s, %s: %llu seeds, %zu refused, %.0f ms a fit (worst %.0f, seed %llu)",
+              std::string(family.name).c_str(), std::string(truth.name).c_str(),
+              static_cast<unsigned long long>(seeds), refused, 1e3 * quantile(seconds, 0.5),
+              1e3 * quantile(seconds, 1.0),
+              static_cast<unsigned long long>(first) + static_cast<unsigned long long>(slowest));
+  if (!family.diagnoses[0].empty()) {
+    std::printf(", diagnosed %.1f %%", 100.0 * static_cast<double>(diagnosed) /
+                                           static_cast<double>(std::max<std::uint64_t>(1, seeds)));
+  }
+  for (const auto& [code, count] : warnings) {
+    if (count > 0) {
+      std::printf(", %s %zu", code.c_str(), count);
+    }
+  }
+  std::printf("\n");
   for (const Tally& tally : tallies) {
     if (!tally.errors.empty()) {
       print(tally);
@@ -122,6 +145,7 @@ int main(int argc, char** argv) {
   std::uint64_t seeds = 1000;
   std::uint64_t first = 1;
   std::string_view only;
+  std::string_view of_family = "clean";
   for (int i = 1; i + 1 < argc; i += 2) {
     const std::string_view option = argv[i];
     if (option == "--seeds") {
@@ -130,14 +154,21 @@ int main(int argc, char** argv) {
       first = std::strtoull(argv[i + 1], nullptr, 10);
     } else if (option == "--only") {
       only = argv[i + 1];
+    } else if (option == "--family") {
+      of_family = argv[i + 1];
     } else {
-      std::fprintf(stderr, "usage: %s [--seeds N] [--seed FIRST] [--only NAME]\n", argv[0]);
+      std::fprintf(stderr,
+                   "usage: %s [--seeds N] [--seed FIRST] [--only MECHANISM] [--family NAME|all]\n",
+                   argv[0]);
       return 2;
     }
   }
-  for (const scenarios::Truth& truth : scenarios::mechanisms) {
-    if (only.empty() || truth.name.find(only) != std::string_view::npos) {
-      run(truth, first, seeds);
+  for (const scenarios::Family& family : scenarios::families) {
+    for (const scenarios::Truth& truth : scenarios::mechanisms) {
+      if ((of_family == "all" || family.name == of_family) &&
+          (only.empty() || truth.name.find(only) != std::string_view::npos)) {
+        run(family, truth, first, seeds);
+      }
     }
   }
   return 0;

@@ -61,4 +61,94 @@ inline CharacterizationOptions session(const Truth& truth, std::uint64_t seed) {
   return options;
 }
 
+/// What a family of sessions adds to the clean one, and what the identification should say of it.
+struct Family {
+  std::string_view name;
+  /// The codes of diagnoses, one of which is right; empty if the model can be right without.
+  std::array<std::string_view, 2> diagnoses;
+  void (*spoil)(const Truth& truth, flyball::Random& random, CharacterizationOptions& options);
+};
+
+/// Half of the travel, or a turn of what turns on.
+inline double reach(const CharacterizationOptions& options) {
+  return options.mechanism == MechanismKind::flywheel
+             ? 2.0 * std::numbers::pi
+             : 0.5 * (options.travel_high - options.travel_low);
+}
+
+inline constexpr std::array<Family, 13> families{{
+    {"clean", {}, [](const Truth&, flyball::Random&, CharacterizationOptions&) {}},
+    {"skew",
+     {},
+     [](const Truth&, flyball::Random& random, CharacterizationOptions& options) {
+       options.defects.position_delay = random.uniform(0.0, 0.04);
+       options.defects.velocity_delay = random.uniform(0.0, 0.04);
+     }},
+    {"filter",
+     {},
+     [](const Truth&, flyball::Random& random, CharacterizationOptions& options) {
+       options.velocity_window = random.uniform(0.0, 0.1);
+     }},
+    {"friction",
+     {},
+     [](const Truth&, flyball::Random&, CharacterizationOptions& options) {
+       options.friction_variation = 0.4;
+       options.breakaway = 1.3;
+     }},
+    {"coarse rows",
+     {},
+     [](const Truth& truth, flyball::Random& random, CharacterizationOptions& options) {
+       options.row_period = 0.02;
+       options.velocity_noise = random.uniform(0.01, 0.03) * (6.0 - truth.kS) / truth.kV;
+     }},
+    {"stale first row",
+     {},
+     [](const Truth&, flyball::Random&, CharacterizationOptions& options) {
+       options.defects.stale_first_row = true;
+     }},
+    {"spring",
+     {"spring", ""},
+     [](const Truth&, flyball::Random& random, CharacterizationOptions& options) {
+       if (options.mechanism != MechanismKind::flywheel) {
+         options.defects.spring = random.uniform(0.2, 0.5) / reach(options);
+       }
+     }},
+    {"drag",
+     {"drag", ""},
+     [](const Truth& truth, flyball::Random& random, CharacterizationOptions& options) {
+       const double top = (options.step_voltage - truth.kS) / truth.kV;
+       options.defects.drag = random.uniform(0.3, 1.0) / (top * top);
+     }},
+    {"asymmetric friction",
+     {"asymmetric_friction", ""},
+     [](const Truth& truth, flyball::Random& random, CharacterizationOptions& options) {
+       // An elevator's is gravity: no log of it moving tells them apart.
+       if (truth.kind != MechanismKind::elevator) {
+         options.defects.friction_asymmetry = random.uniform(0.3, 0.5);
+       }
+     }},
+    {"current limit",
+     {"current_limit", ""},
+     [](const Truth& truth, flyball::Random& random, CharacterizationOptions& options) {
+       options.defects.headroom =
+           random.uniform(0.4, 0.7) * options.step_voltage + truth.kG + truth.kS;
+     }},
+    {"sag",
+     {"sag", "current_limit"},
+     [](const Truth&, flyball::Random& random, CharacterizationOptions& options) {
+       options.defects.sag = random.uniform(0.1, 0.3);
+     }},
+    {"backlash",
+     {"elastic", "backlash"},
+     [](const Truth&, flyball::Random& random, CharacterizationOptions& options) {
+       options.defects.backlash =
+           random.uniform(0.01, 0.03) * (options.mechanism == MechanismKind::elevator ? 0.1 : 1.0);
+     }},
+    {"slip",
+     {"slip", "position_jumps"},
+     [](const Truth&, flyball::Random& random, CharacterizationOptions& options) {
+       options.defects.slip = random.uniform(0.05, 0.1) * reach(options);
+     }},
+}};
+
 }  // namespace scenarios

@@ -199,6 +199,15 @@ bool at_bound(const Eigen::VectorXd& x, const Bounds& bounds, Eigen::Index i) {
 
 }  // namespace
 
+double Covariances::inflation(Eigen::Index parameter) const {
+  const double alone = independent(parameter, parameter);
+  double largest = alone;
+  for (const Eigen::MatrixXd& estimate : estimates) {
+    largest = std::max(largest, estimate(parameter, parameter));
+  }
+  return alone > 0.0 ? largest / alone : 1.0;
+}
+
 double Covariances::standard_error(const Eigen::VectorXd& gradient) const {
   double largest = 0.0;
   for (const Eigen::MatrixXd& covariance : estimates) {
@@ -227,12 +236,9 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
 
   // The same holds, more weakly, for what only nuisance parameters and kA may lack: data.
   bread(parameter::log_time_constant, parameter::log_time_constant) += 0.1;
-  for (const int delay :
-       {parameter::position_delay, parameter::velocity_delay, parameter::averaging_width}) {
-    bread(delay, delay) += 1.0 / square(0.1);
+  for (const OutputErrorProblem::Prior& prior : problem.priors()) {
+    bread(prior.parameter, prior.parameter) += 1.0 / square(prior.deviation);
   }
-  bread.diagonal().tail(n - shared_parameter_count).array() +=
-      problem.initial_velocity_information();
 
   const Covariogram ramp_gamma = covariogram(runs, true);
   const Covariogram step_gamma = covariogram(runs, false);

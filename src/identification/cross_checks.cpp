@@ -16,19 +16,6 @@ constexpr double one_sided_95 = 1.645;
 constexpr int profile_points = 8;
 constexpr int refit_iterations = 12;
 
-/// How much larger the variance is than independent residuals would make it.
-double correlation_inflation(const Covariances& spread, Eigen::Index parameter) {
-  const double independent = spread.independent(parameter, parameter);
-  if (!(independent > 0.0)) {
-    return 1.0;
-  }
-  double largest = independent;
-  for (const Eigen::MatrixXd& estimate : spread.estimates) {
-    largest = std::max(largest, estimate(parameter, parameter));
-  }
-  return largest / independent;
-}
-
 struct Inertia {
   double log_kA;
   double standard_error;
@@ -89,8 +76,8 @@ double overshoot(const std::vector<double>& time, const std::vector<double>& vel
 
 double inertia_ceiling(OutputErrorProblem& problem, const RobustFit& best, const Bounds& bounds,
                        const ChannelScales& scales, const Covariances& spread) {
-  const double inflation = std::max(correlation_inflation(spread, parameter::velocity_gain),
-                                    correlation_inflation(spread, parameter::log_time_constant));
+  const double inflation = std::max(spread.inflation(parameter::velocity_gain),
+                                    spread.inflation(parameter::log_time_constant));
   const double allowed = one_sided_95 * one_sided_95 * inflation;
   std::vector<bool> free = problem.free_parameters();
   free[parameter::log_time_constant] = false;

@@ -25,13 +25,7 @@ constexpr double inertia_allowance = 1e-2;  // relative, added to kA
 
 /// @param allowance  Standard error of what the model leaves out, in the gain's unit.
 GainEstimate symmetric(double value, double random_error, double allowance) {
-  const double standard_error = std::hypot(random_error, allowance);
-  return {value,
-          standard_error,
-          {value - normal_95 * standard_error, value + normal_95 * standard_error},
-          true,
-          0.0,
-          {}};
+  return symmetric_estimate(value, std::hypot(random_error, allowance));
 }
 
 void mark_undetermined(GainEstimate& gain, double upper_bound, std::string reason) {
@@ -115,6 +109,14 @@ void gravity_gains(const Eigen::VectorXd& x, const Covariances& spread, Feedforw
 }
 
 }  // namespace
+
+GainEstimate symmetric_estimate(double value, double standard_error) {
+  GainEstimate estimate;
+  estimate.value = value;
+  estimate.standard_error = standard_error;
+  estimate.interval = {value - normal_95 * standard_error, value + normal_95 * standard_error};
+  return estimate;
+}
 
 Expected<void> estimate_gains(const PreparedRecording& prepared, const Eigen::VectorXd& x,
                               const Covariances& spread, const Bounds& bounds,

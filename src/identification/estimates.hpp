@@ -10,6 +10,9 @@
 
 namespace flyball::identification {
 
+/// A value with its 95 % interval by a standard error.
+[[nodiscard]] GainEstimate symmetric_estimate(double value, double standard_error);
+
 /// Gains with intervals from the parameters; what the data do not determine is marked.
 /// @errors IdentificationError::singular, unphysical_gains.
 [[nodiscard]] Expected<void> estimate_gains(const PreparedRecording& prepared,

@@ -11,6 +11,7 @@
 #include "core/try.hpp"
 #include "identification/cross_checks.hpp"
 #include "identification/estimates.hpp"
+#include "identification/model_terms.hpp"
 #include "identification/output_error.hpp"
 #include "identification/robust_fit.hpp"
 #include "identification/start.hpp"
@@ -92,6 +93,7 @@ Bounds make_bounds(const OutputErrorProblem& problem, const StartGains& start,
   bounds.upper[parameter::velocity_gain] = 1e3 * start.kV;
   bounds.lower[parameter::log_time_constant] = std::log(shortest_time_constant);
   bounds.upper[parameter::log_time_constant] = std::log(longest_time_constant);
+  bounds.lower[parameter::headroom] = 0.1;
   bounds.lower[parameter::position_delay] = -0.04;
   bounds.upper[parameter::position_delay] = options.max_delay;
   bounds.lower[parameter::averaging_width] = 0.0;
@@ -112,6 +114,7 @@ Eigen::VectorXd make_start(const OutputErrorProblem& problem, const StartGains& 
   x[parameter::log_time_constant] = std::log(time_constant);
   x[parameter::gravity_cosine] = gains.gravity_cosine;
   x[parameter::gravity_sine] = gains.gravity_sine;
+  x[parameter::headroom] = no_limit;
   x[parameter::position_delay] = recording.has_position ? 0.01 : 0.0;
   x[parameter::velocity_delay] = recording.has_velocity ? 0.03 : 0.0;
   x[parameter::averaging_width] = recording.has_velocity ? 0.03 : 0.0;
@@ -120,8 +123,7 @@ Eigen::VectorXd make_start(const OutputErrorProblem& problem, const StartGains& 
                                      ? recording.velocity_scale
                                      : 1.0;
   for (std::size_t i = 0; i < problem.runs().size(); ++i) {
-    x[shared_parameter_count + static_cast<Eigen::Index>(i)] =
-        problem.runs()[i].likely_initial_velocity;
+    x[initial_velocity_of(i)] = problem.runs()[i].likely_initial_velocity;
   }
   return x;
 }
@@ -149,7 +151,7 @@ RobustFit fit_gains(OutputErrorProblem& problem, const StartGains& gains, const 
   }
   for (int refresh = 0; refresh < scale_refreshes; ++refresh) {
     const bool last = refresh + 1 == scale_refreshes;
-    problem.set_angle_delay(best.x[parameter::position_delay]);
+    problem.refresh_forces(best.x);
     scales = residual_scales(problem, best.x);
     best = minimize(problem, best.x, free, bounds, scales,
                     std::max(1, std::min(last ? 60 : 20, options.max_iterations - iterations)),
@@ -237,7 +239,13 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
   }
   const Bounds bounds = make_bounds(problem, gains, options);
   ChannelScales scales;
-  const RobustFit best = fit_gains(problem, gains, bounds, options, scales);
+  RobustFit best = fit_gains(problem, gains, bounds, options, scales);
+  if (options.extend && extend_model(problem, bounds, scales, best)) {
+    scales = residual_scales(problem, best.x);
+    const int iterations = best.iterations;
+    best = minimize(problem, best.x, problem.free_parameters(), bounds, scales, 60, 1e-3);
+    best.iterations += iterations;
+  }
   const Covariances spread =
       covariances(problem, best.x, problem.free_parameters(), bounds, scales);
 
@@ -252,6 +260,7 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
   fit.velocity_scale = best.x[parameter::velocity_scale];
   add_runs(problem, best.x, fit);
   FLYBALL_CHECK(estimate_gains(prepared, best.x, spread, bounds, fit));
+  fit.terms = estimate_terms(problem, best, spread);
   if (auto one_step = fit_one_step(prepared)) {
     fit.one_step = *std::move(one_step);
   }
@@ -267,6 +276,7 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
   }
   compare_repeats(fit, diagnostics);
   detect_elasticity(prepared, fit, diagnostics);
+  report_terms(fit, diagnostics);
   report_fit(prepared, fit, diagnostics);
   return fit;
 }

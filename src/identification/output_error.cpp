@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "identification/output_error.hpp"
 #include "identification/statistics.hpp"
@@ -17,10 +18,12 @@ constexpr double crowding_distance =
 constexpr double shortest_width = 1e-3;  // s, below this an average is a sample
 
 SimulationVector simulation_parameters(const Eigen::VectorXd& x, std::size_t run) {
-  return {
-      x[parameter::static_friction],   x[parameter::velocity_gain],
-      x[parameter::log_time_constant], x[parameter::gravity_cosine],
-      x[parameter::gravity_sine],      x[shared_parameter_count + static_cast<Eigen::Index>(run)]};
+  SimulationVector simulated{};
+  for (int k = 0; k < parameter::initial_velocity; ++k) {
+    simulated[static_cast<std::size_t>(k)] = x[k];
+  }
+  simulated[parameter::initial_velocity] = x[initial_velocity_of(run)];
+  return simulated;
 }
 
 /// Keeps one value of `thinning`.
@@ -51,8 +54,6 @@ ResidualRun make_run(const PreparedRun& prepared, std::size_t index, const FitOp
   };
   run.input.time = slice(source.time);
   run.input.voltage = slice(source.voltage);
-  run.input.gravity_cosine.assign(run.input.time.size(), 0.0);
-  run.input.gravity_sine.assign(run.input.time.size(), 0.0);
 
   // A run that starts in motion is compared only where no sensor looks back before its start.
   const double earliest = prepared.starts_at_rest ? begin - lead : begin + options.max_delay;
@@ -119,9 +120,10 @@ Averaged moving_average(const Response& response, double time, double width, boo
   return average;
 }
 
-constexpr int local_initial_velocity = local_parameter_count - 1;
+constexpr int local_initial_velocity = shared_parameter_count;
+constexpr int local_extra_delay = shared_parameter_count + 1;
 
-/// Simulation columns 0–4 are shared; the initial velocity is the last local column.
+/// Simulation columns 0–8 are shared; the initial velocity is the first own one.
 template <class Row>
 void store_gradient(Row&& row, const SimulationGradient& gradient, double factor) {
   row.template head<parameter::initial_velocity>() =
@@ -148,7 +150,27 @@ OutputErrorProblem::OutputErrorProblem(const PreparedRecording& recording,
     }
   }
   responses_.resize(runs_.size());
-  set_angle_delay(0.0);
+  double low = 0.0;
+  double high = 0.0;
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    if (!runs_[i].angle.empty()) {
+      const auto [least, most] = std::minmax_element(runs_[i].angle.begin(), runs_[i].angle.end());
+      low = i == 0 ? *least : std::min(low, *least);
+      high = i == 0 ? *most : std::max(high, *most);
+    }
+  }
+  middle_ = 0.5 * (low + high);
+  priors_ = {{parameter::position_delay, 0.01, 0.02},
+             {parameter::velocity_delay, 0.03, 0.03},
+             {parameter::averaging_width, 0.03, 0.05}};
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    priors_.push_back(
+        {initial_velocity_of(i), runs_[i].likely_initial_velocity, 0.1 * recording_.top_speed});
+    // Uniform within a row.
+    priors_.push_back(
+        {extra_delay_of(i), 0.0, std::max(1e-4, recording_.row_period) / std::sqrt(12.0)});
+  }
+  refresh_forces(Eigen::VectorXd::Zero(parameters()));
 }
 
 std::size_t OutputErrorProblem::residuals() const {
@@ -159,21 +181,60 @@ std::size_t OutputErrorProblem::residuals() const {
   return count;
 }
 
-void OutputErrorProblem::set_angle_delay(double delay) {
-  for (ResidualRun& run : runs_) {
-    for (std::size_t i = 0; i < run.input.time.size(); ++i) {
-      if (mechanism_ == MechanismKind::elevator) {
-        run.input.gravity_cosine[i] = 1.0;
-      } else if (mechanism_ == MechanismKind::arm && !run.angle.empty()) {
-        // The angle in the middle of the interval that the input is held for.
-        const double next =
-            i + 1 < run.input.time.size() ? run.input.time[i + 1] : run.input.time[i];
-        const double middle = 0.5 * (run.input.time[i] + next);
-        const double angle = interpolate(run.angle_time, run.angle, middle + delay);
-        run.input.gravity_cosine[i] = std::cos(angle);
-        run.input.gravity_sine[i] = std::sin(angle);
-      }
+void OutputErrorProblem::refresh_forces(const Eigen::VectorXd& x) {
+  const double delay = x[parameter::position_delay];
+  for (std::size_t index = 0; index < runs_.size(); ++index) {
+    ResidualRun& run = runs_[index];
+    const std::size_t rows = run.input.time.size();
+    const bool simulated = x[parameter::velocity_gain] > 0.0 && is_extended(parameter::drag);
+    if (simulated) {
+      responses_[index].simulate(run.input, simulation_parameters(x, index), false);
     }
+    std::array<std::vector<double>, force_count> forces;
+    const auto force = [&](int of) -> std::vector<double>& {
+      std::vector<double>& values = forces[static_cast<std::size_t>(of - parameter::first_force)];
+      values.resize(rows);
+      return values;
+    };
+    if (mechanism_ == MechanismKind::elevator) {
+      force(parameter::gravity_cosine).assign(rows, 1.0);
+    } else {
+      force(parameter::bias).assign(rows, 1.0);
+    }
+    const bool arm = mechanism_ == MechanismKind::arm && !run.angle.empty();
+    const bool travels = mechanism_ != MechanismKind::flywheel && !run.angle.empty();
+    std::size_t hint = 0;
+    for (std::size_t i = 0; i < rows; ++i) {
+      // The middle of the interval that the input is held for.
+      const double next = i + 1 < rows ? run.input.time[i + 1] : run.input.time[i];
+      const double middle = 0.5 * (run.input.time[i] + next);
+      const double position =
+          travels ? interpolate(run.angle_time, run.angle, middle + delay) : 0.0;
+      if (arm) {
+        force(parameter::gravity_cosine)[i] = std::cos(position);
+        force(parameter::gravity_sine)[i] = std::sin(position);
+      }
+      if (travels) {
+        force(parameter::spring)[i] = position - middle_;
+      }
+      const PreparedRun& prepared = recording_.runs[run.prepared];
+      const double velocity =
+          simulated ? responses_[index].at(middle, false, hint).velocity
+                    : interpolate(prepared.run.time, prepared.smoothed_velocity, middle);
+      force(parameter::drag)[i] = velocity * std::abs(velocity);
+    }
+    run.input.forces = std::move(forces);
+  }
+}
+
+bool OutputErrorProblem::can_extend(int parameter) const {
+  switch (parameter) {
+    case parameter::bias:  // An elevator's gravity is the same force.
+      return mechanism_ != MechanismKind::elevator;
+    case parameter::spring:
+      return mechanism_ != MechanismKind::flywheel && recording_.has_position;
+    default:
+      return true;
   }
 }
 
@@ -193,30 +254,33 @@ void OutputErrorProblem::evaluate(std::size_t index, const Eigen::VectorXd& x, b
     block.velocity_jacobian.setZero(velocities, local_parameter_count);
   }
   Hints hints;
+  const double position_delay = x[parameter::position_delay] + x[extra_delay_of(index)];
+  const double velocity_delay = x[parameter::velocity_delay] + x[extra_delay_of(index)];
   for (Eigen::Index row = 0; row < differences; ++row) {
     const auto [from, to] = run.differences[static_cast<std::size_t>(row)];
     const Response::Sample early =
-        response.at(source.time[from] - x[parameter::position_delay], jacobian, hints.early);
+        response.at(source.time[from] - position_delay, jacobian, hints.early);
     const Response::Sample late =
-        response.at(source.time[to] - x[parameter::position_delay], jacobian, hints.late);
+        response.at(source.time[to] - position_delay, jacobian, hints.late);
     block.difference[row] =
         (source.position[to] - source.position[from]) - (late.position - early.position);
     if (jacobian) {
       store_gradient(block.difference_jacobian.row(row),
                      late.position_gradient - early.position_gradient, -1.0);
       block.difference_jacobian(row, parameter::position_delay) = late.velocity - early.velocity;
+      block.difference_jacobian(row, local_extra_delay) = late.velocity - early.velocity;
     }
   }
   for (Eigen::Index row = 0; row < velocities; ++row) {
     const std::size_t at = run.velocities[static_cast<std::size_t>(row)];
-    const Averaged average =
-        moving_average(response, source.time[at] - x[parameter::velocity_delay],
-                       x[parameter::averaging_width], jacobian, hints);
+    const Averaged average = moving_average(response, source.time[at] - velocity_delay,
+                                            x[parameter::averaging_width], jacobian, hints);
     const double scale = x[parameter::velocity_scale];
     block.velocity[row] = source.velocity[at] - scale * average.value;
     if (jacobian) {
       store_gradient(block.velocity_jacobian.row(row), average.gradient, -scale);
       block.velocity_jacobian(row, parameter::velocity_delay) = -scale * average.by_delay;
+      block.velocity_jacobian(row, local_extra_delay) = -scale * average.by_delay;
       block.velocity_jacobian(row, parameter::averaging_width) = -scale * average.by_width;
       block.velocity_jacobian(row, parameter::velocity_scale) = -average.value;
     }
@@ -226,40 +290,36 @@ void OutputErrorProblem::evaluate(std::size_t index, const Eigen::VectorXd& x, b
 double OutputErrorProblem::velocity_shown(std::size_t run, const Eigen::VectorXd& x,
                                           double time) const {
   Hints hints;
-  return x[parameter::velocity_scale] * moving_average(responses_[run],
-                                                       time - x[parameter::velocity_delay],
-                                                       x[parameter::averaging_width], false, hints)
-                                            .value;
+  return x[parameter::velocity_scale] *
+         moving_average(responses_[run],
+                        time - x[parameter::velocity_delay] - x[extra_delay_of(run)],
+                        x[parameter::averaging_width], false, hints)
+             .value;
 }
 
 double OutputErrorProblem::position_shown(std::size_t run, const Eigen::VectorXd& x,
                                           double time) const {
   std::size_t hint = 0;
-  return responses_[run].at(time - x[parameter::position_delay], false, hint).position;
-}
-
-double OutputErrorProblem::initial_velocity_information() const {
-  const double deviation = 0.1 * recording_.top_speed;
-  return 1.0 / (deviation * deviation);
-}
-
-double OutputErrorProblem::initial_velocity_deviation(const Eigen::VectorXd& x,
-                                                      Eigen::Index parameter) const {
-  const ResidualRun& run = runs_[static_cast<std::size_t>(parameter) - shared_parameter_count];
-  return (x[parameter] - run.likely_initial_velocity) * std::sqrt(initial_velocity_information());
+  const double delay = x[parameter::position_delay] + x[extra_delay_of(run)];
+  return responses_[run].at(time - delay, false, hint).position;
 }
 
 std::vector<bool> OutputErrorProblem::free_parameters() const {
   std::vector<bool> free(static_cast<std::size_t>(parameters()), true);
   free[parameter::gravity_cosine] = mechanism_ != MechanismKind::flywheel;
   free[parameter::gravity_sine] = mechanism_ == MechanismKind::arm;
+  for (const int term :
+       {parameter::bias, parameter::spring, parameter::drag, parameter::headroom}) {
+    free[static_cast<std::size_t>(term)] = is_extended(term) && can_extend(term);
+  }
   free[parameter::position_delay] = recording_.has_position;
   free[parameter::velocity_delay] = recording_.has_velocity;
   free[parameter::averaging_width] = recording_.has_velocity;
   free[parameter::velocity_scale] = recording_.has_velocity && recording_.has_position &&
                                     std::abs(recording_.velocity_scale - 1.0) > 0.03;
   for (std::size_t i = 0; i < runs_.size(); ++i) {
-    free[static_cast<std::size_t>(shared_parameter_count) + i] = !runs_[i].starts_at_rest;
+    free[static_cast<std::size_t>(initial_velocity_of(i))] = !runs_[i].starts_at_rest;
+    free[static_cast<std::size_t>(extra_delay_of(i))] = !runs_[i].ramp;
   }
   return free;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <utility>
 #include <vector>
@@ -15,20 +16,30 @@ namespace flyball::identification {
 
 namespace parameter {
 
-/// Parameters that all runs share; after them, the initial velocity of each run.
+/// Parameters that all runs share; after them, each run's own: its initial velocity, and by how
+/// much its sensors' values are older than those of the others (where they are refreshed within a
+/// row differs by run).
 enum Shared : int {
-  // 0 to 4 are those of Simulation.
-  position_delay = 5,   ///< s.
-  velocity_delay = 6,   ///< s, to the middle of the averaging window.
-  averaging_width = 7,  ///< s.
-  velocity_scale = 8,   ///< Velocity column over true velocity.
+  // 0 to 8 are those of Simulation.
+  position_delay = 9,    ///< s.
+  velocity_delay = 10,   ///< s, to the middle of the averaging window.
+  averaging_width = 11,  ///< s.
+  velocity_scale = 12,   ///< Velocity column over true velocity.
 };
 
 }  // namespace parameter
 
-inline constexpr int shared_parameter_count = 9;
-/// Columns of a run's Jacobian: the shared parameters and the run's initial velocity.
-inline constexpr int local_parameter_count = 10;
+inline constexpr int shared_parameter_count = 13;
+inline constexpr int own_parameter_count = 2;
+/// Columns of a run's Jacobian: the shared parameters and its own.
+inline constexpr int local_parameter_count = shared_parameter_count + own_parameter_count;
+
+[[nodiscard]] inline Eigen::Index initial_velocity_of(std::size_t run) {
+  return shared_parameter_count + own_parameter_count * static_cast<Eigen::Index>(run);
+}
+[[nodiscard]] inline Eigen::Index extra_delay_of(std::size_t run) {
+  return initial_velocity_of(run) + 1;
+}
 
 enum class Channel { position, velocity };
 
@@ -66,12 +77,22 @@ class OutputErrorProblem {
   [[nodiscard]] const PreparedRecording& recording() const { return recording_; }
   [[nodiscard]] mechanisms::MechanismKind mechanism() const { return mechanism_; }
   [[nodiscard]] int parameters() const {
-    return shared_parameter_count + static_cast<int>(runs_.size());
+    return shared_parameter_count + own_parameter_count * static_cast<int>(runs_.size());
   }
   [[nodiscard]] std::size_t residuals() const;
 
-  /// The angle under gravity is the measured one, `delay` later; only arms depend on it.
-  void set_angle_delay(double delay);
+  /// What the forces depend on: the angle under gravity and the position of a spring are the
+  /// measured ones, the position's delay later; the velocity of a drag is that of the last
+  /// simulation with x. @param x  All parameters.
+  void refresh_forces(const Eigen::VectorXd& x);
+
+  /// Makes a term of the model free that a mechanism need not have: bias, spring, drag, headroom.
+  void extend(int parameter, bool by_it) { extended_[static_cast<std::size_t>(parameter)] = by_it; }
+  [[nodiscard]] bool is_extended(int parameter) const {
+    return extended_[static_cast<std::size_t>(parameter)];
+  }
+  /// Whether that term can be told from the model's others: no spring without a travel.
+  [[nodiscard]] bool can_extend(int parameter) const;
 
   /// Residuals (and Jacobians) of one run. @param x  All parameters.
   void evaluate(std::size_t run, const Eigen::VectorXd& x, bool jacobian, ResidualBlock& block);
@@ -80,13 +101,16 @@ class OutputErrorProblem {
   [[nodiscard]] double velocity_shown(std::size_t run, const Eigen::VectorXd& x, double time) const;
   [[nodiscard]] double position_shown(std::size_t run, const Eigen::VectorXd& x, double time) const;
 
-  /// A weak prior: a run that starts in motion starts about as fast as its smoothed velocity says,
-  /// within a tenth of top speed (with a short time constant its data do not tell the start).
-  /// @param parameter  Index of the initial velocity in x. @return  In standard deviations.
-  [[nodiscard]] double initial_velocity_deviation(const Eigen::VectorXd& x,
-                                                  Eigen::Index parameter) const;
-  /// 1/(standard deviation of that prior)².
-  [[nodiscard]] double initial_velocity_information() const;
+  /// What is known of the nuisance parameters before the data: sensors are some 10 ms late and
+  /// average over some 30 ms, which matters where data are so noisy that delay and inertia trade; a
+  /// run that starts in motion starts about as fast as its smoothed velocity says, within a tenth
+  /// of top speed (with a short time constant its data do not tell the start).
+  struct Prior {
+    Eigen::Index parameter;
+    double mean;
+    double deviation;  ///< Standard.
+  };
+  [[nodiscard]] const std::vector<Prior>& priors() const { return priors_; }
 
   /// Which parameters the data can move at all.
   [[nodiscard]] std::vector<bool> free_parameters() const;
@@ -96,6 +120,9 @@ class OutputErrorProblem {
   mechanisms::MechanismKind mechanism_;
   std::vector<ResidualRun> runs_;
   std::vector<Response> responses_;
+  std::array<bool, shared_parameter_count> extended_{};
+  std::vector<Prior> priors_;
+  double middle_ = 0.0;  ///< Of the travel.
 };
 
 }  // namespace flyball::identification

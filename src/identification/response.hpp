@@ -17,23 +17,31 @@ enum Simulation : int {
   static_friction = 0,    ///< kS, V.
   velocity_gain = 1,      ///< kV, V/(unit/s).
   log_time_constant = 2,  ///< ln(kA/kV), kA/kV in s.
-  gravity_cosine = 3,     ///< Factor of the first gravity input (1 or cos θ), V.
-  gravity_sine = 4,       ///< Factor of the second gravity input (sin θ), V.
-  initial_velocity = 5,   ///< Of this run, unit/s.
+  // Factors of the forces that a run's input holds, V a unit of theirs.
+  gravity_cosine = 3,    ///< Of 1 (elevator) or cos θ.
+  gravity_sine = 4,      ///< Of sin θ.
+  bias = 5,              ///< Of 1: friction of one direction above the other's.
+  spring = 6,            ///< Of the position from the middle of the travel.
+  drag = 7,              ///< Of v |v|.
+  headroom = 8,          ///< V, what |V − kV v| is limited to: resistance times current limit.
+  initial_velocity = 9,  ///< Of this run, unit/s.
 };
+inline constexpr int first_force = gravity_cosine;
 
 }  // namespace parameter
 
-inline constexpr int simulation_parameter_count = 6;
+inline constexpr int force_count = 5;
+inline constexpr double no_limit = 1e6;  ///< V, a headroom that no voltage reaches.
+inline constexpr int simulation_parameter_count = 10;
 using SimulationVector = std::array<double, simulation_parameter_count>;
 using SimulationGradient = Eigen::Matrix<double, 1, simulation_parameter_count>;
 
 /// What drives a run: everything is held from a row to the next.
 struct RunInput {
-  std::vector<double> time;            ///< s, ascending.
-  std::vector<double> voltage;         ///< V.
-  std::vector<double> gravity_cosine;  ///< First gravity input.
-  std::vector<double> gravity_sine;    ///< Second gravity input.
+  std::vector<double> time;     ///< s, ascending.
+  std::vector<double> voltage;  ///< V.
+  /// What the forces' factors multiply, in their order; an empty one is nothing.
+  std::array<std::vector<double>, force_count> forces;
 };
 
 /// Position (from 0) and velocity at the rows, and between them by cubic Hermite interpolation.
@@ -45,8 +53,9 @@ class Response {
     SimulationGradient position_gradient;  ///< Only set if asked for.
   };
 
-  /// Integrates kA v̇ = V − kS sgn(v) − kV v − gravity exactly from row to row: exponential pieces,
-  /// split where the velocity reaches zero (there it sticks if |V − gravity| ≤ kS).
+  /// Integrates kA v̇ = V − kS sgn(v) − kV v − forces exactly from row to row: exponential pieces,
+  /// split where the velocity reaches zero (there it sticks if |V − forces| ≤ kS), and parabolic
+  /// ones where the current is limited (|V − kV v| = headroom).
   void simulate(const RunInput& input, const SimulationVector& parameters, bool sensitivities);
 
   /// Before the first row the velocity is the initial one, after the last row it stays.

@@ -9,25 +9,6 @@
 namespace flyball::identification {
 namespace {
 
-double total_cost(OutputErrorProblem& problem, const Eigen::VectorXd& x,
-                  const ChannelScales& scales) {
-  ResidualBlock block;
-  double cost = 0.0;
-  for (std::size_t run = 0; run < problem.runs().size(); ++run) {
-    problem.evaluate(run, x, false, block);
-    for (const double residual : block.difference) {
-      cost += loss(residual * inverse(scales.difference));
-    }
-    for (const double residual : block.velocity) {
-      cost += loss(residual * inverse(scales.velocity));
-    }
-  }
-  for (Eigen::Index i = shared_parameter_count; i < x.size(); ++i) {
-    cost += square(problem.initial_velocity_deviation(x, i));
-  }
-  return cost;
-}
-
 struct NormalEquations {
   Eigen::MatrixXd hessian;
   Eigen::VectorXd gradient;
@@ -64,12 +45,11 @@ NormalEquations normal_equations(OutputErrorProblem& problem, const Eigen::Vecto
       equations.gradient[global_index(a, run)] += gradient[a];
     }
   }
-  const double information = problem.initial_velocity_information();
-  for (Eigen::Index i = shared_parameter_count; i < n; ++i) {
-    const double deviation = problem.initial_velocity_deviation(x, i);
-    equations.cost += square(deviation);
-    equations.gradient[i] += deviation * std::sqrt(information);
-    equations.hessian(i, i) += information;
+  for (const auto& [i, mean, deviation] : problem.priors()) {
+    const double z = (x[i] - mean) / deviation;
+    equations.cost += square(z);
+    equations.gradient[i] += z / deviation;
+    equations.hessian(i, i) += 1.0 / square(deviation);
   }
   return equations;
 }
@@ -94,6 +74,24 @@ std::vector<Eigen::Index> active_parameters(const Eigen::VectorXd& x,
 }
 
 }  // namespace
+
+double cost_at(OutputErrorProblem& problem, const Eigen::VectorXd& x, const ChannelScales& scales) {
+  ResidualBlock block;
+  double cost = 0.0;
+  for (std::size_t run = 0; run < problem.runs().size(); ++run) {
+    problem.evaluate(run, x, false, block);
+    for (const double residual : block.difference) {
+      cost += loss(residual * inverse(scales.difference));
+    }
+    for (const double residual : block.velocity) {
+      cost += loss(residual * inverse(scales.velocity));
+    }
+  }
+  for (const OutputErrorProblem::Prior& prior : problem.priors()) {
+    cost += square((x[prior.parameter] - prior.mean) / prior.deviation);
+  }
+  return cost;
+}
 
 RobustFit minimize(OutputErrorProblem& problem, const Eigen::VectorXd& start,
                    const std::vector<bool>& free, const Bounds& bounds, const ChannelScales& scales,
@@ -121,7 +119,7 @@ RobustFit minimize(OutputErrorProblem& problem, const Eigen::VectorXd& start,
       trial[active[static_cast<std::size_t>(i)]] += std::isfinite(step[i]) ? step[i] : 0.0;
     }
     trial = trial.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
-    const double trial_cost = total_cost(problem, trial, scales);
+    const double trial_cost = cost_at(problem, trial, scales);
     if (trial_cost < fit.cost) {
       const double gain = fit.cost - trial_cost;
       fit.x = trial;
@@ -141,6 +139,27 @@ RobustFit minimize(OutputErrorProblem& problem, const Eigen::VectorXd& start,
     }
   }
   return fit;
+}
+
+std::vector<Score> scores(OutputErrorProblem& problem, const Eigen::VectorXd& x,
+                          const std::vector<bool>& free, const Bounds& bounds,
+                          const ChannelScales& scales, const std::vector<int>& parameters) {
+  const NormalEquations equations = normal_equations(problem, x, scales);
+  const std::vector<Eigen::Index> active = active_parameters(x, equations, free, bounds);
+  const Eigen::MatrixXd hessian = equations.hessian(active, active);
+  std::vector<Score> all;
+  for (const int parameter : parameters) {
+    Eigen::VectorXd cross(hessian.rows());
+    for (Eigen::Index i = 0; i < cross.size(); ++i) {
+      cross[i] = equations.hessian(active[static_cast<std::size_t>(i)], parameter);
+    }
+    const double own = equations.hessian(parameter, parameter);
+    const Eigen::VectorXd projected = detail::solve_symmetric(hessian, cross);
+    const double left = own - cross.dot(projected);
+    const double gradient = equations.gradient[parameter];
+    all.push_back(left > 1e-6 * own ? Score{-gradient / left, square(gradient) / left} : Score{});
+  }
+  return all;
 }
 
 ChannelScales residual_scales(OutputErrorProblem& problem, const Eigen::VectorXd& x) {

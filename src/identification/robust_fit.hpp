@@ -38,12 +38,30 @@ struct RobustFit {
 /// Robust scales of the residuals at x, floored by what the columns' resolution allows.
 [[nodiscard]] ChannelScales residual_scales(OutputErrorProblem& problem, const Eigen::VectorXd& x);
 
+/// The loss of all residuals and priors at x.
+[[nodiscard]] double cost_at(OutputErrorProblem& problem, const Eigen::VectorXd& x,
+                             const ChannelScales& scales);
+
+/// What one more parameter would gain at a minimum over others: the step to its best value and the
+/// fall of the cost, to first order. No gain for a parameter that the data do not move.
+struct Score {
+  double step = 0.0;
+  double gain = 0.0;
+};
+[[nodiscard]] std::vector<Score> scores(OutputErrorProblem& problem, const Eigen::VectorXd& x,
+                                        const std::vector<bool>& free, const Bounds& bounds,
+                                        const ChannelScales& scales,
+                                        const std::vector<int>& parameters);
+
 /// Covariances of all parameters at a minimum: HAC, block sandwich, residual autocorrelation.
 /// Rows and columns of fixed parameters and of those at a bound are zero.
 struct Covariances {
   std::array<Eigen::MatrixXd, 3> estimates;
   Eigen::MatrixXd independent;  ///< What it would be if residuals were independent.
   bool singular = false;
+  /// How much larger a parameter's variance is than independent residuals would make it, at
+  /// least 1.
+  [[nodiscard]] double inflation(Eigen::Index parameter) const;
   /// Largest of the three standard errors of gradient · x.
   [[nodiscard]] double standard_error(const Eigen::VectorXd& gradient) const;
 };

@@ -34,8 +34,9 @@ inline double inverse(double scale) {
 }
 
 inline Eigen::Index global_index(int local, std::size_t run) {
-  return local < shared_parameter_count ? local
-                                        : shared_parameter_count + static_cast<Eigen::Index>(run);
+  return local < shared_parameter_count
+             ? local
+             : initial_velocity_of(run) + (local - shared_parameter_count);
 }
 
 /// Adds a run's matrix to that of all parameters.

@@ -11,6 +11,7 @@
 #include <flyball/mechanisms/friction.hpp>
 #include <flyball/mechanisms/gravity.hpp>
 
+#include "core/format.hpp"
 #include "core/try.hpp"
 
 namespace flyball {
@@ -50,6 +51,21 @@ Expected<void> check_options(const CharacterizationOptions& options) {
       .within(options.velocity_window, 0.0, sensor_memory / 2.0, "velocity_window")
       .not_negative(options.velocity_noise.value_or(0.0), "velocity_noise")
       .not_negative(options.voltage_noise, "voltage_noise", "V")
+      .finite(options.defects.spring, "defects.spring")
+      .not_negative(options.defects.drag, "defects.drag")
+      .within(options.defects.friction_asymmetry, -0.99, 0.99, "defects.friction_asymmetry")
+      .within(options.defects.sag, 0.0, 1.0, "defects.sag")
+      .not_negative(options.defects.backlash, "defects.backlash")
+      .finite(options.defects.slip, "defects.slip")
+      .within(options.defects.position_delay, 0.0, sensor_memory / 4.0, "defects.position_delay")
+      .within(options.defects.velocity_delay, 0.0, sensor_memory / 4.0, "defects.velocity_delay")
+      .also([&]() -> Expected<void> {
+        if (options.defects.headroom > 0.0) {
+          return {};
+        }
+        return refusal(ArgumentError::not_positive, where, "defects.headroom")
+            .got(detail::format("{} V", options.defects.headroom));
+      })
       .also([&] {
         return travels ? check_positive(
                              options.travel_high - options.travel_low - 2.0 * options.travel_margin,
@@ -58,41 +74,121 @@ Expected<void> check_options(const CharacterizationOptions& options) {
       });
 }
 
-/// kA v̇ = V − kS sgn(v) − kV v − gravity between hard stops.
+/// kA v̇ = V − kS sgn(v) − kV v − gravity between hard stops, with the session's defects. The motor
+/// and the load are one body unless backlash parts them.
 class Truth {
  public:
   Truth(const CharacterizationOptions& options, double position)
-      : options_(options), state_{position, 0.0} {}
+      : options_(options), load_{position, 0.0}, motor_{position, 0.0} {}
 
-  [[nodiscard]] double position() const { return state_.position; }
-  void hold() { state_.velocity = 0.0; }
+  [[nodiscard]] double position() const { return load_.position; }
+  /// Where the encoder is.
+  [[nodiscard]] double shown() const {
+    return options_.defects.backlash > 0.0 ? motor_.position : load_.position;
+  }
+  void hold() { load_.velocity = motor_.velocity = 0.0; }
 
   /// Advances by a step with friction and gravity frozen.
   void advance(double voltage) {
-    const double drive =
-        voltage - mechanisms::gravity_voltage(options_.mechanism, options_.kG, position(), 0.0);
-    const mechanisms::Friction friction{friction_here(), options_.breakaway};
-    state_ =
-        mechanisms::FrictionMotion(options_.kV, options_.kA, friction).step(state_, drive, step);
+    const bool parted = options_.defects.backlash > 0.0 && !touches(voltage);
+    const double applied = applied_voltage(voltage, parted ? motor_.velocity : load_.velocity);
+    if (parted) {
+      // The motor runs free, the load under what pulls at it.
+      motor_ = motion(motor_share, friction_here(motor_.velocity, applied) * motor_share)
+                   .step(motor_, applied, step);
+      const double load_force = -opposed();
+      const double friction = friction_here(load_.velocity, load_force) * (1.0 - motor_share);
+      const bool sticks = load_.velocity == 0.0 && std::abs(load_force) <= friction;
+      if (!sticks) {
+        const double sign = load_.velocity != 0.0 ? load_.velocity : load_force;
+        load_.velocity += step * (load_force - std::copysign(friction, sign)) /
+                          (options_.kA * (1.0 - motor_share));
+        load_.position += step * load_.velocity;
+      }
+      collide();
+    } else {
+      load_ = motion(1.0, friction_here(load_.velocity, applied - opposed()))
+                  .step(load_, applied - opposed(), step);
+      motor_ = {load_.position + side_ * 0.5 * options_.defects.backlash, load_.velocity};
+    }
     if (options_.mechanism != MechanismKind::flywheel) {
       const double stopped = std::clamp(position(), options_.travel_low, options_.travel_high);
       if (stopped != position()) {
-        state_ = {stopped, 0.0};
+        motor_.position += stopped - position();
+        load_ = {stopped, 0.0};
+        motor_.velocity = 0.0;
       }
     }
   }
 
  private:
-  [[nodiscard]] double friction_here() const {
+  static constexpr double motor_share = 0.25;  ///< Of inertia and friction, before the backlash.
+
+  [[nodiscard]] mechanisms::FrictionMotion motion(double inertia, double friction) const {
+    return {options_.kV, options_.kA * inertia, mechanisms::Friction{friction, options_.breakaway}};
+  }
+  [[nodiscard]] double applied_voltage(double voltage, double velocity) const {
+    const SessionDefects& defects = options_.defects;
+    const double back_emf = options_.kV * velocity;
+    const double duty = voltage / 12.0;
+    const double loss = defects.sag * duty * duty;
+    const double sagged = (voltage + loss * back_emf) / (1.0 + loss);
+    return std::clamp(sagged, back_emf - defects.headroom, back_emf + defects.headroom);
+  }
+  /// What acts against the load besides friction and damping.
+  [[nodiscard]] double opposed() const {
+    const double middle = options_.mechanism == MechanismKind::flywheel
+                              ? 0.0
+                              : 0.5 * (options_.travel_low + options_.travel_high);
+    return mechanisms::gravity_voltage(options_.mechanism, options_.kG, position(), 0.0) +
+           options_.defects.spring * (position() - middle) +
+           options_.defects.drag * load_.velocity * std::abs(load_.velocity);
+  }
+  /// Whether the motor stays at the side of the gap that it is at: it pushes the load, or would
+  /// fall behind it.
+  [[nodiscard]] bool touches(double voltage) {
+    const double gap = 0.5 * options_.defects.backlash;
+    const double offset = motor_.position - load_.position;
+    if (std::abs(offset) < gap * (1.0 - 1e-9)) {
+      return false;
+    }
+    side_ = offset > 0.0 ? 1.0 : -1.0;
+    const double motor_force =
+        applied_voltage(voltage, motor_.velocity) - options_.kV * motor_.velocity;
+    const double load_force = -opposed();
+    const double sign = motor_.velocity != 0.0 ? motor_.velocity : motor_force + load_force;
+    const double friction = sign == 0.0 ? 0.0 : std::copysign(friction_here(sign, sign), sign);
+    const double motor = (motor_force - friction * motor_share) / motor_share;
+    const double load = (load_force - friction * (1.0 - motor_share)) / (1.0 - motor_share);
+    return side_ * (motor - load) >= 0.0 ||
+           (motor_.velocity == 0.0 && std::abs(motor_force + load_force) <= std::abs(friction));
+  }
+  /// An inelastic impact where the motor runs into a side of the gap.
+  void collide() {
+    const double gap = 0.5 * options_.defects.backlash;
+    const double offset = motor_.position - load_.position;
+    if (std::abs(offset) < gap) {
+      return;
+    }
+    side_ = offset > 0.0 ? 1.0 : -1.0;
+    load_.velocity = motor_share * motor_.velocity + (1.0 - motor_share) * load_.velocity;
+    motor_ = {load_.position + side_ * gap, load_.velocity};
+  }
+
+  [[nodiscard]] double friction_here(double velocity, double drive) const {
     const double length = options_.mechanism == MechanismKind::flywheel
                               ? 2.0 * std::numbers::pi
                               : 0.5 * (options_.travel_high - options_.travel_low);
-    return options_.kS * (1.0 + options_.friction_variation *
-                                    std::sin(2.0 * std::numbers::pi * position() / length));
+    const double sign = velocity != 0.0 ? velocity : drive;
+    return options_.kS * (1.0 + (sign < 0.0 ? -1.0 : 1.0) * options_.defects.friction_asymmetry) *
+           (1.0 +
+            options_.friction_variation * std::sin(2.0 * std::numbers::pi * position() / length));
   }
 
   const CharacterizationOptions& options_;
-  mechanisms::MechanismState state_;
+  mechanisms::MechanismState load_;
+  mechanisms::MechanismState motor_;
+  double side_ = 1.0;  ///< Of the gap, at which the motor touches the load.
 };
 
 /// The true position on a fine grid, at rest before time 0.
@@ -134,7 +230,7 @@ Applied drive(const CharacterizationOptions& options, TestKind kind, Random rand
   const double duration = ramp ? options.ramp_limit / options.ramp_rate : options.step_duration;
 
   Truth mechanism(options, start);
-  Applied applied{{}, {}, History(start)};
+  Applied applied{{}, {}, History(mechanism.shown())};
   double cut = -1.0;
   long steps = 0;
   for (long row = 0;; ++row) {
@@ -148,7 +244,7 @@ Applied drive(const CharacterizationOptions& options, TestKind kind, Random rand
       } else {
         mechanism.advance(applied.voltage.back());
       }
-      applied.history.append(mechanism.position());
+      applied.history.append(mechanism.shown());
     }
     const double driven = time - options.rest_before;
     const bool arrived = travels && sign * (mechanism.position() - end) >= 0.0;
@@ -165,6 +261,11 @@ Applied drive(const CharacterizationOptions& options, TestKind kind, Random rand
     applied.time.push_back(time);
     applied.voltage.push_back(voltage);
   }
+}
+
+/// What an encoder lost by slipping at a third and two thirds of a test.
+double slipped(double slip, double share) {
+  return slip * ((share > 1.0 / 3.0 ? 1.0 : 0.0) + (share > 2.0 / 3.0 ? 1.0 : 0.0));
 }
 
 TestRun record(const CharacterizationOptions& options, TestKind kind, Random random) {
@@ -192,8 +293,13 @@ TestRun record(const CharacterizationOptions& options, TestKind kind, Random ran
     const bool fresh = row == 0 || latest > refreshed + 1e-9;
     if (fresh) {
       refreshed = latest;
-      const double instant = latest - options.sensor_delay;
-      position = applied.history.at(instant) - true_zero;
+      const SessionDefects& defects = options.defects;
+      const double instant = latest - options.sensor_delay - defects.velocity_delay;
+      position = applied.history.at(latest - options.sensor_delay - defects.position_delay) -
+                 true_zero + slipped(defects.slip, latest / applied.time.back());
+      if (row == 0 && defects.stale_first_row) {
+        position = 0.0;
+      }
       if (options.resolution > 0.0) {
         position = std::floor(position / options.resolution) * options.resolution;
       }

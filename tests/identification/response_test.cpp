@@ -19,9 +19,19 @@ RunInput steady(double voltage, double duration, double step) {
     input.time.push_back(time);
   }
   input.voltage.assign(input.time.size(), voltage);
-  input.gravity_cosine.assign(input.time.size(), 0.0);
-  input.gravity_sine.assign(input.time.size(), 0.0);
   return input;
+}
+
+/// kS, kV and τ of above, a constant force and a start.
+SimulationVector at_velocity(double initial, double force = 0.0) {
+  SimulationVector x{};
+  x[parameter::static_friction] = kS;
+  x[parameter::velocity_gain] = kV;
+  x[parameter::log_time_constant] = std::log(tau);
+  x[parameter::gravity_cosine] = force;
+  x[parameter::headroom] = no_limit;
+  x[parameter::initial_velocity] = initial;
+  return x;
 }
 
 double velocity_at(const Response& response, double time) {
@@ -38,7 +48,7 @@ double position_at(const Response& response, double time) {
 TEST(Response, StepFromRestIsExponential) {
   const RunInput input = steady(3.0, 1.0, 0.02);
   Response response;
-  response.simulate(input, {kS, kV, std::log(tau), 0.0, 0.0, 0.0}, false);
+  response.simulate(input, at_velocity(0.0), false);
   for (const double time : {0.1, 0.38, 0.9}) {
     const double rise = 1.0 - std::exp(-time / tau);
     EXPECT_NEAR(velocity_at(response, time), 1.3 * rise, 1e-12);
@@ -52,7 +62,7 @@ TEST(Response, CoastsToRestWithinAStepAndSticks) {
   const RunInput input = steady(0.0, 1.0, 0.1);
   Response response;
   const double v0 = 1.1;
-  response.simulate(input, {kS, kV, std::log(tau), 0.0, 0.0, v0}, false);
+  response.simulate(input, at_velocity(v0), false);
   const double stop = tau * std::log(1.0 + v0 * kV / kS);
   EXPECT_NEAR(position_at(response, 0.9), v0 * tau - stop * kS / kV, 1e-12);
   EXPECT_EQ(velocity_at(response, 0.9), 0.0);
@@ -62,55 +72,98 @@ TEST(Response, SticksBelowBreakawayAndSlipsBackAboveIt) {
   const RunInput below = steady(0.39, 1.0, 0.05);
   const RunInput above = steady(-0.6, 1.0, 0.05);
   Response response;
-  response.simulate(below, {kS, kV, std::log(tau), 0.0, 0.0, 0.0}, false);
+  response.simulate(below, at_velocity(0.0), false);
   EXPECT_EQ(position_at(response, 1.0), 0.0);
   // Reverses: forward friction until rest, then backwards towards (V + kS)/kV = −0.1.
-  response.simulate(above, {kS, kV, std::log(tau), 0.0, 0.0, 0.5}, false);
+  response.simulate(above, at_velocity(0.5), false);
   EXPECT_NEAR(velocity_at(response, 1.0), -0.1, 1e-3);
 }
 
 TEST(Response, GravityActsLikeVoltage) {
   RunInput input = steady(3.0, 1.0, 0.02);
-  input.gravity_cosine.assign(input.time.size(), 1.0);
+  input.forces[0].assign(input.time.size(), 1.0);
   Response with_gravity;
-  with_gravity.simulate(input, {kS, kV, std::log(tau), 0.7, 0.0, 0.0}, false);
+  with_gravity.simulate(input, at_velocity(0.0, 0.7), false);
   const RunInput lower = steady(2.3, 1.0, 0.02);
   Response without;
-  without.simulate(lower, {kS, kV, std::log(tau), 0.0, 0.0, 0.0}, false);
+  without.simulate(lower, at_velocity(0.0), false);
   EXPECT_NEAR(velocity_at(with_gravity, 0.7), velocity_at(without, 0.7), 1e-13);
 }
 
 TEST(Response, StaysAtTheInitialVelocityBeforeItsStart) {
   const RunInput input = steady(3.0, 0.2, 0.02);
   Response response;
-  response.simulate(input, {kS, kV, std::log(tau), 0.0, 0.0, 0.8}, false);
+  response.simulate(input, at_velocity(0.8), false);
   EXPECT_NEAR(position_at(response, -0.05), -0.04, 1e-15);
+}
+
+// At the limit the speed grows by (headroom − kS)/kA until V − kV v = headroom, then on as without.
+TEST(Response, TheCurrentLimitMakesAStraightRise) {
+  const RunInput input = steady(6.0, 1.0, 0.02);
+  SimulationVector x = at_velocity(0.0);
+  const double headroom = 3.0;
+  x[parameter::headroom] = headroom;
+  Response response;
+  response.simulate(input, x, false);
+  const double slope = (headroom - kS) / (kV * tau);
+  const double leaves = (6.0 - headroom) / kV / slope;
+  EXPECT_NEAR(velocity_at(response, 0.1), 0.1 * slope, 1e-12);
+  EXPECT_NEAR(position_at(response, 0.1), 0.005 * slope, 1e-12);
+  const double v_end = (6.0 - kS) / kV;
+  const double v_left = leaves * slope;
+  EXPECT_NEAR(velocity_at(response, 0.8),
+              v_end + (v_left - v_end) * std::exp(-(0.8 - leaves) / tau), 1e-12);
+}
+
+// Braking against the limit: it slows evenly, stops, and turns where the limit lets it.
+TEST(Response, TheCurrentLimitHoldsWhenBraking) {
+  const RunInput input = steady(-6.0, 1.0, 0.05);
+  SimulationVector x = at_velocity(2.0);
+  x[parameter::headroom] = 3.0;
+  Response response;
+  response.simulate(input, x, false);
+  const double braking = (3.0 + kS) / (kV * tau);
+  const double rest = 2.0 / braking;
+  EXPECT_NEAR(position_at(response, rest), 0.5 * 2.0 * rest, 1e-3);
+  EXPECT_NEAR(velocity_at(response, 0.2), -(0.2 - rest) * (3.0 - kS) / (kV * tau), 1e-12);
 }
 
 // Central differences of the position, over random inputs that change direction.
 TEST(Response, SensitivitiesAreDerivatives) {
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+  int limited = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     Random random(seed);
     RunInput input = steady(0.0, 1.0, 0.011);
-    for (std::size_t i = 0; i < input.time.size(); ++i) {
-      input.voltage[i] =
-          4.0 * std::sin(6.0 * input.time[i] + static_cast<double>(seed)) + random.normal(0.0, 0.1);
-      input.gravity_cosine[i] = std::cos(input.time[i]);
-      input.gravity_sine[i] = std::sin(input.time[i]);
+    for (auto& force : input.forces) {
+      force.resize(input.time.size());
     }
-    const SimulationVector x{random.uniform(0.05, 0.3),
-                             random.uniform(0.5, 2.0),
-                             std::log(random.uniform(0.02, 0.3)),
-                             0.4,
-                             0.2,
-                             1.0};
+    for (std::size_t i = 0; i < input.time.size(); ++i) {
+      const double time = input.time[i];
+      input.voltage[i] =
+          4.0 * std::sin(6.0 * time + static_cast<double>(seed)) + random.normal(0.0, 0.1);
+      input.forces[0][i] = std::cos(time);
+      input.forces[1][i] = std::sin(time);
+      input.forces[2][i] = 1.0;
+      input.forces[3][i] = time - 0.5;
+      input.forces[4][i] = std::sin(3.0 * time);
+    }
+    SimulationVector x = at_velocity(1.0, 0.4);
+    x[parameter::static_friction] = random.uniform(0.05, 0.3);
+    x[parameter::velocity_gain] = random.uniform(0.5, 2.0);
+    x[parameter::log_time_constant] = std::log(random.uniform(0.02, 0.3));
+    x[parameter::gravity_sine] = 0.2;
+    x[parameter::bias] = 0.1;
+    x[parameter::spring] = -0.3;
+    x[parameter::drag] = 0.15;
+    x[parameter::headroom] = seed % 2 == 0 ? no_limit : random.uniform(1.0, 3.0);
     Response response;
     response.simulate(input, x, true);
     std::size_t hint = 0;
     const double time = random.uniform(0.2, 1.0);
     const SimulationGradient gradient = response.at(time, true, hint).position_gradient;
+    limited += gradient[parameter::headroom] != 0.0 ? 1 : 0;
     for (std::size_t j = 0; j < x.size(); ++j) {
-      const double step = 1e-6;
+      const double step = j == parameter::headroom ? 1e-5 : 1e-6;
       SimulationVector high = x;
       SimulationVector low = x;
       high[j] += step;
@@ -120,10 +173,11 @@ TEST(Response, SensitivitiesAreDerivatives) {
       const double above = position_at(shifted, time);
       shifted.simulate(input, low, false);
       const double below = position_at(shifted, time);
-      EXPECT_NEAR(gradient[static_cast<Eigen::Index>(j)], (above - below) / (2.0 * step), 2e-6)
+      EXPECT_NEAR(gradient[static_cast<Eigen::Index>(j)], (above - below) / (2.0 * step), 3e-6)
           << "seed " << seed << " parameter " << j;
     }
   }
+  EXPECT_GE(limited, 15);
 }
 
 }  // namespace

@@ -26,6 +26,14 @@ struct GainEstimate {
   std::string reason{};      ///< If not determined: why.
 };
 
+/// A force that the four gains lack and the log asks for beyond doubt; the gains hold beside it.
+struct ModelTerm {
+  std::string name{};  ///< "spring", "drag", "asymmetric_friction", "current_limit".
+  std::string unit{};  ///< Of the value: "V/m", "V/(rad/s)²", "V".
+  GainEstimate value{};
+  double largest = 0.0;  ///< V, of it in this log.
+};
+
 /// A run as measured and as simulated in free run from its recorded voltage.
 struct FittedRun {
   TestKind kind = TestKind::quasistatic_forward;
@@ -50,7 +58,8 @@ struct FeedforwardFit {
   GainEstimate kA;                   ///< V/(unit/s²).
   std::optional<GainEstimate> kG{};  ///< V; elevators and arms.
   std::optional<GainEstimate>
-      angle_offset{};  ///< rad; arms: true angle from horizontal − measured.
+      angle_offset{};              ///< rad; arms: true angle from horizontal − measured.
+  std::vector<ModelTerm> terms{};  ///< Beyond the four gains; none of most logs.
 
   double r_squared = 0.0;        ///< Of the free-run simulated velocity, all used runs.
   double velocity_nrmse = 0.0;   ///< RMS error over standard deviation of the velocity.
@@ -73,6 +82,7 @@ struct FitOptions {
   double difference_span = 0.07;  ///< s, span of the position differences.
   double max_delay = 0.1;         ///< s, largest delay of position or velocity looked for.
   int max_iterations = 200;       ///< Of Levenberg–Marquardt, over all stages.
+  bool extend = true;             ///< Take in terms beyond the four gains where the log asks.
 };
 
 /// The answer with everything that led to it: also a refused recording can be plotted.

@@ -10,6 +10,24 @@
 
 namespace flyball {
 
+/// What real mechanisms and logs have and the model of the four gains has not; nothing of it unless
+/// it is said.
+struct SessionDefects {
+  double spring = 0.0;              ///< V/unit, pulls to the middle of the travel.
+  double drag = 0.0;                ///< V/(unit/s)², against v |v|.
+  double friction_asymmetry = 0.0;  ///< kS (1 + it) forward, kS (1 − it) in reverse; in (−1, 1).
+  double headroom = std::numeric_limits<double>::infinity();  ///< V, of |V − kV v|: a current
+                                                              ///< limit. The command is recorded.
+  /// Resistance of battery and wires over the motor's: V is a duty of 12 V, which sags. Recorded is
+  /// the command.
+  double sag = 0.0;
+  double backlash = 0.0;  ///< unit, between the motor, on which the encoder is, and the load.
+  bool stale_first_row = false;  ///< The first row's position is 0.
+  double slip = 0.0;             ///< unit, by which the position jumps twice in each test.
+  double position_delay = 0.0;   ///< s, beyond sensor_delay.
+  double velocity_delay = 0.0;   ///< s, beyond sensor_delay.
+};
+
 /// A characterization session to be recorded: a mechanism with known gains, driven through the
 /// four tests, seen through the sensors and the logger that real robots have.
 struct CharacterizationOptions {
@@ -21,6 +39,7 @@ struct CharacterizationOptions {
   double angle_offset = 0.0;  ///< rad, arm: true angle from horizontal − angle the encoder shows.
   double friction_variation = 0.0;  ///< Relative amplitude of kS along the travel, in [0, 1).
   double breakaway = 1.0;           ///< Friction at rest over friction in motion, ≥ 1.
+  SessionDefects defects{};
 
   double ramp_rate = 0.25;      ///< V/s, quasistatic.
   double step_voltage = 6.0;    ///< V, dynamic.

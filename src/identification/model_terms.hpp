@@ -1,0 +1,25 @@
+#pragma once
+
+#include <vector>
+
+#include "identification/robust_fit.hpp"
+
+/// Terms that a mechanism need not have, taken in where the log asks for them.
+namespace flyball::identification {
+
+/// Extends the model by the terms (bias, spring, drag, current limit) whose evidence is beyond
+/// doubt, the strongest first, two at most, and fits it again.
+/// @param best  The fit of the model without; becomes that of the extended one.
+/// @return  Whether any was.
+bool extend_model(OutputErrorProblem& problem, const Bounds& bounds, const ChannelScales& scales,
+                  RobustFit& best);
+
+/// The terms of an extended model with their intervals.
+[[nodiscard]] std::vector<ModelTerm> estimate_terms(const OutputErrorProblem& problem,
+                                                    const RobustFit& best,
+                                                    const Covariances& spread);
+
+/// What there is to say of them.
+void report_terms(const FeedforwardFit& fit, std::vector<Diagnostic>& diagnostics);
+
+}  // namespace flyball::identification
