@@ -7,6 +7,7 @@
 
 #include <flyball/core/argument.hpp>
 
+#include "core/diagnose.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "identification/cross_checks.hpp"
@@ -14,6 +15,7 @@
 #include "identification/model_terms.hpp"
 #include "identification/output_error.hpp"
 #include "identification/robust_fit.hpp"
+#include "identification/settling.hpp"
 #include "identification/start.hpp"
 #include "identification/statistics.hpp"
 
@@ -218,8 +220,9 @@ void add_runs(OutputErrorProblem& problem, const Eigen::VectorXd& x, Feedforward
   fit.position_noise = mad_scale(difference_residuals) / std::sqrt(2.0);
 }
 
+/// @param whole  Whether steps may still have an irregular start.
 Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const FitOptions& options,
-                                      std::vector<Diagnostic>& diagnostics) {
+                                      bool whole, std::vector<Diagnostic>& diagnostics) {
   if (!prepared.mechanism) {
     return refusal(IdentificationError::unknown_mechanism, where)
         .hint("say which: flywheel, elevator or arm");
@@ -245,6 +248,24 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
     const int iterations = best.iterations;
     best = minimize(problem, best.x, problem.free_parameters(), bounds, scales, 60, 1e-3);
     best.iterations += iterations;
+  }
+  if (const auto later = whole ? without_irregular_starts(problem, best.x) : std::nullopt) {
+    FitOptions closer = options;
+    closer.settling = std::max(
+        0.01, best.x[parameter::velocity_delay] + 0.5 * best.x[parameter::averaging_width]);
+    std::vector<Diagnostic> found;
+    auto fit = fit_prepared(later->recording, closer, false, found);
+    if (fit) {
+      warn(diagnostics, "backlash",
+           "the speed of {} does not rise as an inertia's does, by up to {:.0f} times the noise: "
+           "backlash or elasticity between the encoder and the load, or a stop that it leaves. The "
+           "first {:.0f} ms were left out; a controller should not count on the load's moving "
+           "before",
+           later->steps == 1 ? "one step" : detail::format("{} steps", later->steps), later->excess,
+           1e3 * later->longest);
+      diagnostics.insert(diagnostics.end(), found.begin(), found.end());
+      return fit;
+    }
   }
   const Covariances spread =
       covariances(problem, best.x, problem.free_parameters(), bounds, scales);
@@ -294,7 +315,7 @@ FitReport identify_feedforward(const Recording& recording, const FitOptions& opt
   }
   FitReport report{*std::move(prepared), {}, refusal(IdentificationError::no_data)};
   report.diagnostics = report.prepared.diagnostics;
-  report.fit = fit_prepared(report.prepared, options, report.diagnostics);
+  report.fit = fit_prepared(report.prepared, options, true, report.diagnostics);
   return report;
 }
 

@@ -56,7 +56,7 @@ ResidualRun make_run(const PreparedRun& prepared, std::size_t index, const FitOp
   run.input.voltage = slice(source.voltage);
 
   // A run that starts in motion is compared only where no sensor looks back before its start.
-  const double earliest = prepared.starts_at_rest ? begin - lead : begin + options.max_delay;
+  const double earliest = prepared.starts_at_rest ? begin - lead : begin + options.settling;
   const auto usable = [&](std::size_t row) {
     return source.time[row] >= earliest && row < prepared.last;
   };
@@ -160,8 +160,8 @@ OutputErrorProblem::OutputErrorProblem(const PreparedRecording& recording,
     }
   }
   middle_ = 0.5 * (low + high);
-  priors_ = {{parameter::position_delay, 0.01, 0.02},
-             {parameter::velocity_delay, 0.03, 0.03},
+  priors_ = {{parameter::position_delay, 0.015, 0.015},
+             {parameter::velocity_delay, 0.035, 0.025},
              {parameter::averaging_width, 0.03, 0.05}};
   for (std::size_t i = 0; i < runs_.size(); ++i) {
     priors_.push_back(

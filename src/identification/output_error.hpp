@@ -101,9 +101,9 @@ class OutputErrorProblem {
   [[nodiscard]] double velocity_shown(std::size_t run, const Eigen::VectorXd& x, double time) const;
   [[nodiscard]] double position_shown(std::size_t run, const Eigen::VectorXd& x, double time) const;
 
-  /// What is known of the nuisance parameters before the data: sensors are some 10 ms late and
-  /// average over some 30 ms, which matters where data are so noisy that delay and inertia trade; a
-  /// run that starts in motion starts about as fast as its smoothed velocity says, within a tenth
+  /// What is known of the nuisance parameters before the data: sensors are 0 to 40 ms late and
+  /// average over 0 to 100 ms, which matters where data are so noisy that delay and inertia trade;
+  /// a run that starts in motion starts about as fast as its smoothed velocity says, within a tenth
   /// of top speed (with a short time constant its data do not tell the start).
   struct Prior {
     Eigen::Index parameter;

@@ -105,19 +105,13 @@ class Truth {
                           (options_.kA * (1.0 - motor_share));
         load_.position += step * load_.velocity;
       }
+      stop_at_ends();
       collide();
     } else {
       load_ = motion(1.0, friction_here(load_.velocity, applied - opposed()))
                   .step(load_, applied - opposed(), step);
+      stop_at_ends();
       motor_ = {load_.position + side_ * 0.5 * options_.defects.backlash, load_.velocity};
-    }
-    if (options_.mechanism != MechanismKind::flywheel) {
-      const double stopped = std::clamp(position(), options_.travel_low, options_.travel_high);
-      if (stopped != position()) {
-        motor_.position += stopped - position();
-        load_ = {stopped, 0.0};
-        motor_.velocity = 0.0;
-      }
     }
   }
 
@@ -143,6 +137,17 @@ class Truth {
     return mechanisms::gravity_voltage(options_.mechanism, options_.kG, position(), 0.0) +
            options_.defects.spring * (position() - middle) +
            options_.defects.drag * load_.velocity * std::abs(load_.velocity);
+  }
+  /// Hard stops at the ends of the travel.
+  void stop_at_ends() {
+    if (options_.mechanism == MechanismKind::flywheel) {
+      return;
+    }
+    if (position() <= options_.travel_low) {
+      load_ = {options_.travel_low, std::max(0.0, load_.velocity)};
+    } else if (position() >= options_.travel_high) {
+      load_ = {options_.travel_high, std::min(0.0, load_.velocity)};
+    }
   }
   /// Whether the motor stays at the side of the gap that it is at: it pushes the load, or would
   /// fall behind it.

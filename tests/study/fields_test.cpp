@@ -44,9 +44,10 @@ FieldValue any_value(const Field& field, std::size_t states) {
       return values;
     }
     case FieldType::text:
-      return field.key == "motor"  ? std::string("Kraken X60 FOC")
-             : field.key == "unit" ? std::string("rotations")
-                                   : any_text();
+      return field.key == "motor"           ? std::string("Kraken X60 FOC")
+             : field.key == "unit"          ? std::string("rotations")
+             : field.key == "velocity_unit" ? std::string("RPM")
+                                            : any_text();
     case FieldType::whole:
       return *rc::gen::inRange<long long>(field.least, 1LL << 62);
     case FieldType::flag:

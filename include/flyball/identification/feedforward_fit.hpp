@@ -81,6 +81,7 @@ struct FitOptions {
   PreparationOptions preparation;
   double difference_span = 0.07;  ///< s, span of the position differences.
   double max_delay = 0.1;         ///< s, largest delay of position or velocity looked for.
+  double settling = 0.1;          ///< s, after the start of a run in motion, that is not compared.
   int max_iterations = 200;       ///< Of Levenberg–Marquardt, over all stages.
   bool extend = true;             ///< Take in terms beyond the four gains where the log asks.
 };
