@@ -167,6 +167,42 @@ double repeated_share(const std::vector<PreparedRun>& runs) {
   return total == 0 ? 0.0 : static_cast<double>(repeated) / static_cast<double>(total);
 }
 
+namespace {
+
+/// Whether the velocity is refreshed with the position although each row differs by noise: what it
+/// changes by while speeding up, it changes by at the position's new values.
+bool is_held_with_position(const PreparedRecording& prepared) {
+  if (!prepared.has_position || !prepared.has_velocity ||
+      prepared.position_refresh_period < 1.5 * prepared.row_period ||
+      prepared.velocity_refresh_period > 0.75 * prepared.position_refresh_period) {
+    return false;
+  }
+  double at_refresh = 0.0;
+  double between = 0.0;
+  double total = 0.0;
+  std::size_t refreshes = 0;
+  for (const PreparedRun& prepared_run : prepared.runs) {
+    const std::vector<double>& v = prepared_run.run.velocity;
+    const std::vector<std::size_t>& fresh = prepared_run.fresh_position;
+    for (std::size_t k = 1; k < fresh.size(); ++k) {
+      const std::size_t a = fresh[k - 1];
+      const std::size_t b = fresh[k];
+      const double change = prepared_run.smoothed_velocity[b] - prepared_run.smoothed_velocity[a];
+      if (b - a < 2 || std::abs(change) < 0.02 * prepared.top_speed) {
+        continue;
+      }
+      at_refresh += (v[b] - v[b - 1]) * change;
+      between += (v[b - 1] - v[a]) * change;
+      total += change * change;
+      ++refreshes;
+    }
+  }
+  constexpr std::size_t enough = 6;
+  return refreshes >= enough && at_refresh > 0.6 * total && between < 0.2 * total;
+}
+
+}  // namespace
+
 void refresh_derived_columns(PreparedRecording& prepared) {
   for (PreparedRun& run : prepared.runs) {
     run.fresh_position.clear();
@@ -180,6 +216,12 @@ void refresh_derived_columns(PreparedRecording& prepared) {
           fresh_rows(run.run.time, run.run.velocity, prepared.velocity_refresh_period);
     }
     run.smoothed_velocity = smooth_velocity(run, prepared.has_position);
+  }
+  if (is_held_with_position(prepared)) {
+    for (PreparedRun& run : prepared.runs) {
+      run.fresh_velocity = run.fresh_position;
+    }
+    prepared.velocity_refresh_period = prepared.position_refresh_period;
   }
 }
 

@@ -17,15 +17,17 @@ constexpr double normal_95 = 1.96;
 constexpr double one_sided_95 = 1.645;
 constexpr double widest_time_constant = 0.6;  // relative half-width beyond which kA is unknown
 
-// What no single session can tell: repeats of one mechanism on one day scatter by at least so much,
-// and voltages are not measured better than to a few millivolts.
-constexpr double voltage_allowance = 3e-3;  // V, standard error added to kS and kG
-constexpr double speed_allowance = 1.5e-3;  // relative, added to kV
-constexpr double inertia_allowance = 1e-2;  // relative, added to kA
+// What residuals cannot tell: measured voltages are a millivolt off, clocks and encoders a few
+// parts in ten thousand, and the sensors are not quite what is supposed of them (simulated sessions
+// with such sensors are covered to 95 % with these).
+constexpr double voltage_allowance = 1e-3;  // V, standard error added to kS and kG
+constexpr double speed_allowance = 2e-4;    // relative, added to kV
+constexpr double inertia_allowance = 2e-3;  // relative, added to kA
+constexpr double small_sample = 1.1;       // of all standard errors
 
 /// @param allowance  Standard error of what the model leaves out, in the gain's unit.
 GainEstimate symmetric(double value, double random_error, double allowance) {
-  return symmetric_estimate(value, std::hypot(random_error, allowance));
+  return symmetric_estimate(value, std::hypot(small_sample * random_error, allowance));
 }
 
 void mark_undetermined(GainEstimate& gain, double upper_bound, std::string reason) {
@@ -46,7 +48,8 @@ GainEstimate inertia_gain(const PreparedRecording& prepared, const Eigen::Vector
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(x.size());
   gradient[parameter::log_time_constant] = 1.0;
   gradient[parameter::velocity_gain] = 1.0 / kV;
-  const double relative = std::hypot(spread.standard_error(gradient), inertia_allowance);
+  const double relative =
+      std::hypot(small_sample * spread.standard_error(gradient), inertia_allowance);
   GainEstimate kA;
   kA.value = tau * kV;
   kA.standard_error = relative * kA.value;
