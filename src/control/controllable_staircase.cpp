@@ -46,7 +46,7 @@ ControllableStaircase controllable_staircase(const MatrixRef& A, const MatrixRef
       form.rank = rank;
     }
     done += rank;
-    entering = form.A.block(done, done - rank, n - done, rank);
+    entering = Eigen::MatrixXd(form.A.block(done, done - rank, n - done, rank));
     threshold = tolerance;
   }
   form.controllable = done;

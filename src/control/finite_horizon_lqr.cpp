@@ -27,7 +27,10 @@ struct Weights {
 
 Expected<Weights> check_weights(const QuadraticCost& cost, const Weight& terminal, Eigen::Index n,
                                 Eigen::Index m, std::string_view where) {
-  FLYBALL_TRY(const auto S, terminal.get());
+  if (!terminal.get()) {
+    return tl::unexpected(terminal.get().error());
+  }
+  const Eigen::MatrixXd& S = *terminal.get();
   const Eigen::MatrixXd N =
       cost.N.size() == 0 ? Eigen::MatrixXd(Eigen::MatrixXd::Zero(n, m)) : cost.N;
   FLYBALL_CHECK(Checks(where)

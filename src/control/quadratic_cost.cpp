@@ -12,7 +12,10 @@ namespace detail {
 
 Expected<Eigen::MatrixXd> weight_of(const Weight& weight, Eigen::Index size, std::string_view where,
                                     std::string_view name, std::string_view meaning) {
-  FLYBALL_TRY(const auto matrix, weight.get());
+  if (!weight.get()) {
+    return tl::unexpected(weight.get().error());
+  }
+  const Eigen::MatrixXd& matrix = *weight.get();
   FLYBALL_CHECK(check_shape(matrix, size, size, where, name, meaning));
   return Checks(where).finite(matrix, name).symmetric(matrix, name).map([&] { return matrix; });
 }

@@ -109,8 +109,11 @@ Expected<SteadyStateFeedforward<>> steady_state_feedforward_of_pairs(const Matri
 
 Expected<Eigen::MatrixXd> qr_weighted_gain(const MatrixRef& B, const Weight& Q, const Weight& R) {
   constexpr std::string_view name = "qr_weighted_gain";
-  FLYBALL_TRY(const auto weight_Q, Q.get());
-  FLYBALL_TRY(const auto weight_R, R.get());
+  if (!Q.get() || !R.get()) {
+    return tl::unexpected((Q.get() ? R : Q).get().error());
+  }
+  const Eigen::MatrixXd& weight_Q = *Q.get();
+  const Eigen::MatrixXd& weight_R = *R.get();
   const Eigen::Index n = B.rows();
   const Eigen::Index m = B.cols();
   FLYBALL_CHECK(Checks(name)

@@ -148,8 +148,11 @@ ErrorInfo error_info(KalmanGainError code) {
 Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const Covariance& Q,
                                    const Covariance& R) {
   constexpr std::string_view where = "kalman_gain";
-  FLYBALL_TRY(const auto noise_Q, Q.get());
-  FLYBALL_TRY(const auto noise_R, R.get());
+  if (!Q.get() || !R.get()) {
+    return tl::unexpected((Q.get() ? R : Q).get().error());
+  }
+  const Eigen::MatrixXd& noise_Q = *Q.get();
+  const Eigen::MatrixXd& noise_R = *R.get();
   FLYBALL_CHECK(check_square(A, where, "A"));
   const Eigen::Index n = A.rows();
   const Eigen::Index p = C.rows();

@@ -30,7 +30,8 @@ Split split(std::string_view section) {
 TomlDocument::TomlDocument(std::string_view text, std::string file)
     : text_(text), file_(std::move(file)) {
   try {
-    root_ = toml::parse(text, file_);
+    // Without the name of the file: toml++ copies it in a constructor that is noexcept.
+    root_ = toml::parse(text);
   } catch (const toml::parse_error& problem) {
     is_toml_ = false;
     std::string hint(problem.description());

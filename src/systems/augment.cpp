@@ -1,5 +1,7 @@
 #include <flyball/systems/augment.hpp>
 
+#include <utility>
+
 #include "core/try.hpp"
 #include "systems/timed.hpp"
 
@@ -88,10 +90,10 @@ Expected<ContinuousSystem<>> augment_integral_reference(const ContinuousSystem<>
     MatrixXd B = MatrixXd::Zero(n + p, m + p);
     B.leftCols(m) = augmented.B;
     B.bottomRightCorner(p, p).setIdentity();
-    augmented.B = B;
+    augmented.B = std::move(B);
     MatrixXd D = MatrixXd::Zero(p, m + p);
     D.leftCols(m) = augmented.D;
-    augmented.D = D;
+    augmented.D = std::move(D);
     return augmented;
   });
 }

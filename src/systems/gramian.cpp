@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <flyball/math/equations/matrix_equation.hpp>
@@ -75,9 +76,9 @@ Expected<MatrixXd> gramian_factor(const MatrixRef& A, const MatrixRef& B, TimeDo
     both << L, next;
     if (both.cols() > n) {
       // L Lᵀ of fewer columns: Rᵀ R with R the triangle of bothᵀ.
-      L = triangle_of(both.transpose()).transpose();
+      L = MatrixXd(triangle_of(both.transpose()).transpose());
     } else {
-      L = both;
+      L = std::move(both);
     }
     if (last) {
       MatrixXd square = MatrixXd::Zero(n, n);

@@ -38,7 +38,7 @@ Matrix<Scalar> triangle_from_right(Matrix<Scalar> M, Eigen::VectorX<Index> from)
       continue;
     }
     // The row x becomes β eᵀ: x (I - τ v vᴴ) with v = (x - β e)ᴴ scaled to v_last = 1.
-    v = M.row(i).segment(first, count + 1).adjoint();
+    v = Vector<Scalar>(M.row(i).segment(first, count + 1).adjoint());
     const double others = v.head(count).norm();
     if (others == 0.0) {
       continue;
@@ -51,7 +51,7 @@ Matrix<Scalar> triangle_from_right(Matrix<Scalar> M, Eigen::VectorX<Index> from)
     v(count) = Scalar(1.0);
     const double tau = 2.0 / v.squaredNorm();
     auto block = M.block(0, first, i + 1, count + 1);
-    products = Vector<Scalar>::Zero(i + 1);
+    products = Vector<Scalar>(Vector<Scalar>::Zero(i + 1));
     for (Index j = 0; j <= count; ++j) {
       products += block.col(j) * v(j);
     }

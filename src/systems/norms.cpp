@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <flyball/math/search/minimum.hpp>
@@ -47,9 +48,9 @@ class Gain {
     C_ = product(system.C, form.Q);
     if (B_.cols() > C_.rows()) {
       // Gᵀ has the same gain and fewer columns to solve for; both orders reversed keep the form.
-      const MatrixXd B = C_.transpose().colwise().reverse();
-      C_ = B_.transpose().rowwise().reverse();
-      B_ = B;
+      MatrixXd B = C_.transpose().colwise().reverse();
+      C_ = MatrixXd(B_.transpose().rowwise().reverse());
+      B_ = std::move(B);
       H_ = H_.transpose().reverse().eval();
       D_ = D_.transpose().eval();
     }

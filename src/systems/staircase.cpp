@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "math/dense/dense.hpp"
 #include "math/dense/dense_reduction.hpp"
@@ -71,7 +72,7 @@ Turned turned_of(const MatrixXd& block, double threshold) {
     const Eigen::RowVectorXd products = t.tau(k) * (w.transpose() * right);
     right.noalias() -= w * products;
   }
-  R = R.topRows(count).eval();
+  R = MatrixXd(R.topRows(count));
   if (t.v.cols() > 0) {
     R.triangularView<Eigen::StrictlyLower>().setZero();
   }
@@ -138,7 +139,7 @@ Staircase staircase_of(const MatrixRef& A, const MatrixRef& B, double tolerance,
     }
     s.stairs.push_back(step);
     s.rank += step;
-    block = s.A.block(s.rank, s.rank - step, n - s.rank, step);
+    block = MatrixXd(s.A.block(s.rank, s.rank - step, n - s.rank, step));
     unit = sizes.A;
   }
   if (s.rank < n && s.rank > 0) {
@@ -172,14 +173,14 @@ MatrixXd cut_off_mode(const MatrixXd& A, const MatrixXd& B, double threshold) {
       const double flatness = std::sqrt(2.0) * svd_of(left).values(1);
       if (found.value > threshold * flatness) {
         found = distances.near(lambda.real(), threshold);
-        left = found.left.real();
+        left = MatrixXd(found.left.real());
       } else {
         found.value /= flatness;
       }
     }
     if (found.value <= least) {
       least = found.value;
-      directions = left;
+      directions = std::move(left);
     }
   }
   return directions;
@@ -196,8 +197,8 @@ ReachedPart reached_part_of(const MatrixRef& A, const MatrixRef& B, double toler
     const Staircase stairs = staircase_of(part.A, part.B, tolerance, sizes);
     const Index r = stairs.rank;
     part.V = product(part.V, stairs.Q.leftCols(r));
-    part.A = stairs.A.topLeftCorner(r, r);
-    part.B = stairs.B.topRows(r);
+    part.A = MatrixXd(stairs.A.topLeftCorner(r, r));
+    part.B = MatrixXd(stairs.B.topRows(r));
     if (r == 0) {
       return part;
     }

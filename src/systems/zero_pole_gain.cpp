@@ -145,7 +145,7 @@ std::optional<ZeroPoleGain> zero_pole_gain(const ContinuousSystem<>& system) {
     b = product(H, b);
     gain *= -sign * length;
     d = b(last, 0);
-    c = F.row(last).head(last);
+    c = MatrixXd(F.row(last).head(last));
     const double row = unit_b > 0.0 ? c.norm() / std::max(A.norm(), 1e-300) * unit_b : 0.0;
     if (std::abs(d) <= tolerance * std::max(row, unit_b * 1e-3)) {
       d = 0.0;
