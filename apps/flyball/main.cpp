@@ -101,19 +101,36 @@ int run(int argc, char** argv) {
   return invocation.status;
 }
 
-}  // namespace
+/// Memory may not have come back: the last words take none.
+int give_up_for_memory() noexcept {
+  try {
+    flyball::app::tell(flyball::not_enough_memory("this"));
+  } catch (...) {
+    std::fputs("flyball: not enough memory for this\n", stderr);
+  }
+  return flyball::app::bad_input;
+}
 
-int main(int argc, char** argv) {
-  int status = flyball::app::bad_input;
+int guarded_run(int argc, char** argv) {
   try {
     flyball::app::begin_session();
-    status = run(argc, argv);
+    return run(argc, argv);
   } catch (const std::bad_alloc&) {
-    flyball::app::tell(flyball::not_enough_memory("this"));
+    return give_up_for_memory();
   } catch (const std::exception& defect) {
     flyball::app::say(std::string("a defect of Flyball: ") + defect.what());
   } catch (...) {
     flyball::app::say("a defect of Flyball");
   }
-  return flyball::app::end_session(status);
+  return flyball::app::bad_input;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return flyball::app::end_session(guarded_run(argc, argv));
+  } catch (const std::bad_alloc&) {
+    return give_up_for_memory();
+  }
 }

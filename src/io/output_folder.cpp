@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <filesystem>
-#include <set>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -19,6 +18,7 @@
 #include "core/try.hpp"
 #include "io/report_marker.hpp"
 #include "io/unfinished.hpp"
+#include "io/unfinished_folder.hpp"
 
 namespace flyball {
 
@@ -40,12 +40,9 @@ struct OutputFolder::Building {
   }
 
   void remove() noexcept {
-    std::error_code ignored;
-    if (!path.empty()) {
-      fs::remove_all(path, ignored);
-    }
+    made.remove();
     for (; !made_parents.empty(); made_parents.pop_back()) {
-      fs::remove(made_parents.back(), ignored);  // removes it only if it is empty
+      ::rmdir(made_parents.back().c_str());  // removes it only if it is empty
     }
   }
 
@@ -55,7 +52,7 @@ struct OutputFolder::Building {
     return buildings;
   }
 
-  std::string path{};
+  io::UnfinishedFolder made{};
   std::vector<std::string> made_parents{};  ///< Outermost first.
   int lock_file = -1;                       ///< Of the folder, locked while its process lives.
   std::vector<WrittenFile> files{};
@@ -169,52 +166,11 @@ Expected<std::vector<WrittenFile>> check_destination(const std::string& path) {
   return earlier;
 }
 
-/// What stood in a folder before files were put there, to be put back unless `done`: a second link
-/// to each beside the new ones, so that at no moment a name is without a file. Where a file system
-/// has no links nothing is kept.
-class Restoring {
- public:
-  Restoring(fs::path folder, const fs::path& building)
-      : folder_(std::move(folder)), kept_(building / ".kept") {}
-  Restoring(const Restoring&) = delete;
-  Restoring& operator=(const Restoring&) = delete;
-  ~Restoring() {
-    std::error_code error;
-    for (auto name = names_.rbegin(); name != names_.rend(); ++name) {
-      if (fs::exists(kept_ / *name, error)) {
-        fs::create_directories((folder_ / *name).parent_path(), error);
-        fs::rename(kept_ / *name, folder_ / *name, error);
-      } else if (!had_.contains(*name)) {
-        fs::remove(folder_ / *name, error);
-      }
-    }
-  }
-
-  void keep(const fs::path& name) {
-    std::error_code error;
-    if (std::find(names_.begin(), names_.end(), name) != names_.end()) {
-      return;  // of a marker that is written twice the first counts
-    }
-    names_.push_back(name);
-    if (fs::exists(folder_ / name, error)) {
-      had_.insert(name);
-      fs::create_directories((kept_ / name).parent_path(), error);
-      fs::create_hard_link(folder_ / name, kept_ / name, error);
-    }
-  }
-  void done() noexcept { names_.clear(); }
-
- private:
-  fs::path folder_;
-  fs::path kept_;
-  std::vector<fs::path> names_;
-  std::set<fs::path> had_;
-};
-
 /// Moves the files of `building` into a folder that is there, and those of an earlier report out of
 /// it. Whenever it is interrupted, the marker lists what is there.
-Expected<void> replace(const fs::path& building, const fs::path& folder,
+Expected<void> replace(io::UnfinishedFolder& made, const fs::path& folder,
                        const std::vector<WrittenFile>& files) {
+  const fs::path building = made.path;
   FLYBALL_TRY(const auto earlier, check_destination(folder.string()));
   for (const WrittenFile& file : files) {
     if (io::occupant_of(folder, file.name, earlier) == io::Occupant::another) {
@@ -224,16 +180,16 @@ Expected<void> replace(const fs::path& building, const fs::path& folder,
     }
   }
   std::error_code error;
-  Restoring restoring(folder, building);
+  io::Restoring restoring(folder, made);
   const auto put = [&](const fs::path& name) -> Expected<void> {
-    fs::create_directories((folder / name).parent_path(), error);
-    restoring.keep(name);
+    error = restoring.keep(name);
     if (!error) {
       fs::rename(building / name, folder / name, error);
     }
     return error ? not_writable((folder / name).string(), error.message()) : Expected<void>{};
   };
   const auto mark = [&](const std::vector<WrittenFile>& listed) {
+    error = made.make_way_for(OutputFolder::marker);
     return write_file_atomically((building / OutputFolder::marker).string(),
                                  io::marker_text(listed))
         .and_then([&] { return put(OutputFolder::marker); });
@@ -249,7 +205,7 @@ Expected<void> replace(const fs::path& building, const fs::path& folder,
       return other.name == file.name;
     });
     if (!stays && io::occupant_of(folder, file.name, earlier) == io::Occupant::ours) {
-      restoring.keep(file.name);
+      error = restoring.keep(file.name);
       fs::remove(folder / file.name, error);
       for (fs::path parent = fs::path(file.name).parent_path(); !parent.empty() && !error;
            parent = parent.parent_path()) {
@@ -303,7 +259,7 @@ Expected<OutputFolder> OutputFolder::create(const std::string& path) {
   if (::mkdtemp(pattern.data()) == nullptr) {
     return not_writable(path, reason());
   }
-  building.path = pattern;
+  building.made.path = pattern;
   building.lock_file = locked(pattern);
   // mkdtemp makes the folder private; a report is as open as the user's other folders.
   const mode_t mask = ::umask(0);
@@ -322,7 +278,7 @@ OutputFolder::~OutputFolder() = default;
 
 const std::string& OutputFolder::path() const noexcept {
   static const std::string none;
-  return building_ ? building_->path : none;
+  return building_ ? building_->made.path : none;
 }
 
 Expected<void> OutputFolder::write(std::string_view name, std::string_view contents) {
@@ -332,10 +288,8 @@ Expected<void> OutputFolder::write(std::string_view name, std::string_view conte
         .got("not a name in the folder");
   }
   const std::lock_guard lock(io::writing());
-  const fs::path path = building_->path / relative;
-  std::error_code error;
-  fs::create_directories(path.parent_path(), error);
-  if (error) {
+  const fs::path path = building_->made.path / relative;
+  if (const std::error_code error = building_->made.make_way_for(relative)) {
     return not_writable(path.parent_path().string(), error.message());
   }
   // The folder that is being built has a passing name; the person knows the one it will have.
@@ -355,17 +309,18 @@ Expected<void> OutputFolder::commit() {
     return not_writable(destination_, "the folder was committed before");
   }
   const std::lock_guard lock(io::writing());
-  const Building& building = *building_;
+  Building& building = *building_;
   std::error_code error;
   if (!fs::exists(fs::symlink_status(destination_, error))) {
-    FLYBALL_CHECK(write_file_atomically((fs::path(building.path) / marker).string(),
+    error = building.made.make_way_for(marker);
+    FLYBALL_CHECK(write_file_atomically((fs::path(building.made.path) / marker).string(),
                                         io::marker_text(building.files)));
-    fs::rename(building.path, destination_, error);
+    fs::rename(building.made.path, destination_, error);
     if (error) {
       return not_writable(destination_, error.message());
     }
   } else {
-    FLYBALL_CHECK(replace(building.path, destination_, building.files));
+    FLYBALL_CHECK(replace(building.made, destination_, building.files));
   }
   building_->made_parents.clear();
   building_.reset();

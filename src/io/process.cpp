@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -145,11 +146,19 @@ ProcessResult run_process(const std::vector<std::string>& arguments, std::string
   if (!out.ok() || !err.ok()) {
     return not_started(errno);
   }
+  std::vector<std::string> words = arguments;
+  std::vector<std::string> environment = clean_environment();
+  const std::vector<char*> argv = pointers(words);
+  const std::vector<char*> envp = pointers(environment);
+  std::unique_lock start(starting());
+  expect_child();
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, ::fileno(script.get()), STDIN_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, out.writer(), STDOUT_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, err.writer(), STDERR_FILENO);
+  // Each takes memory.
+  int error =
+      std::max({posix_spawn_file_actions_adddup2(&actions, ::fileno(script.get()), STDIN_FILENO),
+                posix_spawn_file_actions_adddup2(&actions, out.writer(), STDOUT_FILENO),
+                posix_spawn_file_actions_adddup2(&actions, err.writer(), STDERR_FILENO)});
   // A group of its own, so that what it starts is killed with it; and the signals that this process
   // may have blocked.
   posix_spawnattr_t attributes;
@@ -159,12 +168,10 @@ ProcessResult run_process(const std::vector<std::string>& arguments, std::string
   posix_spawnattr_setsigmask(&attributes, &none);
   posix_spawnattr_setpgroup(&attributes, 0);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETPGROUP);
-  std::vector<std::string> words = arguments;
-  std::vector<std::string> environment = clean_environment();
   pid_t child = 0;
-  std::unique_lock start(starting());
-  const int error = ::posix_spawnp(&child, arguments.front().c_str(), &actions, &attributes,
-                                   pointers(words).data(), pointers(environment).data());
+  if (error == 0) {
+    error = ::posix_spawnp(&child, argv.front(), &actions, &attributes, argv.data(), envp.data());
+  }
   posix_spawn_file_actions_destroy(&actions);
   posix_spawnattr_destroy(&attributes);
   if (error != 0) {
@@ -172,7 +179,7 @@ ProcessResult run_process(const std::vector<std::string>& arguments, std::string
   }
   out.close_writer();
   err.close_writer();
-  const RunningChild running(child);
+  RunningChild running(child);
   start.unlock();
   const auto deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(
                                            std::chrono::duration<double>(limits.seconds));
@@ -186,9 +193,7 @@ ProcessResult run_process(const std::vector<std::string>& arguments, std::string
   if (result.end != ProcessResult::End::exited) {
     ::kill(-child, SIGKILL);
   }
-  int status = 0;
-  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
+  const int status = running.wait();
   if (result.end != ProcessResult::End::exited) {
     result.out.clear();
   } else if (WIFSIGNALED(status)) {

@@ -1,6 +1,9 @@
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
 #include <vector>
+
+#include <sys/wait.h>
 
 #include "io/unfinished.hpp"
 
@@ -26,14 +29,31 @@ std::recursive_mutex& starting() {
   return mutex;
 }
 
+void expect_child() {
+  const std::lock_guard lock(starting());
+  children().reserve(children().size() + 1);
+}
+
 RunningChild::RunningChild(pid_t child) : child_(child) {
   const std::lock_guard lock(starting());
   children().push_back(child);
 }
 
 RunningChild::~RunningChild() {
+  if (!ended_) {
+    ::kill(-child_, SIGKILL);
+    wait();
+  }
   const std::lock_guard lock(starting());
   std::erase(children(), child_);
+}
+
+int RunningChild::wait() noexcept {
+  int status = 0;
+  while (::waitpid(child_, &status, 0) < 0 && errno == EINTR) {
+  }
+  ended_ = true;
+  return status;
 }
 
 void kill_children() noexcept {

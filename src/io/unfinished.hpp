@@ -13,7 +13,10 @@ namespace flyball::io {
 /// Held while a program is started, until it is known as a RunningChild.
 [[nodiscard]] std::recursive_mutex& starting();
 
-/// A program that runs for this process, until it has ended.
+/// Before a program is started: the memory to know it, so that none is started without.
+void expect_child();
+
+/// A program that runs for this process, until it has ended; what was not waited for is killed.
 class RunningChild {
  public:
   explicit RunningChild(pid_t child);
@@ -21,8 +24,12 @@ class RunningChild {
   RunningChild& operator=(const RunningChild&) = delete;
   ~RunningChild();
 
+  /// Until it has ended. @return Its status, as of waitpid.
+  int wait() noexcept;
+
  private:
   pid_t child_;
+  bool ended_ = false;
 };
 
 /// Kills all of them, with what they started; whoever starts another waits for ever.

@@ -17,6 +17,7 @@ namespace {
 struct State {
   std::size_t left = 0;
   FileFault::What what = FileFault::What::fails;
+  int error = 0;
   bool struck = false;
 };
 constinit State state;
@@ -30,8 +31,15 @@ bool fails() noexcept {
   if (state.what == FileFault::What::kills) {
     ::_exit(99);
   }
-  errno = ENOSPC;
+  errno = state.error;
   return true;
+}
+
+/// Of an operation that a full disk does not hinder.
+void may_be_killed() noexcept {
+  if (state.what == FileFault::What::kills) {
+    (void)fails();
+  }
 }
 
 /// The C library's function of a name.
@@ -42,8 +50,8 @@ Function* next(const char* name) noexcept {
 
 }  // namespace
 
-FileFault::FileFault(std::size_t k, What what) noexcept {
-  state = {k, what, false};
+FileFault::FileFault(std::size_t k, What what, int error) noexcept {
+  state = {k, what, error, false};
 }
 
 FileFault::~FileFault() {
@@ -60,6 +68,7 @@ bool FileFault::struck() const noexcept {
 extern "C" {
 
 using flyball::test::fails;
+using flyball::test::may_be_killed;
 using flyball::test::next;
 
 ssize_t write(int fd, const void* bytes, size_t size) {
@@ -97,6 +106,41 @@ char* mkdtemp(char* pattern) {
 
 int fsync(int fd) {
   return fails() ? -1 : next<int(int)>("fsync")(fd);
+}
+
+int link(const char* from, const char* to) {
+  may_be_killed();
+  return next<int(const char*, const char*)>("link")(from, to);
+}
+
+int unlink(const char* path) {
+  may_be_killed();
+  return next<int(const char*)>("unlink")(path);
+}
+
+int unlinkat(int folder, const char* path, int flags) {
+  may_be_killed();
+  return next<int(int, const char*, int)>("unlinkat")(folder, path, flags);
+}
+
+int remove(const char* path) {
+  may_be_killed();
+  return next<int(const char*)>("remove")(path);
+}
+
+int rmdir(const char* path) {
+  may_be_killed();
+  return next<int(const char*)>("rmdir")(path);
+}
+
+int chmod(const char* path, mode_t mode) {
+  may_be_killed();
+  return next<int(const char*, mode_t)>("chmod")(path, mode);
+}
+
+int fchmod(int fd, mode_t mode) {
+  may_be_killed();
+  return next<int(int, mode_t)>("fchmod")(fd, mode);
 }
 
 }  // extern "C"

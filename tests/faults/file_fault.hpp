@@ -1,16 +1,18 @@
 #pragma once
 
+#include <cerrno>
 #include <cstddef>
 
 namespace flyball::test {
 
-/// While it lives, the k-th operation of this process that changes a file system (open for writing,
-/// write, close of what was written, rename, folder made, mode changed) fails with ENOSPC, from 1;
-/// or the process ends there, as a kill does.
+/// While it lives, the k-th operation of this process that adds to a file system (open for writing,
+/// write, rename, folder made) fails, from 1; or the process ends there, as a kill does, or where
+/// something is removed, linked or its mode changed.
 class FileFault {
  public:
   enum class What { fails, kills };
-  FileFault(std::size_t k, What what) noexcept;
+  /// @param error  An errno, such as EIO.
+  FileFault(std::size_t k, What what, int error = ENOSPC) noexcept;
   ~FileFault();
   FileFault(const FileFault&) = delete;
   FileFault& operator=(const FileFault&) = delete;

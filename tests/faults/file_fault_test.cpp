@@ -49,12 +49,17 @@ class FileFaults : public testing::Test {
 
 const std::string big_text(200'000, 'x');
 
-Expected<void> write_report(const std::string& path, const std::string& text) {
+/// @param more  A file that other reports do not have.
+Expected<void> write_report(const std::string& path, const std::string& text,
+                            const std::string& more = "") {
   auto report = OutputFolder::create(path);
   if (!report) {
     return tl::unexpected(report.error());
   }
-  for (const char* name : {"index.html", "data/fit.csv"}) {
+  for (const std::string& name : {std::string("index.html"), std::string("data/fit.csv"), more}) {
+    if (name.empty()) {
+      continue;
+    }
     if (auto written = report->write(name, text); !written) {
       return written;
     }
@@ -116,27 +121,88 @@ TEST_F(FileFaults, AFileThatAKillLeavesIsTheOldOrTheNew) {
 
 TEST_F(FileFaults, AReportIsTheOldOrTheNew) {
   const std::string path = folder_ / "report";
-  ASSERT_TRUE(write_report(path, "old"));
-  const Files before = files();
-  std::size_t k = 0;
-  for (bool struck = true; struck;) {
-    ++k;
-    Expected<void> written;
-    {
-      FileFault fault(k, FileFault::What::fails);
-      written = write_report(path, big_text);
-      struck = fault.struck();
+  for (const int error : {ENOSPC, EIO}) {
+    ASSERT_TRUE(write_report(path, "old"));
+    const Files before = files();
+    std::size_t k = 0;
+    for (bool struck = true; struck;) {
+      ++k;
+      Expected<void> written;
+      {
+        FileFault fault(k, FileFault::What::fails, error);
+        written = write_report(path, big_text);
+        struck = fault.struck();
+      }
+      if (struck && !written) {
+        EXPECT_TRUE(files() == before) << k;
+      } else if (struck) {
+        // What failed was not needed: a link to what would be put back.
+        expect_whole(files(), big_text, k);
+        ASSERT_TRUE(write_report(path, "old")) << k;
+      }
     }
-    if (struck && !written) {
-      EXPECT_TRUE(files() == before) << k;
-    } else if (struck) {
-      // What failed was not needed: a link to what would be put back.
-      expect_whole(files(), big_text, k);
-      ASSERT_TRUE(write_report(path, "old")) << k;
-    }
+    EXPECT_GE(k, 10U);
+    expect_whole(files(), big_text, k);
   }
-  EXPECT_GE(k, 10U);
-  expect_whole(files(), big_text, k);
+}
+
+TEST_F(FileFaults, AReportThatAKillLeavesIsKnownToTheNextRun) {
+  const std::string path = folder_ / "report";
+  int status = 99;
+  std::size_t k = 0;
+  while (status == 99) {
+    ++k;
+    ASSERT_TRUE(write_report(path, "old", "old/plot.svg")) << k;
+    ASSERT_TRUE(write_file_atomically(path + "/note.txt", "mine"));
+    ASSERT_TRUE(write_file_atomically(path + "/data/mine.csv", "mine too"));
+    const pid_t child = ::fork();
+    if (child == 0) {
+      FileFault fault(k, FileFault::What::kills);
+      ::_exit(write_report(path, big_text, "new/plot.svg") ? 0 : 1);
+    }
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFEXITED(status)) << k;
+    status = WEXITSTATUS(status);
+    const Files left = files();
+    for (const char* name : {"report/index.html", "report/data/fit.csv"}) {
+      ASSERT_EQ(left.count(name), 1U) << name << k;
+      EXPECT_TRUE(left.at(name) == "old" || left.at(name) == big_text) << name << k;
+    }
+    // What only one of them has is there as long as that one is not replaced.
+    EXPECT_TRUE(left.contains("report/old/plot.svg") || left.contains("report/new/plot.svg")) << k;
+
+    ASSERT_TRUE(write_report(path, "next")) << k;
+    Files next = files();
+    next.erase("report/" + std::string(OutputFolder::marker));
+    EXPECT_EQ(next, (Files{{"report/index.html", "next"},
+                           {"report/data/fit.csv", "next"},
+                           {"report/note.txt", "mine"},
+                           {"report/data/mine.csv", "mine too"}}))
+        << k;
+  }
+  EXPECT_EQ(status, 0);
+  EXPECT_GE(k, 40U);
+}
+
+TEST_F(FileFaults, ANewReportThatAKillLeavesIsWholeOrAbsent) {
+  const std::string path = folder_ / "report";
+  int status = 99;
+  for (std::size_t k = 1; status == 99; ++k) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      FileFault fault(k, FileFault::What::kills);
+      ::_exit(write_report(path, big_text) ? 0 : 1);
+    }
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    if (fs::exists(path)) {
+      expect_whole(files(), big_text, k);
+    }
+    ASSERT_TRUE(write_report(path, "next")) << k;
+    EXPECT_EQ(files().size(), 3U) << k;
+    fs::remove_all(path);
+  }
+  EXPECT_EQ(status, 0);
 }
 
 }  // namespace
