@@ -247,11 +247,15 @@ void OutputErrorProblem::evaluate(std::size_t index, const Eigen::VectorXd& x, b
 
   const auto differences = static_cast<Eigen::Index>(run.differences.size());
   const auto velocities = static_cast<Eigen::Index>(run.velocities.size());
-  block.difference.resize(differences);
-  block.velocity.resize(velocities);
+  // Made anew: resizing frees the old memory before the new is there.
+  if (block.difference.size() != differences || block.velocity.size() != velocities) {
+    block.difference = Eigen::VectorXd(differences);
+    block.velocity = Eigen::VectorXd(velocities);
+  }
   if (jacobian) {
-    block.difference_jacobian.setZero(differences, local_parameter_count);
-    block.velocity_jacobian.setZero(velocities, local_parameter_count);
+    using Jacobian = ResidualBlock::Jacobian;
+    block.difference_jacobian = Jacobian(Jacobian::Zero(differences, local_parameter_count));
+    block.velocity_jacobian = Jacobian(Jacobian::Zero(velocities, local_parameter_count));
   }
   Hints hints;
   const double position_delay = x[parameter::position_delay] + x[extra_delay_of(index)];

@@ -203,11 +203,14 @@ void Response::simulate(const RunInput& input, const SimulationVector& parameter
                         bool sensitivities) {
   input_ = &input;
   const auto rows = static_cast<Eigen::Index>(input.time.size());
-  velocity_.resize(rows);
-  position_.resize(rows);
-  if (sensitivities) {
-    velocity_gradient_.resize(rows, simulation_parameter_count);
-    position_gradient_.resize(rows, simulation_parameter_count);
+  // Made anew: resizing frees the old memory before the new is there.
+  if (position_.size() != rows) {
+    velocity_ = Eigen::VectorXd(rows);
+    position_ = Eigen::VectorXd(rows);
+  }
+  if (sensitivities && position_gradient_.rows() != rows) {
+    velocity_gradient_ = Gradients(rows, simulation_parameter_count);
+    position_gradient_ = Gradients(rows, simulation_parameter_count);
   }
   State state{parameters[parameter::initial_velocity], 0.0, SimulationGradient::Zero(),
               SimulationGradient::Zero()};
