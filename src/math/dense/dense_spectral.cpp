@@ -1,9 +1,7 @@
 #include <cmath>
 #include <limits>
-#include <utility>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <Eigen/SVD>
 
 #include "math/dense/dense.hpp"
@@ -27,27 +25,6 @@ struct Balanced {
   Eigen::VectorXd d;
   MatrixXd M;
   int unit;
-};
-
-/// The longer of A and Aᵀ, in the unit that makes its entries ordinary, by a QR decomposition. Of a
-/// square matrix none is made: JacobiSVD makes its own of others, and where memory runs short then,
-/// it frees what it has freed.
-template <class Qr>
-struct Reduced {
-  explicit Reduced(const MatrixRef& A)
-      : wide(A.cols() > A.rows()),
-        unit(unit_of(A)),
-        qr(times_power(wide ? MatrixXd(A.transpose()) : MatrixXd(A), -unit)) {}
-
-  /// The square matrix in A's place.
-  [[nodiscard]] MatrixXd triangle() const {
-    const MatrixXd R = qr.matrixQR().topRows(qr.cols()).template triangularView<Eigen::Upper>();
-    return wide ? MatrixXd(R.transpose()) : R;
-  }
-
-  bool wide;
-  int unit;
-  Qr qr;
 };
 
 }  // namespace
@@ -106,28 +83,12 @@ RealSchur real_schur_of(const MatrixRef& A) {
 }
 
 SingularValues svd_of(const MatrixRef& A) {
-  if (A.rows() != A.cols()) {
-    const Reduced<Eigen::FullPivHouseholderQR<MatrixXd>> reduced(A);
-    SingularValues svd = svd_of(reduced.triangle());
-    MatrixXd& longer = reduced.wide ? svd.V : svd.U;
-    MatrixXd& shorter = reduced.wide ? svd.U : svd.V;
-    MatrixXd Q = reduced.qr.matrixQ();
-    Q.leftCols(longer.rows()) = product(Q.leftCols(longer.rows()), longer);
-    longer = std::move(Q);
-    shorter = reduced.qr.colsPermutation() * MatrixXd(shorter);
-    svd.values = times_power(svd.values, reduced.unit);
-    return svd;
-  }
   const Eigen::JacobiSVD<MatrixXd, Eigen::FullPivHouseholderQRPreconditioner> svd(
       A, Eigen::ComputeFullU | Eigen::ComputeFullV);
   return {svd.matrixU(), svd.singularValues(), svd.matrixV()};
 }
 
 Eigen::VectorXd singular_values_of(const MatrixRef& A) {
-  if (A.rows() != A.cols()) {
-    const Reduced<Eigen::ColPivHouseholderQR<MatrixXd>> reduced(A);
-    return times_power(singular_values_of(reduced.triangle()), reduced.unit);
-  }
   return Eigen::JacobiSVD<MatrixXd>(A).singularValues();
 }
 
