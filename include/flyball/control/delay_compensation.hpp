@@ -156,6 +156,20 @@ class DelayPredictor {
     return is_signal(u);
   }
 
+  /// Of the inputs that are on their way the one that was sent first. Over the period after a
+  /// sample the measured state moves by A x + B_0 u_0 + B_1 u_1, where u_1 is the one that is
+  /// oldest before this sample's input is `sent`, and u_0 the one that is after it.
+  [[nodiscard]] const InputVector& oldest() const noexcept { return applied_[next_]; }
+
+  [[nodiscard]] const StateMatrix& A() const noexcept { return A_; }      ///< Over a period.
+  [[nodiscard]] const InputMatrix& B_0() const noexcept { return B_0_; }  ///< Of the newer input.
+  [[nodiscard]] const InputMatrix& B_1() const noexcept { return B_1_; }  ///< Of the older one.
+  /// Over what the delay is longer than whole periods; the identity if it is not.
+  [[nodiscard]] const StateMatrix& A_rest() const noexcept { return A_rest_; }
+  [[nodiscard]] const InputMatrix& B_rest() const noexcept { return B_rest_; }
+  /// How many inputs are on their way.
+  [[nodiscard]] std::size_t on_the_way() const noexcept { return applied_.size(); }
+
   /// Nothing is on its way.
   void reset() noexcept {
     for (InputVector& u : applied_) {
