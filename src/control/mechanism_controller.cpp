@@ -48,13 +48,14 @@ mechanisms::FeedforwardGains MechanismControllerDesign::fed_forward() const noex
 
 template <int States>
 MechanismController<States>::MechanismController(const MechanismControllerDesign& design,
-                                                 const Lqg<States, 1, 1>& regulator,
-                                                 const SimpleFeedforward& feedforward) noexcept
+                                                 const Regulator& regulator,
+                                                 const SimpleFeedforward& feedforward)
     : regulator_(regulator),
       feedforward_(feedforward),
       compensation_(design.nominal_voltage),
       max_voltage_(design.max_voltage),
-      delay_(design.measurement_delay.si()),
+      period_(design.plant.period.si()),
+      delay_(design.predicts_with ? 0.0 : design.measurement_delay.si()),
       compensates_(design.compensate_voltage) {}
 
 template <int States>
@@ -72,14 +73,34 @@ auto MechanismController<States>::create(const MechanismControllerDesign& design
                     .positive(design.max_voltage, "max_voltage", "V")
                     .positive(design.nominal_voltage, "nominal_voltage", "V")
                     .not_negative(design.measurement_delay.si(), "measurement_delay", "s"));
-  using Regulator = Lqg<States, 1, 1>;
-  using Limit = typename Regulator::InputVector;
-  FLYBALL_TRY(auto regulator,
-              Regulator::create({plant.A, plant.B, plant.C, plant.D, plant.period}, design.K,
-                                design.K_e, Limit(-design.max_voltage), Limit(design.max_voltage)));
+  FLYBALL_TRY(auto regulator, regulator_of(design));
   FLYBALL_TRY(auto feedforward,
               SimpleFeedforward::create(design.kind, design.fed_forward(), plant.period));
   return MechanismController(design, regulator, feedforward);
+}
+
+template <int States>
+auto MechanismController<States>::regulator_of(const MechanismControllerDesign& design)
+    -> Expected<Regulator> {
+  using Limit = typename Prompt::InputVector;
+  const typename Prompt::Plant plant{design.plant.A, design.plant.B, design.plant.C, design.plant.D,
+                                     design.plant.period};
+  const Limit most(design.max_voltage);
+  if (!design.predicts_with) {
+    FLYBALL_TRY(auto prompt, Prompt::create(plant, design.K, design.K_e, -most, most));
+    return Regulator(prompt);
+  }
+  const ContinuousSystem<>& model = *design.predicts_with;
+  FLYBALL_CHECK(Checks(where)
+                    .shape(model.A, States, States, "predicts_with's A", "of the plant's states")
+                    .shape(model.B, States, 1, "predicts_with's B", "states x 1 input"));
+  FLYBALL_TRY(const auto predictor,
+              Predicting::Predictor::create(
+                  ContinuousSystem<States, 1, 1>{model.A, model.B, plant.C, plant.D}, plant.period,
+                  design.measurement_delay));
+  FLYBALL_TRY(auto predicting,
+              Predicting::create(plant, predictor, design.K, design.K_e, -most, most));
+  return Regulator(predicting);
 }
 
 template <int States>
@@ -100,14 +121,19 @@ double MechanismController<States>::update(double measurement, const MotionState
                                            double rail_voltage) noexcept {
   using Scalar = Eigen::Matrix<double, 1, 1>;
   const bool flywheel = feedforward_.kind() == mechanisms::MechanismKind::flywheel;
-  const double rate =
-      flywheel ? (r_next.velocity - r.velocity) / regulator_.plant().period.si() : r.velocity;
+  const double rate = flywheel ? (r_next.velocity - r.velocity) / period_ : r.velocity;
   const double y = delay_ > 0.0 ? measurement + delay_ * rate : measurement;
   const double direction = r.velocity != 0.0 ? r.velocity : r_next.velocity;
   const double extra = feedforward_.disturbance(r.position, direction);
   const double rail =
       compensates_ ? compensation_.rail(rail_voltage) : compensation_.nominal_voltage();
-  voltage_ = regulator_.step(states_of(r), states_of(r_next), Scalar(y), Scalar(extra), rail)(0);
+  const StateVector now = states_of(r);
+  const StateVector next = states_of(r_next);
+  if (auto* prompt = std::get_if<Prompt>(&regulator_)) {
+    voltage_ = prompt->step(now, next, Scalar(y), Scalar(extra), rail)(0);
+  } else if (auto* predicting = std::get_if<Predicting>(&regulator_)) {
+    voltage_ = predicting->step(now, next, Scalar(y), Scalar(extra), rail)(0);
+  }
   command_ = compensates_ ? compensation_.command(voltage_, rail) : voltage_;
   limit_ = max_voltage_ < rail ? max_voltage_ : rail;
   return voltage_;
@@ -115,7 +141,7 @@ double MechanismController<States>::update(double measurement, const MotionState
 
 template <int States>
 void MechanismController<States>::reset(const MotionState& state) noexcept {
-  regulator_.reset(states_of(state));
+  std::visit([&](auto& regulator) { regulator.reset(states_of(state)); }, regulator_);
   voltage_ = 0.0;
   command_ = 0.0;
 }
@@ -171,7 +197,7 @@ Eigen::Map<const Eigen::VectorXd> MechanismController<Eigen::Dynamic>::x_hat() c
 Eigen::Map<const Eigen::RowVectorXd> MechanismController<Eigen::Dynamic>::B_pinv() const noexcept {
   return std::visit(
       [](const auto& sized) {
-        const auto& B_pinv = sized.regulator().feedforward().B_pinv();
+        const auto& B_pinv = sized.B_pinv();
         return Eigen::Map<const Eigen::RowVectorXd>(B_pinv.data(), B_pinv.size());
       },
       sized_);

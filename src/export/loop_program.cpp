@@ -1,4 +1,8 @@
+#include <optional>
+
 #include <fmt/format.h>
+
+#include <flyball/control/delay_compensation.hpp>
 
 #include "core/try.hpp"
 #include "export/loop_program.hpp"
@@ -20,8 +24,19 @@ std::string dot(std::string_view name, std::string_view of, Index n) {
   return text;
 }
 
+/// The predictor that the controller has; none where the design does not predict.
+Expected<std::optional<DelayPredictor<>>> predictor_of(const MechanismControllerDesign& design) {
+  if (!design.predicts_with) {
+    return std::nullopt;
+  }
+  FLYBALL_TRY(auto predictor, DelayPredictor<>::create(*design.predicts_with, design.plant.period,
+                                                       design.measurement_delay));
+  return predictor;
+}
+
 std::vector<LoopConstant> constants_of(const LoopProgram& program,
                                        const MechanismControllerDesign& design,
+                                       const std::optional<DelayPredictor<>>& predictor,
                                        const MatrixXd& B_pinv) {
   using Shape = LoopConstant::Shape;
   std::vector<LoopConstant> constants;
@@ -33,7 +48,7 @@ std::vector<LoopConstant> constants_of(const LoopProgram& program,
     constants.push_back({std::move(name), Shape::vector, value, std::move(comment)});
   };
   number("period", design.plant.period.si(), "s");
-  if (program.moves_measurement) {
+  if (program.moves_measurement || predictor) {
     number("measurement_delay", design.measurement_delay.si(), "s, age of a measurement");
   }
   number("max_voltage", design.max_voltage, "V");
@@ -50,7 +65,18 @@ std::vector<LoopConstant> constants_of(const LoopProgram& program,
     }
   }
   constants.push_back({"A", Shape::matrix, design.plant.A, "x(k+1) = A x(k) + B u(k), u in volts"});
-  vector("B", design.plant.B, "unit of the state per V");
+  if (predictor) {
+    const auto matrix = [&](std::string name, const MatrixXd& value, std::string comment) {
+      constants.push_back({std::move(name), Shape::matrix, value, std::move(comment)});
+    };
+    matrix("A_late", predictor->A(), "a period of the measured state, which is late");
+    vector("B_newer", predictor->B_0(), "unit of the state per V, that arrives within the period");
+    vector("B_older", predictor->B_1(), "unit of the state per V, that acts until then");
+    matrix("A_rest", predictor->A_rest(), "what the delay is longer than whole periods");
+    vector("B_rest", predictor->B_rest(), "unit of the state per V");
+  } else {
+    vector("B", design.plant.B, "unit of the state per V");
+  }
   vector("K", design.K.transpose(), "V per unit of the state");
   vector("kalman_gain", design.K_e, "unit of the state per " + program.measured_unit);
   vector("B_inverse", B_pinv.transpose(), "V per unit of the state");
@@ -74,18 +100,32 @@ Expected<LoopProgram> loop_program(const MechanismControllerDesign& design, std:
   }
   program.measured = flywheel ? "velocity" : "position";
   program.measured_unit = flywheel ? rate : program.unit;
-  program.moves_measurement = design.measurement_delay.si() > 0.0;
+  FLYBALL_TRY(const auto predictor, predictor_of(design));
+  program.moves_measurement = design.measurement_delay.si() > 0.0 && !predictor;
+  program.on_the_way = predictor ? predictor->on_the_way() : 0;
   program.gravity = design.feed_forward_gravity && !flywheel;
   program.friction = design.feed_forward_friction;
   program.compensates = design.compensate_voltage;
-  program.constants = constants_of(program, design, controller.B_pinv());
+  program.constants = constants_of(program, design, predictor, controller.B_pinv());
 
   program.rate = flywheel ? "((r_next[0] - r[0]) / period)" : "r[1]";
   program.speed = flywheel ? "[0]" : "[1]";
   for (Index i = 0; i < program.states; ++i) {
     const std::string row = fmt::format("A[{}]", i);
-    program.prediction.push_back(
-        fmt::format("{} + B[{}] * u_model_", dot(row, "x_hat_", program.states), i));
+    if (predictor) {
+      const auto times = [&](std::string_view matrix, std::string_view of) {
+        return dot(fmt::format("{}[{}]", matrix, i), of, program.states);
+      };
+      program.prediction.push_back(
+          fmt::format("{} + (B_newer[{}] * arriving_[0] + B_older[{}] * arriving_[1])",
+                      times("A_late", "delayed_"), i, i));
+      program.one_period.push_back(fmt::format("{} + B_newer[{}] * newer + B_older[{}] * older",
+                                               times("A_late", "x_hat_"), i, i));
+      program.rest.push_back(fmt::format("{} + B_rest[{}] * newer", times("A_rest", "x_hat_"), i));
+    } else {
+      program.prediction.push_back(
+          fmt::format("{} + B[{}] * u_model_", dot(row, "x_hat_", program.states), i));
+    }
     program.demand.push_back(fmt::format("r_next[{}] - ({})", i, dot(row, "r", program.states)));
     program.error.push_back(fmt::format("r[{0}] - x_hat_[{0}]", i));
   }

@@ -28,17 +28,21 @@ struct LoopProgram {
   std::vector<std::string> state_names{};  ///< "position (m)", …
   std::string measured{};                  ///< "position" or "velocity".
   std::string measured_unit{};
-  bool moves_measurement = false;  ///< A measurement is late.
-  bool gravity = false;            ///< Gravity is fed forward, of an arm with its cosine.
+  bool moves_measurement = false;  ///< A measurement is late, and is moved to now.
+  std::size_t on_the_way = 0;  ///< Inputs that the state is predicted with; 0 for no prediction.
+  bool gravity = false;        ///< Gravity is fed forward, of an arm with its cosine.
   bool friction = false;
   bool compensates = false;  ///< The battery's voltage is compensated and limits the answer.
 
   std::vector<LoopConstant> constants{};
 
-  /// With the names of `constants`, measurement, r, r_next, x_hat_, u_model_, x, demand and error:
+  /// With the names of `constants`, measurement, r, r_next, x_hat_, u_model_, x, demand and error;
+  /// with prediction delayed_, arriving_, newer and older:
   std::string rate{};                     ///< dr/dt.
   std::string speed{};                    ///< The index of the velocity in a reference, "[1]".
-  std::vector<std::string> prediction{};  ///< x of x_hat_ and u_model_.
+  std::vector<std::string> prediction{};  ///< x of x_hat_ and u_model_, or delayed_ and arriving_.
+  std::vector<std::string> one_period{};  ///< x_hat_ one period on, of newer and older.
+  std::vector<std::string> rest{};        ///< x_hat_ over the rest of the delay, of newer.
   std::vector<std::string> demand{};      ///< Of r and r_next.
   std::vector<std::string> error{};       ///< Of r and x_hat_.
   std::string inversion{};                ///< Of demand.

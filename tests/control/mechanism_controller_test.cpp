@@ -18,6 +18,7 @@ namespace {
 using test::cases;
 using test::design_of;
 using test::MechanismKind;
+using test::predicting;
 
 struct Inputs {
   double measurement;
@@ -117,18 +118,68 @@ void expect_the_same_as_dynamic(const MechanismControllerDesign& design) {
 
 TEST(MechanismController, FixedIsDynamic) {
   for (const auto& [kind, kA_determined] : cases) {
-    const MechanismControllerDesign design = design_of(kind, kA_determined);
-    if (design.plant.A.rows() == 1) {
-      expect_the_same_as_dynamic<1>(design);
-    } else {
-      expect_the_same_as_dynamic<2>(design);
+    const MechanismControllerDesign prompt = design_of(kind, kA_determined);
+    for (const auto& design : {prompt, predicting(prompt, Time(0.05))}) {
+      if (design.plant.A.rows() == 1) {
+        expect_the_same_as_dynamic<1>(design);
+      } else {
+        expect_the_same_as_dynamic<2>(design);
+      }
     }
   }
+}
+
+// The measurement is left as it is; the rest is a step of PredictingLqg, written out here over the
+// equations of its comment, with a limit and a rail that are reached.
+TEST(MechanismController, PredictsAsItsCommentSays) {
+  const MechanismControllerDesign design =
+      predicting(design_of(MechanismKind::arm), Time(0.05));  // two periods and a half
+  const auto& model = *design.predicts_with;
+  const auto delayed = discretize_delayed_input(model.A, model.B, Time(0.02), Time(0.05)).value();
+  const auto half = discretize_zoh(model.A, model.B, Time(0.01)).value();
+  auto controller = MechanismController<>::create(design).value();
+  const Eigen::MatrixXd B_pinv = pseudoinverse(design.plant.B).value().X;
+  Eigen::Vector2d late = Eigen::Vector2d::Zero();
+  std::array<double, 4> sent{};  // u_{k-1}, u_{k-2}, …
+  bool limited = false;
+  for (const Inputs& in : inputs()) {
+    late = delayed.A * late + delayed.B_0 * sent[2] + delayed.B_1 * sent[3];
+    if (std::isfinite(in.measurement)) {
+      late += design.K_e * (in.measurement - late(0));
+    }
+    Eigen::Vector2d x = delayed.A * late + delayed.B_0 * sent[1] + delayed.B_1 * sent[2];
+    x = delayed.A * x + delayed.B_0 * sent[0] + delayed.B_1 * sent[1];
+    x = half.A * x + half.B * sent[0];
+    const double direction = in.r.velocity != 0.0 ? in.r.velocity : in.r_next.velocity;
+    const double extra =
+        design.gains.gravity_voltage(MechanismKind::arm, in.r.position) + (direction > 0.0   ? 0.15
+                                                                           : direction < 0.0 ? -0.15
+                                                                                             : 0.0);
+    const double rail = !(in.rail > 0.0) || !(in.rail < 120.0) ? 12.0 : std::max(in.rail, 4.0);
+    const Eigen::Vector2d r(in.r.position, in.r.velocity);
+    const Eigen::Vector2d r_next(in.r_next.position, in.r_next.velocity);
+    const double limit = std::min(12.0, rail);
+    const double u =
+        std::clamp((design.K * (r - x))(0) + (B_pinv * (r_next - design.plant.A * r))(0) + extra,
+                   -limit, limit);
+    limited = limited || std::abs(u) == limit;
+    ASSERT_NEAR(controller.update(in.measurement, in.r, in.r_next, in.rail), u, 1e-9);
+    ASSERT_LT((controller.x_hat() - x).norm(), 1e-9 * (1.0 + x.norm()));
+    sent = {u - extra, sent[0], sent[1], sent[2]};
+  }
+  EXPECT_TRUE(limited);
 }
 
 // At the reference, at rest, only gravity is left: 0.6 V cos(0.2 rad - 0.2 rad) for the arm.
 TEST(MechanismController, HoldsWhereItWasReset) {
   auto arm = MechanismController<2>::create(design_of(MechanismKind::arm)).value();
+  auto predicts =
+      MechanismController<2>::create(predicting(design_of(MechanismKind::arm), Time(0.05))).value();
+  (void)predicts.update(3.0, {}, {}, 12.0);
+  predicts.reset({-0.2, 0.0});
+  for (int k = 0; k < 5; ++k) {
+    EXPECT_NEAR(predicts.update(-0.2, {-0.2, 0.0}, {-0.2, 0.0}, 6.0), 0.6, 1e-12);
+  }
   (void)arm.update(3.0, {}, {}, 12.0);
   arm.reset({-0.2, 0.0});
   EXPECT_EQ(arm.voltage(), 0.0);
@@ -163,6 +214,12 @@ TEST(MechanismController, Errors) {
   EXPECT_TRUE(refused([](Design& d) { d.gains.kS = -1.0; }).is(ArgumentError::out_of_range));
   EXPECT_EQ(to_string(refused([](Design& d) { d.kind = MechanismKind::flywheel; })),
             "MechanismController: the plant is of 2 states; it must be of one state, the velocity");
+  const auto of_another_size = [](Design& d) {
+    d.predicts_with = predicting(design_of(MechanismKind::flywheel), Time(0.05)).predicts_with;
+  };
+  EXPECT_TRUE(refused(of_another_size).is(ArgumentError::wrong_shape));
+  const auto too_late = [](Design& d) { d = predicting(d, Time(1e9)); };
+  EXPECT_TRUE(refused(too_late).is(ArgumentError::out_of_range));
   EXPECT_TRUE(MechanismController<1>::create(design_of(MechanismKind::elevator))
                   .error()
                   .is(ArgumentError::wrong_shape));
@@ -192,6 +249,7 @@ TEST(MechanismController, AllocatesNothing) {
   expect_no_allocation(MechanismController<1>::create(design_of(MechanismKind::flywheel)).value());
   expect_no_allocation(MechanismController<2>::create(arm).value());
   expect_no_allocation(MechanismController<>::create(arm).value());
+  expect_no_allocation(MechanismController<>::create(predicting(arm, Time(0.05))).value());
 }
 
 }  // namespace

@@ -58,6 +58,24 @@ inline MechanismControllerDesign design_of(MechanismKind kind, bool kA_determine
   return design;
 }
 
+/// The same with a regulator that predicts over a delay.
+inline MechanismControllerDesign predicting(MechanismControllerDesign design, Time delay) {
+  design.measurement_delay = delay;
+  const auto model = [](const auto& of) { return ContinuousSystem<>{of.A, of.B, of.C, of.D}; };
+  const bool flywheel = design.kind == MechanismKind::flywheel;
+  if (design.gains.kA > 0.0) {
+    design.predicts_with = flywheel ? model(mechanisms::flywheel(design.gains).value())
+                                    : model(mechanisms::elevator(design.gains).value());
+    return design;
+  }
+  // Without kA: the velocity is reached within a tenth of a period, or at once.
+  const auto number = [](double value) { return Eigen::MatrixXd::Constant(1, 1, value); };
+  const double rate = flywheel ? 500.0 : 1.0;
+  design.predicts_with = {number(flywheel ? -rate : 0.0), number(rate / design.gains.kV),
+                          number(1.0), number(0.0)};
+  return design;
+}
+
 /// A mechanism, with or without kA.
 struct Case {
   MechanismKind kind;

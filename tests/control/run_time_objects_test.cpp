@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
@@ -98,17 +99,20 @@ Step regulator(Regulator lqg) {
 
 // Inputs: y, r, dr/dt, their next ones, rail.
 Step mechanism(const MechanismControllerDesign& design) {
+  const std::size_t late = design.predicts_with ? 2 : 0;  // periods
   return [controller = MechanismController<>::create(design).value(), design,
           x = Eigen::VectorXd(Eigen::VectorXd::Zero(design.plant.A.rows())),
-          k = 0](const Faults& faults) mutable {
+          seen = std::vector<double>(late + 1, 0.0), k = 0](const Faults& faults) mutable {
+    std::rotate(seen.begin(), seen.begin() + 1, seen.end());
+    seen.back() = x(0);
     const bool flywheel = design.kind == mechanisms::MechanismKind::flywheel;
     const double speed = flywheel ? 200.0 : 1.0;
     const auto motion = [&](int at, std::size_t first) {
       const Eigen::Vector2d r = reference(at);
       return MotionState{of(faults, first, r(0)), of(faults, first + 1, speed * r(1))};
     };
-    const double u =
-        controller.update(of(faults, 0, x(0)), motion(k, 1), motion(k + 1, 3), of(faults, 5, 11.0));
+    const double u = controller.update(of(faults, 0, seen.front()), motion(k, 1), motion(k + 1, 3),
+                                       of(faults, 5, 11.0));
     const double drag = design.feed_forward_gravity ? 0.4 : 0.0;
     x = (design.plant.A * x + design.plant.B * (std::isfinite(u) ? u - drag : 0.0)).eval();
     ++k;
@@ -157,6 +161,10 @@ std::vector<Subject> subjects() {
     all.push_back({"MechanismController of a " + std::string(to_string(kind)) +
                        (kA_determined ? "" : " without kA"),
                    6, 3, [=] { return mechanism(design); }});
+    const auto predicts = test::predicting(design, 40_ms);
+    all.push_back({"predicting MechanismController of a " + std::string(to_string(kind)) +
+                       (kA_determined ? "" : " without kA"),
+                   6, 3, [=] { return mechanism(predicts); }});
   }
   all.push_back(
       {"KalmanFilter", 2, 0, [=] { return filter(kalman_filter(plant, Q, R, P0).value()); }});

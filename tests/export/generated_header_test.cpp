@@ -57,6 +57,14 @@ std::vector<Loop> all_loops() {
       design.nominal_voltage = choice % 5 == 0 ? 10.0 : 12.0;
       loops.push_back({"Loop" + std::to_string(loops.size()), design});
     }
+    // A part of a period, whole ones, more than whole ones.
+    for (const double delay : {0.015, 0.04, 0.05, 0.2}) {
+      MechanismControllerDesign design =
+          test::predicting(test::design_of(kind, kA_determined), Time(delay));
+      design.compensate_voltage = delay != 0.05;
+      design.max_voltage = delay == 0.04 ? 5.0 : 12.0;
+      loops.push_back({"Loop" + std::to_string(loops.size()), design});
+    }
   }
   return loops;
 }

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <variant>
 
 #include <flyball/control/lqg.hpp>
+#include <flyball/control/predicting_lqg.hpp>
 #include <flyball/planning/trapezoid_profile.hpp>
 
 namespace flyball {
@@ -25,6 +27,9 @@ struct MechanismControllerDesign {
   /// Age of a measurement, s. It is moved along the reference to now, y + delay dr/dt, so that a
   /// late sensor causes no error while the reference moves; the loop itself is not changed.
   Time measurement_delay{};
+  /// In place of that, the regulator predicts over the delay with this continuous model (its A and
+  /// B, of the plant's states, in volts), and K is the gain for no delay.
+  std::optional<ContinuousSystem<>> predicts_with{};
 
   /// The gains that are fed forward: without those that the design leaves out.
   [[nodiscard]] mechanisms::FeedforwardGains fed_forward() const noexcept;
@@ -35,6 +40,10 @@ struct MechanismControllerDesign {
 ///   y = measurement + delay dr/dt
 ///   x_hat, u: a step of `Lqg` with extra = gravity(r) + kS sgn(dr/dt), limited to max_voltage and
 ///   to the rail; command = u V_nominal / V_rail (6.23)
+///
+/// A design that predicts over the delay takes y = measurement and a step of `PredictingLqg`
+/// instead; x_hat is then the state of now that it predicts. The inputs that it remembers are those
+/// that the motor saw, limited and less `extra`.
 ///
 /// Gravity and friction are taken at the reference, so that noise cannot enter; at the start of a
 /// motion the direction is the next reference's. Simulations step this class, and the generated
@@ -54,7 +63,8 @@ class MechanismController {
 
   /// @errors ArgumentError: wrong_shape for a plant whose states are not the mechanism's;
   ///         out_of_range for an output that is not the first state; those of `Lqg` and of
-  ///         `SimpleFeedforward`; not_positive, not_finite for voltages and delay.
+  ///         `SimpleFeedforward`; not_positive, not_finite for voltages and delay; those of
+  ///         `DelayPredictor` for a design that predicts.
   [[nodiscard]] static Expected<MechanismController> create(
       const MechanismControllerDesign& design);
 
@@ -71,7 +81,9 @@ class MechanismController {
   void reset(const MotionState& state) noexcept;
 
   /// Whether the measurement of the last update is in the estimate.
-  [[nodiscard]] bool measured() const noexcept { return regulator_.measured(); }
+  [[nodiscard]] bool measured() const noexcept {
+    return of_regulator([](const auto& regulator) { return regulator.measured(); });
+  }
   /// The last answer of `update`, V at the motor.
   [[nodiscard]] double voltage() const noexcept { return voltage_; }
   /// What to send to a controller that scales by the rail, V of nominal_voltage: the last answer
@@ -80,20 +92,42 @@ class MechanismController {
   /// What |voltage| was limited to in the last update, V.
   [[nodiscard]] double limit() const noexcept { return limit_; }
   /// The estimate after the last update.
-  [[nodiscard]] const StateVector& x_hat() const noexcept { return regulator_.x_hat(); }
+  [[nodiscard]] const StateVector& x_hat() const noexcept {
+    return of_regulator(
+        [](const auto& regulator) -> const StateVector& { return regulator.x_hat(); });
+  }
   /// The reference or the truth in the coordinates of the model's states.
   [[nodiscard]] StateVector states_of(const MotionState& motion) const noexcept;
-  [[nodiscard]] const Lqg<States, 1, 1>& regulator() const noexcept { return regulator_; }
+  /// B⁺ of the plant inversion, 1 x n.
+  [[nodiscard]] const Eigen::Matrix<double, 1, States>& B_pinv() const noexcept {
+    return of_regulator([](const auto& regulator) -> const Eigen::Matrix<double, 1, States>& {
+      return regulator.feedforward().B_pinv();
+    });
+  }
 
  private:
-  MechanismController(const MechanismControllerDesign& design, const Lqg<States, 1, 1>& regulator,
-                      const SimpleFeedforward& feedforward) noexcept;
+  using Prompt = Lqg<States, 1, 1>;
+  using Predicting = PredictingLqg<States, 1, 1>;
+  using Regulator = std::variant<Prompt, Predicting>;
 
-  Lqg<States, 1, 1> regulator_;
+  MechanismController(const MechanismControllerDesign& design, const Regulator& regulator,
+                      const SimpleFeedforward& feedforward);
+
+  /// The predicting regulator of a design that has one.
+  [[nodiscard]] static Expected<Regulator> regulator_of(const MechanismControllerDesign& design);
+
+  template <class Ask>
+  decltype(auto) of_regulator(Ask ask) const noexcept {
+    const auto* prompt = std::get_if<Prompt>(&regulator_);
+    return prompt != nullptr ? ask(*prompt) : ask(*std::get_if<Predicting>(&regulator_));
+  }
+
+  Regulator regulator_;
   SimpleFeedforward feedforward_;
   VoltageCompensation compensation_;
   double max_voltage_;
-  double delay_;
+  double period_;
+  double delay_;  ///< s, by which a measurement is moved.
   bool compensates_;
   double voltage_ = 0.0;
   double command_ = 0.0;
