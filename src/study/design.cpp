@@ -14,6 +14,7 @@
 #include "core/diagnose.hpp"
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
+#include "core/wording.hpp"
 #include "study/design_steps.hpp"
 #include "study/field.hpp"
 #include "study/told.hpp"
@@ -42,14 +43,16 @@ void fill_defaults(DesignJob& job, std::vector<Diagnostic>& diagnostics) {
 }
 
 // What the grid varies, in words.
-std::string varied(const PlantDescription& plant) {
+std::string varied(const DesignJob& job) {
+  const PlantDescription& plant = job.plant;
+  const std::string_view delay = predicts_delay(job) ? ", and ±25 % of the delay" : "";
   if (plant.kA_determined) {
-    return "±20 % of inertia and gain";
+    return fmt::format("±20 % of inertia and gain{}", delay);
   }
   return plant.kA_upper_bound > 0.0
-             ? fmt::format("±20 % of gain with a kA from 0 to {} V·s²/{}",
-                           format_number(plant.kA_upper_bound, 3), plant.unit)
-             : std::string("±20 % of gain without inertia");
+             ? fmt::format("±20 % of gain with a kA from 0 to {} V·s²/{}{}",
+                           format_number(plant.kA_upper_bound, 3), plant.unit, delay)
+             : fmt::format("±20 % of gain without inertia{}", delay);
 }
 
 void tell_tolerances(const LoopDesign& loop, const LinearModel& model, const DesignJob& job,
@@ -57,7 +60,7 @@ void tell_tolerances(const LoopDesign& loop, const LinearModel& model, const Des
   note(diagnostics, "assumed",
        "no tolerances were given: with {} the loop is the stiffest that keeps a gain margin of 2, "
        "a phase margin of 45° and {}",
-       tolerances_text(model, loop.tolerances), varied(job.plant));
+       tolerances_text(model, loop.tolerances), varied(job));
 }
 
 void add_margin_warnings(const LoopDesign& loop, const DesignJob& job,
@@ -69,8 +72,11 @@ void add_margin_warnings(const LoopDesign& loop, const DesignJob& job,
        "the tolerances leave a gain margin of {}, a phase margin of {}° and {} over {} with {} ms "
        "of delay; looser tolerances are safer",
        format_number(loop.margins.gain_margin_up, 3), format_number(loop.margins.phase_margin, 3),
-       loop.robust ? "stability" : "no stability", varied(job.plant),
-       format_number(1e3 * job.controller.delay.value_or(0.0), 3));
+       !loop.robust    ? "no stability"
+       : loop.predicts ? fmt::format("stability with an overshoot of up to {}",
+                                     text::percent(loop.worst_overshoot, 2))
+                       : "stability",
+       varied(job), format_number(1e3 * job.controller.delay.value_or(0.0), 3));
 }
 
 LoopMargins margins_of(const LoopDesign& loop, bool feedback) {
@@ -91,6 +97,40 @@ LoopMargins margins_of(const LoopDesign& loop, bool feedback) {
           .crossover = crossover};
 }
 
+// A delay that can be predicted over: each period of it is a state of the loop whose eigenvalues
+// are told, and of the regulator's model.
+Expected<void> check_prediction(const DesignJob& job) {
+  constexpr double most_periods = 50.0;
+  const double T = job.controller.period;
+  if (!predicts_delay(job) || *job.controller.delay <= most_periods * T) {
+    return {};
+  }
+  return refusal(ArgumentError::out_of_range, where, "controller.delay")
+      .got(fmt::format("{} with controller.predict_delay", text::seconds(*job.controller.delay)))
+      .expected(fmt::format("at most {} periods, {}, to be predicted over",
+                            format_number(most_periods), text::seconds(most_periods * T)))
+      .hint("leave controller.predict_delay out, or lengthen the period");
+}
+
+// The gain for controllers that cannot predict: of the stiffest comfortable loop that does not.
+Eigen::MatrixXd gain_to_paste(const LoopDesign& loop, const LinearModel& model,
+                              const DesignJob& job, std::vector<Diagnostic>& diagnostics) {
+  if (!loop.predicts) {
+    return loop.K_delayed;
+  }
+  DesignJob plain = job;
+  plain.controller.predict_delay = false;
+  std::vector<double> tolerances;
+  const auto other = search_tolerances(model, plain, tolerances);
+  note(diagnostics, "paste_without_prediction",
+       "other tools' controllers cannot predict over the delay: their constants {}",
+       other ? fmt::format("are those of a loop with the delay compensated in its gain and "
+                           "tolerances of {}",
+                           tolerances_text(model, tolerances))
+             : std::string("have no feedback, since no gain without a prediction has margins"));
+  return other ? other->K_delayed : Eigen::MatrixXd::Zero(loop.K.rows(), loop.K.cols());
+}
+
 Expected<void> simulate_response(DesignResult& result) {
   FLYBALL_TRY(auto simulated,
               simulate_design(result, {.measurement_noise = *result.job.estimator.measurement_std,
@@ -108,6 +148,7 @@ Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
   DesignJob& job = result.job;
   fill_defaults(job, result.diagnostics);
   FLYBALL_CHECK(check_delay(*job.controller.delay, job.controller.period, where));
+  FLYBALL_CHECK(check_prediction(job));
 
   FLYBALL_TRY(auto motion, fastest_motion(job));
   result.motion = motion;
@@ -170,6 +211,7 @@ Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
   result.R = loop.R;
   result.K = loop.K;
   result.K_delayed = loop.K_delayed;
+  result.predicts = loop.predicts;
   result.poles = loop.poles;
   result.kalman_gain = loop.kalman_gain;
   result.estimator_poles = loop.estimator_poles;
@@ -185,7 +227,11 @@ Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
          "battery.resistance is not used: without a motor no current is known (set "
          "mechanism.motor)");
   }
-  result.paste = paste_gains(job.plant, result.K_delayed);
+  if (job.controller.predict_delay.value_or(false) && !loop.predicts) {
+    warn(result.diagnostics, "not_used",
+         "controller.predict_delay is not used: there is no delay (set controller.delay)");
+  }
+  result.paste = paste_gains(job.plant, gain_to_paste(loop, model, job, result.diagnostics));
   FLYBALL_CHECK(simulate_response(result));
   return {};
 }

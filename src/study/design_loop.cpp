@@ -165,6 +165,10 @@ std::vector<double> default_tolerances(const PlantDescription& plant, std::size_
   return tolerances;
 }
 
+bool predicts_delay(const DesignJob& job) {
+  return job.controller.predict_delay.value_or(false) && job.controller.delay.value_or(0.0) > 0.0;
+}
+
 Expected<LoopDesign> feedback_of(const LinearModel& model, const DesignJob& job,
                                  const std::vector<double>& tolerances) {
   const ControllerOptions& controller = job.controller;
@@ -177,20 +181,25 @@ Expected<LoopDesign> feedback_of(const LinearModel& model, const DesignJob& job,
   }
   LoopDesign loop;
   loop.tolerances = tolerances;
+  loop.predicts = predicts_delay(job);
   FLYBALL_TRY(loop.Q, told_of("controller.state_tolerance", bryson(tolerances)));
   FLYBALL_TRY(loop.R, told_of("controller.input_tolerance", bryson({controller.input_tolerance})));
   FLYBALL_TRY(auto regulator, lqr(plant, loop.Q, loop.R));
   loop.K = regulator.K;
   loop.poles = regulator.poles;
 
-  auto delayed = compensate_latency(loop.K, plant.A, plant.B, plant.period, delay);
-  if (!delayed && delayed.error().is(MatrixFunctionError::no_real_power)) {
-    // A closed-loop pole on the negative real axis has no real fractional power.
-    loop.whole_periods = true;
-    const Time whole(std::round(delay.si() / plant.period.si()) * plant.period.si());
-    delayed = compensate_latency(loop.K, plant.A, plant.B, plant.period, whole);
+  if (loop.predicts) {
+    loop.K_delayed = loop.K;
+  } else {
+    auto delayed = compensate_latency(loop.K, plant.A, plant.B, plant.period, delay);
+    if (!delayed && delayed.error().is(MatrixFunctionError::no_real_power)) {
+      // A closed-loop pole on the negative real axis has no real fractional power.
+      loop.whole_periods = true;
+      const Time whole(std::round(delay.si() / plant.period.si()) * plant.period.si());
+      delayed = compensate_latency(loop.K, plant.A, plant.B, plant.period, whole);
+    }
+    FLYBALL_TRY(loop.K_delayed, told_of("controller.delay", std::move(delayed)));
   }
-  FLYBALL_TRY(loop.K_delayed, told_of("controller.delay", std::move(delayed)));
 
   const double sigma = measurement_std(job);
   FLYBALL_TRY(auto observer, told_of("the observer",
@@ -203,12 +212,21 @@ Expected<LoopDesign> feedback_of(const LinearModel& model, const DesignJob& job,
   FLYBALL_TRY(const auto inversion, pseudoinverse(plant.B));
   loop.inversion = inversion.X;
 
+  loop.regulator = {plant, loop.K_delayed, loop.kalman_gain};
+  if (loop.predicts) {
+    const ContinuousSystem<> believed{model.A, model.B, model.C, Eigen::MatrixXd::Zero(1, 1)};
+    FLYBALL_TRY(loop.regulator,
+                told_of("controller.delay", predicting_regulator(believed, plant.period, loop.K,
+                                                                 loop.kalman_gain, delay)));
+  }
   return loop;
 }
 
-Expected<void> judge(LoopDesign& loop, const LinearModel& model, const DesignJob& job,
-                     const DiscreteSystem<>& believed, const Eigen::MatrixXd& K,
-                     const Eigen::MatrixXd& K_e) {
+namespace {
+
+/// Margins of the loop with its delay, the worst over what the plant may be, and the grid.
+Expected<void> judge(LoopDesign& loop, const LinearModel& model, const DesignJob& job) {
+  const auto& [believed, K, K_e] = loop.regulator;
   const Time delay(job.controller.delay.value_or(0.0));
   FLYBALL_TRY(const auto plants, possible_plants(model, job.plant));
   const bool determined = job.plant.kA_determined;
@@ -220,31 +238,44 @@ Expected<void> judge(LoopDesign& loop, const LinearModel& model, const DesignJob
     const bool first = &plant == &plants.front();
     loop.stable = first ? margins.stable : loop.stable;
     loop.margins = first ? std::move(margins) : worse(loop.margins, margins);
+    const auto add_grid = [&](double delay_factor, const RobustnessOptions& options) {
+      return robustness_grid(truth.A, truth.B, truth.C, believed, K, K_e,
+                             Time(delay_factor * delay.si()), options)
+          .map([&](const RobustnessGrid& grid) {
+            for (const RobustnessCase& point : grid.cases) {
+              loop.robustness.push_back({.inertia_factor = determined ? point.inertia : NAN,
+                                         .kA = plant.kA * point.inertia,
+                                         .gain_factor = point.gain,
+                                         .delay_factor = delay_factor,
+                                         .stable = point.stable,
+                                         .spectral_radius = point.spectral_radius,
+                                         .overshoot = point.overshoot});
+            }
+            loop.robust = loop.robust && grid.all_stable;
+            loop.worst_overshoot = std::max(loop.worst_overshoot, grid.worst_overshoot);
+          });
+    };
     RobustnessOptions options;
     if (!determined) {
       options.inertia = {1.0};  // it is the plant's own
     }
-    FLYBALL_TRY(const auto grid,
-                robustness_grid(truth.A, truth.B, truth.C, believed, K, K_e, delay, options));
-    for (const RobustnessCase& point : grid.cases) {
-      loop.robustness.push_back(
-          {.inertia_factor = determined ? point.inertia : std::numeric_limits<double>::quiet_NaN(),
-           .kA = plant.kA * point.inertia,
-           .gain_factor = point.gain,
-           .stable = point.stable,
-           .spectral_radius = point.spectral_radius,
-           .overshoot = point.overshoot});
+    FLYBALL_CHECK(add_grid(1.0, options));
+    if (loop.predicts) {
+      // A prediction over the wrong time is what such a loop is sensitive to.
+      for (const double factor : {0.75, 1.25}) {
+        FLYBALL_CHECK(add_grid(factor, {.inertia = {1.0}, .gain = {1.0}}));
+      }
     }
-    loop.robust = loop.robust && grid.all_stable;
-    loop.worst_overshoot = std::max(loop.worst_overshoot, grid.worst_overshoot);
   }
   return {};
 }
 
+}  // namespace
+
 Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
                                  const std::vector<double>& tolerances) {
   FLYBALL_TRY(auto loop, feedback_of(model, job, tolerances));
-  FLYBALL_CHECK(judge(loop, model, job, model.discrete, loop.K_delayed, loop.kalman_gain));
+  FLYBALL_CHECK(judge(loop, model, job));
   return loop;
 }
 
@@ -278,6 +309,9 @@ Expected<LoopDesign> search_tolerances(const LinearModel& model, const DesignJob
       last = std::move(loop).error();
     } else if (is_comfortable(*loop) && (!best || loop->K_delayed(0, 0) > best->K_delayed(0, 0))) {
       best = *std::move(loop);
+      if (best->predicts) {
+        break;  // its gain is that of the tolerances, so looser ones are slower
+      }
     }
   }
   if (!best && last) {
@@ -296,7 +330,8 @@ Expected<LoopDesign> search_tolerances(const LinearModel& model, const DesignJob
 bool is_comfortable(const LoopDesign& loop) {
   const StabilityMargins& margins = loop.margins;
   return margins.stable && margins.gain_margin_up >= 2.0 && margins.phase_margin >= 45.0 &&
-         margins.disk_margin >= 0.5 && loop.robust;
+         margins.disk_margin >= 0.5 && loop.robust &&
+         (!loop.predicts || loop.worst_overshoot <= 0.25);
 }
 
 }  // namespace flyball::study

@@ -40,54 +40,40 @@ Eigen::MatrixXd step_input(const LinearModel& model, const Eigen::MatrixXd& K,
   return (K + inversion * I_A).leftCols(1);
 }
 
-std::string margins_text(const StabilityMargins& margins) {
-  return fmt::format("a gain margin of {} and a phase margin of {}°",
-                     format_number(margins.gain_margin_up, 3),
-                     format_number(margins.phase_margin, 3));
-}
-
-/// A regulator that could be had instead.
-struct Alternative {
-  std::vector<double> tolerances;
-  double time_constant = INFINITY;
-  StabilityMargins margins;
-};
-
-// The delay's inputs in the regulator, at the tightest of the tolerances times 1.25^k with
-// comfortable margins.
-Expected<std::optional<Alternative>> with_prediction(const LinearModel& model, const DesignJob& job,
-                                                     const std::vector<double>& tolerances,
-                                                     double slower) {
-  constexpr double most_periods = 25.0;  // each is a state of the regulator
-  const double T = job.controller.period;
-  if (!(delay_of(job).si() <= most_periods * T)) {
-    return std::nullopt;
+// What predicting over the delay would give, and how it is switched on; empty where it is not
+// faster than that with comfortable margins.
+Expected<std::string> with_prediction(const LoopDesign& loop, const LinearModel& model,
+                                      const DesignJob& job, bool chosen, double slower) {
+  constexpr double most_periods =
+      25.0;  // each is a state of the regulator, and a search takes its time
+  if (loop.predicts || !(delay_of(job).si() <= most_periods * job.controller.period)) {
+    return std::string();
   }
-  FLYBALL_TRY(const auto truth, shown_plant(model, job));
-  const ContinuousSystem<> believed{model.A, model.B, model.C, Eigen::MatrixXd::Zero(1, 1)};
-  DesignJob prompt = job;
-  prompt.controller.delay = 0.0;
-  std::vector<double> looser = tolerances;
-  constexpr int steps = 40;
-  constexpr double step = 1.25;
-  for (int i = 0; i < steps; ++i) {
-    FLYBALL_TRY(const auto loop, feedback_of(model, prompt, looser));
-    FLYBALL_TRY(const auto made,
-                predicting_regulator(believed, Time(T), loop.K, loop.kalman_gain, delay_of(job)));
-    FLYBALL_TRY(const auto running,
-                running_loop(truth, made.model, made.K, made.K_e, delay_of(job)));
-    LoopDesign judged;
-    FLYBALL_CHECK(judge(judged, model, job, made.model, made.K, made.K_e));
-    if (is_comfortable(judged)) {
-      return running.time_constant < slower
-                 ? std::optional(Alternative{looser, running.time_constant, judged.margins})
-                 : std::nullopt;
-    }
-    for (double& tolerance : looser) {
-      tolerance *= step;
+  DesignJob predicted = job;
+  predicted.controller.predict_delay = true;
+  std::vector<double> tolerances = loop.tolerances;
+  std::string_view besides;
+  std::optional<LoopDesign> other;
+  if (!chosen) {
+    if (auto same = design_loop(model, predicted, tolerances); same && is_comfortable(*same)) {
+      other = *std::move(same);
     }
   }
-  return std::nullopt;
+  if (!other) {
+    besides = chosen ? "" : " and leave controller.state_tolerance out";
+    FLYBALL_TRY(other, search_tolerances(model, predicted, tolerances));
+  }
+  FLYBALL_TRY(const auto behavior, behavior_of(*other, model, predicted));
+  if (!(behavior.time_constant < slower)) {
+    return std::string();
+  }
+  return fmt::format(
+      "set controller.predict_delay = true (--predict-delay){}, and a regulator that knows the "
+      "inputs on their way gives {} with {}, a gain margin of {} and a phase margin of {}°, and "
+      "bears a delay that is off by 25 %",
+      besides, text::seconds(behavior.time_constant), tolerances_text(model, tolerances),
+      format_number(other->margins.gain_margin_up, 3),
+      format_number(other->margins.phase_margin, 3));
 }
 
 }  // namespace
@@ -95,8 +81,8 @@ Expected<std::optional<Alternative>> with_prediction(const LinearModel& model, c
 Expected<LoopBehavior> behavior_of(const LoopDesign& loop, const LinearModel& model,
                                    const DesignJob& job) {
   FLYBALL_TRY(const auto truth, shown_plant(model, job));
-  FLYBALL_TRY(auto running,
-              running_loop(truth, model.discrete, loop.K_delayed, loop.kalman_gain, delay_of(job)));
+  const auto& [believed, K, K_e] = loop.regulator;
+  FLYBALL_TRY(auto running, running_loop(truth, believed, K, K_e, delay_of(job)));
   LoopBehavior behavior{.poles = running.poles, .time_constant = running.time_constant};
   if (!std::isfinite(running.time_constant)) {
     return behavior;
@@ -122,8 +108,6 @@ Expected<void> tell_cost_of_delay(const LoopDesign& loop, const LoopBehavior& ru
   if (delay_of(job).si() == 0.0 || !(runs.time_constant > slower)) {
     return {};
   }
-  const std::vector<double> start =
-      chosen ? default_tolerances(job.plant, loop.tolerances.size()) : loop.tolerances;
   std::vector<std::string> faster;
   const double clearly = share * runs.time_constant;
   if (!chosen) {
@@ -138,14 +122,8 @@ Expected<void> tell_cost_of_delay(const LoopDesign& loop, const LoopBehavior& ru
       }
     }
   }
-  if (const auto found = with_prediction(model, job, start, clearly); found && *found) {
-    const std::optional<Alternative>& other = *found;
-    faster.push_back(fmt::format(
-        "a regulator that knows the inputs on their way (DelayPredictor of "
-        "<flyball/control/delay_compensation.hpp>; the exported loop has none) gives {} with "
-        "tolerances of {}, {}",
-        text::seconds(other->time_constant), tolerances_text(model, other->tolerances),
-        margins_text(other->margins)));
+  if (auto offer = with_prediction(loop, model, job, chosen, clearly); offer && !offer->empty()) {
+    faster.push_back(*std::move(offer));
   }
   warn(diagnostics, "delay_costs_speed",
        "the delay of {} costs {} of the loop's speed, more than half: its slowest time constant is "
@@ -159,9 +137,9 @@ Expected<void> tell_cost_of_delay(const LoopDesign& loop, const LoopBehavior& ru
 Expected<std::string> why_no_feedback(const LoopDesign& loop, const LinearModel& model,
                                       const DesignJob& job) {
   const double T = job.controller.period;
+  const auto& [believed, K, K_e] = loop.regulator;
   FLYBALL_TRY(const auto opened,
-              observer_regulator_loop(model.A, model.B, model.C, model.discrete, loop.K_delayed,
-                                      loop.kalman_gain, delay_of(job)));
+              observer_regulator_loop(model.A, model.B, model.C, believed, K, K_e, delay_of(job)));
   // A loop gain below a hundredth changes no error by more than a hundredth.
   constexpr double no_gain = 0.01;
   const double nyquist = std::numbers::pi / T;

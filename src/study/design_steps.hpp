@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <flyball/control/margins.hpp>
+#include <flyball/control/running_loop.hpp>
 #include <flyball/study/design.hpp>
 
 /// The steps of a design, in the order in which `design` takes them.
@@ -41,6 +42,9 @@ struct PossiblePlant {
 struct LoopDesign {
   std::vector<double> tolerances;
   Eigen::MatrixXd Q, R, K, K_delayed, kalman_gain, inversion;
+  bool predicts = false;  ///< The delay is predicted over; K_delayed is K.
+  /// As it runs: of the model, or where it predicts with the inputs on their way as states.
+  PredictingRegulator regulator;
   Eigen::VectorXcd poles, estimator_poles;
   StabilityMargins margins;  ///< The worst over the possible plants.
   std::vector<RobustnessPoint> robustness;
@@ -49,7 +53,10 @@ struct LoopDesign {
   double worst_overshoot = 0.0;  ///< Of them.
   bool whole_periods = false;    ///< The delay had to be rounded to whole periods.
 };
-/// Feedback, its delay compensated, and observer, not judged.
+/// Whether the job's loop predicts over its delay; over none there is nothing to predict.
+[[nodiscard]] bool predicts_delay(const DesignJob& job);
+
+/// Feedback, its delay compensated or predicted over, and observer, not judged.
 [[nodiscard]] Expected<LoopDesign> feedback_of(const LinearModel& model, const DesignJob& job,
                                                const std::vector<double>& tolerances);
 /// The whole.
@@ -60,13 +67,8 @@ struct LoopDesign {
 [[nodiscard]] std::string tolerances_text(const LinearModel& model,
                                           const std::vector<double>& tolerances);
 
-/// Margins of a regulator with the delay, the worst over what the plant may be, and the grid.
-[[nodiscard]] Expected<void> judge(LoopDesign& loop, const LinearModel& model, const DesignJob& job,
-                                   const DiscreteSystem<>& believed, const Eigen::MatrixXd& K,
-                                   const Eigen::MatrixXd& K_e);
-
 /// Gain margins of at least 2, phase margin of at least 45°, a disk margin of at least 0.5, and
-/// stable over the whole grid.
+/// stable over the whole grid; a loop that predicts also overshoots by a quarter at most in it.
 [[nodiscard]] bool is_comfortable(const LoopDesign& loop);
 
 /// Of the tolerances that leave comfortable margins those of the stiffest loop.

@@ -177,6 +177,11 @@ constexpr std::array controller_fields{
     quantity("delay", at<&ControllerOptions::delay>(), time, not_negative, "\"10 ms\"",
              "Delay from sensing to acting")
         .without("what the log shows, else none"),
+    flag("predict_delay", at<&ControllerOptions::predict_delay>(), "true",
+         "Whether the regulator predicts the state over the delay, of 50 periods at most, in place "
+         "of a gain that is compensated for it: faster, where the delay is known to within 25 %")
+        .without("false")
+        .of(mechanism),
     map("tolerance", at<&ControllerOptions::named, &NamedControl::tolerance>(),
         "{ theta = \"5 deg\", omega = \"1 rad/s\", u = \"2 N m\" }",
         "Of a model by formula: largest acceptable error of each state and size of each input "

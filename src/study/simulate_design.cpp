@@ -26,6 +26,10 @@ MechanismControllerDesign controller_of(const DesignResult& design) {
   controller.max_voltage = job.controller.max_voltage;
   controller.nominal_voltage = job.plant.nominal_voltage;
   controller.measurement_delay = Time(job.controller.delay.value_or(0.0));
+  if (design.predicts) {
+    controller.predicts_with = {design.A_continuous, design.B_continuous, design.C,
+                                Eigen::MatrixXd::Zero(1, 1)};
+  }
   return controller;
 }
 

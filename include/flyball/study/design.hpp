@@ -39,7 +39,10 @@ struct ControllerOptions {
   double input_tolerance = 12.0;          ///< V
   double max_voltage = 12.0;              ///< V, the input's limit.
   std::optional<double> delay{};          ///< s, from sensing to acting; identified or 0 if absent.
-  NamedControl named{};                   ///< Of a model by formula, see ModelJob.
+  /// Act on the state that is predicted over the delay (PredictingLqg), with the gain for no delay,
+  /// in place of a gain that is compensated for it (B.12).
+  std::optional<bool> predict_delay{};
+  NamedControl named{};  ///< Of a model by formula, see ModelJob.
 };
 
 /// What is measured, per sample, and how far the model is trusted.
@@ -102,6 +105,7 @@ struct RobustnessPoint {
   double inertia_factor = 1.0;  ///< True inertia over the model's; NaN where kA is not determined.
   double kA = 0.0;              ///< V·s²/unit, the true inertia's.
   double gain_factor = 1.0;     ///< True actuator gain over the model's.
+  double delay_factor = 1.0;    ///< True delay over the model's.
   bool stable = false;
   double spectral_radius = 0.0;  ///< Of the closed loop.
   double overshoot = 0.0;        ///< Of a small step, as a share of it; infinity if unstable.
@@ -129,22 +133,26 @@ using PasteGains = exports::UnitGains;
 /// The loop, each period (MechanismController): the measurement, which is `delay`
 /// old, is moved along the reference to now, y + delay dr/dt, so that a moving reference causes no
 /// error; the observer predicts and corrects; u = K_delayed (r - x_hat) + B⁺ (r' - A r) + kS + kG.
+/// A design that predicts over the delay leaves the measurement as it is and acts on the state that
+/// the inputs on their way lead to.
 struct DesignResult {
   DesignJob job;                     ///< As run, with every default filled in.
   std::vector<Coordinate> states{};  ///< Position (m), …
   bool velocity_servo = false;       ///< kA is not determined: Theorem 14.3.2 is the plant.
 
   Eigen::MatrixXd A_continuous, B_continuous;
-  Eigen::MatrixXd A, B, C;        ///< Discrete plant (Theorem 7.3.1) and its output.
-  Eigen::MatrixXd Q, R;           ///< LQR weights (Bryson).
-  Eigen::MatrixXd K;              ///< LQR gain, u = K (r - x).
-  Eigen::MatrixXd K_delayed;      ///< The gain with the delay compensated (B.12); what is used.
+  Eigen::MatrixXd A, B, C;  ///< Discrete plant (Theorem 7.3.1) and its output.
+  Eigen::MatrixXd Q, R;     ///< LQR weights (Bryson).
+  Eigen::MatrixXd K;        ///< LQR gain, u = K (r - x).
+  /// What is used: the gain with the delay compensated (B.12), or K where the delay is predicted.
+  Eigen::MatrixXd K_delayed;
   Eigen::VectorXcd poles{};       ///< Of A - B K: of the design, which knows no delay.
   Eigen::MatrixXd kalman_gain{};  ///< Filter form (9.22).
   Eigen::VectorXcd estimator_poles{};
   Eigen::MatrixXd inversion{};  ///< B⁺ of the plant inversion u = B⁺ (r' - A r).
 
   LoopBehavior loop{};        ///< As it runs.
+  bool predicts = false;      ///< Whether the delay is predicted over.
   bool feedback = true;       ///< Whether the gain makes a difference anywhere below Nyquist.
   std::string no_feedback{};  ///< Why there is none.
   LoopMargins margins;
@@ -158,6 +166,7 @@ struct DesignResult {
       0.0;  ///< unit, of the true position (velocity) against the reference.
   double tracking_error_max = 0.0;
 
+  /// Of other tools' controllers, which cannot predict: with the delay compensated in the gain.
   std::vector<PasteGains> paste{};
   std::vector<Diagnostic> diagnostics{};
 };
@@ -165,7 +174,8 @@ struct DesignResult {
 /// Runs the job: discretise, LQR by Bryson's rule, delay compensation, steady-state Kalman gain,
 /// feedforward, margins, robustness grid, and a simulated trapezoid with noise, quantisation, delay
 /// and battery sag. A kA that is not determined is taken to be anything from 0 to its upper bound:
-/// margins and grid are checked over it, and the simulated mechanism has the upper bound.
+/// margins and grid are checked over it, and the simulated mechanism has the upper bound. A delay
+/// that is predicted over is checked from 0.75 to 1.25 of it.
 /// @errors ArgumentError for meaningless options; RiccatiError when no controller exists;
 ///         DesignError. With what was noticed before.
 [[nodiscard]] ExpectedAll<DesignResult> design(const DesignJob& job);

@@ -51,7 +51,8 @@ void write_robustness(JsonWriter& json, const DesignResult& result) {
       json.object([&] {
         json.add({{"inertia_factor", point.inertia_factor},
                   {"kA", point.kA},
-                  {"gain_factor", point.gain_factor}});
+                  {"gain_factor", point.gain_factor},
+                  {"delay_factor", point.delay_factor}});
         json.add("stable", point.stable);
         json.add({{"spectral_radius", point.spectral_radius}, {"overshoot", point.overshoot}});
       });
@@ -94,6 +95,7 @@ void write_design(JsonWriter& json, const DesignResult& result) {
   json.add("unit", plant.unit);
   json.add("period", result.job.controller.period);
   json.add("delay", result.job.controller.delay.value_or(0.0));
+  json.add("predicts_delay", result.predicts);
   json.add("states", result.states);
   json.add("input", "voltage");
   json.add("K", result.K);
@@ -144,6 +146,9 @@ Verdict verdict_of(const DesignResult& result) {
                 result.velocity_servo
                     ? "a mechanism with a kA that is not ruled out, and a gain within 20 % of the "
                       "model's, makes the loop unstable"
+                : result.predicts
+                    ? "a mechanism that differs by 20 %, or a delay by 25 %, from its model makes "
+                      "the loop unstable"
                     : "a mechanism that differs by 20 % from its model makes the loop unstable");
   }
   if (!result.feedback) {

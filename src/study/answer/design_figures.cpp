@@ -130,13 +130,14 @@ std::vector<AnswerFile> data_files(const DesignResult& result) {
     files.push_back({"data/closed_loop.csv", to_csv(result.response)});
   }
   if (!result.robustness.empty()) {
-    std::string grid = "inertia_factor,kA,gain_factor,stable,spectral_radius,overshoot\n";
+    std::string grid =
+        "inertia_factor,kA,gain_factor,delay_factor,stable,spectral_radius,overshoot\n";
     for (const RobustnessPoint& point : result.robustness) {
-      grid += fmt::format("{},{},{},{},{},{}\n",
+      grid += fmt::format("{},{},{},{},{},{},{}\n",
                           std::isnan(point.inertia_factor) ? "" : text::exact(point.inertia_factor),
                           text::exact(point.kA), text::exact(point.gain_factor),
-                          point.stable ? "true" : "false", text::exact(point.spectral_radius),
-                          text::exact(point.overshoot));
+                          text::exact(point.delay_factor), point.stable ? "true" : "false",
+                          text::exact(point.spectral_radius), text::exact(point.overshoot));
     }
     files.push_back({"data/robustness.csv", std::move(grid)});
   }

@@ -96,7 +96,8 @@ Table robustness_table(const DesignResult& result) {
     for (const double gain : gains) {
       Value cell("");
       for (const RobustnessPoint& point : result.robustness) {
-        if (point.*row_factor == inertia && point.gain_factor == gain) {
+        if (point.*row_factor == inertia && point.gain_factor == gain &&
+            point.delay_factor == 1.0) {
           cell = point.stable ? Value(percent(point.overshoot, 2)) : Value("unstable", Tone::bad);
         }
       }
@@ -105,6 +106,24 @@ Table robustness_table(const DesignResult& result) {
     table.rows.push_back(std::move(row));
   }
   return table;
+}
+
+/// What a delay makes of the loop that is not as long as it was predicted over, the worst kA.
+Facts delay_error_facts(const DesignResult& result) {
+  Facts facts;
+  for (const double factor : distinct(result.robustness, &RobustnessPoint::delay_factor)) {
+    double overshoot = 0.0;
+    for (const RobustnessPoint& point : result.robustness) {
+      overshoot = point.delay_factor == factor ? std::max(overshoot, point.overshoot) : overshoot;
+    }
+    if (factor != 1.0) {
+      facts.add(fmt::format("delay × {}", number(factor)),
+                std::isfinite(overshoot)
+                    ? Value(fmt::format("a small step overshoots by {}", percent(overshoot, 2)))
+                    : Value("unstable", Tone::bad));
+    }
+  }
+  return facts;
 }
 
 double largest(const TimeSeries& series, std::string_view column) {
@@ -149,13 +168,18 @@ Section controller_section(const DesignResult& result) {
   Section section{"controller", "Controller", {}};
   section.blocks.emplace_back(Paragraph{fmt::format(
       "Every {}: u = K (r − x̂) + B⁺ (r_next − A r){}, limited to ±{} V; x̂ is "
-      "predicted by the plant and corrected by the measured {}.",
+      "predicted by the plant and corrected by the measured {}{}.",
       seconds(controller.period), has_gravity ? " + kS sgn(v) + gravity" : " + kS sgn(v)",
-      number(controller.max_voltage), measured_name(plant.kind))});
+      number(controller.max_voltage), measured_name(plant.kind),
+      result.predicts ? fmt::format(", then carried over the {} of delay by the voltages that the "
+                                    "motor saw in them",
+                                    seconds(delay))
+                      : "")});
   Table table;
   const bool delayed = result.K_delayed.size() > 0 && delay > 0.0;
+  const bool compensated = delayed && !result.predicts;
   table.header = {"state", "tolerance", "K"};
-  if (delayed) {
+  if (compensated) {
     table.header.emplace_back("K, delay " + seconds(delay));
   }
   table.header.emplace_back("B⁺");
@@ -168,7 +192,7 @@ Section controller_section(const DesignResult& result) {
     const Coordinate state = state_of(result, i);
     std::vector<Value> row{label(state), entry(controller.state_tolerance, i, state.unit),
                            entry(result.K, 0, i)};
-    if (delayed) {
+    if (compensated) {
       row.emplace_back(entry(result.K_delayed, 0, i));
     }
     row.emplace_back(entry(result.inversion, 0, i));
@@ -184,7 +208,7 @@ Section controller_section(const DesignResult& result) {
   facts.add("units", fmt::format("K and B⁺: V per unit of the state; Kalman gain: unit of the "
                                  "state per {}",
                                  controlled_unit(plant)));
-  if (delayed) {
+  if (compensated) {
     facts.add("used", fmt::format("the gain for a state that is {} old (B.12)", seconds(delay)));
   } else if (controller.delay) {
     facts.add("delay", seconds(delay));
@@ -270,6 +294,11 @@ Section robustness_section(const DesignResult& result) {
   section.blocks.emplace_back(std::move(facts));
   if (!result.robustness.empty()) {
     section.blocks.emplace_back(robustness_table(result));
+    if (result.predicts) {
+      section.blocks.emplace_back(
+          Paragraph{"And if the delay is not as long as it was predicted over:"});
+      section.blocks.emplace_back(delay_error_facts(result));
+    }
     section.blocks.emplace_back(
         result.robust ? Paragraph{fmt::format("Stable in the whole grid, worst overshoot {}.",
                                               percent(result.worst_overshoot, 3)),
