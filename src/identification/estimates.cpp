@@ -23,7 +23,7 @@ constexpr double widest_time_constant = 0.6;  // relative half-width beyond whic
 constexpr double voltage_allowance = 1e-3;  // V, standard error added to kS and kG
 constexpr double speed_allowance = 2e-4;    // relative, added to kV
 constexpr double inertia_allowance = 2e-3;  // relative, added to kA
-constexpr double small_sample = 1.1;       // of all standard errors
+constexpr double small_sample = 1.1;        // of all standard errors
 
 /// @param allowance  Standard error of what the model leaves out, in the gain's unit.
 GainEstimate symmetric(double value, double random_error, double allowance) {

@@ -180,6 +180,16 @@ std::string fullest_channels(const Log& log, const FoundTests& tests) {
   return fmt::format(", such as {}{}", fmt::join(names, ", "), all.size() > shown ? ", …" : "");
 }
 
+double median_step(const std::vector<double>& time) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < time.size(); ++i) {
+    steps.push_back(time[i] - time[i - 1]);
+  }
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return steps.empty() ? 0.0 : *middle;
+}
+
 constexpr std::array every_quantity{Quantity::voltage, Quantity::position, Quantity::velocity};
 
 }  // namespace
@@ -250,13 +260,13 @@ Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
 
 std::vector<TestRun> join_channels(const FoundChannels& channels,
                                    const std::vector<CharacterizationWindow>& windows) {
-  constexpr double longest_gap = 0.9;  // s
   const Signal* clock = channels.voltage;
   for (const Signal* signal : {channels.position, channels.velocity}) {
     if (signal != nullptr && samples_in(*signal, windows) > samples_in(*clock, windows)) {
       clock = signal;
     }
   }
+  const double longest_gap = std::max(0.9, 20.0 * median_step(clock->time));  // s
   std::vector<TestRun> runs;
   for (const CharacterizationWindow& window : windows) {
     TestRun run;

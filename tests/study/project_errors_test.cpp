@@ -137,7 +137,8 @@ state_tolerance = ["1 m"]
       "p.toml:5:10: controller.period is \"20\", without a unit; it must be a time such as \"20 "
       "ms\"",
       "p.toml:6:1: controller.bogus is not a key of [controller]; known are period, "
-      "state_tolerance, input_tolerance, max_voltage, delay, tolerance, limit, reference",
+      "state_tolerance, input_tolerance, max_voltage, delay, predict_delay, tolerance, limit, "
+      "reference",
       "p.toml:7:19: controller.state_tolerance is 1 value long; it must be one value a state (2)",
       "p.toml:7:19: controller.state_tolerance is \"1 m\", a length; it must be an angle such as "
       "\"15 deg\""};
