@@ -128,6 +128,22 @@ TEST(Response, TheCurrentLimitHoldsWhenBraking) {
   EXPECT_NEAR(velocity_at(response, 0.2), -(0.2 - rest) * (3.0 - kS) / (kV * tau), 1e-12);
 }
 
+// At the first and the last row it is what it is beside them, and after the last it goes on.
+TEST(Response, AtItsFirstAndLastRows) {
+  const RunInput input = steady(3.0, 0.2, 0.02);
+  Response response;
+  response.simulate(input, at_velocity(0.8), false);
+  EXPECT_EQ(position_at(response, 0.0), 0.0);
+  EXPECT_EQ(velocity_at(response, 0.0), 0.8);
+  const double last = input.time.back();
+  // v(t) = v∞ + (0.8 − v∞) e^(−t/τ), v∞ = (3 − 0.4)/2
+  const double velocity = 1.3 - 0.5 * std::exp(-last / tau);
+  const double position = 1.3 * last - 0.5 * tau * (1.0 - std::exp(-last / tau));
+  EXPECT_NEAR(velocity_at(response, last), velocity, 1e-12);
+  EXPECT_NEAR(position_at(response, last), position, 1e-12);
+  EXPECT_NEAR(position_at(response, last + 0.1), position + 0.1 * velocity, 1e-12);
+}
+
 // Central differences of the position, over random inputs that change direction.
 TEST(Response, SensitivitiesAreDerivatives) {
   int limited = 0;

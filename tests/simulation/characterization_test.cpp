@@ -88,6 +88,112 @@ TEST(RecordCharacterization, RepeatsRowsBetweenRefreshes) {
   EXPECT_NEAR(static_cast<double>(repeats) / static_cast<double>(run.time.size()), 0.75, 0.02);
 }
 
+// Rows come each 5 ms: a sensor that is 10 ms late shows the position of two rows before, one that
+// averages 40 ms the way from eight rows before.
+TEST(RecordCharacterization, SensorsAreLateAndAverage) {
+  CharacterizationOptions options = perfect();
+  const TestRun truth = record_characterization(options)->runs[2];
+  options.sensor_delay = 10e-3;
+  options.velocity_window = 40e-3;
+  const TestRun late = record_characterization(options)->runs[2];
+  ASSERT_EQ(late.time, truth.time);
+  for (std::size_t row = 10; row < truth.time.size(); ++row) {
+    ASSERT_NEAR(late.position[row], truth.position[row - 2], 1e-9) << row;
+    ASSERT_NEAR(late.velocity[row], (truth.position[row - 2] - truth.position[row - 10]) / 40e-3,
+                1e-6)
+        << row;
+  }
+  options = perfect();
+  options.resolution = 0.25;
+  const TestRun coarse = record_characterization(options)->runs[3];
+  const TestRun reverse = record_characterization(perfect())->runs[3];
+  for (std::size_t row = 0; row < truth.time.size(); ++row) {
+    ASSERT_EQ(coarse.position[row], 0.25 * std::floor(reverse.position[row] / 0.25)) << row;
+  }
+}
+
+// Held for 50 ms, 6 V for 0.5 s, then none: the last row is 0.1 s after the cut.
+TEST(RecordCharacterization, RestsAndCoasts) {
+  CharacterizationOptions options = perfect();
+  options.rest_before = 0.05;
+  options.coast_after = 0.1;
+  options.step_duration = 0.5;
+  const TestRun run = record_characterization(options)->runs[3];
+  for (std::size_t row = 0; row < run.time.size(); ++row) {
+    const double time = run.time[row];
+    const bool driven = time > 0.05 - 1e-9 && time < 0.55 + 1e-9;
+    EXPECT_EQ(run.voltage[row], driven ? -6.0 : 0.0) << time;
+    EXPECT_EQ(run.position[row] != 0.0, time > 0.05 + 1e-9) << time;
+  }
+  EXPECT_NEAR(run.time.back(), 0.655, 1e-9);
+  // v∞ = −5.5/0.12 of which 1 − e^(−0.5/τ) is reached.
+  const std::size_t cut = 110;
+  EXPECT_NEAR(run.velocity[cut], -5.5 / 0.12 * (1.0 - std::exp(-0.5 * 0.12 / 0.05)), 0.02);
+}
+
+TEST(RecordCharacterization, NoiseAndJitterHaveTheirDeviations) {
+  CharacterizationOptions options = perfect();
+  options.row_jitter = 1e-3;
+  options.voltage_noise = 0.03;
+  options.velocity_noise = 0.2;
+  options.noise_per_row = true;
+  options.step_duration = 60.0;
+  const TestRun run = record_characterization(options)->runs[2];
+  double time = 0.0;
+  double voltage = 0.0;
+  double velocity = 0.0;
+  const std::size_t first = 2000;  // steady from there on
+  for (std::size_t row = first; row < run.time.size(); ++row) {
+    ASSERT_GE(run.time[row], run.time[row - 1]);
+    time += std::pow(run.time[row] - 5e-3 * static_cast<double>(row), 2);
+    voltage += row + 1 < run.time.size() ? std::pow(run.voltage[row] - 6.0, 2) : 0.0;
+    velocity += std::pow(run.velocity[row] - 5.5 / 0.12, 2);
+  }
+  const auto rows = static_cast<double>(run.time.size() - first);
+  EXPECT_NEAR(std::sqrt(time / rows), 1e-3, 3e-5);
+  EXPECT_NEAR(std::sqrt(voltage / rows), 0.03, 1e-3);
+  EXPECT_NEAR(std::sqrt(velocity / rows), 0.2, 5e-3);
+}
+
+// Without inertia v = (V − kS(θ))/kV, kS(θ) = 0.5 (1 + 0.6 sin θ) V; from rest it takes 1.4 kS.
+TEST(RecordCharacterization, FrictionVariesAndSticks) {
+  CharacterizationOptions options = perfect();
+  options.kA = 1e-5;
+  options.friction_variation = 0.6;
+  const TestRun step = record_characterization(options)->runs[2];
+  for (std::size_t row = 10; row + 1 < step.time.size(); ++row) {
+    const double friction = 0.5 * (1.0 + 0.6 * std::sin(step.position[row]));
+    ASSERT_NEAR(step.velocity[row], (6.0 - friction) / 0.12, 0.05) << row;
+  }
+  options.friction_variation = 0.0;
+  options.breakaway = 1.4;
+  const TestRun ramp = record_characterization(options)->runs[0];
+  for (std::size_t row = 0; row + 1 < ramp.time.size(); ++row) {
+    ASSERT_EQ(ramp.position[row] > 0.0, row > 0 && ramp.voltage[row - 1] > 0.7) << row;
+  }
+}
+
+// An elevator is driven from one end of its travel to the margin before the other.
+TEST(RecordCharacterization, EndsBeforeTheEndOfItsTravel) {
+  CharacterizationOptions options = perfect();
+  options.mechanism = MechanismKind::elevator;
+  options.kV = 4.0;
+  options.kA = 0.2;
+  options.kG = 0.5;
+  const auto recording = record_characterization(options);
+  ASSERT_TRUE(recording);
+  EXPECT_EQ(recording->unit, "m");
+  const TestRun& up = recording->runs[2];
+  EXPECT_EQ(up.position.front(), -1.0);
+  EXPECT_NEAR(up.position.back(), 0.95, 7e-3);  // at most a row later
+  EXPECT_GE(up.position.back(), 0.95);
+  EXPECT_NEAR(up.velocity.back(), (6.0 - 0.5 - 0.5) / 4.0, 1e-3);
+  const TestRun& down = recording->runs[3];
+  EXPECT_EQ(down.position.front(), 1.0);
+  EXPECT_LE(down.position.back(), -0.95);
+  EXPECT_NEAR(down.velocity.back(), -(6.0 + 0.5 - 0.5) / 4.0, 1e-3);
+}
+
 TEST(RecordCharacterization, StaysWithinItsTravel) {
   CharacterizationOptions options;
   options.mechanism = MechanismKind::arm;

@@ -225,46 +225,61 @@ TEST(SimulateClosedLoop, IntegratesStiffModelsToAnAccuracy) {
   EXPECT_NEAR(0.5 * x(1) * x(1) - 9.81 * std::cos(x(0)), -9.81 * std::cos(3.0), 1e-9);
 }
 
-// A model that is fine where it starts and has no derivative from x = 1 on.
-struct Cliff {
-  static constexpr int states() { return 1; }
-  static constexpr int inputs() { return 1; }
-  template <class X, class U>
-  auto derivative(const X& x, const U& u) const {
-    using std::sqrt;
-    return Eigen::Vector<ScalarOf<X, U>, 1>{sqrt(1.0 - x(0)) + u(0)};
+// A delay of whole periods ends where a step does, but for the rounding of its sum with the
+// sample's time: no step is taken of that. The position after k periods of 3 V, from the third on.
+TEST(SimulateClosedLoop, DelaysByWholePeriods) {
+  for (const double accuracy : {0.0, 1e-9}) {
+    auto plant =
+        ModelPlant::create(integrators(), Vector2d::Zero(), {.accuracy = accuracy}).value();
+    ClosedLoop loop = periods(300, 10_ms);
+    loop.actuators = {{.delay = 20_ms}, {.delay = 30_ms}};
+    const auto law = [](const LoopSample& s) -> LoopCommand {
+      const double step = static_cast<double>(s.index + 1);
+      return Vector2d(3.0, step);
+    };
+    const auto result = simulate_closed_loop(plant, law, loop);
+    ASSERT_TRUE(result) << to_string(result.error());
+    EXPECT_NEAR(column(*result, "x1")[299], 3.0 * 0.01 * 297.0, 1e-9);
+    EXPECT_NEAR(column(*result, "x2")[299], 0.01 * 296.0 * 297.0 / 2.0, 1e-9);
+    EXPECT_EQ(result->inputs[1].peak, 297.0);
   }
-  static ModelDescription description() { return {.states = {{"height", "m"}}}; }
-};
+}
 
-// A model whose derivative has one entry too many.
-struct Misshapen {
-  static constexpr int states() { return 1; }
-  static constexpr int inputs() { return 1; }
-  template <class X, class U>
-  auto derivative(const X& x, const U& u) const {
-    return Eigen::Vector<ScalarOf<X, U>, 2>{x(0), u(0)};
+// Sensors see what happens between the samples: of a ramp of 1 V/s, read 5 ms late at a period of
+// 20 ms, and of one held by a refresh of 50 ms.
+TEST(SimulateClosedLoop, SensorsLookBetweenTheSamples) {
+  auto plant = ModelPlant::create(integrators(), Vector2d::Zero()).value();
+  ClosedLoop loop = periods(10);
+  loop.sensors = {{.delay = 5_ms}, {.refresh = 50_ms}};
+  const auto law = [](const LoopSample&) -> LoopCommand { return Vector2d(1.0, 2.0); };
+  const auto result = simulate_closed_loop(plant, law, loop).value();
+  for (std::size_t k = 1; k < 10; ++k) {
+    const double time = 0.02 * static_cast<double>(k);
+    EXPECT_NEAR(column(result, "measured_y1")[k], time - 0.005, 1e-12) << k;
+    EXPECT_NEAR(column(result, "measured_y2")[k], 2.0 * 0.05 * std::floor(time / 0.05 + 1e-9),
+                1e-12)
+        << k;
+    EXPECT_NEAR(column(result, "output_y2")[k], 2.0 * time, 1e-12) << k;
   }
-};
+}
 
-TEST(SimulateClosedLoop, RefusesModelsThatGiveNoNumber) {
-  const auto at_once = ModelPlant::create(Cliff{}, MatrixXd::Constant(1, 1, 2.0)).error();
-  EXPECT_TRUE(at_once.is(ArgumentError::not_finite));
-  EXPECT_NE(to_string(at_once).find("height"), std::string::npos) << to_string(at_once);
-  EXPECT_TRUE(
-      ModelPlant::create(Misshapen{}, MatrixXd::Zero(1, 1)).error().is(ArgumentError::wrong_shape));
-  EXPECT_TRUE(ModelPlant::create(Cliff{}, Vector2d::Zero()).error().is(ArgumentError::wrong_shape));
-
-  // dx/dt = √(1 - x) + 1 passes 1 before 1 s.
-  auto plant = ModelPlant::create(Cliff{}, MatrixXd::Zero(1, 1)).value();
-  const auto push = [](const LoopSample&) -> LoopCommand { return VectorXd::Ones(1); };
-  const auto later = simulate_closed_loop(plant, push, periods(100)).error();
-  EXPECT_TRUE(later.is(ArgumentError::not_finite));
-  EXPECT_NE(to_string(later).find("height"), std::string::npos) << to_string(later);
-  EXPECT_NE(to_string(later).find("t = 0.6"), std::string::npos) << to_string(later);
-  auto accurate = ModelPlant::create(Cliff{}, MatrixXd::Zero(1, 1), {.accuracy = 1e-9}).value();
-  const auto found = simulate_closed_loop(accurate, push, periods(100)).error();
-  EXPECT_NE(to_string(found).find("t = 0.6"), std::string::npos) << to_string(found);
+// What is added to a command is drawn once a period, after the limits, and has its deviation.
+TEST(SimulateClosedLoop, AddsTheActuatorsNoise) {
+  auto plant = ModelPlant::create(integrators(), Vector2d::Zero()).value();
+  ClosedLoop loop = periods(4000, 1_ms);
+  loop.actuators = {{.min = -1.0, .max = 1.0, .noise = 0.25}};
+  const auto law = [](const LoopSample&) -> LoopCommand { return Vector2d(5.0, 0.0); };
+  const auto result = simulate_closed_loop(plant, law, loop).value();
+  double sum = 0.0;
+  double squares = 0.0;
+  const auto& x = column(result, "x1");
+  for (std::size_t k = 0; k + 1 < x.size(); ++k) {
+    const double noise = (x[k + 1] - x[k]) / 1e-3 - 1.0;
+    sum += noise;
+    squares += noise * noise;
+  }
+  EXPECT_NEAR(sum / 3999.0, 0.0, 0.02);
+  EXPECT_NEAR(std::sqrt(squares / 3999.0), 0.25, 0.01);
 }
 
 TEST(SimulateClosedLoop, Errors) {
