@@ -210,7 +210,7 @@ Expected<MatrixXd> logarithm(const MatrixRef& A, int unit) {
                      "a matrix whose eigenvalues cannot be found", 0.0);
   }
   for (const Complex& lambda : form.schur.T.diagonal()) {
-    if (lambda == 0.0 || (lambda.real() <= 0.0 && std::abs(lambda.imag()) <= form.zero)) {
+    if (lambda == 0.0 || (lambda.real() < 0.0 && std::abs(lambda.imag()) <= form.zero)) {
       const bool zero = std::abs(lambda) <= form.zero;
       return no_answer(MatrixFunctionError::no_real_logarithm, where,
                        zero ? "a singular matrix" : "a negative real eigenvalue",

@@ -176,6 +176,19 @@ TEST(MatrixLogarithm, ClosedForms) {
   EXPECT_NEAR(logm(wide).value()(1, 1), -300.0 * std::log(10.0), 1e-12);
 }
 
+// A small turn is no zero beside a one: log(εJ) = log(ε) I + π/2 J, J = [0 -1; 1 0].
+TEST(MatrixLogarithm, OfASmallTurnBesideAOne) {
+  Eigen::Matrix3d A = Eigen::Vector3d(1.0, 0.0, 0.0).asDiagonal();
+  A(2, 1) = 1e-17;
+  A(1, 2) = -1e-17;
+  Eigen::Matrix3d expected = Eigen::Vector3d(0.0, std::log(1e-17), std::log(1e-17)).asDiagonal();
+  expected(2, 1) = std::acos(0.0);
+  expected(1, 2) = -std::acos(0.0);
+  const auto L = logm(A);
+  ASSERT_TRUE(L) << to_string(L.error());
+  EXPECT_LE((*L - expected).norm(), 1e-15 * expected.norm());
+}
+
 TEST(MatrixLogarithm, SaysWhenThereIsNone) {
   const Eigen::Matrix2d negative = Eigen::Vector2d(1.0, -2.0).asDiagonal();
   const auto L = logm(negative);
