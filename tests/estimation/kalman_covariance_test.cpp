@@ -158,7 +158,8 @@ TEST(KalmanCovariance, TwoSensorsOfOneStateAreBothTaken) {
 }
 
 // Both without noise: after the first one, what is left of the second one's variance is rounding,
-// and an estimate that trusted it could be anything.
+// and an estimate that trusted it could be anything. That is so in any unit of the states, as is
+// that two that differ are both taken.
 TEST(KalmanCovariance, TwoEqualSensorsWithoutNoiseAreSingular) {
   Random random(13);
   for (int run = 0; run < 200; ++run) {
@@ -169,16 +170,21 @@ TEST(KalmanCovariance, TwoEqualSensorsWithoutNoiseAreSingular) {
     plant.C.row(1) = 3.0 * plant.C.row(0);
     plant.D.setZero();
     plant.period = Time(1.0);
-    const Eigen::Matrix3d F = Eigen::Matrix3d::NullaryExpr([&] { return random.normal(); });
-    auto filter =
-        kalman_filter(plant, Eigen::Matrix3d(Eigen::Matrix3d::Zero()),
-                      Eigen::Matrix2d(Eigen::Matrix2d::Zero()), Eigen::Matrix3d(F * F.transpose()))
-            .value();
+    const Eigen::Matrix3d F = std::pow(10.0, run % 17 - 8) *
+                              Eigen::Matrix3d::NullaryExpr([&] { return random.normal(); });
+    const Eigen::Matrix3d P0 = F * F.transpose();
+    const Eigen::Matrix3d Q = Eigen::Matrix3d::Zero();
+    const Eigen::Matrix2d R = Eigen::Matrix2d::Zero();
+    auto filter = kalman_filter(plant, Q, R, P0).value();
     const Eigen::Matrix3d P = filter.P();
     ASSERT_EQ(filter.update(Eigen::Vector2d(1.0, 1.0), Scalar(0.0)),
               UpdateStatus::singular_innovation);
     ASSERT_TRUE(filter.x_hat().isZero(0.0));
     ASSERT_EQ(filter.P(), P);
+    plant.C(1, 0) += 1.0;
+    auto both = kalman_filter(plant, Q, R, P0).value();
+    ASSERT_EQ(both.update(Eigen::Vector2d(1.0, 1.0), Scalar(0.0)), UpdateStatus::updated);
+    ASSERT_NEAR((plant.C * both.x_hat())(1), 1.0, 1e-6);
   }
 }
 

@@ -135,7 +135,7 @@ TEST(RecordCharacterization, NoiseAndJitterHaveTheirDeviations) {
   CharacterizationOptions options = perfect();
   options.row_jitter = 1e-3;
   options.voltage_noise = 0.03;
-  options.velocity_noise = 0.2;
+  options.velocity_noise.reset();  // 0.5 % of the speed of the step
   options.noise_per_row = true;
   options.step_duration = 60.0;
   const TestRun run = record_characterization(options)->runs[2];
@@ -152,7 +152,7 @@ TEST(RecordCharacterization, NoiseAndJitterHaveTheirDeviations) {
   const auto rows = static_cast<double>(run.time.size() - first);
   EXPECT_NEAR(std::sqrt(time / rows), 1e-3, 3e-5);
   EXPECT_NEAR(std::sqrt(voltage / rows), 0.03, 1e-3);
-  EXPECT_NEAR(std::sqrt(velocity / rows), 0.2, 5e-3);
+  EXPECT_NEAR(std::sqrt(velocity / rows), 0.005 * 5.5 / 0.12, 5e-3);
 }
 
 // Without inertia v = (V − kS(θ))/kV, kS(θ) = 0.5 (1 + 0.6 sin θ) V; from rest it takes 1.4 kS.
