@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 
@@ -74,7 +75,20 @@ void add_common_options(CLI::App& command, CommonOptions& options, const std::st
 
 void add_field_options(CLI::App& command, study::JobKind job, std::vector<study::Override>& given) {
   for (const study::FieldInfo& field : study::fields_of(job)) {
-    std::string help = field.help + ", such as " + field.example;
+    std::string help = field.help;
+    if (field.value.empty()) {
+      // --flag, or --flag=false against a file that says true.
+      command
+          .add_flag_function(
+              field.option,
+              [&given, option = field.option](std::int64_t count) {
+                given.push_back({option, count > 0 ? "true" : "false"});
+              },
+              help)
+          ->group("[" + field.section + "]");
+      continue;
+    }
+    help += ", such as " + field.example;
     if (!field.absent.empty()) {
       help += " [" + field.absent + "]";
     }

@@ -66,6 +66,9 @@ std::string metavar(const Field& field) {
   if (!field.metavar.empty()) {
     return std::string(field.metavar);
   }
+  if (field.type == FieldType::flag) {
+    return {};
+  }
   const auto dimensions = dimensions_of(field, std::nullopt);
   if (field.type == FieldType::whole || field.type == FieldType::list) {
     return field.type == FieldType::whole ? "N" : "LIST";

@@ -129,7 +129,7 @@ struct FieldInfo {
   std::string section;  ///< "controller"
   std::string key;      ///< "max_voltage"
   std::string option;   ///< "--max-voltage"
-  std::string value;    ///< What it takes, for a help text: "VOLTAGE".
+  std::string value;    ///< What it takes, for a help text: "VOLTAGE"; empty of a flag.
   std::string help;     ///< "Limit of the voltage"
   std::string example;  ///< As an option takes it: "12V".
   std::string absent;   ///< What holds without it: "12 V", "needed by elevator, arm".
