@@ -1,6 +1,7 @@
 #include <flyball/control/steady_state_feedforward.hpp>
 
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -143,6 +144,28 @@ TEST(QrWeightedInversion, OfTheBooksMotor) {
   const Eigen::Matrix2d Q = Eigen::Vector2d(1.0 / 400.0, 1.0 / 1600.0).asDiagonal();
   const double inner = plant.B.dot(Q * plant.B) + 1.0 / 144.0;
   EXPECT_NEAR(weighted.B_pinv()(0), (plant.B.transpose() * Q / inner)(0), 1e-14);
+}
+
+// One state, one input: bq/(b²q + r), where b²q or r leave the doubles' range, and where q and r
+// are far apart.
+TEST(QrWeightedInversion, InAnyUnits) {
+  const auto gain = [](double b, double q, double r) {
+    const auto scalar = [](double x) { return Eigen::MatrixXd::Constant(1, 1, x); };
+    return qr_weighted_gain(scalar(b), scalar(q), scalar(r)).value()(0, 0);
+  };
+  EXPECT_NEAR(gain(1e155, 92.85, 0.0) * 1e155, 1.0, 1e-15);
+  EXPECT_NEAR(gain(1.7e308, 1.0, 9.0) * 1.7e308, 1.0, 1e-15);
+  EXPECT_NEAR(gain(-1e-10, 1.0, 1e300) / -1e-310, 1.0, 1e-8);
+  EXPECT_NEAR(gain(0.125, 4.0, 1e300) * 2e300, 1.0, 1e-15);
+  // Of two inputs, 1.7e308 and 1e-310 as strong, the weight of the weak one is all that it has.
+  const Eigen::MatrixXd K = qr_weighted_gain(Eigen::RowVector2d(1.7e308, 1e-310),
+                                             Eigen::MatrixXd::Ones(1, 1), bryson({1.0, 1.0}))
+                                .value();
+  EXPECT_NEAR(K(0, 0) * 1.7e308, 1.0, 1e-15);
+  EXPECT_LT(std::abs(K(1, 0)), 1e-320);
+  const Eigen::MatrixXd one = Eigen::MatrixXd::Ones(1, 1);
+  EXPECT_TRUE(
+      qr_weighted_gain(1e-310 * one, one, 0.0 * one).error().is(FeedforwardError::overflow));
 }
 
 TEST(QrWeightedInversion, Errors) {

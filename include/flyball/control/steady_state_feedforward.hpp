@@ -12,6 +12,7 @@ namespace flyball {
 enum class FeedforwardError {
   no_steady_state,  ///< No constant input holds the outputs at every value.
   singular,         ///< BᵀQB + R has no inverse.
+  overflow,         ///< The gain exceeds the largest double.
 };
 [[nodiscard]] ErrorInfo error_info(FeedforwardError code);
 
@@ -92,7 +93,8 @@ template <int States, int Inputs, int Outputs>
 /// @param B  n x m, discrete. @param Q  n x n, symmetric. @param R  m x m, symmetric.
 /// @return K_ff, m x n.
 /// @errors ArgumentError for shapes, entries and asymmetry; FeedforwardError::singular where
-///         BᵀQB + R is not positive definite.
+///         BᵀQB + R is not positive definite, overflow.
+/// Formed and solved in twice the precision: what is left of (BᵀQB + R) K = BᵀQ is K's rounding.
 /// Source: book, Theorem C.1.1.
 [[nodiscard]] Expected<Eigen::MatrixXd> qr_weighted_gain(const MatrixRef& B, const Weight& Q,
                                                          const Weight& R);

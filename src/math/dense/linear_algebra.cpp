@@ -3,10 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/ordinary_units.hpp"
+#include "math/extended/double_double.hpp"
 
 namespace flyball {
 
@@ -22,6 +26,24 @@ Expected<void> check_symmetric_matrix(const MatrixRef& S, std::string_view where
   return Checks(where).finite(S, "S").symmetric(S, "S");
 }
 
+/// A⁺ of the rank that the leading right singular vectors V span, with what doubles lose where
+/// small singular values stand beside large ones: F = A V, A⁺ = (F⁺A)⁺F⁺, in twice the precision.
+std::optional<MatrixXd> extended_pseudoinverse(const MatrixXd& A, const MatrixXd& V) {
+  using detail::DoubleDoubleMatrix;
+  const DoubleDoubleMatrix a(A);
+  const DoubleDoubleMatrix F = product(a, DoubleDoubleMatrix(V));
+  const auto left = solve(product(F.transpose(), F), F.transpose());
+  if (!left) {
+    return std::nullopt;
+  }
+  const DoubleDoubleMatrix G = product(*left, a);
+  const auto inner = solve(product(G, G.transpose()), *left);
+  if (!inner || !inner->all_finite()) {
+    return std::nullopt;
+  }
+  return product(G.transpose(), *inner).rounded();
+}
+
 }  // namespace
 
 Expected<Pseudoinverse> pseudoinverse(const MatrixRef& A, double tolerance) {
@@ -35,16 +57,30 @@ Expected<Pseudoinverse> pseudoinverse(const MatrixRef& A, double tolerance) {
         .got(format_number(tolerance))
         .expected("below 1");
   }
-  const detail::SingularValues svd = detail::svd_of(A);
+  const int unit = detail::unit_of(A);
+  const MatrixXd scaled = detail::times_power(A, -unit);
+  const detail::SingularValues svd = detail::svd_of(scaled);
   const double relative =
       tolerance > 0.0 ? tolerance : epsilon * static_cast<double>(std::max(A.rows(), A.cols()));
   const double least = relative * svd.values(0);
   Pseudoinverse result;
-  result.singular_values = svd.values;
+  result.singular_values = detail::times_power(svd.values, unit);
   result.rank = (svd.values.array() > least).count();
   const Eigen::VectorXd inverse = svd.values.head(result.rank).cwiseInverse();
   result.X = detail::product_transposed(svd.V.leftCols(result.rank) * inverse.asDiagonal(),
                                         svd.U.leftCols(result.rank));
+  constexpr double alike = 1e-3;
+  if (result.rank > 0 && svd.values(result.rank - 1) < alike * svd.values(0)) {
+    if (auto X = extended_pseudoinverse(scaled, svd.V.leftCols(result.rank))) {
+      result.X = std::move(*X);
+    }
+  }
+  result.X = detail::times_power(result.X, -unit);
+  if (!result.X.allFinite()) {
+    return refusal(ArgumentError::out_of_range, where, "A")
+        .got("so small that its inverse is beyond the largest double")
+        .expected("entries nearer to 1, in other units");
+  }
   return result;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 #include <flyball/core/random.hpp>
@@ -44,6 +45,35 @@ TEST(Pseudoinverse, Penrose) {
     EXPECT_LT((A * X - (A * X).transpose()).norm(), tolerance);
     EXPECT_LT((X * A - (X * A).transpose()).norm(), tolerance);
   }
+}
+
+// [1 1; 1 1 + δ]⁻¹ = [1 + δ, -1; -1, 1]/δ, exact for δ = 2⁻³⁰; with its columns and rows in other
+// units, and at the ends of the doubles' range.
+TEST(Pseudoinverse, KeepsDigitsInAnyUnits) {
+  const double d = std::ldexp(1.0, -30);
+  MatrixXd A(2, 2);
+  A << 1.0, 1.0, 1.0, 1.0 + d;
+  MatrixXd inverse(2, 2);
+  inverse << (1.0 + d) / d, -1.0 / d, -1.0 / d, 1.0 / d;
+  for (const int power : {0, 8, 900, -900}) {
+    const double f = std::ldexp(1.0, power);
+    const MatrixXd X = pseudoinverse(A * f).value().X;
+    EXPECT_LT((X * f - inverse).cwiseAbs().maxCoeff(), 1e-15 / d) << power;
+  }
+  // Of four equations in two unknowns, of which one is in units of 1e8: AᵀA X = Aᵀ row by row.
+  MatrixXd tall(4, 2);
+  tall << 1.0, 1e8, 2.0, -1e8, 0.0, 3e8, 1.0, 0.0;
+  const MatrixXd unscaled = tall * Eigen::Vector2d(1.0, 1e-8).asDiagonal();
+  const MatrixXd expected = Eigen::Vector2d(1.0, 1e-8).asDiagonal() *
+                            (unscaled.transpose() * unscaled).inverse() * unscaled.transpose();
+  const MatrixXd X = pseudoinverse(tall).value().X;
+  for (Index i = 0; i < 2; ++i) {
+    EXPECT_LT((X.row(i) - expected.row(i)).norm(), 1e-14 * expected.row(i).norm());
+  }
+  const MatrixXd large = Eigen::Vector2d(2.0, 1.6e308);
+  EXPECT_NEAR(pseudoinverse(large).value().X(0, 1) * 1.6e308, 1.0, 1e-15);
+  EXPECT_TRUE(
+      pseudoinverse(MatrixXd::Constant(1, 1, 1e-310)).error().is(ArgumentError::out_of_range));
 }
 
 TEST(Definiteness, Kinds) {

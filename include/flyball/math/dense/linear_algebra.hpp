@@ -20,7 +20,10 @@ struct Pseudoinverse {
 /// A⁺ by singular values: x = A⁺b is the shortest of the x that minimise ‖Ax - b‖.
 /// @param A  m x n. @param tolerance  Singular values below it, relative to the largest, count as
 /// zero; 0 takes max(m, n) ε.
-/// @errors ArgumentError::empty, not_finite; out_of_range for a tolerance outside [0, 1).
+/// Where the largest of these is a thousand times the smallest, A⁺ is computed in twice the
+/// precision.
+/// @errors ArgumentError::empty, not_finite; out_of_range for a tolerance outside [0, 1), and where
+///         A⁺ is beyond the largest double.
 /// Cost: O(m n min(m, n)), allocates. Source: book, section 7.8.1 (B⁺); Golub and Van
 /// Loan, "Matrix Computations", section 5.5.
 [[nodiscard]] Expected<Pseudoinverse> pseudoinverse(const MatrixRef& A, double tolerance = 0.0);
