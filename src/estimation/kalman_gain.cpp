@@ -1,80 +1,22 @@
 #include <flyball/estimation/kalman_gain.hpp>
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 
-#include <flyball/math/equations/matrix_equation.hpp>
 #include <flyball/math/riccati/riccati.hpp>
 #include <flyball/systems/controllability.hpp>
 
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
-#include "math/dense/dense.hpp"
-#include "math/equations/lyapunov_correction.hpp"
-#include "math/extended/double_double.hpp"
+#include "estimation/steady_filter.hpp"
 
 namespace flyball {
 
 namespace {
-
-using detail::DoubleDoubleMatrix;
-
-/// What a measurement makes of the covariance P: K = P Cᵀ(C P Cᵀ + R)⁻¹, P⁺ = P - K C P.
-struct Update {
-  DoubleDoubleMatrix K;
-  DoubleDoubleMatrix P;
-};
-
-std::optional<Update> update_of(const DoubleDoubleMatrix& P, const DoubleDoubleMatrix& C,
-                                const DoubleDoubleMatrix& R) {
-  const DoubleDoubleMatrix CP = product(C, P);
-  const auto K = solve(symmetrized(add_product(R, 1.0, CP, C.transpose())), CP);
-  if (!K || !K->all_finite()) {
-    return std::nullopt;
-  }
-  DoubleDoubleMatrix gain = K->transpose();
-  DoubleDoubleMatrix posterior = symmetrized(add_product(P, -1.0, gain, CP));
-  return Update{std::move(gain), std::move(posterior)};
-}
-
-/// P to more digits than a double has, and its update. Where the outputs hardly show a growing
-/// mode, P is large along it, and what its rounding does elsewhere is more than K and P⁺ there:
-/// Newton's method with the residual in twice the working precision gives the missing digits.
-struct Filter {
-  DoubleDoubleMatrix P;
-  Update update;
-};
-
-std::optional<Filter> corrected(const MatrixRef& A, const MatrixRef& C, const Eigen::MatrixXd& Q,
-                                const Eigen::MatrixXd& R, const Eigen::MatrixXd& P) {
-  constexpr int most_steps = 5;
-  constexpr double small = 1e-3;
-  constexpr double last = 1e-12;
-  const DoubleDoubleMatrix a(A);
-  const DoubleDoubleMatrix c(C);
-  const DoubleDoubleMatrix q(detail::symmetrized(Q));
-  const DoubleDoubleMatrix r(detail::symmetrized(R));
-  DoubleDoubleMatrix p(P);
-  auto update = update_of(p, c, r);
-  for (int step = 0; step < most_steps && update; ++step) {
-    const DoubleDoubleMatrix predicted = add_product(q, 1.0, product(a, update->P), a.transpose());
-    const DoubleDoubleMatrix loop = add_product(a, -1.0, product(a, update->K), c);
-    const auto missing =
-        detail::discrete_lyapunov_correction(loop.rounded(), sum(predicted, -1.0, p).rounded());
-    if (!missing || !(missing->X.norm() <= small * P.norm())) {
-      break;
-    }
-    p = symmetrized(sum(std::move(p), 1.0, DoubleDoubleMatrix(missing->X)));
-    update = update_of(p, c, r);
-    if (missing->X.norm() <= last * P.norm()) {
-      break;
-    }
-  }
-  if (!update) {
-    return std::nullopt;
-  }
-  return Filter{std::move(p), std::move(*update)};
-}
 
 Error with_mode(Error error, std::complex<double> mode) {
   return std::move(error)
@@ -88,6 +30,14 @@ Error no_inverse(std::string_view where) {
       .about("C P Cᵀ + R")
       .got("singular")
       .hint("give each output a noise of its own in R");
+}
+
+Error no_digits(std::string_view where) {
+  return Error(RiccatiError::no_convergence)
+      .in(std::string(where))
+      .about("P")
+      .hint(
+          "measure states and outputs in units in which the entries of A, C, Q and R are near one");
 }
 
 /// What the dual's Riccati equation refuses, in words of the filter; the reason is looked for in
@@ -125,12 +75,7 @@ Error filter_error(const Error& dual, const MatrixRef& A, const MatrixRef& C,
     return error;
   }
   if (dual.is(RiccatiError::no_convergence) || dual.is(RiccatiError::not_stabilizable)) {
-    return Error(RiccatiError::no_convergence)
-        .in(name)
-        .about("P")
-        .hint(
-            "measure states and outputs in units in which the entries of A, C, Q and R are near "
-            "one");
+    return no_digits(where);
   }
   return Error(dual).in(name);
 }
@@ -148,6 +93,7 @@ ErrorInfo error_info(KalmanGainError code) {
 Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const Covariance& Q,
                                    const Covariance& R) {
   constexpr std::string_view where = "kalman_gain";
+  constexpr double largest_residual = 1e-11;
   if (!Q.get() || !R.get()) {
     return tl::unexpected((Q.get() ? R : Q).get().error());
   }
@@ -172,23 +118,43 @@ Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const
     return tl::unexpected(filter_error(dual.error(), A, C, where));
   }
   const RiccatiSolution& solution = *dual;
-  const auto filter = corrected(A, C, noise_Q, noise_R, solution.X);
-  if (!filter) {
-    return tl::unexpected(no_inverse(where));
+  const detail::FilterProblem problem{A, C, noise_Q, noise_R};
+  auto filter = detail::filter_at(problem, solution.X);
+  double residual = std::numeric_limits<double>::infinity();
+  std::optional<Eigen::VectorXcd> poles;
+  const auto judge = [&] {
+    residual = filter ? detail::residual_of(*filter) : residual;
+    poles = filter ? detail::poles_of(*filter) : std::nullopt;
+    return residual <= largest_residual && poles;
+  };
+  if (filter) {
+    filter = detail::corrected(std::move(*filter));
+  }
+  if (!judge()) {
+    const bool inverse = filter.has_value();
+    filter = detail::iterated(problem, solution.X, solution.K.transpose());
+    if (!filter && !inverse) {
+      return tl::unexpected(no_inverse(where));
+    }
+    if (!judge()) {
+      return tl::unexpected(
+          no_digits(where)
+              .got(poles ? "lost to rounding: it leaves more of its equations than rounding may"
+                         : "of a filter that is stable or not by the last digits of K")
+              .with("residual", residual));
+    }
   }
   KalmanGain<> gain;
-  gain.K = filter->update.K.rounded();
-  gain.L = product(DoubleDoubleMatrix(A), filter->update.K).rounded();
-  gain.P_prior = detail::symmetrized(filter->P.rounded());
-  gain.P_posterior = detail::symmetrized(filter->update.P.rounded());
-  // Of this K: where the outputs say the same thing without noise, K is not the only one.
-  gain.poles = detail::eigenvalues_of(
-      add_product(DoubleDoubleMatrix(A), -1.0, DoubleDoubleMatrix(gain.L), DoubleDoubleMatrix(C))
-          .rounded());
-  if (!(gain.poles.cwiseAbs().maxCoeff() < 1.0)) {
-    gain.poles = solution.poles;
+  gain.K = filter->gain(filter->update.K);
+  gain.L = filter->gain(product(filter->A, filter->update.K));
+  gain.P_prior = filter->covariance(filter->P);
+  gain.P_posterior = filter->covariance(filter->update.P);
+  gain.poles = *poles;
+  if (!gain.K.allFinite() || !gain.L.allFinite() || !gain.P_prior.allFinite()) {
+    return refusal(RiccatiError::overflow, where, "K")
+        .hint("measure states and outputs in other units");
   }
-  gain.residual = solution.residual;
+  gain.residual = std::max(solution.residual, residual);
   gain.condition = solution.condition;
   return gain;
 }

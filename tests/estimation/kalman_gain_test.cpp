@@ -86,6 +86,38 @@ TEST(KalmanGain, SatisfiesItsEquations) {
   }
 }
 
+// x₂ shows x₁ of the last sample to 1e-20, so x₁ is known but for what has come since: P₁₁ = q +
+// a²p with p = qr/(q + r) = 1/2, P₂₂ = g²p, P₁₂ = a g p; K₁₁ = p/r.
+TEST(KalmanGain, StatesOfFarUnits) {
+  const double a = 0.5;
+  const double g = -1e20;
+  Eigen::Matrix2d A;
+  A << a, 0.0, g, 0.0;
+  const Eigen::Matrix2d I = Eigen::Matrix2d::Identity();
+  const auto gain = kalman_gain(A, I, I, I).value();
+  EXPECT_NEAR(gain.P_prior(0, 0), 1.125, 1e-14);
+  EXPECT_NEAR(gain.P_prior(1, 1) / (0.5 * g * g), 1.0, 1e-14);
+  EXPECT_NEAR(gain.P_prior(0, 1) / (0.5 * a * g), 1.0, 1e-14);
+  EXPECT_NEAR(gain.K(0, 0), 0.5, 1e-14);
+  EXPECT_NEAR(gain.K(1, 1), 1.0, 1e-14);
+  EXPECT_NEAR(gain.P_posterior(1, 1), 1.0, 1e-12);
+}
+
+// Outputs that show everything without noise: K = C⁻¹, and A - LC = 0, also where an output is
+// 1e-100 of a state.
+TEST(KalmanGain, OutputsWithoutNoise) {
+  Eigen::Matrix2d A;
+  A << -1.9, 0.9, 0.0, -1.9;
+  Eigen::Matrix2d C;
+  C << 2.0, 1.0, 0.0, -1e-100;
+  const auto gain = kalman_gain(A, C, Eigen::Matrix2d::Identity(), Eigen::Matrix2d::Zero());
+  ASSERT_TRUE(gain.has_value()) << to_string(gain.error());
+  EXPECT_NEAR(gain->K(0, 0), 0.5, 1e-14);
+  EXPECT_NEAR(gain->K(0, 1) / 5e99, 1.0, 1e-14);
+  EXPECT_NEAR(gain->K(1, 1) / -1e100, 1.0, 1e-14);
+  EXPECT_LT(gain->poles.cwiseAbs().maxCoeff(), 1e-7);
+}
+
 TEST(KalmanGain, FixedIsDynamic) {
   const auto elevator = mechanisms::elevator({.kS = 0.1, .kV = 4.0, .kA = 0.3, .kG = 0.6}).value();
   const auto plant = discretize<2, 1, 1>(elevator, Time(0.02)).value();

@@ -37,7 +37,7 @@ struct KalmanGain {
 /// @errors ArgumentError for shapes, entries, asymmetry, and not_positive for a Q or R that is no
 ///         covariance; the error of a covariance's maker; KalmanGainError::not_detectable with the
 ///         mode that no output shows, undriven_mode with that mode; RiccatiError::singular where
-///         C P Cᵀ + R has no inverse, no_convergence where no answer could be verified.
+///         C P Cᵀ + R has no inverse, no_convergence where no answer could be verified, overflow.
 /// P, K, L and P⁺ are right to their last digit where the Riccati equation determines them: its
 /// solution is corrected and used in twice the working precision.
 /// Cost: one Riccati solution and a Lyapunov equation for each correction; allocates. Source: book,
