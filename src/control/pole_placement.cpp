@@ -9,10 +9,10 @@
 #include <flyball/systems/controllability.hpp>
 
 #include "control/placement.hpp"
+#include "control/placement_units.hpp"
 #include "core/error_rows.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
-#include "math/dense/pair_scaling.hpp"
 
 namespace flyball {
 
@@ -261,38 +261,6 @@ Eigen::VectorXd units_with_inputs(const MatrixRef& A, const MatrixRef& B,
   return detail::balance_of(both).head(n).cwiseProduct(balanced);
 }
 
-/// Units in which nothing is far from one. Where all entries are ordinary those that were given
-/// stay, but for time if the poles are far from one.
-detail::PairScaling working_units(const MatrixRef& A, const MatrixRef& B,
-                                  const Eigen::VectorXcd& poles) {
-  constexpr int far = 100;
-  constexpr int slow = -10;
-  constexpr int fast = 30;
-  const auto is_far = [](double x) { return x != 0.0 && std::abs(std::ilogb(x)) > far; };
-  const Eigen::VectorXd sizes = poles.real().cwiseAbs().cwiseMax(poles.imag().cwiseAbs());
-  const double largest = sizes.maxCoeff();
-  const bool all = A.unaryExpr(is_far).any() || B.unaryExpr(is_far).any() || is_far(largest);
-  detail::PairScaling units{Eigen::VectorXi::Zero(A.rows()), Eigen::VectorXi::Zero(B.cols()), 0};
-  if (all) {
-    units = detail::pair_scaling_of(A, B);
-  }
-  if (largest > 0.0) {
-    const int exponent = std::ilogb(largest);
-    if (all) {
-      units.time = std::max(units.time, exponent);
-    } else if (exponent < slow || exponent > fast) {
-      units.time = exponent;
-    }
-  }
-  return units;
-}
-
-Eigen::VectorXcd in_units_of(const Eigen::VectorXcd& poles, int exponent) {
-  return poles.unaryExpr([&](const Complex& p) {
-    return Complex(std::ldexp(p.real(), exponent), std::ldexp(p.imag(), exponent));
-  });
-}
-
 /// Entries and poles are near one, in units of 2^time per second.
 Expected<PolePlacement<>> place_near_one(const MatrixRef& A, const MatrixRef& B,
                                          const Eigen::VectorXcd& poles, int time) {
@@ -353,13 +321,13 @@ ErrorInfo error_info(PolePlacementError code) {
 Expected<PolePlacement<>> place(const MatrixRef& A, const MatrixRef& B,
                                 const Eigen::VectorXcd& poles) {
   FLYBALL_CHECK(check_arguments(A, B, poles));
-  const detail::PairScaling units = working_units(A, B, poles);
+  const detail::PairScaling units = detail::placement_units(A, B, poles);
   if (units.time == 0 && units.states.isZero() && units.inputs.isZero()) {
     return place_near_one(A, B, poles, 0);
   }
   FLYBALL_TRY(auto placed, place_near_one(detail::scaled_A(A, units), detail::scaled_B(B, units),
-                                          in_units_of(poles, -units.time), units.time));
-  placed.poles = in_units_of(placed.poles, units.time);
+                                          detail::in_units_of(poles, -units.time), units.time));
+  placed.poles = detail::in_units_of(placed.poles, units.time);
   bool held = placed.poles.allFinite();
   for (Eigen::Index j = 0; j < placed.K.cols(); ++j) {
     for (Eigen::Index i = 0; i < placed.K.rows(); ++i) {

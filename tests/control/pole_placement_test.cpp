@@ -378,5 +378,20 @@ TEST(Place, LargeGainsAreRoundedTogether) {
   EXPECT_LT(placed.pole_error, 2e-9);
 }
 
+// A mode that no input reaches, 1e300, stays: in whatever units, it is neither lost nor a pole at
+// 0.
+TEST(Place, KeepsModesBeyondAllOthers) {
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(3, 3);
+  A << 1.5, 1e-155, -1e154, 0.0, 0.6, -1.5, 0.0, 0.0, 1e300;
+  const Eigen::MatrixXd B = Eigen::Vector3d(0.0, 1.7, 0.0);
+  const auto lost = place(A, B, {-0.1, Complex(-0.1, 1e20), Complex(-0.1, -1e20)});
+  ASSERT_FALSE(lost.has_value());
+  EXPECT_TRUE(lost.error().is(PolePlacementError::not_controllable));
+  EXPECT_NEAR(lost.error().evidence().front().values.front() / 1e300, 1.0, 1e-12);
+  // To move 1e154 with an input of 1e-300 takes more than a double.
+  const Eigen::MatrixXd one = Eigen::MatrixXd::Ones(1, 1);
+  EXPECT_TRUE(place(1e154 * one, 1e-300 * one, {1.0}).error().is(PolePlacementError::not_reached));
+}
+
 }  // namespace
 }  // namespace flyball
