@@ -10,6 +10,7 @@
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/spectral_blocks.hpp"
 #include "systems/balance.hpp"
 #include "systems/modes.hpp"
 #include "systems/timed.hpp"
@@ -88,6 +89,74 @@ Eigen::VectorXcd shifted(const Eigen::VectorXcd& values, int exponent) {
 
 }  // namespace
 
+namespace {
+
+/// A block in units in which its entries are ordinary.
+struct InUnits {
+  MatrixXd balanced;
+  int back = 0;  ///< The block's eigenvalues are those of `balanced` times 2^back.
+};
+
+InUnits in_units(const MatrixXd& given) {
+  // Sums must not overflow, nor what is small but counts vanish, before the states have their
+  // units; then products must not.
+  const int before = shift_into(given, -900, 1022 - std::ilogb(static_cast<double>(given.rows())));
+  MatrixXd balanced = shifted(given, before);
+  const Eigen::VectorXd d = balance_of(balanced);
+  balanced = d.cwiseInverse().asDiagonal() * balanced * d.asDiagonal();
+  const int after = shift_into(balanced, -300, 300);
+  return {shifted(balanced, after), -before - after};
+}
+
+bool is_triangular(const MatrixXd& M) {
+  for (Index j = 0; j + 1 < M.cols(); ++j) {
+    if (!M.col(j).tail(M.rows() - j - 1).isZero(0.0)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// Adds the eigenvalues of a block and what is known of each; false where there are none.
+bool judge_block(const MatrixXd& block, TimeDomain domain, double blur, int exponent,
+                 JudgedEigenvalues& judged, Index first) {
+  const auto [balanced, back] = in_units(block);
+  const Index n = block.rows();
+  blur = std::ldexp(blur, -back);
+  const Eigensystem system = eigensystem_of(balanced);
+  judged.of_A.segment(first, n) = shifted(system.values, back);
+  judged.values.segment(first, n) = shifted(system.values, back + exponent);
+  if (!judged.values.segment(first, n).allFinite()) {
+    return false;
+  }
+  // Such a matrix shows its eigenvalues without any computing.
+  const bool exact = is_triangular(balanced) || is_triangular(balanced.transpose());
+  // The condition of an eigenvalue is ‖v‖‖w‖ with wᵀ the row of V⁻¹; a defective one has none, and
+  // moves by the root of rounding.
+  const double rounding = 10.0 * epsilon * std::sqrt(static_cast<double>(n)) * balanced.norm();
+  double rcond = 0.0;
+  const Eigen::MatrixXcd rows =
+      solve_complex(system.vectors, Eigen::MatrixXcd::Identity(n, n), &rcond);
+  for (Index k = 0; k < n; ++k) {
+    const double condition = rows.row(k).norm();
+    const double most = std::sqrt(epsilon) * std::max(balanced.norm(), 1e-300);
+    const double margin_scaled =
+        blur + (exact                      ? epsilon * std::abs(system.values(k))
+                : std::isfinite(condition) ? std::min(rounding * condition, 10.0 * most)
+                                           : most);
+    judged.uncertainty(first + k) = std::ldexp(margin_scaled, back + exponent);
+    const bool continuous = domain == TimeDomain::continuous;
+    const double by = excess(continuous ? system.values(k) : judged.values(first + k), domain);
+    const double margin = continuous ? margin_scaled : judged.uncertainty(first + k);
+    judged.verdicts.push_back(by < -margin  ? Stability::stable
+                              : by > margin ? Stability::unstable
+                                            : Stability::marginal);
+  }
+  return true;
+}
+
+}  // namespace
+
 JudgedEigenvalues judged_eigenvalues(const MatrixRef& A, TimeDomain domain, double blur,
                                      int exponent) {
   const Index n = A.rows();
@@ -95,57 +164,25 @@ JudgedEigenvalues judged_eigenvalues(const MatrixRef& A, TimeDomain domain, doub
   if (n == 0) {
     return judged;
   }
-  // Sums must not overflow, nor what is small but counts vanish, before the states have their
-  // units; then products must not.
-  const MatrixXd given = A;
-  const int before = shift_into(given, -900, 1022 - std::ilogb(static_cast<double>(n)));
-  MatrixXd balanced = shifted(given, before);
-  const Eigen::VectorXd d = balance_of(balanced);
-  balanced = d.cwiseInverse().asDiagonal() * balanced * d.asDiagonal();
-  const int after = shift_into(balanced, -300, 300);
-  balanced = shifted(balanced, after);
-  const int back = -before - after;
-  blur = std::ldexp(blur, -back);
-  const Eigensystem system = eigensystem_of(balanced);
-  judged.of_A = shifted(system.values, back);
-  judged.values = shifted(system.values, back + exponent);
-  if (!judged.values.allFinite()) {
-    judged.converged = false;
-    return judged;
-  }
-  const auto triangular = [](const MatrixXd& M) {
-    for (Index j = 0; j + 1 < M.cols(); ++j) {
-      if (!M.col(j).tail(M.rows() - j - 1).isZero(0.0)) {
-        return false;
-      }
-    }
-    return true;
-  };
-  // Such a matrix shows its eigenvalues without any computing.
-  const bool exact = triangular(balanced) || triangular(balanced.transpose());
-  // The condition of an eigenvalue is ‖v‖‖w‖ with wᵀ the row of V⁻¹; a defective one has none, and
-  // moves by the root of rounding.
-  const double rounding = 10.0 * epsilon * std::sqrt(static_cast<double>(n)) * balanced.norm();
-  double rcond = 0.0;
-  const Eigen::MatrixXcd rows =
-      solve_complex(system.vectors, Eigen::MatrixXcd::Identity(n, n), &rcond);
+  judged.values.resize(n);
+  judged.of_A.resize(n);
   judged.uncertainty.resize(n);
-  for (Index k = 0; k < n; ++k) {
-    const double condition = rows.row(k).norm();
-    const double most = std::sqrt(epsilon) * std::max(balanced.norm(), 1e-300);
-    judged.uncertainty(k) =
-        blur + (exact                      ? epsilon * std::abs(system.values(k))
-                : std::isfinite(condition) ? std::min(rounding * condition, 10.0 * most)
-                                           : most);
-    const double margin_scaled = judged.uncertainty(k);
-    judged.uncertainty(k) = std::ldexp(margin_scaled, back + exponent);
-    const bool continuous = domain == TimeDomain::continuous;
-    const double by = excess(continuous ? system.values(k) : judged.values(k), domain);
-    const double margin = continuous ? margin_scaled : judged.uncertainty(k);
-    judged.verdicts.push_back(by < -margin  ? Stability::stable
-                              : by > margin ? Stability::unstable
-                                            : Stability::marginal);
+  const std::vector<MatrixXd> blocks = spectral_blocks(A);
+  Index done = 0;
+  for (const MatrixXd& block : blocks) {
+    if (!judge_block(block, domain, blur, exponent, judged, done)) {
+      judged.converged = false;
+      return judged;
+    }
+    done += block.rows();
   }
+  const bool marginal = std::find(judged.verdicts.begin(), judged.verdicts.end(),
+                                  Stability::marginal) != judged.verdicts.end();
+  const auto [balanced, back] = marginal ? in_units(A) : InUnits{};
+  const auto value = [&](Index k) {
+    return Complex(std::ldexp(judged.of_A(k).real(), -back),
+                   std::ldexp(judged.of_A(k).imag(), -back));
+  };
   for (Index k = 0; k < n; ++k) {
     const Stability verdict = judged.verdicts[static_cast<std::size_t>(k)];
     if (verdict == Stability::unstable) {
@@ -161,9 +198,9 @@ JudgedEigenvalues judged_eigenvalues(const MatrixRef& A, TimeDomain domain, doub
     const double near = 100.0 * std::sqrt(epsilon) * balanced.norm();
     Complex mean = 0.0;
     for (Index j = 0; j < n; ++j) {
-      if (std::abs(system.values(j) - system.values(k)) <= near) {
+      if (std::abs(value(j) - value(k)) <= near) {
         ++same;
-        mean += system.values(j);
+        mean += value(j);
       }
     }
     if (same == 1) {

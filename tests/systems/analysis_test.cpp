@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -159,6 +161,42 @@ TEST(Analysis, LyapunovCertificateDecides) {
       EXPECT_LE(-x.squaredNorm(), -certificate->decay_rate * x.dot(P * x) * (1.0 - 1e-9));
     }
   }
+}
+
+/// The poles of A, the slowest first.
+std::vector<double> real_poles(const MatrixXd& A) {
+  std::vector<double> poles;
+  const auto analysis = analyze_modes(A, TimeDomain::continuous).value();
+  for (const Mode& mode : analysis.modes) {
+    EXPECT_EQ(mode.stability, Stability::stable);
+    poles.push_back(mode.pole.real());
+  }
+  return poles;
+}
+
+// Blocks with the poles -1, -2 and -f, -2f, f = 1e50: apart, one driving the other, and both; the
+// last moves the slow ones by 1/f.
+TEST(Analysis, PartsFarApart) {
+  const double f = 1e50;
+  Eigen::Matrix2d block;
+  block << 0.0, 1.0, -2.0, -3.0;
+  Eigen::Matrix2d across;
+  across << 0.3, -1.0, 2.0, 0.7;
+  for (const auto& [up, down] : {std::pair{0.0, 0.0}, {1.0, 0.0}, {0.0, 1.0}, {1.0, 1.0}}) {
+    MatrixXd A(4, 4);
+    A << block, up * across, down * across, f * block;
+    const auto poles = real_poles(A);
+    EXPECT_NEAR(poles[0], -1.0, 1e-14) << up << down;
+    EXPECT_NEAR(poles[1], -2.0, 1e-14) << up << down;
+    EXPECT_NEAR(poles[2] / f, -1.0, 1e-14) << up << down;
+    EXPECT_NEAR(poles[3] / f, -2.0, 1e-14) << up << down;
+  }
+  // The states in turn, and between them a coupling that moves the slow pole: -3 + 1.
+  MatrixXd A(2, 2);
+  A << -3.0, 1e25, 1e25, -1e50;
+  const auto poles = real_poles(A);
+  EXPECT_NEAR(poles[0], -2.0, 1e-14);
+  EXPECT_NEAR(poles[1] / f, -1.0, 1e-14);
 }
 
 TEST(Analysis, Errors) {

@@ -59,7 +59,8 @@ struct OrthogonalTriangular {
 /// LAPACK's xGEBAL without its permutations). All ones where that does not lower the 1-norm.
 [[nodiscard]] Eigen::VectorXd balance_of(const MatrixRef& A);
 
-/// The eigenvalues of A, after balancing; all NaN where the QR iteration did not converge.
+/// The eigenvalues of A, after balancing, of its `spectral_blocks` one by one; all NaN where the QR
+/// iteration did not converge.
 [[nodiscard]] Eigen::VectorXcd eigenvalues_of(const MatrixRef& A);
 [[nodiscard]] Eigen::VectorXcd eigenvalues_of_complex(const ComplexMatrixRef& A);
 

@@ -6,6 +6,7 @@
 
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
+#include "math/dense/spectral_blocks.hpp"
 
 namespace flyball::detail {
 
@@ -44,15 +45,22 @@ Eigensystem eigensystem_of(const MatrixRef& A) {
 }
 
 Eigen::VectorXcd eigenvalues_of(const MatrixRef& A) {
-  if (A.rows() == 0) {
-    return {};
+  Eigen::VectorXcd values(A.rows());
+  Eigen::Index done = 0;
+  for (const MatrixXd& block : spectral_blocks(A)) {
+    const Eigen::Index n = block.rows();
+    if (n == 0) {
+      continue;
+    }
+    const Balanced balanced(block);
+    Eigen::EigenSolver<MatrixXd> solver(n);
+    if (!balanced.M.allFinite() || solver.compute(balanced.M, false).info() != Eigen::Success) {
+      return Eigen::VectorXcd::Constant(A.rows(), std::numeric_limits<double>::quiet_NaN());
+    }
+    values.segment(done, n) = times_power(solver.eigenvalues(), balanced.unit);
+    done += n;
   }
-  const Balanced balanced(A);
-  Eigen::EigenSolver<MatrixXd> solver(A.rows());
-  if (!balanced.M.allFinite() || solver.compute(balanced.M, false).info() != Eigen::Success) {
-    return Eigen::VectorXcd::Constant(A.rows(), std::numeric_limits<double>::quiet_NaN());
-  }
-  return times_power(solver.eigenvalues(), balanced.unit);
+  return values;
 }
 
 SymmetricEigensystem symmetric_eigensystem_of(const MatrixRef& S) {
