@@ -7,6 +7,7 @@
 
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/ordinary_units.hpp"
 #include "math/extended/double_double.hpp"
 #include "systems/balance.hpp"
 #include "systems/gramian_factor.hpp"
@@ -156,7 +157,12 @@ template <class System>
 Expected<BalancedRealization<Continuous>> truncate(const System& given, TimeDomain domain,
                                                    Index order, bool all, std::string_view where) {
   FLYBALL_CHECK(check_system(given, where));
-  const Continuous system{given.A, given.B, given.C, given.D};
+  // Inputs and outputs in units in which their squares are doubles: T = T' 2^((b - c)/2).
+  const int b = detail::unit_of(given.B);
+  int c = detail::unit_of(given.C);
+  c += (b - c) % 2;
+  const Continuous system{given.A, detail::times_power(given.B, -b),
+                          detail::times_power(given.C, -c), given.D};
   const Index n = system.A.rows();
   FLYBALL_TRY(auto factors, detail::gramian_factors(system, domain, where));
   const detail::SingularValues svd =
@@ -186,10 +192,31 @@ Expected<BalancedRealization<Continuous>> truncate(const System& given, TimeDoma
   found.T_inverse = root.asDiagonal() *
                     product(svd.U.leftCols(r).transpose(), factors.observability.transpose()) *
                     factors.states.cwiseInverse().asDiagonal();
-  found.hankel = svd.values;
-  found.error_bound = 2.0 * svd.values.tail(n - r).sum();
+  if (r == n) {
+    // The smallest states' rows of T⁻¹ are sums that cancel: to the last digit.
+    const auto inverse =
+        detail::solve(detail::DoubleDoubleMatrix(found.T), detail::DoubleDoubleMatrix::identity(n));
+    if (inverse && inverse->all_finite()) {
+      found.T_inverse = inverse->rounded();
+    }
+  }
+  found.hankel = detail::times_power(svd.values, b + c);
+  found.error_bound = 2.0 * found.hankel.tail(n - r).sum();
   found.system = {product(found.T_inverse, product(system.A, found.T)),
-                  product(found.T_inverse, system.B), product(system.C, found.T), system.D};
+                  detail::times_power(product(found.T_inverse, system.B), (b + c) / 2),
+                  detail::times_power(product(system.C, found.T), (b + c) / 2), system.D};
+  found.T = detail::times_power(found.T, (b - c) / 2);
+  found.T_inverse = detail::times_power(found.T_inverse, (c - b) / 2);
+  const double left =
+      r < n ? 0.0
+            : (product(found.T_inverse, found.T) - MatrixXd::Identity(r, r)).cwiseAbs().maxCoeff() /
+                  product(found.T_inverse.cwiseAbs(), found.T.cwiseAbs()).maxCoeff();
+  if (!found.system.A.allFinite() || !found.system.B.allFinite() || !found.system.C.allFinite() ||
+      !found.hankel.allFinite() || !(left <= 1e-11)) {
+    return refusal(SystemError::no_convergence, where, "the transform")
+        .got("beyond the range of doubles")
+        .hint("measure inputs, outputs and states in units in which the entries are near one");
+  }
   return found;
 }
 

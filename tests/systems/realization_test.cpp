@@ -1,6 +1,7 @@
 #include <flyball/systems/realization.hpp>
 
 #include <cmath>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -211,6 +212,22 @@ TEST(Realization, EdgesAndErrors) {
   EXPECT_TRUE(observable_canonical_form(wide).error().is(ArgumentError::wrong_shape));
   EXPECT_TRUE(minimal_realization(wide, 1.0).error().is(ArgumentError::out_of_range));
   EXPECT_TRUE(minimal_realization(ContinuousSystem<>{}).error().is(ArgumentError::empty));
+}
+
+// dx/dt = -x + b u, y = c x: the Hankel singular value |bc|/2 and the transform √(b/c), with b, c
+// whose squares are no doubles.
+TEST(BalancedRealization, OfSignalsInFarUnits) {
+  const auto scalar = [](double x) { return Eigen::MatrixXd::Constant(1, 1, x); };
+  for (const auto& [b, c] :
+       {std::pair{0x1p-600, 0x1p900}, {0x1p-900, 0x1p-101}, {0x1p1000, 0x1p-3}}) {
+    const auto found =
+        balanced_realization(ContinuousSystem<>{scalar(-1.0), scalar(b), scalar(c), scalar(0.0)});
+    ASSERT_TRUE(found.has_value()) << b << ' ' << c << ' ' << to_string(found.error());
+    EXPECT_NEAR(found->hankel(0) / (0.5 * b * c), 1.0, 1e-14);
+    EXPECT_NEAR(found->T(0, 0) / std::sqrt(b) * std::sqrt(c), found->T(0, 0) > 0.0 ? 1.0 : -1.0,
+                1e-14);
+    EXPECT_NEAR(found->T(0, 0) * found->T_inverse(0, 0), 1.0, 1e-14);
+  }
 }
 
 }  // namespace
