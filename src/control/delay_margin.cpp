@@ -39,12 +39,22 @@ class DelayMargin {
   // last whole period before the limit is known at once; within it the crossover is followed.
   [[nodiscard]] double find(const std::vector<double>& crossovers,
                             const SampledLoop& sampled) const {
-    double margin = infinity;
+    struct Start {
+      double theta, lag, whole;
+    };
+    std::vector<Start> starts;
     for (const double theta : crossovers) {
       const double lag = lag_to_minus_one(sampled.response(theta));
-      const double whole = std::floor(lag / theta);
-      if (whole * period_ < margin) {
-        margin = std::min(margin, within_period(theta, lag, whole));
+      if (std::isfinite(lag)) {
+        starts.push_back({theta, lag, std::floor(lag / theta)});
+      }
+    }
+    std::sort(starts.begin(), starts.end(),
+              [](const Start& a, const Start& b) { return a.whole < b.whole; });
+    double margin = infinity;
+    for (const Start& start : starts) {
+      if (start.whole * period_ < margin) {
+        margin = std::min(margin, within_period(start.theta, start.lag, start.whole));
       }
     }
     return agrees(margin) ? margin : scan(margin);
@@ -118,7 +128,7 @@ class DelayMargin {
       return stable(0.5 * period_) && stable(3.7 * period_);
     }
     // Eigenvalues of a loop with hundreds of stored inputs would cost more than they confirm.
-    constexpr double most_stored = 150.0;
+    constexpr double most_stored = 64.0;
     if (margin + loop_.delay.si() > most_stored * period_) {
       return true;
     }
@@ -135,7 +145,11 @@ class DelayMargin {
     // Further, each step is an eigenvalue problem of as many stored inputs as periods.
     const double most = std::min(1.01 * guess, 32.0 * period_);
     const double step = period_ / 16.0;
-    for (double from = 0.0; from < most; from += step) {
+    constexpr double most_work = 1e7;  // Of n³ for n states.
+    double work = 0.0;
+    for (double from = 0.0; from < most && work < most_work; from += step) {
+      const double stored = (loop_.delay.si() + from) / period_;
+      work += std::pow(static_cast<double>(loop_.A.rows() + loop_.A_c.rows()) + stored, 3.0);
       if (!stable(from + step)) {
         double low = from;
         double high = from + step;

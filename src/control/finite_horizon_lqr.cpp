@@ -56,14 +56,18 @@ Expected<void> check_plant(const MatrixRef& A, const MatrixRef& B, std::string_v
       .finite(B, "B");
 }
 
-Expected<void> check_steps(std::size_t steps, Eigen::Index n, std::string_view where) {
-  constexpr double most_entries = 1e7;
-  if (steps >= 1 && static_cast<double>(steps) * static_cast<double>(n * n) <= most_entries) {
+/// What is kept a step and what it takes beside, as numbers, bounds memory and time.
+Expected<void> check_steps(std::size_t steps, Eigen::Index n, Eigen::Index m,
+                           std::string_view where) {
+  constexpr double most_numbers = 1e7;
+  constexpr double beside = 64.0;
+  const double a_step = static_cast<double>(n * n + n * m) + beside;
+  if (steps >= 1 && static_cast<double>(steps) * a_step <= most_numbers) {
     return {};
   }
   return refusal(ArgumentError::out_of_range, where, "steps")
       .got(detail::format("{}", steps))
-      .expected(detail::format("from 1 to {:.0f}", most_entries / static_cast<double>(n * n)));
+      .expected(detail::format("from 1 to {:.0f}", std::floor(most_numbers / a_step)));
 }
 
 Refusal not_definite(std::string_view where, std::string_view what, std::size_t step) {
@@ -175,7 +179,7 @@ Expected<FiniteHorizonLqr> finite_horizon_lqr(const MatrixRef& A, const MatrixRe
   constexpr std::string_view where = "finite_horizon_lqr";
   FLYBALL_CHECK(check_plant(A, B, where));
   const auto count = static_cast<std::size_t>(std::max(steps, 0));
-  FLYBALL_CHECK(check_steps(count, A.rows(), where));
+  FLYBALL_CHECK(check_steps(count, A.rows(), B.cols(), where));
   const DiscretizedMatrices plant{A, B};
   return check_weights(cost, S_N, A.rows(), B.cols(), where).and_then([&](const Weights& weights) {
     return recursion([&](std::size_t) -> const DiscretizedMatrices& { return plant; }, count,
@@ -191,7 +195,7 @@ Expected<FiniteHorizonLqr> finite_horizon_lqr(std::span<const DiscretizedMatrice
   }
   const Eigen::Index n = plants.front().A.rows();
   const Eigen::Index m = plants.front().B.cols();
-  FLYBALL_CHECK(check_steps(plants.size(), n, where));
+  FLYBALL_CHECK(check_steps(plants.size(), n, m, where));
   for (const DiscretizedMatrices& plant : plants) {
     FLYBALL_CHECK(check_plant(plant.A, plant.B, where));
     FLYBALL_CHECK(Checks(where)
@@ -213,7 +217,7 @@ Expected<FiniteHorizonLqr> continuous_finite_horizon_lqr(const MatrixRef& A, con
   const Eigen::Index n = A.rows();
   const auto count = static_cast<std::size_t>(std::max(steps, 0));
   FLYBALL_CHECK(Checks(where).positive(horizon.si(), "horizon", "s").also([&] {
-    return check_steps(count, n, where);
+    return check_steps(count, n, B.cols(), where);
   }));
   FLYBALL_TRY(auto weights, check_weights(cost, S_T, n, B.cols(), where));
   if (!detail::cholesky_of(weights.R)) {

@@ -7,6 +7,7 @@
 
 #include <flyball/math/search/minimum.hpp>
 #include <flyball/math/search/roots.hpp>
+#include <flyball/systems/system_error.hpp>
 
 #include "control/delay_margin.hpp"
 #include "control/sampled_loop.hpp"
@@ -31,7 +32,7 @@ struct Point {
 
 // Frequencies at which L is looked at first: all decades, every turn of the delay's phase, and the
 // neighbourhood of each pole.
-std::vector<double> first_grid(const SampledLoop& loop) {
+std::vector<double> first_grid(const SampledLoop& loop, const Eigen::VectorXcd& closed_poles) {
   std::vector<double> grid;
   constexpr int decades = 9;
   constexpr int a_decade = 32;
@@ -42,11 +43,8 @@ std::vector<double> first_grid(const SampledLoop& loop) {
   for (int i = 1; i < turns; ++i) {
     grid.push_back(pi * i / turns);
   }
-  const auto around = [&](const Eigen::MatrixXd& M) {
-    if (M.rows() == 0) {
-      return;
-    }
-    for (const Complex& pole : detail::eigenvalues_of(M)) {
+  const auto around = [&](const Eigen::VectorXcd& poles) {
+    for (const Complex& pole : poles) {
       const double angle = std::abs(std::arg(pole));
       const double width = std::abs(std::log(std::max(std::abs(pole), 1e-3)));
       for (int k = -4; k <= 3; ++k) {
@@ -56,9 +54,9 @@ std::vector<double> first_grid(const SampledLoop& loop) {
       }
     }
   };
-  around(loop.A());
-  around(loop.A_c());
-  around(loop.closed(1.0));
+  around(detail::eigenvalues_of(loop.A()));
+  around(detail::eigenvalues_of(loop.A_c()));
+  around(closed_poles);
   std::erase_if(grid, [](double theta) { return !(theta > 1e-9 && theta <= pi); });
   std::sort(grid.begin(), grid.end());
   grid.erase(
@@ -67,13 +65,21 @@ std::vector<double> first_grid(const SampledLoop& loop) {
   return grid;
 }
 
-// L on a grid so fine that between two points neither gain nor phase nor 1 + L turns far.
-std::vector<Point> sample(const SampledLoop& loop) {
+// L on a grid so fine that between two points neither gain nor phase nor 1 + L turns far. Each pole
+// and zero of it turns L through a few hundred points, each period of delay through forty: where
+// more are needed L is rounding, and nothing is answered.
+std::optional<std::vector<Point>> sample(const SampledLoop& loop,
+                                         const Eigen::VectorXcd& closed_poles) {
   constexpr double turn = 0.15;
-  constexpr std::size_t most_points = 60000;
+  constexpr double to_start_with = 10000.0;
+  constexpr double a_state = 500.0;
+  constexpr double a_period = 64.0;
+  const auto most_points =
+      static_cast<std::size_t>(to_start_with + a_period * loop.whole_delays() +
+                               a_state * static_cast<double>(loop.A().rows() + loop.A_c().rows()));
   std::vector<Point> points;
   std::vector<Point> pending;
-  const std::vector<double> grid = first_grid(loop);
+  const std::vector<double> grid = first_grid(loop, closed_poles);
   points.push_back({grid.front(), loop.response(grid.front())});
   for (std::size_t i = 1; i < grid.size(); ++i) {
     pending.push_back({grid[i], loop.response(grid[i])});
@@ -84,7 +90,10 @@ std::vector<Point> sample(const SampledLoop& loop) {
       const Complex distance = (1.0 + to.L) / (1.0 + from.L);
       const bool coarse = std::abs(std::arg(ratio)) > turn || std::abs(log_gain(ratio)) > turn ||
                           std::abs(std::arg(distance)) > turn;
-      if (coarse && to.theta - from.theta > 1e-12 * to.theta && points.size() < most_points) {
+      if (coarse && to.theta - from.theta > 1e-12 * to.theta) {
+        if (points.size() + pending.size() > most_points) {
+          return std::nullopt;
+        }
         const double middle = 0.5 * (from.theta + to.theta);
         pending.push_back({middle, loop.response(middle)});
       } else {
@@ -193,10 +202,19 @@ Expected<StabilityMargins> stability_margins(const PlantInputLoop& loop) {
   FLYBALL_TRY(auto sampled, SampledLoop::create(loop));
   const double period = loop.period.si();
   StabilityMargins margins;
-  margins.spectral_radius = detail::spectral_radius(sampled.closed(1.0));
+  const Eigen::VectorXcd closed_poles = detail::eigenvalues_of(sampled.closed(1.0));
+  margins.spectral_radius = closed_poles.size() == 0 ? 0.0 : closed_poles.cwiseAbs().maxCoeff();
   margins.stable = margins.spectral_radius < 1.0;
 
-  const std::vector<Point> points = sample(sampled);
+  const auto sampled_points = sample(sampled, closed_poles);
+  if (!sampled_points) {
+    return refusal(SystemError::no_convergence, "stability_margins", "the loop's response")
+        .got("rounding: it turns between any two frequencies")
+        .hint(
+            "measure states and outputs in units in which the entries of A, B, C and K are near "
+            "one");
+  }
+  const std::vector<Point>& points = *sampled_points;
   const std::vector<double> gain_crossovers = zeros(sampled, points, log_gain);
   for (const double theta : gain_crossovers) {
     margins.gain_crossovers.push_back(crossover(theta, sampled.response(theta), period));

@@ -27,7 +27,7 @@ std::vector<Field> answered_system(std::string_view states, std::string_view inp
 }
 
 Outcome check_size(double numbers, std::string_view where, std::string_view about) {
-  constexpr double most = 2e7;
+  constexpr double most = 5e6;
   if (numbers <= most) {
     return {};
   }

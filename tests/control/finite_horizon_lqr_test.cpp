@@ -185,6 +185,9 @@ TEST(FiniteHorizonLqr, Errors) {
   EXPECT_TRUE(finite_horizon_lqr(I, B, cost, I, 0).error().is(ArgumentError::out_of_range));
   EXPECT_TRUE(
       finite_horizon_lqr(I, B, cost, I, 100'000'000).error().is(ArgumentError::out_of_range));
+  EXPECT_EQ(finite_horizon_lqr(r, r, {r, r, {}}, r, 100'000).value().K.size(), 100'000U);
+  EXPECT_TRUE(
+      finite_horizon_lqr(r, r, {r, r, {}}, r, 1'000'000).error().is(ArgumentError::out_of_range));
   EXPECT_TRUE(finite_horizon_lqr(I, B, cost, r, 2).error().is(ArgumentError::wrong_shape));
   EXPECT_TRUE(finite_horizon_lqr(I, B, {I, I, {}}, I, 2).error().is(ArgumentError::wrong_shape));
   EXPECT_TRUE(finite_horizon_lqr(I, B, cost, bryson({0.0, 1.0}), 2)

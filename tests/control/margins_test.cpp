@@ -294,6 +294,26 @@ TEST(StabilityMargins, AnUnstableLoopHasNone) {
   EXPECT_EQ(margins.disk_margin, 0.0);
 }
 
+// An observer whose correction is 1e20 times itself: what L is, rounding decides, at each frequency
+// anew. That ends.
+TEST(StabilityMargins, RefusesAResponseThatIsRounding) {
+  const Eigen::MatrixXd A = Eigen::MatrixXd::Zero(6, 6);
+  Eigen::MatrixXd B = Eigen::MatrixXd::Zero(6, 1);
+  B(0, 0) = -1.1;
+  Eigen::RowVectorXd row(6);
+  row << 0.5, 1e-8, 1.8, 1.0, 2.0, -1e20;
+  const Eigen::MatrixXd C = row.replicate(2, 1);
+  Eigen::RowVectorXd K(6);
+  K << -1.6e8, -1.7e8, 6.5e7, 2.2e-8, -1.9e8, -1e-8;
+  const Eigen::MatrixXd K_e = Eigen::RowVector2d(2.2e-16, 1.7).replicate(6, 1);
+  const Time period(1e-300);
+  const auto model = discretize(ContinuousSystem<>{A, B, C, Eigen::MatrixXd::Zero(2, 1)}, period);
+  const auto loop = observer_regulator_loop(A, B, C, model.value(), K, K_e, Time(0.0)).value();
+  const auto margins = stability_margins(loop);
+  ASSERT_FALSE(margins.has_value());
+  EXPECT_TRUE(margins.error().is(SystemError::no_convergence));
+}
+
 TEST(StabilityMargins, Errors) {
   auto loop = state_feedback_loop(scalar(-1.0), scalar(1.0), scalar(0.5), 10_ms, 0_ms).value();
   EXPECT_TRUE(

@@ -100,7 +100,7 @@ TEST(SolveSystems, Responses) {
       answer("step-response", R"({"A":[[-1]],"B":[[1]],"T":0.5,"samples":20000000})");
   EXPECT_EQ(large.at("error").at("message"),
             "step-response: samples is so large that 4e+07 numbers are answered; it must be such "
-            "that at most 20000000 are");
+            "that at most 5000000 are");
   // Six time constants where nothing is said.
   const Json chosen = answer("step-response", R"({"A":[[-2]],"B":[[1]]})");
   EXPECT_NEAR(chosen.at("time").back().get<double>(), 3.0, 1e-12);

@@ -25,7 +25,7 @@ struct FiniteHorizonLqr {
 ///
 /// @param A  n x n. @param B  n x m. @param cost  Q, R and N; an N of no size is zero.
 /// @param S_N  n x n, symmetric, the weight of what is left at the end. @param steps  >= 1.
-/// @errors ArgumentError for shapes, entries, asymmetry and steps out of 1 … 10⁷ entries of S;
+/// @errors ArgumentError for shapes, entries, asymmetry and steps out of 1 … 10⁷/(n² + nm + 64);
 ///         RiccatiError::singular with the step at which R + BᵀSB is not positive definite.
 /// Cost: O(n³) a step. Source: book, section 7.7.2 and appendix B.1; Bryson and Ho, "Applied
 /// Optimal Control" (1975), section 2.3.

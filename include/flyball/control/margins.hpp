@@ -75,8 +75,10 @@ struct StabilityMargins {
 /// that follows poles, zeros and phase, crossings and extrema refined to 1e-12; stability and the
 /// delay margin's limit from the closed loop's eigenvalues.
 ///
-/// @errors ArgumentError for a malformed loop or one with a feedthrough; those of `expm`.
-/// Cost: some thousand evaluations of L; about a millisecond for two states.
+/// @errors ArgumentError for a malformed loop or one with a feedthrough; those of `expm`;
+///         SystemError::no_convergence where the response is nothing but rounding.
+/// Cost: some thousand evaluations of L, at most 10 000, 500 a state and 64 a period of delay more;
+/// about a millisecond for two states.
 /// Source: book, section 7.7.2 (phase margin of the LQR); Seiler, Packard and Gahinet, "An
 /// introduction to disk margins", IEEE Control Systems Magazine 40 (2020).
 [[nodiscard]] Expected<StabilityMargins> stability_margins(const PlantInputLoop& loop);
