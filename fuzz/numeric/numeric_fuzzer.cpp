@@ -24,18 +24,20 @@
 namespace flyball::fuzz {
 namespace {
 
-constexpr double longest_answer = 2.0;     ///< s
-constexpr long most_memory = 1024 * 1024;  ///< KiB
+#if defined(__has_feature)
+#define FLYBALL_FUZZ_SANITIZED __has_feature(address_sanitizer)
+#elif defined(__SANITIZE_ADDRESS__)
+#define FLYBALL_FUZZ_SANITIZED 1
+#else
+#define FLYBALL_FUZZ_SANITIZED 0
+#endif
 
-/// Kinds of which some answers miss an equation by more than 1e-10; docs/fuzzing.md says how many.
-constexpr std::string_view open_kinds[] = {"dare",
-                                           "care",
-                                           "logm",
-                                           "powm",
-                                           "balanced-realization",
-                                           "similarity-transform",
-                                           "plant-inversion",
-                                           "kalman"};
+/// The address sanitizer takes five times as long, and keeps what is freed.
+constexpr double longest_answer = FLYBALL_FUZZ_SANITIZED ? 10.0 : 2.0;                      ///< s
+constexpr long most_memory = FLYBALL_FUZZ_SANITIZED ? 4L * 1024 * 1024 : 1L * 1024 * 1024;  ///< KiB
+
+/// Kinds of which some answers miss an equation by more than 1e-10; see docs/fuzzing.md.
+constexpr std::string_view open_kinds[] = {"dare", "care", "logm", "powm"};
 
 bool is_open(const solve::Kind& kind) {
   return std::find(std::begin(open_kinds), std::end(open_kinds), kind.name) != std::end(open_kinds);
@@ -47,13 +49,14 @@ struct Options {
   std::uint64_t seed = 1;
   std::string kind{};  ///< Empty: all.
   bool strict = false;
+  double longest = longest_answer;  ///< s
   std::size_t shown = 3;
   bool verbose = false;
 };
 
 constexpr const char* usage =
     "usage: numeric_fuzzer [--problems N] [--first N] [--seed N] [--kind NAME] [--shown N] "
-    "[--strict] [--verbose]\n"
+    "[--longest SECONDS] [--strict] [--verbose]\n"
     "Equations of kinds that are still open fail the run only if it is --strict.\n"
     "Problem N of a seed is the same in every run: --first N --problems 1 makes it again.\n";
 
@@ -80,6 +83,8 @@ bool read(int argc, char** argv, Options& options) {
       options.seed = std::strtoull(value, nullptr, 10);
     } else if (name == "--shown") {
       options.shown = std::strtoull(value, nullptr, 10);
+    } else if (name == "--longest") {
+      options.longest = std::strtod(value, nullptr);
     } else if (name == "--kind") {
       options.kind = value;
     } else {
@@ -152,8 +157,8 @@ class Run {
     Tally& tally = tallies_[std::string(kind.name)];
     ++tally.problems;
     tally.slowest = std::max(tally.slowest, took);
-    if (took > longest_answer) {
-      violation(kind, index, "answered within 2 s", took);
+    if (took > options_.longest) {
+      violation(kind, index, "answered in time", took);
     }
     const nlohmann::json read = nlohmann::json::parse(answer.json);
     if (options_.verbose) {
@@ -250,7 +255,7 @@ int run(const Options& options) {
     good = false;
   }
   if (used.ru_maxrss > most_memory) {
-    std::printf("more memory than 1 GiB\n");
+    std::printf("more memory than %ld MiB\n", most_memory / 1024);
     good = false;
   }
   return good ? 0 : 1;
