@@ -47,7 +47,8 @@ class Laws {
   /// Every answered pole is an eigenvalue of M, and together they are as large as its diagonal.
   void eigenvalues(const Balance& M) {
     const int n = M.value.rows();
-    const Quad scale = M.terms.largest();
+    // Poles are rounded to doubles, of which the smallest are not dense; see `answered`.
+    const Quad scale = M.terms.largest() + Quad(std::numeric_limits<double>::denorm_min()) * 1e10;
     double worst = 0.0;
     Quad sum = 0;
     for (const json& pole : answer_.at("poles")) {

@@ -19,11 +19,15 @@ std::optional<FilterUpdate> update_of(const DoubleDoubleMatrix& P, const DoubleD
     return std::nullopt;
   }
   DoubleDoubleMatrix gain = K->transpose();
-  // Not P - K C P, of which nothing is left where a measurement takes away 30 digits.
-  const DoubleDoubleMatrix rest =
-      add_product(DoubleDoubleMatrix::identity(P.rows()), -1.0, gain, C);
-  DoubleDoubleMatrix posterior = symmetrized(add_product(
-      product(product(rest, P), rest.transpose()), 1.0, product(gain, R), gain.transpose()));
+  DoubleDoubleMatrix posterior = symmetrized(add_product(P, -1.0, gain, CP));
+  // Nothing is left of that where a measurement takes away most of its digits.
+  constexpr double cancels = 1e-15;
+  if ((posterior.hi.diagonal().array() < cancels * P.hi.diagonal().array()).any()) {
+    const DoubleDoubleMatrix rest =
+        add_product(DoubleDoubleMatrix::identity(P.rows()), -1.0, gain, C);
+    posterior = symmetrized(add_product(product(product(rest, P), rest.transpose()), 1.0,
+                                        product(gain, R), gain.transpose()));
+  }
   return FilterUpdate{std::move(gain), std::move(posterior)};
 }
 

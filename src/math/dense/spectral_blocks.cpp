@@ -132,7 +132,8 @@ std::optional<Decoupled> decoupled(const MatrixXd& M) {
   for (int step = 0; step < most_steps; ++step) {
     const DoubleDoubleMatrix slow = add_product(S, -1.0, X, across);
     const auto next = solve(F.transpose(), add_product(back, 1.0, slow, X).transpose());
-    if (!next || !next->all_finite()) {
+    // A large X is of another solution, or of an F that is nearly singular.
+    if (!next || !next->all_finite() || !(next->norm() < 1.0)) {
       return std::nullopt;
     }
     const DoubleDoubleMatrix moved = sum(next->transpose(), -1.0, X);
