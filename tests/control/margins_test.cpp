@@ -13,6 +13,7 @@
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/mechanisms/flywheel.hpp>
 #include <flyball/systems/input_delay.hpp>
+#include <flyball/systems/system_error.hpp>
 
 #include "control/regulated_plant.hpp"
 
