@@ -21,6 +21,17 @@ if(FLYBALL_SANITIZER)
   target_compile_options(flyball_options INTERFACE -fsanitize=${FLYBALL_SANITIZER}
                                                    -fno-omit-frame-pointer -fno-sanitize-recover=all)
   target_link_options(flyball_options INTERFACE -fsanitize=${FLYBALL_SANITIZER})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    target_compile_options(
+      flyball_options
+      INTERFACE -fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/cmake/sanitizer-ignorelist.txt)
+    if(FLYBALL_SANITIZER MATCHES fuzzer)
+      target_compile_options(
+        flyball_options
+        INTERFACE -fsanitize-coverage-ignorelist=${PROJECT_SOURCE_DIR}/cmake/coverage-ignorelist.txt
+      )
+    endif()
+  endif()
 endif()
 
 set_property(GLOBAL PROPERTY FLYBALL_DOMAINS "")

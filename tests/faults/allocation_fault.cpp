@@ -1,14 +1,10 @@
 #include <cerrno>
 
 #include "faults/allocation_fault.hpp"
+#include "support/sanitizer.hpp"
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if defined(__GLIBC__) && !FLYBALL_SANITIZED
 #define FLYBALL_INJECTS_FAULTS 1
-#endif
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#undef FLYBALL_INJECTS_FAULTS
-#endif
 #endif
 
 namespace flyball::test {
