@@ -20,6 +20,14 @@ using detail::NamedUnit;
 using detail::units;
 using enum Dimension;
 
+std::string_view trim(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t\r\n");
+  if (first == std::string_view::npos) {
+    return {};
+  }
+  return text.substr(first, text.find_last_not_of(" \t\r\n") - first + 1);
+}
+
 void replace_all(std::string& text, std::string_view from, std::string_view to) {
   for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at)) {
     text.replace(at, from.size(), to);
@@ -27,12 +35,19 @@ void replace_all(std::string& text, std::string_view from, std::string_view to) 
   }
 }
 
+char lower(char c) {
+  return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+}
+
 std::string lower(std::string_view text) {
   std::string out(text);
-  std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : static_cast<char>(c);
-  });
+  std::transform(out.begin(), out.end(), out.begin(), [](char c) { return lower(c); });
   return out;
+}
+
+bool is_lower_case_of(std::string_view folded, std::string_view text) {
+  return std::equal(folded.begin(), folded.end(), text.begin(), text.end(),
+                    [](char a, char b) { return a == lower(b); });
 }
 
 // One spelling for "kg·m²", "kg m^2", "kg*m**2" and "Rotations per Second".
@@ -79,27 +94,6 @@ bool has_milli_prefix(const NamedUnit& unit) {
   return (symbol >= 'A' && symbol <= 'Z') || symbol >= 0x80;
 }
 
-const NamedUnit* find_unit(std::string_view text) {
-  const std::string exact = canonical(text);
-  const auto match = [&](const std::string& wanted, bool fold) -> const NamedUnit* {
-    const auto found = std::find_if(units.begin(), units.end(), [&](const NamedUnit& unit) {
-      if (fold && exact.starts_with('M') && has_milli_prefix(unit)) {
-        return false;
-      }
-      return fold ? lower(unit.text) == wanted : unit.text == wanted;
-    });
-    return found == units.end() ? nullptr : &*found;
-  };
-  if (const NamedUnit* unit = match(exact, false)) {
-    return unit;
-  }
-  const std::string folded = lower(exact);
-  if (const NamedUnit* unit = match(folded, true)) {
-    return unit;
-  }
-  return match(singular(folded), true);
-}
-
 /// @param of  The dimension that is wanted; any if it is not known.
 std::string nearest_unit(std::string_view text, std::optional<Dimension> of = std::nullopt) {
   std::vector<std::string_view> names;
@@ -142,14 +136,6 @@ constexpr DimensionTexts texts_of(Dimension dimension) {
   return index < std::size(dimension_texts) ? dimension_texts[index] : DimensionTexts{};
 }
 
-std::string_view trim(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t\r\n");
-  if (first == std::string_view::npos) {
-    return {};
-  }
-  return text.substr(first, text.find_last_not_of(" \t\r\n") - first + 1);
-}
-
 std::string article(Dimension dimension) {
   const std::string_view name = to_string(dimension);
   const bool vowel = std::string_view("aeiou").find(name.front()) != std::string_view::npos;
@@ -157,6 +143,27 @@ std::string article(Dimension dimension) {
 }
 
 }  // namespace
+
+const NamedUnit* detail::find_unit(std::string_view text) {
+  const std::string exact = canonical(trim(text));
+  const auto match = [&](const std::string& wanted, bool fold) -> const NamedUnit* {
+    const auto found = std::find_if(units.begin(), units.end(), [&](const NamedUnit& unit) {
+      if (fold && exact.starts_with('M') && has_milli_prefix(unit)) {
+        return false;
+      }
+      return fold ? is_lower_case_of(wanted, unit.text) : unit.text == wanted;
+    });
+    return found == units.end() ? nullptr : &*found;
+  };
+  if (const NamedUnit* unit = match(exact, false)) {
+    return unit;
+  }
+  const std::string folded = lower(exact);
+  if (const NamedUnit* unit = match(folded, true)) {
+    return unit;
+  }
+  return match(singular(folded), true);
+}
 
 std::string_view to_string(Dimension dimension) {
   return texts_of(dimension).name;
@@ -167,7 +174,7 @@ std::string_view si_unit(Dimension dimension) {
 }
 
 Expected<Unit> parse_unit(std::string_view text) {
-  if (const NamedUnit* unit = find_unit(trim(text))) {
+  if (const NamedUnit* unit = detail::find_unit(text)) {
     return Unit{unit->dimension, unit->factor};
   }
   const std::string nearest = nearest_unit(text);
@@ -208,8 +215,8 @@ Expected<double> parse_quantity(std::string_view text, Dimension dimension, std:
         .got(detail::format("\"{}\", without a unit", text))
         .expected(expected());
   }
-  auto unit = parse_unit(unit_text);
-  if (!unit) {
+  const NamedUnit* const unit = detail::find_unit(unit_text);
+  if (unit == nullptr) {
     const std::string nearest = nearest_unit(unit_text, dimension);
     return refusal(ArgumentError::wrong_unit, {}, name)
         .got(detail::format("\"{}\", in an unknown unit", text))

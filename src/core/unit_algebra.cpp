@@ -7,6 +7,7 @@
 
 #include "core/format.hpp"
 #include "core/try.hpp"
+#include "core/unit_table.hpp"
 
 namespace flyball {
 
@@ -54,7 +55,7 @@ std::optional<SiUnit> known(std::string_view text) {
   if (symbol != read.end()) {
     return SiUnit{{symbol->exponents}, symbol->factor};
   }
-  if (const auto unit = parse_unit(text); unit && !text.empty()) {
+  if (const auto* const unit = detail::find_unit(text); unit != nullptr && !text.empty()) {
     return SiUnit{si_dimension(unit->dimension), unit->factor};
   }
   return std::nullopt;
@@ -323,7 +324,7 @@ std::string to_text(const SiDimension& dimension) {
 Expected<SiUnit> parse_si_unit(std::string_view text) {
   // As a whole first: "in lb" is a torque by custom, though its parts would be a mass times a
   // length.
-  if (const auto unit = parse_unit(text)) {
+  if (const auto* const unit = detail::find_unit(text)) {
     return SiUnit{si_dimension(unit->dimension), unit->factor};
   }
   return Reader(text).read_all();

@@ -137,4 +137,7 @@ inline constexpr std::array units{
     NamedUnit{"hertz", Dimension::frequency, 1.0},
 };
 
+/// The unit that a text names, in any of its spellings; none if it names none.
+[[nodiscard]] const NamedUnit* find_unit(std::string_view text);
+
 }  // namespace flyball::detail

@@ -14,7 +14,9 @@ std::string shown(std::string_view text, std::size_t at, Character c) {
     return " ";
   }
   if (c.code < 0x20 || c.code == 0x7F || c.code == 0xFFFD) {
-    return detail::format("\\x{:02x}", static_cast<unsigned char>(text[at]));
+    constexpr std::string_view digits = "0123456789abcdef";
+    const auto byte = static_cast<unsigned char>(text[at]);
+    return std::string("\\x") + digits[byte >> 4U] + digits[byte & 15U];
   }
   return std::string(text.substr(at, c.length));
 }
