@@ -58,7 +58,8 @@ double Sensor::read() {
   }
   const auto last = static_cast<long long>(truth_.size() - 1);
   const double now = static_cast<double>(last) * step_;
-  const double refresh = model_.refresh.si();
+  // Far shorter than a record, it is none.
+  const double refresh = model_.refresh.si() >= 1e-6 * step_ ? model_.refresh.si() : 0.0;
   // A refresh that falls on a record happens at it, whatever the rounding of their quotient.
   constexpr double rounding = 1e-9;
   const long long index =

@@ -53,7 +53,8 @@ Expected<Eigen::MatrixXd> discretize(const MatrixRef& A, const ProcessDensity& d
   FLYBALL_TRY(auto Q_d, detail::quadratic_integral(A, Q, T));
   if (!Q_d.allFinite()) {
     return refusal(ArgumentError::not_finite, where, "the discretised Q")
-        .got(detail::format("too large for a double: A grows by more than 1e150 within {} s", T))
+        .got(detail::format(
+            "too large for a double: A T is, or A grows by more than 1e150 within {} s", T))
         .hint("shorten the period");
   }
   return Q_d;

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <limits>
 
 #include <flyball/math/exponential/matrix_exponential.hpp>
 
@@ -15,6 +16,10 @@ Expected<MatrixXd> quadratic_integral(const MatrixRef& F, const MatrixRef& W, do
   const Eigen::VectorXd inverse = d.cwiseInverse();
   const MatrixXd G = inverse.asDiagonal() * F * d.asDiagonal();
   const double norm = norm1(G) * T;
+  if (!std::isfinite(norm)) {
+    return MatrixXd(
+        MatrixXd::Constant(F.rows(), F.cols(), std::numeric_limits<double>::infinity()));
+  }
   const int doublings = norm > 0.5 ? static_cast<int>(std::ceil(std::log2(norm / 0.5))) : 0;
   const double h = std::ldexp(T, -doublings);
 

@@ -67,6 +67,17 @@ TEST(Sensor, HoldsBetweenRefreshes) {
   }
 }
 
+// A refresh that the clock cannot count is none.
+TEST(Sensor, RefreshesOfNoLength) {
+  for (const double refresh : {1e-25, 1e-300, 5e-324}) {
+    Sensor quick = sensor({.refresh = Time(refresh)}, 5e-3);
+    for (int i = 0; i < 5; ++i) {
+      quick.record(i);
+      EXPECT_EQ(quick.read(), i) << refresh;
+    }
+  }
+}
+
 // Noise has its standard deviation, comes once a refresh, and is the same for the same seed.
 TEST(Sensor, NoiseIsSeeded) {
   Sensor noisy = sensor({.noise = 0.3});

@@ -101,6 +101,14 @@ TEST(Discretize, ScalarNoise) {
       2e-6);
 }
 
+// ∫₀ᵀ e^{2at} dt is 1/(2|a|) here, but |a| T has no double.
+TEST(Discretize, NoiseOverAPeriodTooLong) {
+  const Eigen::MatrixXd one = Eigen::MatrixXd::Ones(1, 1);
+  const auto refused = discretize(-1e300 * one, ProcessDensity{one}, Time(1e10));
+  ASSERT_FALSE(refused);
+  EXPECT_TRUE(refused.error().is(ArgumentError::not_finite));
+}
+
 TEST(Discretize, Errors) {
   const Eigen::Matrix2d I = Eigen::Matrix2d::Identity();
   const Eigen::Vector2d B(0.0, 1.0);

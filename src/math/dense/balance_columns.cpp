@@ -36,8 +36,12 @@ void balance_columns(int n, double* A, int ld, double* d) {
       if (row < 2.0 * column && column < 2.0 * row) {
         continue;
       }
+      // Units whose ratio has no double would be none at all.
+      constexpr int widest = 500;
+      const int unit = std::ilogb(d[i]);
       const int exponent =
-          static_cast<int>(std::lround(0.5 * (std::log2(row) - std::log2(column))));
+          std::clamp(static_cast<int>(std::lround(0.5 * (std::log2(row) - std::log2(column)))),
+                     -widest - unit, widest - unit);
       const double f = std::ldexp(1.0, exponent);
       if (exponent == 0 || column * f + row / f > 0.95 * (column + row)) {
         continue;

@@ -182,6 +182,23 @@ TEST(MatrixExponential, HugeEntries) {
   }
 }
 
+// Six steps of one and six of 1e-300 in a ring: units that balance them would lie 1e900 apart. What
+// is not next to nothing is the series of the six, 1/k!.
+TEST(MatrixExponential, BalanceStaysWithinDoubles) {
+  constexpr int n = 12;
+  MatrixXd ring = MatrixXd::Zero(n, n);
+  for (int i = 0; i < n; ++i) {
+    ring((i + 1) % n, i) = i < n / 2 ? 1.0 : 1e-300;
+  }
+  MatrixXd wanted = MatrixXd::Identity(n, n);
+  for (int j = 0; j <= n / 2; ++j) {
+    for (int i = j + 1; i <= n / 2; ++i) {
+      wanted(i, j) = wanted(i - 1, j) / (i - j);
+    }
+  }
+  EXPECT_LE((expm(ring).value() - wanted).cwiseAbs().maxCoeff(), 4e-16);
+}
+
 // A column of zeros leaves that of the identity to the last bit, and a stiff motor's position its
 // digits for any number of squarings: SciPy 1.15 keeps 7e-15 of this one.
 TEST(MatrixExponential, IntegratorBesideStiffModes) {
