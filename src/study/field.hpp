@@ -94,6 +94,16 @@ struct Field {
   std::string_view metavar = {};   ///< What the option takes, if not the dimension's name.
   Subject subject = Subject::any;  ///< If not its section's.
 
+ private:
+  // Before its callers, or clang has no body for it yet where a row is constexpr.
+  template <class Member>
+  constexpr Field with(Member Field::* member, std::type_identity_t<Member> value) const {
+    Field changed = *this;
+    changed.*member = value;
+    return changed;
+  }
+
+ public:
   // What few rows say.
   constexpr Field without(std::string_view what_holds) const {
     return with(&Field::absent, what_holds);
@@ -107,14 +117,6 @@ struct Field {
   constexpr Field no_option() const { return with(&Field::option, "-"); }
   constexpr Field takes(std::string_view what) const { return with(&Field::metavar, what); }
   constexpr Field of(Subject what) const { return with(&Field::subject, what); }
-
- private:
-  template <class Member>
-  constexpr Field with(Member Field::* member, std::type_identity_t<Member> value) const {
-    Field changed = *this;
-    changed.*member = value;
-    return changed;
-  }
 };
 
 constexpr Field quantity(std::string_view key, FieldAccess access, FieldDimension dimension,
