@@ -14,6 +14,7 @@
 #include "identification/estimates.hpp"
 #include "identification/model_terms.hpp"
 #include "identification/output_error.hpp"
+#include "identification/plausibility.hpp"
 #include "identification/robust_fit.hpp"
 #include "identification/settling.hpp"
 #include "identification/start.hpp"
@@ -281,6 +282,7 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
   fit.velocity_scale = best.x[parameter::velocity_scale];
   add_runs(problem, best.x, fit);
   FLYBALL_CHECK(estimate_gains(prepared, best.x, spread, bounds, fit));
+  FLYBALL_CHECK(check_plausibility(prepared, fit, diagnostics));
   fit.terms = estimate_terms(problem, best, spread);
   if (auto one_step = fit_one_step(prepared)) {
     fit.one_step = *std::move(one_step);

@@ -8,6 +8,7 @@
 #include "recording/channels.hpp"
 #include "recording/characterization_windows.hpp"
 #include "recording/recorded_motion.hpp"
+#include "recording/recorded_voltage.hpp"
 #include "recording/to_si.hpp"
 
 namespace flyball::recording {
@@ -113,6 +114,9 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
   scale_runs(loaded.recording, output, units.velocity.factor / units.position.factor,
              selection.voltage_scale);
   loaded.recording.mechanism = kind;
+  if (auto checked = check_voltage(loaded.recording.runs, loaded.diagnostics); !checked) {
+    return tl::unexpected(std::move(checked).error().in(log.source));
+  }
   return loaded;
 }
 

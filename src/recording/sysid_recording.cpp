@@ -9,6 +9,7 @@
 #include "core/try.hpp"
 #include "recording/drivetrain.hpp"
 #include "recording/recorded_motion.hpp"
+#include "recording/recorded_voltage.hpp"
 #include "recording/to_si.hpp"
 
 namespace flyball::recording {
@@ -119,6 +120,9 @@ Expected<LoadedRecording> from_sysid_json(const Log& log, const LogSelection& se
   scale_runs(loaded.recording, output, units.velocity.factor / units.position.factor,
              selection.voltage_scale);
   loaded.recording.mechanism = kind;
+  if (auto checked = check_voltage(loaded.recording.runs, loaded.diagnostics); !checked) {
+    return tl::unexpected(std::move(checked).error().in(log.source));
+  }
   return loaded;
 }
 

@@ -203,6 +203,33 @@ TEST(Units, TheVoltageCanBeScaled) {
   EXPECT_NEAR(loaded->recording.runs.back().voltage.back(), -5.0, 1e-12);
 }
 
+TEST(Units, WhatIsNoVoltageIsToldOrRefused) {
+  const auto scaled = [](double factor, double offset) {
+    Log log = log_of("positionRad", "velocity", 1.0, 1.0);
+    for (double& volts : log.signals[0].value) {
+      volts = offset + factor * volts;
+    }
+    return gain_of(log, {.mechanism = MechanismKind::arm});
+  };
+  const auto percent = scaled(100.0 / 6.0, 0.0);
+  ASSERT_FALSE(percent);
+  EXPECT_NE(to_string(percent.error()).find("--voltage-scale"), std::string::npos)
+      << to_string(percent.error());
+  const auto battery = scaled(-0.1, 12.4);
+  ASSERT_FALSE(battery);
+  EXPECT_NE(to_string(battery.error()).find("battery"), std::string::npos)
+      << to_string(battery.error());
+  const auto duty = scaled(1.0 / 12.0, 0.0);
+  ASSERT_TRUE(duty) << to_string(duty.error());
+  EXPECT_TRUE(has(*duty, "duty_cycle"));
+  const auto high = scaled(4.0, 0.0);
+  ASSERT_TRUE(high) << to_string(high.error());
+  EXPECT_TRUE(has(*high, "high_voltage"));
+  const auto usual = scaled(2.0, 0.0);
+  ASSERT_TRUE(usual) << to_string(usual.error());
+  EXPECT_FALSE(has(*usual, "high_voltage") || has(*usual, "duty_cycle"));
+}
+
 // What SysId multiplied its rows with: 1 beside "Degrees" says nothing of what they are.
 TEST(Units, SysIdsAnglesHaveOneNumberARotation) {
   const auto sysid = [](double row_unit, std::string units, double per_rotation) {

@@ -1,0 +1,131 @@
+// Sessions with what the four gains lack: it is found, named, and does not spoil the gains; gains
+// that no mechanism has are refused with the probable cause.
+#include <cmath>
+
+#include <flyball/identification/feedforward_fit.hpp>
+
+#include "recordings.hpp"
+
+namespace {
+
+using namespace flyball::identification;
+using flyball::CharacterizationOptions;
+using flyball::SessionDefects;
+using recordings::arm;
+using recordings::elevator;
+using recordings::find;
+using recordings::flywheel;
+
+FitReport report_of(std::size_t mechanism, const SessionDefects& defects, bool extend = true) {
+  CharacterizationOptions options = scenarios::session(scenarios::mechanisms.at(mechanism), 7);
+  options.defects = defects;
+  FitOptions fit;
+  fit.extend = extend;
+  return identify_feedforward(flyball::record_characterization(options).value(), fit);
+}
+
+void expect_gains(const FitReport& report, std::size_t mechanism, double tolerance) {
+  const scenarios::Truth& truth = scenarios::mechanisms.at(mechanism);
+  ASSERT_TRUE(report.fit) << to_string(report.fit.error());
+  EXPECT_NEAR(report.fit->kS.value, truth.kS, 4.0 * tolerance * truth.kS);
+  EXPECT_NEAR(report.fit->kV.value, truth.kV, tolerance * truth.kV);
+  EXPECT_NEAR(report.fit->kA.value, truth.kA, 2.0 * tolerance * truth.kA);
+  if (report.fit->kG) {
+    EXPECT_NEAR(report.fit->kG->value, truth.kG, 3.0 * tolerance * truth.kG);
+  }
+}
+
+struct Defect {
+  const char* code;
+  std::size_t mechanism;
+  SessionDefects defects;
+  double value;        ///< Of the term.
+  bool spoils = true;  ///< The gains, if it is left out.
+};
+
+class ModelTerms : public testing::TestWithParam<Defect> {};
+
+TEST_P(ModelTerms, AreFoundAndTheGainsHoldBesideThem) {
+  const auto& [code, mechanism, defects, value, spoils] = GetParam();
+  const FitReport report = report_of(mechanism, defects);
+  expect_gains(report, mechanism, 0.01);
+  ASSERT_NE(find(report.diagnostics, code), nullptr);
+  ASSERT_EQ(report.fit->terms.size(), 1U);
+  const ModelTerm& term = report.fit->terms[0];
+  EXPECT_EQ(term.name, code);
+  EXPECT_NEAR(term.value.value, value, 0.05 * std::abs(value));
+  const double slack = 1e-3 * std::abs(value);
+  EXPECT_LE(term.value.interval[0], value + slack);
+  EXPECT_GE(term.value.interval[1], value - slack);
+  // Without the term the gains are off by more than they say.
+  const FitReport without = report_of(mechanism, defects, false);
+  ASSERT_TRUE(without.fit);
+  const scenarios::Truth& truth = scenarios::mechanisms.at(mechanism);
+  const auto misses = [](const GainEstimate& gain, double true_value) {
+    return true_value < gain.interval[0] || true_value > gain.interval[1];
+  };
+  EXPECT_EQ(spoils, misses(without.fit->kS, truth.kS) || misses(without.fit->kV, truth.kV) ||
+                        misses(without.fit->kA, truth.kA) ||
+                        (without.fit->kG && misses(*without.fit->kG, truth.kG)));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Defects, ModelTerms,
+    testing::Values(Defect{"spring", elevator, {.spring = 0.8}, 0.8},
+                    Defect{"drag", flywheel, {.drag = 4e-4}, 4e-4},
+                    Defect{"drag", elevator, {.drag = 0.4}, 0.4},
+                    Defect{
+                        "asymmetric_friction", flywheel, {.friction_asymmetry = 0.4}, 0.2, false},
+                    Defect{"current_limit", flywheel, {.headroom = 3.0}, 3.0},
+                    Defect{"current_limit", elevator, {.headroom = 3.5}, 3.5}));
+
+TEST(ModelTerms, AreNotFoundWhereNothingIs) {
+  for (const std::size_t mechanism : {flywheel, elevator, arm}) {
+    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+      const auto fit = fit_feedforward(recordings::record(mechanism, seed));
+      ASSERT_TRUE(fit) << to_string(fit.error());
+      EXPECT_TRUE(fit->terms.empty()) << mechanism << " seed " << seed << " " << fit->terms[0].name;
+    }
+  }
+}
+
+TEST(Backlash, IsNamed) {
+  const FitReport report = report_of(arm, {.backlash = 0.08});
+  ASSERT_TRUE(report.fit) << to_string(report.fit.error());
+  EXPECT_NE(find(report.diagnostics, "backlash"), nullptr);
+  EXPECT_NEAR(report.fit->kV.value, 1.2, 0.02);
+}
+
+TEST(Plausibility, GainsBeyondTheBatteryAreRefusedWithTheCause) {
+  Recording recording = recordings::record(elevator);
+  for (TestRun& run : recording.runs) {
+    for (auto* column : {&run.position, &run.velocity}) {
+      for (double& value : *column) {
+        value *= 1000.0;  // millimetres that were taken for metres
+      }
+    }
+  }
+  const auto fit = fit_feedforward(recording);
+  ASSERT_FALSE(fit);
+  EXPECT_TRUE(fit.error().is(IdentificationError::unphysical_gains)) << to_string(fit.error());
+  EXPECT_NE(to_string(fit.error()).find("--unit"), std::string::npos) << to_string(fit.error());
+}
+
+TEST(Plausibility, UnusualSpeedsAreTold) {
+  Recording recording = recordings::record(flywheel);  // 100 rad/s at 12 V
+  for (TestRun& run : recording.runs) {
+    for (auto* column : {&run.position, &run.velocity}) {
+      for (double& value : *column) {
+        value *= 57.29577951308232;  // degrees
+      }
+    }
+  }
+  const FitReport report = identify_feedforward(recording);
+  ASSERT_TRUE(report.fit) << to_string(report.fit.error());
+  const auto* told = find(report.diagnostics, "unusual_speed");
+  ASSERT_NE(told, nullptr);
+  EXPECT_NE(told->message.find("degrees that were taken for radians"), std::string::npos)
+      << told->message;
+}
+
+}  // namespace
