@@ -72,7 +72,8 @@ namespace {
 /// there.
 int shift_into(const MatrixXd& M, int low, int high) {
   const double largest = M.cwiseAbs().maxCoeff();
-  const int exponent = largest > 0.0 ? std::ilogb(largest) : low;
+  // What has overflowed is no number of any exponent.
+  const int exponent = largest > 0.0 && std::isfinite(largest) ? std::ilogb(largest) : low;
   return exponent < low ? low - exponent : exponent > high ? high - exponent : 0;
 }
 

@@ -121,6 +121,7 @@ ResponseTimes response_times(const ModalAnalysis& modes, std::optional<Time> per
   } else if (fastest > 0.0) {
     end = 40.0 / fastest;  // about six turns of an undamped oscillation
   }
+  end = std::clamp(end, 1e-290, 1e290);  // so that its parts and multiples are numbers
   const double step = period ? period->si() : end / 600.0;
   // Ten samples of a mode that grows a thousandfold in each would overflow.
   const double most = std::max(1.0, std::min(2000.0, std::floor(500.0 * growing / step)));

@@ -22,10 +22,10 @@ template <int N>
     const double* const column = A + j * height;
     Vector4 sum{};
     for (int i = 0; i < height; i += 4) {
-      const Vector4& entries = load4(column + i);
+      const Vector4 entries = load4(column + i);
       const Vector4 magnitudes = entries < 0.0 ? -entries : entries;
       sum += magnitudes;
-      *reinterpret_cast<Vector4*>(rows + i) += magnitudes;
+      at4(rows + i) += magnitudes;
     }
     columns[j] = (sum[0] + sum[2]) + (sum[1] + sum[3]);
   }

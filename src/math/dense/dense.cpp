@@ -43,11 +43,11 @@ MatrixXd solve_linear(const MatrixRef& A, const MatrixRef& B, double* rcond) {
     const double smallest = lu.matrixLU().diagonal().cwiseAbs().minCoeff();
     *rcond = smallest > 0.0 ? lu.rcond() : 0.0;
   }
-  return lu.solve(B);
+  return B.size() == 0 ? MatrixXd(B) : MatrixXd(lu.solve(B));
 }
 
 MatrixXd solve_symmetric(const MatrixRef& A, const MatrixRef& B) {
-  return A.ldlt().solve(B);
+  return B.size() == 0 ? MatrixXd(B) : MatrixXd(A.ldlt().solve(B));
 }
 
 std::optional<MatrixXd> cholesky_of(const MatrixRef& S) {

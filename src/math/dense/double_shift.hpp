@@ -100,19 +100,19 @@ inline __attribute__((always_inline)) void reflect_columns(double* M, int ld, in
   const auto [x, y, z, q, r, top] = turn;
   if (last) {
     for (int i = 0; i < rows; i += 4) {
-      Vector4& c0 = *reinterpret_cast<Vector4*>(M + i);
-      Vector4& c1 = *reinterpret_cast<Vector4*>(M + i + ld);
-      const Vector4 t = x * c0 + y * c1;
+      FourAt c0 = at4(M + i);
+      FourAt c1 = at4(M + i + ld);
+      const Vector4 t = x * c0.get() + y * c1.get();
       c0 -= t;
       c1 -= t * q;
     }
     return;
   }
   for (int i = 0; i < rows; i += 4) {
-    Vector4& c0 = *reinterpret_cast<Vector4*>(M + i);
-    Vector4& c1 = *reinterpret_cast<Vector4*>(M + i + ld);
-    Vector4& c2 = *reinterpret_cast<Vector4*>(M + i + 2 * ld);
-    const Vector4 t = x * c0 + y * c1 + z * c2;
+    FourAt c0 = at4(M + i);
+    FourAt c1 = at4(M + i + ld);
+    FourAt c2 = at4(M + i + 2 * ld);
+    const Vector4 t = x * c0.get() + y * c1.get() + z * c2.get();
     c0 -= t;
     c1 -= t * q;
     c2 -= t * r;

@@ -51,7 +51,7 @@ inline __attribute__((always_inline)) bool eliminate_panel(Size<N> size, double*
       double* other = panel + j * ld;
       const double factor = other[k];
       for (int i = 0; i < ld; i += 4) {
-        *reinterpret_cast<Vector4*>(other + i) += load4(column + i) * factor;
+        at4(other + i) += load4(column + i) * factor;
       }
       other[k] = factor * inverse;
     };
@@ -180,7 +180,7 @@ inline bool solve_in_place(Size<N> size, double* M, double* R) {
     const auto eliminate = [=](double* other) {
       const double factor = other[k];
       for (int i = 0; i < ld; i += 4) {
-        *reinterpret_cast<Vector4*>(other + i) += load4(column + i) * factor;
+        at4(other + i) += load4(column + i) * factor;
       }
       other[k] = factor * inverse;
     };

@@ -73,13 +73,13 @@ inline bool eigenvalues(Size<N> size, double* H, std::complex<double>* lambda) {
     for (int j = m; j < n; ++j) {
       const double head = h(m, j);
       for (int i = m / 4 * 4; i < ld; i += 4) {
-        *reinterpret_cast<Vector4*>(&h(i, j)) -= load4(multipliers + i) * head;
+        at4(&h(i, j)) -= load4(multipliers + i) * head;
       }
     }
     for (int k = m + 1; k < n; ++k) {
       const double factor = multipliers[k];
       for (int i = 0; i < ld; i += 4) {
-        *reinterpret_cast<Vector4*>(&h(i, m)) += load4(&h(i, k)) * factor;
+        at4(&h(i, m)) += load4(&h(i, k)) * factor;
       }
     }
   }

@@ -49,12 +49,12 @@ inline void hessenberg(int n, int ld, double* H, double* U, double* work) {
       Vector4 dot{};
       int i = 0;
       for (; i < first; i += 4) {
-        *reinterpret_cast<Vector4*>(y + i) += load4(h + i) * factor;
+        at4(y + i) += load4(h + i) * factor;
       }
       for (; i < ld; i += 4) {
         const Vector4 a = load4(h + i);
         dot += a * load4(v + i);
-        *reinterpret_cast<Vector4*>(y + i) += a * factor;
+        at4(y + i) += a * factor;
       }
       u[j] = beta * ((dot[0] + dot[2]) + (dot[1] + dot[3]));
     }
@@ -64,9 +64,8 @@ inline void hessenberg(int n, int ld, double* H, double* U, double* work) {
     }
     gamma *= 0.5 * beta * beta;
     for (int i = 0; i < ld; i += 4) {
-      Vector4& yi = *reinterpret_cast<Vector4*>(y + i);
-      yi = beta * yi - gamma * load4(v + i);
-      *reinterpret_cast<Vector4*>(u + i) -= gamma * load4(v + i);
+      at4(y + i) = beta * load4(y + i) - gamma * load4(v + i);
+      at4(u + i) -= gamma * load4(v + i);
     }
     for (int j = c + 1; j < n; ++j) {
       double* const h = H + j * ld;
@@ -74,10 +73,10 @@ inline void hessenberg(int n, int ld, double* H, double* U, double* work) {
       const double right = v[j];
       int i = 0;
       for (; i < first; i += 4) {
-        *reinterpret_cast<Vector4*>(h + i) -= load4(y + i) * right;
+        at4(h + i) -= load4(y + i) * right;
       }
       for (; i < ld; i += 4) {
-        *reinterpret_cast<Vector4*>(h + i) -= load4(y + i) * right + load4(v + i) * left;
+        at4(h + i) -= load4(y + i) * right + load4(v + i) * left;
       }
     }
     // U ← U(I - βvvᵀ).
@@ -88,7 +87,7 @@ inline void hessenberg(int n, int ld, double* H, double* U, double* work) {
       }
       sum *= beta;
       for (int j = c + 1; j < n; ++j) {
-        *reinterpret_cast<Vector4*>(U + i + j * ld) -= sum * v[j];
+        at4(U + i + j * ld) -= sum * v[j];
       }
     }
   }

@@ -17,7 +17,7 @@ bool solve_shifted(int n, int ld, const double* H, double alpha, double beta, do
   double* const factor = work + ld;
   double* const swapped = work + 2 * ld;
   for (int i = 0; i < ld; i += 4) {
-    *reinterpret_cast<Vector4*>(c + i) = alpha * load4(H + i + (n - 1) * ld);
+    at4(c + i) = alpha * load4(H + i + (n - 1) * ld);
   }
   c[n - 1] += beta;
   for (int k = n - 1; k > 0; --k) {
@@ -33,10 +33,10 @@ bool solve_shifted(int n, int ld, const double* H, double alpha, double beta, do
       }
       for (int i = 0; i <= k; i += 4) {
         const Vector4 column = load4(c + i);
-        *reinterpret_cast<Vector4*>(c + i) = alpha * load4(next + i) - m * column;
+        at4(c + i) = alpha * load4(next + i) - m * column;
 #pragma GCC unroll 3
         for (int r = 0; r < R; ++r) {
-          *reinterpret_cast<Vector4*>(g + i + r * ld) -= z[r] * column;
+          at4(g + i + r * ld) -= z[r] * column;
         }
       }
       c[k - 1] += beta;
@@ -50,10 +50,10 @@ bool solve_shifted(int n, int ld, const double* H, double alpha, double beta, do
       }
       for (int i = 0; i <= k; i += 4) {
         const Vector4 column = alpha * load4(next + i);
-        *reinterpret_cast<Vector4*>(c + i) -= m * column;
+        at4(c + i) -= m * column;
 #pragma GCC unroll 3
         for (int r = 0; r < R; ++r) {
-          *reinterpret_cast<Vector4*>(g + i + r * ld) -= z[r] * column;
+          at4(g + i + r * ld) -= z[r] * column;
         }
       }
       c[k - 1] -= m * beta;
@@ -131,14 +131,14 @@ bool solve_shifted(int n, int ld, const double* H, Pair alpha, Pair beta, double
         const Vector4 re = load4(cr + i);
         const Vector4 im = load4(ci + i);
         const Vector4 h = load4(next + i);
-        *reinterpret_cast<Vector4*>(cr + i) = alpha.re * h - m.re * re + m.im * im;
-        *reinterpret_cast<Vector4*>(ci + i) = alpha.im * h - m.re * im - m.im * re;
+        at4(cr + i) = alpha.re * h - m.re * re + m.im * im;
+        at4(ci + i) = alpha.im * h - m.re * im - m.im * re;
 #pragma GCC unroll 3
         for (int r = 0; r < R; ++r) {
-          Vector4& a = *reinterpret_cast<Vector4*>(gr + i + r * ld);
-          Vector4& b = *reinterpret_cast<Vector4*>(gi + i + r * ld);
-          a = a - z[r].re * re + z[r].im * im;
-          b = b - z[r].re * im - z[r].im * re;
+          FourAt a = at4(gr + i + r * ld);
+          FourAt b = at4(gi + i + r * ld);
+          a = a.get() - z[r].re * re + z[r].im * im;
+          b = b.get() - z[r].re * im - z[r].im * re;
         }
       }
       cr[k - 1] += beta.re;
@@ -156,12 +156,12 @@ bool solve_shifted(int n, int ld, const double* H, Pair alpha, Pair beta, double
       }
       for (int i = 0; i <= k; i += 4) {
         const Vector4 h = load4(next + i);
-        *reinterpret_cast<Vector4*>(cr + i) -= q.re * h;
-        *reinterpret_cast<Vector4*>(ci + i) -= q.im * h;
+        at4(cr + i) -= q.re * h;
+        at4(ci + i) -= q.im * h;
 #pragma GCC unroll 3
         for (int r = 0; r < R; ++r) {
-          *reinterpret_cast<Vector4*>(gr + i + r * ld) -= step[r].re * h;
-          *reinterpret_cast<Vector4*>(gi + i + r * ld) -= step[r].im * h;
+          at4(gr + i + r * ld) -= step[r].re * h;
+          at4(gi + i + r * ld) -= step[r].im * h;
         }
       }
       const Pair shift = m * beta;

@@ -20,6 +20,39 @@ struct Size {
 using Vector2 = double __attribute__((vector_size(16), aligned(8), may_alias));
 using Vector4 = double __attribute__((vector_size(32), aligned(8), may_alias));
 
+/// Doubles in memory that are aligned as doubles are, no more: a reference to a vector of four
+/// would promise 32 bytes, and template arguments lose the attributes of the types above.
+template <class Vector>
+inline __attribute__((always_inline)) Vector load(const double* from) {
+  Vector value;
+  __builtin_memcpy(&value, from, sizeof(Vector));
+  return value;
+}
+template <class Vector>
+inline __attribute__((always_inline)) void store(double* to, Vector value) {
+  __builtin_memcpy(to, &value, sizeof(Vector));
+}
+
+inline __attribute__((always_inline)) Vector4 load4(const double* from) {
+  return load<Vector4>(from);
+}
+
+/// Four doubles in memory that are changed.
+class FourAt {
+ public:
+  explicit __attribute__((always_inline)) FourAt(double* at) : at_(at) {}
+  __attribute__((always_inline)) Vector4 get() const { return load<Vector4>(at_); }
+  __attribute__((always_inline)) void operator=(Vector4 v) { store<Vector4>(at_, v); }
+  __attribute__((always_inline)) void operator+=(Vector4 v) { store<Vector4>(at_, get() + v); }
+  __attribute__((always_inline)) void operator-=(Vector4 v) { store<Vector4>(at_, get() - v); }
+
+ private:
+  double* at_;
+};
+inline __attribute__((always_inline)) FourAt at4(double* at) {
+  return FourAt(at);
+}
+
 enum class Product { assign, add, subtract };
 
 /// One tile of C: Blocks vectors high, Columns wide.
@@ -40,7 +73,7 @@ inline __attribute__((always_inline)) void product_tile(double* C, std::ptrdiff_
   for (std::ptrdiff_t k = 0; k < depth; ++k) {
 #pragma GCC unroll 8
     for (int b = 0; b < Blocks; ++b) {
-      const Vector a = *reinterpret_cast<const Vector*>(A + k * lda + b * width);
+      const Vector a = load<Vector>(A + k * lda + b * width);
 #pragma GCC unroll 8
       for (int j = 0; j < Columns; ++j) {
         sum[b][j] += a * B[k + j * ldb];
@@ -51,13 +84,13 @@ inline __attribute__((always_inline)) void product_tile(double* C, std::ptrdiff_
   for (int j = 0; j < Columns; ++j) {
 #pragma GCC unroll 8
     for (int b = 0; b < Blocks; ++b) {
-      Vector* c = reinterpret_cast<Vector*>(C + j * ldc + b * width);
+      double* const c = C + j * ldc + b * width;
       if constexpr (Kind == Product::assign) {
-        *c = sum[b][j];
+        store<Vector>(c, sum[b][j]);
       } else if constexpr (Kind == Product::add) {
-        *c += sum[b][j];
+        store<Vector>(c, load<Vector>(c) + sum[b][j]);
       } else {
-        *c -= sum[b][j];
+        store<Vector>(c, load<Vector>(c) - sum[b][j]);
       }
     }
   }
@@ -88,17 +121,17 @@ inline void multiply(Size<N> n, double* C, std::ptrdiff_t ldc, const double* A, 
   const std::ptrdiff_t rows = n.padded();
   if constexpr (N == 2) {
     if (depth == 2) {
-      const Vector2 first = *reinterpret_cast<const Vector2*>(A);
-      const Vector2 second = *reinterpret_cast<const Vector2*>(A + lda);
+      const Vector2 first = load<Vector2>(A);
+      const Vector2 second = load<Vector2>(A + lda);
       for (std::ptrdiff_t j = 0; j < columns; ++j) {
         const Vector2 sum = first * B[j * ldb] + second * B[1 + j * ldb];
-        Vector2* c = reinterpret_cast<Vector2*>(C + j * ldc);
+        double* const c = C + j * ldc;
         if constexpr (Kind == Product::assign) {
-          *c = sum;
+          store<Vector2>(c, sum);
         } else if constexpr (Kind == Product::add) {
-          *c += sum;
+          store<Vector2>(c, load<Vector2>(c) + sum);
         } else {
-          *c -= sum;
+          store<Vector2>(c, load<Vector2>(c) - sum);
         }
       }
       return;
@@ -138,10 +171,6 @@ inline void mirror(Size<N> n, double* S) {
       S[i + j * ld] = S[j + i * ld];
     }
   }
-}
-
-inline const Vector4& load4(const double* from) {
-  return *reinterpret_cast<const Vector4*>(from);
 }
 
 /// Sum of squares over whole columns, padding (zeros) included.

@@ -9,6 +9,13 @@ namespace {
 constexpr int width = 4;
 using Vector = double __attribute__((vector_size(32), aligned(8), may_alias));
 
+/// Of memory that is aligned as doubles are.
+inline __attribute__((always_inline)) Vector load(const double* from) {
+  Vector value;
+  __builtin_memcpy(&value, from, sizeof(Vector));
+  return value;
+}
+
 /// `width` rows of unevaluated sums.
 struct Sums {
   Vector hi;
@@ -17,7 +24,7 @@ struct Sums {
 
 /// s += a b.
 inline __attribute__((always_inline)) void add_product(Sums& s, const double* rows, double b) {
-  const Vector a = *reinterpret_cast<const Vector*>(rows);
+  const Vector a = load(rows);
   const Vector p = a * b;
   const Vector e = {__builtin_fma(a[0], b, -p[0]), __builtin_fma(a[1], b, -p[1]),
                     __builtin_fma(a[2], b, -p[2]), __builtin_fma(a[3], b, -p[3])};
@@ -57,7 +64,7 @@ inline __attribute__((always_inline)) void residual(const SylvesterData& data, c
   }
   for (int j = 0; j < m; ++j) {
     for (int i = data.symmetric ? j / width * width : 0; i < ld; i += width) {
-      Sums s{*reinterpret_cast<const Vector*>(data.F + i + j * ld), Vector{}};
+      Sums s{load(data.F + i + j * ld), Vector{}};
       if (data.continuous) {
         add_columns(s, data.A + i, ld, X + j * ld, n, -1.0);
         add_columns(s, X + i, ld, data.B + j * ldb, m, -1.0);

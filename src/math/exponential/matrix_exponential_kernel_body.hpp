@@ -108,7 +108,7 @@ class Exponential {
     for (int j = 0; j < n_(); ++j) {
       Vector4 sum{};
       for (int i = 0; i < ld(); i += 4) {
-        const Vector4& entries = load4(M + i + j * ld());
+        const Vector4 entries = load4(M + i + j * ld());
         sum += entries < 0.0 ? -entries : entries;
       }
       const double total = (sum[0] + sum[2]) + (sum[1] + sum[3]);

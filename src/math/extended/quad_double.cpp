@@ -187,8 +187,9 @@ QuadDoubleMatrix sum(QuadDoubleMatrix A, double sign, const QuadDoubleMatrix& B)
 }
 
 QuadDoubleMatrix shifted_diagonal(QuadDoubleMatrix A, double scalar) {
-  return sum(std::move(A), 1.0,
-             QuadDoubleMatrix(scalar * Eigen::MatrixXd::Identity(A.rows(), A.rows())));
+  // Before A is moved: compilers differ in which argument they make first.
+  const QuadDoubleMatrix diagonal(scalar * Eigen::MatrixXd::Identity(A.rows(), A.rows()));
+  return sum(std::move(A), 1.0, diagonal);
 }
 
 QuadDoubleMatrix scaled(QuadDoubleMatrix A, double f) {

@@ -28,7 +28,8 @@ template <class Matrix>
 std::optional<Matrix> solve_stein(Matrix A, Matrix C) {
   Matrix X = std::move(C);
   for (int k = 0; k < 110; ++k) {
-    X = sum(std::move(X), 1.0, product(A.transpose(), product(X, A)));
+    const auto moved = product(A.transpose(), product(X, A));
+    X = sum(std::move(X), 1.0, moved);
     const double power = A.norm();
     if (!X.all_finite() || !std::isfinite(power)) {
       return std::nullopt;

@@ -39,7 +39,7 @@ Units best_units(const RiccatiProblem& p) {
     double factor;
   };
   const auto add = [&](double entry, std::initializer_list<Term> terms) {
-    if (entry == 0.0) {
+    if (entry == 0.0 || !std::isfinite(entry)) {  // A sum may have left the doubles.
       return;
     }
     const double size = std::log2(std::abs(entry));
@@ -81,7 +81,7 @@ Units best_units(const RiccatiProblem& p) {
 /// The power of two of the largest entry.
 int exponent(const MatrixXd& M) {
   const double largest = M.cwiseAbs().maxCoeff();
-  return largest > 0.0 ? std::ilogb(largest) : -2000;
+  return largest > 0.0 && std::isfinite(largest) ? std::ilogb(largest) : -2000;
 }
 
 }  // namespace
