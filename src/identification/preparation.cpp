@@ -57,6 +57,7 @@ struct RowDefects {
   std::size_t unsorted = 0;
   std::size_t same_time = 0;
   std::size_t outliers = 0;
+  std::size_t stale = 0;
   std::size_t jumps = 0;
   std::size_t total = 0;
 };
@@ -159,6 +160,36 @@ std::vector<Segment> smooth_segments(const std::vector<double>& position, double
   return segments;
 }
 
+/// A first value that is the last one of another test, or zero: the step away from it is more than
+/// four times both steps after it (a start from rest speeds up, and a ramp has just been at
+/// rest), more than the coarsest usual step and a 200th of the test's travel.
+std::size_t stale_rows(const TestRun& run) {
+  constexpr std::size_t most = 6;  // rows that may repeat it
+  std::vector<std::size_t> changes;
+  for (std::size_t i = 1; i < run.position.size() && changes.size() < 3; ++i) {
+    if (run.position[i] != run.position[i - 1]) {
+      changes.push_back(i);
+    }
+  }
+  if (changes.size() < 3 || changes.front() > most) {
+    return 0;
+  }
+  const auto step = [&](std::size_t k) {
+    return std::abs(run.position[changes[k]] - run.position[changes[k] - 1]);
+  };
+  const auto [low, high] = std::minmax_element(
+      run.position.begin() + static_cast<std::ptrdiff_t>(changes.front()), run.position.end());
+  const bool stale = step(0) > 4.0 * std::max(step(1), step(2)) && step(0) > 0.005 * (*high - *low);
+  return stale ? changes.front() : 0;
+}
+
+/// Puts the value after them in their place: the rows themselves have the voltage's edge.
+void mend_stale_start(TestRun& run, RowDefects& defects) {
+  const std::size_t stale = stale_rows(run);
+  std::fill_n(run.position.begin(), stale, stale > 0 ? run.position[stale] : 0.0);
+  defects.stale += stale;
+}
+
 /// Keeps the longest stretch without jumps and what continues it on both sides.
 void drop_jumps(TestRun& run, RowDefects& defects) {
   if (run.position.size() < 20) {
@@ -209,6 +240,9 @@ void report_rows(const RowDefects& defects, std::vector<Diagnostic>& diagnostics
        "the later one was kept");
   tell(defects.outliers, "outliers", "hold a value far outside the test's range",
        "they were dropped");
+  tell(defects.stale, "stale_first_value",
+       "at the start of a test hold a position of before it (another test's last, or zero)",
+       "the value after them was taken in its place");
   tell(defects.jumps, "position_jumps",
        "lie beyond a jump of the position that no mechanism makes (a stale first value, a wrapping "
        "encoder or a glitch)",
@@ -319,6 +353,7 @@ Expected<PreparedRecording> prepare(const Recording& recording, const Preparatio
     drop_not_finite(run.run, defects);
     sort_rows(run.run, defects);
     drop_outliers(run.run, defects);
+    mend_stale_start(run.run, defects);
     drop_jumps(run.run, defects);
     if (run.run.time.size() >= 2) {
       prepared.runs.push_back(std::move(run));

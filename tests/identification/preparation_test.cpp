@@ -105,7 +105,7 @@ TEST(Prepare, DropsSpikes) {
   EXPECT_EQ(prepared->runs[2].run.time.size(), recording.runs[2].time.size() - 1);
 }
 
-TEST(Prepare, DropsStaleFirstPositionsAndGlitches) {
+TEST(Prepare, MendsStaleFirstPositionsAndDropsGlitches) {
   Recording recording = record(elevator);
   for (std::size_t i = 0; i < 5; ++i) {
     recording.runs[1].position[i] = 0.0;
@@ -115,7 +115,10 @@ TEST(Prepare, DropsStaleFirstPositionsAndGlitches) {
   const auto prepared = prepare(recording);
   ASSERT_TRUE(prepared);
   EXPECT_NE(find(prepared->diagnostics, "position_jumps"), nullptr);
-  EXPECT_EQ(prepared->runs[1].run.time.size(), recording.runs[1].time.size() - 5);
+  // The rows stay: the voltage's edge is among them.
+  EXPECT_NE(find(prepared->diagnostics, "stale_first_value"), nullptr);
+  EXPECT_EQ(prepared->runs[1].run.time.size(), recording.runs[1].time.size());
+  EXPECT_EQ(prepared->runs[1].run.position[0], recording.runs[1].position[5]);
   EXPECT_EQ(prepared->runs[0].run.time.size(), rows - 1);
 }
 
