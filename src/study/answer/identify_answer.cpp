@@ -50,6 +50,13 @@ void write_fit(JsonWriter& json, const identification::FeedforwardFit& fit) {
   json.add("mechanism", to_string(fit.mechanism));
   json.add("unit", fit.unit);
   write_gains(json, fit);
+  if (!fit.terms.empty()) {
+    json.object("terms", [&] {
+      for (const identification::ModelTerm& term : fit.terms) {
+        write_gain(json, term.name, term.value, term.unit);
+      }
+    });
+  }
   json.object("fit", [&] {
     json.add({{"r_squared", fit.r_squared},
               {"velocity_nrmse", fit.velocity_nrmse},
