@@ -213,7 +213,8 @@ double Covariances::standard_error(const Eigen::VectorXd& gradient) const {
   for (const Eigen::MatrixXd& covariance : estimates) {
     largest = std::max(largest, gradient.dot(covariance * gradient));
   }
-  return std::sqrt(largest);
+  const double of_model = doubt.size() == gradient.size() ? gradient.dot(doubt) : 0.0;
+  return std::sqrt(largest + of_model * of_model);
 }
 
 Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,

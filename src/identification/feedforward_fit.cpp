@@ -244,7 +244,11 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
   const Bounds bounds = make_bounds(problem, gains, options);
   ChannelScales scales;
   RobustFit best = fit_gains(problem, gains, bounds, options, scales);
-  if (options.extend && extend_model(problem, bounds, scales, best)) {
+  Extension extension;
+  if (options.extend) {
+    extension = extend_model(problem, bounds, scales, best);
+  }
+  if (extension.extended) {
     scales = residual_scales(problem, best.x);
     const int iterations = best.iterations;
     best = minimize(problem, best.x, problem.free_parameters(), bounds, scales, 60, 1e-3);
@@ -268,8 +272,8 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
       return fit;
     }
   }
-  const Covariances spread =
-      covariances(problem, best.x, problem.free_parameters(), bounds, scales);
+  Covariances spread = covariances(problem, best.x, problem.free_parameters(), bounds, scales);
+  spread.doubt = std::move(extension.doubt);
 
   FeedforwardFit fit;
   fit.mechanism = *prepared.mechanism;

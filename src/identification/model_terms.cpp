@@ -60,14 +60,14 @@ RobustFit with_limit(OutputErrorProblem& problem, const RobustFit& base, const B
 
 }  // namespace
 
-bool extend_model(OutputErrorProblem& problem, const Bounds& bounds, const ChannelScales& scales,
-                  RobustFit& best) {
+Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds,
+                       const ChannelScales& scales, RobustFit& best) {
   struct Candidate {
     int term;
     double gain;
     RobustFit start;
   };
-  bool extended = false;
+  Extension extension;
   for (int round = 0; round < most_terms; ++round) {
     const std::vector<bool> free = problem.free_parameters();
     std::vector<int> absent;
@@ -127,16 +127,20 @@ bool extend_model(OutputErrorProblem& problem, const Bounds& bounds, const Chann
     RobustFit with =
         minimize(problem, better.x, problem.free_parameters(), bounds, fresh, 60, 1e-2);
     const double fall = without.cost - with.cost;
-    if (spread.singular || fall < beyond_doubt * spread.inflation(term)) {
+    const double evidence = spread.singular ? 0.0 : fall / spread.inflation(term);
+    if (evidence < beyond_doubt) {
+      const double weight = std::clamp(evidence / beyond_doubt, 0.0, 1.0);
+      extension.doubt = std::sqrt(weight) * (with.x - without.x);
+      extension.doubt[term] = 0.0;
       problem.extend(term, false);
       problem.refresh_forces(best.x);
       break;
     }
     with.iterations += better.iterations + best.iterations;
     best = std::move(with);
-    extended = true;
+    extension.extended = true;
   }
-  return extended;
+  return extension;
 }
 
 std::vector<ModelTerm> estimate_terms(const OutputErrorProblem& problem, const RobustFit& best,

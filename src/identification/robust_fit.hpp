@@ -59,10 +59,11 @@ struct Covariances {
   std::array<Eigen::MatrixXd, 3> estimates;
   Eigen::MatrixXd independent;  ///< What it would be if residuals were independent.
   bool singular = false;
+  Eigen::VectorXd doubt{};  ///< Of the model itself: a step that counts as a standard error.
   /// How much larger a parameter's variance is than independent residuals would make it, at
   /// least 1.
   [[nodiscard]] double inflation(Eigen::Index parameter) const;
-  /// Largest of the three standard errors of gradient · x.
+  /// Largest of the three standard errors of gradient · x, with the doubt.
   [[nodiscard]] double standard_error(const Eigen::VectorXd& gradient) const;
 };
 

@@ -140,9 +140,10 @@ Table gains_table(const FeedforwardFit& fit) {
                                   "(true angle − measured)"));
   }
   for (const identification::ModelTerm& term : fit.terms) {
-    const std::string meaning = term.name == "current_limit"
-                                    ? "(resistance times the limit)"
-                                    : fmt::format("({} V at most in the log)", number(term.largest, 2));
+    const std::string meaning =
+        term.name == "current_limit"
+            ? "(resistance times the limit)"
+            : fmt::format("({} V at most in the log)", number(term.largest, 2));
     std::string name = term.name;
     std::replace(name.begin(), name.end(), '_', ' ');
     table.rows.push_back(gain_row(name, term.value, term.unit, 0.0, false, meaning));
