@@ -9,11 +9,12 @@ namespace flyball::detail {
 
 namespace {
 
-/// Whether what a state does by itself is no longer a double in these units.
+/// Whether what a state does by itself is nothing in these units, in which the largest coupling is
+/// near one: any gain would reach all poles then.
 bool loses_modes(const MatrixRef& A, const PairScaling& units) {
+  constexpr double nothing = 0x1p-200;
   const Eigen::VectorXd own = scaled_A(A, units).diagonal();
-  return ((own.array().abs() < std::numeric_limits<double>::min()) != (A.diagonal().array() == 0.0))
-      .any();
+  return ((own.array().abs() < nothing) != (A.diagonal().array() == 0.0)).any();
 }
 
 Eigen::VectorXi inputs_near_one(const MatrixRef& B) {

@@ -393,5 +393,14 @@ TEST(Place, KeepsModesBeyondAllOthers) {
   EXPECT_TRUE(place(1e154 * one, 1e-300 * one, {1.0}).error().is(PolePlacementError::not_reached));
 }
 
+// An input of 1e155 must not choose units in which the poles are nothing and K = 0 reaches them.
+TEST(Place, ALargeInputDoesNotHideAModeThatIsNotReached) {
+  const Eigen::Matrix3d A{{1.25, 1.625, 0.0}, {0.0, 1.25, 1.625}, {0.0, 0.0, 1.25}};
+  const Eigen::MatrixXd B{{-3.0, 1e155}, {0.0, -3.0}, {0.0, 0.0}};
+  const auto placed = place(A, B, {0.2, 0.5, 0.6});
+  ASSERT_FALSE(placed);
+  EXPECT_TRUE(placed.error().is(PolePlacementError::not_controllable));
+}
+
 }  // namespace
 }  // namespace flyball
