@@ -28,22 +28,35 @@ class FunctionRef<Result(Arguments...)> {
   // NOLINTBEGIN(google-explicit-constructor, bugprone-forwarding-reference-overload)
   // NOLINTBEGIN(performance-unnecessary-value-param): an Eigen::Ref that is written to is a value.
   FunctionRef(Callable&& callable) noexcept
-      : object_(const_cast<void*>(static_cast<const void*>(std::addressof(callable)))),
-        call_([](void* object, Arguments... arguments) -> Result {
-          return (*static_cast<std::remove_reference_t<Callable>*>(object))(
+      : target_{.object = const_cast<void*>(static_cast<const void*>(std::addressof(callable)))},
+        call_([](Target target, Arguments... arguments) -> Result {
+          return (*static_cast<std::remove_reference_t<Callable>*>(target.object))(
+              std::forward<Arguments>(arguments)...);
+        }) {}
+  /// Refers to a function.
+  template <class Function>
+    requires(std::is_function_v<Function> && std::is_invocable_r_v<Result, Function&, Arguments...>)
+  FunctionRef(Function& function) noexcept
+      : target_{.function = reinterpret_cast<void (*)()>(&function)},
+        call_([](Target target, Arguments... arguments) -> Result {
+          return (*reinterpret_cast<Function*>(target.function))(
               std::forward<Arguments>(arguments)...);
         }) {}
 
   /// Calls what it refers to.
   Result operator()(Arguments... arguments) const {
-    return call_(object_, std::forward<Arguments>(arguments)...);
+    return call_(target_, std::forward<Arguments>(arguments)...);
   }
   // NOLINTEND(performance-unnecessary-value-param)
   // NOLINTEND(google-explicit-constructor, bugprone-forwarding-reference-overload)
 
  private:
-  void* object_;
-  Result (*call_)(void*, Arguments...);
+  union Target {
+    void* object;
+    void (*function)();
+  };
+  Target target_;
+  Result (*call_)(Target, Arguments...);
 };
 
 }  // namespace flyball
