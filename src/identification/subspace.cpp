@@ -1,0 +1,337 @@
+#include <flyball/identification/subspace.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include <flyball/identification/identification_error.hpp>
+#include <flyball/math/riccati/riccati.hpp>
+
+#include "core/format.hpp"
+#include "core/try.hpp"
+#include "identification/subspace_data.hpp"
+#include "math/dense/dense.hpp"
+#include "math/dense/dense_reduction.hpp"
+
+namespace flyball::identification {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr std::string_view where = "fit_subspace";
+
+ScaledSignals scaled(const MatrixRef& u, const MatrixRef& y) {
+  const auto units = [](const MatrixRef& signals) {
+    VectorXd of(signals.cols());
+    for (Index j = 0; j < signals.cols(); ++j) {
+      const double size =
+          signals.col(j).stableNorm() / std::sqrt(static_cast<double>(signals.rows()));
+      of(j) = size > 0.0 ? std::ldexp(1.0, std::ilogb(size)) : 1.0;
+    }
+    return of;
+  };
+  ScaledSignals record{u, y, units(u), units(y)};
+  record.u *= record.u_unit.cwiseInverse().asDiagonal();
+  record.y *= record.y_unit.cwiseInverse().asDiagonal();
+  return record;
+}
+
+/// Where the block triangular factor's parts are.
+struct Parts {
+  Index m;
+  Index p;
+  Index s;
+  const MatrixXd& L;
+
+  [[nodiscard]] Index past() const { return s * (m + p); }
+  [[nodiscard]] auto L21() const { return L.block(s * m, 0, past(), s * m); }
+  [[nodiscard]] auto L22() const { return L.block(s * m, s * m, past(), past()); }
+  [[nodiscard]] auto L32() const { return L.block(s * m + past(), s * m, s * p, past()); }
+  [[nodiscard]] auto L33() const { return L.bottomRightCorner(s * p, s * p); }
+};
+
+/// The weighted future as the past tells it: left singular vectors, singular values, and the
+/// weighting J⁻¹.
+struct Observed {
+  MatrixXd J;
+  MatrixXd U;
+  VectorXd values;
+};
+
+MatrixXd lower_solve(const MatrixXd& J, const MatrixXd& right) {
+  return J.triangularView<Eigen::Lower>().solve(right);
+}
+
+/// Lower triangular J with J Jᵀ = [L32 L33][L32 L33]ᵀ, or nothing where that is singular: data
+/// without noise.
+std::optional<MatrixXd> future_factor(const Parts& parts) {
+  MatrixXd both(parts.past() + parts.s * parts.p, parts.s * parts.p);
+  both << parts.L32().transpose(), parts.L33().transpose();
+  MatrixXd J = detail::triangle_of(both).transpose();
+  const VectorXd size = both.colwise().norm();
+  if ((J.diagonal().cwiseAbs().array() > 1e-7 * size.array()).all()) {
+    return J;
+  }
+  return std::nullopt;
+}
+
+/// U and σ of M Mᵀ = U σ² Uᵀ, with half of the digits: those that noise leaves.
+void from_square(const MatrixXd& square, Observed& observed) {
+  const detail::SymmetricEigensystem modes = detail::symmetric_eigensystem_of(square);
+  observed.U = modes.vectors.rowwise().reverse();
+  observed.values = modes.values.reverse().cwiseMax(0.0).cwiseSqrt();
+}
+
+Observed observe(const Parts& parts, SubspaceWeighting weighting, const MatrixXd* J) {
+  const Index rows = parts.s * parts.p;
+  Observed observed{MatrixXd::Identity(rows, rows), {}, {}};
+  MatrixXd M = parts.L32();
+  if (J == nullptr) {
+    if (weighting == SubspaceWeighting::n4sid) {
+      // L32 L22⁺ [L21 L22]
+      MatrixXd past(parts.past(), parts.s * parts.m + parts.past());
+      past << parts.L21(), parts.L22();
+      M = detail::solve_least_squares(parts.L22().transpose(), M.transpose()).transpose() * past;
+    }
+    // Without the orthogonal factor of Mᵀ, which changes neither.
+    const detail::SingularValues svd =
+        detail::svd_of(detail::triangle_of(M.transpose()).transpose());
+    observed.U = svd.U;
+    observed.values = svd.values;
+    return observed;
+  }
+  if (weighting == SubspaceWeighting::cva) {
+    observed.J = *J;
+    M = lower_solve(*J, M);
+  }
+  MatrixXd square = detail::product_transposed(M, M);
+  if (weighting == SubspaceWeighting::n4sid) {
+    const MatrixXd through =
+        parts.L22().transpose().triangularView<Eigen::Upper>().solve(M.transpose()).transpose() *
+        parts.L21();
+    square += detail::product_transposed(through, through);
+  }
+  from_square(square, observed);
+  return observed;
+}
+
+/// Bauer's criterion over the canonical correlations, or the gaps of exact data.
+VectorXd order_criterion(const VectorXd& values, bool correlations, Index most, const Parts& parts,
+                         Index samples) {
+  VectorXd criterion(most + 1);
+  const auto N = static_cast<double>(samples);
+  for (Index n = 0; n <= most; ++n) {
+    const double left = n < values.size() ? values(n) : 0.0;
+    if (correlations) {
+      const auto cost = static_cast<double>(n * (2 * parts.p + parts.m));
+      criterion(n) = left * left + cost * std::log(N) / N;
+    } else {
+      const double floor = 1e-12 * values(0);
+      criterion(n) = n == 0 ? 1.0 : (left + floor) / (values(n - 1) + floor);
+    }
+  }
+  return criterion;
+}
+
+struct NoiseGain {
+  MatrixXd K;
+  MatrixXd noise;
+  bool determined = false;
+};
+
+/// The steady predictor of x⁺ = A x + w, y = C x + v with the covariance of [w; v].
+NoiseGain noise_gain(const MatrixXd& A, const MatrixXd& C, const MatrixXd& covariance) {
+  const Index n = A.rows();
+  const Index p = C.rows();
+  const MatrixXd R = covariance.bottomRightCorner(p, p);
+  if (R.diagonal().minCoeff() > 1e-18) {
+    const auto riccati = dare(A.transpose(), C.transpose(), covariance.topLeftCorner(n, n), R,
+                              covariance.topRightCorner(n, p));
+    if (riccati) {
+      return {riccati->K.transpose(), detail::symmetrized(R + C * riccati->X * C.transpose()),
+              true};
+    }
+  }
+  // Any stable predictor serves where there is no noise to tell the best one; none for a stable A.
+  const Eigen::VectorXcd modes = detail::eigenvalues_of(A);
+  NoiseGain gain{MatrixXd::Zero(n, p), R, false};
+  if (!(modes.cwiseAbs().maxCoeff() < 1.0)) {
+    const auto observer =
+        dare(A.transpose(), C.transpose(), MatrixXd::Identity(n, n), MatrixXd::Identity(p, p));
+    if (observer) {
+      gain.K = observer->K.transpose();
+    }
+  }
+  return gain;
+}
+
+/// Poles outside the unit circle go to where they are as far inside.
+MatrixXd reflected(const MatrixXd& A) {
+  const detail::Eigensystem modes = detail::eigensystem_of(A);
+  if (!modes.values.allFinite() || modes.values.cwiseAbs().maxCoeff() < 1.0) {
+    return A;
+  }
+  Eigen::VectorXcd values = modes.values;
+  for (std::complex<double>& value : values) {
+    const double size = std::abs(value);
+    if (size >= 1.0) {
+      value *= std::min(1.0 / size, 1.0 - 1e-6) / size;
+    }
+  }
+  // A V = V Λ: the transposed equation Vᵀ Aᵀ = Λ Vᵀ.
+  return detail::solve_complex(modes.vectors.transpose(),
+                               values.asDiagonal() * modes.vectors.transpose())
+      .transpose()
+      .real();
+}
+
+Expected<void> check(const MatrixRef& u, const MatrixRef& y, Time period,
+                     const SubspaceOptions& options) {
+  FLYBALL_CHECK(Checks(where)
+                    .finite(u, "u")
+                    .shape(y, u.rows(), y.cols(), "y", "samples of u x outputs")
+                    .finite(y, "y")
+                    .positive(period.si(), "period", "s"));
+  if (u.cols() == 0 || y.cols() == 0) {
+    return refusal(ArgumentError::empty, where, u.cols() == 0 ? "u" : "y")
+        .expected("samples x signals");
+  }
+  for (const auto& [value, name] : {std::pair{options.order.value_or(1), "order"},
+                                    {options.most_order, "most_order"},
+                                    {options.block_rows, "block_rows"}}) {
+    if (value < (options.order && name == std::string_view("order") ? 1 : 0) || value > 200) {
+      return refusal(ArgumentError::out_of_range, where, name)
+          .got(std::to_string(value))
+          .expected("from 1 to 200");
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Expected<SubspaceFit> fit_subspace(const MatrixRef& u, const MatrixRef& y, Time period,
+                                   const SubspaceOptions& options) {
+  FLYBALL_CHECK(check(u, y, period, options));
+  const Index m = u.cols();
+  const Index p = y.cols();
+  const Index samples = u.rows();
+  const Index wanted =
+      options.order.value_or(options.most_order > 0 ? options.most_order : Index{10});
+  // Γ without a block row must still show every state.
+  const Index least = wanted / p + 2;
+  const Index most = (samples + 1) / (2 * (m + p) + 3);
+  const Index s = options.block_rows > 0 ? options.block_rows
+                                         : std::clamp<Index>(std::max<Index>(15, least + 3), 2,
+                                                             std::max<Index>(2, most));
+  if (s > most || (options.order && s < least)) {
+    return refusal(IdentificationError::too_short, where)
+        .hint(s > most ? "record more samples, or take a smaller order"
+                       : "take more block rows, or a smaller order")
+        .with("samples", static_cast<double>(samples))
+        .with("block rows", static_cast<double>(s))
+        .with("needed block rows", static_cast<double>(least));
+  }
+  const ScaledSignals record = scaled(u, y);
+  const PastAndFuture data = compress(record.u, record.y, s);
+  const Parts parts{m, p, s, data.L};
+  const VectorXd excitation = data.L.topLeftCorner(s * m, s * m).diagonal().cwiseAbs();
+  if (excitation.minCoeff() <= 1e-9 * std::sqrt(static_cast<double>(data.columns))) {
+    return refusal(IdentificationError::singular, where)
+        .hint("excite every input with more frequencies, or take fewer block rows")
+        .with("block rows", static_cast<double>(s));
+  }
+  const std::optional<MatrixXd> J = future_factor(parts);
+  const Observed observed = observe(parts, options.weighting, J ? &*J : nullptr);
+
+  SubspaceFit fit;
+  fit.block_rows = s;
+  fit.singular_values = observed.values;
+  const Index largest = std::min<Index>(wanted, (s - 1) * p);
+  VectorXd correlations = observed.values;
+  if (J && options.weighting != SubspaceWeighting::cva) {
+    correlations = observe(parts, SubspaceWeighting::cva, &*J).values;
+  }
+  fit.criterion = order_criterion(correlations, J.has_value(), largest, parts, samples);
+  fit.order = largest;
+  if (!options.order) {
+    fit.criterion.tail(largest).minCoeff(&fit.order);
+    ++fit.order;
+  }
+  const Index n = fit.order;
+
+  // Γ = J U₁ √S and X = √S V₁ᵀ of the future; one sample later Γ without its last block row.
+  const VectorXd root = observed.values.head(n).cwiseSqrt().cwiseMax(1e-150);
+  const MatrixXd weighted = observed.U.leftCols(n) * root.asDiagonal();  // J⁻¹ Γ.
+  const MatrixXd Gamma = observed.J * weighted;
+  const Index rest = (s - 1) * p;
+  const MatrixXd J_rest = observed.J.topLeftCorner(rest, rest);
+  const MatrixXd X = root.cwiseInverse().asDiagonal() *
+                     (observed.U.leftCols(n).transpose() * lower_solve(observed.J, parts.L32()));
+  MatrixXd next(rest, parts.past() + p);
+  next << parts.L32().bottomRows(rest), parts.L33().bottomLeftCorner(rest, p);
+  MatrixXd target(n + p, parts.past() + p);
+  target.topRows(n) = detail::solve_least_squares(lower_solve(J_rest, Gamma.topRows(rest)),
+                                                  lower_solve(J_rest, next));
+  target.bottomRows(p) << parts.L32().topRows(p), parts.L33().topLeftCorner(p, p);
+
+  InnovationsModel& model = fit.model;
+  MatrixXd A;
+  MatrixXd C;
+  if (options.weighting == SubspaceWeighting::moesp) {
+    A = detail::solve_least_squares(Gamma.topRows(rest), Gamma.bottomRows(rest));
+    C = Gamma.topRows(p);
+  } else {
+    const MatrixXd both =
+        detail::solve_least_squares(X.transpose(), target.leftCols(parts.past()).transpose())
+            .transpose();
+    A = both.topRows(n);
+    C = both.bottomRows(p);
+  }
+  if (options.stable) {
+    A = reflected(A);
+  }
+  MatrixXd left = target;
+  left.topLeftCorner(n, parts.past()) -= A * X;
+  left.bottomLeftCorner(p, parts.past()) -= C * X;
+  const MatrixXd covariance = detail::symmetrized(detail::product_transposed(left, left)) /
+                              static_cast<double>(data.columns);
+  const NoiseGain gain = noise_gain(A, C, covariance);
+  fit.noise_determined = gain.determined;
+  model.system = {A, MatrixXd::Zero(n, m), C, MatrixXd::Zero(p, m), period};
+  model.K = gain.K;
+  model.x0 = VectorXd::Zero(n);
+
+  MatrixXd W = MatrixXd::Identity(p, p);
+  if (gain.determined) {
+    if (const auto factor = detail::cholesky_of(gain.noise)) {
+      W = lower_solve(*factor, W);
+    }
+  }
+  FLYBALL_TRY(const VectorXd inputs, regress_inputs(record, model, W, options));
+  const Index start = options.initial_state ? n : 0;
+  if (start > 0) {
+    model.x0 = inputs.head(n);
+  }
+  for (Index j = 0; j < m; ++j) {
+    model.system.B.col(j) = inputs.segment(start + j * n, n);
+    if (options.feedthrough) {
+      model.system.D.col(j) = inputs.segment(start + n * m + j * p, p);
+    }
+  }
+  model.noise = gain.noise;
+
+  model.system.B *= record.u_unit.cwiseInverse().asDiagonal();
+  model.system.C = record.y_unit.asDiagonal() * model.system.C;
+  model.system.D =
+      record.y_unit.asDiagonal() * model.system.D * record.u_unit.cwiseInverse().asDiagonal();
+  model.K *= record.y_unit.cwiseInverse().asDiagonal();
+  model.noise = record.y_unit.asDiagonal() * model.noise * record.y_unit.asDiagonal();
+  return fit;
+}
+
+}  // namespace flyball::identification
