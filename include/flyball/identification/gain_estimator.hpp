@@ -39,7 +39,7 @@ struct GainEstimatorSettings {
 /// Noise of the velocity biases kA towards zero by its variance over that of the acceleration, both
 /// filtered; the noise in `FeedforwardFit` does not. For a log take `identify_feedforward`.
 ///
-/// Run-time object: noexcept, allocation-free, finite whatever comes; about 0.2 µs a sample.
+/// Run-time object: noexcept, allocation-free, finite whatever comes.
 /// Source: book, section 14.2; Young, "Recursive Estimation and Time-Series Analysis" (2011),
 /// chapter 8 (state-variable filters).
 class GainEstimator {
