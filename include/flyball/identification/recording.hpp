@@ -28,9 +28,11 @@ enum class TestKind {
 /// @errors ArgumentError::unknown_name.
 [[nodiscard]] Expected<TestKind> parse_test_kind(std::string_view name);
 
+/// Whether the test is a slow ramp.
 [[nodiscard]] constexpr bool is_quasistatic(TestKind kind) {
   return kind == TestKind::quasistatic_forward || kind == TestKind::quasistatic_reverse;
 }
+/// Whether the test is driven forward.
 [[nodiscard]] constexpr bool is_forward(TestKind kind) {
   return kind == TestKind::quasistatic_forward || kind == TestKind::dynamic_forward;
 }

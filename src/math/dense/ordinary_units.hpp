@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
@@ -35,7 +36,9 @@ template <class Derived>
   Eigen::MatrixXd scaled(M.rows(), M.cols());
   for (Eigen::Index j = 0; j < M.cols(); ++j) {
     for (Eigen::Index i = 0; i < M.rows(); ++i) {
-      scaled(i, j) = std::ldexp(M(i, j), row(i) + column(j) + all);
+      // Powers beyond those of any two doubles' quotient change nothing more.
+      const long power = std::clamp(long{row(i)} + column(j) + all, -9999L, 9999L);
+      scaled(i, j) = std::ldexp(M(i, j), static_cast<int>(power));
     }
   }
   return scaled;

@@ -65,7 +65,7 @@ bool is_ordinary(const MatrixRef& M) {
 /// The power of two of a matrix's largest entry; 0 for a matrix of zeros.
 int exponent_of(const MatrixRef& M) {
   const double largest = M.cwiseAbs().maxCoeff();
-  return largest > 0.0 ? std::ilogb(largest) : 0;
+  return largest > 0.0 && std::isfinite(largest) ? std::ilogb(largest) : 0;
 }
 
 /// The exponents of the powers of two that balance M, whatever its size.

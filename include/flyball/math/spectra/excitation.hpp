@@ -24,6 +24,7 @@ enum class ChirpShape { linear, logarithmic };
 /// Sines one after the other, each for as many whole turns as told, as section E.7 measures them.
 struct SteppedSine {
   Eigen::VectorXd u;
+  /// One of the sines.
   struct Step {
     double frequency = 0.0;  ///< rad/s.
     Eigen::Index first = 0;  ///< First sample.
@@ -42,17 +43,19 @@ struct Multisine {
   Eigen::VectorXd u;
   double crest_factor = 0.0;
 };
+/// Which multiples of 1/(samples T) a multisine has.
+struct Harmonics {
+  Eigen::Index first = 1;
+  Eigen::Index last = 1;
+  Eigen::Index step = 1;
+};
+/// A multisine whose phases keep its crest factor low.
 /// @param harmonics  {first, last, step}: within [1, samples/2). @param seed  Of the first phases;
 /// further ones are tried and the best is kept.
 /// @errors ArgumentError::out_of_range, not_positive.
 /// Cost: O(iterations samples log samples), 600 iterations.
 /// Source: Van der Ouderaa, Schoukens and Renneboog, IEEE Trans. Instrumentation 37 (1988)
 /// (clipping); Schroeder, IEEE Trans. Information Theory 16 (1970) (the start).
-struct Harmonics {
-  Eigen::Index first = 1;
-  Eigen::Index last = 1;
-  Eigen::Index step = 1;
-};
 [[nodiscard]] Expected<Multisine> multisine(Eigen::Index samples, const Harmonics& harmonics,
                                             double amplitude = 1.0, std::uint64_t seed = 1);
 
