@@ -1,3 +1,5 @@
+#include <utility>
+
 #include <fmt/format.h>
 
 #include <flyball/io/log.hpp>
@@ -8,7 +10,6 @@
 #include "recording/channels.hpp"
 #include "recording/characterization_windows.hpp"
 #include "recording/recorded_motion.hpp"
-#include "recording/recorded_voltage.hpp"
 #include "recording/to_si.hpp"
 
 namespace flyball::recording {
@@ -111,13 +112,8 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
     units.velocity = unit_of_text(units.position.text, true, units.position.source);
   }
   FLYBALL_TRY_IN(log.source, auto output, output_scale(units.position, selection.scale, kind));
-  scale_runs(loaded.recording, output, units.velocity.factor / units.position.factor,
-             selection.voltage_scale);
   loaded.recording.mechanism = kind;
-  if (auto checked = check_voltage(loaded.recording.runs, loaded.diagnostics); !checked) {
-    return tl::unexpected(std::move(checked).error().in(log.source));
-  }
-  return loaded;
+  return in_si(std::move(loaded), units, output, selection.voltage_scale);
 }
 
 }  // namespace flyball::recording

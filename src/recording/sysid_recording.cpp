@@ -1,5 +1,6 @@
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -9,7 +10,6 @@
 #include "core/try.hpp"
 #include "recording/drivetrain.hpp"
 #include "recording/recorded_motion.hpp"
-#include "recording/recorded_voltage.hpp"
 #include "recording/to_si.hpp"
 
 namespace flyball::recording {
@@ -117,13 +117,8 @@ Expected<LoadedRecording> from_sysid_json(const Log& log, const LogSelection& se
   if (elevator_angles) {
     output.factor *= scale / selection.scale;
   }
-  scale_runs(loaded.recording, output, units.velocity.factor / units.position.factor,
-             selection.voltage_scale);
   loaded.recording.mechanism = kind;
-  if (auto checked = check_voltage(loaded.recording.runs, loaded.diagnostics); !checked) {
-    return tl::unexpected(std::move(checked).error().in(log.source));
-  }
-  return loaded;
+  return in_si(std::move(loaded), units, output, selection.voltage_scale);
 }
 
 }  // namespace flyball::recording

@@ -5,6 +5,7 @@
 
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
+#include "recording/recorded_voltage.hpp"
 #include "recording/to_si.hpp"
 
 namespace flyball::recording {
@@ -52,19 +53,23 @@ Expected<RecordedUnit> said_unit(const std::string& text, bool rate) {
   return unit;
 }
 
-void scale_runs(Recording& recording, const OutputScale& output, double velocity_over_position,
-                double voltage_scale) {
+Expected<LoadedRecording> in_si(LoadedRecording loaded, const RecordedUnits& units,
+                                const OutputScale& output, double voltage_scale) {
   const auto scale = [](std::vector<double>& values, double factor) {
     for (double& value : values) {
       value *= factor;
     }
   };
-  for (TestRun& run : recording.runs) {
+  for (TestRun& run : loaded.recording.runs) {
     scale(run.position, output.factor);
-    scale(run.velocity, output.factor * velocity_over_position);
+    scale(run.velocity, output.factor * units.velocity.factor / units.position.factor);
     scale(run.voltage, voltage_scale);
   }
-  recording.unit = output.unit;
+  loaded.recording.unit = output.unit;
+  if (auto checked = check_voltage(loaded.recording.runs, loaded.diagnostics); !checked) {
+    return tl::unexpected(std::move(checked).error().in(loaded.path));
+  }
+  return loaded;
 }
 
 void leave_velocity_out(Recording& recording) {

@@ -22,10 +22,10 @@ struct OutputScale {
 /// A unit that the person said; unknown if there is none. @errors RecordingError::unit_mismatch.
 [[nodiscard]] Expected<RecordedUnit> said_unit(const std::string& text, bool rate);
 
-/// Brings the runs to SI. @param output  Of the position. @param velocity_over_position  Sizes of
-/// their units, SI.
-void scale_runs(identification::Recording& recording, const OutputScale& output,
-                double velocity_over_position, double voltage_scale);
+/// The same with its runs in SI. @param output  Of the position.
+/// @errors RecordingError::unit_mismatch if the voltage is none (`check_voltage`).
+[[nodiscard]] Expected<LoadedRecording> in_si(LoadedRecording loaded, const RecordedUnits& units,
+                                              const OutputScale& output, double voltage_scale);
 
 /// Takes the velocity out where the position tells it too.
 void leave_velocity_out(identification::Recording& recording);

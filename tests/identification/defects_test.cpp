@@ -89,6 +89,34 @@ TEST(ModelTerms, AreNotFoundWhereNothingIs) {
   }
 }
 
+// A velocity that is refreshed with the position every 20 ms, with noise in every row of 5 ms: only
+// the rows of a refresh are new.
+TEST(Prepare, AVelocityThatRepeatsUnderNoiseIsNewOnceARefresh) {
+  CharacterizationOptions options = scenarios::session(scenarios::mechanisms.at(elevator), 7);
+  options.noise_per_row = true;
+  const auto held = prepare(flyball::record_characterization(options).value());
+  ASSERT_TRUE(held);
+  EXPECT_NEAR(held->velocity_refresh_period, 0.02, 1e-3);
+  EXPECT_EQ(held->runs[2].fresh_velocity, held->runs[2].fresh_position);
+  // Refreshed in every row, it is new in every row.
+  options.sensor_refresh = options.row_period;
+  const auto free = prepare(flyball::record_characterization(options).value());
+  ASSERT_TRUE(free);
+  EXPECT_GT(free->runs[2].fresh_velocity.size() * 2, free->runs[2].run.time.size());
+}
+
+// An arm's spring is nearly gravity's sine: left out without being denied, it must be in kG's
+// interval.
+TEST(ModelTerms, ATermInDoubtWidensTheIntervals) {
+  const SessionDefects weak{.spring = -0.4};
+  const FitReport doubting = report_of(arm, weak);
+  const FitReport sure = report_of(arm, weak, false);
+  ASSERT_TRUE(doubting.fit && sure.fit);
+  ASSERT_TRUE(doubting.fit->terms.empty());
+  EXPECT_EQ(doubting.fit->kG->value, sure.fit->kG->value);
+  EXPECT_GT(doubting.fit->kG->standard_error, 1.2 * sure.fit->kG->standard_error);
+}
+
 TEST(Backlash, IsNamed) {
   const FitReport report = report_of(arm, {.backlash = 0.08});
   ASSERT_TRUE(report.fit) << to_string(report.fit.error());
