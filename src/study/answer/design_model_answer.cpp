@@ -39,7 +39,12 @@ Table gain_table(std::string caption, std::string corner, const Eigen::MatrixXd&
 std::string poles_text(const Eigen::VectorXcd& poles) {
   constexpr std::size_t most = 12;
   std::vector<std::string> words;
-  for (const std::complex<double>& pole : poles) {
+  for (Eigen::Index i = 0; i < poles.size(); ++i) {
+    const std::complex<double>& pole = poles(i);
+    if (pole == 0.0 && i + 1 < poles.size()) {
+      words.push_back(fmt::format("0, {} times", poles.size() - i));
+      break;
+    }
     if (words.size() == most) {
       words.emplace_back("faster ones");
       break;

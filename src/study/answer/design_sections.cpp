@@ -42,6 +42,12 @@ void add_poles(Table& table, const std::string& which, const Eigen::VectorXcd& p
     if (pole.imag() < 0.0 && i > 0 && std::abs(poles(i - 1) - std::conj(pole)) < 1e-9) {
       continue;  // shown with its conjugate
     }
+    if (pole == 0.0) {
+      const Eigen::Index zeros = poles.size() - i;
+      table.rows.push_back(
+          {which, zeros > 1 ? fmt::format("0, {} times", zeros) : "0", "0", "0 ms"});
+      break;
+    }
     if (i >= most_poles) {
       table.rows.push_back({which, fmt::format("{} faster ones", poles.size() - i), "", ""});
       break;
