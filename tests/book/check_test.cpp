@@ -100,7 +100,7 @@ TEST(FigureChecks, EveryAlteredNumberIsFound) {
       entry["value"] = entry.contains("decimals") ? value + 1e-3 : value * (1.0 + 3e-9);
       const auto failures = failures_against(altered);
       ASSERT_EQ(failures.size(), 1u) << original["figure"] << " " << entry["name"];
-      EXPECT_EQ(failures[0].name, entry["name"]);
+      EXPECT_EQ(failures[0].name, entry["name"].get<std::string>());
       EXPECT_TRUE(failures[0].problem.empty());
     }
   }

@@ -78,14 +78,6 @@ struct SymmetricEigensystem {
 };
 [[nodiscard]] SymmetricEigensystem symmetric_eigensystem_of(const MatrixRef& S);
 
-/// A = U T Uᵀ, T block upper triangular, U orthogonal; not `converged`: no answer.
-struct RealSchur {
-  Eigen::MatrixXd T;
-  Eigen::MatrixXd U;
-  bool converged = false;
-};
-[[nodiscard]] RealSchur real_schur_of(const MatrixRef& A);
-
 /// A = U T Uᴴ, T upper triangular, U unitary.
 struct ComplexSchur {
   Eigen::MatrixXcd T;

@@ -77,19 +77,6 @@ SymmetricEigensystem symmetric_eigensystem_of(const MatrixRef& S) {
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
-RealSchur real_schur_of(const MatrixRef& A) {
-  if (const int unit = unit_of(A); unit != 0) {
-    RealSchur schur = real_schur_of(times_power(A, -unit));
-    schur.T = times_power(schur.T, unit);
-    return schur;
-  }
-  if (!A.allFinite()) {
-    return {A, A, false};
-  }
-  const Eigen::RealSchur<MatrixXd> schur(A);
-  return {schur.matrixT(), schur.matrixU(), schur.info() == Eigen::Success};
-}
-
 SingularValues svd_of(const MatrixRef& A) {
   const Eigen::JacobiSVD<MatrixXd, Eigen::FullPivHouseholderQRPreconditioner> svd(
       A, Eigen::ComputeFullU | Eigen::ComputeFullV);
