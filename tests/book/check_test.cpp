@@ -133,7 +133,7 @@ TEST(FigureChecks, EveryAlteredSeriesIsFound) {
         const auto failures = failures_against(altered);
         ASSERT_EQ(failures.size(), 1u)
             << original["figure"] << " " << series["name"] << " " << part;
-        EXPECT_EQ(failures[0].name, series["name"]);
+        EXPECT_EQ(failures[0].name, series["name"].get<std::string>());
       }
     }
   }
