@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <memory>
 
 #include <flyball/io/output_folder.hpp>
@@ -6,6 +7,20 @@
 #include "job_command.hpp"
 
 namespace flyball::app {
+
+namespace {
+
+/// A project file among further logs is the project; of two the last stays a log, which it is not.
+void take_project_out(JobInput& input) {
+  const auto found = std::find_if(input.more.begin(), input.more.end(),
+                                  [](const std::string& path) { return path.ends_with(".toml"); });
+  if (found != input.more.end()) {
+    input.project = *found;
+    input.more.erase(found);
+  }
+}
+
+}  // namespace
 
 CLI::App* add_job_command(CLI::App& program, Invocation& invocation, const JobCommand& command,
                           bool project) {
@@ -18,7 +33,10 @@ CLI::App* add_job_command(CLI::App& program, Invocation& invocation, const JobCo
   CLI::App* added = program.add_subcommand(command.name, command.help);
   added->footer(command.footer);
   added->add_option(command.file, options->input.path, command.file_help)->required();
-  if (project) {
+  if (command.several) {
+    added->add_option("MORE", options->input.more,
+                      "Further logs of the mechanism, and a project file (TOML)");
+  } else if (project) {
     added->add_option("PROJECT", options->input.project, "A project file (TOML)");
   }
   add_field_options(*added, command.job, options->input.given);
@@ -26,6 +44,7 @@ CLI::App* add_job_command(CLI::App& program, Invocation& invocation, const JobCo
   added->callback([options, command, &invocation] {
     JobInput& input = options->input;
     input.schema = command.schema;
+    take_project_out(input);
     const auto run = [&] {
       // Asked for first: a job is wasted on a folder that cannot be written.
       if (const std::string& out = options->common.out; !out.empty()) {

@@ -15,7 +15,8 @@ namespace flyball::app {
 /// What was typed for a job.
 struct JobInput {
   std::string path;
-  std::string project;  ///< Of a command that takes one beside.
+  std::vector<std::string> more;  ///< Further logs, of a command that takes several.
+  std::string project;            ///< Of a command that takes one beside.
   std::vector<study::Override> given;
   std::string schema;  ///< Of a refusal; the job may name another.
 };
@@ -32,6 +33,7 @@ struct JobCommand {
   const char* report;    ///< What --out writes.
   bool reports_unasked;  ///< Into flyball-report.
   ExpectedAll<Answer> (*run)(JobInput& input);
+  bool several = false;  ///< Whether further files of the kind may follow.
 };
 
 /// Adds it with the options of its job, --json and --out.

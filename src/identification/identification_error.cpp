@@ -15,6 +15,7 @@ ErrorInfo error_info(IdentificationError code) {
       {"singular", "the data do not tell the gains apart", ErrorKind::no_answer},
       {"no_convergence", "the fit does not settle", ErrorKind::no_answer},
       {"unphysical_gains", "no such mechanism has the gains that fit best", ErrorKind::no_answer},
+      {"logs_differ", "the logs are not of one mechanism", ErrorKind::no_answer},
   };
   return detail::info_of(code, "identification", rows);
 }

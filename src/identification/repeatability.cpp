@@ -49,6 +49,7 @@ double sigma_of(const GainEstimate& gain) {
 
 struct Scatter {
   double Q = 0.0;
+  double ratio = 1.0;
   double p_value = 1.0;
   double between_squared = 0.0;
 };
@@ -69,6 +70,7 @@ Scatter scatter_of(const std::vector<Reading>& readings) {
   }
   const double freedom = static_cast<double>(readings.size()) - 1.0;
   if (freedom > 0.0) {
+    scatter.ratio = std::sqrt(std::max(1.0, scatter.Q / freedom));
     scatter.p_value = chi_squared_tail(scatter.Q, freedom);
     scatter.between_squared = std::max(0.0, (scatter.Q - freedom) / (sum_w - sum_w2 / sum_w));
   }
@@ -98,6 +100,7 @@ GainComparison compare(std::string_view name, std::string unit,
   GainComparison comparison{.name = std::string(name), .unit = std::move(unit)};
   const Scatter scatter = scatter_of(readings);
   comparison.between = std::sqrt(scatter.between_squared);
+  comparison.ratio = scatter.ratio;
   comparison.p_value = scatter.p_value;
   double sum_w = 0.0;
   double sum_wx = 0.0;
@@ -175,7 +178,14 @@ void widen_by_scatter(FeedforwardFit& joint, const std::vector<GainComparison>& 
     const auto found = std::find_if(comparisons.begin(), comparisons.end(),
                                     [&](const GainComparison& c) { return c.name == gain.name; });
     GainEstimate& estimate = *gain.estimate;
-    if (found == comparisons.end() || !estimate.determined || !(found->between > 0.0)) {
+    if (found == comparisons.end() || !estimate.determined) {
+      continue;
+    }
+    if (found->agrees()) {
+      estimate.standard_error *= found->ratio;
+      for (double& end : estimate.interval) {
+        end = estimate.value + found->ratio * (end - estimate.value);
+      }
       continue;
     }
     const auto k = static_cast<double>(found->logs.size());

@@ -68,6 +68,8 @@ PARTS = {
 def check_answers(folder):
     log = examples / "logs/elevator.json"
     check_answer(["identify", log], 0, folder)
+    (folder / "again.json").write_text(log.read_text())
+    check_answer(["identify", log, "again.json"], 0, folder, "identify_logs")
     check_answer(["tune", log, "--out", "tuned"], 0, folder)
     check("project", tomllib.loads((folder / "tuned/gains.toml").read_text()), "gains.toml")
     for kind, parts in PARTS.items():

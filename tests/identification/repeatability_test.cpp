@@ -39,6 +39,7 @@ TEST(Repeatability, ComparesTwoLogs) {
   EXPECT_NEAR(kV.largest_z, std::sqrt(2.0), 1e-12);
   EXPECT_NEAR(kV.p_value, std::erfc(1.0), 1e-12);
   EXPECT_NEAR(kV.between, 0.1, 1e-12);
+  EXPECT_NEAR(kV.ratio, std::sqrt(2.0), 1e-12);
   EXPECT_NEAR(kV.mean, 1.1, 1e-12);
   EXPECT_NEAR(kV.standard_error, 0.1, 1e-12);
   EXPECT_TRUE(kV.agrees());
@@ -70,6 +71,12 @@ TEST(Repeatability, WidensAJointFitByTheScatter) {
   EXPECT_NEAR(joint.kV.standard_error, std::sqrt(0.007 * 0.007 + scatter), 1e-12);
   EXPECT_LT(joint.kV.interval[0], 1.1 - 12.0 * std::sqrt(scatter));  // Student's t of 1 is 12.7
   EXPECT_EQ(joint.kS.standard_error, 0.01);
+  // Logs that agree, but scatter by 1.41 of what was expected.
+  const auto agreeing = compare_fits({fit_with(1.0, 0.1), fit_with(1.2, 0.1)}).value();
+  joint = fit_with(1.1, 0.07);
+  widen_by_scatter(joint, agreeing);
+  EXPECT_NEAR(joint.kV.standard_error, 0.07 * std::sqrt(2.0), 1e-12);
+  EXPECT_NEAR(joint.kV.interval[1], 1.1 + 1.959963984540054 * 0.07 * std::sqrt(2.0), 1e-12);
 }
 
 // Sessions of one mechanism: they agree, and together tell more than each.

@@ -87,6 +87,19 @@ TEST(MechanismPlant, StepsAddUp) {
   }
 }
 
+// a = (V - kS sgn(v) - kV v - gravity)/kA, and what a short step does to the velocity.
+TEST(MechanismPlant, AcceleratesAsItSteps) {
+  const MechanismState state{0.4, -1.3};
+  const auto elevator = plant(MechanismKind::elevator);
+  EXPECT_NEAR(elevator.acceleration(state, 2.0), (2.0 + 0.2 + 1.5 * 1.3 - 0.6) / 0.3, 1e-14);
+  constexpr double h = 1e-6;
+  for (const auto kind : {MechanismKind::flywheel, MechanismKind::elevator, MechanismKind::arm}) {
+    const auto p = plant(kind);
+    const double slope = (p.step(state, 2.0, h).velocity - state.velocity) / h;
+    EXPECT_NEAR(p.acceleration(state, 2.0), slope, 1e-4);
+  }
+}
+
 // The exact steps of the arm against a classical Runge-Kutta of order 4 at 1 us steps, away from
 // reversals: second order at 0.25 ms leaves about 1e-8.
 TEST(MechanismPlant, ArmAgreesWithRungeKutta) {

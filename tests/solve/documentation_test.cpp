@@ -243,7 +243,8 @@ TEST(SolveTable, HelpNamesEveryField) {
     }
     for (const std::vector<Field>& fields : {kind.fields, kind.answer}) {
       for (const Field& field : fields) {
-        for (const char c : std::string().append(field.rows).append(field.columns)) {
+        const std::string sizes = std::string(field.rows) + std::string(field.columns);
+        for (const char c : sizes) {
           if (c >= 'a' && c <= 'z') {
             EXPECT_NE(help.find(std::string("\n  ") + c + "  "), std::string::npos)
                 << kind.name << "." << field.name << ": what is " << c << "?";

@@ -14,6 +14,7 @@ enum class IdentificationError {
   singular,           ///< The data do not distinguish the gains.
   no_convergence,     ///< The fit did not settle within its iteration cap.
   unphysical_gains,   ///< The best fit has gains that no such mechanism has.
+  logs_differ,        ///< Several logs are not of one mechanism.
 };
 [[nodiscard]] ErrorInfo error_info(IdentificationError code);
 

@@ -19,6 +19,7 @@ struct GainComparison {
   double mean = 0.0;                ///< Σ w x / Σ w, w = 1/(σ² + between²).
   double standard_error = 0.0;      ///< Of the mean.
   double between = 0.0;    ///< Standard deviation among logs beyond their own errors, at least 0.
+  double ratio = 1.0;      ///< √(Q/(k − 1)), Birge's, at least 1: scatter over what was expected.
   double p_value = 1.0;    ///< Of as large a scatter where the logs measure one value.
   double largest_z = 0.0;  ///< Of two logs: |x − y|/√(σx² + σy²), the largest.
   std::array<std::size_t, 2> pair{};     ///< The two logs.
@@ -41,8 +42,11 @@ struct GainComparison {
 [[nodiscard]] Expected<std::vector<GainComparison>> compare_fits(
     const std::vector<FeedforwardFit>& fits);
 
-/// The gains of a joint fit with what the logs differ by: a standard error is
-/// √(σ² + between²/k), and the interval takes Student's t with Satterthwaite's degrees of freedom.
+/// The gains of a joint fit with what the logs differ by. Where they agree, interval and standard
+/// error grow by Birge's ratio; where not, the error is √(σ² + between²/k), and the interval takes
+/// Student's t with Satterthwaite's degrees of freedom.
+/// Source: Birge, Physical Review 40 (1932); Particle Data Group, "Review of Particle Physics",
+/// section 5.2.2.
 void widen_by_scatter(FeedforwardFit& joint, const std::vector<GainComparison>& comparisons);
 
 /// The runs of several recordings of one mechanism, in their order. A channel that not every

@@ -32,6 +32,8 @@ void write_gain(JsonWriter& json, std::string_view name, const GainEstimate& gai
   });
 }
 
+}  // namespace
+
 void write_gains(JsonWriter& json, const identification::FeedforwardFit& fit) {
   json.object("gains", [&] {
     write_gain(json, "kS", fit.kS, "V");
@@ -77,6 +79,8 @@ void write_fit(JsonWriter& json, const identification::FeedforwardFit& fit) {
     });
   }
 }
+
+namespace {
 
 void write_source(JsonWriter& json, const recording::LoadedRecording& source) {
   json.object("log", [&] {

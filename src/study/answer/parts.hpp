@@ -57,6 +57,10 @@ void add_warnings(Verdict& verdict, const std::vector<Diagnostic>& diagnostics,
 void add_design_files(Answer& answer, const DesignResult& result,
                       const identification::FeedforwardFit* fit);
 
+/// The member "gains" of a fit.
+void write_gains(JsonWriter& json, const identification::FeedforwardFit& fit);
+/// The members of a fit: mechanism, unit, gains, terms, quality.
+void write_fit(JsonWriter& json, const identification::FeedforwardFit& fit);
 /// The object of "flyball.identify/1".
 void write_identification(JsonWriter& json, const IdentifyResult& result);
 /// The members of "flyball.design/2", without the schema.
