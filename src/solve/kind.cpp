@@ -54,6 +54,9 @@ std::span<const Kind> kinds() {
     add("Feedforward, delay and margins", feedforward_kinds());
     add("PID", pid_kinds());
     add("Observers", estimator_kinds());
+    add("Regression", regression_kinds());
+    add("Spectra and frequency responses", spectrum_kinds());
+    add("Models from records", identification_kinds());
     return table;
   }();
   return all;

@@ -169,5 +169,8 @@ template <class Function>
 [[nodiscard]] std::vector<Kind> feedforward_kinds();
 [[nodiscard]] std::vector<Kind> pid_kinds();
 [[nodiscard]] std::vector<Kind> estimator_kinds();
+[[nodiscard]] std::vector<Kind> regression_kinds();
+[[nodiscard]] std::vector<Kind> spectrum_kinds();
+[[nodiscard]] std::vector<Kind> identification_kinds();
 
 }  // namespace flyball::solve

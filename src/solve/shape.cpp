@@ -31,7 +31,15 @@ constexpr std::array letters{Letter{'n', "states"},
                              Letter{'f', "phase crossovers"},
                              Letter{'q', "inputs of the reference model"},
                              Letter{'i', "rows of A"},
-                             Letter{'j', "rows of B"}};
+                             Letter{'j', "rows of B"},
+                             Letter{'v', "coefficients"},
+                             Letter{'e', "equations"},
+                             Letter{'z', "parameters or orders"},
+                             Letter{'o', "coefficients of B"},
+                             Letter{'t', "coefficients of C"},
+                             Letter{'x', "coefficients of D"},
+                             Letter{'l', "numbers"},
+                             Letter{'w', "frequencies"}};
 
 /// "states x inputs"; "states + outputs".
 std::string words_of(std::string_view size) {
