@@ -358,7 +358,7 @@ TEST(Place, RefusesWhatOnlyRoundingReaches) {
   Random random(11);
   const Eigen::MatrixXd turn = test::random_rotation(random, n);
   Eigen::MatrixXd b = Eigen::VectorXd::Ones(n);
-  b(n - 1) = 1e-14;
+  b(n - 1) = 1e-16;
   const auto placed = place(turn * A * turn.transpose(), turn * b, {-1, -2, -3, -4, -5, -6});
   ASSERT_FALSE(placed.has_value());
   EXPECT_TRUE(placed.error().is(PolePlacementError::not_controllable));
