@@ -11,6 +11,7 @@
 
 #include <flyball/io/csv.hpp>
 #include <flyball/io/file.hpp>
+#include <flyball/io/wpilog.hpp>
 #include <flyball/study/project.hpp>
 
 #include "fixtures.hpp"
@@ -66,13 +67,26 @@ TEST_F(WriteReport, HoldsEverythingThatATuneGives) {
   const auto written = write(result, folder());
   ASSERT_TRUE(written) << to_string(written.error());
   const std::set<std::string> files = files_in(folder());
-  for (const char* name :
-       {"index.html", "result.json", "gains.toml", "ElevatorLoop.hpp", "data/closed_loop.csv",
-        "data/robustness.csv", "data/run_1_quasistatic-forward.csv",
-        "data/run_4_dynamic-reverse.csv", "pictures/closed_loop.png", "pictures/closed_loop.svg",
-        "pictures/poles.png", "pictures/estimate.svg", "pictures/fit_1_quasistatic-forward.png",
-        "constants/wpilib_cpp.txt", "constants/wpilib_java.txt", "constants/phoenix6_cpp.txt",
-        "constants/phoenix6_java.txt", "constants/revlib_cpp.txt", "constants/revlib_java.txt"}) {
+  for (const char* name : {"index.html",
+                           "result.json",
+                           "gains.toml",
+                           "ElevatorLoop.hpp",
+                           "data/closed_loop.csv",
+                           "data/robustness.csv",
+                           "data/run_1_quasistatic-forward.csv",
+                           "data/run_4_dynamic-reverse.csv",
+                           "data/signals.wpilog",
+                           "pictures/closed_loop.png",
+                           "pictures/closed_loop.svg",
+                           "pictures/poles.png",
+                           "pictures/estimate.svg",
+                           "pictures/fit_1_quasistatic-forward.png",
+                           "constants/wpilib_cpp.txt",
+                           "constants/wpilib_java.txt",
+                           "constants/phoenix6_cpp.txt",
+                           "constants/phoenix6_java.txt",
+                           "constants/revlib_cpp.txt",
+                           "constants/revlib_java.txt"}) {
     EXPECT_EQ(files.count(name), 1u) << name;
   }
   EXPECT_EQ(text_of(folder() + "/pictures/poles.png").substr(1, 3), "PNG");
@@ -102,6 +116,32 @@ TEST_F(WriteReport, TablesReadBackAsTheyWere) {
   ASSERT_TRUE(data) << to_string(data.error());
   EXPECT_EQ(data->find_signal("velocity")->value, run.velocity);
   EXPECT_EQ(data->find_signal("velocity_simulated")->value, run.velocity_hat);
+
+  // The same in one log, with the name of the test; runs that begin at zero each stand one after
+  // another.
+  const auto log = parse_wpilog(text_of(folder() + "/data/signals.wpilog"), "signals.wpilog");
+  ASSERT_TRUE(log) << to_string(log.error());
+  EXPECT_TRUE(log->diagnostics.empty());
+  const Signal* simulated = log->find_signal("flyball/velocity_simulated");
+  ASSERT_NE(simulated, nullptr);
+  EXPECT_EQ(simulated->unit, "rad/s");
+  std::size_t row = 0;
+  double end = -1.0;
+  for (const identification::FittedRun& fitted : result.identification.report.fit->runs) {
+    const double shift = simulated->time[row] - fitted.time.front();
+    EXPECT_GT(simulated->time[row], end);
+    for (std::size_t i = 0; i < fitted.time.size(); ++i, ++row) {
+      end = simulated->time[row];
+      EXPECT_NEAR(end, fitted.time[i] + shift, 2e-6);
+      EXPECT_EQ(simulated->value[row], fitted.velocity_hat[i]);
+    }
+  }
+  EXPECT_EQ(simulated->value.size(), row);
+  const TextSignal* test = log->find_text("flyball/test");
+  ASSERT_NE(test, nullptr);
+  ASSERT_EQ(test->value.size(), 8u);
+  EXPECT_EQ(test->value[0], "quasistatic-forward");
+  EXPECT_EQ(test->value[1], "none");
 }
 
 TEST_F(WriteReport, GainsAreAProjectThatGivesTheSameDesign) {

@@ -96,7 +96,7 @@ std::vector<Figure> figures_of(const IdentifyResult& result) {
 }
 
 std::vector<AnswerFile> data_files(const IdentifyResult& result) {
-  std::vector<AnswerFile> files;
+  std::vector<AnswerFile> files = signal_log(result);
   for (const PreparedRun& prepared : shown_runs(result)) {
     const FittedRun* fitted = fitted_run(result, prepared.source);
     files.push_back(

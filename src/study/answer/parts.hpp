@@ -49,6 +49,8 @@ void add_warnings(Verdict& verdict, const std::vector<Diagnostic>& diagnostics,
 
 /// The same as CSV: the runs; the response and the robustness grid; the step responses.
 [[nodiscard]] std::vector<AnswerFile> data_files(const IdentifyResult& result);
+/// data/signals.wpilog: measured, simulated and residual signals on the log's own clock.
+[[nodiscard]] std::vector<AnswerFile> signal_log(const IdentifyResult& result);
 [[nodiscard]] std::vector<AnswerFile> data_files(const DesignResult& result);
 [[nodiscard]] std::vector<AnswerFile> data_files(const ModelAnalysis& result);
 /// gains.toml, the generated header, constants to paste, data. A header that cannot be made is a
