@@ -55,6 +55,7 @@ int run(int argc, char** argv) {
       "  flyball identify shooter.json --json       only the gains, for other programs\n"
       "  flyball design elevator.toml               no robot yet: mass, gearing and motors\n"
       "  flyball simulate pendulum.toml             a mechanism, or a model by formula\n"
+      "  flyball experiment elevator.toml           which tests tell the gains best\n"
       "  flyball motors krakenX60                   what the motor table knows\n"
       "  flyball analyze elevator.toml              poles, what can be moved and seen, gains\n"
       "  flyball solve dare < problems.jsonl        any kernel, from any language\n"
@@ -73,6 +74,7 @@ int run(int argc, char** argv) {
   flyball::app::add_design_command(program, invocation);
   flyball::app::add_simulate_command(program, invocation);
   flyball::app::add_tune_command(program, invocation);
+  flyball::app::add_experiment_command(program, invocation);
   flyball::app::add_motors_command(program, invocation);
   flyball::app::add_book_command(program, invocation);
   flyball::app::add_analyze_command(program, invocation);

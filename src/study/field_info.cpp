@@ -116,7 +116,11 @@ Names sections_of(JobKind job) {
   static constexpr std::array<std::string_view, 10> simulate{
       "simulation", "point",  "model",     "mechanism", "gains",
       "controller", "sensor", "estimator", "battery",   "profile"};
+  static constexpr std::array<std::string_view, 5> experiment{"experiment", "log", "mechanism",
+                                                              "gains", "sensor"};
   switch (job) {
+    case JobKind::experiment:
+      return experiment;
     case JobKind::identify:
       return Names(all).first(1);
     case JobKind::design:

@@ -1,6 +1,7 @@
 #include <flyball/study/project.hpp>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -275,6 +276,39 @@ ExpectedAll<IdentifyJob> identify_job(const std::string& log, const std::string&
   return tune_job(log, project, overrides).map([](TuneJob job) {
     return std::move(job.identification);
   });
+}
+
+ExpectedAll<ExperimentJob> experiment_job(const std::string& file,
+                                          std::span<const Override> overrides) {
+  if (file.ends_with(".toml")) {
+    FLYBALL_TRY(auto project, read_project(file, overrides));
+    if (project.plant_error) {
+      return tl::unexpected(*std::move(project.plant_error));
+    }
+    ExperimentJob job{.plant = std::move(project.job.plant), .limits = project.experiment, .sensor = {}};
+    job.sensor.resolution = project.job.sensor.resolution;
+    job.sensor.delay = project.job.controller.delay.value_or(0.0);
+    job.seed = project.job.seed;
+    return job;
+  }
+  // The unit of the travel is that of the mechanism, which the log may tell.
+  std::vector<Override> of_log;
+  std::copy_if(overrides.begin(), overrides.end(), std::back_inserter(of_log),
+               [](const Override& given) { return !given.option.starts_with("--travel-"); });
+  FLYBALL_TRY(auto first, read("", "", of_log, Source::log));
+  const bool said_kind = first.log.mechanism.has_value();
+  FLYBALL_TRY(const auto identified, identify({file, std::move(first.log)}));
+  if (!identified.report.fit) {
+    return tl::unexpected(Errors(identified.report.fit.error()));
+  }
+  std::vector<Override> all(overrides.begin(), overrides.end());
+  if (!said_kind) {
+    all.push_back({"--mechanism", std::string(to_string(identified.mechanism))});
+  }
+  FLYBALL_TRY(auto said, read("", "", all, Source::log));
+  ExperimentJob job = experiment_after(identified, said.experiment);
+  job.seed = said.job.seed;
+  return job;
 }
 
 }  // namespace flyball::study

@@ -233,6 +233,22 @@ constexpr std::array profile_fields{
         .of(mechanism),
     whole("seed", at<&DesignJob::seed>(), 0, largest_whole, "1", "Seed of the simulation's noise")};
 
+constexpr std::array experiment_fields{
+    quantity("travel_low", at<&ExperimentLimits::travel_low>(), Of::output, any, "\"0.05 m\"",
+             "Lower end of an elevator's or arm's travel, as its sensor counts")
+        .without("of a log: the least position in it")
+        .of(mechanism),
+    quantity("travel_high", at<&ExperimentLimits::travel_high>(), Of::output, any, "\"1.2 m\"",
+             "Higher end")
+        .without("of a log: the greatest position in it")
+        .of(mechanism),
+    quantity("voltage", at<&ExperimentLimits::voltage>(), voltage, positive, "\"10 V\"",
+             "Largest voltage of a test")
+        .called("test-voltage"),
+    quantity("duration", at<&ExperimentLimits::duration>(), time, positive, "\"60 s\"",
+             "Of all tests together")
+        .called("test-time")};
+
 constexpr std::array model_fields{
     text("name", at<&FormulaSection::name>(), "\"pendulum\"", "What it is called")
         .without("model")
@@ -334,7 +350,9 @@ constexpr std::array sections{
             "The sensor of the simulation.", "", mechanism},
     Section{"battery", battery_fields, &within<&Project::job, &DesignJob::battery>,
             "The battery whose voltage sags in the simulation; needs a motor.", "", mechanism},
-    Section{"profile", profile_fields, &within<&Project::job>, "The motion that is simulated."}};
+    Section{"profile", profile_fields, &within<&Project::job>, "The motion that is simulated."},
+    Section{"experiment", experiment_fields, &within<&Project::experiment>,
+            "What tests may do that `flyball experiment` plans.", "", mechanism}};
 
 std::optional<SignalDimensions> signals(const void* document) {
   const auto& project = *static_cast<const Project*>(document);

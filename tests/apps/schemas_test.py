@@ -70,6 +70,8 @@ def check_answers(folder):
     check_answer(["identify", log], 0, folder)
     (folder / "again.json").write_text(log.read_text())
     check_answer(["identify", log, "again.json"], 0, folder, "identify_logs")
+    check_answer(["experiment", log, "--test-time", "30s"], 0, folder)
+    check_answer(["experiment", examples / "elevator.toml"], 2, folder)
     check_answer(["tune", log, "--out", "tuned"], 0, folder)
     check("project", tomllib.loads((folder / "tuned/gains.toml").read_text()), "gains.toml")
     for kind, parts in PARTS.items():

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include <flyball/core/errors.hpp>
+#include <flyball/study/experiment.hpp>
 #include <flyball/study/model_job.hpp>
 #include <flyball/study/tune.hpp>
 
@@ -68,6 +69,7 @@ struct Project {
   FormulaSection model{};  ///< In place of a mechanism.
   PointSection point{};
   SimulationSection simulation{};
+  ExperimentLimits experiment{};
   DesignJob job;  ///< Its plant comes from the parts and the gains.
   /// Why the file does not define a mechanism, if it does not: all that is missing.
   std::optional<Errors> plant_error{};
@@ -121,8 +123,13 @@ struct KeyComment {
 [[nodiscard]] ExpectedAll<TuneJob> tune_job(const std::string& log, const std::string& project,
                                             std::span<const Override> overrides = {});
 
+/// @param file  A log, or a project file (its name ends in .toml) of a mechanism that has none yet.
+/// @errors as `identify` and `design_job`.
+[[nodiscard]] ExpectedAll<ExperimentJob> experiment_job(const std::string& file,
+                                                        std::span<const Override> overrides = {});
+
 /// The jobs whose fields a person may set.
-enum class JobKind { identify, design, tune, analyze, simulate };
+enum class JobKind { identify, design, tune, analyze, simulate, experiment };
 
 /// A field of a job, for whoever asks a person for it: a command line, a form, a binding.
 struct FieldInfo {
