@@ -1,7 +1,9 @@
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <Eigen/SVD>
 
 #include "math/dense/dense.hpp"
@@ -10,6 +12,7 @@
 
 namespace flyball::detail {
 
+using Eigen::Index;
 using Eigen::MatrixXd;
 
 namespace {
@@ -27,6 +30,21 @@ struct Balanced {
   MatrixXd M;
   int unit;
 };
+
+/// Of square matrices only: what JacobiSVD prepares others by is made anew in place, and destroyed
+/// twice where memory is too short for it.
+using SquareSvd = Eigen::JacobiSVD<MatrixXd, Eigen::NoQRPreconditioner>;
+
+/// R of a decomposition of a matrix that is not wide.
+MatrixXd triangle(const MatrixXd& qr) {
+  return qr.topRows(qr.cols()).triangularView<Eigen::Upper>();
+}
+
+/// The largest entry, by which squares neither overflow nor vanish.
+double scale_of(const MatrixRef& A) {
+  const double largest = A.size() > 0 ? A.cwiseAbs().maxCoeff() : 0.0;
+  return largest > 0.0 ? largest : 1.0;
+}
 
 }  // namespace
 
@@ -78,13 +96,35 @@ SymmetricEigensystem symmetric_eigensystem_of(const MatrixRef& S) {
 }
 
 SingularValues svd_of(const MatrixRef& A) {
-  const Eigen::JacobiSVD<MatrixXd, Eigen::FullPivHouseholderQRPreconditioner> svd(
-      A, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  return {svd.matrixU(), svd.singularValues(), svd.matrixV()};
+  const Index m = A.rows();
+  const Index n = A.cols();
+  if (m < n) {
+    SingularValues turned = svd_of(A.transpose());
+    return {std::move(turned.V), std::move(turned.values), std::move(turned.U)};
+  }
+  if (m == n) {
+    const SquareSvd svd(A, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    return {svd.matrixU(), svd.singularValues(), svd.matrixV()};
+  }
+  // A P = Q R and R = U S Vᵀ.
+  const double scale = scale_of(A);
+  const Eigen::FullPivHouseholderQR<MatrixXd> qr(A / scale);
+  const SquareSvd svd(triangle(qr.matrixQR()), Eigen::ComputeFullU | Eigen::ComputeFullV);
+  MatrixXd U = qr.matrixQ();
+  U.leftCols(n) *= svd.matrixU();
+  return {std::move(U), svd.singularValues() * scale, qr.colsPermutation() * svd.matrixV()};
 }
 
 Eigen::VectorXd singular_values_of(const MatrixRef& A) {
-  return Eigen::JacobiSVD<MatrixXd>(A).singularValues();
+  if (A.rows() < A.cols()) {
+    return singular_values_of(A.transpose());
+  }
+  if (A.rows() == A.cols()) {
+    return SquareSvd(A).singularValues();
+  }
+  const double scale = scale_of(A);
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(A / scale);
+  return SquareSvd(triangle(qr.matrixQR())).singularValues() * scale;
 }
 
 Eigen::VectorXd singular_values_of_complex(const ComplexMatrixRef& A) {
