@@ -16,6 +16,8 @@
 #include <flyball/io/file.hpp>
 
 #include "core/try.hpp"
+#include "io/folder_entries.hpp"
+#include "io/folder_exchange.hpp"
 #include "io/report_marker.hpp"
 #include "io/unfinished.hpp"
 #include "io/unfinished_folder.hpp"
@@ -89,25 +91,21 @@ std::string temporary_beside(const fs::path& target) {
   return fmt::format(".{}.flyball-", target.filename().string());
 }
 
-bool is_temporary(const fs::path& path, const std::string& prefix) {
-  constexpr std::size_t unique = 6;  // what mkdtemp adds
-  const std::string name = path.filename().string();
+constexpr std::size_t unique = 6;  // what mkdtemp adds
+
+bool is_temporary(const std::string& name, const std::string& prefix) {
   return name.size() == prefix.size() + unique && name.starts_with(prefix);
 }
 
 /// Removes the temporary folders that killed processes left.
 void sweep(const fs::path& folder, const std::string& prefix) {
   std::error_code ignored;
-  std::vector<fs::path> left;
-  for (fs::directory_iterator entry(folder, ignored), end; !ignored && entry != end;
-       entry.increment(ignored)) {
-    if (is_temporary(entry->path(), prefix)) {
-      left.push_back(entry->path());
+  for (const std::string& name : io::names_in(folder, ignored)) {
+    if (!is_temporary(name, prefix)) {
+      continue;
     }
-  }
-  for (const fs::path& path : left) {
-    if (const int file = locked(path.string()); file >= 0) {
-      fs::remove_all(path, ignored);
+    if (const int file = locked((folder / name).string()); file >= 0) {
+      io::remove_folder(folder / name);
       ::close(file);
     }
   }
@@ -140,11 +138,10 @@ Expected<std::vector<WrittenFile>> check_destination(const std::string& path) {
         .got("a file")
         .expected("a folder, or a path where nothing is yet");
   }
-  bool empty = true;
-  for (fs::directory_iterator entry(path, error), end; !error && entry != end;
-       entry.increment(error)) {
-    empty = empty && is_temporary(entry->path(), temporary_inside());
-  }
+  const std::vector<std::string> names = io::names_in(path, error);
+  const bool empty = std::all_of(names.begin(), names.end(), [](const std::string& name) {
+    return is_temporary(name, temporary_inside());
+  });
   if (error) {
     return not_writable(path, error.message());
   }
@@ -166,8 +163,17 @@ Expected<std::vector<WrittenFile>> check_destination(const std::string& path) {
   return earlier;
 }
 
-/// Moves the files of `building` into a folder that is there, and those of an earlier report out of
-/// it. Whenever it is interrupted, the marker lists what is there.
+/// Writes the marker into the folder that is being built.
+Expected<void> mark(io::UnfinishedFolder& made, const std::vector<WrittenFile>& files) {
+  const fs::path marker = fs::path(made.path) / OutputFolder::marker;
+  if (const std::error_code error = made.make_way_for(OutputFolder::marker)) {
+    return not_writable(marker.string(), error.message());
+  }
+  return write_file_atomically(marker.string(), io::marker_text(files));
+}
+
+/// Puts the report in the place of an earlier one: all of it at once, and where that cannot be,
+/// file by file; whenever that is interrupted, the marker lists what is there.
 Expected<void> replace(io::UnfinishedFolder& made, const fs::path& folder,
                        const std::vector<WrittenFile>& files) {
   const fs::path building = made.path;
@@ -179,6 +185,12 @@ Expected<void> replace(io::UnfinishedFolder& made, const fs::path& folder,
                     "move it elsewhere or give another folder, so that it is not overwritten");
     }
   }
+  if (building.parent_path() == folder.parent_path()) {
+    FLYBALL_CHECK(mark(made, files));
+    if (io::exchange(made, folder, earlier)) {
+      return {};
+    }
+  }
   std::error_code error;
   io::Restoring restoring(folder, made);
   const auto put = [&](const fs::path& name) -> Expected<void> {
@@ -188,15 +200,10 @@ Expected<void> replace(io::UnfinishedFolder& made, const fs::path& folder,
     }
     return error ? not_writable((folder / name).string(), error.message()) : Expected<void>{};
   };
-  const auto mark = [&](const std::vector<WrittenFile>& listed) {
-    error = made.make_way_for(OutputFolder::marker);
-    return write_file_atomically((building / OutputFolder::marker).string(),
-                                 io::marker_text(listed))
-        .and_then([&] { return put(OutputFolder::marker); });
-  };
   std::vector<WrittenFile> both = earlier;
   both.insert(both.end(), files.begin(), files.end());
-  FLYBALL_CHECK(mark(both));
+  FLYBALL_CHECK(mark(made, both));
+  FLYBALL_CHECK(put(OutputFolder::marker));
   for (const WrittenFile& file : files) {
     FLYBALL_CHECK(put(file.name));
   }
@@ -213,7 +220,8 @@ Expected<void> replace(io::UnfinishedFolder& made, const fs::path& folder,
       }
     }
   }
-  FLYBALL_CHECK(mark(files));
+  FLYBALL_CHECK(mark(made, files));
+  FLYBALL_CHECK(put(OutputFolder::marker));
   restoring.done();
   return {};
 }
@@ -249,24 +257,31 @@ Expected<OutputFolder> OutputFolder::create(const std::string& path) {
     }
     building.made_parents.push_back(parent->string());
   }
-  // In the folder itself if it is there: whatever is mounted, it is on the same device then.
-  const std::string beside = temporary_beside(target);
-  if (!exists) {
-    sweep(target.parent_path(), beside);
-  }
-  std::string pattern = exists ? (target / (temporary_inside() + "XXXXXX")).string()
-                               : (target.parent_path() / (beside + "XXXXXX")).string();
+  const std::string prefix = temporary_beside(target);
+  sweep(target.parent_path(), prefix);
+  std::string beside = (target.parent_path() / (prefix + "XXXXXX")).string();
+  std::string inside = (target / (temporary_inside() + "XXXXXX")).string();
+  std::string& pattern = exists ? inside : beside;
   if (::mkdtemp(pattern.data()) == nullptr) {
     return not_writable(path, reason());
   }
-  building.made.path = pattern;
-  building.lock_file = locked(pattern);
+  building.made.path.swap(pattern);
+  // What is built beside the folder can take its place at once. What is mounted there, or is in a
+  // folder that others may write to only, keeps it inside.
+  if (exists) {
+    beside.replace(beside.size() - unique, unique, building.made.path,
+                   building.made.path.size() - unique, unique);
+    if (::rename(building.made.path.c_str(), beside.c_str()) == 0) {
+      building.made.path.swap(beside);
+    }
+  }
+  building.lock_file = locked(building.made.path);
   // mkdtemp makes the folder private; a report is as open as the user's other folders.
   const mode_t mask = ::umask(0);
   ::umask(mask);
   struct stat status{};
-  ::stat(pattern.c_str(), &status);
-  ::chmod(pattern.c_str(), (0777 & ~mask) | (status.st_mode & S_ISGID));
+  ::stat(building.made.path.c_str(), &status);
+  ::chmod(building.made.path.c_str(), (0777 & ~mask) | (status.st_mode & S_ISGID));
   return folder;
 }
 
@@ -312,9 +327,7 @@ Expected<void> OutputFolder::commit() {
   Building& building = *building_;
   std::error_code error;
   if (!fs::exists(fs::symlink_status(destination_, error))) {
-    error = building.made.make_way_for(marker);
-    FLYBALL_CHECK(write_file_atomically((fs::path(building.made.path) / marker).string(),
-                                        io::marker_text(building.files)));
+    FLYBALL_CHECK(mark(building.made, building.files));
     fs::rename(building.made.path, destination_, error);
     if (error) {
       return not_writable(destination_, error.message());

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "io/folder_entries.hpp"
 #include "io/unfinished_folder.hpp"
 
 namespace flyball::io {
@@ -35,8 +36,7 @@ void UnfinishedFolder::remove() noexcept {
   }
   if (!path.empty() && ::rmdir(path.c_str()) != 0) {
     try {
-      std::error_code ignored;
-      fs::remove_all(path, ignored);  // Another put something there.
+      remove_folder(path);  // Another put something there.
     } catch (...) {
       return;  // The next run sweeps it.
     }

@@ -138,6 +138,11 @@ int chmod(const char* path, mode_t mode) {
   return next<int(const char*, mode_t)>("chmod")(path, mode);
 }
 
+int chown(const char* path, uid_t owner, gid_t group) {
+  may_be_killed();
+  return next<int(const char*, uid_t, gid_t)>("chown")(path, owner, group);
+}
+
 int fchmod(int fd, mode_t mode) {
   may_be_killed();
   return next<int(int, mode_t)>("fchmod")(fd, mode);

@@ -179,27 +179,97 @@ TEST(OutputFolder, AMarkerThatLiesLeadsNowhere) {
   EXPECT_EQ(folder.get("thesis"), "thesis");
 }
 
-TEST(OutputFolder, TheFolderStaysTheSame) {
+struct stat status_of(const std::string& path) {
+  struct stat status{};
+  EXPECT_EQ(::stat(path.c_str(), &status), 0) << path;
+  return status;
+}
+
+TEST(OutputFolder, TheFolderStaysAsOpenAsItWas) {
   const TemporaryFolder folder;
   const std::string path = folder.file("report");
-  fs::create_directory(path);
-  ASSERT_EQ(::chmod(path.c_str(), 02750), 0);
-  struct stat before{};
-  struct stat after{};
-  ASSERT_EQ(::stat(path.c_str(), &before), 0);
-  for (int k = 0; k < 2; ++k) {
-    ASSERT_TRUE(report_of(path, {"index.html", "data/a.csv"}));
-    ASSERT_EQ(::stat(path.c_str(), &after), 0);
-    EXPECT_EQ(before.st_ino, after.st_ino);
-    EXPECT_EQ(before.st_mode, after.st_mode);
+  fs::create_directories(path + "/data");
+  if (::geteuid() == 0) {
+    ASSERT_EQ(::chown(path.c_str(), 65534, 65533), 0);
   }
-  // "." is a folder like any other.
+  ASSERT_EQ(::chmod(path.c_str(), 02750), 0);
+  const struct stat before = status_of(path);
+  fs::remove(path + "/data");
+  for (int k = 0; k < 3; ++k) {
+    ASSERT_TRUE(report_of(path, {"index.html", "data/a.csv"}));
+    const struct stat after = status_of(path);
+    EXPECT_EQ(before.st_mode, after.st_mode);
+    EXPECT_EQ(before.st_uid, after.st_uid);
+    EXPECT_EQ(before.st_gid, after.st_gid);
+    if (k > 0) {
+      EXPECT_EQ(status_of(path + "/data").st_mode & 07777, 0710U);
+      EXPECT_EQ(folder.get("report/data/mine.csv"), "mine");
+    }
+    ASSERT_EQ(::chmod((path + "/data").c_str(), 0710), 0);
+    folder.put("report/data/mine.csv", "mine");
+  }
+}
+
+// Their relative paths would lead into a folder that is gone.
+TEST(OutputFolder, WhoWorksInTheFolderKeepsIt) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("report");
+  ASSERT_TRUE(report_of(path, {"index.html", "old.csv"}));
+  const ino_t before = status_of(path).st_ino;
   const fs::path here = fs::current_path();
   fs::current_path(path);
   EXPECT_TRUE(report_of(".", {"index.html"}));
   EXPECT_TRUE(report_of("./", {"index.html"}));
   fs::current_path(here);
+  EXPECT_EQ(status_of(path).st_ino, before);
+
+  int ready[2];
+  ASSERT_EQ(::pipe(ready), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    (void)!::write(ready[1], ::chdir(path.c_str()) == 0 ? "y" : "n", 1);
+    for (;;) {
+      ::pause();
+    }
+  }
+  char arrived = 'n';
+  ASSERT_EQ(::read(ready[0], &arrived, 1), 1);
+  EXPECT_EQ(arrived, 'y');
+  EXPECT_TRUE(report_of(path, {"index.html"}));
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+  ::close(ready[0]);
+  ::close(ready[1]);
+  if (fs::exists("/proc/self/cwd")) {
+    EXPECT_EQ(status_of(path).st_ino, before);
+  }
   EXPECT_EQ(folder.names("report"), (Names{".flyball-report", "index.html"}));
+}
+
+TEST(OutputFolder, WhatIsNotOfTheReportIsTheSameAfterIt) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("report");
+  ASSERT_TRUE(report_of(path, {"index.html", "data/a.csv"}));
+  folder.put("report/log.json", "the only copy");
+  fs::create_symlink("../elsewhere", path + "/link");
+  const struct stat log = status_of(path + "/log.json");
+  ASSERT_TRUE(report_of(path, {"index.html", "b.csv"}));
+  EXPECT_EQ(status_of(path + "/log.json").st_ino, log.st_ino);
+  EXPECT_EQ(status_of(path + "/log.json").st_nlink, 1U);
+  EXPECT_EQ(fs::read_symlink(path + "/link"), "../elsewhere");
+  EXPECT_EQ(folder.names("report"),
+            (Names{".flyball-report", "b.csv", "index.html", "link", "log.json"}));
+  EXPECT_EQ(folder.names(), Names{"report"});
+
+  // A folder of the user's is not made again: the report's files are replaced one by one.
+  folder.put("report/notes/today.txt", "mine");
+  const ino_t notes = status_of(path + "/notes").st_ino;
+  ASSERT_TRUE(report_of(path, {"index.html", "notes.csv"}));
+  EXPECT_EQ(status_of(path + "/notes").st_ino, notes);
+  EXPECT_EQ(folder.get("report/notes/today.txt"), "mine");
+  EXPECT_EQ(folder.names("report"),
+            (Names{".flyball-report", "index.html", "link", "log.json", "notes", "notes.csv"}));
+  EXPECT_EQ(folder.names(), Names{"report"});
 }
 
 TEST(OutputFolder, LinksLeadToTheirFolderOrAreRefused) {
@@ -231,7 +301,7 @@ TEST(OutputFolder, SweepsWhatAKilledProcessLeft) {
     ASSERT_EQ(::waitpid(child, &status, 0), child);
     ASSERT_TRUE(WIFSIGNALED(status));
   }
-  EXPECT_EQ(folder.names().size(), 3U);  // old, empty and what "new" left
+  EXPECT_EQ(folder.names().size(), 5U);  // old, empty and what the three left
   Expected<OutputFolder> living = OutputFolder::create(folder.file("old"));
   ASSERT_TRUE(living);
   for (const char* name : {"new", "old", "empty"}) {

@@ -12,9 +12,13 @@ namespace flyball {
 /// commit, the destructor removes every trace. A folder that is new appears whole.
 ///
 /// Of a folder that is there only files may go that Flyball wrote and nobody changed: its marker,
-/// `.flyball-report`, lists them with size and checksum. Everything else in it stays, and so do the
-/// folder itself, its mode and its owner. Killed at any moment it is a folder that the next run
-/// knows, and temporary folders that a killed process left are swept by the next.
+/// `.flyball-report`, lists them with size and checksum. Everything else in it stays, and so do its
+/// mode and its owner. The new report takes the place of the earlier one in one step, its folder
+/// with it, so that a process that is killed leaves all of the one or all of the other. Where that
+/// cannot be (something is mounted there, a program works in it, it has folders of the user's own,
+/// the parent may not be written to, no Linux), the folder stays, and its files are replaced one by
+/// one: killed in the middle, it is one that the next run knows. Temporary folders that a killed
+/// process left are swept by the next.
 class OutputFolder {
  public:
   static constexpr std::string_view marker = ".flyball-report";
