@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <new>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -20,7 +22,8 @@ std::vector<Picture> draw(const std::vector<Figure>& figures, bool png, double s
   const std::size_t jobs = pictures.size() * (png ? 2 : 1);
   std::vector<std::string> problems(jobs);
   std::atomic<std::size_t> next{0};
-  const auto work = [&] {
+  std::atomic<bool> short_of_memory{false};
+  const auto draw_all = [&] {
     for (std::size_t job = next++; job < jobs; job = next++) {
       const bool raster = job >= pictures.size();
       Picture& target = pictures[job % pictures.size()];
@@ -36,15 +39,29 @@ std::vector<Picture> draw(const std::vector<Figure>& figures, bool png, double s
       }
     }
   };
+  const auto work = [&] {
+    try {
+      draw_all();
+    } catch (const std::bad_alloc&) {
+      short_of_memory = true;  // A thread that an exception leaves ends the process.
+    }
+  };
   // Each picture is a process of its own; waiting for one costs nothing.
   std::vector<std::jthread> workers;
   const std::size_t threads =
       std::min<std::size_t>(jobs, std::clamp(std::thread::hardware_concurrency(), 1U, 8U));
-  for (std::size_t i = 1; i < threads; ++i) {
-    workers.emplace_back(work);
+  try {
+    for (std::size_t i = 1; i < threads; ++i) {
+      workers.emplace_back(work);
+    }
+  } catch (const std::system_error&) {
+    // The system has no more threads: those that there are do the work.
   }
   work();
   workers.clear();
+  if (short_of_memory) {
+    throw std::bad_alloc();
+  }
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     pictures[i].problem = !png || !problems[i].empty() ? problems[i] : problems[i + figures.size()];
   }
