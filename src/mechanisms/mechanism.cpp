@@ -4,32 +4,11 @@
 #include <flyball/mechanisms/velocity_servo.hpp>
 
 #include "core/try.hpp"
+#include "mechanisms/motor_checks.hpp"
 
 namespace flyball::mechanisms {
 
 namespace {
-
-constexpr std::string_view gearing_hint =
-    "; write motor turns per output turn, above 1 for a reduction";
-
-Expected<void> check_drive(const DcMotor& motor, double gearing, std::string_view where) {
-  if (motor.count < 1) {
-    return refusal(ArgumentError::out_of_range, where, "motor count")
-        .got(std::to_string(motor.count))
-        .expected("at least 1");
-  }
-  FLYBALL_CHECK(Checks(where)
-                    .positive(motor.R, "motor.R", "Ohm")
-                    .positive(motor.Kt, "motor.Kt", "N m/A")
-                    .positive(motor.Kv, "motor.Kv", "rad/s/V"));
-  if (!(gearing > 0.0) || !std::isfinite(gearing)) {
-    return refusal(std::isfinite(gearing) ? ArgumentError::not_positive : ArgumentError::not_finite,
-                   where, "gearing")
-        .got(format_number(gearing))
-        .expected("greater than zero" + std::string(gearing_hint));
-  }
-  return {};
-}
 
 // Parameters that are numbers can have a model that is none (J = 1e-320): A and B are checked too.
 Expected<void> check_gains(const FeedforwardGains& gains, std::string_view where) {
@@ -75,6 +54,26 @@ FeedforwardGains rotational_gains(const DcMotor& motor, double G, double J) {
 }
 
 }  // namespace
+
+Expected<void> check_drive(const DcMotor& motor, double gearing, std::string_view where,
+                           std::string_view name) {
+  if (motor.count < 1) {
+    return refusal(ArgumentError::out_of_range, where, "motor count")
+        .got(std::to_string(motor.count))
+        .expected("at least 1");
+  }
+  FLYBALL_CHECK(Checks(where)
+                    .positive(motor.R, "motor.R", "Ohm")
+                    .positive(motor.Kt, "motor.Kt", "N m/A")
+                    .positive(motor.Kv, "motor.Kv", "rad/s/V"));
+  if (!(gearing > 0.0) || !std::isfinite(gearing)) {
+    return refusal(std::isfinite(gearing) ? ArgumentError::not_positive : ArgumentError::not_finite,
+                   where, std::string(name))
+        .got(format_number(gearing))
+        .expected("greater than zero; write motor turns per output turn, above 1 for a reduction");
+  }
+  return {};
+}
 
 ModelDescription description_of(MechanismKind kind, const FeedforwardGains& gains) {
   const std::string unit(position_unit(kind));
