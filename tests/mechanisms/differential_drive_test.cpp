@@ -1,10 +1,11 @@
+#include <flyball/mechanisms/differential_drive.hpp>
+
 #include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
-#include <flyball/mechanisms/differential_drive.hpp>
 #include <flyball/systems/discretize.hpp>
 
 namespace flyball::mechanisms {
@@ -135,7 +136,8 @@ TEST(DifferentialDrive, IsNewtonsLawOnTheMotors) {
     const double r_b = 0.5 * made.trackwidth.si();
     const double domega = r_b * (right - left) / made.moment_of_inertia.si();
     const Eigen::Vector2d found = model.derivative(x, u);
-    const double scale = (model.A.cwiseAbs() * x.cwiseAbs() + model.B.cwiseAbs() * u.cwiseAbs()).norm();
+    const double scale =
+        (model.A.cwiseAbs() * x.cwiseAbs() + model.B.cwiseAbs() * u.cwiseAbs()).norm();
     RC_ASSERT(std::abs(found(0) - (dv - r_b * domega)) <= 1e-13 * scale);
     RC_ASSERT(std::abs(found(1) - (dv + r_b * domega)) <= 1e-13 * scale);
   });
@@ -186,12 +188,11 @@ TEST(DifferentialDrive, RefusesWhatIsNoDrive) {
             "turns per output turn, above 1 for a reduction");
   parameters = of_book(0);
   EXPECT_TRUE(differential_drive(parameters).error().is(ArgumentError::out_of_range));
-  for (const auto spoil : {+[](DifferentialDriveParameters& p) { p.mass = 0_kg; },
-                           +[](DifferentialDriveParameters& p) { p.wheel_radius = 0_m; },
-                           +[](DifferentialDriveParameters& p) { p.trackwidth = 0_m; },
-                           +[](DifferentialDriveParameters& p) {
-                             p.moment_of_inertia = MomentOfInertia(-1.0);
-                           }}) {
+  for (const auto spoil :
+       {+[](DifferentialDriveParameters& p) { p.mass = 0_kg; },
+        +[](DifferentialDriveParameters& p) { p.wheel_radius = 0_m; },
+        +[](DifferentialDriveParameters& p) { p.trackwidth = 0_m; },
+        +[](DifferentialDriveParameters& p) { p.moment_of_inertia = MomentOfInertia(-1.0); }}) {
     parameters = of_book(2);
     spoil(parameters);
     EXPECT_TRUE(differential_drive(parameters).error().is(ArgumentError::not_positive));

@@ -43,9 +43,8 @@ struct DifferentialDrive : ContinuousSystem<2, 2, 2> {
     const Scalar vr = x(1);
     const Scalar left = u(0) - friction_voltage(kS_left, vl);
     const Scalar right = u(1) - friction_voltage(kS_right, vr);
-    return Eigen::Vector<Scalar, 2>{
-        A(0, 0) * vl + A(0, 1) * vr + B(0, 0) * left + B(0, 1) * right,
-        A(1, 0) * vl + A(1, 1) * vr + B(1, 0) * left + B(1, 1) * right};
+    return Eigen::Vector<Scalar, 2>{A(0, 0) * vl + A(0, 1) * vr + B(0, 0) * left + B(0, 1) * right,
+                                    A(1, 0) * vl + A(1, 1) * vr + B(1, 0) * left + B(1, 1) * right};
   }
   [[nodiscard]] ModelDescription description() const;
 };
