@@ -1,5 +1,6 @@
 #include <flyball/core/error.hpp>
 
+#include <new>
 #include <utility>
 
 #include <flyball/core/errors.hpp>
@@ -9,6 +10,19 @@
 #include "core/format.hpp"
 
 namespace flyball {
+
+Error::Error(const Error& other) noexcept : info_(other.info_) {
+  try {
+    where_ = other.where_;
+    subject_ = other.subject_;
+    expected_ = other.expected_;
+    got_ = other.got_;
+    hint_ = other.hint_;
+    evidence_ = other.evidence_;
+  } catch (const std::bad_alloc&) {
+    *this = Error(MemoryError::not_enough_memory);
+  }
+}
 
 Error& Error::operator=(Error&& other) noexcept {
   if (this != &other) {
@@ -104,6 +118,19 @@ std::string to_string(const Error& error) {
     text += ")";
   }
   return shortened(text);
+}
+
+Errors::Errors(const Errors& other) noexcept : Error(other) {
+  try {
+    all_ = other.all_;
+    diagnostics_ = other.diagnostics_;
+  } catch (const std::bad_alloc&) {
+    *this = Errors(Error(MemoryError::not_enough_memory));
+  }
+}
+
+std::vector<QuotedError> Errors::all() const {
+  return all_.empty() ? std::vector<QuotedError>{{*this, {}}} : all_;
 }
 
 Error not_enough_memory(std::string_view what) {

@@ -85,17 +85,41 @@ TEST(AllocationFaults, ReadersOfTexts) {
   }
 }
 
-// Not of those that are refused: tl::expected converts an Error to Errors, which takes memory, in
-// functions that it declares noexcept.
+// Not of what is no TOML: toml++ words that in functions that it declares noexcept.
 TEST(AllocationFaults, ReaderOfProjects) {
   const std::string text =
       "[mechanism]\ntype = \"elevator\"\nmass = \"8 kg\" # of all\nmotor = \"krakenX60\"\n"
       "gearing = 10\ndrum_radius = \"2 cm\"\n";
-  const auto read = [&] {
-    return std::string(study::parse_project(text, "a.toml") ? "read" : "refused");
-  };
-  ASSERT_EQ(read(), "read");
-  try_every_allocation("project", read);
+  for (const std::string& project :
+       {text, text + "gearng = 1\nmass = \"8 m\"\n",
+        text + "profile = 1\n[profile]\ngoal = \"1 V\"\n",
+        std::string("[mechanism]\ntype = \"wing\"\n")}) {
+    const auto read = [&] {
+      const auto found = study::parse_project(project, "a.toml");
+      return found ? std::string("read") : to_string(found.error());
+    };
+    ASSERT_EQ(read() == "read", project == text) << read();
+    try_every_allocation("project", read);
+  }
+}
+
+// tl::expected copies errors in functions that it declares noexcept.
+TEST(AllocationFaults, ACopyOfAnErrorTakesNoMemoryThatIsNotThere) {
+  const std::string long_text(100, 'x');
+  const Errors errors(
+      {{Error(ArgumentError::malformed).in(long_text).with("row", {1.0, 2.0}), long_text},
+       {Error(ArgumentError::empty).about(long_text), long_text}});
+  try_every_allocation("copies", [&] {
+    const Expected<int> one = tl::unexpected(Error(errors));
+    const Expected<int> copied = one;
+    ExpectedAll<int> all = copied;  // an Error becomes Errors
+    const std::string first = to_string(all.error());
+    const ExpectedAll<int> both = tl::unexpected(errors);
+    all = both;
+    EXPECT_TRUE(all.error().is(ArgumentError::malformed) ||
+                all.error().is(MemoryError::not_enough_memory));
+    return first + to_string(all.error()) + std::to_string(all.error().all().size());
+  });
 }
 
 TEST(AllocationFaults, ReaderOfModels) {
@@ -115,6 +139,39 @@ TEST_P(EveryKind, Example) {
   const solve::Kind& kind = solve::kinds()[GetParam()];
   const solve::Solver solver = solve::Solver::create(kind.name).value();
   try_every_allocation(std::string(kind.name), [&] { return solver.solve(kind.example).json; });
+}
+
+/// An example with its numbers replaced by one.
+std::string with_numbers(std::string_view example, std::string_view number) {
+  std::string text;
+  bool quoted = false;
+  bool inside = false;
+  for (const char c : example) {
+    quoted = quoted != (c == '"');
+    const std::string_view of_numbers = inside ? "0123456789+-.eE" : "0123456789-";
+    const bool part = !quoted && of_numbers.find(c) != std::string_view::npos;
+    text += !part ? std::string(1, c) : inside ? "" : std::string(number);
+    inside = part;
+  }
+  return text;
+}
+
+TEST_P(EveryKind, Refusals) {
+  const solve::Kind& kind = solve::kinds()[GetParam()];
+  const solve::Solver solver = solve::Solver::create(kind.name).value();
+  const auto refused = [&](const std::string& problem) {
+    EXPECT_NE(solver.solve(problem).json.find("\"error\""), std::string::npos) << problem;
+    try_every_allocation(problem, [&] { return solver.solve(problem).json; });
+  };
+  refused("{}");
+  refused("{\"nothing of it\": 1}");
+  refused(std::string(kind.example).substr(0, kind.example.size() / 2));
+  refused(with_numbers(kind.example, "1e999"));
+  // The mathematics of most kinds says no to one of these.
+  for (const char* number : {"0", "-1"}) {
+    const std::string problem = with_numbers(kind.example, number);
+    try_every_allocation(problem, [&] { return solver.solve(problem).json; });
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(AllocationFaults, EveryKind,

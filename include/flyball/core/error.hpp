@@ -53,9 +53,11 @@ class Error {
   template <ErrorEnum E>
   explicit Error(E code) : info_(error_info(code)) {}
 
-  Error(const Error&) = default;
+  /// A copy for which memory is too short is MemoryError::not_enough_memory and no more:
+  /// tl::expected copies its errors in functions that it declares noexcept.
+  Error(const Error& other) noexcept;
   Error(Error&&) noexcept = default;
-  Error& operator=(const Error&) = default;
+  Error& operator=(const Error& other) noexcept { return *this = Error(other); }
   /// Safe when both are one: `error = std::move(error).in("lqr")` keeps its text.
   Error& operator=(Error&& other) noexcept;
   ~Error() = default;

@@ -33,9 +33,16 @@ class Errors : public Error {
   /// @param all  Not empty.
   explicit Errors(std::vector<QuotedError> all) : Error(all.front()), all_(std::move(all)) {}
   // NOLINTNEXTLINE(google-explicit-constructor): whatever returns Errors may meet a single one.
-  Errors(Error error) : Error(error) { all_.push_back({std::move(error), {}}); }
+  Errors(Error error) noexcept : Error(std::move(error)) {}
 
-  [[nodiscard]] const std::vector<QuotedError>& all() const noexcept { return all_; }
+  /// As a copy of Error where memory is too short.
+  Errors(const Errors& other) noexcept;
+  Errors(Errors&&) noexcept = default;
+  Errors& operator=(const Errors& other) noexcept { return *this = Errors(other); }
+  Errors& operator=(Errors&&) noexcept = default;
+  ~Errors() = default;
+
+  [[nodiscard]] std::vector<QuotedError> all() const;
 
   /// What was noticed before the error, which nobody else can tell once there is no result.
   [[nodiscard]] const std::vector<Diagnostic>& diagnostics() const noexcept { return diagnostics_; }
@@ -46,7 +53,7 @@ class Errors : public Error {
   }
 
  private:
-  std::vector<QuotedError> all_;
+  std::vector<QuotedError> all_{};  ///< Empty if there is but the one that this is.
   std::vector<Diagnostic> diagnostics_{};
 };
 
