@@ -98,6 +98,28 @@ TEST(Arx, IsTheRegression) {
   EXPECT_LT(fit.whiteness, 1.2);
 }
 
+// Octave 7.3, control 3.4.0 (its delay 0 is ours of 1):
+//   pkg load control; k = (0:199)'; y = zeros(200, 1); e = 0.2*sin(0.7*k.^2 + 1);
+//   u = sign(sin(0.37*k) + 0.3*sin(1.9*k)).*(1 + 0.5*cos(0.11*k));
+//   for i = 3:200; y(i) = 1.5*y(i-1) - 0.7*y(i-2) + u(i-1) + 0.5*u(i-2) + e(i); end
+//   s = arx(iddata(y, u, 0.02), "na", 2, "nb", 2, "nk", 0); [b, a] = tfdata(s(1, 1), "v")
+TEST(Arx, AgreesWithOctave) {
+  VectorXd u(200);
+  VectorXd y = VectorXd::Zero(200);
+  for (Index k = 0; k < 200; ++k) {
+    const auto t = static_cast<double>(k);
+    const double wave = std::sin(0.37 * t) + 0.3 * std::sin(1.9 * t);
+    u(k) = wave == 0.0 ? 0.0 : std::copysign(1.0 + 0.5 * std::cos(0.11 * t), wave);
+    if (k >= 2) {
+      y(k) = 1.5 * y(k - 1) - 0.7 * y(k - 2) + u(k - 1) + 0.5 * u(k - 2) +
+             0.2 * std::sin(0.7 * t * t + 1.0);
+    }
+  }
+  const PolynomialFit fit = fit_arx(u, y, T, {.a = 2, .b = 2}).value();
+  EXPECT_LT((fit.model.A - polynomial({1.0, -1.48583543039, 0.689467423551})).norm(), 1e-10);
+  EXPECT_LT((fit.model.B[0] - polynomial({0.0, 1.01315927261, 0.532910368308})).norm(), 1e-10);
+}
+
 TEST(Arx, ChoosesItsOrders) {
   PolynomialModel truth = second_order();
   truth.B = {polynomial({0.0, 0.0, 0.0, 1.0, 0.5})};
