@@ -1,5 +1,7 @@
+#include <flyball/core/argument.hpp>
 #include <flyball/study/answer.hpp>
 #include <flyball/study/identify_logs.hpp>
+#include <flyball/study/identify_model.hpp>
 
 #include "job_command.hpp"
 
@@ -7,7 +9,33 @@ namespace flyball::app {
 
 namespace {
 
+/// A model by formula, whose project file says what of it is looked for.
+ExpectedAll<Answer> run_model(const JobInput& input, const study::Project& project) {
+  if (!input.more.empty()) {
+    return tl::unexpected(Errors(Error(ArgumentError::out_of_range)
+                                     .in("identify")
+                                     .about("the list of logs")
+                                     .got("of more than one")
+                                     .expected("one log of a model by formula")
+                                     .hint("several runs stand in one log: where its time jumps a "
+                                           "new one begins")));
+  }
+  return ExpectedAll<Log>(study::read_model_log(input.path, project))
+      .and_then([&](const Log& read) { return study::identify_model(read, project); })
+      .map([](const auto& result) { return study::answer_of(result); });
+}
+
 ExpectedAll<Answer> run(JobInput& input) {
+  if (!input.project.empty()) {
+    const auto project = study::read_project_beside_log(input.project, input.given);
+    if (!project) {
+      return tl::unexpected(project.error());
+    }
+    if (project->model_job) {
+      input.schema = "flyball.identify_model/1";
+      return run_model(input, *project);
+    }
+  }
   const auto job = study::identify_job(input.path, input.project, input.given);
   if (!job) {
     return tl::unexpected(job.error());
@@ -29,13 +57,15 @@ void add_identify_command(CLI::App& program, Invocation& invocation) {
       program, invocation,
       {.name = "identify",
        .schema = "flyball.identify/1",
-       .help = "Identify kS, kV, kA and kG of a mechanism from a log of it moving",
+       .help = "Identify a mechanism's kS, kV, kA and kG, or any model's parameters, from a log",
        .footer =
            "LOG is a SysId JSON, a WPILOG or a CSV with the four characterisation tests "
            "(quasistatic\n"
            "and dynamic, forward and reverse). What the log does not say is detected and told.\n"
            "PROJECT.toml may say the rest in [log], and the kind of mechanism in [mechanism].\n"
-           "Several logs of one mechanism are compared, and fitted together.",
+           "Several logs of one mechanism are compared, and fitted together.\n"
+           "With a [model] and a [fit] in PROJECT.toml, LOG is any recording of its inputs and "
+           "outputs.",
        .job = study::JobKind::identify,
        .file = "LOG",
        .file_help = "The log",

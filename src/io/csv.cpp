@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include <flyball/core/argument.hpp>
 #include <flyball/core/quantity.hpp>
 #include <flyball/io/file.hpp>
 
@@ -80,14 +81,18 @@ std::optional<double> cell_number(std::string_view cell) {
 
 class Reader {
  public:
-  Reader(CsvTable table, const std::string& source) : table_(std::move(table)), source_(source) {
+  /// @param period  s, between rows that have no time of their own.
+  Reader(CsvTable table, const std::string& source, std::optional<double> period = {})
+      : table_(std::move(table)), source_(source), period_(period) {
     log_.source = source;
     log_.format = "CSV";
   }
 
   Expected<Log> read() {
     FLYBALL_CHECK(read_header());
-    if (is_list()) {
+    if (period_) {
+      read_rows(*period_);
+    } else if (is_list()) {
       read_list();
     } else {
       FLYBALL_CHECK(read_table());
@@ -298,6 +303,17 @@ class Reader {
     return {};
   }
 
+  /// The rows are the clock.
+  void read_rows(double period) {
+    std::vector<std::optional<double>> time(table_.rows.size());
+    for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
+      time[row] = static_cast<double>(row - first_row_) * period;
+    }
+    for (std::size_t c = 0; c < headers_.size(); ++c) {
+      read_column(c, time);
+    }
+  }
+
   void read_column(std::size_t column, const std::vector<std::optional<double>>& time) {
     Signal signal{headers_[column].name, headers_[column].unit, {}, {}};
     TextSignal text{headers_[column].name, {}, {}};
@@ -372,6 +388,7 @@ class Reader {
 
   CsvTable table_;
   const std::string& source_;
+  std::optional<double> period_;
   Log log_;
   std::vector<Header> headers_;
   std::size_t first_row_ = 1;
@@ -399,6 +416,13 @@ std::string header_cell(const std::string& name, const std::string& unit) {
 Expected<Log> parse_csv(std::string_view text, const std::string& source) {
   return io::split_csv(text, source).and_then([&](CsvTable table) {
     return Reader(std::move(table), source).read();
+  });
+}
+
+Expected<Log> parse_csv(std::string_view text, const std::string& source, double period) {
+  FLYBALL_CHECK(check_positive(period, "parse_csv", "period", "s"));
+  return io::split_csv(text, source).and_then([&](CsvTable table) {
+    return Reader(std::move(table), source, period).read();
   });
 }
 

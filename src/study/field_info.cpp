@@ -118,11 +118,12 @@ Names sections_of(JobKind job) {
       "controller", "sensor", "estimator", "battery",   "profile"};
   static constexpr std::array<std::string_view, 5> experiment{"experiment", "log", "mechanism",
                                                               "gains", "sensor"};
+  static constexpr std::array<std::string_view, 3> identify{"log", "fit", "model.parameters"};
   switch (job) {
     case JobKind::experiment:
       return experiment;
     case JobKind::identify:
-      return Names(all).first(1);
+      return identify;
     case JobKind::design:
       return design;
     case JobKind::tune:

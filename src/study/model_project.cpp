@@ -10,6 +10,7 @@
 #include <flyball/math/expression/formula.hpp>
 #include <flyball/systems/formula_model.hpp>
 
+#include "study/fit_project.hpp"
 #include "study/model_project.hpp"
 #include "study/named_values.hpp"
 
@@ -56,6 +57,7 @@ class ModelReader : private NamedValues {
     if (!model) {
       return std::nullopt;
     }
+    ModelFit fit = model_fit(document_, project_, *model, point.x);
     return ModelJob{.path = project_.path,
                     .model = *model,
                     .outputs_are_states = said_.outputs.empty(),
@@ -68,7 +70,8 @@ class ModelReader : private NamedValues {
                     .input_tolerance = input_tolerance,
                     .limit = std::move(limit),
                     .reference = std::move(reference),
-                    .run = std::move(simulation)};
+                    .run = std::move(simulation),
+                    .fit = std::move(fit)};
   }
 
  private:

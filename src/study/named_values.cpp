@@ -86,7 +86,6 @@ Error NamedValues::unknown(const std::string& name, std::initializer_list<const 
                              : fmt::format("there are {}", fmt::join(names, ", ")));
 }
 
-/// A value with the unit of a coordinate, in SI; nothing where it is refused.
 std::optional<double> NamedValues::value(const std::string& section, const NamedText& said,
                                          const std::string& unit, Range range) {
   auto read = named_value(said.text, document_.name(section, said.name), unit, range);

@@ -32,6 +32,9 @@ class NamedValues {
   static Error unknown(const std::string& name,
                        std::initializer_list<const std::vector<Coordinate>*> lists,
                        std::string_view what);
+  /// A value with the unit of a coordinate, in SI; nothing where it is refused.
+  std::optional<double> value(const std::string& section, const NamedText& said,
+                              const std::string& unit, Range range);
   /// Values by the names of states and inputs. @param x, u  Where they go; null: not allowed.
   void read_values(const std::string& section, const NamedTexts& said, Range range,
                    Eigen::VectorXd* x, Eigen::VectorXd* u);
@@ -43,8 +46,6 @@ class NamedValues {
   std::vector<Parameter> parameters_;  ///< Their names may stand in an input's formula.
 
  private:
-  std::optional<double> value(const std::string& section, const NamedText& said,
-                              const std::string& unit, Range range);
   std::vector<double> of_outputs(const std::string& section, const NamedTexts& said,
                                  const std::vector<Coordinate>* outputs);
   InputSignals read_input(const Eigen::VectorXd& u);

@@ -251,6 +251,11 @@ ExpectedAll<Project> read_project(const std::string& path, std::span<const Overr
   return read_file_of(path, overrides, Source::file);
 }
 
+ExpectedAll<Project> read_project_beside_log(const std::string& path,
+                                             std::span<const Override> overrides) {
+  return read_file_of(path, overrides, Source::file_with_log);
+}
+
 ExpectedAll<DesignJob> design_job(const std::string& project, std::span<const Override> overrides) {
   FLYBALL_TRY(auto read, read_project(project, overrides));
   if (read.plant_error) {
@@ -262,7 +267,7 @@ ExpectedAll<DesignJob> design_job(const std::string& project, std::span<const Ov
 ExpectedAll<TuneJob> tune_job(const std::string& log, const std::string& project,
                               std::span<const Override> overrides) {
   FLYBALL_TRY(auto said, project.empty() ? read("", "", overrides, Source::log)
-                                         : read_file_of(project, overrides, Source::file_with_log));
+                                         : read_project_beside_log(project, overrides));
   TuneJob job{.identification = {.log = log, .selection = std::move(said.log)},
               .design = std::move(said.job)};
   if (!job.identification.selection.mechanism) {

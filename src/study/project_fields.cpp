@@ -3,6 +3,7 @@
 #include <array>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <flyball/study/project.hpp>
 
@@ -47,6 +48,16 @@ Expected<void> check_velocity_unit(const std::string& text) {
 
 Expected<void> check_motor(const std::string& text) {
   return mechanisms::motor(text).map([](const auto&) {});
+}
+
+Expected<void> check_choice(const std::string& text,
+                            std::initializer_list<std::string_view> choices) {
+  if (std::find(choices.begin(), choices.end(), text) != choices.end()) {
+    return {};
+  }
+  return refusal(ArgumentError::unknown_name, {}, fmt::format("\"{}\"", text))
+      .got("not one of the choices")
+      .expected(fmt::format("{}", fmt::join(choices, ", ")));
 }
 
 constexpr std::string_view kinds = "elevator, arm, flywheel";
@@ -322,6 +333,72 @@ constexpr std::array simulation_fields{
         .without("none")
         .of(model)};
 
+Expected<void> check_hold(const std::string& text) {
+  return check_choice(text, {"held", "linear", "cubic"});
+}
+
+Expected<void> check_loss(const std::string& text) {
+  return check_choice(text, {"squared", "soft_l1", "huber", "cauchy", "tukey"});
+}
+
+constexpr std::array fit_fields{
+    map("free", at<&FitSection::free>(), "{ k = \"0 .. 10 N/m\", b = \"free\" }",
+        "Parameters that are looked for, each with its range (\"free\", \"0 .. 10 N/m\", "
+        "\">= 0 N/m\") or what is known of it (\"5 N/m ± 1 N/m\"); [model] says where they start")
+        .without("none")
+        .no_option(),
+    map("channels", at<&FitSection::channels>(), "{ u = \"/Arm/AppliedVolts\" }",
+        "The log's channel of an input or an output of the model")
+        .without("the one of its name")
+        .no_option(),
+    map("validation_channels", at<&FitSection::validation_channels>(),
+        "{ u = \"uVal\", y = \"yVal\" }", "The same of a recording that the fit does not see")
+        .without("none")
+        .no_option(),
+    quantity("period", at<&FitSection::period>(), time, positive, "\"4 s\"",
+             "Time between the rows of a table that has no column of time")
+        .called("row-period")
+        .without("the log's own time"),
+    quantity("from", at<&FitSection::from>(), time, any, "\"2 s\"",
+             "Where the part of the log begins that is fitted")
+        .without("the log's start"),
+    quantity("to", at<&FitSection::to>(), time, any, "\"30 s\"", "Where it ends")
+        .without("the log's end"),
+    quantity("validation_from", at<&FitSection::validation_from>(), time, any, "\"30 s\"",
+             "Where the part begins that is kept aside to check the fit, which does not see it")
+        .without("none"),
+    quantity("validation_to", at<&FitSection::validation_to>(), time, any, "\"60 s\"",
+             "Where it ends")
+        .without("the log's end"),
+    map("initial", at<&FitSection::initial>(), "{ theta = \"10 deg\" }",
+        "The states at the first sample, where the search begins for free ones")
+        .called("fit-initial")
+        .without("the point")
+        .no_option(),
+    names("free_initial", at<&FitSection::free_initial>(), "[\"theta\"]",
+          "States whose value at the first sample is looked for")
+        .without("none")
+        .no_option(),
+    flag("same_initial", at<&FitSection::same_initial>(), "true",
+         "Whether the part that is kept aside begins at the states found for the fit")
+        .without("false: free ones are found anew"),
+    text("hold", at<&FitSection::hold>(), "\"linear\"", "What an input does between its samples")
+        .one_of("held, linear, cubic")
+        .checked(check_hold)
+        .without("held"),
+    text("loss", at<&FitSection::loss>(), "\"soft_l1\"", "How large errors count")
+        .one_of("squared, soft_l1, huber, cauchy, tukey")
+        .checked(check_loss)
+        .without("squared"),
+    whole("starts", at<&FitSection::starts>(), 1, 10000, "8",
+          "From how many places of the ranges the search starts, the model's own values the first")
+        .without("1"),
+    whole("seed", at<&FitSection::seed>(), 0, largest_whole, "1", "Which places these are")
+        .called("start-seed"),
+    flag("profile", at<&FitSection::profile>(), "true",
+         "Whether intervals come from the profile of the likelihood")
+        .without("false")};
+
 constexpr std::array sections{
     Section{"mechanism", mechanism_fields, &within<&Project::parts>,
             "What the mechanism is, and the parts it is made of.", "every mechanism", mechanism},
@@ -334,6 +411,8 @@ constexpr std::array sections{
             "Where a model by formula is linearised, and held by its controller.", "", model},
     Section{"simulation", simulation_fields, &within<&Project::simulation>,
             "What `flyball simulate` does."},
+    Section{"fit", fit_fields, &within<&Project::fit>,
+            "What `flyball identify LOG PROJECT.toml` finds of a model.", "", model},
     Section{"gains", gains_fields, &within<&Project::gains>,
             "Feedforward gains that are known, in place of those that follow from the parts. With "
             "kV no part is needed.",

@@ -1,4 +1,6 @@
-// Models by formula on the command line: simulated, analysed, regulated.
+// Models by formula on the command line: simulated, analysed, regulated, fitted.
+#include <cmath>
+
 #include <nlohmann/json.hpp>
 
 #include "run.hpp"
@@ -73,6 +75,80 @@ TEST_F(Command, AnalysesAndRegulatesAModelByFormula) {
   EXPECT_NEAR(json.at("simulation").at("states")[0].at("final").get<double>(), 0.5, 0.02);
   const Answer words = run("design " + example("cart_pole.toml"));
   EXPECT_TRUE(holds(words.out, "Operating point")) << words.out;
+}
+
+constexpr const char* lag =
+    "[model]\nname = \"lag\"\nstates = { x = \"m\" }\ninputs = { u = \"1\" }\n"
+    "parameters = { gain = \"1 m\", lag = \"0.2 s\" }\n"
+    "[model.derivative]\nx = \"(gain*u - x)/lag\"\n"
+    "[fit]\nchannels = { u = \"command\" }\nvalidation_from = \"6 s\"\n"
+    "free = { gain = \"0 .. 10 m\", lag = \"1 ms .. 10 s\" }\n";
+
+/// What a lag of 0.5 s with a gain of 2 m does with a square wave, every 20 ms.
+/// @param clock  Whether the rows have a time.
+std::string lag_table(bool clock) {
+  std::string table = std::string(clock ? "time (s)," : "") + "command,x (mm)\n";
+  double x = 0.0;
+  for (int k = 0; k < 400; ++k) {
+    const double u = k / 40 % 2 == 0 ? 1.0 : -0.5;
+    table += (clock ? std::to_string(0.02 * k) + "," : "") + std::to_string(u) + "," +
+             std::to_string(1000.0 * x) + "\n";
+    x += (2.0 * u - x) * (1.0 - std::exp(-0.02 / 0.5));
+  }
+  return table;
+}
+
+TEST_F(Command, FitsAModelByFormulaToALog) {
+  write("lag.toml", lag);
+  write("lag.csv", lag_table(true));
+  const Answer words = run("identify lag.csv lag.toml --out report");
+  ASSERT_EQ(words.status, 0) << words.err;
+  EXPECT_TRUE(holds(words.out, "kept aside")) << words.out;
+  EXPECT_TRUE(holds(contents(work() / "report/data/validation.csv"), "simulated_x"));
+  const Answer answer = run("identify lag.csv lag.toml --json --starts 3 --start-seed 4");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  const Json json = Json::parse(answer.out);
+  EXPECT_EQ(json.at("schema"), "flyball.identify_model/1");
+  EXPECT_NEAR(json.at("parameters")[0].at("value").get<double>(), 2.0, 1e-5);
+  EXPECT_NEAR(json.at("parameters")[1].at("value").get<double>(), 0.5, 1e-5);
+  EXPECT_EQ(json.at("search").at("start_costs").size(), 3U);
+  EXPECT_EQ(json.at("validation").size(), 1U);
+  const Answer started = run("identify lag.csv lag.toml --json --parameters gain=3m,lag=1s");
+  ASSERT_EQ(started.status, 0) << started.err;
+  EXPECT_NEAR(Json::parse(started.out).at("parameters")[1].at("value").get<double>(), 0.5, 1e-5);
+}
+
+TEST_F(Command, FitsAModelToATableWithoutTime) {
+  write("lag.toml", lag);
+  write("lag.csv", lag_table(false));
+  const Answer wrong = run("identify lag.csv lag.toml");
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_TRUE(holds(wrong.err, "[fit] period = \"20 ms\"")) << wrong.err;
+  const Answer answer = run("identify lag.csv lag.toml --json --row-period 20ms");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  EXPECT_NEAR(Json::parse(answer.out).at("parameters")[1].at("value").get<double>(), 0.5, 1e-5);
+}
+
+TEST_F(Command, RefusesWhatAFitOfAModelCannotUse) {
+  write("lag.toml", lag);
+  write("lag.csv", lag_table(true));
+  const auto refused = [&](const std::string& arguments, std::string_view sentence) {
+    const Answer answer = run("identify lag.csv " + arguments);
+    EXPECT_EQ(answer.status, 2) << arguments;
+    EXPECT_TRUE(answer.out.empty()) << answer.out;
+    EXPECT_TRUE(holds(answer.err, sentence)) << answer.err;
+  };
+  refused("lag.toml --mechanism elevator", "--mechanism is for a mechanism");
+  refused("lag.toml --hold square", "held, linear, cubic");
+  refused("lag.toml --starts 0", "starts");
+  refused("lag.toml --validation-from 9s", "the log has it from 0 ms to 7.98 s");
+  refused("lag.toml --parameters gian=3m", "gian");
+  refused("none.toml", "none.toml");
+  write("mechanism.toml", "[mechanism]\ntype = \"elevator\"\n[fit]\nstarts = 3\n");
+  refused("mechanism.toml", "fit");
+  const Answer json = run("identify lag.csv lag.toml --json --validation-from 9s");
+  EXPECT_EQ(json.status, 2);
+  EXPECT_EQ(Json::parse(json.out).at("schema"), "flyball.identify_model/1");
 }
 
 TEST_F(Command, TellsAllMistakesOfAModelByFormula) {

@@ -7,6 +7,7 @@ usage: schemas_test.py COMMAND SCHEMAS EXAMPLES
 
 import copy
 import json
+import math
 import pathlib
 import subprocess
 import sys
@@ -91,8 +92,35 @@ def check_answers(folder):
         check_answer(["analyze", examples / f"{model}.toml"], 0, folder)
         check_answer(["design", examples / f"{model}.toml"], 0, folder, "design_model")
     check_answer(["simulate", examples / "elevator.toml"], 0, folder)
+    check_model_fit(folder)
     (folder / "discrete.json").write_text('{"A":[[0.5]],"B":[[1]],"domain":"discrete","T":0.02}')
     check_answer(["analyze", "discrete.json"], 0, folder)
+
+
+def check_model_fit(folder):
+    """A lag of 0.5 s behind a square wave, its output in mm."""
+    rows, x = ["time (s),command,x (mm)"], 0.0
+    for k in range(400):
+        u = 1.0 if k // 40 % 2 == 0 else -0.5
+        rows.append(f"{0.02 * k:.2f},{u},{1000 * x + (-1) ** (k * k // 3):.6f}")
+        x += (2.0 * u - x) * (1.0 - math.exp(-0.02 / 0.5))
+    (folder / "lag.csv").write_text("\n".join(rows) + "\n")
+    (folder / "lag.toml").write_text(
+        '[model]\nname = "lag"\nstates = { x = "m" }\ninputs = { u = "1" }\n'
+        'parameters = { gain = "1 m", lag = "0.2 s" }\n[model.derivative]\nx = "(gain*u - x)/lag"\n'
+        '[fit]\nchannels = { u = "command" }\nto = "6 s"\nvalidation_from = "6 s"\nfree_initial = ["x"]\n'
+        'free = { gain = "0 .. 10 m", lag = ">= 1 ms" }\n')
+    check("project", tomllib.loads((folder / "lag.toml").read_text()), "lag.toml")
+    told = check_answer(["identify", "lag.csv", "lag.toml", "--out", "lag"], 0, folder, "identify_model")
+    found = {one["name"]: one["value"] for one in told["parameters"]}
+    if abs(found["gain"] - 2.0) > 0.01 or abs(found["lag"] - 0.5) > 0.01:
+        failures.append(f"identify lag.csv: {found}")
+    check_answer(["identify", "lag.csv", "lag.toml", "--loss", "soft_l1", "--starts", "3"], 0, folder,
+                 "identify_model")
+    (folder / "wrong_channel.toml").write_text((folder / "lag.toml").read_text().replace('"command"', '"comand"'))
+    check_answer(["identify", "lag.csv", "wrong_channel.toml"], 2, folder, "identify_model")
+    for name in ("cascaded_tanks", "cascaded_tanks_extended", "silverbox"):
+        check("project", tomllib.loads((examples / f"{name}.toml").read_text()), name)
 
 
 def check_motors(folder):
@@ -116,7 +144,7 @@ def check_reader_and_schema(folder):
     values = {"1": 1, "1.5": 1.5, '"10"': "10", '"x"': "x", '""': "", "true": True, "[]": [], "[1]": [1]}
     base = '[mechanism]\ntype = "elevator"\n'
     for section, told in schema["properties"].items():
-        if section in ("model", "point", "simulation"):
+        if section in ("model", "point", "simulation", "fit"):
             continue
         for key in told["properties"]:
             if key in ("type", "motor", "tolerance", "limit", "reference", "mechanism"):

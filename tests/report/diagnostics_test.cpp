@@ -6,6 +6,7 @@
 
 #include <flyball/report/html.hpp>
 #include <flyball/report/terminal.hpp>
+#include <flyball/study/identify_model.hpp>
 
 #include "fixtures.hpp"
 #include "report/format.hpp"
@@ -158,6 +159,16 @@ TEST(Diagnostics, OfAnAnalysis) {
                   Eigen::MatrixXd::Constant(1, 1, 1.0), Eigen::MatrixXd::Zero(1, 1)};
   add(model.notes, "model");
   expect_nothing_lost(study::answer_of(study::analyze(model).value()), {"model"});
+}
+
+TEST(Diagnostics, OfAFittedModelReachEveryReader) {
+  study::ModelIdentification result{identification::PredictionErrorFit(
+      ContinuousSystem<>{Eigen::MatrixXd::Constant(1, 1, -1.0), Eigen::MatrixXd::Ones(1, 1),
+                         Eigen::MatrixXd::Ones(1, 1), Eigen::MatrixXd::Zero(1, 1)})};
+  result.fit.whiteness.resize(1);
+  result.fit.output_std = {1.0};
+  add(result.diagnostics, "model");
+  expect_nothing_lost(study::answer_of(result), {"model"});
 }
 
 }  // namespace

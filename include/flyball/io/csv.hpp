@@ -23,6 +23,11 @@ namespace flyball {
 ///         its line).
 [[nodiscard]] Expected<Log> parse_csv(std::string_view text, const std::string& source);
 
+/// The same of a table whose rows are that far apart, whatever columns it has; the first is at 0.
+/// @param period  s, positive and finite.
+[[nodiscard]] Expected<Log> parse_csv(std::string_view text, const std::string& source,
+                                      double period);
+
 /// A table as CSV: header `time (s),name (unit),…`, one row a line, numbers the shortest that read
 /// back to the same double, NaN as a blank cell. UTF-8, LF.
 [[nodiscard]] std::string to_csv(const TimeSeries& series);

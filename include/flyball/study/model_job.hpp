@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <flyball/core/quantity.hpp>
+#include <flyball/identification/prediction_error.hpp>
 #include <flyball/math/expression/tape.hpp>
 #include <flyball/systems/any_model.hpp>
 
@@ -47,6 +48,32 @@ struct SimulationSection {
   std::optional<double> accuracy{};  ///< Relative, of an open loop.
   std::optional<bool> closed_loop{};
   NamedTexts initial{}, input{}, noise{}, resolution{};
+};
+
+/// [fit]: what `flyball identify LOG PROJECT.toml` does with a model.
+struct FitSection {
+  NamedTexts free{};                   ///< Parameters that are looked for, with their range.
+  NamedTexts channels{};               ///< The log's channel of an input or an output.
+  NamedTexts validation_channels{};    ///< The same of the part that is kept aside.
+  std::optional<double> period{};      ///< s, between rows of a table without time.
+  std::optional<double> from{}, to{};  ///< s, of the log's time.
+  std::optional<double> validation_from{}, validation_to{};  ///< s
+  NamedTexts initial{};                                      ///< States at the first sample.
+  std::vector<std::string> free_initial{};                   ///< Those of them that are looked for.
+  bool same_initial = false;  ///< Whether the validation begins as the fit does.
+  std::string hold{}, loss{};
+  std::optional<int> starts{};
+  unsigned long long seed = 1;  ///< Of the places where they are.
+  bool profile = false;
+};
+
+/// The same, checked, in SI.
+struct ModelFit {
+  std::vector<identification::FreeParameter> free{};
+  std::vector<std::string> channels{};             ///< Of the inputs, then of the outputs.
+  std::vector<std::string> validation_channels{};  ///< The same; empty: none.
+  std::vector<identification::InitialState> initial{};
+  identification::PredictionErrorOptions options{};
 };
 
 /// The inputs of an open loop, over time.
@@ -92,6 +119,7 @@ struct ModelJob {
   Eigen::VectorXd limit{};      ///< m, largest size of each input's deviation from zero; infinite.
   Eigen::VectorXd reference{};  ///< n, where the loop goes; NaN: the point.
   ModelRun run{};
+  ModelFit fit{};
 };
 
 }  // namespace flyball::study

@@ -70,6 +70,7 @@ struct Project {
   PointSection point{};
   SimulationSection simulation{};
   ExperimentLimits experiment{};
+  FitSection fit{};
   DesignJob job;  ///< Its plant comes from the parts and the gains.
   /// Why the file does not define a mechanism, if it does not: all that is missing.
   std::optional<Errors> plant_error{};
@@ -115,6 +116,9 @@ struct KeyComment {
 /// @errors as `read_project`, and Project::plant_error.
 [[nodiscard]] ExpectedAll<DesignJob> design_job(const std::string& project,
                                                 std::span<const Override> overrides = {});
+/// A file that stands beside a log, which may say the rest. @errors as `read_project`.
+[[nodiscard]] ExpectedAll<Project> read_project_beside_log(
+    const std::string& path, std::span<const Override> overrides = {});
 /// @param project  May be empty: no file. @errors as `read_project`.
 [[nodiscard]] ExpectedAll<IdentifyJob> identify_job(const std::string& log,
                                                     const std::string& project,

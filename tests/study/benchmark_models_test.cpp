@@ -1,0 +1,66 @@
+// Public benchmarks of nonlinear identification, free simulation on the part that is kept aside.
+// The numbers are those of docs/benchmarks.md.
+#include <cstdio>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include <flyball/io/csv.hpp>
+#include <flyball/study/identify_model.hpp>
+
+namespace flyball::study {
+namespace {
+
+const std::string folder = FLYBALL_TEST_DATA "/benchmarks/";
+const std::string examples = FLYBALL_EXAMPLES "/";
+
+/// A file that may be compressed, by the tool that everybody has.
+std::string contents(const std::string& path) {
+  std::string text;
+  std::FILE* const pipe = ::popen(("gzip -cdf '" + path + "'").c_str(), "r");
+  if (pipe == nullptr) {
+    return text;
+  }
+  char buffer[1 << 16];
+  for (std::size_t read = 0; (read = std::fread(buffer, 1, sizeof buffer, pipe)) > 0;) {
+    text.append(buffer, read);
+  }
+  ::pclose(pipe);
+  return text;
+}
+
+double validation_error(const std::string& data, const std::string& model) {
+  const auto project = read_project(examples + model);
+  if (!project) {
+    ADD_FAILURE() << to_string(project.error());
+    return 1e300;
+  }
+  const auto log = parse_csv(contents(folder + data), data, *project->fit.period);
+  if (!log) {
+    ADD_FAILURE() << to_string(log.error());
+    return 1e300;
+  }
+  const auto result = identify_model(*log, *project);
+  if (!result) {
+    ADD_FAILURE() << to_string(result.error());
+    return 1e300;
+  }
+  EXPECT_TRUE(result->fit.minimum.converged) << to_string(result->fit.minimum.stop);
+  EXPECT_EQ(result->validation.size(), 1U);
+  return result->validation.front().outputs.front().rmse;
+}
+
+// Published 0.34 to 0.76 V (Math. Probl. Eng. 2021, 6613425, Table 2).
+TEST(BenchmarkModels, CascadedTanksByTheirSquareRoots) {
+  EXPECT_LT(validation_error("cascaded_tanks_dataBenchmark.csv", "cascaded_tanks.toml"), 0.34);
+}
+TEST(BenchmarkModels, CascadedTanksWithMoreOfTheirOutlets) {
+  EXPECT_LT(validation_error("cascaded_tanks_dataBenchmark.csv", "cascaded_tanks_extended.toml"),
+            0.26);
+}
+TEST(BenchmarkModels, SilverboxByDuffingsOscillator) {
+  EXPECT_LT(validation_error("silverbox_SNLS80mV.csv.gz", "silverbox.toml"), 0.5e-3);
+}
+
+}  // namespace
+}  // namespace flyball::study
