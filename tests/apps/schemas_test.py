@@ -119,7 +119,8 @@ def check_model_fit(folder):
                  "identify_model")
     (folder / "wrong_channel.toml").write_text((folder / "lag.toml").read_text().replace('"command"', '"comand"'))
     check_answer(["identify", "lag.csv", "wrong_channel.toml"], 2, folder, "identify_model")
-    for name in ("cascaded_tanks", "cascaded_tanks_extended", "silverbox"):
+    for name in ("cascaded_tanks", "cascaded_tanks_extended", "silverbox", "wiener_hammerstein",
+                 "wiener_hammerstein_linear"):
         check("project", tomllib.loads((examples / f"{name}.toml").read_text()), name)
 
 

@@ -61,6 +61,17 @@ TEST(BenchmarkModels, CascadedTanksWithMoreOfTheirOutlets) {
 TEST(BenchmarkModels, SilverboxByDuffingsOscillator) {
   EXPECT_LT(validation_error("silverbox_SNLS80mV.csv.gz", "silverbox.toml"), 0.5e-3);
 }
+// What the best model without the diode leaves is the diode's.
+TEST(BenchmarkModels, WienerHammersteinWithoutItsNonlinearity) {
+  EXPECT_LT(validation_error("wiener_hammerstein_WienerHammerBenchmark.csv.gz",
+                             "wiener_hammerstein_linear.toml"),
+            45e-3);
+}
+TEST(BenchmarkModels, WienerHammersteinFromItsFilterDesigns) {
+  EXPECT_LT(validation_error("wiener_hammerstein_WienerHammerBenchmark.csv.gz",
+                             "wiener_hammerstein.toml"),
+            0.5e-3);
+}
 
 }  // namespace
 }  // namespace flyball::study
