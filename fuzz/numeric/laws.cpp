@@ -33,6 +33,12 @@ class Laws {
   [[nodiscard]] Balance given_or_zero(const char* name, const Balance& B, const Balance& A) const {
     return has(name) ? given(name) : Balance(QuadMatrix(A.value.columns(), B.value.columns()));
   }
+  /// Half of it and of its transpose: what a solver takes of one that is symmetric but for
+  /// rounding.
+  [[nodiscard]] Balance symmetric(const char* name) const {
+    const QuadMatrix M = quad_matrix(problem_.at(name));
+    return Balance(Quad(0.5) * (M + transpose(M)));
+  }
   /// A matrix of the answer.
   [[nodiscard]] Balance found(const char* name) const {
     return answered(quad_matrix(answer_.at(name)));
@@ -97,8 +103,8 @@ Balance cost_of(const Balance& Q, const Balance& R, const Balance& N, const Bala
 void riccati(Laws& laws, const char* solution, bool discrete) {
   const Balance A = laws.given("A");
   const Balance B = laws.given("B");
-  const Balance Q = laws.given("Q");
-  const Balance R = laws.given("R");
+  const Balance Q = laws.symmetric("Q");
+  const Balance R = laws.symmetric("R");
   const Balance N = laws.given_or_zero("N", B, A);
   const Balance X = laws.found(solution);
   const Balance K = laws.found("K");
@@ -117,8 +123,8 @@ void riccati(Laws& laws, const char* solution, bool discrete) {
 void kalman(Laws& laws) {
   const Balance A = laws.given("A");
   const Balance C = laws.given("C");
-  const Balance Q = laws.given("Q");
-  const Balance R = laws.given("R");
+  const Balance Q = laws.symmetric("Q");
+  const Balance R = laws.symmetric("R");
   const Balance P = laws.found("P");
   const Balance K = laws.found("K");
   const Balance AK = A * K;
@@ -136,8 +142,8 @@ void finite_horizon(Laws& laws) {
   }
   const Balance A = laws.given("A");
   const Balance B = laws.given("B");
-  const Balance Q = laws.given("Q");
-  const Balance R = laws.given("R");
+  const Balance Q = laws.symmetric("Q");
+  const Balance R = laws.symmetric("R");
   const Balance N = laws.given_or_zero("N", B, A);
   const json& gains = laws.answer().at("K");
   const json& costs = laws.answer().at("S");

@@ -200,6 +200,8 @@ double residual_of(const SteadyFilter& f) {
   loop = sum(add_product(std::move(loop), 1.0, LR, L.transpose()), -1.0, P);
   const DoubleDoubleMatrix W = add_product(f.R, 1.0, CP, f.C.transpose());
   const DoubleDoubleMatrix gain = sum(product(K, W), -1.0, CP.transpose());
+  const DoubleDoubleMatrix updated(f.update.P.rounded());
+  const DoubleDoubleMatrix posterior = add_product(sum(updated, -1.0, P), 1.0, K, CP);
   const auto size = [](const DoubleDoubleMatrix& M) -> Eigen::MatrixXd { return M.hi.cwiseAbs(); };
   const Eigen::MatrixXd S_terms = size(f.A) + size(f.A) * size(K) * size(f.C);
   const Eigen::MatrixXd L_terms = size(f.A) * size(K);
@@ -208,11 +210,13 @@ double residual_of(const SteadyFilter& f) {
                                      L_terms * size(f.R) * L_terms.transpose() + size(f.Q) +
                                      size(P);
   const Eigen::MatrixXd gain_terms = size(K) * (size(f.C) * PC_terms + size(f.R)) + PC_terms;
+  const Eigen::MatrixXd posterior_terms = size(updated) + size(P) + size(K) * PC_terms.transpose();
   // And P is a covariance, to what rounding leaves of its zeros.
   constexpr double rounding = 1e-12;
   const Eigen::Index n = P.rows();
-  if (!loop.all_finite() || !gain.all_finite() || !loop_terms.allFinite() ||
-      !gain_terms.allFinite() || P.hi.diagonal().minCoeff() < 0.0 ||
+  if (!loop.all_finite() || !gain.all_finite() || !posterior.all_finite() ||
+      !loop_terms.allFinite() || !gain_terms.allFinite() || !posterior_terms.allFinite() ||
+      P.hi.diagonal().minCoeff() < 0.0 ||
       !cholesky_of(P.hi + rounding * Eigen::MatrixXd::Identity(n, n))) {
     return std::numeric_limits<double>::infinity();
   }
@@ -221,7 +225,8 @@ double residual_of(const SteadyFilter& f) {
   const Eigen::VectorXi own_x = Eigen::VectorXi::Zero(x.size());
   const Eigen::VectorXi own_y = Eigen::VectorXi::Zero(y.size());
   return std::max({share_of(loop, loop_terms, own_x, own_x), share_of(loop, loop_terms, x, x),
-                   share_of(gain, gain_terms, own_x, own_y), share_of(gain, gain_terms, x, y)});
+                   share_of(gain, gain_terms, own_x, own_y), share_of(gain, gain_terms, x, y),
+                   share_of(posterior, posterior_terms, own_x, own_x)});
 }
 
 std::optional<Eigen::VectorXcd> poles_of(const SteadyFilter& f) {

@@ -1,5 +1,6 @@
 #include <flyball/simulation/characterization.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -209,6 +210,33 @@ TEST(RecordCharacterization, StaysWithinItsTravel) {
       EXPECT_GE(position + 0.2, options.travel_low - 1e-12);
       EXPECT_LE(position + 0.2, options.travel_high + 1e-12);
     }
+  }
+}
+
+// What coasts or falls into a stop stands there.
+TEST(RecordCharacterization, StandsAtAStop) {
+  CharacterizationOptions options = perfect();
+  options.mechanism = MechanismKind::elevator;
+  options.kV = 2.0;
+  options.kA = 0.4;
+  options.kG = 0.8;
+  options.kS = 0.1;
+  options.travel_margin = 0.01;
+  options.coast_after = 0.5;
+  const auto recording = record_characterization(options).value();
+  for (const TestKind kind : {TestKind::dynamic_reverse, TestKind::dynamic_forward}) {
+    const auto run = std::find_if(recording.runs.begin(), recording.runs.end(),
+                                  [&](const TestRun& r) { return r.kind == kind; });
+    const bool up = kind == TestKind::dynamic_forward;
+    const double stop = up ? options.travel_high : options.travel_low;
+    const auto at_stop =
+        std::find_if(run->position.begin(), run->position.end(),
+                     [&](double position) { return std::abs(position - stop) < 1e-12; });
+    ASSERT_NE(at_stop, run->position.end());
+    const auto row = static_cast<std::size_t>(at_stop - run->position.begin());
+    // From the upper one it falls again, at first by less than gravity would in a row.
+    EXPECT_GT(run->velocity[row], up ? -0.8 / 0.4 * options.row_period : -1e-12);
+    EXPECT_LT(run->velocity[row], 1e-12);
   }
 }
 

@@ -30,7 +30,8 @@ constexpr const char* search =
 /// the reading of the angle with noise; at 100 s the recording goes on after a pause.
 Log lag_log(double noise = 0.002) {
   Random random(1);
-  Log log{.source = "lag.csv"};
+  Log log;
+  log.source = "lag.csv";
   Signal u{"/volts", "V", {}, {}};
   Signal x{"angle", "deg", {}, {}};
   for (const double start : {0.0, 100.0}) {

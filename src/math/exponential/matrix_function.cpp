@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
 #include "math/exponential/triangular_function.hpp"
+#include "math/extended/double_double.hpp"
 
 namespace flyball {
 
@@ -160,6 +162,20 @@ Expected<MatrixXd> fractional_power(const MatrixRef& given, double f, std::strin
   return lower ? MatrixXd(result.transpose()) : result;
 }
 
+/// The largest entry that A X and X A miss of I, beside its terms; infinity where X is not finite.
+double inverse_error(const MatrixRef& A, const MatrixXd& X) {
+  if (!X.allFinite()) {
+    return std::numeric_limits<double>::infinity();
+  }
+  const auto error = [](const MatrixRef& left, const MatrixRef& right) {
+    const MatrixXd missed =
+        detail::product(left, right) - MatrixXd::Identity(left.rows(), left.cols());
+    const MatrixXd terms = detail::product(left.cwiseAbs(), right.cwiseAbs());
+    return (missed.array().abs() / terms.array().max(1.0)).maxCoeff();
+  };
+  return std::max(error(A, X), error(X, A));
+}
+
 /// A⁻¹, solved in balanced units and with rows of one size.
 Expected<MatrixXd> inverse_of(const MatrixRef& A, std::string_view where) {
   const Eigen::VectorXd d = detail::balance_of(A);
@@ -176,11 +192,16 @@ Expected<MatrixXd> inverse_of(const MatrixRef& A, std::string_view where) {
   if (!(rcond > 0.0) || !inverse.allFinite()) {
     return refusal(MatrixFunctionError::singular, where, "A").with("reciprocal condition", rcond);
   }
-  const MatrixXd X = d.asDiagonal() * inverse * d.cwiseInverse().asDiagonal();
-  // Entry by entry, beside the terms.
-  const MatrixXd left = detail::product(A, X) - MatrixXd::Identity(A.rows(), A.cols());
-  const MatrixXd terms = detail::product(A.cwiseAbs(), X.cwiseAbs());
-  if (!X.allFinite() || !(left.array().abs() <= 1e-9 * terms.array().max(1.0)).all()) {
+  MatrixXd X = d.asDiagonal() * inverse * d.cwiseInverse().asDiagonal();
+  if (inverse_error(A, X) <= 1e-12) {
+    return X;
+  }
+  // Rows of sizes far apart: again in twice the precision.
+  const auto exact = detail::solve(detail::DoubleDoubleMatrix(M), detail::DoubleDoubleMatrix(rhs));
+  if (exact) {
+    X = d.asDiagonal() * exact->rounded() * d.cwiseInverse().asDiagonal();
+  }
+  if (!(inverse_error(A, X) <= 1e-10)) {
     return not_accurate(where);
   }
   return X;

@@ -84,6 +84,25 @@ int exponent(const MatrixXd& M) {
   return largest > 0.0 && std::isfinite(largest) ? std::ilogb(largest) : -2000;
 }
 
+/// K = (R + B'X B)⁻¹(B'X A + N') of discrete time, R⁻¹(B'X + N') of continuous, each factor by its
+/// largest entry's power of two, so that no product leaves the range of doubles.
+MatrixXd gain_of(const RiccatiProblem& given, const MatrixXd& X) {
+  const int a = given.continuous ? 0 : exponent(given.A);
+  const int b = exponent(given.B);
+  const int x = exponent(X);
+  const MatrixXd B = times_power(given.B, -b);
+  MatrixXd G = product(B.transpose(), times_power(X, -x));
+  const MatrixXd weight = given.continuous ? MatrixXd(0.0 * given.R) : product(G, B);
+  if (!given.continuous) {
+    G = product(G, times_power(given.A, -a));
+  }
+  const int g = given.N.isZero(0.0) ? a + b + x : std::max(a + b + x, exponent(given.N));
+  G = times_power(G, a + b + x - g) + times_power(given.N.transpose(), -g);
+  const int r = given.continuous ? exponent(given.R) : std::max(exponent(given.R), 2 * b + x);
+  const MatrixXd M = times_power(given.R, -r) + times_power(weight, 2 * b + x - r);
+  return times_power(solve_linear(M, G), g - r);
+}
+
 }  // namespace
 
 Expected<RiccatiSolution> solve_riccati_in_other_units(const RiccatiProblem& given) {
@@ -109,7 +128,12 @@ Expected<RiccatiSolution> solve_riccati_in_other_units(const RiccatiProblem& giv
   }
   FLYBALL_TRY(auto solution, solve_riccati_robustly(p));
   const MatrixXd X = times_powers(solution.X, -x, -x, units.weight);
-  const MatrixXd K = times_powers(solution.K, u, -x, units.rate);
+  MatrixXd K = times_powers(solution.K, u, -x, units.rate);
+  if (X.allFinite() && (K.array() == 0.0).any()) {
+    // Below the smallest double in those units, and perhaps not in these.
+    const MatrixXd direct = gain_of(given, X);
+    K = (K.array() == 0.0 && direct.array().isFinite()).select(direct, K);
+  }
   solution.poles *= std::ldexp(1.0, units.rate);
   if (!X.allFinite() || !K.allFinite() || !solution.poles.allFinite()) {
     return tl::unexpected(
