@@ -57,13 +57,17 @@ void add_identify_command(CLI::App& program, Invocation& invocation) {
       program, invocation,
       {.name = "identify",
        .schema = "flyball.identify/1",
-       .help = "Identify a mechanism's kS, kV, kA and kG, or any model's parameters, from a log",
+       .help =
+           "Identify kS, kV, kA and kG of a mechanism or a drivetrain, or any model's parameters, "
+           "from a log",
        .footer =
            "LOG is a SysId JSON, a WPILOG or a CSV with the four characterisation tests "
            "(quasistatic\n"
            "and dynamic, forward and reverse). What the log does not say is detected and told.\n"
            "PROJECT.toml may say the rest in [log], and the kind of mechanism in [mechanism].\n"
-           "Several logs of one mechanism are compared, and fitted together.\n"
+           "Several logs of one mechanism are compared, and fitted together. A drivetrain's log "
+           "has\n"
+           "both sides; --also adds the log of its rotation tests.\n"
            "With a [model] and a [fit] in PROJECT.toml, LOG is any recording of its inputs and "
            "outputs.",
        .job = study::JobKind::identify,

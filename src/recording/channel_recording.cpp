@@ -9,6 +9,7 @@
 #include "recording/channel_names.hpp"
 #include "recording/channels.hpp"
 #include "recording/characterization_windows.hpp"
+#include "recording/drivetrain.hpp"
 #include "recording/recorded_motion.hpp"
 #include "recording/to_si.hpp"
 
@@ -16,22 +17,44 @@ namespace flyball::recording {
 
 using mechanisms::MechanismKind;
 
+Expected<RecordedUnits> channel_units(const LogSelection& selection,
+                                      const FoundChannels& channels) {
+  RecordedUnits units;
+  FLYBALL_TRY(units.position, said_unit(selection.unit, false));
+  FLYBALL_TRY(units.velocity, said_unit(selection.velocity_unit, true));
+  const auto by_channel = [](RecordedUnit& unit, const Signal* signal, bool rate) {
+    if (!unit.known() && signal != nullptr) {
+      unit = unit_of_text(signal->unit, rate, UnitSource::metadata);
+      unit = unit.known() ? unit : unit_in_name(signal->name, rate);
+    }
+  };
+  by_channel(units.position, channels.position, false);
+  by_channel(units.velocity, selection.no_velocity ? nullptr : channels.velocity, true);
+  return units;
+}
+
 Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& selection,
                                         LoadedRecording loaded) {
   FLYBALL_TRY_IN(log.source, auto tests, find_tests(log, selection.state_channel));
   loaded.subject = tests.subject;
   if (const std::string reason = drivetrain_reason(log, tests, selection); !reason.empty()) {
-    loaded.refusal = refusal(RecordingError::drivetrain, log.source, "mechanism")
-                         .got("a drivetrain: " + reason)
-                         .expected("a flywheel, an elevator or an arm")
-                         .hint(
-                             "drivetrains are not supported yet; if it is another mechanism, say "
-                             "which with --mechanism");
-    if (const auto channels = one_side(log, tests)) {
-      loaded.recording.runs = join_channels(
-          *channels, tests.windows.empty() ? split_by_voltage(*channels->voltage) : tests.windows);
+    if (!selection.drivetrain && lower(reason).find("swerve") != std::string::npos) {
+      return refusal(RecordingError::drivetrain, log.source, "mechanism")
+          .got("a swerve drive: " + reason)
+          .expected("a mechanism of one motor, or a drivetrain of a left and a right side")
+          .hint(
+              "identify a module's drive and steering motor each as --mechanism flywheel, with its "
+              "channels by --voltage, --position and --velocity; if it is a left and a right "
+              "side, say --mechanism drivetrain");
     }
-    return loaded;
+    return drive_from_channels(log, selection, std::move(tests), std::move(loaded))
+        .map_error([&](Error error) {
+          return selection.drivetrain ? error
+                                      : std::move(error).with(
+                                            "taken for a drivetrain (else say --mechanism "
+                                            "flywheel, elevator or arm)",
+                                            reason);
+        });
   }
 
   FLYBALL_TRY_IN(log.source, auto channels, find_channels(log, tests, selection));
@@ -50,7 +73,9 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
        channels.voltage->name,
        channels.position ? "\"" + channels.position->name + "\"" : "nowhere",
        channels.velocity ? "\"" + channels.velocity->name + "\"" : "nowhere");
-  loaded.recording.runs = join_channels(channels, tests.windows);
+  loaded.recording.runs = join_channels(
+      channels, tests.windows,
+      fullest_of({channels.voltage, channels.position, channels.velocity}, tests.windows));
   if (loaded.recording.runs.empty()) {
     return refusal(RecordingError::no_tests, log.source, tests.state_name)
         .got("without a test in which the mechanism was recorded");
@@ -60,16 +85,7 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
   }
   const std::optional<double> ratio = velocity_ratio(loaded.recording.runs);
   RecordedUnits units;
-  FLYBALL_TRY_IN(log.source, units.position, said_unit(selection.unit, false));
-  FLYBALL_TRY_IN(log.source, units.velocity, said_unit(selection.velocity_unit, true));
-  const auto by_channel = [](RecordedUnit& unit, const Signal* signal, bool rate) {
-    if (!unit.known() && signal != nullptr) {
-      unit = unit_of_text(signal->unit, rate, UnitSource::metadata);
-      unit = unit.known() ? unit : unit_in_name(signal->name, rate);
-    }
-  };
-  by_channel(units.position, channels.position, false);
-  by_channel(units.velocity, selection.no_velocity ? nullptr : channels.velocity, true);
+  FLYBALL_TRY_IN(log.source, units, channel_units(selection, channels));
   FLYBALL_TRY_IN(log.source, units, settle_units(units, ratio, loaded.diagnostics));
   std::optional<MechanismKind> kind = selection.mechanism;
   if (!kind) {

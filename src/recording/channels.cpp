@@ -26,9 +26,7 @@ constexpr std::array<std::string_view, 4> velocity_words{"velocity", "speed", "r
 constexpr std::array<std::string_view, 8> other_words{"battery", "bus",       "target",  "setpoint",
                                                       "goal",    "reference", "desired", "error"};
 
-enum class Quantity { voltage, position, velocity };
-
-bool fits(const Signal& signal, Quantity quantity) {
+bool fits(const Signal& signal, Channel quantity) {
   const std::string name = lower(signal.name);
   if (contains_any(name, other_words)) {
     return false;
@@ -37,78 +35,31 @@ bool fits(const Signal& signal, Quantity quantity) {
   const bool known = !signal.unit.empty() && unit.has_value();
   const Dimension dimension = known ? unit->dimension : Dimension::dimensionless;
   switch (quantity) {
-    case Quantity::voltage:
+    case Channel::voltage:
       return contains_any(name, voltage_words) && (!known || dimension == Dimension::voltage);
-    case Quantity::position:
+    case Channel::position:
       return contains_any(name, position_words) && !contains_any(name, velocity_words) &&
              (!known || dimension == Dimension::length || dimension == Dimension::angle);
-    case Quantity::velocity:
+    case Channel::velocity:
       return contains_any(name, velocity_words) && (!known || dimension == Dimension::velocity ||
                                                     dimension == Dimension::angular_velocity);
   }
   return false;
 }
 
-struct Candidates {
-  std::vector<const Signal*> signals;
-};
-
-Candidates candidates_for(const Log& log, const FoundTests& tests, Quantity quantity) {
-  Candidates all;
-  Candidates of_subject;
-  for (const Signal& signal : log.signals) {
-    if (!fits(signal, quantity) || samples_in(signal, tests.windows) < 2) {
-      continue;
-    }
-    all.signals.push_back(&signal);
-    if (!tests.subject.empty() && signal.name.ends_with("-" + tests.subject)) {
-      of_subject.signals.push_back(&signal);
-    }
-  }
-  return of_subject.signals.empty() ? all : of_subject;
-}
-
-std::string quantity_name(Quantity quantity) {
-  switch (quantity) {
-    case Quantity::voltage:
-      return "voltage";
-    case Quantity::position:
-      return "position";
-    case Quantity::velocity:
-      return "velocity";
-  }
-  return "";
-}
-
-Expected<const Signal*> named_channel(const Log& log, const std::string& name, Quantity quantity) {
-  if (const Signal* signal = log.find_signal(name)) {
-    return signal;
-  }
-  std::vector<std::string_view> names;
-  names.reserve(log.signals.size());
-  for (const Signal& signal : log.signals) {
-    names.push_back(signal.name);
-  }
-  const std::string nearest = nearest_name(name, names);
-  return refusal(RecordingError::no_channel, {}, quantity_name(quantity) + " channel")
-      .got(fmt::format("\"{}\", which the log does not have", name))
-      .hint(nearest.empty() ? std::string("flyball lists the channels when it cannot choose")
-                            : fmt::format("did you mean \"{}\"?", nearest));
-}
-
-Expected<const Signal*> choose(const Log& log, const FoundTests& tests, Quantity quantity,
+Expected<const Signal*> choose(const Log& log, const FoundTests& tests, Channel quantity,
                                const std::string& said, const Signal* voltage) {
   if (!said.empty()) {
     return named_channel(log, said, quantity);
   }
-  Candidates candidates = candidates_for(log, tests, quantity);
-  if (candidates.signals.size() > 1 && voltage != nullptr) {
+  std::vector<const Signal*> candidates = candidates_for(log, tests, quantity);
+  if (candidates.size() > 1 && voltage != nullptr) {
     // The voltage's namesake: "position-wrist-Coral" beside "voltage-wrist-Coral".
     std::string wanted = lower(voltage->name);
     const std::size_t at = wanted.find("voltage");
     if (at != std::string::npos) {
-      wanted.replace(at, std::string_view("voltage").size(), quantity_name(quantity));
-      for (const Signal* signal : candidates.signals) {
+      wanted.replace(at, std::string_view("voltage").size(), channel_name(quantity));
+      for (const Signal* signal : candidates) {
         if (lower(signal->name) == wanted) {
           return signal;
         }
@@ -116,25 +67,25 @@ Expected<const Signal*> choose(const Log& log, const FoundTests& tests, Quantity
     }
     const Side side = side_of(voltage->name);
     if (side != Side::none) {
-      std::erase_if(candidates.signals, [&](const Signal* s) { return side_of(s->name) != side; });
+      std::erase_if(candidates, [&](const Signal* s) { return side_of(s->name) != side; });
     }
   }
-  if (candidates.signals.size() == 1) {
-    return candidates.signals.front();
+  if (candidates.size() == 1) {
+    return candidates.front();
   }
-  if (candidates.signals.empty()) {
+  if (candidates.empty()) {
     return nullptr;
   }
   std::vector<std::string> names;
-  for (const Signal* signal : candidates.signals) {
+  for (const Signal* signal : candidates) {
     if (names.size() < 12) {
       names.push_back("\"" + signal->name + "\"");
     }
   }
-  return refusal(RecordingError::ambiguous_channel, {}, quantity_name(quantity) + " channel")
-      .got(fmt::format("one of {}: {}{}", candidates.signals.size(), fmt::join(names, ", "),
-                       candidates.signals.size() > names.size() ? ", …" : ""))
-      .hint(fmt::format("choose one with --{}", quantity_name(quantity)));
+  return refusal(RecordingError::ambiguous_channel, {}, channel_name(quantity) + " channel")
+      .got(fmt::format("one of {}: {}{}", candidates.size(), fmt::join(names, ", "),
+                       candidates.size() > names.size() ? ", …" : ""))
+      .hint(fmt::format("choose one with --{}", channel_name(quantity)));
 }
 
 // Linear interpolation in a sorted signal; `cursor` only moves forward.
@@ -159,7 +110,64 @@ double hold(const Signal& signal, double t, std::size_t& cursor) {
   return signal.value[cursor];
 }
 
-// The channels with the most samples in the tests, for a person to choose from.
+double median_step(const std::vector<double>& time) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < time.size(); ++i) {
+    steps.push_back(time[i] - time[i - 1]);
+  }
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return steps.empty() ? 0.0 : *middle;
+}
+
+constexpr std::array every_channel{Channel::voltage, Channel::position, Channel::velocity};
+
+}  // namespace
+
+std::vector<const Signal*> candidates_for(const Log& log, const FoundTests& tests,
+                                          Channel quantity) {
+  std::vector<const Signal*> all;
+  std::vector<const Signal*> of_subject;
+  for (const Signal& signal : log.signals) {
+    if (!fits(signal, quantity) || samples_in(signal, tests.windows) < 2) {
+      continue;
+    }
+    all.push_back(&signal);
+    if (!tests.subject.empty() && signal.name.ends_with("-" + tests.subject)) {
+      of_subject.push_back(&signal);
+    }
+  }
+  return of_subject.empty() ? all : of_subject;
+}
+
+std::string channel_name(Channel quantity) {
+  switch (quantity) {
+    case Channel::voltage:
+      return "voltage";
+    case Channel::position:
+      return "position";
+    case Channel::velocity:
+      return "velocity";
+  }
+  return "";
+}
+
+Expected<const Signal*> named_channel(const Log& log, const std::string& name, Channel quantity) {
+  if (const Signal* signal = log.find_signal(name)) {
+    return signal;
+  }
+  std::vector<std::string_view> names;
+  names.reserve(log.signals.size());
+  for (const Signal& signal : log.signals) {
+    names.push_back(signal.name);
+  }
+  const std::string nearest = nearest_name(name, names);
+  return refusal(RecordingError::no_channel, {}, channel_name(quantity) + " channel")
+      .got(fmt::format("\"{}\", which the log does not have", name))
+      .hint(nearest.empty() ? std::string("flyball lists the channels when it cannot choose")
+                            : fmt::format("did you mean \"{}\"?", nearest));
+}
+
 std::string fullest_channels(const Log& log, const FoundTests& tests) {
   constexpr std::size_t shown = 12;
   std::vector<std::pair<std::size_t, const Signal*>> all;
@@ -180,24 +188,18 @@ std::string fullest_channels(const Log& log, const FoundTests& tests) {
   return fmt::format(", such as {}{}", fmt::join(names, ", "), all.size() > shown ? ", …" : "");
 }
 
-double median_step(const std::vector<double>& time) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < time.size(); ++i) {
-    steps.push_back(time[i] - time[i - 1]);
-  }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return steps.empty() ? 0.0 : *middle;
-}
-
-constexpr std::array every_quantity{Quantity::voltage, Quantity::position, Quantity::velocity};
-
-}  // namespace
-
 std::string drivetrain_reason(const Log& log, const FoundTests& tests,
                               const LogSelection& selection) {
   const bool said = selection.mechanism || !selection.voltage_channel.empty() ||
                     !selection.position_channel.empty() || !selection.velocity_channel.empty();
+  const auto pair = [&](const std::string& text) {
+    return text.find(',') != std::string::npos && log.find_signal(text) == nullptr;
+  };
+  if (selection.drivetrain || (!selection.mechanism && (pair(selection.voltage_channel) ||
+                                                        pair(selection.position_channel) ||
+                                                        pair(selection.velocity_channel)))) {
+    return "as said";
+  }
   // An elevator lifted by a left and a right motor is an elevator.
   if (said || kind_from_name(tests.state_name)) {
     return {};
@@ -205,10 +207,10 @@ std::string drivetrain_reason(const Log& log, const FoundTests& tests,
   if (names_drivetrain(tests.state_name)) {
     return fmt::format("\"{}\" names it one", tests.state_name);
   }
-  for (const Quantity quantity : every_quantity) {
+  for (const Channel quantity : every_channel) {
     const Signal* left = nullptr;
     const Signal* right = nullptr;
-    for (const Signal* signal : candidates_for(log, tests, quantity).signals) {
+    for (const Signal* signal : candidates_for(log, tests, quantity)) {
       const Side side = side_of(signal->name);
       left = side == Side::left && left == nullptr ? signal : left;
       right = side == Side::right && right == nullptr ? signal : right;
@@ -220,32 +222,15 @@ std::string drivetrain_reason(const Log& log, const FoundTests& tests,
   return {};
 }
 
-std::optional<FoundChannels> one_side(const Log& log, const FoundTests& tests) {
-  std::array<const Signal*, 3> chosen{};
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    const Candidates candidates = candidates_for(log, tests, every_quantity[i]);
-    for (const Signal* signal : candidates.signals) {
-      const bool better = chosen[i] != nullptr && side_of(chosen[i]->name) != Side::left &&
-                          side_of(signal->name) == Side::left;
-      chosen[i] = chosen[i] == nullptr || better ? signal : chosen[i];
-    }
-  }
-  const auto [voltage, position, velocity] = chosen;
-  if (voltage == nullptr || (position == nullptr && velocity == nullptr)) {
-    return std::nullopt;
-  }
-  return FoundChannels{voltage, position, velocity};
-}
-
 Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
                                       const LogSelection& selection) {
   FoundChannels channels;
   FLYBALL_TRY(channels.voltage,
-              choose(log, tests, Quantity::voltage, selection.voltage_channel, nullptr));
+              choose(log, tests, Channel::voltage, selection.voltage_channel, nullptr));
   FLYBALL_TRY(channels.position,
-              choose(log, tests, Quantity::position, selection.position_channel, channels.voltage));
+              choose(log, tests, Channel::position, selection.position_channel, channels.voltage));
   FLYBALL_TRY(channels.velocity,
-              choose(log, tests, Quantity::velocity, selection.velocity_channel, channels.voltage));
+              choose(log, tests, Channel::velocity, selection.velocity_channel, channels.voltage));
   if (channels.voltage == nullptr ||
       (channels.position == nullptr && channels.velocity == nullptr)) {
     return refusal(RecordingError::no_channel, {},
@@ -258,14 +243,30 @@ Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
   return channels;
 }
 
-std::vector<TestRun> join_channels(const FoundChannels& channels,
-                                   const std::vector<CharacterizationWindow>& windows) {
-  const Signal* clock = channels.voltage;
-  for (const Signal* signal : {channels.position, channels.velocity}) {
-    if (signal != nullptr && samples_in(*signal, windows) > samples_in(*clock, windows)) {
-      clock = signal;
+const Signal* fullest_of(std::initializer_list<const Signal*> signals,
+                         const std::vector<CharacterizationWindow>& windows) {
+  const Signal* fullest = nullptr;
+  for (const Signal* signal : signals) {
+    if (signal != nullptr &&
+        (fullest == nullptr || samples_in(*signal, windows) > samples_in(*fullest, windows))) {
+      fullest = signal;
     }
   }
+  return fullest;
+}
+
+std::vector<double> sampled(const Signal& signal, const std::vector<double>& time) {
+  std::vector<double> values;
+  std::size_t cursor = 0;
+  for (const double t : time) {
+    values.push_back(interpolate(signal, t, cursor));
+  }
+  return values;
+}
+
+std::vector<TestRun> join_channels(const FoundChannels& channels,
+                                   const std::vector<CharacterizationWindow>& windows,
+                                   const Signal* clock) {
   const double longest_gap = std::max(0.9, 20.0 * median_step(clock->time));  // s
   std::vector<TestRun> runs;
   for (const CharacterizationWindow& window : windows) {

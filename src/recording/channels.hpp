@@ -1,6 +1,6 @@
 #pragma once
 
-#include <optional>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -26,17 +26,38 @@ struct FoundChannels {
 [[nodiscard]] std::string drivetrain_reason(const Log& log, const FoundTests& tests,
                                             const LogSelection& selection);
 
-/// The channels of a drivetrain's left side, else the first that fit, to be looked at; nothing if
-/// there is no voltage or no motion among them.
-[[nodiscard]] std::optional<FoundChannels> one_side(const Log& log, const FoundTests& tests);
+/// What a channel of a mechanism holds.
+enum class Channel { voltage, position, velocity };
+
+/// "voltage", …, as its option is called.
+[[nodiscard]] std::string channel_name(Channel quantity);
+
+/// Channels whose name and unit fit, those of the tests' subject if there are any.
+[[nodiscard]] std::vector<const Signal*> candidates_for(const Log& log, const FoundTests& tests,
+                                                        Channel quantity);
+
+/// The channel of that name. @errors RecordingError::no_channel with the nearest.
+[[nodiscard]] Expected<const Signal*> named_channel(const Log& log, const std::string& name,
+                                                    Channel quantity);
+
+/// ", such as …": the channels with the most samples in the tests, for a person to choose from.
+[[nodiscard]] std::string fullest_channels(const Log& log, const FoundTests& tests);
+
+/// The one with the most samples in the windows; null among none.
+[[nodiscard]] const Signal* fullest_of(std::initializer_list<const Signal*> signals,
+                                       const std::vector<CharacterizationWindow>& windows);
+
+/// A signal interpolated to the given ascending times.
+[[nodiscard]] std::vector<double> sampled(const Signal& signal, const std::vector<double>& time);
 
 /// @errors RecordingError::no_channel, ambiguous_channel with the candidates.
 [[nodiscard]] Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
                                                     const LogSelection& selection);
 
-/// Joins the channels onto the clock of the fullest one. The voltage is held between its samples
+/// Joins the channels onto the times of `clock`. The voltage is held between its samples
 /// (it is what was commanded), position and velocity are interpolated.
 [[nodiscard]] std::vector<identification::TestRun> join_channels(
-    const FoundChannels& channels, const std::vector<CharacterizationWindow>& windows);
+    const FoundChannels& channels, const std::vector<CharacterizationWindow>& windows,
+    const Signal* clock);
 
 }  // namespace flyball::recording

@@ -10,6 +10,7 @@
 
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
+#include "recording/drivetrain.hpp"
 #include "recording/to_si.hpp"
 
 namespace flyball::recording {
@@ -22,7 +23,7 @@ constexpr std::string_view where = "recording";
 
 ErrorInfo error_info(RecordingError code) {
   static constexpr detail::ErrorRow rows[] = {
-      {"drivetrain", "this is a drivetrain's log", ErrorKind::no_answer},
+      {"drivetrain", "this is no log of one motor's mechanism", ErrorKind::no_answer},
       {"mechanism_unknown", "the kind of mechanism is not known", ErrorKind::misuse},
       {"no_test_state", "no channel names the running test", ErrorKind::misuse},
       {"no_channel", "a channel is missing", ErrorKind::misuse},
@@ -49,10 +50,10 @@ ExpectedAll<LoadedRecording> recording_from_log(const Log& log, const LogSelecti
   loaded.diagnostics = log.diagnostics;
   auto result = log.sysid ? from_sysid_json(log, selection, std::move(loaded))
                           : from_channels(log, selection, std::move(loaded));
-  if (result && !result->refusal && !result->recording.mechanism) {
+  if (result && !result->drive && !result->recording.mechanism) {
     Error error = refusal(RecordingError::mechanism_unknown, log.source, "mechanism")
                       .got("not told by the log")
-                      .hint("say it with --mechanism flywheel, elevator or arm");
+                      .hint("say it with --mechanism flywheel, elevator, arm or drivetrain");
     // A log that was cut short often lost the key that says it.
     for (const Diagnostic& diagnostic : log.diagnostics) {
       if (diagnostic.severity != Severity::info) {
@@ -70,7 +71,14 @@ ExpectedAll<LoadedRecording> recording_from_log(const Log& log, const LogSelecti
 ExpectedAll<LoadedRecording> load_recording(const std::string& path,
                                             const LogSelection& selection) {
   FLYBALL_TRY(const Log log, read_log(path));
-  return recording_from_log(log, selection);
+  if (selection.also.empty()) {
+    return recording_from_log(log, selection);
+  }
+  FLYBALL_TRY(auto loaded, recording_from_log(log, selection));
+  FLYBALL_TRY(const Log beside, read_log(selection.also));
+  FLYBALL_TRY(auto other, recording_from_log(beside, selection));
+  FLYBALL_TRY(loaded, with_other(std::move(loaded), std::move(other)));
+  return loaded;
 }
 
 }  // namespace flyball::recording

@@ -371,6 +371,17 @@ Expected<RecordedUnits> settle_units(RecordedUnits units, std::optional<double> 
   return units;
 }
 
+RecordedUnit likely_way_unit(const std::vector<TestRun>& runs, std::optional<double> ratio) {
+  const double speed = speed_at_full_voltage(runs, ratio);
+  for (const std::string_view unit : {"m", "ft", "in"}) {
+    RecordedUnit found = position_in(unit_called(unit), UnitSource::assumed);
+    if (speed * found.factor > 0.8 && speed * found.factor < 8.0) {
+      return found;
+    }
+  }
+  return position_in(unit_called("m"), UnitSource::assumed);
+}
+
 bool has_usual_speed(std::optional<MechanismKind> kind, double speed) {
   constexpr double slowest_arm = 0.3;
   constexpr double fastest_arm = 40.0;

@@ -55,6 +55,11 @@ struct RecordedUnits {
                                              std::optional<double> ratio,
                                              std::optional<mechanisms::MechanismKind> kind);
 
+/// The unit that a drivetrain's ways of unknown unit are most likely in: the first of metres, feet
+/// and inches with which its speed at 12 V is a drivetrain's.
+[[nodiscard]] RecordedUnit likely_way_unit(const std::vector<identification::TestRun>& runs,
+                                           std::optional<double> ratio);
+
 /// Whether a mechanism of that kind (of any, if it is not known) turns so fast at 12 V, rad/s.
 [[nodiscard]] bool has_usual_speed(std::optional<mechanisms::MechanismKind> kind, double speed);
 

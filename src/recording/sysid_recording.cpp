@@ -21,6 +21,7 @@ namespace {
 
 constexpr double two_pi = 2.0 * std::numbers::pi;
 
+/// The tests of a mechanism, or of a drivetrain's left side.
 std::vector<TestRun> runs_of(const SysIdJson& sysid) {
   std::vector<TestRun> runs;
   for (const SysIdJson::Run& run : sysid.runs) {
@@ -29,6 +30,45 @@ std::vector<TestRun> runs_of(const SysIdJson& sysid) {
     }
   }
   return runs;
+}
+
+std::vector<TestRun> right_runs_of(const SysIdJson& sysid) {
+  std::vector<TestRun> runs;
+  for (const SysIdJson::Run& run : sysid.runs) {
+    if (const auto kind = identification::parse_test_kind(run.name)) {
+      runs.push_back({*kind, run.time, run.right_voltage, run.right_position, run.right_velocity});
+    }
+  }
+  return runs;
+}
+
+GyroColumns gyro_of(const SysIdJson& sysid) {
+  GyroColumns gyro;
+  for (const SysIdJson::Run& run : sysid.runs) {
+    if (identification::parse_test_kind(run.name)) {
+      gyro.heading.push_back(run.angle);
+      gyro.rate.push_back(run.angle_rate);
+    }
+  }
+  return gyro;
+}
+
+/// Whether a log is to be read as a drivetrain's: what the person says has the last word.
+Expected<bool> is_drive(const Log& log, const LogSelection& selection,
+                        std::vector<Diagnostic>& notes) {
+  const SysIdJson& sysid = *log.sysid;
+  if (selection.drivetrain && !sysid.is_drive()) {
+    return refusal(RecordingError::no_channel, log.source, "the right side")
+        .got("missing: rows of 4 columns have one voltage, position and velocity")
+        .expected("rows of a drivetrain, with both sides")
+        .hint("record it with the drivetrain's project, or identify it as --mechanism flywheel");
+  }
+  if (sysid.is_drive() && selection.mechanism) {
+    warn(notes, "mechanism_overruled",
+         "the log is a drivetrain's; as said, its left side is taken for the {}'s",
+         to_string(*selection.mechanism));
+  }
+  return sysid.is_drive() && !selection.mechanism;
 }
 
 /// What SysId multiplied its rows with. Angles have but one number of units a rotation; a file that
@@ -66,24 +106,12 @@ Expected<LoadedRecording> from_sysid_json(const Log& log, const LogSelection& se
   const SysIdJson& sysid = *log.sysid;
   loaded.subject = sysid.test;
   loaded.recording.runs = runs_of(sysid);
-  if (sysid.is_drive()) {
-    std::vector<Diagnostic> found = diagnose_drive(sysid);
-    loaded.diagnostics.insert(loaded.diagnostics.end(), found.begin(), found.end());
-    std::string defects;
-    for (const Diagnostic& diagnostic : found) {
-      if (diagnostic.severity != Severity::info) {
-        defects += "; " + diagnostic.message;
-      }
-    }
-    loaded.refusal = refusal(RecordingError::drivetrain, log.source)
-                         .hint(
-                             "its two sides cannot be identified as one mechanism, and drivetrains "
-                             "are not supported yet" +
-                             defects);
-    return loaded;
+  FLYBALL_TRY(const bool drive, is_drive(log, selection, loaded.diagnostics));
+  if (drive) {
+    loaded.recording.runs = both_sides(std::move(loaded.recording.runs), right_runs_of(sysid));
   }
   std::optional<MechanismKind> kind = selection.mechanism;
-  if (!kind && !sysid.test.empty()) {
+  if (!kind && !drive && !sysid.test.empty()) {
     if (auto parsed = mechanisms::parse_mechanism_kind(sysid.test)) {
       kind = *parsed;
     }
@@ -106,19 +134,24 @@ Expected<LoadedRecording> from_sysid_json(const Log& log, const LogSelection& se
   }
   FLYBALL_TRY_IN(log.source, units, settle_units(units, ratio, loaded.diagnostics));
   if (!units.position.known()) {
-    units.position = likely_angle_unit(loaded.recording.runs, ratio, kind);
+    units.position = drive ? likely_way_unit(loaded.recording.runs, ratio)
+                           : likely_angle_unit(loaded.recording.runs, ratio, kind);
     units.velocity = unit_of_text(units.position.text, true, UnitSource::assumed);
     tell_assumed_unit(loaded.diagnostics, units.position);
   }
-  // SysId's own scale turns rows into its unit; what an elevator's angles are in metres it is not.
-  const bool elevator_angles = kind == MechanismKind::elevator && !units.position.linear;
-  FLYBALL_TRY_IN(log.source, auto output,
-                 output_scale(units.position, elevator_angles ? selection.scale : scale, kind));
-  if (elevator_angles) {
+  // SysId's own scale turns rows into its unit; what angles of a drum or a wheel are in metres it
+  // is not.
+  const bool rolled = (kind == MechanismKind::elevator || drive) && !units.position.linear;
+  const double metres = rolled ? selection.scale : scale;
+  FLYBALL_TRY_IN(
+      log.source, auto output,
+      drive ? drive_scale(units.position, metres) : output_scale(units.position, metres, kind));
+  if (rolled) {
     output.factor *= scale / selection.scale;
   }
   loaded.recording.mechanism = kind;
-  return in_si(std::move(loaded), units, output, selection.voltage_scale);
+  FLYBALL_TRY(loaded, in_si(std::move(loaded), units, output, selection.voltage_scale));
+  return drive ? as_drive(std::move(loaded), gyro_of(sysid)) : loaded;
 }
 
 }  // namespace flyball::recording

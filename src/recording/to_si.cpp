@@ -39,6 +39,11 @@ Expected<OutputScale> output_scale(const RecordedUnit& unit, double scale,
   return OutputScale{unit.factor * scale, "rad"};
 }
 
+Expected<OutputScale> drive_scale(const RecordedUnit& unit, double scale) {
+  return !unit.linear && scale != 1.0 ? Expected<OutputScale>(OutputScale{scale, "m"})
+                                      : output_scale(unit, scale, std::nullopt);
+}
+
 Expected<RecordedUnit> said_unit(const std::string& text, bool rate) {
   RecordedUnit unit = unit_of_text(text, rate, UnitSource::said);
   if (!text.empty() && !unit.known()) {

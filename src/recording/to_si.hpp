@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "recording/channels.hpp"
 #include "recording/recorded_units.hpp"
 
 /// From recorded units to a recording in SI.
@@ -18,6 +19,9 @@ struct OutputScale {
 /// @errors RecordingError::unit_mismatch.
 [[nodiscard]] Expected<OutputScale> output_scale(const RecordedUnit& unit, double scale,
                                                  std::optional<mechanisms::MechanismKind> kind);
+
+/// The same for a drivetrain's wheels: metres, or radians of wheels whose size nobody said.
+[[nodiscard]] Expected<OutputScale> drive_scale(const RecordedUnit& unit, double scale);
 
 /// A unit that the person said; unknown if there is none. @errors RecordingError::unit_mismatch.
 [[nodiscard]] Expected<RecordedUnit> said_unit(const std::string& text, bool rate);
@@ -37,6 +41,10 @@ void tell_assumed_unit(std::vector<Diagnostic>& notes, const RecordedUnit& unit)
 [[nodiscard]] Expected<LoadedRecording> from_sysid_json(const Log& log,
                                                         const LogSelection& selection,
                                                         LoadedRecording loaded);
+/// The units that the person, or the channels' metadata or names, say; else unknown.
+[[nodiscard]] Expected<RecordedUnits> channel_units(const LogSelection& selection,
+                                                    const FoundChannels& channels);
+
 /// The tests of a log of channels.
 [[nodiscard]] Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& selection,
                                                       LoadedRecording loaded);

@@ -270,8 +270,9 @@ ExpectedAll<TuneJob> tune_job(const std::string& log, const std::string& project
                                          : read_project_beside_log(project, overrides));
   TuneJob job{.identification = {.log = log, .selection = std::move(said.log)},
               .design = std::move(said.job)};
-  if (!job.identification.selection.mechanism) {
-    job.identification.selection.mechanism = said.parts.type;
+  if (auto& selection = job.identification.selection;
+      !selection.mechanism && !selection.drivetrain) {
+    selection.mechanism = said.parts.type;
   }
   return job;
 }
@@ -290,7 +291,8 @@ ExpectedAll<ExperimentJob> experiment_job(const std::string& file,
     if (project.plant_error) {
       return tl::unexpected(*std::move(project.plant_error));
     }
-    ExperimentJob job{.plant = std::move(project.job.plant), .limits = project.experiment, .sensor = {}};
+    ExperimentJob job{
+        .plant = std::move(project.job.plant), .limits = project.experiment, .sensor = {}};
     job.sensor.resolution = project.job.sensor.resolution;
     job.sensor.delay = project.job.controller.delay.value_or(0.0);
     job.seed = project.job.seed;

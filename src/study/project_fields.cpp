@@ -26,6 +26,28 @@ Expected<void> check_kind(const std::string& text) {
   return mechanisms::parse_mechanism_kind(text).map([](auto) {});
 }
 
+Expected<void> check_log_kind(const std::string& text) {
+  return recording::means_drivetrain(text) ? Expected<void>() : check_kind(text);
+}
+
+/// A kind of mechanism, or a drivetrain.
+constexpr FieldAccess log_kind{[](const void* section) {
+                                 const auto& log = *static_cast<const LogSelection*>(section);
+                                 return log.drivetrain ? FieldValue(std::string("drivetrain"))
+                                        : log.mechanism
+                                            ? FieldValue(std::string(to_string(*log.mechanism)))
+                                            : FieldValue();
+                               },
+                               [](void* section, const FieldValue& value) {
+                                 auto& log = *static_cast<LogSelection*>(section);
+                                 const auto& text = std::get<std::string>(value);
+                                 log.drivetrain = recording::means_drivetrain(text);
+                                 log.mechanism.reset();
+                                 if (!log.drivetrain) {
+                                   log.mechanism = *mechanisms::parse_mechanism_kind(text);
+                                 }
+                               }};
+
 Expected<void> check_position_unit(const std::string& text) {
   const auto unit = parse_unit(text);
   const bool fits = unit && (unit->dimension == length || unit->dimension == angle);
@@ -126,9 +148,9 @@ constexpr std::array gains_fields{
         .without("none")};
 
 constexpr std::array log_fields{
-    text("mechanism", at<&LogSelection::mechanism>(), "\"arm\"", "What the log is of")
-        .one_of(kinds)
-        .checked(check_kind)
+    text("mechanism", log_kind, "\"arm\"", "What the log is of")
+        .one_of("elevator, arm, flywheel, drivetrain")
+        .checked(check_log_kind)
         .without("the type in [mechanism], else what the log says")
         .takes("KIND"),
     text("unit", at<&LogSelection::unit>(), "\"rotations\"",
@@ -159,7 +181,7 @@ constexpr std::array log_fields{
         .without("found by its values")
         .takes("CHANNEL"),
     text("voltage", at<&LogSelection::voltage_channel>(), "\"/Arm/AppliedVolts\"",
-         "Channel of the applied voltage")
+         "Channel of the applied voltage; of a drivetrain's sides LEFT,RIGHT, as the next two")
         .without("found by its name")
         .takes("CHANNEL"),
     text("position", at<&LogSelection::position_channel>(), "\"/Arm/Position\"",
@@ -169,7 +191,15 @@ constexpr std::array log_fields{
     text("velocity", at<&LogSelection::velocity_channel>(), "\"/Arm/Velocity\"",
          "Channel of the velocity")
         .without("found by its name")
-        .takes("CHANNEL")};
+        .takes("CHANNEL"),
+    text("heading", at<&LogSelection::heading_channel>(), "\"/Gyro/Yaw\"",
+         "Channel of a drivetrain's heading")
+        .without("found by its name")
+        .takes("CHANNEL"),
+    text("also", at<&LogSelection::also>(), "\"rotation.json\"",
+         "Another log of the same drivetrain: its rotation tests beside its straight ones")
+        .without("none")
+        .takes("LOG")};
 
 constexpr std::array controller_fields{
     quantity("period", at<&ControllerOptions::period>(), time, positive, "\"20 ms\"",

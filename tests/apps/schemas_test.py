@@ -66,6 +66,42 @@ PARTS = {
 }
 
 
+def drivetrain(turning):
+    """A SysId JSON of a drivetrain: kS 0.6 V, kV 2.4 V s/m, kA 0.4 V s²/m, 0.62 m wide."""
+    log = {"sysid": True, "test": "Drivetrain", "units": "Meters", "unitsPerRotation": 0.5}
+    for test in ("slow-forward", "slow-backward", "fast-forward", "fast-backward"):
+        sign = 1 if test.endswith("forward") else -1
+        signs = (-sign if turning else sign, sign)
+        way, speed, rows, step = [0.0, 0.0], [0.0, 0.0], [], 0.005
+        for i in range(2400 if test.startswith("slow") else 500):
+            volts = 0.25 * i * step if test.startswith("slow") else 4.0
+            heading = (way[1] - way[0]) / 0.62
+            rate = (speed[1] - speed[0]) / 0.62
+            rows.append([i * step, signs[0] * volts, signs[1] * volts, way[0] / 0.5, way[1] / 0.5,
+                         speed[0] / 0.5, speed[1] / 0.5, heading, rate])
+            for side in (0, 1):
+                pushed = max(0.0, volts - 0.6) - 2.4 * abs(speed[side])
+                way[side] += step * speed[side]
+                speed[side] += signs[side] * step * pushed / 0.4
+        log[test] = rows
+    return log
+
+
+def check_drivetrain(folder):
+    (folder / "straight.json").write_text(json.dumps(drivetrain(False)))
+    (folder / "turning.json").write_text(json.dumps(drivetrain(True)))
+    both = ["identify", "straight.json", "--also", "turning.json"]
+    gains = check_answer(both, 0, folder)["gains"]
+    for name, value, tolerance in [("kV", 2.4, 0.01), ("kV_angular", 2.4 * 0.31, 0.01), ("kA", 0.4, 0.05),
+                                   ("kS_left", 0.6, 0.05), ("trackwidth", 0.62, 0.005)]:
+        if abs(gains[name]["value"] / value - 1) > tolerance:
+            failures.append(f"drivetrain: {name} is {gains[name]}, not {value}")
+    check_answer(["identify", "straight.json"], 0, folder)
+    check_answer(["identify", "turning.json"], 0, folder)
+    check_answer(["tune", "turning.json"], 1, folder)
+    check_answer(["identify", examples / "logs/elevator.json", "--mechanism", "drivetrain"], 2, folder)
+
+
 def check_answers(folder):
     log = examples / "logs/elevator.json"
     check_answer(["identify", log], 0, folder)
@@ -206,6 +242,7 @@ def check_project_schema():
 
 with tempfile.TemporaryDirectory() as name:
     check_answers(pathlib.Path(name))
+    check_drivetrain(pathlib.Path(name))
     check_refusals(pathlib.Path(name))
     check_motors(pathlib.Path(name))
     check_places(pathlib.Path(name))

@@ -90,10 +90,9 @@ TEST(AllocationFaults, ReaderOfProjects) {
   const std::string text =
       "[mechanism]\ntype = \"elevator\"\nmass = \"8 kg\" # of all\nmotor = \"krakenX60\"\n"
       "gearing = 10\ndrum_radius = \"2 cm\"\n";
-  for (const std::string& project :
-       {text, text + "gearng = 1\nmass = \"8 m\"\n",
-        text + "profile = 1\n[profile]\ngoal = \"1 V\"\n",
-        std::string("[mechanism]\ntype = \"wing\"\n")}) {
+  for (const std::string& project : {text, text + "gearng = 1\nmass = \"8 m\"\n",
+                                     text + "profile = 1\n[profile]\ngoal = \"1 V\"\n",
+                                     std::string("[mechanism]\ntype = \"wing\"\n")}) {
     const auto read = [&] {
       const auto found = study::parse_project(project, "a.toml");
       return found ? std::string("read") : to_string(found.error());

@@ -114,23 +114,53 @@ TEST(Recording, AVelocityMayHaveAnotherUnitThanItsPosition) {
               1e-9);
 }
 
-TEST(Recording, LeftAndRightAreADrivetrain) {
+// A drivetrain's channels in metres; the left side's velocity is 0.9 m/s, the right one's 1 m/s.
+Log drivetrain(std::string state_name) {
   Log log = wpilog("Meter");
+  log.texts[0].name = std::move(state_name);
   log.signals.clear();
-  for (const char* side : {"left", "right"}) {
-    for (const char* field : {"voltage", "position", "velocity"}) {
-      log.signals.push_back(
-          signal(std::string(field) + "-" + side + "-Wrist", "", field[0] == 'v' ? volts : linear));
-    }
+  for (const std::string side : {"left", "right"}) {
+    log.signals.push_back(signal("voltage-" + side + "-Base", "Volt", volts));
+    log.signals.push_back(signal("position-" + side + "-Base", "Meter",
+                                 side == "left" ? +[](double t) { return 0.9 * t; } : linear, 0.02,
+                                 0.004));
+    log.signals.push_back(signal("velocity-" + side + "-Base", "Meter per Second",
+                                 side == "left" ? +[](double) { return 0.9; } : one, 0.02, 0.004));
   }
-  const auto loaded = recording_from_log(log, {});
+  log.signals.push_back(signal("NT:/SmartDashboard/Gyro Pitch", "", one));
+  log.signals.push_back(
+      signal("NT:/SmartDashboard/Gyro Yaw", "deg", [](double t) { return 10.0 * t; }));
+  return log;
+}
+
+TEST(Recording, LeftAndRightAreADrivetrain) {
+  const auto loaded = recording_from_log(drivetrain("sysid-test-state-Base"), {});
   ASSERT_TRUE(loaded) << to_string(loaded.error());
-  ASSERT_TRUE(loaded->refusal);
-  EXPECT_TRUE(loaded->refusal->is(RecordingError::drivetrain));
-  EXPECT_EQ(loaded->refusal->kind(), ErrorKind::no_answer);
-  EXPECT_NE(to_string(*loaded->refusal).find("a left and a right side"), std::string::npos);
-  // What one side did can still be looked at.
-  EXPECT_EQ(loaded->recording.runs.size(), 2u);
+  ASSERT_TRUE(loaded->drive);
+  EXPECT_TRUE(loaded->recording.runs.empty());
+  EXPECT_EQ(loaded->drive->unit, "m");
+  ASSERT_EQ(loaded->drive->runs.size(), 2u);
+  const identification::DriveRun& run = loaded->drive->runs[0];
+  EXPECT_EQ(run.kind, TestKind::quasistatic_forward);
+  const std::size_t i = run.time.size() / 2;
+  EXPECT_NEAR(run.left.position[i], 0.9 * run.time[i], 1e-9);
+  EXPECT_NEAR(run.right.position[i], run.time[i], 1e-9);
+  EXPECT_NEAR(run.left.velocity[i], 0.9, 1e-12);
+  EXPECT_NEAR(run.right.voltage[i], volts(run.time[i]), 0.02);
+  EXPECT_NEAR(run.heading[i], 10.0 * run.time[i] * two_pi / 360.0, 1e-9);
+
+  LogSelection channels;
+  channels.voltage_channel = "voltage-right-Base,voltage-left-Base";
+  channels.position_channel = "position-right-Base,position-left-Base";
+  channels.velocity_channel = "velocity-right-Base,velocity-left-Base";
+  channels.heading_channel = "NT:/SmartDashboard/Gyro Pitch";
+  channels.drivetrain = true;
+  const auto said = recording_from_log(drivetrain("sysid-test-state-Base"), channels);
+  ASSERT_TRUE(said) << to_string(said.error());
+  EXPECT_NEAR(said->drive->runs[0].left.velocity[i], 1.0, 1e-12);
+  EXPECT_EQ(said->drive->runs[0].heading[i], 1.0);
+  channels.voltage_channel = "voltage-right-Base";
+  EXPECT_EQ(code_of(drivetrain("sysid-test-state-Base"), channels), "no_channel");
 }
 
 // The channels of a robot that logs each motor controller: none says its side, only the distances
@@ -150,16 +180,28 @@ Log four_controllers(std::string state_name) {
 
 std::string refusal_of(const Log& log, const LogSelection& selection) {
   const auto recording = recording_from_log(log, selection);
-  return !recording           ? std::string(recording.error().code())
-         : recording->refusal ? std::string(recording->refusal->code())
-                              : "accepted";
+  return !recording         ? std::string(recording.error().code())
+         : recording->drive ? "drivetrain"
+                            : "accepted";
 }
 
 TEST(Recording, ADrivetrainIsToldByItsName) {
-  for (const char* name : {"sysid-test-state-DriveSubsystem", "sysid-test-state-drivetrain",
-                           "/RealOutputs/Swerve/SysIdState", "sysid-test-state-swerve_drive",
+  for (const char* name : {"sysid-test-state-DriveSubsystem", "sysid-test-state-drivetrain"}) {
+    // Its sides are asked for, all at once.
+    const auto asked = recording_from_log(four_controllers(name), {});
+    ASSERT_FALSE(asked) << name;
+    EXPECT_TRUE(asked.error().is(RecordingError::no_channel)) << name;
+    for (const char* words : {"--voltage LEFT,RIGHT", "--position LEFT,RIGHT", "--heading", name}) {
+      EXPECT_NE(to_string(asked.error()).find(words), std::string::npos)
+          << to_string(asked.error());
+    }
+  }
+  for (const char* name : {"/RealOutputs/Swerve/SysIdState", "sysid-test-state-swerve_drive",
                            "sysid-test-state-CommandSwerveDrivetrain"}) {
-    EXPECT_EQ(refusal_of(four_controllers(name), {}), "drivetrain") << name;
+    const auto swerve = recording_from_log(four_controllers(name), {});
+    ASSERT_FALSE(swerve) << name;
+    EXPECT_TRUE(swerve.error().is(RecordingError::drivetrain)) << name;
+    EXPECT_NE(to_string(swerve.error()).find("--mechanism flywheel"), std::string::npos);
   }
   EXPECT_EQ(refusal_of(four_controllers("sysid-test-state-Wrist"), {}), "ambiguous_channel");
   // Not every word that begins so is one.
@@ -175,16 +217,6 @@ TEST(Recording, ADrivetrainIsToldByItsName) {
   EXPECT_EQ(refusal_of(drive, one_motor), "accepted");
 }
 
-TEST(Recording, ADrivetrainIsToldWithoutVoltages) {
-  Log log = four_controllers("sysid-test-state-DriveSubsystem");
-  std::erase_if(log.signals, [](const Signal& s) { return s.name.ends_with("Voltage"); });
-  const auto loaded = recording_from_log(log, {});
-  ASSERT_TRUE(loaded) << to_string(loaded.error());
-  ASSERT_TRUE(loaded->refusal);
-  EXPECT_TRUE(loaded->refusal->is(RecordingError::drivetrain));
-  EXPECT_TRUE(loaded->recording.runs.empty());
-}
-
 TEST(Recording, SidesMayBeOneLetterOrOneWord) {
   const std::vector<std::pair<const char*, const char*>> pairs{
       {"Distance L", "Distance R"},
@@ -192,9 +224,13 @@ TEST(Recording, SidesMayBeOneLetterOrOneWord) {
       {"frontleft/position", "frontright/position"}};
   for (const auto& [left, right] : pairs) {
     Log log = four_controllers("sysid-test-state-Base");
-    log.signals.push_back(signal(left, "", linear));
-    log.signals.push_back(signal(right, "", linear));
-    EXPECT_EQ(refusal_of(log, {}), "drivetrain") << left;
+    log.signals.push_back(signal(left, "Meter", linear));
+    log.signals.push_back(signal(right, "Meter", linear));
+    // Only the voltages are asked for.
+    const auto asked = recording_from_log(log, {});
+    ASSERT_FALSE(asked) << left;
+    EXPECT_NE(to_string(asked.error()).find("--voltage LEFT,RIGHT"), std::string::npos) << left;
+    EXPECT_EQ(to_string(asked.error()).find("--position LEFT,RIGHT"), std::string::npos) << left;
   }
   Log log = four_controllers("sysid-test-state-Base");
   log.signals.push_back(signal("Level position", "", linear));
@@ -218,7 +254,7 @@ TEST(Recording, AnElevatorMayHaveALeftAndARightMotor) {
   selection.voltage_channel = "right applied volts";
   const auto loaded = recording_from_log(log, selection);
   ASSERT_TRUE(loaded) << to_string(loaded.error());
-  EXPECT_FALSE(loaded->refusal);
+  EXPECT_FALSE(loaded->drive);
   ASSERT_FALSE(loaded->diagnostics.empty());
   EXPECT_NE(loaded->diagnostics.front().message.find("right carriage position"), std::string::npos);
 }
@@ -298,6 +334,97 @@ TEST(Recording, ScalesASysIdJsonByItsUnits) {
 
   log.sysid->test.clear();
   EXPECT_EQ(code_of(log, {}), "mechanism_unknown");
+}
+
+// A drivetrain's SysId JSON in each of its layouts; a wheel's circumference is 0.5 m.
+TEST(Recording, SysIdDrivetrains) {
+  using Layout = SysIdJson::Layout;
+  for (const Layout layout :
+       {Layout::drive, Layout::characterization_2019, Layout::characterization_2020}) {
+    Log log;
+    log.source = "drive.json";
+    log.format = "SysId JSON";
+    SysIdJson sysid;
+    sysid.layout = layout;
+    const bool legacy = layout != Layout::drive;
+    if (!legacy) {
+      sysid.test = "Drivetrain (Angular)";
+      sysid.units = "Meters";
+      sysid.units_per_rotation = 0.5;
+    }
+    SysIdJson::Run run;
+    run.name = "fast-backward";
+    for (int i = 0; i < 400; ++i) {
+      const double t = 0.005 * i;
+      run.time.push_back(t);
+      run.voltage.push_back(-6.0);
+      run.right_voltage.push_back(6.0);
+      run.position.push_back(-2.0 * t);
+      run.right_position.push_back(1.5 * t);
+      run.velocity.push_back(-2.0);
+      run.right_velocity.push_back(1.5);
+      if (layout != Layout::characterization_2019) {
+        run.angle.push_back(0.25 * t);
+      }
+      if (!legacy) {
+        run.angle_rate.push_back(0.25);
+      }
+    }
+    sysid.runs = {run};
+    log.sysid = sysid;
+    const auto loaded = recording_from_log(log, {});
+    ASSERT_TRUE(loaded) << to_string(loaded.error());
+    ASSERT_TRUE(loaded->drive);
+    const identification::DriveRun& read = loaded->drive->runs.at(0);
+    const double metres = legacy ? 1.0 : 0.5;
+    EXPECT_NEAR(read.left.position[200], -2.0 * metres, 1e-12);
+    EXPECT_NEAR(read.right.velocity[200], 1.5 * metres, 1e-12);
+    EXPECT_EQ(read.left.voltage[200], -6.0);
+    EXPECT_EQ(read.heading.empty(), layout == Layout::characterization_2019);
+    EXPECT_EQ(read.heading_rate.empty(), legacy);
+    // Nothing in the older files says the unit: it is assumed, first of all.
+    EXPECT_EQ(loaded->diagnostics.empty() ? "" : loaded->diagnostics.front().code,
+              legacy ? "unit_assumed" : "");
+    // A person's word has the last word.
+    const auto overruled = recording_from_log(log, {.mechanism = MechanismKind::flywheel});
+    ASSERT_TRUE(overruled) << to_string(overruled.error());
+    EXPECT_FALSE(overruled->drive);
+    EXPECT_EQ(overruled->recording.runs.size(), 1u);
+  }
+  Log log;
+  log.sysid = SysIdJson{};
+  LogSelection drive;
+  drive.drivetrain = true;
+  EXPECT_EQ(code_of(log, drive), "no_channel");
+}
+
+// Rotations of wheels become metres once the person says how many one is.
+TEST(Recording, WheelsOfUnknownSize) {
+  Log log = drivetrain("sysid-test-state-Base");
+  for (Signal& s : log.signals) {
+    s.unit = s.unit == "Meter"              ? "Rotation"
+             : s.unit == "Meter per Second" ? "Rotation per Second"
+                                            : s.unit;
+  }
+  const auto turns = recording_from_log(log, {});
+  ASSERT_TRUE(turns) << to_string(turns.error());
+  EXPECT_EQ(turns->drive->unit, "rad");
+  EXPECT_NEAR(turns->drive->runs[0].right.velocity[9], two_pi, 1e-12);
+  LogSelection selection;
+  selection.scale = 0.479;
+  const auto metres = recording_from_log(log, selection);
+  ASSERT_TRUE(metres) << to_string(metres.error());
+  EXPECT_EQ(metres->drive->unit, "m");
+  EXPECT_NEAR(metres->drive->runs[0].right.velocity[9], 0.479, 1e-12);
+}
+
+TEST(Recording, WordsForADrivetrain) {
+  for (const char* text : {"drivetrain", "Drivetrain", "differential drive", "tank-drive"}) {
+    EXPECT_TRUE(means_drivetrain(text)) << text;
+  }
+  for (const char* text : {"", "arm", "driver", "drivetrain (angular)"}) {
+    EXPECT_FALSE(means_drivetrain(text)) << text;
+  }
 }
 
 // Two tests of one kind whose clocks begin anew are two runs, although no state lies between them.

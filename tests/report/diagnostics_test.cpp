@@ -8,6 +8,7 @@
 #include <flyball/report/terminal.hpp>
 #include <flyball/study/identify_model.hpp>
 
+#include "drive_sessions.hpp"
 #include "fixtures.hpp"
 #include "report/format.hpp"
 
@@ -127,6 +128,43 @@ TEST(Diagnostics, OfAnIdentification) {
 TEST(Diagnostics, OfARefusedIdentification) {
   const Answer answer = study::answer_of(noted(refused_result()));
   ASSERT_TRUE(answer.refusal);
+  expect_nothing_lost(answer, {"source", "fit"});
+}
+
+study::IdentifyResult drive_result(bool still) {
+  identification::DriveRecording recording = drives::record({});
+  if (still) {
+    for (identification::DriveRun& run : recording.runs) {
+      run.right.position.assign(run.time.size(), 0.5);
+      run.right.velocity.assign(run.time.size(), 0.0);
+    }
+  }
+  recording::LoadedRecording source;
+  source.path = "drive.wpilog";
+  source.format = "WPILOG";
+  source.drive = recording;
+  identification::DriveReport drive = identification::identify_drive(recording);
+  const Error error = drive.fit ? Error(recording::RecordingError::drivetrain) : drive.fit.error();
+  study::IdentifyResult result{
+      std::move(source), {{}, drive.diagnostics, tl::unexpected(error)}, {}, "m", std::move(drive)};
+  return noted(std::move(result));
+}
+
+TEST(Diagnostics, OfADrivetrain) {
+  const Answer answer = study::answer_of(drive_result(false));
+  EXPECT_FALSE(answer.refusal);
+  expect_nothing_lost(answer, {"source", "fit"});
+  // Left, right, heading and the voltages of each test.
+  ASSERT_EQ(answer.figures.size(), 8u);
+  EXPECT_EQ(answer.figures[0].plot.panels.size(), 4u);
+  EXPECT_EQ(answer.figures[0].plot.panels[2].lines.size(), 2u);
+  EXPECT_EQ(answer.files.size(), 8u);
+}
+
+TEST(Diagnostics, OfARefusedDrivetrain) {
+  const Answer answer = study::answer_of(drive_result(true));
+  ASSERT_TRUE(answer.refusal);
+  EXPECT_TRUE(answer.refusal->is(identification::IdentificationError::no_motion));
   expect_nothing_lost(answer, {"source", "fit"});
 }
 

@@ -2,10 +2,12 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <flyball/core/diagnostic.hpp>
 #include <flyball/core/errors.hpp>
+#include <flyball/identification/drive_fit.hpp>
 #include <flyball/identification/recording.hpp>
 
 namespace flyball {
@@ -17,10 +19,15 @@ namespace flyball::recording {
 /// What a person may say about a log beyond what it says itself. Empty fields are detected.
 struct LogSelection {
   std::optional<mechanisms::MechanismKind> mechanism{};
-  std::string state_channel{};    ///< The channel with the name of the running test.
-  std::string voltage_channel{};  ///< Channel names as the log has them.
+  bool drivetrain = false;      ///< The log is of a drivetrain, in place of a mechanism.
+  std::string state_channel{};  ///< The channel with the name of the running test.
+  std::string
+      voltage_channel{};  ///< Channel names as the log has them; of a drivetrain "LEFT,RIGHT".
   std::string position_channel{};
   std::string velocity_channel{};
+  std::string heading_channel{};  ///< Of a drivetrain's gyro.
+  std::string
+      also{};  ///< Path of another log of the same drivetrain: rotations beside straight tests.
   std::string unit{};           ///< Unit of the position channel: "rotations", "m", "deg", …
   std::string velocity_unit{};  ///< Unit of the velocity channel: "RPM", "deg/s", …
   bool no_velocity = false;     ///< Leave the velocity channel out; the position tells it.
@@ -30,7 +37,8 @@ struct LogSelection {
 
 /// Why a log cannot be turned into a recording.
 enum class RecordingError {
-  drivetrain,         ///< A drivetrain log: two sides; not supported yet (no_answer).
+  drivetrain,         ///< A swerve drive's log, or two logs that are not of one drivetrain
+                      ///< (no_answer).
   mechanism_unknown,  ///< The log leaves the kind open; the person has to say it.
   no_test_state,      ///< No channel tells which test runs.
   no_channel,         ///< Voltage, or both of position and velocity, are missing.
@@ -41,15 +49,17 @@ enum class RecordingError {
 };
 [[nodiscard]] ErrorInfo error_info(RecordingError code);
 
-/// A log, read as the characterisation tests of one mechanism.
+/// Whether a person's word for the mechanism is a drivetrain: "drivetrain", "differential drive".
+[[nodiscard]] bool means_drivetrain(std::string_view mechanism);
+
+/// A log, read as the characterisation tests of one mechanism or drivetrain.
 struct LoadedRecording {
   std::string path{};
   std::string format{};   ///< "SysId JSON", "WPILOG", "CSV".
   std::string subject{};  ///< The mechanism's name in the log, or empty.
   identification::Recording recording;
+  std::optional<identification::DriveRecording> drive{};  ///< In its place, of a drivetrain.
   std::vector<Diagnostic> diagnostics{};  ///< What was found; assumptions have the code "assumed".
-  /// Why the recording can be shown but not identified: a drivetrain's.
-  std::optional<Error> refusal{};
 };
 
 /// Reads a log and finds the tests in it: channels by name, type and unit; runs by the test state;

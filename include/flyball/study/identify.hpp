@@ -1,13 +1,15 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
+#include <flyball/identification/drive_fit.hpp>
 #include <flyball/identification/feedforward_fit.hpp>
 #include <flyball/recording/load_recording.hpp>
 
 namespace flyball::study {
 
-/// Identify a mechanism from a log.
+/// Identify a mechanism or a drivetrain from a log.
 struct IdentifyJob {
   std::string log{};  ///< Path.
   recording::LogSelection selection;
@@ -19,7 +21,9 @@ struct IdentifyResult {
   identification::FitReport
       report;  ///< `report.fit` is the gains or the reason why there are none.
   mechanisms::MechanismKind mechanism{};
-  std::string unit{};  ///< "m" or "rad"; "unit" of a log that was refused before it was known.
+  std::string unit{};  ///< "m" or "rad".
+  /// Of a drivetrain; then `report.fit` only says why there are no gains of one mechanism.
+  std::optional<identification::DriveReport> drive{};
 
   /// Everything found while reading, preparing and fitting, in that order.
   [[nodiscard]] std::vector<Diagnostic> diagnostics() const;

@@ -16,22 +16,6 @@ using identification::GainEstimate;
 
 constexpr double poor_fit = 0.9;  ///< R² below which the overlay deserves a look.
 
-void write_gain(JsonWriter& json, std::string_view name, const GainEstimate& gain,
-                const std::string& unit) {
-  json.object(name, [&] {
-    json.add("value", gain.determined ? std::optional(gain.value) : std::nullopt);
-    json.add("determined", gain.determined);
-    json.add("unit", unit);
-    if (gain.determined) {
-      json.add("standard_error", gain.standard_error);
-      json.add("interval", std::span<const double>(gain.interval));
-    } else {
-      json.add("upper_bound", gain.upper_bound);
-      json.add("reason", gain.reason);
-    }
-  });
-}
-
 }  // namespace
 
 void write_gains(JsonWriter& json, const identification::FeedforwardFit& fit) {
@@ -52,21 +36,8 @@ void write_fit(JsonWriter& json, const identification::FeedforwardFit& fit) {
   json.add("mechanism", to_string(fit.mechanism));
   json.add("unit", fit.unit);
   write_gains(json, fit);
-  if (!fit.terms.empty()) {
-    json.object("terms", [&] {
-      for (const identification::ModelTerm& term : fit.terms) {
-        write_gain(json, term.name, term.value, term.unit);
-      }
-    });
-  }
-  json.object("fit", [&] {
-    json.add({{"r_squared", fit.r_squared},
-              {"velocity_nrmse", fit.velocity_nrmse},
-              {"position_delay", fit.position_delay},
-              {"velocity_delay", fit.velocity_delay},
-              {"averaging_width", fit.averaging_width}});
-    json.add("iterations", fit.iterations);
-  });
+  write_terms(json, fit);
+  json.object("fit", [&] { write_quality(json, fit); });
   if (fit.one_step) {
     json.object("one_step_regression", [&] {
       json.add({{"kS", fit.one_step->kS},
@@ -87,27 +58,67 @@ void write_source(JsonWriter& json, const recording::LoadedRecording& source) {
     json.add("path", source.path);
     json.add("format", source.format);
     json.add("subject", source.subject);
-    std::size_t rows = 0;
-    for (const identification::TestRun& run : source.recording.runs) {
-      rows += run.time.size();
-    }
-    json.add("rows", rows);
-    json.list("runs", source.recording.runs, [&](const identification::TestRun& run) {
-      json.object([&] {
-        json.add("test", to_string(run.kind));
-        json.add("rows", run.time.size());
-        json.add("duration", run.time.empty() ? 0.0 : run.time.back() - run.time.front());
+    const auto list = [&](const auto& runs) {
+      std::size_t rows = 0;
+      for (const auto& run : runs) {
+        rows += run.time.size();
+      }
+      json.add("rows", rows);
+      json.list("runs", runs, [&](const auto& run) {
+        json.object([&] {
+          json.add("test", to_string(run.kind));
+          json.add("rows", run.time.size());
+          json.add("duration", run.time.empty() ? 0.0 : run.time.back() - run.time.front());
+        });
       });
-    });
+    };
+    source.drive ? list(source.drive->runs) : list(source.recording.runs);
   });
 }
 
 }  // namespace
 
+void write_gain(JsonWriter& json, std::string_view name, const GainEstimate& gain,
+                const std::string& unit) {
+  json.object(name, [&] {
+    json.add("value", gain.determined ? std::optional(gain.value) : std::nullopt);
+    json.add("determined", gain.determined);
+    json.add("unit", unit);
+    if (gain.determined) {
+      json.add("standard_error", gain.standard_error);
+      json.add("interval", std::span<const double>(gain.interval));
+    } else {
+      json.add("upper_bound", gain.upper_bound);
+      json.add("reason", gain.reason);
+    }
+  });
+}
+
+void write_terms(JsonWriter& json, const identification::FeedforwardFit& fit) {
+  if (!fit.terms.empty()) {
+    json.object("terms", [&] {
+      for (const identification::ModelTerm& term : fit.terms) {
+        write_gain(json, term.name, term.value, term.unit);
+      }
+    });
+  }
+}
+
+void write_quality(JsonWriter& json, const identification::FeedforwardFit& fit) {
+  json.add({{"r_squared", fit.r_squared},
+            {"velocity_nrmse", fit.velocity_nrmse},
+            {"position_delay", fit.position_delay},
+            {"velocity_delay", fit.velocity_delay},
+            {"averaging_width", fit.averaging_width}});
+  json.add("iterations", fit.iterations);
+}
+
 void write_identification(JsonWriter& json, const IdentifyResult& result) {
   json.object([&] {
     json.add("schema", "flyball.identify/1");
-    if (result.report.fit) {
+    if (result.drive && result.drive->fit) {
+      write_drive(json, result);
+    } else if (result.report.fit) {
       write_fit(json, *result.report.fit);
     } else {
       json.add("error", result.report.fit.error());
@@ -146,11 +157,13 @@ std::string title_of(const std::string& kind, const std::string& subject, const 
 }
 
 std::string kind_of(const IdentifyResult& result) {
-  // A drivetrain's log is refused before it is taken for a mechanism's.
-  return result.source.refusal ? "drivetrain" : std::string(to_string(result.mechanism));
+  return result.drive ? "drivetrain" : std::string(to_string(result.mechanism));
 }
 
 Verdict verdict_of(const IdentifyResult& result) {
+  if (result.drive) {
+    return drive_verdict(result);
+  }
   if (!result.report.fit) {
     return {
         Tone::bad, "No gains can be taken from this log.", {to_string(result.report.fit.error())}};
@@ -202,7 +215,7 @@ Answer answer_of(const IdentifyResult& result) {
   answer.figures = figures_of(result);
   if (result.report.fit) {
     answer.files.push_back({"gains.toml", gains_toml(result)});
-  } else {
+  } else if (!result.drive || !result.drive->fit) {
     answer.refusal = result.report.fit.error();
   }
   append(answer.files, data_files(result));

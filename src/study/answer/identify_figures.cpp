@@ -84,6 +84,9 @@ std::string run_csv(const TestRun& run, const std::string& unit) {
 }  // namespace
 
 std::vector<Figure> figures_of(const IdentifyResult& result) {
+  if (result.drive) {
+    return drive_figures(result);
+  }
   std::vector<Figure> figures;
   for (const PreparedRun& prepared : shown_runs(result)) {
     const FittedRun* fitted = fitted_run(result, prepared.source);
@@ -96,6 +99,9 @@ std::vector<Figure> figures_of(const IdentifyResult& result) {
 }
 
 std::vector<AnswerFile> data_files(const IdentifyResult& result) {
+  if (result.drive) {
+    return drive_files(result);
+  }
   std::vector<AnswerFile> files = signal_log(result);
   for (const PreparedRun& prepared : shown_runs(result)) {
     const FittedRun* fitted = fitted_run(result, prepared.source);

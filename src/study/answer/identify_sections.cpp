@@ -98,26 +98,6 @@ std::string interval_text(const GainEstimate& gain) {
                      in_digits_of(gain.interval[1], half));
 }
 
-std::vector<Value> gain_row(const std::string& name, const GainEstimate& gain,
-                            const std::string& unit, double one_step, bool has_one_step,
-                            const std::string& meaning) {
-  std::vector<Value> row{name};
-  if (gain.determined) {
-    Value& value =
-        row.emplace_back(with_half_width(gain.value, 0.5 * (gain.interval[1] - gain.interval[0])));
-    value.number = gain.value;
-    value.unit = unit;
-    row.emplace_back(interval_text(gain));
-  } else {
-    row.emplace_back("not determined", Tone::caution);
-    row.emplace_back("below " + number(gain.upper_bound, 3), Tone::caution);
-  }
-  row.emplace_back(unit);
-  row.emplace_back(has_one_step ? number(one_step, 4) : "", Tone::quiet);
-  row.emplace_back(meaning);
-  return row;
-}
-
 Table gains_table(const FeedforwardFit& fit) {
   const std::string speed = fit.unit + "/s";
   Table table;
@@ -139,6 +119,33 @@ Table gains_table(const FeedforwardFit& fit) {
     table.rows.push_back(gain_row("offset", *fit.angle_offset, "rad", one.angle_offset, has,
                                   "(true angle − measured)"));
   }
+  term_rows(table, "", fit);
+  return table;
+}
+
+}  // namespace
+
+std::vector<Value> gain_row(const std::string& name, const GainEstimate& gain,
+                            const std::string& unit, double one_step, bool has_one_step,
+                            const std::string& meaning) {
+  std::vector<Value> row{name};
+  if (gain.determined) {
+    Value& value =
+        row.emplace_back(with_half_width(gain.value, 0.5 * (gain.interval[1] - gain.interval[0])));
+    value.number = gain.value;
+    value.unit = unit;
+    row.emplace_back(interval_text(gain));
+  } else {
+    row.emplace_back("not determined", Tone::caution);
+    row.emplace_back("below " + number(gain.upper_bound, 3), Tone::caution);
+  }
+  row.emplace_back(unit);
+  row.emplace_back(has_one_step ? number(one_step, 4) : "", Tone::quiet);
+  row.emplace_back(meaning);
+  return row;
+}
+
+void term_rows(Table& table, const std::string& mode, const FeedforwardFit& fit) {
   for (const identification::ModelTerm& term : fit.terms) {
     const std::string meaning =
         term.name == "current_limit"
@@ -146,12 +153,9 @@ Table gains_table(const FeedforwardFit& fit) {
             : fmt::format("({} V at most in the log)", number(term.largest, 2));
     std::string name = term.name;
     std::replace(name.begin(), name.end(), '_', ' ');
-    table.rows.push_back(gain_row(name, term.value, term.unit, 0.0, false, meaning));
+    table.rows.push_back(gain_row(name + mode, term.value, term.unit, 0.0, false, meaning));
   }
-  return table;
 }
-
-}  // namespace
 
 const FittedRun* fitted_run(const IdentifyResult& result, std::size_t source) {
   if (result.report.fit) {
@@ -179,6 +183,9 @@ std::vector<PreparedRun> shown_runs(const IdentifyResult& result) {
 }
 
 Section data_section(const IdentifyResult& result) {
+  if (result.drive) {
+    return drive_data(result);
+  }
   const identification::PreparedRecording& data = result.report.prepared;
   const std::string rate = result.unit + "/s";
   Section section{"data", "Data", {}};
@@ -240,6 +247,9 @@ Section data_section(const IdentifyResult& result) {
 }
 
 Section gains_section(const IdentifyResult& result) {
+  if (result.drive) {
+    return drive_gains(result);
+  }
   Section section{"gains", "Gains", {}};
   if (!result.report.fit) {
     section.blocks.emplace_back(

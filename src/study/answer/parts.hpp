@@ -23,8 +23,31 @@ void append(std::vector<T>& list, std::vector<T> more) {
 /// The fit of a run, or null.
 [[nodiscard]] const identification::FittedRun* fitted_run(const IdentifyResult& result,
                                                           std::size_t source);
-/// "elevator", …, or "drivetrain" for a log that was refused as one.
+/// "elevator", …, "drivetrain".
 [[nodiscard]] std::string kind_of(const IdentifyResult& result);
+
+/// A row of the table of gains: value, interval, unit, one-step estimate, meaning.
+[[nodiscard]] std::vector<Value> gain_row(const std::string& name,
+                                          const identification::GainEstimate& gain,
+                                          const std::string& unit, double one_step,
+                                          bool has_one_step, const std::string& meaning);
+/// A gain as a member of an answer's JSON.
+void write_gain(JsonWriter& json, std::string_view name, const identification::GainEstimate& gain,
+                const std::string& unit);
+/// The member "terms", if a fit has any beyond its gains.
+void write_terms(JsonWriter& json, const identification::FeedforwardFit& fit);
+/// A row for each of them.
+void term_rows(Table& table, const std::string& mode, const identification::FeedforwardFit& fit);
+/// The members that tell how a fit went.
+void write_quality(JsonWriter& json, const identification::FeedforwardFit& fit);
+
+// Of a drivetrain (`result.drive`), in place of those of a mechanism.
+[[nodiscard]] Section drive_data(const IdentifyResult& result);
+[[nodiscard]] Section drive_gains(const IdentifyResult& result);
+[[nodiscard]] Verdict drive_verdict(const IdentifyResult& result);
+[[nodiscard]] std::vector<Figure> drive_figures(const IdentifyResult& result);
+[[nodiscard]] std::vector<AnswerFile> drive_files(const IdentifyResult& result);
+void write_drive(JsonWriter& json, const IdentifyResult& result);
 
 [[nodiscard]] Section data_section(const IdentifyResult& result);
 /// Gains and the quality of the fit; for a refused fit, its reason.

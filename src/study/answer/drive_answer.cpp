@@ -1,0 +1,210 @@
+// Verdict, JSON, pictures and tables of a drivetrain's identification.
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include <flyball/io/csv.hpp>
+
+#include "core/wording.hpp"
+#include "study/answer/drawing.hpp"
+#include "study/answer/parts.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+using identification::DriveFit;
+using identification::DriveReport;
+using identification::DriveRun;
+using identification::FeedforwardFit;
+using identification::FittedDriveRun;
+
+constexpr double poor_fit = 0.9;  ///< R² below which the overlay deserves a look.
+
+std::string run_name(std::string_view prefix, std::size_t index, const DriveRun& run) {
+  return fmt::format("{}_{}_{}", prefix, index + 1, to_string(run.kind));
+}
+
+PlotPanel compared(const Coordinate& shown, const FittedDriveRun& run,
+                   const std::vector<double>& measured, const std::vector<double>& simulated) {
+  std::vector<PlotLine> lines{line("measured", run.time, measured, measured_color)};
+  if (!simulated.empty()) {
+    lines.push_back(line("simulated", run.time, simulated, simulated_color));
+  }
+  return panel(shown, std::move(lines));
+}
+
+Figure drive_figure(const DriveReport& report, const FittedDriveRun& fitted, std::size_t index) {
+  const DriveRun& run = report.recording.runs[index];
+  const std::string rate = report.recording.unit + "/s";
+  Figure figure = over_time(
+      fitted.used ? "gains" : "data", run_name(fitted.used ? "fit" : "recorded", index, run),
+      fmt::format("Run {}: {}, {}", index + 1, to_string(run.kind), to_string(report.tests[index])),
+      fitted.used ? "Measured velocities and heading against those that the whole model makes in "
+                    "free run from both recorded voltages, and the voltages."
+                  : "Velocities, heading and voltages as the log has them.");
+  figure.plot.panels = {
+      compared({"Left velocity", rate}, fitted, fitted.left_velocity, fitted.left_velocity_hat),
+      compared({"Right velocity", rate}, fitted, fitted.right_velocity, fitted.right_velocity_hat)};
+  if (!fitted.heading.empty()) {
+    figure.plot.panels.push_back(
+        compared({"Heading", "rad"}, fitted, fitted.heading, fitted.heading_hat));
+  }
+  figure.plot.panels.push_back(
+      panel({"Voltage", "V"},
+            {line("left", run.time, run.left.voltage, voltage_color),
+             line("right", run.time, run.right.voltage, quiet_color, LineStyle::dashed)},
+            true));
+  return figure;
+}
+
+/// Adds a column if it fits the clock.
+void add(TimeSeries& series, std::string name, std::string unit,
+         const std::vector<double>& values) {
+  if (values.size() == series.rows() && !values.empty()) {
+    static_cast<void>(series.add(std::move(name), std::move(unit), values));
+  }
+}
+
+std::string run_csv(const DriveReport& report, std::size_t index) {
+  const std::string& unit = report.recording.unit;
+  const std::string rate = unit + "/s";
+  if (index < report.runs.size() && report.runs[index].used) {
+    const FittedDriveRun& run = report.runs[index];
+    TimeSeries series(run.time);
+    add(series, "left_velocity", rate, run.left_velocity);
+    add(series, "left_velocity_simulated", rate, run.left_velocity_hat);
+    add(series, "right_velocity", rate, run.right_velocity);
+    add(series, "right_velocity_simulated", rate, run.right_velocity_hat);
+    add(series, "heading", "rad", run.heading);
+    add(series, "heading_simulated", "rad", run.heading_hat);
+    return to_csv(series);
+  }
+  const DriveRun& run = report.recording.runs[index];
+  TimeSeries series(run.time);
+  add(series, "left_voltage", "V", run.left.voltage);
+  add(series, "right_voltage", "V", run.right.voltage);
+  add(series, "left_position", unit, run.left.position);
+  add(series, "right_position", unit, run.right.position);
+  add(series, "left_velocity", rate, run.left.velocity);
+  add(series, "right_velocity", rate, run.right.velocity);
+  add(series, "heading", "rad", run.heading);
+  return to_csv(series);
+}
+
+void write_mode(JsonWriter& json, std::string_view name, const std::optional<FeedforwardFit>& fit) {
+  if (!fit) {
+    return;
+  }
+  json.object(name, [&] {
+    write_quality(json, *fit);
+    write_terms(json, *fit);
+  });
+}
+
+}  // namespace
+
+Verdict drive_verdict(const IdentifyResult& result) {
+  if (!result.drive->fit) {
+    return {
+        Tone::bad, "No gains can be taken from this log.", {to_string(result.drive->fit.error())}};
+  }
+  const DriveFit& fit = *result.drive->fit;
+  Verdict verdict;
+  bool assumed = false;
+  for (const Diagnostic& found : result.diagnostics()) {
+    if (found.code == "unit_assumed") {
+      verdict.add(Tone::caution, found.message);
+      assumed = true;
+    }
+  }
+  const auto judge = [&](const char* mode, const std::optional<FeedforwardFit>& of) {
+    if (!of) {
+      verdict.add(Tone::caution, fmt::format("no gains of the {} motion", mode));
+      return;
+    }
+    if (!of->kA.determined) {
+      verdict.add(Tone::caution,
+                  fmt::format("the log does not determine kA of the {} motion", mode));
+    }
+    if (of->r_squared < poor_fit) {
+      verdict.add(Tone::caution,
+                  fmt::format("the simulated {} velocity explains only {} of the measured one: "
+                              "compare them before you trust the gains",
+                              mode, text::percent(std::max(0.0, of->r_squared))));
+    }
+  };
+  judge("linear", fit.linear);
+  judge("angular", fit.angular);
+  if (!fit.trackwidth || !fit.trackwidth->determined) {
+    verdict.add(Tone::caution, "the trackwidth is not known");
+  }
+  add_warnings(verdict, result.diagnostics(), "about the data");
+  verdict.line = verdict.tone == Tone::good ? "The gains of both motions can be used."
+                 : assumed                  ? "The gains can be used once the unit is confirmed."
+                                            : "The gains can be used with care.";
+  return verdict;
+}
+
+void write_drive(JsonWriter& json, const IdentifyResult& result) {
+  const DriveFit& fit = *result.drive->fit;
+  const bool width = fit.trackwidth && fit.trackwidth->determined;
+  const auto angular = [&](const identification::GainEstimate& gain) {
+    return width ? identification::per_radian(gain, *fit.trackwidth) : gain;
+  };
+  const std::string turning = width ? "rad" : fit.unit;
+  json.add("mechanism", "drivetrain");
+  json.add("unit", fit.unit);
+  json.object("gains", [&] {
+    if (fit.linear) {
+      write_gain(json, "kS", fit.linear->kS, "V");
+      write_gain(json, "kV", fit.linear->kV, "V·s/" + fit.unit);
+      write_gain(json, "kA", fit.linear->kA, "V·s²/" + fit.unit);
+    }
+    if (fit.angular) {
+      write_gain(json, "kS_angular", fit.angular->kS, "V");
+      write_gain(json, "kV_angular", angular(fit.angular->kV), "V·s/" + turning);
+      write_gain(json, "kA_angular", angular(fit.angular->kA), "V·s²/" + turning);
+    }
+    if (fit.kS_left) {
+      write_gain(json, "kS_left", *fit.kS_left, "V");
+      write_gain(json, "kS_right", *fit.kS_right, "V");
+    }
+    if (fit.trackwidth) {
+      write_gain(json, "trackwidth", *fit.trackwidth, "m");
+    }
+  });
+  json.object("modes", [&] {
+    write_mode(json, "linear", fit.linear);
+    write_mode(json, "angular", fit.angular);
+  });
+  if (const auto gains = fit.gains()) {
+    if (const auto drive = mechanisms::differential_drive(*gains)) {
+      json.object("plant", [&] {
+        json.add("A", Eigen::MatrixXd(drive->A));
+        json.add("B", Eigen::MatrixXd(drive->B));
+      });
+    }
+  }
+}
+
+std::vector<Figure> drive_figures(const IdentifyResult& result) {
+  const DriveReport& report = *result.drive;
+  std::vector<Figure> figures;
+  for (std::size_t i = 0; i < report.runs.size(); ++i) {
+    figures.push_back(drive_figure(report, report.runs[i], i));
+  }
+  return figures;
+}
+
+std::vector<AnswerFile> drive_files(const IdentifyResult& result) {
+  const DriveReport& report = *result.drive;
+  std::vector<AnswerFile> files;
+  for (std::size_t i = 0; i < report.recording.runs.size(); ++i) {
+    files.push_back({fmt::format("data/{}.csv", run_name("run", i, report.recording.runs[i])),
+                     run_csv(report, i)});
+  }
+  return files;
+}
+
+}  // namespace flyball::study
