@@ -239,7 +239,7 @@ TEST(IdentifyModel, WhatIsEmptyIsRefusedWithWhatThereIs) {
 
 TEST(IdentifyModel, WhatTheFileSaysWronglyIsToldWithItsPlace) {
   const std::string told = complaints(
-      lag_with("[fit]\nchannels = { v = \"/volts\" }\nfree_initial = [\"y\"]\nhold = \"cubic\"\n"
+      lag_with("[fit]\nchannels = { v = \"/volts\" }\nfree_initial = [\"y\"]\nhold = \"bent\"\n"
                "[fit.free]\ngian = \"free\"\nlag = \"5 .. 1 s\"\n"));
   for (const std::string_view part :
        {"lag.toml:10:", "\"v\" is not an input or an output", "\"y\" is not a state",
