@@ -66,6 +66,7 @@ struct Experiment {
   double score = 0.0;  ///< Largest half width over what is wanted; infinity: no gains at all.
 };
 
+/// The experiment that was found, beside the one that teams run without looking.
 struct ExperimentResult {
   ExperimentJob job;
   Experiment best;
