@@ -12,7 +12,8 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_L
 endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
   # The standard library of g++ 12 deprecates what its own std::stable_sort is made of.
-  target_compile_options(flyball_options INTERFACE -Wno-deprecated-declarations)
+  # Eigen's fixed-size vectors are passed within the library alone: no ABI is at stake (-Wpsabi).
+  target_compile_options(flyball_options INTERFACE -Wno-deprecated-declarations -Wno-psabi)
 endif()
 if(FLYBALL_WARNINGS_AS_ERRORS)
   target_compile_options(flyball_options INTERFACE -Werror)

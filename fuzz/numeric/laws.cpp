@@ -28,7 +28,14 @@ class Laws {
   [[nodiscard]] bool answers(const char* name) const { return answer_.contains(name); }
   /// A matrix of the problem.
   [[nodiscard]] Balance given(const char* name) const {
-    return Balance(quad_matrix(problem_.at(name)));
+    Balance matrix(quad_matrix(problem_.at(name)));
+    // An entry below the smallest normal number is known to within that number: products with it
+    // have no sixteen digits.
+    constexpr double least = std::numeric_limits<double>::min();
+    for (Quad& term : matrix.terms.entries()) {
+      term += term > 0 && term < least ? Quad(least) * 1e10 : Quad(0);
+    }
+    return matrix;
   }
   [[nodiscard]] Balance given_or_zero(const char* name, const Balance& B, const Balance& A) const {
     return has(name) ? given(name) : Balance(QuadMatrix(A.value.columns(), B.value.columns()));
@@ -210,7 +217,12 @@ void power_law(Laws& laws) {
   } else if (power == 0.25) {
     laws.holds("fourth root", X * X * (X * X) - A);
   } else if (power == -0.5) {
-    laws.holds("inverse root", X * X * A - ones(A.value.rows()));
+    // X is the inverse root of A + E: X X A - I = -X X E, whatever entries meet in the products.
+    const Balance XX = X * X;
+    const Balance left = XX * A - ones(A.value.rows());
+    const Quad of = std::max(left.terms.largest(), XX.value.largest() * A.value.largest());
+    const Quad missed = left.value.largest();
+    laws.holds("inverse root", missed > 0 ? static_cast<double>(missed / of) : 0.0);
   }
 }
 
@@ -270,8 +282,8 @@ void balanced(Laws& laws) {
 void inversion(Laws& laws) {
   const Balance B = laws.given("B");
   const int n = B.value.rows();
-  const Balance BtQ = transpose(B) * (laws.has("Q") ? laws.given("Q") : ones(n));
-  const Balance weight = laws.has("R") ? BtQ * B + laws.given("R") : BtQ * B;
+  const Balance BtQ = transpose(B) * (laws.has("Q") ? laws.symmetric("Q") : ones(n));
+  const Balance weight = laws.has("R") ? BtQ * B + laws.symmetric("R") : BtQ * B;
   laws.holds("least squares", weight * laws.found("K_ff") - BtQ);
 }
 

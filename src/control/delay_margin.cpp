@@ -147,7 +147,8 @@ class DelayMargin {
     const double step = period_ / 16.0;
     constexpr double most_work = 1e7;  // Of n³ for n states.
     double work = 0.0;
-    for (double from = 0.0; from < most && work < most_work; from += step) {
+    for (int i = 0; i * step < most && work < most_work && step > 0.0; ++i) {
+      const double from = i * step;
       const double stored = (loop_.delay.si() + from) / period_;
       work += std::pow(static_cast<double>(loop_.A.rows() + loop_.A_c.rows()) + stored, 3.0);
       if (!stable(from + step)) {

@@ -17,6 +17,11 @@ bool loses_modes(const MatrixRef& A, const PairScaling& units) {
   return ((own.array().abs() < nothing) != (A.diagonal().array() == 0.0)).any();
 }
 
+/// Whether an entry is zero in these units that was not.
+bool loses_entries(const MatrixRef& M, const Eigen::MatrixXd& in_units) {
+  return ((M.array() != 0.0) && (in_units.array() == 0.0)).any();
+}
+
 Eigen::VectorXi inputs_near_one(const MatrixRef& B) {
   Eigen::VectorXi units(B.cols());
   for (Eigen::Index j = 0; j < B.cols(); ++j) {
@@ -39,7 +44,10 @@ PairScaling placement_units(const MatrixRef& A, const MatrixRef& B, const Eigen:
   PairScaling units{Eigen::VectorXi::Zero(A.rows()), Eigen::VectorXi::Zero(B.cols()), 0};
   if (all) {
     units = pair_scaling_of(A, B);
-    if (loses_modes(A, units)) {
+    // In a unit of time in which the poles are nothing any gain would reach them.
+    const bool loses_poles = largest > 0.0 && std::ilogb(largest) < units.time - far;
+    if (loses_poles || loses_modes(A, units) || loses_entries(A, scaled_A(A, units)) ||
+        loses_entries(B, scaled_B(B, units))) {
       units = {Eigen::VectorXi::Zero(A.rows()), inputs_near_one(B), 0};
       const double most = A.cwiseAbs().maxCoeff();
       units.time = most > 0.0 ? std::ilogb(most) : 0;

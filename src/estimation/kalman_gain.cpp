@@ -146,7 +146,10 @@ Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const
   }
   KalmanGain<> gain;
   gain.K = filter->gain(filter->update.K);
-  gain.L = filter->gain(product(filter->A, filter->update.K));
+  gain.L = detail::product(A, gain.K);
+  if (!gain.L.allFinite()) {
+    gain.L = filter->gain(product(filter->A, filter->update.K));
+  }
   gain.P_prior = filter->covariance(filter->P);
   gain.P_posterior = filter->covariance(filter->update.P);
   gain.poles = *poles;

@@ -14,7 +14,6 @@ namespace {
 using mechanisms::MechanismKind;
 
 constexpr double normal_95 = 1.96;
-constexpr double one_sided_95 = 1.645;
 constexpr double widest_time_constant = 0.6;  // relative half-width beyond which kA is unknown
 
 // What residuals cannot tell: measured voltages are a millivolt off, clocks and encoders a few

@@ -200,13 +200,21 @@ Expected<void> check(const MatrixRef& u, const MatrixRef& y, Time period,
     return refusal(ArgumentError::empty, where, u.cols() == 0 ? "u" : "y")
         .expected("samples x signals");
   }
-  for (const auto& [value, name] : {std::pair{options.order.value_or(1), "order"},
-                                    {options.most_order, "most_order"},
-                                    {options.block_rows, "block_rows"}}) {
-    if (value < (options.order && name == std::string_view("order") ? 1 : 0) || value > 200) {
-      return refusal(ArgumentError::out_of_range, where, name)
-          .got(std::to_string(value))
-          .expected("from 1 to 200");
+  struct Range {
+    Index value;
+    const char* name;
+    Index least;
+    bool given;
+  };
+  // One block row of the future is what the next one is told by: there must be two.
+  for (const Range& range :
+       {Range{options.order.value_or(0), "order", 1, options.order.has_value()},
+        Range{options.most_order, "most_order", 1, options.most_order != 0},
+        Range{options.block_rows, "block_rows", 2, options.block_rows != 0}}) {
+    if (range.given && (range.value < range.least || range.value > 200)) {
+      return refusal(ArgumentError::out_of_range, where, range.name)
+          .got(std::to_string(range.value))
+          .expected(detail::format("from {} to 200", range.least));
     }
   }
   return {};

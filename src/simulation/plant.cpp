@@ -12,7 +12,7 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "ModelPlant";
+constexpr std::string_view model_plant = "ModelPlant";
 
 }  // namespace
 
@@ -62,12 +62,12 @@ ModelPlant::ModelPlant(const AnyModel& model, const MatrixRef& x0,
 
 Expected<ModelPlant> ModelPlant::create(const AnyModel& model, const MatrixRef& x0,
                                         const ModelIntegration& integration) {
-  return Checks(where)
+  return Checks(model_plant)
       .positive(integration.max_step.si(), "max_step", "s")
       .not_negative(integration.accuracy, "accuracy")
       .shape(x0, model.states(), 1, "x0", "states x 1")
       .also([&] {
-        return model.check(Eigen::VectorXd(x0), Eigen::VectorXd::Zero(model.inputs()), where);
+        return model.check(Eigen::VectorXd(x0), Eigen::VectorXd::Zero(model.inputs()), model_plant);
       })
       .map([&] { return ModelPlant(model, x0, integration); });
 }
@@ -84,7 +84,7 @@ Expected<void> ModelPlant::advance(double time, const VectorIn& u, double durati
         integrate(with_input(stepper_.model(), held), time, x_, time + duration, options);
     if (!solution) {
       return tl::unexpected(
-          explained(solution.error(), stepper_.model(), [&](double) { return held; }, where));
+          explained(solution.error(), stepper_.model(), [&](double) { return held; }, model_plant));
     }
     x_ = solution->final_state();
     return {};
@@ -102,12 +102,12 @@ Expected<void> ModelPlant::advance(double time, const VectorIn& u, double durati
 
 /// What is not finite in the step that began at `before_`: the model there, or what came of it.
 Expected<void> ModelPlant::not_finite(double time, const VectorIn& u) const {
-  FLYBALL_CHECK(stepper_.model().check(before_, u, where, time));
+  FLYBALL_CHECK(stepper_.model().check(before_, u, model_plant, time));
   Eigen::Index i = 0;
   while (std::isfinite(x_(i))) {
     ++i;
   }
-  return refusal(ArgumentError::not_finite, where,
+  return refusal(ArgumentError::not_finite, model_plant,
                  "the state " + description().states[static_cast<std::size_t>(i)].name)
       .got(detail::format("{} after t = {} s", format_number(x_(i)), format_number(time)))
       .expected("a finite number")

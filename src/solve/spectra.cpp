@@ -101,6 +101,8 @@ Outcome solve_fit(const Problem& problem, JsonWriter& answer) {
 }
 
 Outcome solve_multisine(const Problem& problem, JsonWriter& answer) {
+  FLYBALL_CHECK(
+      check_size(static_cast<double>(problem.integer("samples")), "multisine", "samples"));
   FLYBALL_TRY(
       const Multisine signal,
       multisine(problem.integer("samples"),

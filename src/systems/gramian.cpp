@@ -11,6 +11,7 @@
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/dense_reduction.hpp"
+#include "math/dense/ordinary_units.hpp"
 #include "systems/balance.hpp"
 #include "systems/gramian_factor.hpp"
 #include "systems/modes.hpp"
@@ -107,11 +108,18 @@ namespace {
 using Eigen::MatrixXd;
 
 Expected<Gramian> gramian(const MatrixRef& A, const MatrixRef& B, TimeDomain domain) {
-  const MatrixXd BB = detail::product_transposed(B, B);
+  // In a unit of the inputs in which BBᵀ is a double, where W is one.
+  const int unit = detail::unit_of(B);
+  const MatrixXd in_unit = detail::times_power(B, -unit);
+  const MatrixXd BB = detail::product_transposed(in_unit, in_unit);
   FLYBALL_TRY(auto solution,
               domain == TimeDomain::continuous ? lyapunov(A, BB) : discrete_lyapunov(A, BB));
   Gramian found;
-  found.W = detail::symmetrized(solution.X);
+  found.W = detail::times_power(detail::times_power(detail::symmetrized(solution.X), unit), unit);
+  if (!found.W.allFinite()) {
+    return refusal(MatrixEquationError::overflow, "the Gramian")
+        .hint("measure states, inputs and outputs in units in which the entries are nearer to 1");
+  }
   found.eigenvalues = detail::symmetric_eigensystem_of(found.W).values;
   found.is_energy = detail::judged_eigenvalues(A, domain).stability == Stability::stable;
   found.residual = solution.residual;

@@ -19,7 +19,6 @@ namespace {
 
 using namespace flyball::literals;
 using Scalar = Eigen::Matrix<double, 1, 1>;
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 mechanisms::Elevator book_elevator() {
   return mechanisms::elevator({.motor = mechanisms::cim(2),

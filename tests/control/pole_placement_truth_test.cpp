@@ -189,5 +189,17 @@ TEST(PlaceTruth, IsTotal) {
   EXPECT_GT(placed_ones, 300);
 }
 
+// An entry that is nothing beside the others is not what the states' units are made for.
+TEST(PlaceTruth, AnEntryOfNoWeightChangesNothing) {
+  for (const double entry : {0.0, 1e-20, 1e-100, 1e-155, -1e-300, 5e-324}) {
+    const Eigen::Matrix2d A{{0.0, 0.0}, {1.5, 0.0}};
+    const Eigen::Matrix2d B{{0.0, 1.0}, {0.9, entry}};
+    const auto placed = place(A, B, {0.18, 0.05}).value();
+    const Eigen::Matrix2d S = A - B * placed.K;
+    EXPECT_NEAR(S.trace(), 0.23, 1e-13) << entry;
+    EXPECT_NEAR(S.determinant(), 0.009, 1e-13) << entry;
+  }
+}
+
 }  // namespace
 }  // namespace flyball

@@ -331,5 +331,15 @@ TEST(KalmanGainProperties, AxesAndUnitsChangeNothing) {
   units.expect_within(1.0);
 }
 
+// L = AK to the last digit that its size leaves.
+TEST(KalmanGain, PredictorOfASubnormalPlant) {
+  const Eigen::Matrix<double, 1, 1> A(5e-324);
+  const auto gain = kalman_gain(A, Eigen::Matrix<double, 1, 1>(-0.0029),
+                                Covariance(A * 0.0 + Eigen::Matrix<double, 1, 1>(0.88)),
+                                Covariance(Eigen::Matrix<double, 1, 1>(1e-20)));
+  ASSERT_TRUE(gain.has_value());
+  EXPECT_EQ(gain->L(0, 0), A(0, 0) * gain->K(0, 0));
+}
+
 }  // namespace
 }  // namespace flyball

@@ -226,6 +226,10 @@ TEST(Subspace, Refusals) {
   options.order = 0;
   EXPECT_EQ(to_string(fit_subspace(u, y, T, options).error()),
             "fit_subspace: order is 0; it must be from 1 to 200");
+  SubspaceOptions one_row;
+  one_row.block_rows = 1;
+  EXPECT_EQ(to_string(fit_subspace(u, y, T, one_row).error()),
+            "fit_subspace: block_rows is 1; it must be from 2 to 200");
   options.order = 60;
   EXPECT_TRUE(fit_subspace(u, y, T, options).error().is(IdentificationError::too_short));
   options.order = 5;

@@ -212,5 +212,15 @@ TEST(Norms, Errors) {
                   .is(ArgumentError::empty));
 }
 
+// W = B²/-2a where B² is no double.
+TEST(Gramian, OfInputsWhoseSquaresAreNoDoubles) {
+  const auto continuous = [](double a, double b) {
+    return controllability_gramian(scalar(a), scalar(b), TimeDomain::continuous);
+  };
+  EXPECT_NEAR(continuous(-2.3e-308, 1e-300)->W(0, 0) * 2.3e292, 0.5, 1e-14);
+  EXPECT_NEAR(continuous(-4e307, 1e200)->W(0, 0) / 1e92, 1.0 / 0.8, 1e-14);
+  EXPECT_TRUE(continuous(-1.0, 1e200).error().is(MatrixEquationError::overflow));
+}
+
 }  // namespace
 }  // namespace flyball

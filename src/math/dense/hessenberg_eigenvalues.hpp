@@ -9,17 +9,30 @@ namespace flyball::detail::FLYBALL_VARIANT {
 
 /// The roots of λ² - trace λ + determinant of a 2x2 block, real ones without cancellation.
 inline void eigenvalues_2x2(double a, double b, double c, double d, std::complex<double>* lambda) {
-  const double p = 0.5 * (a - d);
-  const double discriminant = p * p + b * c;
+  double p = 0.5 * (a - d);
+  double bc = b * c;
+  double unit = 1.0;
+  if (std::abs(p * p + bc) < 0x1p-800) {
+    // Squares that are no doubles, or nearly: in a unit in which they are.
+    const double small = std::min(std::abs(b), std::abs(c));
+    const double large = std::max(std::abs(b), std::abs(c));
+    const double size = std::max(std::abs(p), std::sqrt(small) * std::sqrt(large));
+    if (size > 0.0 && size < 0x1p-300) {
+      unit = std::ldexp(1.0, std::ilogb(size));
+      p /= unit;
+      bc = std::copysign(large * (small / unit) / unit, b * std::copysign(1.0, c));
+    }
+  }
+  const double discriminant = p * p + bc;
   if (discriminant >= 0.0) {
     const double root = std::sqrt(discriminant);
     const double z = p >= 0.0 ? p + root : p - root;
-    lambda[0] = d + z;
-    lambda[1] = z != 0.0 ? d - b * c / z : d;
+    lambda[0] = d + unit * z;
+    lambda[1] = z != 0.0 ? d - unit * (bc / z) : d;
   } else {
-    const double root = std::sqrt(-discriminant);
-    lambda[0] = {d + p, root};
-    lambda[1] = {d + p, -root};
+    const double root = unit * std::sqrt(-discriminant);
+    lambda[0] = {d + unit * p, root};
+    lambda[1] = {d + unit * p, -root};
   }
 }
 

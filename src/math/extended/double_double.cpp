@@ -19,7 +19,11 @@ struct Value {
 inline __attribute__((always_inline)) void axpy_body(Index count, Value a, const double* x_hi,
                                                      const double* x_lo, double* y_hi,
                                                      double* y_lo) {
+#ifdef __clang__
+#pragma clang loop vectorize(assume_safety)
+#else
 #pragma GCC ivdep
+#endif
   for (Index i = 0; i < count; ++i) {
     const double p = a.hi * x_hi[i];
     const double e = __builtin_fma(a.hi, x_hi[i], -p) + (a.hi * x_lo[i] + a.lo * x_hi[i]);

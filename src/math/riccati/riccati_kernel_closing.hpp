@@ -141,11 +141,12 @@ inline void Kernel<N>::measure() {
   for (int j = 0; j < n; ++j) {
     for (int i = j; i < n; ++i) {
       const double unit = d_inverse[i] * d_inverse[j];
-      const double weight = i == j ? unit * unit : 2.0 * unit * unit;
-      const double x = X[i + j * ld()];
-      const double w = W[i + j * ld()];
-      const double axa = continuous ? next[i + j * ld()] + next[j + i * ld()] : next[i + j * ld()];
-      const double q = Q[i + j * ld()];
+      const double weight = i == j ? 1.0 : 2.0;
+      const double x = unit * X[i + j * ld()];
+      const double w = unit * W[i + j * ld()];
+      const double axa =
+          unit * (continuous ? next[i + j * ld()] + next[j + i * ld()] : next[i + j * ld()]);
+      const double q = unit * Q[i + j * ld()];
       const double entry = (continuous ? axa : axa - x) - w + q;
       defect += weight * entry * entry;
       size_AXA += weight * axa * axa;

@@ -22,6 +22,8 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr Index most_samples = 100'000'000;
+constexpr Index finest_grid = 16;             // points in a turn of the last harmonic
+constexpr Index most_work = Index{1} << 25U;  // samples that the search of phases goes through
 
 Expected<void> check_band(double frequency, Time period, std::string_view where,
                           std::string_view name) {
@@ -136,23 +138,38 @@ Expected<Multisine> multisine(Index samples, const Harmonics& harmonics, double 
   for (Index k = harmonics.first; k <= harmonics.last; k += harmonics.step) {
     lines.push_back(k);
   }
-  FLYBALL_TRY(RealFft plan, RealFft::create(samples));
+  // Harmonics far below half the samples are smooth between those of a coarser grid, on which the
+  // phases are found.
+  Index grid = samples;
+  if (const Index last = lines.back(); last < samples / (2 * finest_grid)) {
+    grid = 4;
+    while (grid < finest_grid * last) {
+      grid *= 2;
+    }
+  }
+  FLYBALL_TRY(RealFft plan, RealFft::create(grid));
   using Complex = std::complex<double>;
   std::vector<Complex> bins(static_cast<std::size_t>(plan.bins()));
-  VectorXd u(samples);
-  Multisine best;
+  std::vector<Complex> best;
+  double best_crest = 0.0;
+  VectorXd u(grid);
+  const auto crest_of = [](const VectorXd& signal) {
+    return signal.cwiseAbs().maxCoeff() /
+           std::sqrt(signal.squaredNorm() / static_cast<double>(signal.size()));
+  };
   const auto judge = [&] {
     plan.inverse(bins.data(), u.data());
-    const double crest =
-        u.cwiseAbs().maxCoeff() / std::sqrt(u.squaredNorm() / static_cast<double>(samples));
-    if (best.u.size() == 0 || crest < best.crest_factor) {
-      best = {u, crest};
+    const double crest = crest_of(u);
+    if (best.empty() || crest < best_crest) {
+      best = bins;
+      best_crest = crest;
     }
   };
   Random random(seed);
   const auto count = static_cast<double>(lines.size());
-  constexpr int starts = 4;
-  constexpr int clippings = 150;
+  const int starts = lines.size() > 1 ? 4 : 1;
+  const auto affordable = static_cast<int>(std::min<Index>(most_work / grid, 1000)) / starts;
+  const int clippings = lines.size() > 1 ? std::clamp(affordable, 1, 150) : 0;
   for (int start = 0; start < starts; ++start) {
     std::fill(bins.begin(), bins.end(), Complex());
     for (std::size_t i = 0; i < lines.size(); ++i) {
@@ -163,11 +180,11 @@ Expected<Multisine> multisine(Index samples, const Harmonics& harmonics, double 
       bins[static_cast<std::size_t>(lines[i])] = std::polar(1.0, phase);
     }
     judge();
-    for (int step = 0; step < clippings && lines.size() > 1; ++step) {
+    std::vector<Complex> clipped(bins.size());
+    for (int step = 0; step < clippings; ++step) {
       // The peaks are cut off, and of what is left only the phases are kept.
       const double level = (0.7 + 0.25 * step / clippings) * u.cwiseAbs().maxCoeff();
       u = u.cwiseMin(level).cwiseMax(-level);
-      std::vector<Complex> clipped(bins.size());
       plan.forward(u.data(), clipped.data());
       for (const Index k : lines) {
         const Complex line = clipped[static_cast<std::size_t>(k)];
@@ -178,8 +195,17 @@ Expected<Multisine> multisine(Index samples, const Harmonics& harmonics, double 
       judge();
     }
   }
-  best.u *= amplitude / best.u.cwiseAbs().maxCoeff();
-  return best;
+  Multisine signal;
+  signal.u.resize(samples);
+  if (grid != samples) {
+    FLYBALL_TRY(plan, RealFft::create(samples));
+    best.resize(static_cast<std::size_t>(plan.bins()));
+  }
+  plan.inverse(best.data(), signal.u.data());
+  signal.u /= signal.u.cwiseAbs().maxCoeff();
+  signal.crest_factor = crest_of(signal.u);
+  signal.u *= amplitude;
+  return signal;
 }
 
 Expected<VectorXd> prbs(int bits, Index hold, double amplitude, std::uint64_t seed) {

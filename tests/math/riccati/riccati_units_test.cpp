@@ -150,5 +150,36 @@ TEST(RiccatiUnits, AnyFiniteEntries) {
   EXPECT_GT(answers, 100);
 }
 
+// An entry whose square is no double leaves what the same equation without it has.
+TEST(RiccatiUnits, AnEntryOfNoWeightChangesNothing) {
+  const Eigen::Matrix2d A{{0.0, 1.0}, {0.0, -1.0}};
+  const Eigen::Vector2d B(-1.3934326171875, 0.0);
+  const Eigen::Matrix2d Q = Eigen::Matrix2d::Identity();
+  const Eigen::Matrix<double, 1, 1> R(1.19183349609375);
+  const auto without = care(A, B, Q, R).value();
+  EXPECT_NEAR(without.K(0, 1), -0.402391187621348, 1e-14);
+  for (const double entry : {-1e-20, -1e-154, 1e-154, -1e-160, 1e-300, -5e-324}) {
+    Eigen::Matrix2d with = A;
+    with(1, 0) = entry;
+    const auto solution = care(with, B, Q, R).value();
+    EXPECT_LE((solution.K - without.K).norm(), 1e-13) << entry;
+    EXPECT_LE((solution.X - without.X).norm(), 1e-13) << entry;
+    EXPECT_LE(solution.condition, 100.0) << entry;
+  }
+}
+
+TEST(RiccatiUnits, PolesWhoseSquaresAreNoDoubles) {
+  for (const double pole : {-1e-150, -1e-200, 3e-300, 1e-310}) {
+    const Eigen::Matrix2d A = Eigen::Vector2d(0.0, pole).asDiagonal();
+    const auto solution = dare(A, Eigen::Vector2d(2.2e-16, 0.0),
+                               Eigen::Vector2d(0.64, 0.0).asDiagonal().toDenseMatrix(),
+                               Eigen::Matrix<double, 1, 1>(0.5))
+                              .value();
+    const Eigen::Vector2d poles = solution.poles.real();
+    EXPECT_LE(poles.cwiseAbs().minCoeff(), 1e-13 * std::abs(pole)) << pole;
+    EXPECT_NEAR(poles.sum() / pole, 1.0, 1e-12) << pole;
+  }
+}
+
 }  // namespace
 }  // namespace flyball
