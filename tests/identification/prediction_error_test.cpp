@@ -215,6 +215,17 @@ TEST(PredictionError, RunsWithStartsOfTheirOwnAndMissingReadings) {
   ASSERT_EQ(left_out->size(), 3U);
   for (const RunFit& run : *left_out) {
     EXPECT_NEAR(run.outputs[0].rmse, 0.01, 0.0015);
+    std::vector<double> y;
+    double squares = 0.0;
+    for (Index k = 0; k < run.residuals.cols(); ++k) {
+      if (const double error = run.residuals(0, k); !std::isnan(error)) {
+        y.push_back(run.simulated(0, k) + error);
+        squares += error * error;
+      }
+    }
+    const Eigen::Map<const VectorXd> measured(y.data(), std::ssize(y));
+    EXPECT_NEAR(run.outputs[0].nrmse,
+                std::sqrt(squares) / (measured.array() - measured.mean()).matrix().norm(), 1e-12);
   }
 }
 

@@ -234,6 +234,41 @@ TEST(RecordCharacterization, StandsAtAStop) {
   }
 }
 
+// A duty of V/12 of a battery whose wires are `sag` of the motor's resistance: kV v = V - kS (1 +
+// L) at rest from acceleration, L = sag (V/12)².
+TEST(RecordCharacterization, ASaggingBatteryLowersTheSpeed) {
+  CharacterizationOptions options = perfect();
+  options.kA = 0.005;
+  options.defects.sag = 0.4;
+  const auto recording = record_characterization(options).value();
+  const double loss = 0.4 * std::pow(options.step_voltage / 12.0, 2);
+  const double speed = (options.step_voltage - options.kS * (1.0 + loss)) / options.kV;
+  EXPECT_NEAR(recording.runs[2].velocity.back(), speed, 1e-9 * speed);
+  EXPECT_NEAR(recording.runs[3].velocity.back(), -speed, 1e-9 * speed);
+}
+
+// The motor, a quarter of the inertia, crosses the gap and meets a load at rest: a quarter of its
+// speed is left. After that both go as one.
+TEST(RecordCharacterization, BacklashEndsInAnImpact) {
+  CharacterizationOptions options = perfect();
+  options.kS = 0.0;
+  options.kA = 0.02;
+  options.row_period = 1e-3;
+  options.step_duration = 3.0;
+  options.defects.backlash = 0.5;
+  const auto recording = record_characterization(options).value();
+  const TestRun& run = recording.runs[3];
+  double least = 1.0;
+  for (std::size_t k = 1; k < run.velocity.size(); ++k) {
+    if (run.velocity[k - 1] < -0.5) {
+      least = std::min(least, run.velocity[k] / run.velocity[k - 1]);
+    }
+  }
+  EXPECT_NEAR(least, 0.25, 0.04);
+  EXPECT_NEAR(run.velocity.back(), -options.step_voltage / options.kV, 1e-4);
+  EXPECT_LT(run.position.back(), -100.0);
+}
+
 TEST(RecordCharacterization, SameSeedSameRecording) {
   CharacterizationOptions options;
   options.seed = 7;

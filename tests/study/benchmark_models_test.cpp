@@ -67,5 +67,10 @@ TEST(BenchmarkModels, WienerHammersteinWithoutItsNonlinearity) {
                              "wiener_hammerstein_linear.toml"),
             45e-3);
 }
+TEST(BenchmarkModels, WienerHammersteinFromItsFilterDesigns) {
+  EXPECT_LT(validation_error("wiener_hammerstein_WienerHammerBenchmark.csv.gz",
+                             "wiener_hammerstein.toml"),
+            0.3e-3);
+}
 }  // namespace
 }  // namespace flyball::study

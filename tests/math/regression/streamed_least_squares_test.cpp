@@ -111,6 +111,13 @@ TEST(StreamedLeastSquares, Refusals) {
   EXPECT_EQ(stream.rows(), 0);
   EXPECT_TRUE(
       stream.add(MatrixXd::Ones(2, 3), VectorXd::Ones(2)).error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(stream.add(MatrixXd::Ones(2, 2), VectorXd::Constant(2, std::nan("")))
+                  .error()
+                  .is(ArgumentError::not_finite));
+  EXPECT_TRUE(stream.add(MatrixXd::Constant(2, 2, 1e101), VectorXd::Ones(2))
+                  .error()
+                  .is(ArgumentError::not_finite));
+  EXPECT_EQ(stream.rows(), 0);
   EXPECT_TRUE(
       stream.merge(StreamedLeastSquares::create(3).value()).error().is(ArgumentError::wrong_shape));
   EXPECT_TRUE(stream.add(good, 1.0));
