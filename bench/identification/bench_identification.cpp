@@ -1,10 +1,12 @@
 // Monte Carlo of the identification: recordings of known mechanisms, what is recovered of them.
 //
-//   bench_identification [--seeds N] [--seed FIRST] [--only MECHANISM] [--family NAME]
+//   bench_identification [--seeds N] [--seed FIRST] [--only MECHANISM] [--family NAME] [--kind
+//   open]
 //
 // Per family of sessions (clean, and with what real logs have), mechanism and gain: median and 90th
 // percentile of the relative error, share of the 95 % intervals that hold the truth, median
-// relative half-width; and the time of a fit.
+// relative half-width; and the time of a fit. With --kind open the recordings do not say what they
+// are of: how often that is found, asked for, or found wrong.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -16,6 +18,7 @@
 #include <vector>
 
 #include <flyball/identification/feedforward_fit.hpp>
+#include <flyball/identification/mechanism_choice.hpp>
 
 #include "scenarios.hpp"
 
@@ -139,6 +142,43 @@ void run(const scenarios::Family& family, const scenarios::Truth& truth, std::ui
   std::fflush(stdout);
 }
 
+/// Recordings that do not say what they are of.
+void run_open(const scenarios::Family& family, const scenarios::Truth& truth, std::uint64_t first,
+              std::uint64_t seeds) {
+  std::size_t right = 0;
+  std::size_t asked = 0;
+  std::size_t wrong = 0;
+  std::vector<double> seconds;
+  for (std::uint64_t seed = first; seed < first + seeds; ++seed) {
+    auto options = scenarios::session(truth, seed);
+    flyball::Random random(seed * 104729 + 5);
+    family.spoil(truth, random, options);
+    auto recording = flyball::record_characterization(options).value();
+    recording.mechanism.reset();
+    const auto prepared = flyball::identification::prepare(recording).value();
+    const auto start = std::chrono::steady_clock::now();
+    const auto choice = flyball::identification::choose_mechanism(prepared);
+    seconds.push_back(
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    if (!choice || choice->fitting.size() > 1) {
+      ++asked;
+      std::printf("  seed %llu: %s\n", static_cast<unsigned long long>(seed),
+                  choice ? choice->evidence.c_str() : to_string(choice.error()).c_str());
+    } else if (choice->fitting.front() == truth.kind) {
+      ++right;
+    } else {
+      ++wrong;
+      std::printf("  seed %llu WRONG: %s: %s\n", static_cast<unsigned long long>(seed),
+                  std::string(to_string(choice->fitting.front())).c_str(),
+                  choice->evidence.c_str());
+    }
+  }
+  std::printf("%s, %s: %zu right, %zu asked, %zu wrong, %.0f ms\n",
+              std::string(family.name).c_str(), std::string(truth.name).c_str(), right, asked,
+              wrong, 1e3 * quantile(seconds, 0.5));
+  std::fflush(stdout);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -146,6 +186,7 @@ int main(int argc, char** argv) {
   std::uint64_t first = 1;
   std::string_view only;
   std::string_view of_family = "clean";
+  bool open = false;
   for (int i = 1; i + 1 < argc; i += 2) {
     const std::string_view option = argv[i];
     if (option == "--seeds") {
@@ -156,9 +197,12 @@ int main(int argc, char** argv) {
       only = argv[i + 1];
     } else if (option == "--family") {
       of_family = argv[i + 1];
+    } else if (option == "--kind" && std::string_view(argv[i + 1]) == "open") {
+      open = true;
     } else {
       std::fprintf(stderr,
-                   "usage: %s [--seeds N] [--seed FIRST] [--only MECHANISM] [--family NAME|all]\n",
+                   "usage: %s [--seeds N] [--seed FIRST] [--only MECHANISM] [--family NAME|all] "
+                   "[--kind open]\n",
                    argv[0]);
       return 2;
     }
@@ -167,7 +211,7 @@ int main(int argc, char** argv) {
     for (const scenarios::Truth& truth : scenarios::mechanisms) {
       if ((of_family == "all" || family.name == of_family) &&
           (only.empty() || truth.name.find(only) != std::string_view::npos)) {
-        run(family, truth, first, seeds);
+        (open ? run_open : run)(family, truth, first, seeds);
       }
     }
   }

@@ -14,6 +14,7 @@ namespace {
 using mechanisms::MechanismKind;
 
 constexpr double normal_95 = 1.96;
+constexpr double longest_usual = 0.5;         // s, kA/kV that a ramp's friction allows for
 constexpr double widest_time_constant = 0.6;  // relative half-width beyond which kA is unknown
 
 // What residuals cannot tell: measured voltages are a millivolt off, clocks and encoders a few
@@ -166,6 +167,72 @@ Expected<void> estimate_gains(const PreparedRecording& prepared, const Eigen::Ve
   return {};
 }
 
+void estimate_what_tests_leave(const TestCoverage& coverage, const OutputErrorProblem& problem,
+                               const Eigen::VectorXd& x, const Covariances& spread,
+                               FeedforwardFit& fit) {
+  const char* other = coverage.forward ? "quasistatic-reverse" : "quasistatic-forward";
+  if (problem.hides_friction()) {
+    // Forward V = (kG + kS) + kV v, in reverse V = (kG − kS) + kV v.
+    const double direction = coverage.forward ? 1.0 : -1.0;
+    const GainEstimate both =
+        symmetric(x[parameter::gravity_cosine] + direction * x[parameter::static_friction],
+                  spread.standard_error(unit_gradient(x.size(), parameter::gravity_cosine)),
+                  voltage_allowance);
+    const std::string reason = detail::format(
+        "tests {} alone tell kG {} kS = {:.3g} ± {:.2g} V, not the two apart; {} would",
+        coverage.forward ? "forward" : "in reverse", coverage.forward ? "+" : "−", both.value,
+        normal_95 * both.standard_error, other);
+    double most = both.interval[1];
+    for (const ResidualRun& run : problem.runs()) {
+      for (std::size_t i = 0; direction < 0.0 && i < run.input.voltage.size(); ++i) {
+        most = std::max(most, std::abs(run.input.voltage[i]));
+      }
+    }
+    // With all of it as gravity the way up is right, and it is held.
+    fit.kS.value = std::max(0.0, direction < 0.0 ? -both.value : 0.0);
+    fit.kG->value = both.value - direction * fit.kS.value;
+    for (GainEstimate* gain : {&fit.kS, &*fit.kG}) {
+      gain->interval = {0.0, std::max(1e-3, most)};
+      gain->standard_error = 0.5 * gain->interval[1];
+      mark_undetermined(*gain, gain->interval[1], reason);
+    }
+    fit.gravity_with_friction = both;
+    fit.in_reverse = direction < 0.0;
+  } else if (coverage.one_way() && !fit.kS.determined && fit.kG) {
+    fit.kS.reason = detail::format(
+        "in one direction alone static friction trades with gravity; {} would tell", other);
+  }
+  if (problem.hides_inertia()) {
+    // A ramp's speed-up takes kA r / kV volts of a rate of r V/s, which look like friction.
+    double rate = 1e-3;
+    for (const ResidualRun& run : problem.runs()) {
+      rate = std::max(rate, std::abs(run.input.voltage.back() - run.input.voltage.front()) /
+                                (run.input.time.back() - run.input.time.front()));
+    }
+    const double share = rate * longest_usual;
+    const auto widen = [&](GainEstimate& gain, std::size_t end) {
+      gain.interval[end] += end == 0 ? -share : share;
+      gain.standard_error = (gain.interval[1] - gain.interval[0]) / (2.0 * normal_95);
+    };
+    if (fit.gravity_with_friction) {
+      widen(*fit.gravity_with_friction, fit.in_reverse ? 1 : 0);
+    } else {
+      widen(fit.kS, 0);
+      fit.kS.interval[0] = std::max(0.0, fit.kS.interval[0]);
+    }
+    const double bound =
+        std::max(1e-3, fit.kS.determined ? fit.kS.interval[1] : fit.kS.upper_bound) * fit.kV.value /
+        rate;
+    fit.kA.interval = {0.0, bound};
+    mark_undetermined(
+        fit.kA, bound,
+        detail::format("there is no dynamic test, so it is taken for zero; for a kA/kV of up to "
+                       "{:.1f} s, {:.2g} V of kS are the ramps' own speed-up; dynamic-forward "
+                       "would tell",
+                       longest_usual, share));
+  }
+}
+
 void report_fit(const PreparedRecording& prepared, const FeedforwardFit& fit,
                 std::vector<Diagnostic>& diagnostics) {
   const std::string& unit = fit.unit;
@@ -173,11 +240,13 @@ void report_fit(const PreparedRecording& prepared, const FeedforwardFit& fit,
     warn(diagnostics, "kA_not_determined", "kA is below {:.3g} V·s²/{} but not determined: {}",
          fit.kA.upper_bound, unit, fit.kA.reason);
   }
-  if (!fit.kS.determined) {
+  if (fit.gravity_with_friction) {
+    warn(diagnostics, "gravity_with_friction", "kS and kG are not determined: {}", fit.kS.reason);
+  } else if (!fit.kS.determined) {
     note(diagnostics, "kS_indistinguishable", "kS is below {:.3g} V: {}", fit.kS.upper_bound,
          fit.kS.reason);
   }
-  if (fit.kG && !fit.kG->determined) {
+  if (fit.kG && !fit.kG->determined && !fit.gravity_with_friction) {
     warn(diagnostics, "kG_indistinguishable", "|kG| is below {:.3g} V: {}", fit.kG->upper_bound,
          fit.kG->reason);
   }

@@ -6,19 +6,21 @@
 #include <utility>
 
 #include <flyball/core/argument.hpp>
+#include <flyball/identification/mechanism_choice.hpp>
 
 #include "core/diagnose.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "identification/cross_checks.hpp"
 #include "identification/estimates.hpp"
+#include "identification/gain_fit.hpp"
 #include "identification/model_terms.hpp"
 #include "identification/output_error.hpp"
 #include "identification/plausibility.hpp"
 #include "identification/robust_fit.hpp"
 #include "identification/settling.hpp"
-#include "identification/start.hpp"
 #include "identification/statistics.hpp"
+#include "identification/test_coverage.hpp"
 
 namespace flyball::identification {
 namespace {
@@ -26,143 +28,9 @@ namespace {
 using mechanisms::MechanismKind;
 
 constexpr std::string_view where = "identify";
-constexpr double shortest_time_constant = 0.002;  // s
-constexpr double longest_time_constant = 10.0;    // s
-constexpr int scale_refreshes = 4;
 
-Expected<void> check_tests(const PreparedRecording& prepared) {
-  bool any = false;
-  bool ramps = false;
-  bool steps = false;
-  bool forward = false;
-  bool backward = false;
-  std::string unusable;
-  for (const PreparedRun& run : prepared.runs) {
-    any = any || run.moved;
-    if (run.moved) {
-      const bool ramp = is_quasistatic(run.run.kind);
-      ramps = ramps || ramp;
-      steps = steps || !ramp;
-      forward = forward || run.direction > 0.0;
-      backward = backward || run.direction < 0.0;
-    }
-  }
-  if (prepared.runs.empty()) {
-    return refusal(IdentificationError::no_data, where).hint("record the four tests again");
-  }
-  if (!any) {
-    double voltage = 0.0;
-    double travel = 0.0;
-    for (const PreparedRun& run : prepared.runs) {
-      for (const double value : run.run.voltage) {
-        voltage = std::max(voltage, std::abs(value));
-      }
-      if (!run.run.position.empty()) {
-        const auto [low, high] =
-            std::minmax_element(run.run.position.begin(), run.run.position.end());
-        travel = std::max(travel, *high - *low);
-      }
-    }
-    return refusal(IdentificationError::no_motion, where)
-        .hint(voltage < 0.1 ? "no voltage was applied either: the log was started but no test ran"
-                            : "check that the encoder counts and that the mechanism is free")
-        .with("largest voltage (V)", voltage)
-        .with("largest travel (" + prepared.unit + ")", travel);
-  }
-  if (!ramps || !steps) {
-    return refusal(IdentificationError::missing_tests, where,
-                   ramps ? "dynamic tests (steps)" : "quasistatic tests (ramps)")
-        .got("missing or without usable motion")
-        .hint(ramps ? "ramps alone do not tell kA; record dynamic-forward and dynamic-reverse"
-                    : "steps alone do not tell friction from speed; record quasistatic-forward and "
-                      "quasistatic-reverse");
-  }
-  if (prepared.mechanism != MechanismKind::flywheel && !(forward && backward)) {
-    return refusal(IdentificationError::missing_tests, where,
-                   forward ? "motion in reverse" : "motion forward")
-        .got("missing")
-        .hint("in one direction alone friction and gravity are one number; record both directions");
-  }
-  return {};
-}
-
-Bounds make_bounds(const OutputErrorProblem& problem, const StartGains& start,
-                   const FitOptions& options) {
-  const Eigen::Index n = problem.parameters();
-  constexpr double unbounded = 1e12;
-  Bounds bounds{Eigen::VectorXd::Constant(n, -unbounded), Eigen::VectorXd::Constant(n, unbounded)};
-  bounds.lower[parameter::static_friction] = 0.0;
-  bounds.lower[parameter::velocity_gain] = 1e-3 * start.kV;
-  bounds.upper[parameter::velocity_gain] = 1e3 * start.kV;
-  bounds.lower[parameter::log_time_constant] = std::log(shortest_time_constant);
-  bounds.upper[parameter::log_time_constant] = std::log(longest_time_constant);
-  bounds.lower[parameter::headroom] = 0.1;
-  bounds.lower[parameter::position_delay] = -0.04;
-  bounds.upper[parameter::position_delay] = options.max_delay;
-  bounds.lower[parameter::averaging_width] = 0.0;
-  bounds.upper[parameter::averaging_width] = 0.3;
-  bounds.lower[parameter::velocity_delay] = -0.04;
-  bounds.upper[parameter::velocity_delay] = options.max_delay + 0.15;
-  bounds.lower[parameter::velocity_scale] = 0.3;
-  bounds.upper[parameter::velocity_scale] = 3.0;
-  return bounds;
-}
-
-Eigen::VectorXd make_start(const OutputErrorProblem& problem, const StartGains& gains,
-                           double time_constant) {
-  const PreparedRecording& recording = problem.recording();
-  Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.parameters());
-  x[parameter::static_friction] = gains.kS;
-  x[parameter::velocity_gain] = gains.kV;
-  x[parameter::log_time_constant] = std::log(time_constant);
-  x[parameter::gravity_cosine] = gains.gravity_cosine;
-  x[parameter::gravity_sine] = gains.gravity_sine;
-  x[parameter::headroom] = no_limit;
-  x[parameter::position_delay] = recording.has_position ? 0.01 : 0.0;
-  x[parameter::velocity_delay] = recording.has_velocity ? 0.03 : 0.0;
-  x[parameter::averaging_width] = recording.has_velocity ? 0.03 : 0.0;
-  x[parameter::velocity_scale] = recording.has_position && recording.has_velocity &&
-                                         std::abs(recording.velocity_scale - 1.0) > 0.03
-                                     ? recording.velocity_scale
-                                     : 1.0;
-  for (std::size_t i = 0; i < problem.runs().size(); ++i) {
-    x[initial_velocity_of(i)] = problem.runs()[i].likely_initial_velocity;
-  }
-  return x;
-}
-
-/// A thinned problem decides between several time constants; the whole one is then solved with
-/// scales and angles refreshed.
-RobustFit fit_gains(OutputErrorProblem& problem, const StartGains& gains, const Bounds& bounds,
-                    const FitOptions& options, ChannelScales& scales) {
-  const std::vector<bool> free = problem.free_parameters();
-  const double top = problem.recording().top_speed;
-  scales = {problem.recording().has_position ? 0.02 * top * options.difference_span : 0.0,
-            problem.recording().has_velocity ? 0.02 * top : 0.0};
-  const std::size_t thinning = std::clamp<std::size_t>(problem.residuals() / 600, 1, 8);
-  OutputErrorProblem thinned(problem.recording(), options, thinning);
-  OutputErrorProblem& scout = thinned.runs().size() == problem.runs().size() ? thinned : problem;
-  RobustFit best;
-  int iterations = 0;
-  for (const double time_constant : {0.03, 0.15, 0.7}) {
-    RobustFit fit = minimize(scout, make_start(problem, gains, time_constant), free, bounds, scales,
-                             std::min(15, options.max_iterations / 8), 1e-2);
-    iterations += fit.iterations;
-    if (best.x.size() == 0 || fit.cost < best.cost) {
-      best = std::move(fit);
-    }
-  }
-  for (int refresh = 0; refresh < scale_refreshes; ++refresh) {
-    const bool last = refresh + 1 == scale_refreshes;
-    problem.refresh_forces(best.x);
-    scales = residual_scales(problem, best.x);
-    best = minimize(problem, best.x, free, bounds, scales,
-                    std::max(1, std::min(last ? 60 : 20, options.max_iterations - iterations)),
-                    last ? 1e-3 : 0.1);
-    iterations += best.iterations;
-  }
-  best.iterations = iterations;
-  return best;
+std::string named(MechanismKind kind) {
+  return std::string(kind == MechanismKind::flywheel ? "a " : "an ") + std::string(to_string(kind));
 }
 
 /// What the simulation says about each run, and how well.
@@ -189,6 +57,8 @@ void add_runs(OutputErrorProblem& problem, const Eigen::VectorXd& x, Feedforward
     FittedRun& fitted = fit.runs[run.prepared];
     fitted.used = true;
     std::vector<double> offsets;
+    const std::vector<std::size_t>& fresh =
+        recording.has_velocity ? prepared.fresh_velocity : prepared.fresh_position;
     for (std::size_t row = prepared.first; row < prepared.last; ++row) {
       const double time = prepared.run.time[row];
       fitted.time.push_back(time);
@@ -202,13 +72,16 @@ void add_runs(OutputErrorProblem& problem, const Eigen::VectorXd& x, Feedforward
         fitted.position_hat.push_back(problem.position_shown(index, x, time));
         offsets.push_back(fitted.position.back() - fitted.position_hat.back());
       }
+      if (!std::binary_search(fresh.begin(), fresh.end(), row)) {
+        continue;
+      }
+      fitted.fresh.push_back(row - prepared.first);
+      velocity_residuals.push_back(fitted.velocity_residual.back());
       squared_error += fitted.velocity_residual.back() * fitted.velocity_residual.back();
       sum += fitted.velocity.back();
       squares += fitted.velocity.back() * fitted.velocity.back();
       count += 1.0;
     }
-    velocity_residuals.insert(velocity_residuals.end(), fitted.velocity_residual.begin(),
-                              fitted.velocity_residual.end());
     const double offset = median(std::move(offsets));
     for (double& position : fitted.position_hat) {
       position += offset;
@@ -224,11 +97,7 @@ void add_runs(OutputErrorProblem& problem, const Eigen::VectorXd& x, Feedforward
 /// @param whole  Whether steps may still have an irregular start.
 Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const FitOptions& options,
                                       bool whole, std::vector<Diagnostic>& diagnostics) {
-  if (!prepared.mechanism) {
-    return refusal(IdentificationError::unknown_mechanism, where)
-        .hint("say which: flywheel, elevator or arm");
-  }
-  FLYBALL_CHECK(check_tests(prepared));
+  FLYBALL_TRY(const TestCoverage coverage, cover_tests(prepared));
   if (*prepared.mechanism == MechanismKind::arm && !prepared.has_position) {
     return refusal(IdentificationError::singular, where, "the position")
         .got("missing or constant")
@@ -272,7 +141,12 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
       return fit;
     }
   }
-  Covariances spread = covariances(problem, best.x, problem.free_parameters(), bounds, scales);
+  Bounds known = bounds;
+  if (coverage.one_way()) {
+    // Friction that a bound held would lend its certainty to what trades with it.
+    known.lower[parameter::static_friction] = -1.0;
+  }
+  Covariances spread = covariances(problem, best.x, problem.free_parameters(), known, scales);
   spread.doubt = std::move(extension.doubt);
 
   FeedforwardFit fit;
@@ -286,19 +160,20 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
   fit.velocity_scale = best.x[parameter::velocity_scale];
   add_runs(problem, best.x, fit);
   FLYBALL_CHECK(estimate_gains(prepared, best.x, spread, bounds, fit));
+  estimate_what_tests_leave(coverage, problem, best.x, spread, fit);
   FLYBALL_CHECK(check_plausibility(prepared, fit, diagnostics));
   fit.terms = estimate_terms(problem, best, spread);
   if (auto one_step = fit_one_step(prepared)) {
     fit.one_step = *std::move(one_step);
   }
-  if (!fit.kA.determined) {
+  if (!fit.kA.determined && coverage.steps) {
     // A speed-up within one sensor value leaves no trace of its own that could bound it further.
     const double refresh =
         std::max(prepared.position_refresh_period, prepared.velocity_refresh_period);
     fit.kA.upper_bound = std::max({fit.kA.value, refresh * fit.kV.value,
                                    inertia_ceiling(problem, best, bounds, scales, spread)});
     fit.kA.interval = {0.0, fit.kA.upper_bound};
-  } else {
+  } else if (coverage.steps) {
     compare_channels(problem, best, bounds, scales, diagnostics);
   }
   compare_repeats(fit, diagnostics);
@@ -306,6 +181,76 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
   report_terms(fit, diagnostics);
   report_fit(prepared, fit, diagnostics);
   return fit;
+}
+
+/// Puts the kind that the data tell into a recording that leaves it open.
+Expected<void> propose_mechanism(PreparedRecording& prepared, const FitOptions& options,
+                                 std::vector<Diagnostic>& diagnostics) {
+  FLYBALL_TRY(const MechanismChoice choice, choose_mechanism(prepared, options));
+  const bool angles = prepared.unit == "rad";
+  if (choice.fitting.size() == 1) {
+    prepared.mechanism = choice.fitting.front();
+    std::vector<Diagnostic> first;
+    warn(first, "mechanism_assumed",
+         "the log does not say what its mechanism is, and it is taken for {}: {} (say it with "
+         "--mechanism)",
+         named(*prepared.mechanism), choice.evidence);
+    diagnostics.insert(diagnostics.begin(), first.front());
+    return {};
+  }
+  std::string kinds;
+  std::string options_text;
+  for (std::size_t i = 0; i < choice.fitting.size(); ++i) {
+    const MechanismKind kind = choice.fitting[i];
+    const bool drum = kind == MechanismKind::elevator && angles;
+    const std::string_view between = i == 0 ? "" : i + 1 == choice.fitting.size() ? " or " : ", ";
+    kinds += detail::format("{}{}{}", i == 0 ? "" : " and ", named(kind),
+                            drum ? " in angles of its drum" : "");
+    options_text +=
+        detail::format("{}--mechanism {}{}", between, to_string(kind),
+                       drum ? " with the metres a rotation (or radian) in --scale" : "");
+  }
+  Error error = refusal(IdentificationError::unknown_mechanism, where)
+                    .got("data that fit " + kinds + ": " + choice.evidence)
+                    .hint("say which, with " + options_text);
+  for (const KindEvidence& compared : choice.compared) {
+    error = std::move(error).with(
+        detail::format("simulated velocity misses as {} (%)", named(compared.kind)),
+        100.0 * compared.nrmse);
+  }
+  return tl::unexpected(std::move(error));
+}
+
+/// What was said of the mechanism, against the data: only where something makes it doubtful, as
+/// it costs three fits.
+void doubt_mechanism(const PreparedRecording& prepared, const FitOptions& options,
+                     const Expected<FeedforwardFit>& fit, std::vector<Diagnostic>& diagnostics) {
+  const MechanismKind said = *prepared.mechanism;
+  const bool unexplained = !fit && (fit.error().is(IdentificationError::unphysical_gains) ||
+                                    fit.error().is(IdentificationError::singular));
+  const bool beyond_gains = fit && (!fit->terms.empty() || fit->velocity_nrmse > 0.1);
+  if (said == MechanismKind::elevator || (!unexplained && !beyond_gains)) {
+    return;
+  }
+  const auto choice = choose_mechanism(prepared, options);
+  if (!choice ||
+      std::find(choice->fitting.begin(), choice->fitting.end(), said) != choice->fitting.end()) {
+    return;
+  }
+  const auto winner =
+      std::find_if(choice->compared.begin(), choice->compared.end(),
+                   [&](const KindEvidence& k) { return k.kind == choice->fitting.front(); });
+  // A travel alone contradicts nothing, nor does a force that friction of one direction may be.
+  const bool steady = winner->kind == MechanismKind::elevator;
+  constexpr double clear = 24.0;
+  if (winner->kind == MechanismKind::flywheel ||
+      (winner->evidence >= clear && !(steady && fit && winner->gravity <= fit->kS.value))) {
+    std::vector<Diagnostic> first;
+    warn(first, "mechanism_contradicted",
+         "the data are those of {}, not of {} as was said: {} (say what it is with --mechanism)",
+         named(choice->fitting.front()), named(said), choice->evidence);
+    diagnostics.insert(diagnostics.begin(), first.front());
+  }
 }
 
 }  // namespace
@@ -321,7 +266,18 @@ FitReport identify_feedforward(const Recording& recording, const FitOptions& opt
   }
   FitReport report{*std::move(prepared), {}, refusal(IdentificationError::no_data)};
   report.diagnostics = report.prepared.diagnostics;
+  const bool said = report.prepared.mechanism.has_value();
+  if (!said) {
+    if (auto proposed = propose_mechanism(report.prepared, options, report.diagnostics);
+        !proposed) {
+      report.fit = tl::unexpected(std::move(proposed).error());
+      return report;
+    }
+  }
   report.fit = fit_prepared(report.prepared, options, true, report.diagnostics);
+  if (said) {
+    doubt_mechanism(report.prepared, options, report.fit, report.diagnostics);
+  }
   return report;
 }
 

@@ -6,8 +6,7 @@ namespace flyball::identification {
 
 ErrorInfo error_info(IdentificationError code) {
   static constexpr detail::ErrorRow rows[] = {
-      {"unknown_mechanism", "the log does not say what kind of mechanism it is",
-       ErrorKind::no_answer},
+      {"unknown_mechanism", "the log does not say what kind of mechanism it is", ErrorKind::misuse},
       {"no_data", "there is no usable row", ErrorKind::no_answer},
       {"no_motion", "the mechanism does not move in any test", ErrorKind::no_answer},
       {"missing_tests", "the tests do not determine the gains together", ErrorKind::no_answer},

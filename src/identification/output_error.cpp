@@ -150,6 +150,13 @@ OutputErrorProblem::OutputErrorProblem(const PreparedRecording& recording,
     }
   }
   responses_.resize(runs_.size());
+  const auto forward = std::count_if(runs_.begin(), runs_.end(), [&](const ResidualRun& run) {
+    return recording.runs[run.prepared].direction > 0.0;
+  });
+  hides_friction_ = mechanism_ == MechanismKind::elevator &&
+                    (forward == 0 || forward == static_cast<std::ptrdiff_t>(runs_.size()));
+  hides_inertia_ =
+      std::all_of(runs_.begin(), runs_.end(), [](const ResidualRun& run) { return run.ramp; });
   double low = 0.0;
   double high = 0.0;
   for (std::size_t i = 0; i < runs_.size(); ++i) {
@@ -310,6 +317,8 @@ double OutputErrorProblem::position_shown(std::size_t run, const Eigen::VectorXd
 
 std::vector<bool> OutputErrorProblem::free_parameters() const {
   std::vector<bool> free(static_cast<std::size_t>(parameters()), true);
+  free[parameter::static_friction] = !hides_friction_;
+  free[parameter::log_time_constant] = !hides_inertia_;
   free[parameter::gravity_cosine] = mechanism_ != MechanismKind::flywheel;
   free[parameter::gravity_sine] = mechanism_ == MechanismKind::arm;
   for (const int term :

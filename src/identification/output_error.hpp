@@ -112,6 +112,12 @@ class OutputErrorProblem {
   };
   [[nodiscard]] const std::vector<Prior>& priors() const { return priors_; }
 
+  /// Whether friction and gravity are one number: a lift that moves in one direction alone.
+  [[nodiscard]] bool hides_friction() const { return hides_friction_; }
+
+  /// Whether no step tells the inertia: friction takes a ramp's share of it (Theorem 14.3.2).
+  [[nodiscard]] bool hides_inertia() const { return hides_inertia_; }
+
   /// Which parameters the data can move at all.
   [[nodiscard]] std::vector<bool> free_parameters() const;
 
@@ -123,6 +129,8 @@ class OutputErrorProblem {
   std::array<bool, shared_parameter_count> extended_{};
   std::vector<Prior> priors_;
   double middle_ = 0.0;  ///< Of the travel.
+  bool hides_friction_ = false;
+  bool hides_inertia_ = false;
 };
 
 }  // namespace flyball::identification

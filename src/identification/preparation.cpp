@@ -78,6 +78,24 @@ void drop_not_finite(TestRun& run, RowDefects& defects) {
   }
 }
 
+/// What a person trimmed away goes before anything is looked at.
+void trim_by_hand(PreparedRun& prepared) {
+  TestRun& run = prepared.run;
+  if (!run.is_trimmed() || run.time.empty()) {
+    return;
+  }
+  const double start = *std::min_element(run.time.begin(), run.time.end());
+  std::vector<std::size_t> rows;
+  for (std::size_t i = 0; i < run.time.size(); ++i) {
+    const double at = run.time[i] - start;
+    if (at >= run.from && at <= run.to) {
+      rows.push_back(i);
+    }
+    prepared.begins_cut = prepared.begins_cut || at < run.from;
+  }
+  keep_rows(run, rows);
+}
+
 void sort_rows(TestRun& run, RowDefects& defects) {
   std::size_t inversions = 0;
   for (std::size_t i = 1; i < run.time.size(); ++i) {
@@ -306,9 +324,9 @@ void report_repeats(PreparedRecording& prepared) {
 void report_missing_tests(PreparedRecording& prepared) {
   for (const TestKind kind : {TestKind::quasistatic_forward, TestKind::quasistatic_reverse,
                               TestKind::dynamic_forward, TestKind::dynamic_reverse}) {
-    const bool present =
-        std::any_of(prepared.runs.begin(), prepared.runs.end(),
-                    [kind](const PreparedRun& run) { return run.run.kind == kind; });
+    const bool present = std::any_of(
+        prepared.runs.begin(), prepared.runs.end(),
+        [kind](const PreparedRun& run) { return run.run.kind == kind && !run.run.left_out; });
     if (!present) {
       warn(prepared.diagnostics, "missing_test", "the {} test is missing from the log",
            to_string(kind));
@@ -324,7 +342,7 @@ void report_travel(PreparedRecording& prepared) {
   double travel = 0.0;
   for (const PreparedRun& run : prepared.runs) {
     const auto [low, high] = std::minmax_element(run.run.position.begin(), run.run.position.end());
-    travel = std::max(travel, *high - *low);
+    travel = std::max(travel, run.run.left_out ? 0.0 : *high - *low);
   }
   constexpr double turn = 2.0 * std::numbers::pi;
   if (travel > turn) {
@@ -349,12 +367,18 @@ Expected<PreparedRecording> prepare(const Recording& recording, const Preparatio
     PreparedRun run;
     run.run = recording.runs[i];
     run.source = i;
-    defects.total += run.run.time.size();
     drop_not_finite(run.run, defects);
-    sort_rows(run.run, defects);
-    drop_outliers(run.run, defects);
-    mend_stale_start(run.run, defects);
-    drop_jumps(run.run, defects);
+    trim_by_hand(run);
+    if (run.run.left_out) {
+      RowDefects untold;
+      sort_rows(run.run, untold);
+    } else {
+      defects.total += run.run.time.size();
+      sort_rows(run.run, defects);
+      drop_outliers(run.run, defects);
+      mend_stale_start(run.run, defects);
+      drop_jumps(run.run, defects);
+    }
     if (run.run.time.size() >= 2) {
       prepared.runs.push_back(std::move(run));
     }

@@ -52,8 +52,8 @@ bool rests_before(const PreparedRun& prepared, const PreparedRecording& recordin
                                      run.velocity.begin() + static_cast<std::ptrdiff_t>(row) + 1);
     return std::abs(median(before)) <= limit;
   }
-  // Nothing was recorded before the step: the routine starts it from rest.
-  return true;
+  // Nothing was recorded before the step: the routine starts it from rest, a person's cut may not.
+  return !prepared.begins_cut || std::abs(prepared.smoothed_velocity[row]) <= limit;
 }
 
 /// The longest stretch of [first, last) without a gap in time.
@@ -223,6 +223,7 @@ void detect_motion(PreparedRecording& prepared) {
                   speed > std::max(15.0 * prepared.velocity_quantum, noise_speed * noise) &&
                   std::abs(signed_square) > 0.3 * square;
     }
+    run.moved = run.moved && !run.run.left_out;
     if (run.moved) {
       prepared.top_speed = std::max(prepared.top_speed, speed);
     }
@@ -237,6 +238,9 @@ void trim_runs(PreparedRecording& prepared, const PreparationOptions& options) {
   for (PreparedRun& run : prepared.runs) {
     if (run.moved) {
       mark_window(run, prepared, options);
+      continue;
+    }
+    if (run.run.left_out) {
       continue;
     }
     double range = 0.0;

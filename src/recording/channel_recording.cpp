@@ -57,7 +57,8 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
         });
   }
 
-  FLYBALL_TRY_IN(log.source, auto channels, find_channels(log, tests, selection));
+  FLYBALL_TRY_IN(log.source, auto channels,
+                 find_channels(log, tests, selection, loaded.diagnostics));
   if (tests.windows.empty()) {
     tests.windows = split_by_voltage(*channels.voltage);
     if (tests.windows.empty()) {
@@ -68,6 +69,15 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
     note(loaded.diagnostics, "assumed",
          "no channel names the running test: {} tests were told apart by the voltage",
          tests.windows.size());
+  }
+  const std::size_t all_tests = tests.windows.size();
+  FoundTests driven = tests;
+  const std::size_t others = leave_other_routines(*channels.voltage, driven);
+  if (others > 0 && others < all_tests) {
+    note(loaded.diagnostics, "other_routine",
+         "\"{}\" is not driven in {} of {} tests: they are another mechanism's and left out",
+         channels.voltage->name, others, all_tests);
+    tests = std::move(driven);
   }
   note(loaded.diagnostics, "assumed", "voltage from \"{}\", position from {}, velocity from {}",
        channels.voltage->name,
@@ -87,27 +97,10 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
   RecordedUnits units;
   FLYBALL_TRY_IN(log.source, units, channel_units(selection, channels));
   FLYBALL_TRY_IN(log.source, units, settle_units(units, ratio, loaded.diagnostics));
-  std::optional<MechanismKind> kind = selection.mechanism;
-  if (!kind) {
-    kind = kind_from_name(tests.subject + " " + channels.voltage->name);
-    if (kind) {
-      note(loaded.diagnostics, "assumed", "the names in the log say that it is {} {}",
-           *kind == MechanismKind::flywheel ? "a" : "an", to_string(*kind));
-    } else if (units.position.known() && units.position.linear) {
-      kind = MechanismKind::elevator;
-      note(loaded.diagnostics, "assumed", "positions are lengths: an elevator is assumed");
-    }
-  }
-  if (!kind) {
-    return refusal(RecordingError::mechanism_unknown, log.source, "mechanism")
-        .got(
-            units.position.known()
-                ? fmt::format("not told by the log (positions in \"{}\" fit an arm and a flywheel)",
-                              units.position.text)
-                : "not told by the log, nor is the unit of its positions")
-        .hint(units.position.known()
-                  ? "say it with --mechanism arm or --mechanism flywheel"
-                  : "say both, such as --mechanism arm --unit rotations (or rad, deg, m)");
+  const auto said = kind_from_name(tests.subject + " " + channels.voltage->name);
+  const auto kind = selection.mechanism ? selection.mechanism : said;
+  if (said) {
+    tell_said_kind(loaded.diagnostics, "the names in the log say", *said, selection.mechanism);
   }
   if (!units.position.known()) {
     if (kind == MechanismKind::elevator) {

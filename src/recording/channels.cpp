@@ -9,6 +9,7 @@
 #include <flyball/core/quantity.hpp>
 #include <flyball/core/text.hpp>
 
+#include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "recording/channel_names.hpp"
 #include "recording/channels.hpp"
@@ -47,8 +48,60 @@ bool fits(const Signal& signal, Channel quantity) {
   return false;
 }
 
+// Linear interpolation in a sorted signal; `cursor` only moves forward.
+double interpolate(const Signal& signal, double t, std::size_t& cursor) {
+  while (cursor + 1 < signal.time.size() && signal.time[cursor + 1] <= t) {
+    ++cursor;
+  }
+  if (cursor + 1 >= signal.time.size() || t <= signal.time[cursor]) {
+    return signal.value[cursor];
+  }
+  const double span = signal.time[cursor + 1] - signal.time[cursor];
+  const double share = span > 0.0 ? (t - signal.time[cursor]) / span : 0.0;
+  return signal.value[cursor] + share * (signal.value[cursor + 1] - signal.value[cursor]);
+}
+
+/// "/Elevator/Leader" of "/Elevator/Leader/Voltage".
+std::string_view folder_of(std::string_view name) {
+  const std::size_t slash = name.find_last_of('/');
+  return slash == std::string_view::npos ? std::string_view() : name.substr(0, slash);
+}
+
+/// How far another channel is from the first one's values in the tests, as a share of those: leader
+/// and followers show the same, perhaps with the other sign, positions perhaps from another zero.
+double disagreement(const Signal& first, const Signal& other, const FoundTests& tests,
+                    Channel quantity) {
+  double sums[5] = {0.0, 0.0, 0.0, 0.0, 0.0};
+  double rows = 0.0;
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < first.time.size(); ++i) {
+    const double time = first.time[i];
+    const bool tested =
+        tests.windows.empty() ||
+        std::any_of(tests.windows.begin(), tests.windows.end(),
+                    [&](const auto& window) { return time >= window.begin && time < window.end; });
+    if (!tested) {
+      continue;
+    }
+    const double a = first.value[i];
+    const double b = interpolate(other, time, at);
+    rows += 1.0;
+    sums[0] += a;
+    sums[1] += b;
+    sums[2] += a * a;
+    sums[3] += b * b;
+    sums[4] += a * b;
+  }
+  const double centre = quantity == Channel::position ? 1.0 / std::max(1.0, rows) : 0.0;
+  const double own = sums[2] - centre * sums[0] * sums[0];
+  const double theirs = sums[3] - centre * sums[1] * sums[1];
+  const double common = std::abs(sums[4] - centre * sums[0] * sums[1]);
+  return own > 0.0 ? std::sqrt(std::max(0.0, own + theirs - 2.0 * common) / own) : 1.0;
+}
+
 Expected<const Signal*> choose(const Log& log, const FoundTests& tests, Channel quantity,
-                               const std::string& said, const Signal* voltage) {
+                               const std::string& said, const Signal* voltage,
+                               std::vector<Diagnostic>& notes) {
   if (!said.empty()) {
     return named_channel(log, said, quantity);
   }
@@ -70,11 +123,32 @@ Expected<const Signal*> choose(const Log& log, const FoundTests& tests, Channel 
       std::erase_if(candidates, [&](const Signal* s) { return side_of(s->name) != side; });
     }
   }
+  if (candidates.size() > 1 && voltage != nullptr && !folder_of(voltage->name).empty()) {
+    std::vector<const Signal*> beside;
+    std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(beside),
+                 [&](const Signal* s) { return folder_of(s->name) == folder_of(voltage->name); });
+    candidates = beside.empty() ? candidates : beside;
+  }
   if (candidates.size() == 1) {
     return candidates.front();
   }
   if (candidates.empty()) {
     return nullptr;
+  }
+  // Several motors of one mechanism: a leader and its followers.
+  const Signal& first = *candidates.front();
+  double farthest = 0.0;
+  for (const Signal* signal : candidates) {
+    farthest = std::max(farthest, disagreement(first, *signal, tests, quantity));
+  }
+  constexpr double alike = 0.05;
+  if (farthest < alike) {
+    note(
+        notes, "several_motors",
+        "{} {} channels show the same within {:.2g} % (signs and zeros aside), as of motors on one "
+        "mechanism: \"{}\" is used",
+        candidates.size(), channel_name(quantity), 100.0 * farthest, first.name);
+    return &first;
   }
   std::vector<std::string> names;
   for (const Signal* signal : candidates) {
@@ -83,22 +157,12 @@ Expected<const Signal*> choose(const Log& log, const FoundTests& tests, Channel 
     }
   }
   return refusal(RecordingError::ambiguous_channel, {}, channel_name(quantity) + " channel")
-      .got(fmt::format("one of {}: {}{}", candidates.size(), fmt::join(names, ", "),
-                       candidates.size() > names.size() ? ", …" : ""))
+      .got(
+          fmt::format("one of {}: {}{}; they differ by up to {:.2g} % of the first, so not all are "
+                      "of one mechanism's motors",
+                      candidates.size(), fmt::join(names, ", "),
+                      candidates.size() > names.size() ? ", …" : "", 100.0 * farthest))
       .hint(fmt::format("choose one with --{}", channel_name(quantity)));
-}
-
-// Linear interpolation in a sorted signal; `cursor` only moves forward.
-double interpolate(const Signal& signal, double t, std::size_t& cursor) {
-  while (cursor + 1 < signal.time.size() && signal.time[cursor + 1] <= t) {
-    ++cursor;
-  }
-  if (cursor + 1 >= signal.time.size() || t <= signal.time[cursor]) {
-    return signal.value[cursor];
-  }
-  const double span = signal.time[cursor + 1] - signal.time[cursor];
-  const double share = span > 0.0 ? (t - signal.time[cursor]) / span : 0.0;
-  return signal.value[cursor] + share * (signal.value[cursor + 1] - signal.value[cursor]);
 }
 
 double hold(const Signal& signal, double t, std::size_t& cursor) {
@@ -223,14 +287,15 @@ std::string drivetrain_reason(const Log& log, const FoundTests& tests,
 }
 
 Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
-                                      const LogSelection& selection) {
+                                      const LogSelection& selection,
+                                      std::vector<Diagnostic>& notes) {
   FoundChannels channels;
   FLYBALL_TRY(channels.voltage,
-              choose(log, tests, Channel::voltage, selection.voltage_channel, nullptr));
-  FLYBALL_TRY(channels.position,
-              choose(log, tests, Channel::position, selection.position_channel, channels.voltage));
-  FLYBALL_TRY(channels.velocity,
-              choose(log, tests, Channel::velocity, selection.velocity_channel, channels.voltage));
+              choose(log, tests, Channel::voltage, selection.voltage_channel, nullptr, notes));
+  FLYBALL_TRY(channels.position, choose(log, tests, Channel::position, selection.position_channel,
+                                        channels.voltage, notes));
+  FLYBALL_TRY(channels.velocity, choose(log, tests, Channel::velocity, selection.velocity_channel,
+                                        channels.voltage, notes));
   if (channels.voltage == nullptr ||
       (channels.position == nullptr && channels.velocity == nullptr)) {
     return refusal(RecordingError::no_channel, {},
@@ -241,6 +306,22 @@ Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
                                           : "name them with --position and --velocity");
   }
   return channels;
+}
+
+std::size_t leave_other_routines(const Signal& voltage, FoundTests& tests) {
+  constexpr double idle = 0.05;  // V
+  return std::erase_if(tests.windows, [&](const CharacterizationWindow& window) {
+    bool any = false;
+    for (std::size_t i = 0; i < voltage.time.size(); ++i) {
+      if (voltage.time[i] >= window.begin && voltage.time[i] < window.end) {
+        any = true;
+        if (!(std::abs(voltage.value[i]) <= idle)) {
+          return false;
+        }
+      }
+    }
+    return any;
+  });
 }
 
 const Signal* fullest_of(std::initializer_list<const Signal*> signals,

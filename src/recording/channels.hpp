@@ -50,9 +50,15 @@ enum class Channel { voltage, position, velocity };
 /// A signal interpolated to the given ascending times.
 [[nodiscard]] std::vector<double> sampled(const Signal& signal, const std::vector<double>& time);
 
+/// Of several that fit, those that show the same are one mechanism's motors, told in `notes`.
 /// @errors RecordingError::no_channel, ambiguous_channel with the candidates.
 [[nodiscard]] Expected<FoundChannels> find_channels(const Log& log, const FoundTests& tests,
-                                                    const LogSelection& selection);
+                                                    const LogSelection& selection,
+                                                    std::vector<Diagnostic>& notes);
+
+/// Takes out the tests in which this voltage stays at zero: those of another mechanism, whose
+/// routine the same channel names. @return  How many.
+[[nodiscard]] std::size_t leave_other_routines(const Signal& voltage, FoundTests& tests);
 
 /// Joins the channels onto the times of `clock`. The voltage is held between its samples
 /// (it is what was commanded), position and velocity are interpolated.

@@ -11,6 +11,7 @@
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "recording/drivetrain.hpp"
+#include "recording/run_selection.hpp"
 #include "recording/to_si.hpp"
 
 namespace flyball::recording {
@@ -24,12 +25,12 @@ constexpr std::string_view where = "recording";
 ErrorInfo error_info(RecordingError code) {
   static constexpr detail::ErrorRow rows[] = {
       {"drivetrain", "this is no log of one motor's mechanism", ErrorKind::no_answer},
-      {"mechanism_unknown", "the kind of mechanism is not known", ErrorKind::misuse},
       {"no_test_state", "no channel names the running test", ErrorKind::misuse},
       {"no_channel", "a channel is missing", ErrorKind::misuse},
       {"ambiguous_channel", "several channels fit", ErrorKind::misuse},
       {"unit_unknown", "the unit is not known", ErrorKind::misuse},
       {"unit_mismatch", "the unit does not fit", ErrorKind::misuse},
+      {"no_run", "there is no such run", ErrorKind::misuse},
       {"no_tests", "the log holds no test", ErrorKind::no_answer},
   };
   return detail::info_of(code, "recording", rows);
@@ -50,17 +51,10 @@ ExpectedAll<LoadedRecording> recording_from_log(const Log& log, const LogSelecti
   loaded.diagnostics = log.diagnostics;
   auto result = log.sysid ? from_sysid_json(log, selection, std::move(loaded))
                           : from_channels(log, selection, std::move(loaded));
-  if (result && !result->drive && !result->recording.mechanism) {
-    Error error = refusal(RecordingError::mechanism_unknown, log.source, "mechanism")
-                      .got("not told by the log")
-                      .hint("say it with --mechanism flywheel, elevator, arm or drivetrain");
-    // A log that was cut short often lost the key that says it.
-    for (const Diagnostic& diagnostic : log.diagnostics) {
-      if (diagnostic.severity != Severity::info) {
-        error = std::move(error).with(diagnostic.code, diagnostic.message);
-      }
+  if (result) {
+    if (auto selected = select_runs(selection, result->recording); !selected) {
+      result = tl::unexpected(std::move(selected).error().in(log.source));
     }
-    result = tl::unexpected(std::move(error));
   }
   if (!result) {
     return tl::unexpected(Errors(std::move(result).error()).after(log.diagnostics));

@@ -111,10 +111,10 @@ Expected<LoadedRecording> from_sysid_json(const Log& log, const LogSelection& se
     loaded.recording.runs = both_sides(std::move(loaded.recording.runs), right_runs_of(sysid));
   }
   std::optional<MechanismKind> kind = selection.mechanism;
-  if (!kind && !drive && !sysid.test.empty()) {
-    if (auto parsed = mechanisms::parse_mechanism_kind(sysid.test)) {
-      kind = *parsed;
-    }
+  const auto said = mechanisms::parse_mechanism_kind(sysid.test);
+  if (said && !drive) {
+    tell_said_kind(loaded.diagnostics, "the log says", *said, kind);
+    kind = kind ? kind : std::optional(*said);
   }
   if (selection.no_velocity) {
     leave_velocity_out(loaded.recording);

@@ -85,6 +85,19 @@ void leave_velocity_out(Recording& recording) {
   }
 }
 
+void tell_said_kind(std::vector<Diagnostic>& notes, std::string_view how, MechanismKind said,
+                    std::optional<MechanismKind> selected) {
+  const auto named = [](MechanismKind kind) {
+    return fmt::format("{} {}", kind == MechanismKind::flywheel ? "a" : "an", to_string(kind));
+  };
+  if (selected && *selected != said) {
+    warn(notes, "mechanism_overruled", "{} that it is {}: it is taken for {}, as was said", how,
+         named(said), named(*selected));
+  } else if (!selected) {
+    note(notes, "assumed", "{} that it is {}", how, named(said));
+  }
+}
+
 void tell_assumed_unit(std::vector<Diagnostic>& notes, const RecordedUnit& unit) {
   std::vector<Diagnostic> first;
   warn(first, "unit_assumed",

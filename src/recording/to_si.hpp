@@ -34,6 +34,12 @@ struct OutputScale {
 /// Takes the velocity out where the position tells it too.
 void leave_velocity_out(identification::Recording& recording);
 
+/// Tells of which kind a log calls its mechanism, and that a person says another.
+/// @param how  "the log says". @param selected  By the person, if at all.
+void tell_said_kind(std::vector<Diagnostic>& notes, std::string_view how,
+                    mechanisms::MechanismKind said,
+                    std::optional<mechanisms::MechanismKind> selected);
+
 /// Tells first what was assumed and nothing can check.
 void tell_assumed_unit(std::vector<Diagnostic>& notes, const RecordedUnit& unit);
 

@@ -1,5 +1,6 @@
 #include <flyball/study/identify.hpp>
 
+#include <algorithm>
 #include <utility>
 
 #include "core/try.hpp"
@@ -13,6 +14,32 @@ std::vector<Diagnostic> IdentifyResult::diagnostics() const {
 }
 
 namespace {
+
+bool assumes_unit(const recording::LoadedRecording& source) {
+  return std::any_of(source.diagnostics.begin(), source.diagnostics.end(),
+                     [](const Diagnostic& found) { return found.code == "unit_assumed"; });
+}
+
+/// Everything that the person has to say before this log can be answered.
+Errors missing_facts(const recording::LoadedRecording& source, const Error& open_kind) {
+  std::vector<QuotedError> all{{Error(open_kind).in(source.path), {}, {}}};
+  if (assumes_unit(source)) {
+    all.push_back({refusal(recording::RecordingError::unit_unknown, source.path, "position unit")
+                       .got("not told by the log")
+                       .hint("say it with --unit rotations (or rad, deg, m)"),
+                   {},
+                   {}});
+  }
+  return Errors(std::move(all)).after(source.diagnostics);
+}
+
+bool same_motion(const identification::Recording& a, const identification::Recording& b) {
+  return a.unit == b.unit && std::equal(a.runs.begin(), a.runs.end(), b.runs.begin(), b.runs.end(),
+                                        [](const auto& first, const auto& second) {
+                                          return first.position == second.position &&
+                                                 first.velocity == second.velocity;
+                                        });
+}
 
 IdentifyResult identify_drivetrain(const IdentifyJob& job, recording::LoadedRecording source) {
   identification::DriveReport drive = identification::identify_drive(*source.drive);
@@ -39,9 +66,25 @@ ExpectedAll<IdentifyResult> identify(const IdentifyJob& job) {
   if (source.drive) {
     return identify_drivetrain(job, std::move(source));
   }
-  const mechanisms::MechanismKind mechanism = *source.recording.mechanism;
-  const std::string unit = source.recording.unit;
   identification::FitReport report = identification::identify_feedforward(source.recording);
+  if (!report.fit &&
+      report.fit.error().is(identification::IdentificationError::unknown_mechanism)) {
+    return tl::unexpected(missing_facts(source, report.fit.error()));
+  }
+  if (const auto& chosen = report.prepared.mechanism; chosen && !source.recording.mechanism) {
+    // Units may have been assumed for any kind: for this one they may be others.
+    recording::LogSelection closer = job.selection;
+    closer.mechanism = chosen;
+    FLYBALL_TRY(auto again, load_recording(job.log, closer));
+    if (!same_motion(source.recording, again.recording)) {
+      const Diagnostic assumed = report.diagnostics.front();
+      report = identification::identify_feedforward(again.recording);
+      report.diagnostics.insert(report.diagnostics.begin(), assumed);
+    }
+    source = std::move(again);
+  }
+  const auto mechanism = report.prepared.mechanism;
+  const std::string unit = source.recording.unit;
   return IdentifyResult{.source = std::move(source),
                         .report = std::move(report),
                         .mechanism = mechanism,

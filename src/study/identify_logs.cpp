@@ -127,6 +127,12 @@ void tell_differences(IdentifyLogsResult& result) {
     }
   }
   for (const LogOutcome& log : result.logs) {
+    for (const Diagnostic& found : log.diagnostics) {
+      if (log.fit && found.code == "mechanism_assumed") {
+        told.insert(told.begin(), found);
+        told.front().message = log.path + ": " + found.message;
+      }
+    }
     if (!log.fit) {
       warn(told, "log_left_out", "{} was left out: {}", log.path, to_string(log.fit.error()));
     }

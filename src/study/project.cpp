@@ -310,7 +310,7 @@ ExpectedAll<ExperimentJob> experiment_job(const std::string& file,
   }
   std::vector<Override> all(overrides.begin(), overrides.end());
   if (!said_kind) {
-    all.push_back({"--mechanism", std::string(to_string(identified.mechanism))});
+    all.push_back({"--mechanism", std::string(to_string(identified.report.fit->mechanism))});
   }
   FLYBALL_TRY(auto said, read("", "", all, Source::log));
   ExperimentJob job = experiment_after(identified, said.experiment);

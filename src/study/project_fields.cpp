@@ -176,6 +176,17 @@ constexpr std::array log_fields{
         "Volts a recorded unit of voltage; the battery's voltage for a duty cycle from -1 to 1")
         .called("voltage-scale")
         .takes("NUMBER"),
+    names("runs", at<&LogSelection::runs>(), "[\"2:0.5..3\"]",
+          "What to use of single runs: number, from and to in seconds after the run's start; an "
+          "end may be left out")
+        .without("what is found to be of use")
+        .called("run")
+        .takes("N:FROM..TO,…"),
+    names("without_runs", at<&LogSelection::without_runs>(), "[\"3\"]",
+          "The numbers of runs to leave out")
+        .without("none")
+        .called("without-run")
+        .takes("N,…"),
     text("state", at<&LogSelection::state_channel>(), "\"/SysIdState\"",
          "Channel that names the running test")
         .without("found by its values")

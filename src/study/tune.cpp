@@ -22,6 +22,10 @@ PlantDescription plant_from_fit(const identification::FeedforwardFit& fit) {
   plant.kA_upper_bound = fit.kA.determined ? 0.0 : fit.kA.upper_bound;
   plant.kA_reason = fit.kA.determined ? "" : fit.kA.reason;
   plant.gains.kG = fit.kG ? known(*fit.kG) : 0.0;
+  if (fit.gravity_with_friction) {
+    plant.gains.kS = fit.kS.value;
+    plant.gains.kG = fit.kG->value;
+  }
   plant.gains.angle_offset = fit.angle_offset ? known(*fit.angle_offset) : 0.0;
   return plant;
 }

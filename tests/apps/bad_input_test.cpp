@@ -231,6 +231,9 @@ TEST_F(BadInput, OptionsOfTheCommandLine) {
   expect("identify " + example("logs/elevator.json") + " --mechanism turret", 2, "turret");
   expect("identify " + example("logs/elevator.json") + " --unit parsnips", 2, "parsnips");
   expect("identify " + example("logs/elevator.json") + " --scale 0", 2, "scale");
+  expect("identify " + example("logs/elevator.json") + " --run 9:0..1", 2, "run 9");
+  expect("identify " + example("logs/elevator.json") + " --run 1:90..91", 2, "none of run 1");
+  expect("identify " + example("logs/elevator.json") + " --without-run all", 2, "number of a run");
 }
 
 TEST_F(BadInput, CommandLinesThatEndTooSoon) {

@@ -153,43 +153,167 @@ TEST(FeedforwardFit, GoesOnWithThreeTestsOfFour) {
   }
 }
 
-TEST(FeedforwardFit, RefusesOneTestOfFour) {
-  for (std::size_t only = 0; only < 4; ++only) {
-    Recording recording = record(elevator);
-    recording.runs = {recording.runs[only]};
-    const auto report = identify_feedforward(recording);
-    ASSERT_FALSE(report.fit);
-    EXPECT_TRUE(report.fit.error().is(IdentificationError::missing_tests));
-    EXPECT_EQ(report.prepared.runs.size(), 1U) << "what there is can still be plotted";
+bool holds(const GainEstimate& gain, double truth) {
+  return gain.interval[0] <= truth && truth <= gain.interval[1];
+}
+
+Recording only(Recording recording, std::initializer_list<std::size_t> runs) {
+  std::vector<TestRun> kept;
+  for (const std::size_t run : runs) {
+    kept.push_back(recording.runs[run]);
+  }
+  recording.runs = std::move(kept);
+  return recording;
+}
+
+// Theorem 14.3.2 does without kA.
+TEST(FeedforwardFit, RampsAloneTellAllButKa) {
+  for (const std::size_t mechanism : {flywheel, elevator, arm}) {
+    const auto report = identify_feedforward(only(record(mechanism), {0, 1}));
+    const scenarios::Truth& truth = scenarios::mechanisms[mechanism];
+    ASSERT_TRUE(report.fit) << truth.name << ": " << to_string(report.fit.error());
+    EXPECT_FALSE(report.fit->kA.determined);
+    EXPECT_NE(report.fit->kA.reason.find("dynamic-forward"), std::string::npos);
+    EXPECT_GE(report.fit->kA.upper_bound, truth.kA);
+    expect_near(report.fit->kV, truth.kV, 0.02);
+    EXPECT_TRUE(holds(report.fit->kS, truth.kS)) << truth.name;
+    EXPECT_NEAR(report.fit->kG ? report.fit->kG->value : 0.0, truth.kG, 0.03) << truth.name;
   }
 }
 
-TEST(FeedforwardFit, RefusesOnlyRampsAndOnlySteps) {
-  const Recording recording = record(flywheel);
-  Recording ramps = recording;
-  ramps.runs = {recording.runs[0], recording.runs[1]};
-  Recording steps = recording;
-  steps.runs = {recording.runs[2], recording.runs[3]};
-  const auto no_steps = fit_feedforward(ramps);
-  ASSERT_FALSE(no_steps);
-  EXPECT_TRUE(no_steps.error().is(IdentificationError::missing_tests));
-  EXPECT_EQ(no_steps.error().subject(), "dynamic tests (steps)");
-  const auto no_ramps = fit_feedforward(steps);
-  ASSERT_FALSE(no_ramps);
-  EXPECT_EQ(no_ramps.error().subject(), "quasistatic tests (ramps)");
+TEST(FeedforwardFit, OneRampOfAFlywheelTellsFrictionAndSpeed) {
+  const auto fit = fit_feedforward(only(record(flywheel), {0}));
+  ASSERT_TRUE(fit) << to_string(fit.error());
+  expect_near(fit->kV, 0.12, 0.02);
+  EXPECT_TRUE(holds(fit->kS, 0.5));
+  EXPECT_FALSE(fit->kA.determined);
 }
 
-TEST(FeedforwardFit, RefusesOneDirectionUnderGravityButNotOfAFlywheel) {
-  Recording lift = record(elevator);
-  lift.runs = {lift.runs[0], lift.runs[2]};
-  const auto refused = fit_feedforward(lift);
-  ASSERT_FALSE(refused);
-  EXPECT_TRUE(refused.error().is(IdentificationError::missing_tests));
-  Recording wheel = record(flywheel);
-  wheel.runs = {wheel.runs[0], wheel.runs[2]};
-  const auto fit = fit_feedforward(wheel);
+TEST(FeedforwardFit, StepsOfOneVoltageAreRefusedWithTheSpeedTheyEndIn) {
+  const auto fit = fit_feedforward(only(record(flywheel), {2, 3}));
+  ASSERT_FALSE(fit);
+  EXPECT_TRUE(fit.error().is(IdentificationError::missing_tests));
+  EXPECT_EQ(fit.error().subject(), "quasistatic tests (ramps)");
+  ASSERT_EQ(fit.error().evidence().size(), 2U);
+  // (6 V − 0.5 V) / 0.12 V s, nearly.
+  EXPECT_NE(to_string(fit.error()).find("6 V end in 4"), std::string::npos)
+      << to_string(fit.error());
+}
+
+TEST(FeedforwardFit, StepsOfTwoVoltagesTellAllOfAFlywheel) {
+  Recording steps = only(record(flywheel), {2, 3});
+  auto options = scenarios::session(scenarios::mechanisms[flywheel], 7);
+  options.step_voltage = 3.0;
+  const Recording slower = flyball::record_characterization(options).value();
+  steps.runs.insert(steps.runs.end(), slower.runs.begin() + 2, slower.runs.end());
+  const auto fit = fit_feedforward(steps);
   ASSERT_TRUE(fit) << to_string(fit.error());
+  expect_near(fit->kV, 0.12, 0.02);
+  expect_near(fit->kA, 0.05, 0.05);
+  EXPECT_TRUE(holds(fit->kS, 0.5));
+}
+
+// kS = 0.15 V and kG = 0.6 V: upwards they are one number, downwards their difference is.
+TEST(FeedforwardFit, OneDirectionOfALiftTellsFrictionWithGravity) {
+  const auto up = identify_feedforward(only(record(elevator), {0, 2}));
+  ASSERT_TRUE(up.fit) << to_string(up.fit.error());
+  ASSERT_TRUE(up.fit->gravity_with_friction);
+  EXPECT_NEAR(up.fit->gravity_with_friction->value, 0.75, 0.02);
+  EXPECT_TRUE(holds(*up.fit->gravity_with_friction, 0.75));
+  EXPECT_FALSE(up.fit->in_reverse);
+  EXPECT_FALSE(up.fit->kS.determined);
+  EXPECT_FALSE(up.fit->kG->determined);
+  EXPECT_EQ(up.fit->kS.value, 0.0);
+  EXPECT_EQ(up.fit->kG->value, up.fit->gravity_with_friction->value);
+  EXPECT_TRUE(holds(up.fit->kS, 0.15) && holds(*up.fit->kG, 0.6));
+  expect_near(up.fit->kV, 4.0, 0.02);
+  expect_near(up.fit->kA, 0.3, 0.1);
+  const flyball::Diagnostic* told = find(up.diagnostics, "gravity_with_friction");
+  ASSERT_NE(told, nullptr);
+  EXPECT_NE(told->message.find("quasistatic-reverse"), std::string::npos) << told->message;
+  EXPECT_EQ(find(up.diagnostics, "kG_indistinguishable"), nullptr);
+
+  const auto down = identify_feedforward(only(record(elevator), {1, 3}));
+  ASSERT_TRUE(down.fit) << to_string(down.fit.error());
+  ASSERT_TRUE(down.fit->gravity_with_friction);
+  EXPECT_TRUE(down.fit->in_reverse);
+  EXPECT_NEAR(down.fit->gravity_with_friction->value, 0.45, 0.02);
+  expect_near(down.fit->kV, 4.0, 0.02);
+}
+
+TEST(FeedforwardFit, OneDirectionOfAFlywheelIsEnough) {
+  const auto fit = fit_feedforward(only(record(flywheel), {0, 2}));
+  ASSERT_TRUE(fit) << to_string(fit.error());
+  EXPECT_FALSE(fit->gravity_with_friction);
   expect_near(fit->kS, 0.5, 0.02);
+}
+
+// An arm's gravity changes along its way, friction does not.
+TEST(FeedforwardFit, OneDirectionOfAnArmTellsThemApart) {
+  const auto fit = fit_feedforward(only(record(arm), {0, 2}));
+  ASSERT_TRUE(fit) << to_string(fit.error());
+  EXPECT_TRUE(holds(fit->kS, 0.1));
+  EXPECT_TRUE(holds(*fit->kG, 0.65));
+  expect_near(fit->kV, 1.2, 0.03);
+}
+
+TEST(FeedforwardFit, TheSameTestsRecordedTwiceAreUsedTogether) {
+  Recording twice = record(elevator);
+  const Recording again = record(elevator, 9);
+  twice.runs.insert(twice.runs.end(), again.runs.begin(), again.runs.end());
+  const auto fit = fit_feedforward(twice);
+  ASSERT_TRUE(fit) << to_string(fit.error());
+  const auto once = fit_feedforward(record(elevator));
+  expect_near(fit->kV, 4.0, 0.005);
+  EXPECT_LT(fit->kV.standard_error, once->kV.standard_error);
+  EXPECT_EQ(fit->runs.size(), 8U);
+}
+
+// Rows repeat a value four times: a repeated one is no residual.
+TEST(FeedforwardFit, CountsAValueOnce) {
+  auto options = scenarios::session(scenarios::mechanisms[elevator], 1);
+  options.noise_per_row = false;
+  const auto fit = fit_feedforward(flyball::record_characterization(options).value());
+  ASSERT_TRUE(fit) << to_string(fit.error());
+  for (const FittedRun& run : fit->runs) {
+    ASSERT_FALSE(run.fresh.empty());
+    EXPECT_LT(run.fresh.size(), run.time.size() / 3);
+    for (const std::size_t row : run.fresh) {
+      ASSERT_LT(row, run.time.size());
+      EXPECT_TRUE(row == 0 || run.velocity[row] != run.velocity[row - 1]);
+    }
+  }
+}
+
+TEST(FeedforwardFit, UsesOfARunWhatAPersonLeaves) {
+  Recording recording = record(flywheel);
+  TestRun& ramp = recording.runs[0];
+  const double half = 0.5 * (ramp.time.back() - ramp.time.front());
+  ramp.to = half;
+  recording.runs[1].left_out = true;
+  const auto report = identify_feedforward(recording);
+  ASSERT_TRUE(report.fit) << to_string(report.fit.error());
+  ASSERT_EQ(report.fit->runs.size(), 4U);
+  EXPECT_TRUE(report.fit->runs[0].used);
+  EXPECT_LE(report.fit->runs[0].time.back(), ramp.time.front() + half);
+  EXPECT_FALSE(report.fit->runs[1].used);
+  EXPECT_EQ(find(report.diagnostics, "no_motion"), nullptr);
+  EXPECT_NE(find(report.diagnostics, "missing_test"), nullptr);
+  expect_near(report.fit->kV, 0.12, 0.01);
+}
+
+TEST(FeedforwardFit, AStepThatIsCutInMotionDoesNotStartAtRest) {
+  Recording recording = record(elevator);
+  for (TestRun& run : recording.runs) {
+    run.velocity.clear();
+  }
+  TestRun& step = recording.runs[2];
+  step.from = 0.4;
+  const auto report = identify_feedforward(recording);
+  ASSERT_TRUE(report.fit) << to_string(report.fit.error());
+  EXPECT_FALSE(report.prepared.runs[2].starts_at_rest);
+  EXPECT_TRUE(report.prepared.runs[3].starts_at_rest);
+  expect_near(report.fit->kV, 4.0, 0.02);
 }
 
 TEST(FeedforwardFit, RefusesALogWithoutMotion) {
@@ -237,17 +361,6 @@ TEST(FeedforwardFit, RefusesAMechanismThatOnlyShowsNoise) {
       }
     }
   }
-}
-
-TEST(FeedforwardFit, RefusesAnUnknownMechanismAndTakesTheOption) {
-  Recording recording = record(flywheel);
-  recording.mechanism.reset();
-  const auto refused = fit_feedforward(recording);
-  ASSERT_FALSE(refused);
-  EXPECT_TRUE(refused.error().is(IdentificationError::unknown_mechanism));
-  FitOptions options;
-  options.mechanism = MechanismKind::flywheel;
-  EXPECT_TRUE(fit_feedforward(recording, options));
 }
 
 TEST(FeedforwardFit, RefusesNothing) {

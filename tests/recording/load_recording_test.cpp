@@ -1,5 +1,6 @@
 #include <flyball/recording/load_recording.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -80,16 +81,118 @@ TEST(Recording, FindsTheSysIdChannelsOfAWpilog) {
   }
 }
 
-TEST(Recording, MetresAreAnElevatorAndRotationsAreAsked) {
-  const auto elevator = recording_from_log(wpilog("Meter"), {});
-  ASSERT_TRUE(elevator) << to_string(elevator.error());
-  EXPECT_EQ(elevator->recording.mechanism, MechanismKind::elevator);
-  EXPECT_EQ(elevator->recording.unit, "m");
+TEST(Recording, LeavesTheMechanismOpenThatNothingSays) {
+  for (const auto& [unit, si] : {std::pair{"Meter", "m"}, {"Rotation", "rad"}}) {
+    const auto open = recording_from_log(wpilog(unit), {});
+    ASSERT_TRUE(open) << to_string(open.error());
+    EXPECT_FALSE(open->recording.mechanism);
+    EXPECT_EQ(open->recording.unit, si);
+  }
+}
 
-  const auto open = recording_from_log(wpilog("Rotation"), {});
-  ASSERT_FALSE(open);
-  EXPECT_TRUE(open.error().is(RecordingError::mechanism_unknown));
-  EXPECT_NE(to_string(open.error()).find("--mechanism"), std::string::npos);
+const Diagnostic* told(const LoadedRecording& loaded, std::string_view code) {
+  const auto found = std::find_if(loaded.diagnostics.begin(), loaded.diagnostics.end(),
+                                  [code](const Diagnostic& d) { return d.code == code; });
+  return found != loaded.diagnostics.end() ? &*found : nullptr;
+}
+
+TEST(Recording, APersonOverrulesTheLogsOwnWordWithAWarning) {
+  Log log = wpilog("Rotation");
+  log.texts[0].name = "sysid-test-state-Shooter";
+  const auto believed = recording_from_log(log, {});
+  ASSERT_TRUE(believed);
+  EXPECT_EQ(believed->recording.mechanism, MechanismKind::flywheel);
+  EXPECT_EQ(told(*believed, "mechanism_overruled"), nullptr);
+  const auto overruled = recording_from_log(log, {.mechanism = MechanismKind::arm});
+  ASSERT_TRUE(overruled);
+  EXPECT_EQ(overruled->recording.mechanism, MechanismKind::arm);
+  const Diagnostic* warning = told(*overruled, "mechanism_overruled");
+  ASSERT_NE(warning, nullptr);
+  EXPECT_EQ(warning->severity, Severity::warning);
+  EXPECT_NE(warning->message.find("a flywheel"), std::string::npos);
+}
+
+TEST(Recording, MarksTheRunsThatAPersonTrimsAndLeavesOut) {
+  LogSelection selection;
+  selection.runs = {"1: 0.5 .. 1.5"};
+  selection.without_runs = {"2"};
+  auto loaded = recording_from_log(wpilog("Rotation"), selection);
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  ASSERT_EQ(loaded->recording.runs.size(), 2U);
+  EXPECT_EQ(loaded->recording.runs[0].from, 0.5);
+  EXPECT_EQ(loaded->recording.runs[0].to, 1.5);
+  EXPECT_FALSE(loaded->recording.runs[0].left_out);
+  EXPECT_TRUE(loaded->recording.runs[1].left_out);
+  EXPECT_FALSE(loaded->recording.runs[1].is_trimmed());
+  selection.runs = {"2:..500 ms"};
+  selection.without_runs.clear();
+  loaded = recording_from_log(wpilog("Rotation"), selection);
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_EQ(loaded->recording.runs[1].from, 0.0);
+  EXPECT_NEAR(loaded->recording.runs[1].to, 0.5, 1e-12);
+}
+
+TEST(Recording, RefusesRunsThatAreNotThere) {
+  const auto code = [](std::vector<std::string> runs, std::vector<std::string> without) {
+    LogSelection selection;
+    selection.runs = std::move(runs);
+    selection.without_runs = std::move(without);
+    return code_of(wpilog("Rotation"), selection);
+  };
+  EXPECT_EQ(code({"3:0..1"}, {}), "no_run");
+  EXPECT_EQ(code({"0:0..1"}, {}), "no_run");
+  EXPECT_EQ(code({}, {"3"}), "no_run");
+  EXPECT_EQ(code({}, {"1", "2"}), "empty");
+  EXPECT_EQ(code({}, {"all"}), "malformed");
+  EXPECT_EQ(code({"1:0.5-1"}, {}), "malformed");
+  EXPECT_EQ(code({"one:0.5..1"}, {}), "malformed");
+  EXPECT_EQ(code({"1:2.5..3"}, {}), "empty");
+  EXPECT_EQ(code({"1:1..0.5"}, {}), "empty");
+  EXPECT_EQ(code({"1:0.5 V..1"}, {}), "wrong_unit");
+  LogSelection selection;
+  selection.runs = {"3:0..1"};
+  EXPECT_EQ(to_string(recording_from_log(wpilog("Rotation"), selection).error()),
+            "robot.wpilog: runs is run 3, which the log does not have; it must be one of 1 "
+            "(quasistatic-forward), 2 (dynamic-reverse)");
+}
+
+Log with_follower(double (*volts_of)(double), double (*position_of)(double)) {
+  Log log = wpilog("Rotation");
+  log.signals.push_back(signal("voltage-follower-Wrist", "Volt", volts_of, 0.02, 0.001));
+  log.signals.push_back(signal("position-follower-Wrist", "Rotation", position_of, 0.02, 0.004));
+  return log;
+}
+
+// A follower on the other side turns the other way, from another zero.
+TEST(Recording, MotorsThatShowTheSameAreOneMechanisms) {
+  const Log log =
+      with_follower([](double t) { return -volts(t); }, [](double t) { return 3.0 - t; });
+  const auto loaded = recording_from_log(log, {.mechanism = MechanismKind::arm});
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  ASSERT_NE(told(*loaded, "several_motors"), nullptr);
+  EXPECT_NE(told(*loaded, "several_motors")->message.find("voltage-motor-Wrist"),
+            std::string::npos);
+  EXPECT_GT(loaded->recording.runs[0].voltage.back(), 0.0);
+}
+
+TEST(Recording, MotorsThatDifferHaveToBeChosenFrom) {
+  const Log log =
+      with_follower([](double t) { return 0.7 * volts(t); }, [](double t) { return 3.0 - t; });
+  const auto loaded = recording_from_log(log, {.mechanism = MechanismKind::arm});
+  ASSERT_FALSE(loaded);
+  EXPECT_TRUE(loaded.error().is(RecordingError::ambiguous_channel));
+  EXPECT_NE(to_string(loaded.error()).find("30 %"), std::string::npos) << to_string(loaded.error());
+}
+
+TEST(Recording, AnotherMechanismsRoutineIsLeftOut) {
+  Log log = wpilog("Rotation");
+  log.texts[0].time.insert(log.texts[0].time.end(), {6.0, 7.0});
+  log.texts[0].value.insert(log.texts[0].value.end(), {"dynamic-forward", "none"});
+  const auto loaded = recording_from_log(log, {.mechanism = MechanismKind::arm});
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_EQ(loaded->recording.runs.size(), 2U);
+  ASSERT_NE(told(*loaded, "other_routine"), nullptr);
+  EXPECT_NE(told(*loaded, "other_routine")->message.find("1 of 3 tests"), std::string::npos);
 }
 
 TEST(Recording, ScaleTurnsRotationsIntoMetres) {
@@ -333,7 +436,9 @@ TEST(Recording, ScalesASysIdJsonByItsUnits) {
   EXPECT_NEAR(loaded->recording.runs[0].velocity[1], two_pi, 1e-12);
 
   log.sysid->test.clear();
-  EXPECT_EQ(code_of(log, {}), "mechanism_unknown");
+  const auto open = recording_from_log(log, {});
+  ASSERT_TRUE(open) << to_string(open.error());
+  EXPECT_FALSE(open->recording.mechanism);
 }
 
 // A drivetrain's SysId JSON in each of its layouts; a wheel's circumference is 0.5 m.

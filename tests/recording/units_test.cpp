@@ -184,12 +184,12 @@ TEST(Units, AnElevatorsAreLengthsOrSaid) {
   EXPECT_TRUE(unknown.error().is(RecordingError::unit_unknown)) << to_string(unknown.error());
 }
 
-TEST(Units, WhatIsMissingIsAskedForAtOnce) {
-  const auto open = gain_of(log_of("position", "velocity", 1.0, 1.0), {});
-  ASSERT_FALSE(open);
-  const std::string told = to_string(open.error());
-  EXPECT_NE(told.find("--mechanism"), std::string::npos) << told;
-  EXPECT_NE(told.find("--unit"), std::string::npos) << told;
+TEST(Units, AreAssumedWhereTheMechanismIsOpenToo) {
+  const auto open = recording_from_log(log_of("position", "velocity", 1.0, 1.0), {});
+  ASSERT_TRUE(open) << to_string(open.error());
+  EXPECT_FALSE(open->recording.mechanism);
+  ASSERT_FALSE(open->diagnostics.empty());
+  EXPECT_EQ(open->diagnostics.front().code, "unit_assumed");
 }
 
 TEST(Units, TheVoltageCanBeScaled) {

@@ -109,5 +109,14 @@ TEST(IdentifyLogs, Errors) {
   EXPECT_NE(to_string(mixed.error()).find(other.path()), std::string::npos);
 }
 
+TEST(IdentifyLogs, AMechanismThatTheDataTellWaitsForItsConfirmation) {
+  const SessionFile a(elevator(1), "", "flyball_logs_open_a.json", "Meters");
+  const SessionFile b(elevator(2), "", "flyball_logs_open_b.json", "Meters");
+  const auto result = identify_logs({.logs = {a.path(), b.path()}, .selection = {}});
+  ASSERT_TRUE(result) << to_string(result.error());
+  EXPECT_EQ(result->joint.mechanism, mechanisms::MechanismKind::elevator);
+  EXPECT_TRUE(has(result->joint.report.diagnostics, "mechanism_assumed"));
+}
+
 }  // namespace
 }  // namespace flyball::study

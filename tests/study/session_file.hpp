@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -20,13 +21,13 @@ inline const char* sysid_name(identification::TestKind kind) {
 class SessionFile {
  public:
   SessionFile(const CharacterizationOptions& session, const std::string& test,
-              const std::string& name)
+              const std::string& name, std::optional<std::string> units = std::nullopt)
       : path_((std::filesystem::temp_directory_path() / name).string()) {
     const auto recording = record_characterization(session);
     EXPECT_TRUE(recording);
     SysIdJson log;
     log.test = test;
-    log.units = test == "Elevator" ? "Meters" : "Radians";
+    log.units = units.value_or(test == "Elevator" ? "Meters" : "Radians");
     log.units_per_rotation = 1.0;
     for (const identification::TestRun& run : recording->runs) {
       SysIdJson::Run rows;

@@ -171,5 +171,76 @@ TEST(Tune, AMissingLogIsAnError) {
   EXPECT_NE(to_string(result.error()).find("found.json"), std::string::npos);
 }
 
+CharacterizationOptions arm_session() {
+  CharacterizationOptions session;
+  session.mechanism = MechanismKind::arm;
+  session.kS = 0.1;
+  session.kV = 1.2;
+  session.kA = 0.15;
+  session.kG = 0.65;
+  session.angle_offset = 0.2;
+  session.ramp_limit = 10.0;
+  return session;
+}
+
+TEST(Identify, TakesTheMechanismFromTheDataUntilItIsConfirmed) {
+  const SessionFile log(arm_session(), "", "flyball_open_arm.json");
+  const auto open = identify({.log = log.path(), .selection = {}});
+  ASSERT_TRUE(open) << to_string(open.error());
+  ASSERT_TRUE(open->report.fit) << to_string(open->report.fit.error());
+  EXPECT_EQ(open->mechanism, MechanismKind::arm);
+  const Document document = answer_of(*open).document;
+  EXPECT_EQ(document.verdict.line, "The gains can be used once the mechanism is confirmed.");
+  ASSERT_FALSE(document.verdict.reasons.empty());
+  EXPECT_NE(document.verdict.reasons.front().find("taken for an arm"), std::string::npos);
+  recording::LogSelection said;
+  said.mechanism = MechanismKind::arm;
+  const auto told = identify({.log = log.path(), .selection = said});
+  ASSERT_TRUE(told && told->report.fit);
+  EXPECT_EQ(told->report.fit->kG->value, open->report.fit->kG->value);
+}
+
+TEST(Identify, AsksForTheMechanismThatTheDataLeaveOpen) {
+  CharacterizationOptions turret = arm_session();
+  turret.kG = 0.0;
+  const SessionFile log(turret, "", "flyball_open_turret.json");
+  const auto open = identify({.log = log.path(), .selection = {}});
+  ASSERT_FALSE(open);
+  EXPECT_TRUE(open.error().is(identification::IdentificationError::unknown_mechanism));
+  EXPECT_EQ(open.error().kind(), ErrorKind::misuse);
+  const std::string text = to_string(open.error());
+  EXPECT_NE(text.find("--mechanism arm or --mechanism flywheel"), std::string::npos) << text;
+}
+
+// Two facts are missing, and both are asked for.
+TEST(Identify, AsksForTheUnitBesideTheMechanism) {
+  CharacterizationOptions turret = arm_session();
+  turret.kG = 0.0;
+  const SessionFile log(turret, "", "flyball_open_unit.json", "");
+  const auto open = identify({.log = log.path(), .selection = {}});
+  ASSERT_FALSE(open);
+  ASSERT_EQ(open.error().all().size(), 2U);
+  EXPECT_NE(to_string(open.error().all()[0]).find("--mechanism"), std::string::npos);
+  EXPECT_NE(to_string(open.error().all()[1]).find("--unit"), std::string::npos);
+}
+
+TEST(Identify, ShowsWhatAPersonTrimmed) {
+  const SessionFile log(arm_session(), "Arm", "flyball_trimmed_arm.json");
+  IdentifyJob job{.log = log.path(), .selection = {}};
+  job.selection.runs = {"1:..4"};
+  job.selection.without_runs = {"4"};
+  const auto result = identify(job);
+  ASSERT_TRUE(result) << to_string(result.error());
+  const Answer answer = answer_of(*result);
+  const auto json = nlohmann::json::parse(answer.json);
+  EXPECT_EQ(json.at("log").at("runs").at(0).at("used_to"), 4.0);
+  EXPECT_EQ(json.at("log").at("runs").at(3).at("left_out"), true);
+  EXPECT_FALSE(json.at("log").at("runs").at(1).contains("used_to"));
+  ASSERT_EQ(answer.figures.size(), 4U);
+  EXPECT_NE(answer.figures[0].title.find("to 4 s by hand"), std::string::npos)
+      << answer.figures[0].title;
+  EXPECT_NE(answer.figures[3].title.find("left out by hand"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace flyball::study

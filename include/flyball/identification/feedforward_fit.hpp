@@ -46,6 +46,8 @@ struct FittedRun {
   std::vector<double> position_hat{};  ///< Simulated, as the sensor would have shown it.
   std::vector<double> velocity_hat{};  ///< Simulated, delayed and averaged as the sensor does.
   std::vector<double> velocity_residual{};  ///< velocity − velocity_hat.
+  /// Rows whose velocity is new: loggers repeat the last one in between, which is no residual.
+  std::vector<std::size_t> fresh{};
 };
 
 /// The feedforward model V = kS sgn(v) + kV v + kA a + gravity, with gravity nothing (flywheel),
@@ -58,7 +60,11 @@ struct FeedforwardFit {
   GainEstimate kA;                   ///< V/(unit/s²).
   std::optional<GainEstimate> kG{};  ///< V; elevators and arms.
   std::optional<GainEstimate>
-      angle_offset{};              ///< rad; arms: true angle from horizontal − measured.
+      angle_offset{};  ///< rad; arms: true angle from horizontal − measured.
+  /// V, of a lift that moves in one direction alone, where neither is determined: kS + kG (forward)
+  /// or kG − kS (in reverse).
+  std::optional<GainEstimate> gravity_with_friction{};
+  bool in_reverse = false;         ///< Whether that is kG − kS.
   std::vector<ModelTerm> terms{};  ///< Beyond the four gains; none of most logs.
 
   double r_squared = 0.0;        ///< Of the free-run simulated velocity, all used runs.
@@ -88,7 +94,7 @@ struct FitOptions {
 
 /// The answer with everything that led to it: also a refused recording can be plotted.
 struct FitReport {
-  PreparedRecording prepared;
+  PreparedRecording prepared;             ///< With the mechanism that was chosen, if it was open.
   std::vector<Diagnostic> diagnostics{};  ///< Of preparation and fit.
   Expected<FeedforwardFit> fit;
 };
@@ -101,6 +107,10 @@ struct FitReport {
 /// of unknown width, each with its own delay and scaled by its own median absolute deviation, under
 /// a soft-L1 loss. Intervals take the largest of three variance estimates: HAC, block sandwich and
 /// the residuals' own autocorrelation.
+///
+/// Where neither the recording nor the options say what the mechanism is, the data choose it if
+/// they can (`choose_mechanism`), with the warning "mechanism_assumed"; where they contradict what
+/// was said, there is the warning "mechanism_contradicted".
 ///
 /// @errors in `fit`: any IdentificationError; ArgumentError::wrong_shape for malformed columns.
 /// Cost: about 0.1 s for 10 000 rows; capped by `max_iterations`.

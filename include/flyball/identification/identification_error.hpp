@@ -4,9 +4,9 @@
 
 namespace flyball::identification {
 
-/// Why a recording gives no gains. All are answers, not misuse (exit status 1).
+/// Why a recording gives no gains. All but the first are answers, not misuse (exit status 1).
 enum class IdentificationError {
-  unknown_mechanism,  ///< Neither the recording nor the options say what the mechanism is.
+  unknown_mechanism,  ///< Nobody says what the mechanism is, and the data fit several kinds.
   no_data,            ///< No run with usable rows.
   no_motion,          ///< The mechanism did not move in any test.
   missing_tests,      ///< The tests that moved do not determine the gains together.

@@ -13,10 +13,11 @@ namespace flyball::identification {
 
 /// A run made fit for fitting: rows sorted, finite, signs corrected, its usable window marked.
 struct PreparedRun {
-  TestRun run;             ///< The rows kept; time starts as recorded.
-  std::size_t source = 0;  ///< Index of the run in the recording.
-  bool moved = false;      ///< Whether the mechanism moved as the voltage asked.
-  double direction = 1.0;  ///< Sign of the motion.
+  TestRun run;              ///< The rows kept; time starts as recorded.
+  std::size_t source = 0;   ///< Index of the run in the recording.
+  bool begins_cut = false;  ///< Rows before its first were cut by a person.
+  bool moved = false;       ///< Whether the mechanism moved as the voltage asked.
+  double direction = 1.0;   ///< Sign of the motion.
 
   std::size_t first = 0;        ///< First row of the usable window (start of the simulation).
   std::size_t last = 0;         ///< One past the last row of the usable window.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -46,6 +47,14 @@ struct TestRun {
   std::vector<double> voltage{};   ///< V, applied to the motors.
   std::vector<double> position{};  ///< m or rad, at the output.
   std::vector<double> velocity{};  ///< m/s or rad/s, at the output.
+
+  // What a person says of it.
+  double from = 0.0;  ///< s after its first row: what is before is not used.
+  double to = std::numeric_limits<double>::infinity();  ///< s after its first row.
+  bool left_out = false;                                ///< It is shown, not used.
+  [[nodiscard]] bool is_trimmed() const {
+    return from > 0.0 || to < std::numeric_limits<double>::infinity();
+  }
 };
 
 /// The characterisation tests of one mechanism, any number of each kind.

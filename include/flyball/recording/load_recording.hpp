@@ -33,18 +33,22 @@ struct LogSelection {
   bool no_velocity = false;     ///< Leave the velocity channel out; the position tells it.
   double scale = 1.0;           ///< Multiplies position and velocity: output units a recorded unit.
   double voltage_scale = 1.0;   ///< Volts a recorded unit of the voltage channel.
+  /// What to use of single runs, "2:0.5..3": of the second run what lies between 0.5 s and 3 s
+  /// after its start. "2:0.5.." and "2:..3" leave the other end.
+  std::vector<std::string> runs{};
+  std::vector<std::string> without_runs{};  ///< The numbers of runs that are not to be used.
 };
 
 /// Why a log cannot be turned into a recording.
 enum class RecordingError {
   drivetrain,         ///< A swerve drive's log, or two logs that are not of one drivetrain
                       ///< (no_answer).
-  mechanism_unknown,  ///< The log leaves the kind open; the person has to say it.
   no_test_state,      ///< No channel tells which test runs.
   no_channel,         ///< Voltage, or both of position and velocity, are missing.
   ambiguous_channel,  ///< Several mechanisms were recorded; the person has to choose.
   unit_unknown,       ///< Nothing tells the unit, and none can be assumed.
   unit_mismatch,      ///< The unit cannot be one of that mechanism, or not of both channels.
+  no_run,             ///< The person names a run that the log does not have.
   no_tests,           ///< A test state channel without a test.
 };
 [[nodiscard]] ErrorInfo error_info(RecordingError code);
@@ -55,9 +59,9 @@ enum class RecordingError {
 /// A log, read as the characterisation tests of one mechanism or drivetrain.
 struct LoadedRecording {
   std::string path{};
-  std::string format{};   ///< "SysId JSON", "WPILOG", "CSV".
-  std::string subject{};  ///< The mechanism's name in the log, or empty.
-  identification::Recording recording;
+  std::string format{};                 ///< "SysId JSON", "WPILOG", "CSV".
+  std::string subject{};                ///< The mechanism's name in the log, or empty.
+  identification::Recording recording;  ///< Without a mechanism if neither log nor person say it.
   std::optional<identification::DriveRecording> drive{};  ///< In its place, of a drivetrain.
   std::vector<Diagnostic> diagnostics{};  ///< What was found; assumptions have the code "assumed".
 };

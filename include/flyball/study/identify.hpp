@@ -20,7 +20,9 @@ struct IdentifyResult {
   recording::LoadedRecording source;
   identification::FitReport
       report;  ///< `report.fit` is the gains or the reason why there are none.
-  mechanisms::MechanismKind mechanism{};
+  /// As the log, the person or the data say; nothing for a log that was refused before it was
+  /// known.
+  std::optional<mechanisms::MechanismKind> mechanism{};
   std::string unit{};  ///< "m" or "rad".
   /// Of a drivetrain; then `report.fit` only says why there are no gains of one mechanism.
   std::optional<identification::DriveReport> drive{};
@@ -29,9 +31,12 @@ struct IdentifyResult {
   [[nodiscard]] std::vector<Diagnostic> diagnostics() const;
 };
 
-/// Runs the job. An error means that the log could not be read as a recording at all; a fit that
-/// was refused is in `report.fit`.
-/// @errors as `recording::load_recording`.
+/// Runs the job. Where neither the log nor the person say what the mechanism is, the data choose it
+/// (`identification::choose_mechanism`), and the units are those of that kind. An error means that
+/// the log could not be read as a recording at all; a fit that was refused is in `report.fit`.
+/// @errors as `recording::load_recording`; IdentificationError::unknown_mechanism where the data
+/// fit
+///         several kinds, together with RecordingError::unit_unknown where the unit is open too.
 [[nodiscard]] ExpectedAll<IdentifyResult> identify(const IdentifyJob& job);
 
 }  // namespace flyball::study

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
@@ -25,6 +26,10 @@ void write_gains(JsonWriter& json, const identification::FeedforwardFit& fit) {
     write_gain(json, "kA", fit.kA, fmt::format("V·s²/{}", fit.unit));
     if (fit.kG) {
       write_gain(json, "kG", *fit.kG, "V");
+    }
+    if (fit.gravity_with_friction) {
+      write_gain(json, fit.in_reverse ? "kG_minus_kS" : "kG_plus_kS", *fit.gravity_with_friction,
+                 "V");
     }
     if (fit.angle_offset) {
       write_gain(json, "angle_offset", *fit.angle_offset, "rad");
@@ -69,6 +74,15 @@ void write_source(JsonWriter& json, const recording::LoadedRecording& source) {
           json.add("test", to_string(run.kind));
           json.add("rows", run.time.size());
           json.add("duration", run.time.empty() ? 0.0 : run.time.back() - run.time.front());
+          if constexpr (requires { run.left_out; }) {
+            if (run.is_trimmed()) {
+              json.add("used_from", run.from);
+              json.add("used_to", std::isfinite(run.to) ? std::optional(run.to) : std::nullopt);
+            }
+            if (run.left_out) {
+              json.add("left_out", true);
+            }
+          }
         });
       });
     };
@@ -157,7 +171,9 @@ std::string title_of(const std::string& kind, const std::string& subject, const 
 }
 
 std::string kind_of(const IdentifyResult& result) {
-  return result.drive ? "drivetrain" : std::string(to_string(result.mechanism));
+  return result.drive       ? "drivetrain"
+         : result.mechanism ? std::string(to_string(*result.mechanism))
+                            : "mechanism";
 }
 
 Verdict verdict_of(const IdentifyResult& result) {
@@ -170,23 +186,32 @@ Verdict verdict_of(const IdentifyResult& result) {
   }
   const identification::FeedforwardFit& fit = *result.report.fit;
   Verdict verdict;
+  std::string assumed;
   for (const Diagnostic& found : result.diagnostics()) {
-    if (found.code == "unit_assumed") {
+    const bool unit = found.code == "unit_assumed";
+    const bool kind = found.code == "mechanism_assumed" || found.code == "mechanism_contradicted";
+    if (unit || kind) {
       verdict.add(Tone::caution, found.message);
+      assumed +=
+          (assumed.empty() ? "" : " and ") + std::string(unit ? "the unit" : "the mechanism");
     }
   }
-  const bool assumed = verdict.tone != Tone::good;
+  const bool several = assumed.find(" and ") != std::string::npos;
   const auto undetermined = [&](const char* name, const identification::GainEstimate& gain) {
     if (!gain.determined) {
       verdict.add(Tone::caution, fmt::format("the log does not determine {}", name));
     }
   };
-  undetermined("kS", fit.kS);
+  if (fit.gravity_with_friction) {
+    verdict.add(Tone::caution, fit.kS.reason);
+  } else {
+    undetermined("kS", fit.kS);
+    if (fit.kG) {
+      undetermined("kG", *fit.kG);
+    }
+  }
   undetermined("kV", fit.kV);
   undetermined("kA; the design does without it", fit.kA);
-  if (fit.kG) {
-    undetermined("kG", *fit.kG);
-  }
   if (fit.r_squared < poor_fit) {
     verdict.add(Tone::caution,
                 fmt::format("the simulated velocity explains only {} of the measured one: "
@@ -199,8 +224,9 @@ Verdict verdict_of(const IdentifyResult& result) {
                            "The gains can be used: the model explains {} of the measured "
                            "velocity.",
                            text::percent(fit.r_squared))
-                 : assumed ? "The gains can be used once the unit is confirmed."
-                           : "The gains can be used with care.";
+                 : assumed.empty() ? "The gains can be used with care."
+                                   : fmt::format("The gains can be used once {} {} confirmed.",
+                                                 assumed, several ? "are" : "is");
   return verdict;
 }
 

@@ -1,4 +1,7 @@
 // Pictures and tables of a log and its fit.
+#include <algorithm>
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include <flyball/io/csv.hpp>
@@ -19,29 +22,52 @@ std::string run_name(std::string_view prefix, std::size_t source, identification
   return fmt::format("{}_{}_{}", prefix, source + 1, to_string(kind));
 }
 
-Figure fitted_figure(const IdentifyResult& result, const FittedRun& run) {
+std::vector<double> at_rows(const std::vector<double>& values,
+                            const std::vector<std::size_t>& rows) {
+  std::vector<double> picked(rows.size());
+  std::transform(rows.begin(), rows.end(), picked.begin(),
+                 [&](std::size_t row) { return values[row]; });
+  return picked;
+}
+
+/// ", 500 ms to 3 s by hand" of a run that a person trimmed.
+std::string by_hand(const TestRun& run) {
+  if (run.left_out) {
+    return ", left out by hand";
+  }
+  if (!run.is_trimmed() || run.time.empty()) {
+    return "";
+  }
+  const double end = std::isfinite(run.to) ? run.to : run.from + run.time.back() - run.time.front();
+  return fmt::format(", {} to {} by hand", text::seconds(run.from), text::seconds(end));
+}
+
+Figure fitted_figure(const IdentifyResult& result, const FittedRun& run, const TestRun& recorded) {
   const std::string rate = result.unit + "/s";
   Figure figure = over_time(
       "gains", run_name("fit", run.source, run.kind),
-      fmt::format("Run {}: {}", run.source + 1, to_string(run.kind)),
+      fmt::format("Run {}: {}{}", run.source + 1, to_string(run.kind), by_hand(recorded)),
       fmt::format("Measured velocity against the velocity simulated in free run from the recorded "
-                  "voltage, their difference, and the voltage, over {}.",
+                  "voltage, their difference where the velocity is new, and "
+                  "the voltage, over {}.",
                   text::seconds(run.time.empty() ? 0.0 : run.time.back() - run.time.front())));
   figure.plot.panels = {
       panel({"Velocity", rate}, {line("measured", run.time, run.velocity, measured_color),
                                  line("simulated", run.time, run.velocity_hat, simulated_color)}),
       panel({"Residual", rate},
-            {line("measured − simulated", run.time, run.velocity_residual, quiet_color)}, true),
+            {line("measured − simulated", at_rows(run.time, run.fresh),
+                  at_rows(run.velocity_residual, run.fresh), quiet_color)},
+            true),
       panel({"Voltage", "V"}, {line("", run.time, run.voltage, voltage_color)}, true)};
   return figure;
 }
 
 Figure recorded_figure(const IdentifyResult& result, const PreparedRun& prepared) {
   const TestRun& run = prepared.run;
-  Figure figure =
-      over_time("data", run_name("recorded", prepared.source, run.kind),
-                fmt::format("Run {}: {}, as recorded", prepared.source + 1, to_string(run.kind)),
-                "Voltage, velocity and position as the log has them.");
+  Figure figure = over_time("data", run_name("recorded", prepared.source, run.kind),
+                            fmt::format("Run {}: {}, as recorded{}", prepared.source + 1,
+                                        to_string(run.kind), by_hand(run)),
+                            "Voltage, velocity and position as the log has them.");
   const auto add = [&](const Coordinate& shown, const std::vector<double>& values, int color) {
     if (!values.empty()) {
       figure.plot.panels.push_back(panel(shown, {line("", run.time, values, color)}));
@@ -92,7 +118,7 @@ std::vector<Figure> figures_of(const IdentifyResult& result) {
     const FittedRun* fitted = fitted_run(result, prepared.source);
     const bool simulated = fitted != nullptr && fitted->used && !fitted->time.empty() &&
                            fitted->velocity_hat.size() == fitted->time.size();
-    figures.push_back(simulated ? fitted_figure(result, *fitted)
+    figures.push_back(simulated ? fitted_figure(result, *fitted, prepared.run)
                                 : recorded_figure(result, prepared));
   }
   return figures;

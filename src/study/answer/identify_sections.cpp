@@ -54,10 +54,15 @@ Table runs_table(const IdentifyResult& result) {
   const std::string rate = result.unit + "/s";
   const std::vector<PreparedRun> shown = shown_runs(result);
   Table table;
-  table.header = {"test",      "rows",        "time (s)",
-                  "used (s)",  "voltage (V)", "top speed (" + rate + ")",
+  table.header = {"run",
+                  "test",
+                  "rows",
+                  "time (s)",
+                  "used (s)",
+                  "voltage (V)",
+                  "top speed (" + rate + ")",
                   "in the fit"};
-  table.words = {0, 6};
+  table.words = {1, 7};
   const auto cell = [](double value, const std::string& unit) {
     return quantity(value, unit, 3, /*shown=*/false);
   };
@@ -75,10 +80,15 @@ Table runs_table(const IdentifyResult& result) {
       const std::vector<double>& speed =
           prepared.run.velocity.empty() ? prepared.smoothed_velocity : prepared.run.velocity;
       Value state = used ? Value("yes", Tone::good) : Value("no", Tone::caution);
-      if (!prepared.moved) {
+      if (prepared.run.left_out) {
+        state = {"left out by hand", Tone::quiet};
+      } else if (!prepared.moved) {
         state = {"did not move", Tone::bad};
+      } else if (prepared.run.is_trimmed()) {
+        state.text += ", trimmed by hand";
       }
-      table.rows.push_back({std::string(to_string(kind)), fmt::to_string(prepared.run.time.size()),
+      table.rows.push_back({fmt::to_string(prepared.source + 1), std::string(to_string(kind)),
+                            fmt::to_string(prepared.run.time.size()),
                             cell(duration(prepared.run.time), "s"),
                             fitted != nullptr ? cell(duration(fitted->time), "s") : "",
                             cell(largest_magnitude(prepared.run.voltage), "V"),
@@ -86,7 +96,7 @@ Table runs_table(const IdentifyResult& result) {
     }
     if (!found) {
       table.rows.push_back(
-          {std::string(to_string(kind)), "0", "", "", "", "", Value("missing", Tone::caution)});
+          {"", std::string(to_string(kind)), "0", "", "", "", "", Value("missing", Tone::caution)});
     }
   }
   return table;
@@ -114,6 +124,11 @@ Table gains_table(const FeedforwardFit& fit) {
     const bool arm = fit.mechanism == mechanisms::MechanismKind::arm;
     table.rows.push_back(
         gain_row("kG", *fit.kG, "V", one.kG, has, arm ? "hold the arm level" : "hold it up"));
+  }
+  if (fit.gravity_with_friction) {
+    table.rows.push_back(gain_row(fit.in_reverse ? "kG − kS" : "kG + kS",
+                                  *fit.gravity_with_friction, "V", 0.0, false,
+                                  fit.in_reverse ? "let it down" : "move it up"));
   }
   if (fit.angle_offset) {
     table.rows.push_back(gain_row("offset", *fit.angle_offset, "rad", one.angle_offset, has,
@@ -273,11 +288,18 @@ Section gains_section(const IdentifyResult& result) {
           Paragraph{fmt::format("{} is not determined: {}.", name, gain.reason), Tone::caution});
     }
   };
-  explain("kS", fit.kS);
-  explain("kV", fit.kV);
-  if (fit.kG) {
-    explain("kG", *fit.kG);
+  if (fit.gravity_with_friction) {
+    section.blocks.emplace_back(
+        Paragraph{"kS and kG are not determined: " + fit.kS.reason +
+                      ". A design takes all of it for gravity: the way up and holding are right.",
+                  Tone::caution});
+  } else {
+    explain("kS", fit.kS);
+    if (fit.kG) {
+      explain("kG", *fit.kG);
+    }
   }
+  explain("kV", fit.kV);
   if (fit.angle_offset) {
     explain("The angle offset", *fit.angle_offset);
   }
