@@ -36,6 +36,19 @@ void mark_undetermined(GainEstimate& gain, double upper_bound, std::string reaso
   gain.reason = std::move(reason);
 }
 
+/// V/s, from where the voltage rises to where it is largest.
+double ramp_rate(const ResidualRun& run) {
+  const std::vector<double>& voltage = run.input.voltage;
+  std::size_t first = 0;
+  std::size_t last = 0;
+  for (std::size_t k = 0; k < voltage.size(); ++k) {
+    first = voltage[k] == 0.0 && last == 0 ? k : first;
+    last = std::abs(voltage[k]) > std::abs(voltage[last]) ? k : last;
+  }
+  const double time = run.input.time[last] - run.input.time[first];
+  return time > 0.0 ? std::abs(voltage[last] - voltage[first]) / time : 0.0;
+}
+
 Eigen::VectorXd unit_gradient(Eigen::Index size, Eigen::Index at) {
   return Eigen::VectorXd::Unit(size, at);
 }
@@ -206,30 +219,32 @@ void estimate_what_tests_leave(const TestCoverage& coverage, const OutputErrorPr
     // A ramp's speed-up takes kA r / kV volts of a rate of r V/s, which look like friction.
     double rate = 1e-3;
     for (const ResidualRun& run : problem.runs()) {
-      rate = std::max(rate, std::abs(run.input.voltage.back() - run.input.voltage.front()) /
-                                (run.input.time.back() - run.input.time.front()));
+      rate = std::max(rate, ramp_rate(run));
     }
+    const double tau = std::min(std::exp(x[parameter::log_time_constant]), longest_usual);
     const double share = rate * longest_usual;
-    const auto widen = [&](GainEstimate& gain, std::size_t end) {
-      gain.interval[end] += end == 0 ? -share : share;
+    const auto widen = [&](GainEstimate& gain, double sign) {
+      const double low = -rate * (sign > 0.0 ? longest_usual - tau : tau);
+      gain.interval[0] += low;
+      gain.interval[1] += low + share;
       gain.standard_error = (gain.interval[1] - gain.interval[0]) / (2.0 * normal_95);
     };
     if (fit.gravity_with_friction) {
-      widen(*fit.gravity_with_friction, fit.in_reverse ? 1 : 0);
+      widen(*fit.gravity_with_friction, fit.in_reverse ? -1.0 : 1.0);
     } else {
-      widen(fit.kS, 0);
+      widen(fit.kS, 1.0);
       fit.kS.interval[0] = std::max(0.0, fit.kS.interval[0]);
     }
     const double bound =
         std::max(1e-3, fit.kS.determined ? fit.kS.interval[1] : fit.kS.upper_bound) * fit.kV.value /
         rate;
-    fit.kA.interval = {0.0, bound};
+    fit.kA.interval = {0.0, std::max(bound, fit.kA.value)};
     mark_undetermined(
-        fit.kA, bound,
-        detail::format("there is no dynamic test, so it is taken for zero; for a kA/kV of up to "
-                       "{:.1f} s, {:.2g} V of kS are the ramps' own speed-up; dynamic-forward "
+        fit.kA, fit.kA.interval[1],
+        detail::format("there is no dynamic test, so kA/kV is supposed to be near {:.1f} s; for up "
+                       "to {:.1f} s, {:.2g} V of kS are the ramps' own speed-up; dynamic-forward "
                        "would tell",
-                       longest_usual, share));
+                       usual_time_constant, longest_usual, share));
   }
 }
 

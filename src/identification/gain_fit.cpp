@@ -19,7 +19,7 @@ Eigen::VectorXd make_start(const OutputErrorProblem& problem, const StartGains& 
   x[parameter::static_friction] = gains.kS;
   x[parameter::velocity_gain] = gains.kV;
   x[parameter::log_time_constant] =
-      std::log(problem.hides_inertia() ? shortest_time_constant : time_constant);
+      std::log(problem.hides_inertia() ? usual_time_constant : time_constant);
   x[parameter::gravity_cosine] = gains.gravity_cosine;
   x[parameter::gravity_sine] = gains.gravity_sine;
   x[parameter::headroom] = no_limit;

@@ -170,6 +170,9 @@ OutputErrorProblem::OutputErrorProblem(const PreparedRecording& recording,
   priors_ = {{parameter::position_delay, 0.015, 0.015},
              {parameter::velocity_delay, 0.035, 0.025},
              {parameter::averaging_width, 0.03, 0.05}};
+  if (hides_inertia_) {
+    priors_.push_back({parameter::log_time_constant, std::log(usual_time_constant), 1.0});
+  }
   for (std::size_t i = 0; i < runs_.size(); ++i) {
     priors_.push_back(
         {initial_velocity_of(i), runs_[i].likely_initial_velocity, 0.1 * recording_.top_speed});
@@ -318,7 +321,6 @@ double OutputErrorProblem::position_shown(std::size_t run, const Eigen::VectorXd
 std::vector<bool> OutputErrorProblem::free_parameters() const {
   std::vector<bool> free(static_cast<std::size_t>(parameters()), true);
   free[parameter::static_friction] = !hides_friction_;
-  free[parameter::log_time_constant] = !hides_inertia_;
   free[parameter::gravity_cosine] = mechanism_ != MechanismKind::flywheel;
   free[parameter::gravity_sine] = mechanism_ == MechanismKind::arm;
   for (const int term :

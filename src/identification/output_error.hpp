@@ -58,6 +58,9 @@ struct ResidualRun {
   std::vector<double> angle;
 };
 
+/// s, kA/kV of a mechanism of which nothing is known, give or take a factor of e.
+inline constexpr double usual_time_constant = 0.1;
+
 /// Measured − simulated with its Jacobian, in units of the channel; differences first.
 struct ResidualBlock {
   Eigen::VectorXd difference;

@@ -67,36 +67,51 @@ std::string_view folder_of(std::string_view name) {
   return slash == std::string_view::npos ? std::string_view() : name.substr(0, slash);
 }
 
+bool is_tested(const FoundTests& tests, double time) {
+  return tests.windows.empty() ||
+         std::any_of(tests.windows.begin(), tests.windows.end(),
+                     [&](const auto& window) { return time >= window.begin && time < window.end; });
+}
+
 /// How far another channel is from the first one's values in the tests, as a share of those: leader
-/// and followers show the same, perhaps with the other sign, positions perhaps from another zero.
+/// and followers show the same, perhaps with the other sign, positions perhaps from another zero,
+/// and each in its own row: what lies between the neighbouring rows is no difference.
 double disagreement(const Signal& first, const Signal& other, const FoundTests& tests,
                     Channel quantity) {
-  double sums[5] = {0.0, 0.0, 0.0, 0.0, 0.0};
+  double sum_a = 0.0;
+  double sum_b = 0.0;
+  double squares = 0.0;
+  double products = 0.0;
   double rows = 0.0;
   std::size_t at = 0;
   for (std::size_t i = 0; i < first.time.size(); ++i) {
-    const double time = first.time[i];
-    const bool tested =
-        tests.windows.empty() ||
-        std::any_of(tests.windows.begin(), tests.windows.end(),
-                    [&](const auto& window) { return time >= window.begin && time < window.end; });
-    if (!tested) {
-      continue;
+    if (is_tested(tests, first.time[i])) {
+      const double a = first.value[i];
+      const double b = interpolate(other, first.time[i], at);
+      rows += 1.0;
+      sum_a += a;
+      sum_b += b;
+      squares += a * a;
+      products += a * b;
     }
-    const double a = first.value[i];
-    const double b = interpolate(other, time, at);
-    rows += 1.0;
-    sums[0] += a;
-    sums[1] += b;
-    sums[2] += a * a;
-    sums[3] += b * b;
-    sums[4] += a * b;
   }
-  const double centre = quantity == Channel::position ? 1.0 / std::max(1.0, rows) : 0.0;
-  const double own = sums[2] - centre * sums[0] * sums[0];
-  const double theirs = sums[3] - centre * sums[1] * sums[1];
-  const double common = std::abs(sums[4] - centre * sums[0] * sums[1]);
-  return own > 0.0 ? std::sqrt(std::max(0.0, own + theirs - 2.0 * common) / own) : 1.0;
+  const double share = quantity == Channel::position ? 1.0 / std::max(1.0, rows) : 0.0;
+  const double own = squares - share * sum_a * sum_a;
+  const double sign = products - share * sum_a * sum_b < 0.0 ? -1.0 : 1.0;
+  const double zero = share * (sum_a - sign * sum_b);
+  double missed = 0.0;
+  at = 0;
+  for (std::size_t i = 0; i < first.time.size(); ++i) {
+    if (is_tested(tests, first.time[i])) {
+      const double b = interpolate(other, first.time[i], at);
+      const std::size_t next = std::min(at + 1, other.value.size() - 1);
+      const auto [low, high] = std::minmax({b, other.value[at], other.value[next]});
+      const double wanted = sign * (first.value[i] - zero);
+      const double off = wanted - std::clamp(wanted, low, high);
+      missed += off * off;
+    }
+  }
+  return own > 0.0 ? std::sqrt(missed / own) : 1.0;
 }
 
 Expected<const Signal*> choose(const Log& log, const FoundTests& tests, Channel quantity,

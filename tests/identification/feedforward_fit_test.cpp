@@ -265,7 +265,9 @@ TEST(FeedforwardFit, TheSameTestsRecordedTwiceAreUsedTogether) {
   ASSERT_TRUE(fit) << to_string(fit.error());
   const auto once = fit_feedforward(record(elevator));
   expect_near(fit->kV, 4.0, 0.005);
-  EXPECT_LT(fit->kV.standard_error, once->kV.standard_error);
+  // What differs between the tests, not the rows, is what the interval is made of.
+  EXPECT_LT(fit->kV.standard_error, 1.3 * once->kV.standard_error);
+  EXPECT_LT(fit->kA.standard_error, 1.3 * once->kA.standard_error);
   EXPECT_EQ(fit->runs.size(), 8U);
 }
 

@@ -37,13 +37,14 @@ TEST(TestKind, KnowsRampsAndDirections) {
 
 TEST(IdentificationError, AreAnswersNotMisuse) {
   for (const IdentificationError code :
-       {IdentificationError::unknown_mechanism, IdentificationError::no_data,
-        IdentificationError::no_motion, IdentificationError::missing_tests,
-        IdentificationError::too_short, IdentificationError::singular,
-        IdentificationError::unphysical_gains}) {
+       {IdentificationError::no_data, IdentificationError::no_motion,
+        IdentificationError::missing_tests, IdentificationError::too_short,
+        IdentificationError::singular, IdentificationError::unphysical_gains}) {
     EXPECT_EQ(error_info(code).kind, ErrorKind::no_answer);
     EXPECT_EQ(error_info(code).family, "identification");
   }
+  // The person can say it.
+  EXPECT_EQ(error_info(IdentificationError::unknown_mechanism).kind, ErrorKind::misuse);
 }
 
 }  // namespace

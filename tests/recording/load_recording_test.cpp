@@ -306,12 +306,13 @@ TEST(Recording, ADrivetrainIsToldByItsName) {
     EXPECT_TRUE(swerve.error().is(RecordingError::drivetrain)) << name;
     EXPECT_NE(to_string(swerve.error()).find("--mechanism flywheel"), std::string::npos);
   }
-  EXPECT_EQ(refusal_of(four_controllers("sysid-test-state-Wrist"), {}), "ambiguous_channel");
+  // Four motors that show the same are one mechanism's.
+  EXPECT_EQ(refusal_of(four_controllers("sysid-test-state-Wrist"), {}), "accepted");
   // Not every word that begins so is one.
-  EXPECT_EQ(refusal_of(four_controllers("sysid-test-state-Screwdriver"), {}), "ambiguous_channel");
+  EXPECT_EQ(refusal_of(four_controllers("sysid-test-state-Screwdriver"), {}), "accepted");
   // What the person says has the last word.
   const Log drive = four_controllers("sysid-test-state-DriveSubsystem");
-  EXPECT_EQ(refusal_of(drive, {.mechanism = MechanismKind::flywheel}), "ambiguous_channel");
+  EXPECT_EQ(refusal_of(drive, {.mechanism = MechanismKind::flywheel}), "accepted");
   LogSelection one_motor;
   one_motor.mechanism = MechanismKind::flywheel;
   one_motor.voltage_channel = drive.signals[0].name;
@@ -338,10 +339,10 @@ TEST(Recording, SidesMayBeOneLetterOrOneWord) {
   Log log = four_controllers("sysid-test-state-Base");
   log.signals.push_back(signal("Level position", "", linear));
   log.signals.push_back(signal("Roller position", "", linear));
-  EXPECT_EQ(refusal_of(log, {}), "ambiguous_channel");
+  EXPECT_EQ(refusal_of(log, {}), "accepted");  // As of motors that show the same.
 }
 
-// Two motors lift it: which one was recorded is asked, and a side once said is kept.
+// Two motors lift it: where they differ it is asked which is meant, and a side once said is kept.
 TEST(Recording, AnElevatorMayHaveALeftAndARightMotor) {
   Log log = wpilog("Meter");
   log.texts[0].name = "sysid-test-state-Elevator";
@@ -352,6 +353,10 @@ TEST(Recording, AnElevatorMayHaveALeftAndARightMotor) {
     log.signals.push_back(
         signal(std::string(side) + " carriage velocity", "Meter per Second", one));
   }
+  EXPECT_EQ(refusal_of(log, {}), "accepted");
+  log.signals[1] = signal("left carriage position", "Meter", [](double t) { return 0.5 * t; });
+  EXPECT_EQ(refusal_of(log, {}), "accepted");  // The voltage's own side.
+  log.signals[0] = signal("left applied volts", "Volt", [](double t) { return 0.5 * volts(t); });
   EXPECT_EQ(refusal_of(log, {}), "ambiguous_channel");
   LogSelection selection;
   selection.voltage_channel = "right applied volts";
