@@ -187,8 +187,8 @@ int main(int argc, char** argv) {
   std::string_view only;
   std::string_view of_family = "clean";
   bool open = false;
-  for (int i = 1; i + 1 < argc; i += 2) {
-    const std::string_view option = argv[i];
+  for (int i = 1; i < argc; i += 2) {
+    const std::string_view option = i + 1 < argc ? argv[i] : "";
     if (option == "--seeds") {
       seeds = std::strtoull(argv[i + 1], nullptr, 10);
     } else if (option == "--seed") {
