@@ -253,5 +253,13 @@ TEST(SolveDesigns, PidByPoles) {
   EXPECT_EQ(refusal("pid-by-poles", R"({"A":[[-2]],"B":[[0]])" + loop), "not_positive");
 }
 
+// Sixteenths of the period are zero: the search for the delay margin ends all the same.
+TEST(SolveDesigns, MarginsOfASubnormalPeriod) {
+  const Json margins = answer(
+      "margins",
+      R"({"A":[[-3]],"B":[[0]],"C":[[1.8],[0]],"K":[[0.7]],"K_e":[[1e-8,-22000]],"T":5e-324})");
+  EXPECT_EQ(margins.at("gain_crossovers").size(), 0u);
+}
+
 }  // namespace
 }  // namespace flyball::solve
