@@ -1,5 +1,6 @@
 #include <flyball/identification/motor_curve.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -54,6 +55,21 @@ GainEstimate propagated(const F& f, const Regression& torque, const Regression& 
     slope(i) = (f(above) - f(below)) / (above(i) - below(i));
   }
   return symmetric_estimate(f(at), std::sqrt(std::max(0.0, slope.dot(covariance * slope))));
+}
+
+/// How many rows at the start are of one state of the motor: warm windings, and worse ones that
+/// burn, take current away.
+Index steady_rows(const VectorXd& current) {
+  constexpr Index first = 5;
+  constexpr double share = 0.8;
+  VectorXd start = current.head(first);
+  std::sort(start.begin(), start.end());
+  const double level = start(first / 2);
+  Index rows = first;
+  while (rows < current.size() && current(rows) > share * level && current(rows) * share < level) {
+    ++rows;
+  }
+  return rows;
 }
 
 double root_mean_square(const VectorXd& values) {
@@ -131,23 +147,24 @@ Expected<LockedRotorConstants> fit_locked_rotor(const LockedRotor& run) {
         .got("not positive throughout")
         .expected("the rows in which the motor is driven");
   }
+  const Index used = steady_rows(run.current);
+  const VectorXd current = run.current.head(used);
   LeastSquaresOptions options;
   options.errors = ErrorModel::hac;
-  FLYBALL_TRY(const LeastSquares torque, least_squares(run.current, run.torque, options));
-  const double span = run.time(rows - 1) - run.time(0);
-  if (!(span > 0.0)) {
+  FLYBALL_TRY(const LeastSquares torque, least_squares(current, run.torque.head(used), options));
+  const VectorXd time = run.time.head(used).array() - run.time(0);
+  if (!(time(used - 1) > 0.0)) {
     return refusal(IdentificationError::singular, rotor_name).hint("give the rows in their order");
   }
-  const Eigen::ArrayXd t = (run.time.array() - run.time(0)) / span;
-  MatrixXd X(rows, 3);
-  X << VectorXd::Ones(rows), t.matrix(), t.square().matrix();
+  MatrixXd X(used, 2);
+  X << VectorXd::Ones(used), time;
   FLYBALL_TRY(const LeastSquares resistance,
-              least_squares(X, run.voltage.cwiseQuotient(run.current), options));
+              least_squares(X, run.voltage.head(used).cwiseQuotient(current), options));
   LockedRotorConstants found;
+  found.rows = used;
   found.Kt = symmetric_estimate(torque.coefficients(0), torque.standard_errors(0));
   found.R = symmetric_estimate(resistance.coefficients(0), resistance.standard_errors(0));
-  found.R_rise =
-      (resistance.coefficients(1) + resistance.coefficients(2)) / resistance.coefficients(0);
+  found.R_rise = resistance.coefficients(1) * time(used - 1) / resistance.coefficients(0);
   return found;
 }
 

@@ -129,6 +129,34 @@ TEST_F(Command, FitsAModelToATableWithoutTime) {
   EXPECT_NEAR(Json::parse(answer.out).at("parameters")[1].at("value").get<double>(), 0.5, 1e-5);
 }
 
+// Equations 12.4 to 12.6 of a curve at 12 V, with the header of a dynamometer.
+TEST_F(Command, FindsAMotorsConstantsInItsCurve) {
+  std::string table =
+      "Speed (RPM),Torque (N\xB7m),Current (A),Supplied Power (W),Efficiency (%)\r\n";
+  for (int row = 0; row <= 20; ++row) {
+    const double share = row / 20.0;
+    const double current = 133.0 + (2.7 - 133.0) * share;
+    table += std::to_string(5310.0 * share) + "," + std::to_string(2.42 * (1.0 - share)) + "," +
+             std::to_string(current) + "," + std::to_string(12.0 * current) + ",1\r\n";
+  }
+  write("cim-motor-curve.csv", table);
+  const Answer answer = run("motor-curves cim-motor-curve.csv --json");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  const Json file = Json::parse(answer.out).at("files")[0];
+  EXPECT_EQ(file.at("motor"), "CIM");
+  EXPECT_NEAR(file.at("voltage").get<double>(), 12.0, 1e-6);
+  EXPECT_NEAR(file.at("R").at("value").get<double>(), 12.0 / 133.0, 1e-8);
+  EXPECT_NEAR(file.at("Kt").at("value").get<double>(), 2.42 / 133.0, 1e-8);
+  EXPECT_NEAR(file.at("free_speed").get<double>(), 556.0619, 1e-3);
+  EXPECT_TRUE(holds(run("motor-curves cim-motor-curve.csv").out, "straight lines"));
+  write("power.csv", "Time,Current (A),Power Output (W)\n0,83,374\n1,82,370\n2,80,365\n");
+  const Answer refused = run("motor-curves power.csv");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_TRUE(holds(refused.err, "power.csv: a column of torque is not there")) << refused.err;
+  EXPECT_EQ(run("motor-curves nothing.csv").status, 2);
+  EXPECT_EQ(run("motor-curves cim-motor-curve.csv --voltage -1").status, 2);
+}
+
 TEST_F(Command, RefusesWhatAFitOfAModelCannotUse) {
   write("lag.toml", lag);
   write("lag.csv", lag_table(true));

@@ -164,6 +164,12 @@ def check_motors(folder):
     check_answer(["motors"], 0, folder)
     check_answer(["motors", "NEO"], 0, folder)
     check_answer(["motors", "nothing"], 2, folder)
+    rows = [f"{s},{2.42 * (1 - s / 5310)},{133 - 130.3 * s / 5310}" for s in range(0, 5311, 531)]
+    (folder / "cim.csv").write_text("Speed (RPM),Torque (N m),Current (A)\n" + "\n".join(rows))
+    rows = [f"{0.1 * k},12.0,2.4,{130 - 0.2 * k}" for k in range(20)]
+    (folder / "held.csv").write_text("Time,Volts,Torque (N m),Amps\n" + "\n".join(rows))
+    check_answer(["motor-curves", "cim.csv", "held.csv"], 0, folder)
+    check_answer(["motor-curves", "cim.csv", "--motor", "nothing"], 2, folder)
 
 
 def check_places(folder):

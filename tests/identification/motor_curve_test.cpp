@@ -70,17 +70,19 @@ TEST(MotorCurve, ALockedRotorHeats) {
   LockedRotor run;
   run.time = VectorXd::LinSpaced(rows, 0.0, 30.0);
   run.voltage = VectorXd::Constant(rows, 6.0);
-  run.current.resize(rows);
-  Random random(4);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    const double warm = run.time(i) / 30.0;
-    run.current(i) = 6.0 / (0.09 * (1.0 + 0.3 * warm - 0.05 * warm * warm));
-  }
+  run.current = 6.0 / (0.09 * (1.0 + 0.01 * run.time.array()));
   run.torque = 0.0184 * run.current;
   const auto exact = fit_locked_rotor(run).value();
   EXPECT_NEAR(exact.R.value, 0.09, 1e-12);
-  EXPECT_NEAR(exact.R_rise, 0.25, 1e-10);
-  EXPECT_NEAR(exact.Kt.value, 0.0184, 1e-15);
+  EXPECT_NEAR(exact.Kt.value, 0.0184, 1e-14);
+  // 1.25 times the third row's R is reached after 25.9 s; rows are 30/79 s apart.
+  EXPECT_EQ(exact.rows, 69);
+  EXPECT_NEAR(exact.R_rise, 0.01 * run.time(68), 1e-10);
+  // What burns after that changes nothing.
+  LockedRotor burnt = run;
+  burnt.current.tail(11).setConstant(1.0);
+  EXPECT_EQ(fit_locked_rotor(burnt)->R.value, exact.R.value);
+  Random random(4);
   for (Eigen::Index i = 0; i < rows; ++i) {
     run.torque(i) += 0.01 * random.normal();
     run.current(i) *= 1.0 + 0.005 * random.normal();

@@ -36,9 +36,10 @@ struct MotorConstants {
 
 /// What a locked rotor says.
 struct LockedRotorConstants {
-  GainEstimate R{};     ///< Ω, at the first row, before the windings are warm.
-  GainEstimate Kt{};    ///< N m/A, τ = K_t I (12.2).
-  double R_rise = 0.0;  ///< Of R from the first row to the last, as a share.
+  GainEstimate R{};       ///< Ω, at the first row, before the windings are warm.
+  GainEstimate Kt{};      ///< N m/A, τ = K_t I (12.2).
+  Eigen::Index rows = 0;  ///< Used: from the first until the current has changed by a fifth.
+  double R_rise = 0.0;    ///< Of R from the first row to the last that is used, as a share.
 };
 
 /// The constants of a motor from its curve: torque and current are straight lines of the speed
@@ -51,8 +52,9 @@ struct LockedRotorConstants {
 [[nodiscard]] Expected<MotorConstants> fit_motor_curve(std::string_view name,
                                                        const MotorCurve& curve);
 
-/// K_t by least squares through the origin; R = V/I as a parabola of time, at the first row. The
-/// errors of rows that follow each other are correlated (Newey and West).
+/// K_t by least squares through the origin; R = V/I as a line of time, at the first row, both until
+/// the current has changed by a fifth: then the windings are warm, or burn. The errors of rows that
+/// follow each other are correlated (Newey and West).
 /// @errors as fit_motor_curve; at least five rows.
 /// Cost: O(rows). Source: book, equations 12.1, 12.2 and 12.5.
 [[nodiscard]] Expected<LockedRotorConstants> fit_locked_rotor(const LockedRotor& run);
