@@ -30,6 +30,7 @@ struct MotorCurveFile {
   std::optional<mechanisms::DcMotor> known{};  ///< The table's.
 };
 
+/// What all files say, in the order in which they were given.
 struct MotorCurvesResult {
   std::vector<MotorCurveFile> files;
   std::vector<Diagnostic> diagnostics{};
