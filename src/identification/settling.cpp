@@ -63,15 +63,16 @@ std::optional<LaterStarts> without_irregular_starts(OutputErrorProblem& problem,
       continue;
     }
     const double noise = mad_scale(calm);
-    // A value that is a row older or younger than supposed misses by the speed-up in that time.
+    // A value that is a row older or younger than supposed misses by what the speed, on its way to
+    // V/kV, changes in that time.
     double most = 0.0;
     for (const double voltage : run.input.voltage) {
       most = std::max(most, std::abs(voltage));
     }
-    const double speed_up =
-        most / (x[parameter::velocity_gain] * std::exp(x[parameter::log_time_constant]));
-    const double limit = std::max(
-        {irregular * noise, visible * recording.top_speed, 1.5 * speed_up * recording.row_period});
+    const double tau = std::exp(x[parameter::log_time_constant]);
+    const double a_row =
+        most / x[parameter::velocity_gain] * -std::expm1(-recording.row_period / tau);
+    const double limit = std::max({irregular * noise, visible * recording.top_speed, 1.5 * a_row});
     double end = edge;
     double largest = 0.0;
     for (const auto& [time, value] : residuals) {

@@ -99,7 +99,9 @@ Error no_column(std::string_view what, const Log& log) {
     names.push_back("\"" + signal.name + "\"");
   }
   return Error(refusal(ArgumentError::empty, where, std::string(what))
-                   .got(fmt::format("not there, among {}", fmt::join(names, ", ")))
+                   .got(names.size() < 2
+                            ? std::string("not there: this is no table of numbers")
+                            : fmt::format("not there, among {}", fmt::join(names, ", ")))
                    .expected("speed, torque and current (a motor curve), or time, voltage, torque "
                              "and current (a locked rotor)"));
 }

@@ -154,6 +154,8 @@ TEST_F(Command, FindsAMotorsConstantsInItsCurve) {
   EXPECT_EQ(refused.status, 2);
   EXPECT_TRUE(holds(refused.err, "power.csv: a column of torque is not there")) << refused.err;
   EXPECT_EQ(run("motor-curves nothing.csv").status, 2);
+  write("words.csv", "a,b\nx,y\nz,w\n");
+  EXPECT_EQ(run("motor-curves words.csv").status, 2);
   EXPECT_EQ(run("motor-curves cim-motor-curve.csv --voltage -1").status, 2);
 }
 

@@ -181,6 +181,23 @@ TEST(FeedforwardFit, RampsAloneTellAllButKa) {
   }
 }
 
+// What a ramp of a slow or a quick mechanism is taken for is not decided by what is usual.
+TEST(FeedforwardFit, RampsOfUnusualArmsHoldTheTruth) {
+  for (const double kA : {0.012, 0.15, 0.6}) {
+    auto options = scenarios::session(scenarios::mechanisms[arm], 3);
+    options.kA = kA;
+    const auto fit =
+        fit_feedforward(only(flyball::record_characterization(options).value(), {0, 1}));
+    ASSERT_TRUE(fit) << kA << ": " << to_string(fit.error());
+    EXPECT_TRUE(holds(fit->kV, 1.2))
+        << kA << " " << fit->kV.value << " ± " << 1.96 * fit->kV.standard_error;
+    expect_near(fit->kV, 1.2, 0.02);
+    EXPECT_TRUE(holds(fit->kS, 0.1)) << kA;
+    EXPECT_TRUE(holds(*fit->kG, 0.65)) << kA;
+    EXPECT_GE(fit->kA.upper_bound, kA);
+  }
+}
+
 TEST(FeedforwardFit, OneRampOfAFlywheelTellsFrictionAndSpeed) {
   const auto fit = fit_feedforward(only(record(flywheel), {0}));
   ASSERT_TRUE(fit) << to_string(fit.error());

@@ -66,6 +66,18 @@ TEST_P(MonteCarlo, RecoversTheGainsWithHonestIntervals) {
   }
 }
 
+// A sensor whose value is a row late misses a step's start by what the speed changes in a row.
+TEST(CleanSessions, HaveNoBacklash) {
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    const auto recording =
+        flyball::record_characterization(scenarios::session(scenarios::mechanisms[2], seed));
+    const auto report = flyball::identification::identify_feedforward(recording.value());
+    for (const flyball::Diagnostic& diagnostic : report.diagnostics) {
+      EXPECT_NE(diagnostic.code, "backlash") << "seed " << seed;
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Mechanisms, MonteCarlo, testing::Range<std::size_t>(0, 6));
 
 }  // namespace

@@ -175,6 +175,25 @@ TEST(Recording, MotorsThatShowTheSameAreOneMechanisms) {
   EXPECT_GT(loaded->recording.runs[0].voltage.back(), 0.0);
 }
 
+// Two encoders that turn opposite ways from zeros of their own, neither named as the voltage is.
+TEST(Recording, EncodersOfOneMechanismMayHaveTheirOwnZeros) {
+  const auto log_with = [](double (*other)(double)) {
+    Log log = wpilog("Rotation");
+    log.signals[1].name = "left encoder angle";
+    log.signals[2].name = "left encoder speed";
+    log.signals.push_back(signal("right encoder angle", "Rotation", other, 0.02, 0.004));
+    std::erase_if(log.signals, [](const Signal& s) { return s.name.starts_with("NT:"); });
+    return log;
+  };
+  const auto alike = recording_from_log(log_with([](double t) { return 7.0 - linear(t); }),
+                                        {.mechanism = MechanismKind::arm});
+  ASSERT_TRUE(alike) << to_string(alike.error());
+  EXPECT_NE(told(*alike, "several_motors"), nullptr);
+  EXPECT_EQ(code_of(log_with([](double t) { return 7.0 - 1.2 * linear(t); }),
+                    {.mechanism = MechanismKind::arm}),
+            "ambiguous_channel");
+}
+
 TEST(Recording, MotorsThatDifferHaveToBeChosenFrom) {
   const Log log =
       with_follower([](double t) { return 0.7 * volts(t); }, [](double t) { return 3.0 - t; });

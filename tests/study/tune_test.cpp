@@ -17,7 +17,7 @@ namespace {
 
 using mechanisms::MechanismKind;
 
-TEST(Tune, GoesFromALogToAProvenController) {
+CharacterizationOptions arm_session(double ramp_limit = 10.0) {
   CharacterizationOptions session;
   session.mechanism = MechanismKind::arm;
   session.kS = 0.1;
@@ -25,6 +25,12 @@ TEST(Tune, GoesFromALogToAProvenController) {
   session.kA = 0.15;
   session.kG = 0.65;
   session.angle_offset = 0.2;
+  session.ramp_limit = ramp_limit;
+  return session;
+}
+
+TEST(Tune, GoesFromALogToAProvenController) {
+  CharacterizationOptions session = arm_session(6.0);
   session.resolution = 2.0 * 3.141592653589793 / 4096.0;
   session.sensor_delay = 0.010;
   session.seed = 5;
@@ -169,18 +175,6 @@ TEST(Tune, AMissingLogIsAnError) {
   const auto result = tune(job);
   ASSERT_FALSE(result);
   EXPECT_NE(to_string(result.error()).find("found.json"), std::string::npos);
-}
-
-CharacterizationOptions arm_session() {
-  CharacterizationOptions session;
-  session.mechanism = MechanismKind::arm;
-  session.kS = 0.1;
-  session.kV = 1.2;
-  session.kA = 0.15;
-  session.kG = 0.65;
-  session.angle_offset = 0.2;
-  session.ramp_limit = 10.0;
-  return session;
 }
 
 TEST(Identify, TakesTheMechanismFromTheDataUntilItIsConfirmed) {

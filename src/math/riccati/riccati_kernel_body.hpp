@@ -47,9 +47,6 @@ class Kernel {
       // The computed defect itself is rounded by about eps times the terms.
       const double error = gain * (defect_ + epsilon * scale_);
       answer_.condition = size_X_ > 0.0 ? gain * scale_ / size_X_ : gain;
-      if (!(error + bound <= std::numeric_limits<double>::max())) {
-        return false;
-      }
       if (refinements == 0 && error <= allowed * bound) {
         break;
       }
