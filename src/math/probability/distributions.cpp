@@ -64,6 +64,18 @@ double gamma_fraction(double a, double x) {
 
 }  // namespace
 
+double normal_pdf(double x, double mean, double sigma) noexcept {
+  return std::exp(normal_log_pdf(x, mean, sigma));
+}
+
+double normal_log_pdf(double x, double mean, double sigma) noexcept {
+  if (!(sigma > 0.0)) {
+    return nan;
+  }
+  const double z = (x - mean) / sigma;
+  return -0.5 * z * z - std::log(sigma) - 0.5 * std::log(2.0 * std::numbers::pi);
+}
+
 double normal_cdf(double x) noexcept {
   return 0.5 * std::erfc(-x / std::numbers::sqrt2);
 }
@@ -117,6 +129,37 @@ double beta_ratio(double a, double b, double x) noexcept {
 
 double chi_squared_tail(double x, double freedom) noexcept {
   return upper_gamma_ratio(0.5 * freedom, 0.5 * x);
+}
+
+double chi_squared_quantile(double p, double freedom) noexcept {
+  if (!(p >= 0.0 && p <= 1.0 && freedom > 0.0)) {
+    return nan;
+  }
+  if (p == 0.0 || p == 1.0) {
+    return p == 0.0 ? 0.0 : infinity;
+  }
+  // The smaller of the two tails, which keeps its relative accuracy.
+  const auto below = [&](double x) {
+    return p < 0.5 ? lower_gamma_ratio(0.5 * freedom, 0.5 * x) < p
+                   : chi_squared_tail(x, freedom) > 1.0 - p;
+  };
+  double high = freedom;
+  while (below(high) && high < 1e300) {
+    high *= 2.0;
+  }
+  double low = 0.5 * high;
+  while (!below(low) && low > 1e-300) {
+    high = low;
+    low *= 0.5;
+  }
+  for (int i = 0; i < 100; ++i) {
+    const double middle = 0.5 * (low + high);
+    if (middle == low || middle == high) {
+      break;
+    }
+    (below(middle) ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
 }
 
 double f_tail(double f, double numerator, double denominator) noexcept {

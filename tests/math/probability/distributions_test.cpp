@@ -36,6 +36,32 @@ TEST(Distributions, TailsAreThoseOfTheTables) {
   EXPECT_NEAR(f_tail(3.0983912, 3.0, 20.0), 0.05, 1e-8);
 }
 
+// Tables: χ²(0.95; 1) = 1.959964², χ²(0.95; 2) = -2 ln 0.05, χ²(0.99; 3) = 11.3449, and the inverse
+// of the tail.
+TEST(Distributions, ChiSquaredQuantileIsTheInverseOfItsTail) {
+  EXPECT_NEAR(chi_squared_quantile(0.95, 1.0), std::pow(normal_quantile(0.975), 2), 1e-12);
+  EXPECT_NEAR(chi_squared_quantile(0.95, 2.0), -2.0 * std::log(0.05), 1e-13);
+  EXPECT_NEAR(chi_squared_quantile(0.99, 3.0), 11.344866730144373, 1e-10);
+  for (const double freedom : {0.3, 1.0, 4.0, 77.0, 5000.0}) {
+    for (const double p : {1e-12, 0.01, 0.4999, 0.5, 0.9, 1.0 - 1e-12}) {
+      const double x = chi_squared_quantile(p, freedom);
+      EXPECT_NEAR(lower_gamma_ratio(0.5 * freedom, 0.5 * x) / p, 1.0, 1e-9) << p << ' ' << freedom;
+      EXPECT_NEAR(chi_squared_tail(x, freedom) / (1.0 - p), 1.0, 1e-9) << p << ' ' << freedom;
+    }
+  }
+  EXPECT_EQ(chi_squared_quantile(0.0, 2.0), 0.0);
+  EXPECT_EQ(chi_squared_quantile(1.0, 2.0), infinity);
+  EXPECT_TRUE(std::isnan(chi_squared_quantile(-0.1, 2.0)));
+  EXPECT_TRUE(std::isnan(chi_squared_quantile(0.5, 0.0)));
+}
+
+TEST(Distributions, NormalDensityIsTheFormula) {
+  EXPECT_NEAR(normal_pdf(0.0), 1.0 / std::sqrt(2.0 * M_PI), 1e-16);
+  EXPECT_NEAR(normal_pdf(2.5, 1.0, 2.0), std::exp(-0.28125) / (2.0 * std::sqrt(2.0 * M_PI)), 1e-16);
+  EXPECT_NEAR(normal_log_pdf(100.0), -5000.0 - 0.5 * std::log(2.0 * M_PI), 1e-12);
+  EXPECT_TRUE(std::isnan(normal_pdf(0.0, 0.0, 0.0)));
+}
+
 // One degree of freedom: tan(π(p - 1/2)). Two: (2p - 1)/√(2p(1 - p)). None to count: the normal's.
 TEST(Distributions, StudentsQuantilesHaveTheirClosedForms) {
   for (const double p : {1e-9, 0.025, 0.3, 0.5, 0.975}) {
