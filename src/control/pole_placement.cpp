@@ -314,6 +314,7 @@ ErrorInfo error_info(PolePlacementError code) {
       {"not_conjugate", "a complex pole is without its conjugate", ErrorKind::misuse},
       {"not_controllable", "a mode that no input reaches would have to move", ErrorKind::no_answer},
       {"not_reached", "no gain was found that places the poles well enough", ErrorKind::no_answer},
+      {"not_observable", "a mode that no output shows would have to move", ErrorKind::no_answer},
   };
   return detail::info_of(code, "pole_placement", rows);
 }

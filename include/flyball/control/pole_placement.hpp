@@ -16,6 +16,7 @@ enum class PolePlacementError {
   not_controllable,  ///< A mode that no input reaches is not among the poles that were asked for.
   not_reached,       ///< No gain of doubles was found that places the poles: the best one leaves
                      ///< one a tenth of its size off, or further than its condition explains.
+  not_observable,    ///< A mode that no output shows is not among an observer's poles.
 };
 [[nodiscard]] ErrorInfo error_info(PolePlacementError code);
 
@@ -58,8 +59,8 @@ struct PolePlacement {
 /// poles, the entries are rounded together such that their errors cancel; such a K has to be passed
 /// on with all its digits.
 ///
-/// The same function serves continuous and discrete plants; place an observer's poles with
-/// place(Aᵀ, Cᵀ, poles), whose gain is Lᵀ.
+/// The same function serves continuous and discrete plants; `place_observer`
+/// (observer_placement.hpp) is its dual.
 ///
 /// @param A  n x n. @param B  n x m; its columns may depend on each other.
 /// @param poles  n, complex ones in conjugate pairs (1e-10 of each other), in any order.

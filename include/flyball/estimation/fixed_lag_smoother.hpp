@@ -14,6 +14,14 @@ namespace flyball {
 /// What was the state some steps ago, by all measurements since: the Rauch-Tung-Striebel smoother
 /// over the last `Lag` steps of a filter, linear or extended.
 ///
+/// ```
+/// filter.predict(u);
+/// const auto x_prior = filter.x_hat();
+/// filter.update(y, u);
+/// smoother.take({plant.A, Q, x_prior, filter.x_hat(), filter.P()});
+/// const auto [x, P] = smoother.at(10);  // ten periods ago
+/// ```
+///
 /// Each step stores the gain back over it, so that `at` only has to go back by Theorem 9.7.1.
 /// Run-time object: noexcept, finite whatever comes, of fixed capacity, and for states known at
 /// compile time allocation-free; a step that comes when all places are taken replaces the oldest.

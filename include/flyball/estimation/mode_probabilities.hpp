@@ -135,7 +135,7 @@ bool ModeProbabilities<Models>::update(const Vector& log_likelihoods) noexcept {
 
 /// The Gaussian vector with the mean and covariance of a mixture Σ μ_i N(x_i, P_i).
 /// @param weights  Of sum one. @param x  n x Models. @param P  Models covariances.
-/// @return  mean and P; allocation-free for sizes known at compile time.
+/// @param mean, covariance  Receive it. Allocation-free for sizes known at compile time.
 template <int States, std::size_t Models, class Weights>
 void match_moments(const Weights& weights,
                    const std::array<Eigen::Matrix<double, States, 1>, Models>& x,

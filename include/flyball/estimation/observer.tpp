@@ -44,4 +44,30 @@ bool Observer<States, Inputs, Outputs>::update(const OutputVector& y,
   return take(corrected);
 }
 
+template <int States, int Inputs, int Outputs>
+bool LuenbergerObserver<States, Inputs, Outputs>::step(const InputVector& u,
+                                                       const OutputVector& y) noexcept {
+  InputVector known = u;
+  detail::keep_signals(known);
+  StateVector next = plant_.A * x_hat_;
+  next.noalias() += plant_.B * known;
+  const bool measured = is_signal(y);
+  if (measured) {
+    OutputVector innovation = y;
+    innovation.noalias() -= plant_.C * x_hat_;
+    innovation.noalias() -= plant_.D * known;
+    next.noalias() += L_ * innovation;
+  }
+  return reset(next) && measured && is_signal(u);
+}
+
+template <int States, int Inputs, int Outputs>
+bool LuenbergerObserver<States, Inputs, Outputs>::reset(const StateVector& x_hat) noexcept {
+  const bool usable = is_signal(x_hat);
+  if (usable) {
+    x_hat_ = x_hat;
+  }
+  return usable;
+}
+
 }  // namespace flyball
