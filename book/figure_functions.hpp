@@ -27,6 +27,15 @@ namespace flyball::book {
 [[nodiscard]] FigureResult figure_7_7();
 [[nodiscard]] FigureResult figure_7_8();
 [[nodiscard]] FigureResult figure_7_10();
+[[nodiscard]] FigureResult figure_9_1();
+[[nodiscard]] FigureResult figure_9_2();
+[[nodiscard]] FigureResult figure_9_3();
+[[nodiscard]] FigureResult figure_9_4();
+[[nodiscard]] FigureResult figure_9_5();
+[[nodiscard]] FigureResult figure_9_6();
+[[nodiscard]] FigureResult figure_9_7();
+[[nodiscard]] FigureResult figure_9_8();
+[[nodiscard]] FigureResult figure_9_9();
 [[nodiscard]] FigureResult figure_B_1();
 [[nodiscard]] FigureResult figure_B_2();
 [[nodiscard]] FigureResult figure_B_3();
