@@ -1,9 +1,12 @@
+#include <flyball/control/observer_placement.hpp>
 #include <flyball/estimation/kalman_gain.hpp>
+#include <flyball/estimation/smoother.hpp>
+#include <flyball/math/probability/gaussian_vector.hpp>
 
 #include "core/try.hpp"
 #include "solve/row.hpp"
 
-// Gains of observers.
+// Gains of observers, and estimates.
 namespace flyball::solve {
 
 namespace {
@@ -18,6 +21,62 @@ Outcome solve_kalman(const Problem& problem, JsonWriter& answer) {
   answer.add("L", gain.L);
   answer.add("residual", gain.residual);
   answer.add("condition", gain.condition);
+  return {};
+}
+
+Expected<ObserverPlacement> with_domain(const Problem& problem) {
+  const Eigen::MatrixXd& A = problem.matrix("A");
+  const Eigen::MatrixXd& C = problem.matrix("C");
+  const ContinuousSystem<> plant{A, Eigen::MatrixXd::Zero(A.rows(), 1), C,
+                                 Eigen::MatrixXd::Zero(C.rows(), 1)};
+  const Eigen::VectorXcd& poles = problem.complex_list("poles");
+  return problem.domain() == TimeDomain::continuous
+             ? place_observer(plant, poles)
+             : place_observer(DiscreteSystem<>{plant.A, plant.B, plant.C, plant.D, Time(1.0)},
+                              poles);
+}
+
+Outcome solve_place_observer(const Problem& problem, JsonWriter& answer) {
+  FLYBALL_TRY(const auto observer, with_domain(problem));
+  answer.add("L", observer.L);
+  if (observer.K) {
+    answer.add("K", *observer.K);
+  }
+  answer.add("poles", observer.poles);
+  answer.add("condition", observer.condition);
+  answer.add("pole_error", observer.pole_error);
+  return {};
+}
+
+Outcome solve_smooth(const Problem& problem, JsonWriter& answer) {
+  const Eigen::MatrixXd& y = problem.matrix("y");
+  LinearStep step{problem.matrix("A"), {}, problem.matrix("Q"), problem.matrix("C"),
+                  problem.matrix("R"), {}};
+  std::vector<LinearStep> steps;
+  for (Eigen::Index k = 0; k < y.rows(); ++k) {
+    step.input = problem.matrix("added").row(k).transpose();
+    step.y = y.row(k).transpose();
+    steps.push_back(step);
+  }
+  FLYBALL_TRY(const auto result, smooth(Eigen::VectorXd(problem.matrix("x0")), problem.matrix("P0"),
+                                        std::span<const LinearStep>(steps)));
+  answer.add("x", Eigen::MatrixXd(result.smoothed.x.transpose()));
+  answer.add("P", result.smoothed.P);
+  answer.add("x_filtered", Eigen::MatrixXd(result.x_filtered.transpose()));
+  answer.add("log_likelihood", result.log_likelihood);
+  answer.add("nis", result.nis);
+  return {};
+}
+
+Outcome solve_bayes(const Problem& problem, JsonWriter& answer) {
+  FLYBALL_TRY(const auto prior,
+              GaussianVector::create(problem.matrix("mean"), problem.matrix("covariance")));
+  FLYBALL_TRY(const auto posterior,
+              prior.measured(problem.matrix("C"), problem.matrix("R"), problem.matrix("y")));
+  answer.add("mean", posterior.estimate.mean());
+  answer.add("covariance", posterior.estimate.covariance());
+  answer.add("squared_distance", posterior.squared_distance);
+  answer.add("log_evidence", posterior.log_evidence);
   return {};
 }
 
@@ -39,6 +98,46 @@ std::vector<Kind> estimator_kinds() {
         matrix("L", "n", "p", "the predictor's gain, AK"), residual, condition},
        R"({"A": [[1, 0.02], [0, 1]], "C": [[1, 0]], "Q": [[0, 0], [0, 0.01]], "R": [[0.0001]]})",
        &solve_kalman},
+      {"place_observer",
+       "the gain with which the errors of an observer, A - LC, have given eigenvalues (9.2)",
+       {A, matrix("C", "p", "n", "how the outputs see the states"),
+        complex_list("poles", "n", "where they are to be"), or_first(domain)},
+       {matrix("L", "n", "p", "the gain of the observer in one step (9.1, 9.3)"),
+        optional(matrix("K", "n", "p", "A⁻¹L, of predict and update apart (9.6)")),
+        complex_list("poles", "n", "where they are with this L, in the same order"),
+        unbounded(number("condition", "", "how much a relative error of A - LC moves a pole")),
+        number("pole_error", "",
+               "no pole is further from its place, relative to its size; at most 0.1")},
+       R"({"A": [[0, 1], [0, 0]], "C": [[1, 0]], "poles": [[-1, 1], [-1, -1]]})",
+       &solve_place_observer},
+      {"smooth",
+       "the states by the measurements before and after them: Kalman filter and smoother (9.7)",
+       {matrix("A", "n", "n", "how the states move by themselves, sampled"),
+        or_identity(matrix("C", "p", "n", "how the outputs see the states")),
+        matrix("Q", "n", "n", "covariance of the process noise, a sample", "state²"),
+        matrix("R", "p", "p", "covariance of the measurement noise, a sample", "output²"),
+        matrix("P0", "n", "n", "error covariance before the first step", "state²"),
+        or_zero(samples("x0", "n", "1", "the state before the first step")),
+        samples("y", "k", "p", "what was measured after each step, a row a step"),
+        or_zero(samples("added", "k", "n", "what the inputs add to the states in each step, Bu"))},
+       {matrix("x", "k+1", "n", "the states, smoothed, from before the first step on"),
+        matrices("P", "n", "n", "their error covariances"),
+        matrix("x_filtered", "k+1", "n", "by the measurements up to each step alone"),
+        number("log_likelihood", "", "logarithm of the measurements' density"),
+        list("nis", "k", "", "normalised innovations squared")},
+       R"({"A": [[1, 0.1], [0, 1]], "C": [[1, 0]], "Q": [[0, 0], [0, 0.01]], "R": [[0.1]], "P0": [[1, 0], [0, 1]], "y": [0.1, 0.3, 0.2]})",
+       &solve_smooth},
+      {"bayes",
+       "a Gaussian vector after the measurement y = Cx + v: fusion and conditionals (9.3, 9.5)",
+       {list("mean", "n", "", "E[x] before"),
+        matrix("covariance", "n", "n", "of x before; it may be singular"),
+        or_identity(matrix("C", "p", "n", "how the measurements see x")),
+        or_zero(matrix("R", "p", "p", "covariance of v")), list("y", "p", "", "what was measured")},
+       {list("mean", "n", "", "E[x | y]"), matrix("covariance", "n", "n", "of x given y"),
+        number("squared_distance", "", "of y from what was expected, in its deviations"),
+        number("log_evidence", "", "log p(y)")},
+       R"({"mean": [2], "covariance": [[4]], "R": [[1]], "y": [5]})",
+       &solve_bayes},
   };
 }
 

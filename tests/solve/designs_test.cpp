@@ -47,6 +47,38 @@ TEST(SolveDesigns, KalmanIsRefusedInItsOwnWords) {
   EXPECT_EQ(unseen.at("error").at("eigenvalue").at(0), 1.5);
 }
 
+// (z + 0.5)² of A - LC with A = [1 1; 0 1]: l₁ = 3, l₂ = 2.25; and K = A⁻¹L = [0.75; 2.25].
+TEST(SolveDesigns, PlaceObserver) {
+  const std::string plant = R"({"A":[[1,1],[0,1]],"C":[[1,0]],"poles":[-0.5,-0.5])";
+  const Json discrete = answer("place_observer", plant + R"(,"domain":"discrete"})");
+  EXPECT_NEAR(discrete.at("L").at(0).at(0).get<double>(), 3.0, 1e-12);
+  EXPECT_NEAR(discrete.at("K").at(0).at(0).get<double>(), 0.75, 1e-12);
+  EXPECT_FALSE(answer("place_observer", plant + "}").contains("K"));
+  EXPECT_EQ(refusal("place_observer", R"({"A":[[1,1],[0,1]],"C":[[0,1]],"poles":[-0.5,-0.5]})"),
+            "not_observable");
+}
+
+// By hand in tests/estimation/smoother_test.cpp: x = 7/8, 7/4, 11/8.
+TEST(SolveDesigns, Smooth) {
+  const std::string scalar = R"({"A":1,"Q":1,"R":1,"P0":1,"y":[3,1])";
+  const Json smoothed = answer("smooth", scalar + "}");
+  EXPECT_NEAR(smoothed.at("x").at(0).at(0).get<double>(), 0.875, 1e-14);
+  EXPECT_NEAR(smoothed.at("x").at(1).at(0).get<double>(), 1.75, 1e-14);
+  EXPECT_NEAR(smoothed.at("P").at(1).at(0).at(0).get<double>(), 0.5, 1e-14);
+  EXPECT_NEAR(smoothed.at("nis").at(1).get<double>(), 0.375, 1e-14);
+  EXPECT_NEAR(answer("smooth", scalar + R"(,"added":[3,-1]})").at("nis").at(0).get<double>(), 0.0,
+              1e-14);
+  EXPECT_EQ(refusal("smooth", R"({"A":1,"Q":-1,"R":1,"P0":1,"y":[3,1]})"), "not_positive");
+}
+
+// (9.11), (9.12): 2 ± 2 and 5 ± 1 make 4.4 with the variance 0.8.
+TEST(SolveDesigns, Bayes) {
+  const Json fused = answer("bayes", R"({"mean":[2],"covariance":4,"R":1,"y":[5]})");
+  EXPECT_NEAR(fused.at("mean").at(0).get<double>(), 4.4, 1e-14);
+  EXPECT_NEAR(entry(fused, "covariance"), 0.8, 1e-14);
+  EXPECT_EQ(refusal("bayes", R"({"mean":[2],"covariance":0,"y":[5]})"), "contradiction");
+}
+
 TEST(SolveDesigns, Lqi) {
   const std::string plant = R"({"A":[[0]],"B":[[1]],"C":[[1]],"Q":[[1,0],[0,1]],"R":[[1]])";
   const Json continuous = answer("lqi", plant + "}");
