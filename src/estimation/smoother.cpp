@@ -41,8 +41,7 @@ void step_back(const Backward& step, const VectorXd& x_filtered, const VectorXd&
                const VectorXd& x_after, MatrixXd& S, Eigen::Ref<VectorXd> x, MatrixXd& P,
                MatrixXd& P_cross) {
   // x_k given x_{k+1} (9.41), whatever else is known of that.
-  const auto given = detail::condition(step.S, detail::product(step.F, step.S), step.S_noise,
-                                       detail::term_sizes(step.F, step.S, step.S_noise));
+  const auto given = detail::measure(step.S, step.F, step.S_noise);
   x = x_filtered + detail::product(given.K, x_after - x_prior);  // (9.42)
   // (9.43): (I - KF)P⁺(I - KF)ᵀ + KQKᵀ is the covariance of that condition.
   const MatrixXd KS = detail::product(given.K, S);
@@ -142,8 +141,7 @@ class Forward {
     FLYBALL_CHECK(measure(step, k));
     keep(k + 1);
     if (!x_.allFinite() || !result_.P_filtered[static_cast<std::size_t>(k + 1)].allFinite()) {
-      return refusal(ArgumentError::out_of_range, where, entry_of_step(k, "the estimate"))
-          .got("beyond the largest double");
+      return beyond_doubles(k);
     }
     return passed;
   }
@@ -151,6 +149,11 @@ class Forward {
   [[nodiscard]] const MatrixXd& factor() const noexcept { return S_; }
 
  private:
+  static Refusal beyond_doubles(Index k) {
+    return refusal(ArgumentError::out_of_range, where, entry_of_step(k, "the estimate"))
+        .got("beyond the largest double");
+  }
+
   void keep(Index k) {
     result_.x_filtered.col(k) = x_;
     result_.P_filtered[static_cast<std::size_t>(k)] = square_of(S_);
@@ -172,9 +175,11 @@ class Forward {
     const MatrixXd C = step.C(there, Eigen::all);
     const VectorXd y = step.y(there);
     FLYBALL_TRY(const MatrixXd* R, measurement_noise_.of(MatrixXd(step.R(there, there)), k, "R"));
-    const auto of =
-        detail::condition(S_, detail::product(C, S_), *R, detail::term_sizes(C, S_, *R));
+    const auto of = detail::measure(S_, C, *R);
     const VectorXd innovation = y - detail::product(C, x_);
+    if (!innovation.allFinite() || !of.K.allFinite()) {
+      return beyond_doubles(k);
+    }
     Index contradicted = -1;
     result_.nis(k) =
         of.squared_distance(innovation, y.cwiseAbs() + C.cwiseAbs() * x_.cwiseAbs(), contradicted);

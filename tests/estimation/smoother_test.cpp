@@ -258,6 +258,9 @@ TEST(Smoother, Refusals) {
       refused([](LinearStep& s) { s.input = VectorXd::Ones(2); }).is(ArgumentError::wrong_shape));
   EXPECT_TRUE(smooth(VectorXd(), MatrixXd(), steps).error().is(ArgumentError::empty));
   EXPECT_TRUE(smooth(x0, -one, steps).error().is(ArgumentError::not_positive));
+  // The deviation 1e250 has no square; a measurement brings it back.
+  steps[0].A(0) = 1e200;
+  EXPECT_NEAR(smooth(VectorXd::Ones(1), 1e100 * one, steps)->x_filtered(1), 0.0, 1e-12);
   // A measurement brings back what a step has blown up; two steps without one do not.
   steps[0].A(0) = steps[1].A(0) = 1e150;
   EXPECT_TRUE(smooth(VectorXd::Ones(1), one, steps));

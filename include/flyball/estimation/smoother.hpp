@@ -91,7 +91,8 @@ struct LinearSmoothing {
 /// @param x0, P0  n, n x n: the estimate before the first step; a measurement of that instant is a
 ///                step with A = I and Q = 0.
 /// @errors ArgumentError for shapes, entries, and not_positive for what is no covariance, each
-///         naming the step; GaussianError::contradiction with the entry of y for a measurement
+///         naming the step; out_of_range where the estimate is beyond the largest double;
+///         GaussianError::contradiction with the entry of y for a measurement
 ///         without noise that differs from what is certain.
 /// Cost: O(N n³), allocates.
 [[nodiscard]] Expected<LinearSmoothing> smooth(const Eigen::VectorXd& x0, const MatrixRef& P0,

@@ -15,6 +15,24 @@ namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
+/// What is rounding of sums of so many terms.
+double rounding_of(Eigen::Index terms) {
+  return 8.0 * static_cast<double>(terms) * epsilon;
+}
+
+/// Sizes of the terms of C F and G: Σⱼ |C_ij| ‖F_j‖ + ‖G_i‖.
+Eigen::VectorXd term_sizes(const MatrixRef& C, const Eigen::MatrixXd& F, const Eigen::MatrixXd& G) {
+  Eigen::VectorXd sizes(C.rows());
+  Eigen::VectorXd deviations(F.rows());
+  for (Eigen::Index i = 0; i < F.rows(); ++i) {
+    deviations(i) = F.row(i).stableNorm();
+  }
+  for (Eigen::Index i = 0; i < C.rows(); ++i) {
+    sizes(i) = C.row(i).cwiseAbs().dot(deviations) + G.row(i).stableNorm();
+  }
+  return sizes;
+}
+
 }  // namespace
 
 Expected<Eigen::MatrixXd> covariance_factor(const MatrixRef& P, std::string_view where,
@@ -64,17 +82,13 @@ Eigen::MatrixXd compressed(const Eigen::MatrixXd& F) {
   return F.cols() > F.rows() ? Eigen::MatrixXd(triangle_of(F.transpose()).transpose()) : F;
 }
 
-Eigen::VectorXd term_sizes(const MatrixRef& C, const Eigen::MatrixXd& F, const Eigen::MatrixXd& G) {
-  return C.cwiseAbs() * F.rowwise().norm() + G.rowwise().norm();
-}
-
 Conditioning condition(const Eigen::MatrixXd& F, const Eigen::MatrixXd& M, const Eigen::MatrixXd& G,
                        const Eigen::VectorXd& reference) {
   const Eigen::Index n = F.rows();
   const Eigen::Index r = F.cols();
   const Eigen::Index p = M.rows();
   const Eigen::Index q = G.cols();
-  const double rounding = static_cast<double>(r + q + p) * epsilon;
+  const double rounding = rounding_of(r + q + p);
   Conditioning result;
   result.K = Eigen::MatrixXd::Zero(n, p);
   result.units = Eigen::VectorXd::Ones(p);
@@ -87,7 +101,7 @@ Conditioning condition(const Eigen::MatrixXd& F, const Eigen::MatrixXd& M, const
   Eigen::MatrixXd W(r + q, p);
   W << M.transpose(), G.transpose();
   for (Eigen::Index i = 0; i < p; ++i) {
-    const double size = W.col(i).norm();
+    const double size = W.col(i).stableNorm();
     if (size > rounding * reference(i)) {
       result.units(i) = size;
       W.col(i) /= size;
@@ -121,13 +135,28 @@ Conditioning condition(const Eigen::MatrixXd& F, const Eigen::MatrixXd& M, const
     result.K.col(entry) = gains.row(i) / result.units(entry);
   }
   result.factor = turned.bottomRows(r + q - rank).transpose();
-  // What a measurement without noise makes certain has no variance but rounding.
-  for (Eigen::Index i = 0; i < n; ++i) {
-    if (result.factor.row(i).norm() <= rounding * F.row(i).norm()) {
+  result.factor = compressed(result.factor);
+  return result;
+}
+
+Conditioning measure(const Eigen::MatrixXd& F, const MatrixRef& C, const Eigen::MatrixXd& G) {
+  Conditioning result = condition(F, product(C, F), G, term_sizes(C, F, G));
+  const Eigen::Index certain = C.rows() - G.cols();
+  if (certain <= 0 || result.factor.cols() == 0) {
+    return result;
+  }
+  // Combinations N of the measurement without noise are known now: NᵀCK = Nᵀ, and what rounding has
+  // left of NᵀC factor is taken off again, down to rounding of the factor itself.
+  const Eigen::MatrixXd N = G.cols() == 0
+                                ? Eigen::MatrixXd(Eigen::MatrixXd::Identity(C.rows(), C.rows()))
+                                : Eigen::MatrixXd(full_qr(G).Q.rightCols(certain));
+  result.factor -= product(product(result.K, N), transposed_product(N, product(C, result.factor)));
+  const double rounding = rounding_of(F.cols() + C.rows());
+  for (Eigen::Index i = 0; i < F.rows(); ++i) {
+    if (result.factor.row(i).stableNorm() <= rounding * F.row(i).stableNorm()) {
       result.factor.row(i).setZero();
     }
   }
-  result.factor = compressed(result.factor);
   return result;
 }
 

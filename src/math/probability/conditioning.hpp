@@ -52,8 +52,12 @@ struct Conditioning {
 [[nodiscard]] Conditioning condition(const Eigen::MatrixXd& F, const Eigen::MatrixXd& M,
                                      const Eigen::MatrixXd& G, const Eigen::VectorXd& reference);
 
-/// Sizes of the terms of C F and G, for `condition`: Σⱼ |C_ij| ‖F_j‖ + ‖G_i‖.
-[[nodiscard]] Eigen::VectorXd term_sizes(const MatrixRef& C, const Eigen::MatrixXd& F,
-                                         const Eigen::MatrixXd& G);
+/// The same of a measurement z = C x + G η. @param C  p x n.
+/// @param G  p x rank: of a covariance's factor, so that fewer columns than rows say that some
+///           combination of the measurement has no noise. Along that one C factor is zero to
+///           rounding of the factor, however much smaller than F it is: seen again, it adds
+///           nothing.
+[[nodiscard]] Conditioning measure(const Eigen::MatrixXd& F, const MatrixRef& C,
+                                   const Eigen::MatrixXd& G);
 
 }  // namespace flyball::detail

@@ -60,6 +60,15 @@ Expected<void> check_entries(std::span<const Index> entries, Index n, std::strin
   return {};
 }
 
+Expected<void> check_difference(const VectorXd& difference, std::string_view where,
+                                std::string_view name) {
+  if (!difference.allFinite()) {
+    return refusal(ArgumentError::out_of_range, where, name)
+        .got("further from what was expected than the largest double");
+  }
+  return {};
+}
+
 }  // namespace
 
 ErrorInfo error_info(GaussianError code) {
@@ -98,6 +107,7 @@ Expected<GaussianVector> GaussianVector::create(const VectorXd& mean, const Matr
 Expected<double> GaussianVector::squared_distance(const VectorXd& x) const {
   constexpr std::string_view where = "squared_distance";
   FLYBALL_CHECK(Checks(where).shape(x, mean_.size(), 1, "x", "entries x 1").finite(x, "x"));
+  FLYBALL_CHECK(check_difference(x - mean_, where, "x"));
   const auto of = detail::condition(MatrixXd(0, factor_.cols()), factor_, MatrixXd(mean_.size(), 0),
                                     factor_.rowwise().norm());
   Index contradicted = -1;
@@ -218,9 +228,9 @@ Expected<GaussianPosterior> GaussianVector::given(const MatrixRef& C, const Matr
                                                   const VectorXd& y, std::string_view where,
                                                   std::string_view name) const {
   const VectorXd expected = detail::product(C, mean_);
-  const auto of = detail::condition(factor_, detail::product(C, factor_), noise,
-                                    detail::term_sizes(C, factor_, noise));
+  const auto of = detail::measure(factor_, C, noise);
   const VectorXd innovation = y - expected;
+  FLYBALL_CHECK(check_difference(innovation, where, name));
   Index contradicted = -1;
   const double distance =
       of.squared_distance(innovation, y.cwiseAbs() + C.cwiseAbs() * mean_.cwiseAbs(), contradicted);

@@ -220,6 +220,45 @@ TEST(GaussianVector, CertainDirectionsAreNotInverted) {
   EXPECT_TRUE(fuse(scalar(1.0, 0.0), scalar(1.0, 0.0)));
 }
 
+// Seen once without noise, a coordinate or any other direction is known: to see the same again
+// changes nothing, although rounding leaves something of its variance.
+TEST(GaussianVector, WhatIsKnownIsNotLearntAgain) {
+  Random random(8);
+  for (int trial = 0; trial < 60; ++trial) {
+    const Index n = 2 + trial % 3;
+    const auto x = random_vector(random, n, n);
+    const MatrixXd C =
+        trial % 2 == 0 ? MatrixXd(MatrixXd::Identity(1, n)) : MatrixXd(random_matrix(random, 1, n));
+    const MatrixXd R = MatrixXd::Zero(1, 1);
+    const VectorXd y = random_matrix(random, 1, 1);
+    const auto once = x.measured(C, R, y).value();
+    const auto again = once.estimate.measured(C, R, y);
+    ASSERT_TRUE(again) << to_string(again.error());
+    EXPECT_EQ(again->rank, 0);
+    EXPECT_EQ(again->estimate.mean(), once.estimate.mean()) << trial;
+    EXPECT_NEAR((again->estimate.covariance() - once.estimate.covariance()).norm(), 0.0,
+                1e-13 * x.covariance().norm());
+    EXPECT_TRUE(
+        once.estimate.measured(C, R, y.array() + 1e-3).error().is(GaussianError::contradiction));
+  }
+}
+
+// Squares of the deviations overflow long before they do.
+TEST(GaussianVector, HugeNumbers) {
+  const auto far = scalar(1e308, 1e308);
+  EXPECT_NEAR(far.measured(MatrixXd::Ones(1, 1), MatrixXd::Ones(1, 1) * 1e308,
+                           VectorXd::Constant(1, 0.9e308))
+                      ->estimate.mean()(0) /
+                  0.95e308,
+              1.0, 1e-12);
+  EXPECT_TRUE(
+      far.measured(MatrixXd::Ones(1, 1), MatrixXd::Zero(1, 1), VectorXd::Constant(1, -1e308))
+          .error()
+          .is(ArgumentError::out_of_range));
+  EXPECT_TRUE(
+      far.squared_distance(VectorXd::Constant(1, -1e308)).error().is(ArgumentError::out_of_range));
+}
+
 TEST(GaussianVector, Refusals) {
   const auto bad =
       GaussianVector::create(Eigen::Vector2d(0.0, 0.0), Eigen::Matrix2d{{1.0, 2.0}, {2.0, 1.0}});

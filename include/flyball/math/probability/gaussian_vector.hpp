@@ -44,7 +44,8 @@ class GaussianVector {
 
   /// (x - x̄)ᵀΣ⁺(x - x̄), the squared Mahalanobis distance; of a random x it is χ² with `rank`
   /// degrees of freedom, so that `chi_squared_quantile` gives its gate.
-  /// @errors ArgumentError for the shape and entries of x; GaussianError::contradiction for an x
+  /// @errors ArgumentError for the shape and entries of x, and out_of_range where x is beyond the
+  ///         largest double from the mean; GaussianError::contradiction for an x
   ///         that differs from the mean along a direction that is certain, with that entry.
   [[nodiscard]] Expected<double> squared_distance(const Eigen::VectorXd& x) const;
 
@@ -81,7 +82,8 @@ class GaussianVector {
 
   /// Bayes's rule with the measurement y = C x + v, v ~ N(0, R) independent of x:
   /// x̄ + K(y - C x̄), K = ΣCᵀ(CΣCᵀ + R)⁻¹. @param C  p x n. @param R  p x p, may be singular.
-  /// @errors ArgumentError for shapes and entries, and not_positive for R;
+  /// @errors ArgumentError for shapes and entries, not_positive for R, and out_of_range where y is
+  ///         beyond the largest double from what was expected;
   ///         GaussianError::contradiction with the entry of y.
   /// Source: book, sections 9.3.10 and 9.5; equations 9.11 to 9.13 for one entry.
   [[nodiscard]] Expected<GaussianPosterior> measured(const MatrixRef& C, const MatrixRef& R,
