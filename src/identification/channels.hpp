@@ -32,6 +32,10 @@ void refresh_derived_columns(PreparedRecording& prepared);
 /// so.
 void mend_signs(PreparedRecording& prepared);
 
+/// Takes out the jumps of the position that the velocity does not show, and says so. Needs
+/// `top_speed` and which runs moved.
+void mend_slips(PreparedRecording& prepared);
+
 /// Gives up a velocity column that is truncated to a few steps where the position is finer.
 void drop_coarse_velocity(PreparedRecording& prepared);
 

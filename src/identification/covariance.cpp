@@ -213,7 +213,10 @@ double Covariances::standard_error(const Eigen::VectorXd& gradient) const {
   for (const Eigen::MatrixXd& covariance : estimates) {
     largest = std::max(largest, gradient.dot(covariance * gradient));
   }
-  const double of_model = doubt.size() == gradient.size() ? gradient.dot(doubt) : 0.0;
+  double of_model = 0.0;
+  for (const Eigen::VectorXd& doubt : doubts) {
+    of_model = std::max(of_model, std::abs(gradient.dot(doubt)));
+  }
   return std::sqrt(largest + of_model * of_model);
 }
 

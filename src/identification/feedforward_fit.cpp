@@ -115,7 +115,16 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
   RobustFit best = fit_gains(problem, gains, bounds, options, scales);
   Extension extension;
   if (options.extend) {
-    extension = extend_model(problem, bounds, scales, best);
+    const RobustFit plain = best;
+    extension = extend_model(problem, bounds, scales, best, true);
+    // Where backlash leaves the starts as odd as they were, it is not what is odd about them.
+    if (whole && problem.is_extended(parameter::take_up) &&
+        without_irregular_starts(problem, best.x)) {
+      problem.take_terms_out();
+      problem.refresh_forces(plain.x);
+      best = plain;
+      extension = extend_model(problem, bounds, scales, best, false);
+    }
   }
   if (extension.extended) {
     scales = residual_scales(problem, best.x);
@@ -147,7 +156,7 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
     known.lower[parameter::static_friction] = -1.0;
   }
   Covariances spread = covariances(problem, best.x, problem.free_parameters(), known, scales);
-  spread.doubt = std::move(extension.doubt);
+  spread.doubts = std::move(extension.doubts);
 
   FeedforwardFit fit;
   fit.mechanism = *prepared.mechanism;

@@ -9,12 +9,60 @@
 namespace flyball::identification {
 namespace {
 
-/// Of a term over its standard error, squared; χ² of one degree of freedom if it is absent: one in
-/// a million, as four terms are looked at and residuals are not quite what is supposed.
-constexpr double beyond_doubt = 24.0;
 constexpr int most_terms = 2;
 
-constexpr std::array linear_terms{parameter::bias, parameter::spring, parameter::drag};
+/// Parameters that one cause moves.
+using Term = std::vector<Eigen::Index>;
+
+/// Of a term over its standard error, squared; χ² of as many degrees of freedom as it has
+/// parameters if it is absent: one in a million, as several terms are looked at and residuals are
+/// not quite what is supposed. A start is looked at for one thing alone, and with white noise.
+double beyond_doubt(const Term& term) {
+  if (term.front() == parameter::take_up) {
+    return 12.0;
+  }
+  return 24.0 + 2.9 * static_cast<double>(term.size() - 1);
+}
+
+/// Of the evidence beyond doubt: with more, a term is fitted to see what would come of it.
+constexpr double worth_a_fit = 0.25;
+constexpr std::size_t most_fits = 3;
+/// Two terms that differ by less evidence explain the same.
+constexpr double as_good = 0.5;
+
+/// The terms that the model's cost has a gradient by.
+std::vector<Term> differentiable_terms() {
+  std::vector<Term> terms{{parameter::bias},
+                          {parameter::spring},
+                          {parameter::drag},
+                          {parameter::sag},
+                          {parameter::take_up}};
+  terms.emplace_back();
+  for (int k = 0; k < field_count; ++k) {
+    terms.back().push_back(parameter::friction_field + k);
+  }
+  return terms;
+}
+
+/// Drag pushes nothing, a battery gives nothing and has less resistance than the motors, and an
+/// encoder is not behind its load.
+bool is_physical(const Term& term, double value) {
+  switch (term.front()) {
+    case parameter::drag:
+    case parameter::take_up:
+      return value > 0.0;
+    case parameter::sag:
+      return value > 0.0 && value < 1.0;
+    default:
+      return true;
+  }
+}
+
+void extend(OutputErrorProblem& problem, const Term& term, bool by_it) {
+  for (const Eigen::Index k : term) {
+    problem.extend(static_cast<int>(k), by_it);
+  }
+}
 
 /// The largest voltage across the resistance that the model without a limit supposes.
 double largest_across(OutputErrorProblem& problem) {
@@ -58,101 +106,246 @@ RobustFit with_limit(OutputErrorProblem& problem, const RobustFit& base, const B
   return best;
 }
 
-}  // namespace
+/// Whether the fit has sensors that know of the start before it is: then something else started
+/// sooner than the inertia may.
+bool may_start_ahead(const OutputErrorProblem& problem, const Eigen::VectorXd& x) {
+  return problem.can_extend(parameter::take_up) && !problem.is_extended(parameter::take_up) &&
+         (x[parameter::position_delay] < 0.0 ||
+          x[parameter::velocity_delay] < 0.5 * x[parameter::averaging_width]);
+}
 
-Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds,
-                       const ChannelScales& scales, RobustFit& best) {
-  struct Candidate {
-    int term;
-    double gain;
-    RobustFit start;
-  };
-  Extension extension;
-  for (int round = 0; round < most_terms; ++round) {
-    const std::vector<bool> free = problem.free_parameters();
-    std::vector<int> absent;
-    for (const int term : linear_terms) {
-      if (problem.can_extend(term) && !problem.is_extended(term)) {
-        absent.push_back(term);
-      }
+/// The best fit with backlash, from sensors that are as late as usual.
+RobustFit with_take_up(OutputErrorProblem& problem, const RobustFit& base, const Bounds& bounds,
+                       const ChannelScales& scales) {
+  Eigen::VectorXd start = base.x;
+  for (const OutputErrorProblem::Prior& prior : problem.priors()) {
+    const bool of_sensors = prior.parameter == parameter::position_delay ||
+                            prior.parameter == parameter::velocity_delay ||
+                            prior.parameter == parameter::averaging_width;
+    if (of_sensors && problem.free_parameters()[static_cast<std::size_t>(prior.parameter)]) {
+      start[prior.parameter] = prior.mean;
     }
-    std::vector<Candidate> candidates;
-    const std::vector<Score> found = scores(problem, best.x, free, bounds, scales, absent);
-    for (std::size_t k = 0; k < absent.size(); ++k) {
-      const bool pushes = absent[k] == parameter::drag && found[k].step < 0.0;
-      if (!pushes) {
-        candidates.push_back({absent[k], found[k].gain, best});
-      }
+  }
+  start[parameter::take_up] = 0.01 * problem.recording().top_speed;  // of 10 ms
+  problem.refresh_forces(start);
+  const RobustFit fit =
+      minimize(problem, start, problem.free_parameters(), bounds, scales, 15, 0.1);
+  problem.refresh_forces(base.x);
+  return fit;
+}
+
+struct Candidate {
+  Term term;
+  double evidence;  ///< Over what is beyond doubt, to first order.
+  RobustFit start;
+};
+
+/// The terms that the model lacks, those first that to first order gain most.
+std::vector<Candidate> candidates(OutputErrorProblem& problem, const Bounds& bounds,
+                                  const ChannelScales& scales, const RobustFit& best) {
+  std::vector<Term> absent;
+  for (const Term& term : differentiable_terms()) {
+    const auto first = static_cast<int>(term.front());
+    if (problem.can_extend(first) && !problem.is_extended(first)) {
+      absent.push_back(term);
     }
-    if (!problem.is_extended(parameter::headroom)) {
-      problem.extend(parameter::headroom, true);
-      RobustFit limited = with_limit(problem, best, bounds, scales);
-      problem.extend(parameter::headroom, false);
-      const double gain = best.cost - limited.cost;
-      candidates.push_back({parameter::headroom, gain, std::move(limited)});
+  }
+  std::vector<Candidate> found;
+  const std::vector<Score> all =
+      scores(problem, best.x, problem.free_parameters(), bounds, scales, absent);
+  for (std::size_t k = 0; k < absent.size(); ++k) {
+    if (all[k].gain > 0.0 && is_physical(absent[k], all[k].step[0])) {
+      found.push_back({absent[k], all[k].gain / beyond_doubt(absent[k]), best});
     }
-    std::sort(candidates.begin(), candidates.end(),
-              [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
-    // To first order a term may look better than it is: two are fitted, the better is taken.
-    RobustFit better = best;
-    int term = -1;
-    for (std::size_t k = 0; k < std::min<std::size_t>(2, candidates.size()); ++k) {
-      if (candidates[k].gain < beyond_doubt) {
-        break;
-      }
-      problem.extend(candidates[k].term, true);
-      RobustFit fit = refit(problem, candidates[k].start, bounds, scales);
-      problem.extend(candidates[k].term, false);
-      if (fit.cost < better.cost) {
-        better = std::move(fit);
-        term = candidates[k].term;
-      }
+  }
+  if (may_start_ahead(problem, best.x)) {
+    const Term backlash{parameter::take_up};
+    extend(problem, backlash, true);
+    RobustFit ahead = with_take_up(problem, best, bounds, scales);
+    extend(problem, backlash, false);
+    const double evidence = (best.cost - ahead.cost) / beyond_doubt(backlash);
+    const auto known = std::find_if(found.begin(), found.end(), [&](const Candidate& candidate) {
+      return candidate.term == backlash;
+    });
+    if (known == found.end()) {
+      found.push_back({backlash, evidence, std::move(ahead)});
+    } else if (evidence > known->evidence) {
+      *known = {backlash, evidence, std::move(ahead)};
     }
-    if (term < 0) {
-      problem.refresh_forces(best.x);
-      break;
-    }
-    problem.extend(term, true);
-    problem.refresh_forces(better.x);
+  }
+  const Term limit{parameter::headroom};
+  if (!problem.is_extended(parameter::headroom)) {
+    extend(problem, limit, true);
+    RobustFit limited = with_limit(problem, best, bounds, scales);
+    extend(problem, limit, false);
+    const double gain = best.cost - limited.cost;
+    found.push_back({limit, gain / beyond_doubt(limit), std::move(limited)});
+  }
+  std::sort(found.begin(), found.end(),
+            [](const Candidate& a, const Candidate& b) { return a.evidence > b.evidence; });
+  return found;
+}
+
+/// How much correlated residuals inflate the fall of the cost by a term. What a start tells stands
+/// in one or two blocks, whose sums say nothing of their spread: there the correlation of all
+/// residuals is what is left to go by.
+double inflation_of(const Covariances& spread, const Term& term) {
+  if (term.front() == parameter::take_up) {
+    return std::max(1.0, spread.estimates.back()(term.front(), term.front()) /
+                             spread.independent(term.front(), term.front()));
+  }
+  double largest = 1.0;
+  for (const Eigen::Index k : term) {
+    largest = std::max(largest, spread.inflation(k));
+  }
+  return largest;
+}
+
+/// A model with one term more.
+struct Judged {
+  Term term;
+  RobustFit fit;
+  double evidence = 0.0;  ///< Over what is beyond doubt.
+  Eigen::VectorXd moved;  ///< Of the parameters, by the term.
+  [[nodiscard]] double chi_squared() const { return evidence * beyond_doubt(term); }
+};
+
+/// Fits the model with a term more, and leaves it without.
+Judged judge(OutputErrorProblem& problem, const Bounds& bounds, const ChannelScales& scales,
+             const RobustFit& best, const Candidate& candidate) {
+  const Term& term = candidate.term;
+  extend(problem, term, true);
+  const RobustFit larger = refit(problem, candidate.start, bounds, scales);
+  Judged judged{term, larger, 0.0, Eigen::VectorXd::Zero(best.x.size())};
+  if (larger.cost < best.cost && is_physical(term, larger.x[term.front()])) {
+    problem.refresh_forces(larger.x);
     // Judged by the residuals that the larger model leaves, which are white if it is right.
-    const ChannelScales fresh = residual_scales(problem, better.x);
+    const ChannelScales fresh = residual_scales(problem, larger.x);
     const Covariances spread =
-        covariances(problem, better.x, problem.free_parameters(), bounds, fresh);
-    problem.extend(term, false);
+        covariances(problem, larger.x, problem.free_parameters(), bounds, fresh);
+    judged.fit = minimize(problem, larger.x, problem.free_parameters(), bounds, fresh, 60, 1e-2);
+    extend(problem, term, false);
     problem.refresh_forces(best.x);
     const RobustFit without =
         minimize(problem, best.x, problem.free_parameters(), bounds, fresh, 60, 1e-2);
-    problem.extend(term, true);
-    problem.refresh_forces(better.x);
-    RobustFit with =
-        minimize(problem, better.x, problem.free_parameters(), bounds, fresh, 60, 1e-2);
-    const double fall = without.cost - with.cost;
-    const double evidence = spread.singular ? 0.0 : fall / spread.inflation(term);
-    if (evidence < beyond_doubt) {
-      const double weight = std::clamp(evidence / beyond_doubt, 0.0, 1.0);
-      extension.doubt = std::sqrt(weight) * (with.x - without.x);
-      extension.doubt[term] = 0.0;
-      problem.extend(term, false);
-      problem.refresh_forces(best.x);
+    judged.evidence = spread.singular ? 0.0
+                                      : (without.cost - judged.fit.cost) /
+                                            inflation_of(spread, term) / beyond_doubt(term);
+    judged.moved = judged.fit.x - without.x;
+    judged.fit.iterations += larger.iterations + best.iterations;
+  }
+  extend(problem, term, false);
+  problem.refresh_forces(best.x);
+  return judged;
+}
+
+std::vector<Judged>::iterator find(std::vector<Judged>& all, Eigen::Index term) {
+  return std::find_if(all.begin(), all.end(),
+                      [term](const Judged& judged) { return judged.term.front() == term; });
+}
+
+/// That there is the term: odds of one to ten before the data, of which half is lost to what else
+/// it could have been.
+double probability(const Judged& judged) {
+  constexpr double against = 20.0;
+  return 1.0 / (1.0 + against * std::exp(-0.5 * judged.chi_squared()));
+}
+
+/// The parameters that are there without the term, as far as it would move them.
+Eigen::VectorXd doubt(const Judged& judged, double share) {
+  Eigen::VectorXd moved = share * judged.moved;
+  for (const Eigen::Index k : judged.term) {
+    moved[k] = 0.0;
+  }
+  return moved;
+}
+
+}  // namespace
+
+Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds, ChannelScales scales,
+                       RobustFit& best, bool backlash) {
+  Extension extension;
+  problem.offer_backlash(backlash);
+  problem.offer_field(true);
+  problem.refresh_forces(best.x);
+  for (int round = 0; round < most_terms; ++round) {
+    const std::vector<Candidate> found = candidates(problem, bounds, scales, best);
+    // To first order a term may look better than it is: some are fitted, the best is taken.
+    std::vector<Judged> all;
+    for (std::size_t k = 0; k < std::min(most_fits, found.size()); ++k) {
+      if (found[k].evidence >= worth_a_fit * std::max(1.0, found.front().evidence)) {
+        all.push_back(judge(problem, bounds, scales, best, found[k]));
+      }
+    }
+    auto better = std::max_element(all.begin(), all.end(), [](const Judged& a, const Judged& b) {
+      const bool sure = b.evidence >= 1.0;
+      return (a.evidence >= 1.0) == sure ? a.chi_squared() < b.chi_squared() : sure;
+    });
+    if (better == all.end() || better->evidence < 1.0) {
+      for (const Judged& judged : all) {
+        extension.doubts.push_back(doubt(judged, std::sqrt(probability(judged))));
+      }
       break;
     }
-    with.iterations += better.iterations + best.iterations;
-    best = std::move(with);
+    // At a flywheel a sagging battery looks like a little drag and more inertia.
+    const auto sag = find(all, parameter::sag);
+    const auto drag = find(all, parameter::drag);
+    if (sag != all.end() && drag != all.end() && (better == sag || better == drag) &&
+        std::abs(sag->evidence - drag->evidence) < as_good) {
+      better = sag;
+      Judged between = *drag;
+      between.moved -= sag->moved;
+      between.term.push_back(parameter::sag);
+      extension.doubts.push_back(doubt(between, 0.5));
+    }
+    extend(problem, better->term, true);
+    problem.refresh_forces(better->fit.x);
+    scales = residual_scales(problem, better->fit.x);
+    const int iterations = better->fit.iterations;
+    best = minimize(problem, better->fit.x, problem.free_parameters(), bounds, scales, 60, 1e-2);
+    best.iterations += iterations;
     extension.extended = true;
   }
+  problem.offer_field(problem.is_extended(parameter::friction_field));
+  problem.refresh_forces(best.x);
   return extension;
 }
+
+namespace {
+
+/// Where friction differs most from its mean: what its size is made of there.
+Eigen::VectorXd steepest_field(const OutputErrorProblem& problem, const Eigen::VectorXd& x) {
+  Eigen::VectorXd most = Eigen::VectorXd::Zero(x.size());
+  for (const ResidualRun& run : problem.runs()) {
+    for (std::size_t i = 0; i < run.input.time.size(); ++i) {
+      Eigen::VectorXd here = Eigen::VectorXd::Zero(x.size());
+      for (int k = parameter::friction_field; k < parameter::headroom; ++k) {
+        here[k] = run.input.forces[static_cast<std::size_t>(k - parameter::first_force)][i];
+      }
+      if (std::abs(here.dot(x)) > std::abs(most.dot(x))) {
+        most = std::copysign(1.0, here.dot(x)) * here;
+      }
+    }
+  }
+  return most;
+}
+
+}  // namespace
 
 std::vector<ModelTerm> estimate_terms(const OutputErrorProblem& problem, const RobustFit& best,
                                       const Covariances& spread) {
   struct Row {
     int parameter;
     const char* name;
-    const char* unit;  ///< After "V".
+    const char* unit;
   };
-  static constexpr std::array rows{
-      Row{parameter::bias, "asymmetric_friction", ""}, Row{parameter::spring, "spring", "/unit"},
-      Row{parameter::drag, "drag", "/(unit/s)²"}, Row{parameter::headroom, "current_limit", ""}};
+  static constexpr std::array rows{Row{parameter::bias, "asymmetric_friction", "V"},
+                                   Row{parameter::spring, "spring", "V/unit"},
+                                   Row{parameter::drag, "drag", "V/(unit/s)²"},
+                                   Row{parameter::sag, "sag", ""},
+                                   Row{parameter::friction_field, "friction_along_travel", "V"},
+                                   Row{parameter::take_up, "backlash", "unit"},
+                                   Row{parameter::headroom, "current_limit", "V"}};
   std::vector<ModelTerm> terms;
   const std::string& unit = problem.recording().unit;
   for (const Row& row : rows) {
@@ -161,23 +354,25 @@ std::vector<ModelTerm> estimate_terms(const OutputErrorProblem& problem, const R
     }
     ModelTerm term;
     term.name = row.name;
-    term.unit = std::string("V") + row.unit;
+    term.unit = row.unit;
     if (const std::size_t at = term.unit.find("unit"); at != std::string::npos) {
       term.unit.replace(at, 4, unit);
     }
-    const Eigen::VectorXd gradient = Eigen::VectorXd::Unit(best.x.size(), row.parameter);
-    term.value = symmetric_estimate(best.x[row.parameter], spread.standard_error(gradient));
+    Eigen::VectorXd gradient = Eigen::VectorXd::Unit(best.x.size(), row.parameter);
+    if (row.parameter == parameter::friction_field) {
+      gradient = steepest_field(problem, best.x);
+    }
+    term.value = symmetric_estimate(gradient.dot(best.x), spread.standard_error(gradient));
     // What it makes at most in this log.
     const int force = row.parameter - parameter::first_force;
-    for (const ResidualRun& run : problem.runs()) {
-      if (force < force_count) {
+    term.largest = term.value.value;
+    if (force < force_count && row.parameter != parameter::friction_field) {
+      term.largest = 0.0;
+      for (const ResidualRun& run : problem.runs()) {
         for (const double input : run.input.forces[static_cast<std::size_t>(force)]) {
           term.largest = std::max(term.largest, std::abs(input * term.value.value));
         }
       }
-    }
-    if (row.parameter == parameter::headroom) {
-      term.largest = term.value.value;
     }
     terms.push_back(std::move(term));
   }
@@ -198,6 +393,26 @@ void report_terms(const FeedforwardFit& fit, std::vector<Diagnostic>& diagnostic
            "a drag of {:.3g} {} that grows with the square of the speed explains the log ({:.2g} V "
            "at its top speed). The gains hold beside it: kV v alone is too little at speed",
            value, term.unit, term.largest);
+    } else if (term.name == "sag") {
+      warn(
+          diagnostics, "sag",
+          "the motors get less than the log says, by a share that grows with the square of the "
+          "command, {:.0f} % at 12 V: a battery that sags, or wires, with {:.2g} times the motors' "
+          "resistance, while the command was recorded. The gains are those of the voltage at the "
+          "motor; record that (applied output times bus voltage), or use voltage compensation",
+          100.0 * value / (1.0 + value), value);
+    } else if (term.name == "friction_along_travel") {
+      warn(diagnostics, "friction_along_travel",
+           "friction varies along the travel by up to {:.2g} V about kS = {:.3g} V. The gains hold "
+           "beside it; look for a place that binds",
+           value, fit.kS.value);
+    } else if (term.name == "backlash") {
+      warn(
+          diagnostics, "backlash",
+          "at the start of a step the encoder moves {:.2g} {} before the load follows: backlash or "
+          "slack between them. The gains are those after it is taken up; a controller should not "
+          "count on the load's moving before",
+          value, term.unit);
     } else if (term.name == "asymmetric_friction") {
       warn(diagnostics, "asymmetric_friction",
            "friction differs by direction: kS is {:.3g} V forward and {:.3g} V in reverse",

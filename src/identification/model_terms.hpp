@@ -10,17 +10,19 @@ namespace flyball::identification {
 /// What an extension did.
 struct Extension {
   bool extended = false;
-  /// By how much a term that was not taken in, though something spoke for it, would move the
-  /// parameters, times the root of its weight: none, or one of the size of x. As a standard error
-  /// it keeps intervals true where the log leaves open whether there is such a term.
-  Eigen::VectorXd doubt{};
+  /// By how much each term that was not taken in, though something spoke for it, would move the
+  /// parameters, times the root of its weight. As standard errors they keep intervals true where
+  /// the log leaves open whether there is such a term.
+  std::vector<Eigen::VectorXd> doubts{};
 };
 
-/// Extends the model by the terms (bias, spring, drag, current limit) whose evidence is beyond
-/// doubt, the strongest first, two at most, and fits it again.
-/// @param best  The fit of the model without; becomes that of the extended one.
+/// Extends the model by the terms (bias, spring, drag, sag, friction along the travel, backlash,
+/// current limit) whose evidence is beyond doubt, the strongest first, two at most, and fits it
+/// again.
+/// @param best      The fit of the model without; becomes that of the extended one.
+/// @param backlash  Whether it is one of the terms.
 [[nodiscard]] Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds,
-                                     const ChannelScales& scales, RobustFit& best);
+                                     ChannelScales scales, RobustFit& best, bool backlash);
 
 /// The terms of an extended model with their intervals.
 [[nodiscard]] std::vector<ModelTerm> estimate_terms(const OutputErrorProblem& problem,

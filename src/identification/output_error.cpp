@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "identification/output_error.hpp"
@@ -16,6 +17,8 @@ constexpr double longest_span = 0.2;  // s, of a position difference
 constexpr double crowding_distance =
     0.018;                               // s, differences closer than this add nothing on a ramp
 constexpr double shortest_width = 1e-3;  // s, below this an average is a sample
+constexpr double battery = 12.0;         // V, of which the voltage is a share
+constexpr double motor_share = 0.25;     // of the inertia, before the backlash
 
 SimulationVector simulation_parameters(const Eigen::VectorXd& x, std::size_t run) {
   SimulationVector simulated{};
@@ -123,7 +126,16 @@ Averaged moving_average(const Response& response, double time, double width, boo
 constexpr int local_initial_velocity = shared_parameter_count;
 constexpr int local_extra_delay = shared_parameter_count + 1;
 
-/// Simulation columns 0–8 are shared; the initial velocity is the first own one.
+/// How much of the backlash a run from rest has crossed: quadratic in time, as a push does.
+double taken_up(const ResidualRun& run, double time) {
+  if (!run.starts_at_rest) {
+    return 0.0;
+  }
+  const double place = std::clamp((time - run.input.time.front()) / run.take_up_time, 0.0, 1.0);
+  return place * place;
+}
+
+/// The initial velocity is the first own column; those before it are shared.
 template <class Row>
 void store_gradient(Row&& row, const SimulationGradient& gradient, double factor) {
   row.template head<parameter::initial_velocity>() =
@@ -157,16 +169,13 @@ OutputErrorProblem::OutputErrorProblem(const PreparedRecording& recording,
                     (forward == 0 || forward == static_cast<std::ptrdiff_t>(runs_.size()));
   hides_inertia_ =
       std::all_of(runs_.begin(), runs_.end(), [](const ResidualRun& run) { return run.ramp; });
-  double low = 0.0;
-  double high = 0.0;
   for (std::size_t i = 0; i < runs_.size(); ++i) {
     if (!runs_[i].angle.empty()) {
       const auto [least, most] = std::minmax_element(runs_[i].angle.begin(), runs_[i].angle.end());
-      low = i == 0 ? *least : std::min(low, *least);
-      high = i == 0 ? *most : std::max(high, *most);
+      low_ = i == 0 ? *least : std::min(low_, *least);
+      high_ = i == 0 ? *most : std::max(high_, *most);
     }
   }
-  middle_ = 0.5 * (low + high);
   priors_ = {{parameter::position_delay, 0.015, 0.015},
              {parameter::velocity_delay, 0.035, 0.025},
              {parameter::averaging_width, 0.03, 0.05}};
@@ -193,10 +202,14 @@ std::size_t OutputErrorProblem::residuals() const {
 
 void OutputErrorProblem::refresh_forces(const Eigen::VectorXd& x) {
   const double delay = x[parameter::position_delay];
+  const double kV = x[parameter::velocity_gain];
+  const double middle = 0.5 * (low_ + high_);
   for (std::size_t index = 0; index < runs_.size(); ++index) {
     ResidualRun& run = runs_[index];
+    const PreparedRun& prepared = recording_.runs[run.prepared];
     const std::size_t rows = run.input.time.size();
-    const bool simulated = x[parameter::velocity_gain] > 0.0 && is_extended(parameter::drag);
+    const bool simulated =
+        kV > 0.0 && (is_extended(parameter::drag) || is_extended(parameter::sag));
     if (simulated) {
       responses_[index].simulate(run.input, simulation_parameters(x, index), false);
     }
@@ -213,36 +226,64 @@ void OutputErrorProblem::refresh_forces(const Eigen::VectorXd& x) {
     }
     const bool arm = mechanism_ == MechanismKind::arm && !run.angle.empty();
     const bool travels = mechanism_ != MechanismKind::flywheel && !run.angle.empty();
+    double largest = 0.0;
     std::size_t hint = 0;
     for (std::size_t i = 0; i < rows; ++i) {
       // The middle of the interval that the input is held for.
       const double next = i + 1 < rows ? run.input.time[i + 1] : run.input.time[i];
-      const double middle = 0.5 * (run.input.time[i] + next);
-      const double position =
-          travels ? interpolate(run.angle_time, run.angle, middle + delay) : 0.0;
+      const double time = 0.5 * (run.input.time[i] + next);
+      const double position = travels ? interpolate(run.angle_time, run.angle, time + delay) : 0.0;
       if (arm) {
         force(parameter::gravity_cosine)[i] = std::cos(position);
         force(parameter::gravity_sine)[i] = std::sin(position);
       }
       if (travels) {
-        force(parameter::spring)[i] = position - middle_;
+        force(parameter::spring)[i] = position - middle;
+        if (field_) {
+          const double turn = 2.0 * std::numbers::pi * (position - low_) / (high_ - low_);
+          for (int k = 0; k < field_count; ++k) {
+            const double angle = turn * (1 + k / 2);
+            force(parameter::friction_field + k)[i] =
+                prepared.direction * (k % 2 == 0 ? std::sin(angle) : std::cos(angle));
+          }
+        }
       }
-      const PreparedRun& prepared = recording_.runs[run.prepared];
       const double velocity =
-          simulated ? responses_[index].at(middle, false, hint).velocity
-                    : interpolate(prepared.run.time, prepared.smoothed_velocity, middle);
+          simulated ? responses_[index].at(time, false, hint).velocity
+                    : interpolate(prepared.run.time, prepared.smoothed_velocity, time);
       force(parameter::drag)[i] = velocity * std::abs(velocity);
+      // Battery and wires lose what the motor's resistance drops, times the duty squared: the
+      // current is that of the battery times the duty, and so is what its loss takes off.
+      const double voltage = run.input.voltage[i];
+      const double duty = voltage / battery;
+      force(parameter::sag)[i] = duty * duty * (voltage - kV * velocity) /
+                                 (1.0 + std::max(0.0, x[parameter::sag]) * duty * duty);
+      largest = std::max(largest, std::abs(voltage));
     }
     run.input.forces = std::move(forces);
+    if (x[parameter::take_up] > 0.0) {
+      const double kA = kV * std::exp(x[parameter::log_time_constant]);
+      run.take_up_time = std::clamp(
+          std::sqrt(2.0 * x[parameter::take_up] * motor_share * kA / largest), 1e-3, 0.05);
+    }
   }
 }
 
 bool OutputErrorProblem::can_extend(int parameter) const {
+  const bool travels = mechanism_ != MechanismKind::flywheel && recording_.has_position;
+  if (parameter >= parameter::friction_field && parameter < parameter::headroom) {
+    return travels && !hides_friction_ && high_ > low_;
+  }
   switch (parameter) {
     case parameter::bias:  // An elevator's gravity is the same force.
       return mechanism_ != MechanismKind::elevator;
     case parameter::spring:
-      return mechanism_ != MechanismKind::flywheel && recording_.has_position;
+      return travels;
+    case parameter::sag:
+      return !hides_inertia_;
+    case parameter::take_up:
+      return backlash_ && std::any_of(runs_.begin(), runs_.end(),
+                                      [](const ResidualRun& run) { return run.starts_at_rest; });
     default:
       return true;
   }
@@ -252,6 +293,7 @@ void OutputErrorProblem::evaluate(std::size_t index, const Eigen::VectorXd& x, b
                                   ResidualBlock& block) {
   const ResidualRun& run = runs_[index];
   const TestRun& source = recording_.runs[run.prepared].run;
+  const double direction = recording_.runs[run.prepared].direction;
   Response& response = responses_[index];
   response.simulate(run.input, simulation_parameters(x, index), jacobian);
 
@@ -276,23 +318,31 @@ void OutputErrorProblem::evaluate(std::size_t index, const Eigen::VectorXd& x, b
         response.at(source.time[from] - position_delay, jacobian, hints.early);
     const Response::Sample late =
         response.at(source.time[to] - position_delay, jacobian, hints.late);
-    block.difference[row] =
-        (source.position[to] - source.position[from]) - (late.position - early.position);
+    const double taken = direction * (taken_up(run, source.time[to] - position_delay) -
+                                      taken_up(run, source.time[from] - position_delay));
+    block.difference[row] = (source.position[to] - source.position[from]) -
+                            (late.position - early.position) - x[parameter::take_up] * taken;
     if (jacobian) {
       store_gradient(block.difference_jacobian.row(row),
                      late.position_gradient - early.position_gradient, -1.0);
+      block.difference_jacobian(row, parameter::take_up) = -taken;
       block.difference_jacobian(row, parameter::position_delay) = late.velocity - early.velocity;
       block.difference_jacobian(row, local_extra_delay) = late.velocity - early.velocity;
     }
   }
   for (Eigen::Index row = 0; row < velocities; ++row) {
     const std::size_t at = run.velocities[static_cast<std::size_t>(row)];
-    const Averaged average = moving_average(response, source.time[at] - velocity_delay,
-                                            x[parameter::averaging_width], jacobian, hints);
+    const double time = source.time[at] - velocity_delay;
+    const double width = std::max(x[parameter::averaging_width], shortest_width);
+    Averaged average = moving_average(response, time, width, jacobian, hints);
+    const double taken =
+        direction * (taken_up(run, time + 0.5 * width) - taken_up(run, time - 0.5 * width)) / width;
+    average.value += x[parameter::take_up] * taken;
     const double scale = x[parameter::velocity_scale];
     block.velocity[row] = source.velocity[at] - scale * average.value;
     if (jacobian) {
       store_gradient(block.velocity_jacobian.row(row), average.gradient, -scale);
+      block.velocity_jacobian(row, parameter::take_up) = -scale * taken;
       block.velocity_jacobian(row, parameter::velocity_delay) = -scale * average.by_delay;
       block.velocity_jacobian(row, local_extra_delay) = -scale * average.by_delay;
       block.velocity_jacobian(row, parameter::averaging_width) = -scale * average.by_width;
@@ -304,18 +354,24 @@ void OutputErrorProblem::evaluate(std::size_t index, const Eigen::VectorXd& x, b
 double OutputErrorProblem::velocity_shown(std::size_t run, const Eigen::VectorXd& x,
                                           double time) const {
   Hints hints;
+  const double shown = time - x[parameter::velocity_delay] - x[extra_delay_of(run)];
+  const double width = std::max(x[parameter::averaging_width], shortest_width);
+  const double taken =
+      recording_.runs[runs_[run].prepared].direction *
+      (taken_up(runs_[run], shown + 0.5 * width) - taken_up(runs_[run], shown - 0.5 * width)) /
+      width;
   return x[parameter::velocity_scale] *
-         moving_average(responses_[run],
-                        time - x[parameter::velocity_delay] - x[extra_delay_of(run)],
-                        x[parameter::averaging_width], false, hints)
-             .value;
+         (moving_average(responses_[run], shown, width, false, hints).value +
+          x[parameter::take_up] * taken);
 }
 
 double OutputErrorProblem::position_shown(std::size_t run, const Eigen::VectorXd& x,
                                           double time) const {
   std::size_t hint = 0;
   const double delay = x[parameter::position_delay] + x[extra_delay_of(run)];
-  return responses_[run].at(time - delay, false, hint).position;
+  return responses_[run].at(time - delay, false, hint).position +
+         x[parameter::take_up] * recording_.runs[runs_[run].prepared].direction *
+             taken_up(runs_[run], time - delay);
 }
 
 std::vector<bool> OutputErrorProblem::free_parameters() const {
@@ -323,10 +379,10 @@ std::vector<bool> OutputErrorProblem::free_parameters() const {
   free[parameter::static_friction] = !hides_friction_;
   free[parameter::gravity_cosine] = mechanism_ != MechanismKind::flywheel;
   free[parameter::gravity_sine] = mechanism_ == MechanismKind::arm;
-  for (const int term :
-       {parameter::bias, parameter::spring, parameter::drag, parameter::headroom}) {
+  for (int term = parameter::bias; term <= parameter::headroom; ++term) {
     free[static_cast<std::size_t>(term)] = is_extended(term) && can_extend(term);
   }
+  free[parameter::take_up] = is_extended(parameter::take_up) && can_extend(parameter::take_up);
   free[parameter::position_delay] = recording_.has_position;
   free[parameter::velocity_delay] = recording_.has_velocity;
   free[parameter::averaging_width] = recording_.has_velocity;

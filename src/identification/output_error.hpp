@@ -20,16 +20,20 @@ namespace parameter {
 /// much its sensors' values are older than those of the others (where they are refreshed within a
 /// row differs by run).
 enum Shared : int {
-  // 0 to 8 are those of Simulation.
-  position_delay = 9,    ///< s.
-  velocity_delay = 10,   ///< s, to the middle of the averaging window.
-  averaging_width = 11,  ///< s.
-  velocity_scale = 12,   ///< Velocity column over true velocity.
+  // Before them those of Simulation that runs share.
+  position_delay = initial_velocity,  ///< s.
+  velocity_delay,                     ///< s, to the middle of the averaging window.
+  averaging_width,                    ///< s.
+  velocity_scale,                     ///< Velocity column over true velocity.
+  /// unit, by which the encoder is ahead of the inertia after a start from rest: it crosses
+  /// backlash alone.
+  take_up,
+  end_of_shared,
 };
 
 }  // namespace parameter
 
-inline constexpr int shared_parameter_count = 13;
+inline constexpr int shared_parameter_count = parameter::end_of_shared;
 inline constexpr int own_parameter_count = 2;
 /// Columns of a run's Jacobian: the shared parameters and its own.
 inline constexpr int local_parameter_count = shared_parameter_count + own_parameter_count;
@@ -50,6 +54,7 @@ struct ResidualRun {
   bool starts_at_rest = false;
   double likely_initial_velocity = 0.0;
   double window_end = 0.0;
+  double take_up_time = 5e-3;  ///< s, that crossing the backlash takes.
   RunInput input;
   /// Rows of the prepared run (from, to) whose position difference is compared.
   std::vector<std::pair<std::size_t, std::size_t>> differences;
@@ -89,8 +94,15 @@ class OutputErrorProblem {
   /// simulation with x. @param x  All parameters.
   void refresh_forces(const Eigen::VectorXd& x);
 
-  /// Makes a term of the model free that a mechanism need not have: bias, spring, drag, headroom.
+  /// Whether the forces hold what friction along the travel is made of, from the next refresh on.
+  void offer_field(bool offered) { field_ = offered; }
+  /// Whether a start may be one across backlash.
+  void offer_backlash(bool offered) { backlash_ = offered; }
+
+  /// Makes a term of the model free that a mechanism need not have: bias, spring, drag, sag, all of
+  /// the friction field, headroom, take_up.
   void extend(int parameter, bool by_it) { extended_[static_cast<std::size_t>(parameter)] = by_it; }
+  void take_terms_out() { extended_.fill(false); }
   [[nodiscard]] bool is_extended(int parameter) const {
     return extended_[static_cast<std::size_t>(parameter)];
   }
@@ -131,7 +143,10 @@ class OutputErrorProblem {
   std::vector<Response> responses_;
   std::array<bool, shared_parameter_count> extended_{};
   std::vector<Prior> priors_;
-  double middle_ = 0.0;  ///< Of the travel.
+  double low_ = 0.0;   ///< Of the travel.
+  double high_ = 0.0;  ///< Of the travel.
+  bool backlash_ = true;
+  bool field_ = false;  ///< Whether the forces hold friction along the travel.
   bool hides_friction_ = false;
   bool hides_inertia_ = false;
 };

@@ -390,6 +390,7 @@ Expected<PreparedRecording> prepare(const Recording& recording, const Preparatio
   FLYBALL_CHECK(check_row_period(prepared.row_period));
   refresh_derived_columns(prepared);
   detect_motion(prepared);
+  mend_slips(prepared);
   mend_signs(prepared);
   drop_coarse_velocity(prepared);
   trim_runs(prepared, options);

@@ -22,13 +22,11 @@ struct Drive {
   double voltage;
   double opposed;  ///< Sum of the forces, V.
   /// Of the forces, by their factors.
-  std::array<double, force_count> by_factor{};
+  Eigen::Matrix<double, 1, force_count> by_factor{};
 };
 
 void add_force_gradient(const Drive& drive, double factor, SimulationGradient& gradient) {
-  for (int k = 0; k < force_count; ++k) {
-    gradient[parameter::first_force + k] -= factor * drive.by_factor[static_cast<std::size_t>(k)];
-  }
+  gradient.segment<force_count>(parameter::first_force) -= factor * drive.by_factor;
 }
 
 /// Slides for `duration` with friction against `sign`:
@@ -224,11 +222,11 @@ void Response::simulate(const RunInput& input, const SimulationVector& parameter
     }
     if (row + 1 < rows) {
       const auto i = static_cast<std::size_t>(row);
-      Drive drive{input.voltage[i], 0.0, {}};
+      Drive drive{input.voltage[i], 0.0, Eigen::Matrix<double, 1, force_count>::Zero()};
       for (std::size_t k = 0; k < input.forces.size(); ++k) {
         if (!input.forces[k].empty()) {
-          drive.by_factor[k] = input.forces[k][i];
-          drive.opposed += parameters[parameter::first_force + k] * drive.by_factor[k];
+          drive.by_factor[static_cast<Eigen::Index>(k)] = input.forces[k][i];
+          drive.opposed += parameters[parameter::first_force + k] * input.forces[k][i];
         }
       }
       advance(state, drive, input.time[i + 1] - input.time[i], parameters, sensitivities);

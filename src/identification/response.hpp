@@ -18,21 +18,25 @@ enum Simulation : int {
   velocity_gain = 1,      ///< kV, V/(unit/s).
   log_time_constant = 2,  ///< ln(kA/kV), kA/kV in s.
   // Factors of the forces that a run's input holds, V a unit of theirs.
-  gravity_cosine = 3,    ///< Of 1 (elevator) or cos θ.
-  gravity_sine = 4,      ///< Of sin θ.
-  bias = 5,              ///< Of 1: friction of one direction above the other's.
-  spring = 6,            ///< Of the position from the middle of the travel.
-  drag = 7,              ///< Of v |v|.
-  headroom = 8,          ///< V, what |V − kV v| is limited to: resistance times current limit.
-  initial_velocity = 9,  ///< Of this run, unit/s.
+  gravity_cosine = 3,     ///< Of 1 (elevator) or cos θ.
+  gravity_sine = 4,       ///< Of sin θ.
+  bias = 5,               ///< Of 1: friction of one direction above the other's.
+  spring = 6,             ///< Of the position from the middle of the travel.
+  drag = 7,               ///< Of v |v|.
+  sag = 8,                ///< Resistance of battery and wires over the motor's.
+  friction_field = 9,     ///< The first of those of friction along the travel.
+  headroom = 15,          ///< V, what |V − kV v| is limited to: resistance times current limit.
+  initial_velocity = 16,  ///< Of this run, unit/s.
 };
 inline constexpr int first_force = gravity_cosine;
 
 }  // namespace parameter
 
-inline constexpr int force_count = 5;
+inline constexpr int force_count = parameter::headroom - parameter::first_force;
+/// Sines and cosines of one, two and three waves along the travel.
+inline constexpr int field_count = parameter::headroom - parameter::friction_field;
 inline constexpr double no_limit = 1e6;  ///< V, a headroom that no voltage reaches.
-inline constexpr int simulation_parameter_count = 10;
+inline constexpr int simulation_parameter_count = 17;
 using SimulationVector = std::array<double, simulation_parameter_count>;
 using SimulationGradient = Eigen::Matrix<double, 1, simulation_parameter_count>;
 

@@ -143,21 +143,27 @@ RobustFit minimize(OutputErrorProblem& problem, const Eigen::VectorXd& start,
 
 std::vector<Score> scores(OutputErrorProblem& problem, const Eigen::VectorXd& x,
                           const std::vector<bool>& free, const Bounds& bounds,
-                          const ChannelScales& scales, const std::vector<int>& parameters) {
+                          const ChannelScales& scales,
+                          const std::vector<std::vector<Eigen::Index>>& groups) {
   const NormalEquations equations = normal_equations(problem, x, scales);
   const std::vector<Eigen::Index> active = active_parameters(x, equations, free, bounds);
   const Eigen::MatrixXd hessian = equations.hessian(active, active);
   std::vector<Score> all;
-  for (const int parameter : parameters) {
-    Eigen::VectorXd cross(hessian.rows());
-    for (Eigen::Index i = 0; i < cross.size(); ++i) {
-      cross[i] = equations.hessian(active[static_cast<std::size_t>(i)], parameter);
+  for (const std::vector<Eigen::Index>& group : groups) {
+    const Eigen::MatrixXd cross = equations.hessian(active, group);
+    const Eigen::MatrixXd own = equations.hessian(group, group);
+    Eigen::MatrixXd left = own;
+    for (Eigen::Index k = 0; k < cross.cols(); ++k) {
+      const Eigen::VectorXd column = cross.col(k);
+      left.col(k) -= cross.transpose() * detail::solve_symmetric(hessian, column);
     }
-    const double own = equations.hessian(parameter, parameter);
-    const Eigen::VectorXd projected = detail::solve_symmetric(hessian, cross);
-    const double left = own - cross.dot(projected);
-    const double gradient = equations.gradient[parameter];
-    all.push_back(left > 1e-6 * own ? Score{-gradient / left, square(gradient) / left} : Score{});
+    Score score;
+    if ((left.diagonal().array() > 1e-6 * own.diagonal().array()).all()) {
+      const Eigen::VectorXd gradient = equations.gradient(group);
+      score.step = -detail::solve_symmetric(left, gradient);
+      score.gain = -gradient.dot(score.step);
+    }
+    all.push_back(std::move(score));
   }
   return all;
 }

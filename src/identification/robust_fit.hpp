@@ -42,16 +42,16 @@ struct RobustFit {
 [[nodiscard]] double cost_at(OutputErrorProblem& problem, const Eigen::VectorXd& x,
                              const ChannelScales& scales);
 
-/// What one more parameter would gain at a minimum over others: the step to its best value and the
-/// fall of the cost, to first order. No gain for a parameter that the data do not move.
+/// What some more parameters would gain together at a minimum over others: the step to their best
+/// values and the fall of the cost, to first order. No gain for those that the data do not move.
 struct Score {
-  double step = 0.0;
+  Eigen::VectorXd step{};
   double gain = 0.0;
 };
 [[nodiscard]] std::vector<Score> scores(OutputErrorProblem& problem, const Eigen::VectorXd& x,
                                         const std::vector<bool>& free, const Bounds& bounds,
                                         const ChannelScales& scales,
-                                        const std::vector<int>& parameters);
+                                        const std::vector<std::vector<Eigen::Index>>& groups);
 
 /// Covariances of all parameters at a minimum: HAC, block sandwich, residual autocorrelation.
 /// Rows and columns of fixed parameters and of those at a bound are zero.
@@ -59,11 +59,12 @@ struct Covariances {
   std::array<Eigen::MatrixXd, 3> estimates;
   Eigen::MatrixXd independent;  ///< What it would be if residuals were independent.
   bool singular = false;
-  Eigen::VectorXd doubt{};  ///< Of the model itself: a step that counts as a standard error.
+  /// Of the model itself: steps, the largest of which counts as a standard error.
+  std::vector<Eigen::VectorXd> doubts{};
   /// How much larger a parameter's variance is than independent residuals would make it, at
   /// least 1.
   [[nodiscard]] double inflation(Eigen::Index parameter) const;
-  /// Largest of the three standard errors of gradient · x, with the doubt.
+  /// Largest of the three standard errors of gradient · x, with the largest doubt.
   [[nodiscard]] double standard_error(const Eigen::VectorXd& gradient) const;
 };
 

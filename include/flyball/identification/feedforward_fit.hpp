@@ -28,10 +28,12 @@ struct GainEstimate {
 
 /// A force that the four gains lack and the log asks for beyond doubt; the gains hold beside it.
 struct ModelTerm {
-  std::string name{};  ///< "spring", "drag", "asymmetric_friction", "current_limit".
-  std::string unit{};  ///< Of the value: "V/m", "V/(rad/s)²", "V".
+  /// "spring", "drag", "asymmetric_friction", "current_limit", "sag", "friction_along_travel",
+  /// "backlash".
+  std::string name{};
+  std::string unit{};  ///< Of the value: "V/m", "V/(rad/s)²", "V", "m", "" (sag).
   GainEstimate value{};
-  double largest = 0.0;  ///< V, of it in this log.
+  double largest = 0.0;  ///< V, of it in this log; of backlash the value.
 };
 
 /// A run as measured and as simulated in free run from its recorded voltage.

@@ -162,10 +162,16 @@ std::vector<Value> gain_row(const std::string& name, const GainEstimate& gain,
 
 void term_rows(Table& table, const std::string& mode, const FeedforwardFit& fit) {
   for (const identification::ModelTerm& term : fit.terms) {
-    const std::string meaning =
-        term.name == "current_limit"
-            ? "(resistance times the limit)"
-            : fmt::format("({} V at most in the log)", number(term.largest, 2));
+    std::string meaning = fmt::format("({} V at most in the log)", number(term.largest, 2));
+    if (term.name == "current_limit") {
+      meaning = "(resistance times the limit)";
+    } else if (term.name == "sag") {
+      meaning = "(resistance of battery and wires over the motors')";
+    } else if (term.name == "backlash") {
+      meaning = "(taken up at the start of a step)";
+    } else if (term.name == "friction_along_travel") {
+      meaning = "(at most, about kS)";
+    }
     std::string name = term.name;
     std::replace(name.begin(), name.end(), '_', ' ');
     table.rows.push_back(gain_row(name + mode, term.value, term.unit, 0.0, false, meaning));
