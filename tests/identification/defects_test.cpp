@@ -74,6 +74,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(Defect{"spring", elevator, {.spring = 0.8}, 0.8},
                     Defect{"drag", flywheel, {.drag = 4e-4}, 4e-4},
                     Defect{"drag", elevator, {.drag = 0.4}, 0.4},
+                    Defect{"sag", elevator, {.sag = 0.2}, 0.2},
                     Defect{
                         "asymmetric_friction", flywheel, {.friction_asymmetry = 0.4}, 0.2, false},
                     Defect{"current_limit", flywheel, {.headroom = 3.0}, 3.0},
@@ -115,6 +116,72 @@ TEST(ModelTerms, ATermInDoubtWidensTheIntervals) {
   ASSERT_TRUE(doubting.fit->terms.empty());
   EXPECT_EQ(doubting.fit->kG->value, sure.fit->kG->value);
   EXPECT_GT(doubting.fit->kG->standard_error, 1.2 * sure.fit->kG->standard_error);
+}
+
+// What the step's encoder is ahead by is three quarters of half the gap: it starts in the middle,
+// and a quarter of the inertia is the motor's.
+TEST(Backlash, BeforeTheLoadFollowsIsTakenOutOfTheStep) {
+  const SessionDefects slack{.backlash = 0.03};
+  const FitReport report = report_of(arm, slack);
+  ASSERT_NE(find(report.diagnostics, "backlash"), nullptr);
+  ASSERT_EQ(report.fit->terms.size(), 1U);
+  EXPECT_EQ(report.fit->terms[0].unit, "rad");
+  EXPECT_NEAR(report.fit->terms[0].value.value, 0.75 * 0.5 * 0.03, 0.2 * 0.01125);
+  expect_gains(report, arm, 0.01);
+  const FitReport without = report_of(arm, slack, false);
+  EXPECT_GT(without.fit->kA.value, 1.03 * scenarios::mechanisms.at(arm).kA);
+}
+
+TEST(Friction, ThatVariesAlongTheTravelDoesNotSpoilTheGains) {
+  for (const std::size_t mechanism : {elevator, std::size_t{3}, arm}) {
+    CharacterizationOptions options = scenarios::session(scenarios::mechanisms.at(mechanism), 7);
+    options.friction_variation = 0.4;
+    const FitReport report =
+        identify_feedforward(flyball::record_characterization(options).value());
+    expect_gains(report, mechanism, 0.01);
+    ASSERT_NE(find(report.diagnostics, "friction_along_travel"), nullptr) << mechanism;
+    EXPECT_NEAR(report.fit->terms.at(0).value.value, 0.4 * options.kS, 0.04 * options.kS);
+  }
+}
+
+// Twice in each test the encoder loses a twentieth of half the travel.
+TEST(Slip, IsNamedAndPutBack) {
+  for (const std::size_t mechanism : {elevator, arm}) {
+    CharacterizationOptions options = scenarios::session(scenarios::mechanisms.at(mechanism), 7);
+    const Recording sound = flyball::record_characterization(options).value();
+    options.defects.slip = 0.05 * scenarios::reach(options);
+    const Recording slipped = flyball::record_characterization(options).value();
+    const auto prepared = prepare(slipped);
+    ASSERT_TRUE(prepared);
+    EXPECT_NE(find(prepared->diagnostics, "slip"), nullptr) << mechanism;
+    EXPECT_EQ(find(prepare(sound)->diagnostics, "slip"), nullptr) << mechanism;
+    // Of the ramps no jump is left.
+    for (std::size_t run = 0; run < 2; ++run) {
+      const double moved =
+          prepared->runs[run].run.position.back() - sound.runs[run].position.back();
+      EXPECT_NEAR(moved, 0.0, 0.1 * options.defects.slip) << mechanism;
+    }
+    expect_gains(identify_feedforward(slipped), mechanism, 0.02);
+  }
+}
+
+// A clock that loses a refresh of the sensor makes the position jump as well, by the speed's way.
+TEST(Slip, IsNotAClockThatLosesARefresh) {
+  Recording recording = recordings::record(elevator);
+  for (TestRun& run : recording.runs) {
+    for (const double share : {0.4, 0.7}) {
+      const auto at = static_cast<std::size_t>(share * static_cast<double>(run.time.size()));
+      constexpr std::size_t refresh = 4;  // rows
+      for (auto* column : {&run.time, &run.voltage, &run.position, &run.velocity}) {
+        const auto first = column->begin() + static_cast<std::ptrdiff_t>(at);
+        column->erase(first, first + refresh);
+      }
+      for (std::size_t i = at; i < run.time.size(); ++i) {
+        run.time[i] -= 0.02;
+      }
+    }
+  }
+  EXPECT_EQ(find(prepare(recording)->diagnostics, "slip"), nullptr);
 }
 
 TEST(Backlash, IsNamed) {
