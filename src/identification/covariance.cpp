@@ -44,7 +44,7 @@ LocalMatrix bin_channel(const Eigen::VectorXd& residuals, const ResidualBlock::J
     bins[at].count += 1;
     bins[at].jacobian += j;
     bins[at].score += w * z * j;
-    hessian.noalias() += (w * w * w * j) * j.transpose();  // ψ' = w³
+    add_square(hessian, w * w * w, j);  // ψ' = w³
   }
   return hessian;
 }
@@ -135,11 +135,12 @@ LocalMatrix hac_middle(const Bins& run) {
     scores[i] = score_at(run, i);
   }
   for (std::size_t i = 0; i < bins; ++i) {
-    middle += scores[i] * scores[i].transpose();
+    LocalVector later = 0.5 * scores[i];
     for (std::size_t lag = 1; lag <= lags && i + lag < bins; ++lag) {
-      const LocalMatrix cross = scores[i] * scores[i + lag].transpose();
-      middle += bartlett(static_cast<int>(lag)) * (cross + cross.transpose());
+      later += bartlett(static_cast<int>(lag)) * scores[i + lag];
     }
+    const LocalMatrix cross = scores[i] * later.transpose();
+    middle += cross + cross.transpose();
   }
   return middle;
 }

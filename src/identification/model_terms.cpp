@@ -23,18 +23,17 @@ double beyond_doubt(const Term& term) {
 }
 
 /// Of the evidence beyond doubt: with more, a term is fitted to see what would come of it.
-constexpr double worth_a_fit = 0.25;
+constexpr double worth_a_fit = 0.5;
 constexpr std::size_t most_fits = 3;
+/// s, that crossing backlash may take in a step.
+constexpr std::array take_up_times{0.005, 0.015};
 /// Two terms that differ by less evidence explain the same.
 constexpr double as_good = 0.5;
 
 /// The terms that the model's cost has a gradient by.
 std::vector<Term> differentiable_terms() {
-  std::vector<Term> terms{{parameter::bias},
-                          {parameter::spring},
-                          {parameter::drag},
-                          {parameter::sag},
-                          {parameter::take_up}};
+  std::vector<Term> terms{
+      {parameter::bias}, {parameter::spring}, {parameter::drag}, {parameter::sag}};
   terms.emplace_back();
   for (int k = 0; k < field_count; ++k) {
     terms.back().push_back(parameter::friction_field + k);
@@ -104,32 +103,33 @@ RobustFit with_limit(OutputErrorProblem& problem, const RobustFit& base, const B
   return best;
 }
 
-/// Whether the fit has sensors that know of the start before it is: then something else started
-/// sooner than the inertia may.
-bool may_start_ahead(const OutputErrorProblem& problem, const Eigen::VectorXd& x) {
-  return problem.can_extend(parameter::take_up) && !problem.is_extended(parameter::take_up) &&
-         (x[parameter::position_delay] < 0.0 ||
-          x[parameter::velocity_delay] < 0.5 * x[parameter::averaging_width]);
-}
-
-/// The best fit with backlash, from sensors that are as late as usual.
+/// The best fit with backlash, from sensors that are as late as usual: without it they are found so
+/// early, and the inertia so large, that to first order nothing is left for it to explain.
 RobustFit with_take_up(OutputErrorProblem& problem, const RobustFit& base, const Bounds& bounds,
                        const ChannelScales& scales) {
-  Eigen::VectorXd start = base.x;
+  const std::vector<bool> free = problem.free_parameters();
+  RobustFit fit = base;
   for (const OutputErrorProblem::Prior& prior : problem.priors()) {
     const bool of_sensors = prior.parameter == parameter::position_delay ||
                             prior.parameter == parameter::velocity_delay ||
                             prior.parameter == parameter::averaging_width;
-    if (of_sensors && problem.free_parameters()[static_cast<std::size_t>(prior.parameter)]) {
-      start[prior.parameter] = prior.mean;
+    if (of_sensors && free[static_cast<std::size_t>(prior.parameter)]) {
+      fit.x[prior.parameter] = prior.mean;
     }
   }
-  start[parameter::take_up] = 0.01 * problem.recording().top_speed;  // of 10 ms
-  problem.refresh_forces(start);
-  const RobustFit fit =
-      minimize(problem, start, problem.free_parameters(), bounds, scales, 15, 0.1);
-  problem.refresh_forces(base.x);
-  return fit;
+  fit.x[parameter::take_up] = 0.005 * problem.recording().top_speed;  // of 5 ms
+  RobustFit best = base;
+  double best_time = take_up_times.front();
+  for (const double time : take_up_times) {
+    problem.cross_backlash_in(time);
+    RobustFit tried = minimize(problem, fit.x, free, bounds, scales, 8, 0.3);
+    if (tried.cost < best.cost && tried.x[parameter::take_up] > 0.0) {
+      best = std::move(tried);
+      best_time = time;
+    }
+  }
+  problem.cross_backlash_in(best_time);
+  return best;
 }
 
 struct Candidate {
@@ -156,20 +156,13 @@ std::vector<Candidate> candidates(OutputErrorProblem& problem, const Bounds& bou
       found.push_back({absent[k], all[k].gain / beyond_doubt(absent[k]), best});
     }
   }
-  if (may_start_ahead(problem, best.x)) {
+  if (problem.can_extend(parameter::take_up) && !problem.is_extended(parameter::take_up)) {
     const Term backlash{parameter::take_up};
     extend(problem, backlash, true);
     RobustFit ahead = with_take_up(problem, best, bounds, scales);
     extend(problem, backlash, false);
-    const double evidence = (best.cost - ahead.cost) / beyond_doubt(backlash);
-    const auto known = std::find_if(found.begin(), found.end(), [&](const Candidate& candidate) {
-      return candidate.term == backlash;
-    });
-    if (known == found.end()) {
-      found.push_back({backlash, evidence, std::move(ahead)});
-    } else if (evidence > known->evidence) {
-      *known = {backlash, evidence, std::move(ahead)};
-    }
+    const double gain = best.cost - ahead.cost;
+    found.push_back({backlash, gain / beyond_doubt(backlash), std::move(ahead)});
   }
   const Term limit{parameter::headroom};
   if (!problem.is_extended(parameter::headroom)) {

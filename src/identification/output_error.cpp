@@ -18,7 +18,6 @@ constexpr double crowding_distance =
     0.018;                               // s, differences closer than this add nothing on a ramp
 constexpr double shortest_width = 1e-3;  // s, below this an average is a sample
 constexpr double battery = 12.0;         // V, of which the voltage is a share
-constexpr double motor_share = 0.25;     // of the inertia, before the backlash
 
 SimulationVector simulation_parameters(const Eigen::VectorXd& x, std::size_t run) {
   SimulationVector simulated{};
@@ -127,11 +126,11 @@ constexpr int local_initial_velocity = shared_parameter_count;
 constexpr int local_extra_delay = shared_parameter_count + 1;
 
 /// How much of the backlash a run from rest has crossed: quadratic in time, as a push does.
-double taken_up(const ResidualRun& run, double time) {
+double taken_up(const ResidualRun& run, double time, double duration) {
   if (!run.starts_at_rest) {
     return 0.0;
   }
-  const double place = std::clamp((time - run.input.time.front()) / run.take_up_time, 0.0, 1.0);
+  const double place = std::clamp((time - run.input.time.front()) / duration, 0.0, 1.0);
   return place * place;
 }
 
@@ -226,7 +225,6 @@ void OutputErrorProblem::refresh_forces(const Eigen::VectorXd& x) {
     }
     const bool arm = mechanism_ == MechanismKind::arm && !run.angle.empty();
     const bool travels = mechanism_ != MechanismKind::flywheel && !run.angle.empty();
-    double largest = 0.0;
     std::size_t hint = 0;
     for (std::size_t i = 0; i < rows; ++i) {
       // The middle of the interval that the input is held for.
@@ -258,14 +256,8 @@ void OutputErrorProblem::refresh_forces(const Eigen::VectorXd& x) {
       const double duty = voltage / battery;
       force(parameter::sag)[i] = duty * duty * (voltage - kV * velocity) /
                                  (1.0 + std::max(0.0, x[parameter::sag]) * duty * duty);
-      largest = std::max(largest, std::abs(voltage));
     }
     run.input.forces = std::move(forces);
-    if (x[parameter::take_up] > 0.0) {
-      const double kA = kV * std::exp(x[parameter::log_time_constant]);
-      run.take_up_time = std::clamp(
-          std::sqrt(2.0 * x[parameter::take_up] * motor_share * kA / largest), 1e-3, 0.05);
-    }
   }
 }
 
@@ -318,8 +310,9 @@ void OutputErrorProblem::evaluate(std::size_t index, const Eigen::VectorXd& x, b
         response.at(source.time[from] - position_delay, jacobian, hints.early);
     const Response::Sample late =
         response.at(source.time[to] - position_delay, jacobian, hints.late);
-    const double taken = direction * (taken_up(run, source.time[to] - position_delay) -
-                                      taken_up(run, source.time[from] - position_delay));
+    const double taken =
+        direction * (taken_up(run, source.time[to] - position_delay, take_up_time_) -
+                     taken_up(run, source.time[from] - position_delay, take_up_time_));
     block.difference[row] = (source.position[to] - source.position[from]) -
                             (late.position - early.position) - x[parameter::take_up] * taken;
     if (jacobian) {
@@ -335,8 +328,10 @@ void OutputErrorProblem::evaluate(std::size_t index, const Eigen::VectorXd& x, b
     const double time = source.time[at] - velocity_delay;
     const double width = std::max(x[parameter::averaging_width], shortest_width);
     Averaged average = moving_average(response, time, width, jacobian, hints);
-    const double taken =
-        direction * (taken_up(run, time + 0.5 * width) - taken_up(run, time - 0.5 * width)) / width;
+    const double taken = direction *
+                         (taken_up(run, time + 0.5 * width, take_up_time_) -
+                          taken_up(run, time - 0.5 * width, take_up_time_)) /
+                         width;
     average.value += x[parameter::take_up] * taken;
     const double scale = x[parameter::velocity_scale];
     block.velocity[row] = source.velocity[at] - scale * average.value;
@@ -356,10 +351,10 @@ double OutputErrorProblem::velocity_shown(std::size_t run, const Eigen::VectorXd
   Hints hints;
   const double shown = time - x[parameter::velocity_delay] - x[extra_delay_of(run)];
   const double width = std::max(x[parameter::averaging_width], shortest_width);
-  const double taken =
-      recording_.runs[runs_[run].prepared].direction *
-      (taken_up(runs_[run], shown + 0.5 * width) - taken_up(runs_[run], shown - 0.5 * width)) /
-      width;
+  const double taken = recording_.runs[runs_[run].prepared].direction *
+                       (taken_up(runs_[run], shown + 0.5 * width, take_up_time_) -
+                        taken_up(runs_[run], shown - 0.5 * width, take_up_time_)) /
+                       width;
   return x[parameter::velocity_scale] *
          (moving_average(responses_[run], shown, width, false, hints).value +
           x[parameter::take_up] * taken);
@@ -371,7 +366,7 @@ double OutputErrorProblem::position_shown(std::size_t run, const Eigen::VectorXd
   const double delay = x[parameter::position_delay] + x[extra_delay_of(run)];
   return responses_[run].at(time - delay, false, hint).position +
          x[parameter::take_up] * recording_.runs[runs_[run].prepared].direction *
-             taken_up(runs_[run], time - delay);
+             taken_up(runs_[run], time - delay, take_up_time_);
 }
 
 std::vector<bool> OutputErrorProblem::free_parameters() const {

@@ -54,7 +54,6 @@ struct ResidualRun {
   bool starts_at_rest = false;
   double likely_initial_velocity = 0.0;
   double window_end = 0.0;
-  double take_up_time = 5e-3;  ///< s, that crossing the backlash takes.
   RunInput input;
   /// Rows of the prepared run (from, to) whose position difference is compared.
   std::vector<std::pair<std::size_t, std::size_t>> differences;
@@ -96,6 +95,8 @@ class OutputErrorProblem {
 
   /// Whether the forces hold what friction along the travel is made of, from the next refresh on.
   void offer_field(bool offered) { field_ = offered; }
+  /// @param time  s, that a step takes for it.
+  void cross_backlash_in(double time) { take_up_time_ = time; }
   /// Whether a start may be one across backlash.
   void offer_backlash(bool offered) { backlash_ = offered; }
 
@@ -143,8 +144,9 @@ class OutputErrorProblem {
   std::vector<Response> responses_;
   std::array<bool, shared_parameter_count> extended_{};
   std::vector<Prior> priors_;
-  double low_ = 0.0;   ///< Of the travel.
-  double high_ = 0.0;  ///< Of the travel.
+  double low_ = 0.0;            ///< Of the travel.
+  double high_ = 0.0;           ///< Of the travel.
+  double take_up_time_ = 5e-3;  ///< s
   bool backlash_ = true;
   bool field_ = false;  ///< Whether the forces hold friction along the travel.
   bool hides_friction_ = false;

@@ -21,7 +21,7 @@ void accumulate(const Eigen::VectorXd& residuals, const ResidualBlock::Jacobian&
     const double z = residuals[row] * inverse_scale;
     const double w = weight(z);
     const LocalVector j = jacobian.row(row).transpose() * inverse_scale;
-    hessian.noalias() += (w * j) * j.transpose();
+    add_square(hessian, w, j);
     gradient.noalias() += (w * z) * j;
     cost += loss(z);
   }

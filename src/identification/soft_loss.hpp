@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 
 #include <Eigen/Core>
 
@@ -26,6 +27,18 @@ inline double loss(double z) {
 /// ρ'(z)/(2z): the weight of iterated least squares. ρ''(z)/2 is its cube.
 inline double weight(double z) {
   return 1.0 / std::sqrt(1.0 + square(z / soft_limit));
+}
+
+/// Adds weight j jᵀ; most terms of the model are absent, and their entries of j zero.
+inline void add_square(LocalMatrix& sum, double weight, const LocalVector& j) {
+  for (int k = 0; k < local_parameter_count; ++k) {
+    if (const double factor = weight * j[k]; factor != 0.0) {
+      double* column = sum.data() + static_cast<std::ptrdiff_t>(k) * local_parameter_count;
+      for (int i = 0; i < local_parameter_count; ++i) {
+        column[i] += factor * j[i];
+      }
+    }
+  }
 }
 
 /// 1/scale, and 0 for a channel that is switched off.
