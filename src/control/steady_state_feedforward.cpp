@@ -9,7 +9,7 @@
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
-#include "math/extended/double_double.hpp"
+#include "math/extended/wide_matrix.hpp"
 
 namespace flyball {
 
@@ -58,39 +58,6 @@ Expected<SteadyStateFeedforward<>> solve(const MatrixRef& A, const MatrixRef& B,
       feedforward.N_u,
       detail::solve_least_squares(feedforward.N_x, Eigen::MatrixXd::Identity(n, n)));
   return feedforward;
-}
-
-/// Powers of two: states and inputs in units in which no entry of Q, R, and B where Q weighs it, is
-/// above one.
-struct InversionUnits {
-  Eigen::VectorXi states;
-  Eigen::VectorXi inputs;
-  Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> weighted;  ///< Entries of B.
-};
-
-InversionUnits inversion_units(const MatrixRef& B, const MatrixRef& Q, const MatrixRef& R) {
-  constexpr int none = -5000;
-  const auto above = [](double x) { return x == 0.0 ? none : std::ilogb(x) + 1; };
-  const Eigen::Index n = B.rows();
-  const Eigen::Index m = B.cols();
-  InversionUnits units{Eigen::VectorXi::Zero(n), Eigen::VectorXi::Zero(m),
-                       Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>::Constant(n, m, false)};
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const int weight = above(Q.row(i).cwiseAbs().maxCoeff());
-    units.weighted.row(i) = weight > none;
-    units.states(i) = weight > none ? -(weight / 2 + 1) : 0;
-  }
-  for (Eigen::Index j = 0; j < m; ++j) {
-    const int weight = above(R.row(j).cwiseAbs().maxCoeff());
-    int size = weight > none ? weight / 2 + 1 : none;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      if (units.weighted(i, j) && B(i, j) != 0.0) {
-        size = std::max(size, above(B(i, j)) - units.states(i));
-      }
-    }
-    units.inputs(j) = size > none ? -size : 0;
-  }
-  return units;
 }
 
 }  // namespace
@@ -144,6 +111,7 @@ Expected<SteadyStateFeedforward<>> steady_state_feedforward_of_pairs(const Matri
 }
 
 Expected<Eigen::MatrixXd> qr_weighted_gain(const MatrixRef& B, const Weight& Q, const Weight& R) {
+  using detail::WideMatrix;
   constexpr std::string_view name = "qr_weighted_gain";
   if (!Q.get() || !R.get()) {
     return tl::unexpected((Q.get() ? R : Q).get().error());
@@ -160,33 +128,38 @@ Expected<Eigen::MatrixXd> qr_weighted_gain(const MatrixRef& B, const Weight& Q, 
                     .finite(weight_R, "R")
                     .symmetric(weight_Q, "Q")
                     .symmetric(weight_R, "R"));
-  const InversionUnits units = inversion_units(B, weight_Q, weight_R);
-  const Eigen::VectorXi& x = units.states;
-  const Eigen::VectorXi& u = units.inputs;
-  const detail::DoubleDoubleMatrix Q_scaled(detail::times_powers(weight_Q, x, x, 0));
-  // What has no weight may be of any size.
-  const auto scaled_B = [&](int lift) {
-    return detail::DoubleDoubleMatrix(
-        units.weighted.select(detail::times_powers(B, -x, u, lift), 0.0));
-  };
-  const detail::DoubleDoubleMatrix B_scaled = scaled_B(0);
-  const detail::DoubleDoubleMatrix inner =
-      symmetrized(add_product(detail::DoubleDoubleMatrix(detail::times_powers(weight_R, u, u, 0)),
-                              1.0, product(B_scaled.transpose(), Q_scaled), B_scaled));
-  // Beside a large R, BᵀQ may be so small that its products need another unit.
-  const double largest = B.size() > 0 ? B_scaled.hi.cwiseAbs().maxCoeff() : 0.0;
-  const int lift = largest > 0.0 ? -std::ilogb(largest) : 0;
-  const auto gain = m > 0 && detail::cholesky_of(inner.rounded())
-                        ? solve(inner, product(scaled_B(lift).transpose(), Q_scaled))
+  const WideMatrix B_wide(B);
+  const WideMatrix BQ = product(B_wide.transpose(), symmetrized(WideMatrix(weight_Q)));
+  const WideMatrix inner = symmetrized(add_product(WideMatrix(weight_R), 1.0, BQ, B_wide));
+  // The inputs in units in which the diagonal is near one.
+  Eigen::VectorXi unit(m);
+  for (Eigen::Index j = 0; j < m; ++j) {
+    unit(j) = static_cast<int>(-inner(j, j).exponent / 2);
+  }
+  const Eigen::VectorXi none = Eigen::VectorXi::Zero(n);
+  const WideMatrix scaled = inner.times_powers(unit, unit, 0);
+  const auto gain = m > 0 && detail::cholesky_of(scaled.rounded())
+                        ? solve(scaled, BQ.times_powers(unit, none, 0))
                         : std::nullopt;
   if (!gain || !gain->all_finite()) {
     return refusal(FeedforwardError::singular, name, "B'QB + R")
         .hint("give every input a weight in R");
   }
-  Eigen::MatrixXd K = detail::times_powers(gain->rounded(), u, -x, -lift);
+  const Eigen::MatrixXd K = gain->times_powers(unit, none, 0).rounded();
   if (!K.allFinite()) {
     return refusal(FeedforwardError::overflow, name, "K_ff")
         .hint("choose units in which the entries of B are nearer to 1");
+  }
+  constexpr double largest = 1e-10;
+  const WideMatrix K_wide(K);
+  const double residual =
+      share_of(sum(product(inner, K_wide), -1.0, BQ),
+               sum(product(inner.magnitudes(), K_wide.magnitudes()), 1.0, BQ.magnitudes()));
+  if (!(residual <= largest)) {
+    return refusal(FeedforwardError::singular, name, "B'QB + R")
+        .got("singular but for rounding")
+        .hint("give every input a weight in R")
+        .with("residual", residual);
   }
   return K;
 }

@@ -226,7 +226,8 @@ double residual_of(const SteadyFilter& f) {
   const Eigen::VectorXi own_y = Eigen::VectorXi::Zero(y.size());
   return std::max({share_of(loop, loop_terms, own_x, own_x), share_of(loop, loop_terms, x, x),
                    share_of(gain, gain_terms, own_x, own_y), share_of(gain, gain_terms, x, y),
-                   share_of(posterior, posterior_terms, own_x, own_x)});
+                   share_of(posterior, posterior_terms, own_x, own_x),
+                   share_of(posterior, posterior_terms, x, x)});
 }
 
 std::optional<Eigen::VectorXcd> poles_of(const SteadyFilter& f) {
@@ -237,12 +238,7 @@ std::optional<Eigen::VectorXcd> poles_of(const SteadyFilter& f) {
   if (poles.cwiseAbs().maxCoeff() < 1.0) {
     return poles;
   }
-  const Eigen::VectorXd d = balance_of(rounded);
-  DoubleDoubleMatrix balanced = loop;
-  for (Eigen::MatrixXd* part : {&balanced.hi, &balanced.lo}) {
-    *part = d.cwiseInverse().asDiagonal() * *part * d.asDiagonal();
-  }
-  auto extended = extended_eigenvalues_of(balanced);
+  auto extended = balanced_extended_eigenvalues_of(loop);
   if (!extended || !(extended->cwiseAbs().maxCoeff() < 1.0)) {
     return std::nullopt;
   }

@@ -9,6 +9,7 @@
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
 #include "math/extended/double_double.hpp"
+#include "math/extended/wide_matrix.hpp"
 #include "systems/balance.hpp"
 #include "systems/gramian_factor.hpp"
 #include "systems/staircase.hpp"
@@ -22,6 +23,7 @@ using Complex = std::complex<double>;
 using detail::bare;
 using detail::product;
 using detail::timed;
+using detail::WideMatrix;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Continuous = ContinuousSystem<>;
@@ -61,25 +63,35 @@ Expected<Continuous> transform(const Continuous& system, const MatrixRef& T) {
   if (fine) {
     solved.leftCols(n) *= columns.asDiagonal();
   }
-  if (!(rcond > 10.0 * epsilon) || !fine || !solved.allFinite()) {
+  if (!(rcond > 10.0 * epsilon) || !fine) {
     return refusal(SystemError::singular_transform, where, "T")
         .got("singular")
         .expected("invertible")
         .with("reciprocal condition", rcond);
   }
   // T A' = A T and T B' = B by their largest entries, in the units that were given.
-  const auto holds = [&](const MatrixXd& made, const MatrixXd& wanted) {
-    const MatrixXd back = product(T, made);
-    const double terms = product(T.cwiseAbs(), made.cwiseAbs()).cwiseAbs().maxCoeff();
-    return back.allFinite() && (back - wanted).cwiseAbs().maxCoeff() <= 1e-10 * terms;
+  const WideMatrix T_wide(T);
+  const WideMatrix AT = product(WideMatrix(system.A), T_wide);
+  const auto hold = [&] {
+    const auto holds = [&](const MatrixXd& made, const WideMatrix& wanted) {
+      const WideMatrix M(made);
+      return share_of(sum(product(T_wide, M), -1.0, wanted),
+                      product(T_wide.magnitudes(), M.magnitudes())) <= 1e-10;
+    };
+    return holds(solved.leftCols(n), AT) &&
+           holds(solved.rightCols(system.B.cols()), WideMatrix(system.B));
   };
+  if (!hold()) {
+    const auto wide = detail::solve(T_wide, beside(AT, WideMatrix(system.B)));
+    solved = wide ? wide->rounded() : solved;
+    if (!hold()) {
+      return refusal(SystemError::singular_transform, where, "T")
+          .got("of entries too far apart for sixteen digits")
+          .with("reciprocal condition", rcond);
+    }
+  }
   const MatrixXd A = solved.leftCols(n);
   const MatrixXd B = solved.rightCols(system.B.cols());
-  if (!holds(A, product(system.A, T)) || (B.size() > 0 && !holds(B, system.B))) {
-    return refusal(SystemError::singular_transform, where, "T")
-        .got("of entries too far apart for sixteen digits")
-        .with("reciprocal condition", rcond);
-  }
   return Continuous{A, B, product(system.C, T), system.D};
 }
 
@@ -202,9 +214,12 @@ Expected<BalancedRealization<Continuous>> truncate(const System& given, TimeDoma
   }
   found.hankel = detail::times_power(svd.values, b + c);
   found.error_bound = 2.0 * found.hankel.tail(n - r).sum();
-  found.system = {product(found.T_inverse, product(system.A, found.T)),
-                  detail::times_power(product(found.T_inverse, system.B), (b + c) / 2),
-                  detail::times_power(product(system.C, found.T), (b + c) / 2), system.D};
+  const int a = detail::unit_of(system.A);
+  found.system = {
+      detail::times_power(
+          product(found.T_inverse, product(detail::times_power(system.A, -a), found.T)), a),
+      detail::times_power(product(found.T_inverse, system.B), (b + c) / 2),
+      detail::times_power(product(system.C, found.T), (b + c) / 2), system.D};
   found.T = detail::times_power(found.T, (b - c) / 2);
   found.T_inverse = detail::times_power(found.T_inverse, (c - b) / 2);
   const double left =

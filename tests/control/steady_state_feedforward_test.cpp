@@ -168,6 +168,24 @@ TEST(QrWeightedInversion, InAnyUnits) {
       qr_weighted_gain(1e-310 * one, one, 0.0 * one).error().is(FeedforwardError::overflow));
 }
 
+// One input that reaches one state, whose weight and those beside it are 5e-324: K_ff = 1/b times
+// the weights' quotients, which are one; what else Q has says nothing.
+TEST(QrWeightedInversion, WeightsFarApart) {
+  Eigen::MatrixXd Q(3, 3);
+  Q << 5e-324, 5e-324, 5e-324, 5e-324, -1.7e308, -1e-154, 5e-324, -1e-154, 1e-8;
+  const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(1, 1);
+  const auto first = qr_weighted_gain(Eigen::Vector3d(0x1p-52, 0.0, 0.0), Q, zero);
+  ASSERT_TRUE(first.has_value()) << to_string(first.error());
+  EXPECT_EQ(*first, Eigen::RowVector3d::Constant(0x1p52));
+  // bᵀQ/(bᵀQb) with b = (-5e-324, 1e154), Q₁₁ = 5e-324 and the mean of two that differ by rounding.
+  Eigen::MatrixXd P(2, 2);
+  P << 0.69, 0.0, 1e-224, 5e-324;
+  const auto mean = qr_weighted_gain(Eigen::Vector2d(-5e-324, 1e154), P, zero);
+  ASSERT_TRUE(mean.has_value()) << to_string(mean.error());
+  EXPECT_NEAR((*mean)(0, 1) * 1e154, 1.0, 1e-15);
+  EXPECT_NEAR((*mean)(0, 0) / (0.5e-224 / 5e-324 / 1e154), 1.0, 0.02);
+}
+
 TEST(QrWeightedInversion, Errors) {
   const Eigen::MatrixXd B = Eigen::Vector2d(0.0, 1.0);
   const Eigen::MatrixXd I = Eigen::MatrixXd::Identity(2, 2);

@@ -341,5 +341,45 @@ TEST(KalmanGain, PredictorOfASubnormalPlant) {
   EXPECT_EQ(gain->L(0, 0), A(0, 0) * gain->K(0, 0));
 }
 
+// P⁺ = P - KCP holds in the units that were given, too, or there is no answer: outputs without
+// noise of states 1e16 and rows of C 1e30 apart, whose K cannot be told in 31 digits.
+TEST(KalmanGain, PosteriorInTheGivenUnits) {
+  const Eigen::Matrix2d A = Eigen::Vector2d(1e-20, 0.0).asDiagonal();
+  Eigen::MatrixXd C(2, 2);
+  C << -1.2, -1.6e30, 43.9, -1.78e32;
+  const Eigen::Matrix2d Q = Eigen::Vector2d(2.2, 1e-32).asDiagonal();
+  const auto gain =
+      kalman_gain(A, C, Covariance(Q), Covariance(Eigen::MatrixXd(Eigen::Matrix2d::Zero())));
+  if (gain) {
+    const Eigen::MatrixXd KC = gain->K * C;
+    EXPECT_NEAR(KC(0, 0), 1.0, 1e-10);
+  } else {
+    EXPECT_TRUE(gain.error().is(RiccatiError::no_convergence)) << to_string(gain.error());
+  }
+}
+
+// The residual that is told is the larger of the dual equation's and of the filter's own, which
+// random plants have either way round.
+TEST(KalmanGain, TellsTheLargerResidual) {
+  Random random(151);
+  bool of_filter = false;
+  bool of_dual = false;
+  for (int trial = 0; trial < 200; ++trial) {
+    const Eigen::MatrixXd A = random_matrix(random, 3, 3);
+    const Eigen::MatrixXd C = random_matrix(random, 2, 3);
+    const Eigen::MatrixXd Q = Eigen::MatrixXd::Identity(3, 3);
+    const Eigen::MatrixXd R = Eigen::MatrixXd::Identity(2, 2);
+    const auto dual = dare(A.transpose(), C.transpose(), Q, R);
+    const auto gain = kalman_gain(A, C, Covariance(Q), Covariance(R));
+    ASSERT_EQ(dual.has_value(), gain.has_value()) << trial;
+    if (gain) {
+      EXPECT_GE(gain->residual, dual->residual) << trial;
+      of_filter = of_filter || gain->residual > dual->residual;
+      of_dual = of_dual || gain->residual == dual->residual;
+    }
+  }
+  EXPECT_TRUE(of_filter && of_dual) << of_filter << of_dual;
+}
+
 }  // namespace
 }  // namespace flyball

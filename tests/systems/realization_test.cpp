@@ -230,5 +230,30 @@ TEST(BalancedRealization, OfSignalsInFarUnits) {
   }
 }
 
+// A = 2.3e-308 in states that are 1e40 apart stays what it is.
+TEST(BalancedRealization, OfASubnormalPlant) {
+  const auto scalar = [](double x) { return Eigen::MatrixXd::Constant(1, 1, x); };
+  const auto found = balanced_realization(
+      DiscreteSystem<>{scalar(2.3e-308), scalar(1e100), scalar(1e20), scalar(0.0), Time(1.0)});
+  ASSERT_TRUE(found.has_value()) << to_string(found.error());
+  EXPECT_EQ(found->system.A(0, 0), 2.3e-308);
+}
+
+// T B' = B where the rows of T are 1e154 apart and B has no room for products: the last row says
+// x₀ = -0.75e-154 x₂, which is not nothing.
+TEST(Realization, SimilarityTransformOfLargeInputs) {
+  Eigen::MatrixXd T(3, 3);
+  T << -1e20, 1.0, -1.25, 1.0, 2.0, 0.0, 1e154, 1e-154, 0.75;
+  Eigen::MatrixXd A = Eigen::Vector3d(2.0, 0.125, 2.0).asDiagonal();
+  const Eigen::Vector3d B(-1.5, 1.7e308, 1.25);
+  const ContinuousSystem<> plant{A, B, Eigen::MatrixXd::Zero(1, 3), Eigen::MatrixXd::Zero(1, 1)};
+  const auto found = similarity_transform(plant, T);
+  ASSERT_TRUE(found.has_value()) << to_string(found.error());
+  const Eigen::VectorXd x = found->B.col(0);
+  EXPECT_NEAR(x(1) / 0.85e308, 1.0, 1e-14);
+  EXPECT_NEAR(x(2) / 0.68e308, 1.0, 1e-14);
+  EXPECT_NEAR(x(0) / -0.51e154, 1.0, 1e-14);
+}
+
 }  // namespace
 }  // namespace flyball

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <flyball/math/exponential/matrix_exponential.hpp>
@@ -14,6 +15,7 @@
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
+#include "math/exponential/extended_function.hpp"
 #include "math/exponential/triangular_function.hpp"
 #include "math/extended/double_double.hpp"
 
@@ -88,16 +90,51 @@ bool is_lower_triangular(const MatrixRef& A) {
   return A.cols() > 1;
 }
 
-/// Whether two matrices that should be one differ by rounding, beside their largest entry.
-bool agree(const MatrixXd& made, const MatrixRef& wanted) {
-  constexpr double share = 1e-9;
-  return made.allFinite() &&
-         (made - wanted).cwiseAbs().maxCoeff() <= share * wanted.cwiseAbs().maxCoeff();
+/// Whether two matrices that should be one differ by rounding, beside their largest entry or the
+/// largest term of the product that made one.
+bool agree(const MatrixXd& made, const MatrixRef& wanted, double terms = 0.0) {
+  constexpr double share = 9e-11;
+  return made.allFinite() && (made - wanted).cwiseAbs().maxCoeff() <=
+                                 share * std::max(terms, wanted.cwiseAbs().maxCoeff());
 }
 
 Refusal not_accurate(std::string_view where) {
   return refusal(MatrixFunctionError::not_accurate, where, "A")
       .got("of entries too far apart for sixteen digits");
+}
+
+/// A balanced, with digits to spare.
+struct Balanced {
+  explicit Balanced(const MatrixRef& A)
+      : d(detail::balance_of(A)), M(MatrixXd(d.cwiseInverse().asDiagonal() * A * d.asDiagonal())) {}
+  [[nodiscard]] MatrixXd unbalanced(const detail::DoubleDoubleMatrix& F) const {
+    return d.asDiagonal() * F.rounded() * d.cwiseInverse().asDiagonal();
+  }
+
+  Eigen::VectorXd d;
+  detail::DoubleDoubleMatrix M;
+};
+
+/// A^f = e^(f log A) where the Schur form loses the large entries' digits in balanced units.
+Expected<MatrixXd> power_in_twice(const MatrixRef& A, double f, std::string_view where) {
+  const Balanced balanced(A);
+  const auto L = detail::extended_logarithm(balanced.M);
+  if (!L) {
+    return not_accurate(where);
+  }
+  const auto power = [&](double p) {
+    const detail::DoubleDoubleMatrix weight(MatrixXd::Identity(A.rows(), A.cols()) * p);
+    return balanced.unbalanced(detail::extended_exponential(detail::product(weight, *L)));
+  };
+  const MatrixXd result = power(f);
+  const MatrixXd rest = power(1.0 - f);
+  const MatrixXd back =
+      detail::product(detail::DoubleDoubleMatrix(result), detail::DoubleDoubleMatrix(rest))
+          .rounded();
+  if (!agree(back, A, detail::product(result.cwiseAbs(), rest.cwiseAbs()).maxCoeff())) {
+    return not_accurate(where);
+  }
+  return result;
 }
 
 /// A^f, 0 < f < 1.
@@ -150,14 +187,15 @@ Expected<MatrixXd> fractional_power(const MatrixRef& given, double f, std::strin
   const auto size = [&](const MatrixXd& M) {
     return detail::norm1(form.d.cwiseInverse().asDiagonal() * M * form.d.asDiagonal());
   };
-  const MatrixXd back = detail::product(result, power(1.0 - f));
+  const MatrixXd rest = power(1.0 - f);
+  const MatrixXd back = detail::product(result, rest);
   if (!result.allFinite() || !(size(back - A) <= 1e-7 * size(A))) {
     return tl::unexpected(no_answer(MatrixFunctionError::no_real_power, where,
                                     "not real: an eigenvalue near zero is defective", smallest)
                               .hint("round the power to a whole number"));
   }
-  if (!agree(back, A)) {
-    return not_accurate(where);
+  if (!agree(back, A, detail::product(result.cwiseAbs(), rest.cwiseAbs()).maxCoeff())) {
+    return power_in_twice(given, f, where);
   }
   return lower ? MatrixXd(result.transpose()) : result;
 }
@@ -207,13 +245,22 @@ Expected<MatrixXd> inverse_of(const MatrixRef& A, std::string_view where) {
   return X;
 }
 
-/// That e^L is A.
-Expected<void> confirm(const MatrixRef& A, const MatrixXd& L) {
-  const auto back = expm(L);
-  if (!back || !agree(*back, A)) {
+/// L, where e^L is A; else log A in twice the precision.
+Expected<MatrixXd> confirmed(const MatrixRef& A, MatrixXd L) {
+  if (const auto back = expm(L); back && agree(*back, A)) {
+    return L;
+  }
+  const Balanced balanced(A);
+  const auto better = detail::extended_logarithm(balanced.M);
+  if (!better) {
     return not_accurate("logm");
   }
-  return {};
+  L = balanced.unbalanced(*better);
+  const Balanced answer(L);
+  if (!agree(answer.unbalanced(detail::extended_exponential(answer.M)), A)) {
+    return not_accurate("logm");
+  }
+  return L;
 }
 
 /// log(A / 2^unit), whose errors speak of A's eigenvalues.
@@ -267,14 +314,13 @@ Expected<MatrixXd> logm(const MatrixRef& A) {
         (A.array() == 0.0).select(A.cwiseAbs().maxCoeff(), A.cwiseAbs()).minCoeff();
     const int unit = (std::ilogb(A.cwiseAbs().maxCoeff()) + std::ilogb(least)) / 2;
     const MatrixXd scaled = detail::times_power(A, -unit);
-    FLYBALL_TRY(MatrixXd L, logarithm(scaled, unit));
-    FLYBALL_CHECK(confirm(scaled, L));
+    FLYBALL_TRY(MatrixXd rough, logarithm(scaled, unit));
+    FLYBALL_TRY(MatrixXd L, confirmed(scaled, std::move(rough)));
     L.diagonal().array() += unit * std::numbers::ln2;
     return L;
   }
   FLYBALL_TRY(MatrixXd L, logarithm(A, 0));
-  FLYBALL_CHECK(confirm(A, L));
-  return L;
+  return confirmed(A, std::move(L));
 }
 
 Expected<MatrixXd> powm(const MatrixRef& A, double power) {

@@ -3,6 +3,7 @@
 #include <complex>
 #include <vector>
 
+#include "math/dense/dense.hpp"
 #include "math/extended/extended_eigenvalues.hpp"
 
 // Compiled with -ffp-contract=off: a fused product would be no longer what the next line corrects.
@@ -256,6 +257,14 @@ std::optional<Eigen::VectorXcd> extended_eigenvalues_of(const DoubleDoubleMatrix
   }
   pair_up(values);
   return values;
+}
+
+std::optional<Eigen::VectorXcd> balanced_extended_eigenvalues_of(DoubleDoubleMatrix M) {
+  const Eigen::VectorXd d = balance_of(M.rounded());
+  for (Eigen::MatrixXd* part : {&M.hi, &M.lo}) {
+    *part = d.cwiseInverse().asDiagonal() * *part * d.asDiagonal();
+  }
+  return extended_eigenvalues_of(M);
 }
 
 }  // namespace flyball::detail

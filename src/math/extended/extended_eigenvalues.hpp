@@ -14,4 +14,8 @@ namespace flyball::detail {
 /// matrices" (comlr), with rotations for eliminations.
 [[nodiscard]] std::optional<Eigen::VectorXcd> extended_eigenvalues_of(const DoubleDoubleMatrix& M);
 
+/// The same of D⁻¹MD with the powers of two D that balance M.
+[[nodiscard]] std::optional<Eigen::VectorXcd> balanced_extended_eigenvalues_of(
+    DoubleDoubleMatrix M);
+
 }  // namespace flyball::detail

@@ -60,6 +60,55 @@ bool is_ordinary(double size) {
   return size < 0x1p100 && (size == 0.0 || size > 0x1p-100);
 }
 
+/// Whether the kernel's units, √X_ii, are so far apart that a rounding error of the closed loop in
+/// them is more in those that were given: its poles may be another loop's there.
+bool in_units_far_apart(const double* X, int n) {
+  constexpr double far = 0x1p24;  // of the squares
+  double least = std::abs(X[0]);
+  double most = least;
+  for (int i = 1; i < n; ++i) {
+    least = std::min(least, std::abs(X[i * (n + 1)]));
+    most = std::max(most, std::abs(X[i * (n + 1)]));
+  }
+  return most > far * least;
+}
+
+using ConstMap = Eigen::Map<const Eigen::MatrixXd>;
+
+Eigen::MatrixXd cross_weight(const detail::RiccatiData& data) {
+  return data.N == nullptr ? Eigen::MatrixXd(Eigen::MatrixXd::Zero(data.states, data.inputs))
+                           : Eigen::MatrixXd(ConstMap(data.N, data.states, data.inputs));
+}
+
+/// Whether the kernel's answer leaves little of its equations in the units that were given, too;
+/// then with the poles that A - BK has in them.
+bool holds_in_given_units(const detail::RiccatiData& data, detail::RiccatiAnswer& answer) {
+  constexpr double little = 1e-11;
+  const int n = data.states;
+  const int m = data.inputs;
+  const detail::RiccatiProblem problem{ConstMap(data.A, n, n),
+                                       ConstMap(data.B, n, m),
+                                       detail::symmetrized(ConstMap(data.Q, n, n)),
+                                       detail::symmetrized(ConstMap(data.R, m, m)),
+                                       cross_weight(data),
+                                       data.continuous};
+  const Eigen::MatrixXd K = ConstMap(answer.K, m, n);
+  const double residual = detail::riccati_residual(problem, ConstMap(answer.X, n, n), K);
+  if (!(residual <= little)) {
+    return false;
+  }
+  answer.residual = std::max(answer.residual, residual);
+  if (n > detail::most_states_in_twice) {
+    return true;
+  }
+  const auto poles = detail::riccati_poles(problem.A, problem.B, K);
+  if (!poles || !detail::are_stable(*poles, data.continuous)) {
+    return false;
+  }
+  Eigen::Map<Eigen::VectorXcd>(answer.poles, n) = *poles;
+  return true;
+}
+
 /// The same answer as check_symmetric without its message; S finite.
 bool symmetric(const double* S, int n) {
   for (int j = 0; j < n; ++j) {
@@ -94,7 +143,7 @@ ErrorInfo error_info(RiccatiError code) {
 namespace detail {
 
 Expected<void> solve_riccati(const RiccatiData& data, RiccatiAnswer& answer) {
-  using ConstMap = Eigen::Map<const Eigen::MatrixXd>;
+  constexpr double nearly_nothing = 0x1p-800;
   const int n = data.states;
   const int m = data.inputs;
   const double size_A = largest(data.A, n * n);
@@ -105,14 +154,18 @@ Expected<void> solve_riccati(const RiccatiData& data, RiccatiAnswer& answer) {
                         (data.N == nullptr || is_ordinary(largest(data.N, n * m)));
   if (ordinary && symmetric(data.Q, n) && symmetric(data.R, m) &&
       solve_riccati_quickly(data, answer)) {
-    return {};
+    if (!in_units_far_apart(answer.X, n) && !(size_A > 0.0 && size_A < nearly_nothing)) {
+      return {};
+    }
+    if (holds_in_given_units(data, answer)) {
+      return {};
+    }
   }
   const ConstMap A(data.A, n, n);
   const ConstMap B(data.B, n, m);
   const ConstMap Q(data.Q, n, n);
   const ConstMap R(data.R, m, m);
-  const Eigen::MatrixXd N = data.N == nullptr ? Eigen::MatrixXd(Eigen::MatrixXd::Zero(n, m))
-                                              : Eigen::MatrixXd(ConstMap(data.N, n, m));
+  const Eigen::MatrixXd N = cross_weight(data);
   FLYBALL_CHECK(check_values(A, B, Q, R, N, data.continuous ? "care" : "dare"));
   const RiccatiProblem problem{A, B, symmetrized(Q), symmetrized(R), N, data.continuous};
   FLYBALL_TRY(auto solution,

@@ -6,6 +6,8 @@
 
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/ordinary_units.hpp"
+#include "math/extended/extended_eigenvalues.hpp"
 #include "math/riccati/riccati_robust.hpp"
 
 namespace flyball::detail {
@@ -83,6 +85,16 @@ bool survives_rounding(const MatrixXd& closed_loop, bool continuous) {
     }
   }
   return true;
+}
+
+Error hangs_on_digits(const RiccatiProblem& p, const MatrixXd& X) {
+  return refusal(RiccatiError::no_convergence, p.continuous ? "care" : "dare", "A - BK")
+      .got("stable or not by the last digits of its entries")
+      .expected("stable")
+      .hint(
+          "the plant grows too much in a step, or hangs on its inputs by too little, for 16 "
+          "digits: sample faster, or add an input")
+      .with("size of X", X.norm());
 }
 
 }  // namespace
@@ -169,13 +181,7 @@ Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem) 
       (answer->cancels && !survives_rounding(answer->closed_loop, p.continuous))) {
     Error why = diagnose_riccati(p);
     if (why.is(RiccatiError::no_convergence)) {
-      why = refusal(RiccatiError::no_convergence, p.continuous ? "care" : "dare", "A - BK")
-                .got("stable or not by the last digits of its entries")
-                .expected("stable")
-                .hint(
-                    "the plant grows too much in a step, or hangs on its inputs by too little, for "
-                    "16 digits: sample faster, or add an input")
-                .with("size of X", answer->X.norm());
+      why = hangs_on_digits(p, answer->X);
     }
     return tl::unexpected(std::move(why));
   }
@@ -186,21 +192,58 @@ Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem) 
   solution.X = inverse.asDiagonal() * solution.X * inverse.asDiagonal();
   solution.K = solution.K * inverse.asDiagonal();
   FLYBALL_CHECK(check_riccati(problem, solution));
+  if (auto poles = riccati_poles(problem.A, problem.B, solution.K)) {
+    solution.poles = std::move(*poles);
+    FLYBALL_CHECK(check_stable(problem, solution));
+  }
   return solution;
 }
 
 Expected<void> check_riccati(const RiccatiProblem& p, RiccatiSolution& solution) {
-  constexpr double largest = 1e-10;
-  const double residual = riccati_residual(p, solution.X, solution.K);
+  return judge_riccati(p, riccati_residual(p, solution.X, solution.K), solution);
+}
+
+Expected<void> judge_riccati(const RiccatiProblem& p, double residual, RiccatiSolution& solution) {
   solution.residual = std::max(solution.residual, residual);
-  if (!(residual <= largest)) {
+  if (!(residual <= small_residual)) {
     return tl::unexpected(Error(RiccatiError::no_convergence)
                               .in(p.continuous ? "care" : "dare")
                               .about("X")
                               .got("lost to rounding: it leaves more of the equation")
-                              .expected(format_number(largest) + " of its terms at most")
+                              .expected(format_number(small_residual) + " of its terms at most")
                               .hint("choose units in which the numbers are nearer to 1")
                               .with("residual", residual));
+  }
+  return {};
+}
+
+std::optional<Eigen::VectorXcd> riccati_poles(const MatrixRef& A, const MatrixRef& B,
+                                              const MatrixRef& K) {
+  if (A.rows() > most_states_in_twice) {
+    return std::nullopt;
+  }
+  // In a unit in which the closed loop's entries are ordinary.
+  const auto size = [](const MatrixRef& M) {
+    const double largest = M.cwiseAbs().maxCoeff();
+    return largest > 0.0 ? std::ilogb(largest) : -5000;
+  };
+  const int exponent = std::max(size(A), size(B) + size(K));
+  const int unit = std::abs(exponent) > 200 && exponent > -5000 ? exponent : 0;
+  const auto digits = [&](const MatrixRef& M, int power) {
+    return DoubleDoubleMatrix(power == 0 ? MatrixXd(M) : times_power(M, power));
+  };
+  auto poles = balanced_extended_eigenvalues_of(
+      add_product(digits(A, -unit), -1.0, digits(B, 0), digits(K, -unit)));
+  return poles && unit != 0 ? times_power(*poles, unit) : poles;
+}
+
+bool are_stable(const Eigen::VectorXcd& poles, bool continuous) {
+  return continuous ? (poles.real().array() < 0.0).all() : (poles.cwiseAbs().array() < 1.0).all();
+}
+
+Expected<void> check_stable(const RiccatiProblem& p, const RiccatiSolution& solution) {
+  if (!are_stable(solution.poles, p.continuous)) {
+    return tl::unexpected(hangs_on_digits(p, solution.X));
   }
   return {};
 }

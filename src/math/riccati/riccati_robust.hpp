@@ -56,9 +56,29 @@ struct ExtendedRiccati {
 /// kernels do not vouch for.
 [[nodiscard]] Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem);
 
+/// The largest residual of an answer.
+inline constexpr double small_residual = 1e-10;
+
 /// Raises the residual to that of X and K as they stand.
 /// @errors RiccatiError::no_convergence where it is not small.
 [[nodiscard]] Expected<void> check_riccati(const RiccatiProblem& p, RiccatiSolution& solution);
+/// The same with a residual that is known.
+[[nodiscard]] Expected<void> judge_riccati(const RiccatiProblem& p, double residual,
+                                           RiccatiSolution& solution);
+
+/// With more states eigenvalues in twice the working precision would take seconds.
+inline constexpr Eigen::Index most_states_in_twice = 20;
+
+/// The eigenvalues of A - BK with the K that is answered: those of its exact entries, in twice the
+/// working precision. Nothing where there are too many states for that.
+[[nodiscard]] std::optional<Eigen::VectorXcd> riccati_poles(const MatrixRef& A, const MatrixRef& B,
+                                                            const MatrixRef& K);
+
+[[nodiscard]] bool are_stable(const Eigen::VectorXcd& poles, bool continuous);
+
+/// That the answered poles are stable.
+/// @errors RiccatiError::no_convergence where they are not: by the last digits of K.
+[[nodiscard]] Expected<void> check_stable(const RiccatiProblem& p, const RiccatiSolution& solution);
 
 /// What X and K leave of the closed loop's equation, SᵀXS - X + [I -Kᵀ][Q N; Nᵀ R][I; -K] with
 /// S = A - BK, and of (R + BᵀXB)K = BᵀXA + Nᵀ, each beside the norms of its terms, the larger of
@@ -66,6 +86,27 @@ struct ExtendedRiccati {
 /// equation and its gain; F of a rounded X alone is not small where XB cancels.
 [[nodiscard]] double riccati_residual(const RiccatiProblem& p, const Eigen::MatrixXd& X,
                                       const Eigen::MatrixXd& K);
+
+/// Exponents of powers of two: the states x = 2^states z, the inputs u = 2^inputs v, the cost in
+/// 2^weight, and, of a continuous equation, the rates in 2^rate.
+struct RiccatiUnits {
+  Eigen::VectorXi states;
+  Eigen::VectorXi inputs;
+  int weight = 0;
+  int rate = 0;
+};
+
+/// `riccati_residual`, the gain and the poles of an answer in the given problem's units, measured
+/// in other units with exponents that no product leaves.
+[[nodiscard]] double wide_riccati_residual(const RiccatiProblem& given, const RiccatiUnits& units,
+                                           const RiccatiSolution& solution);
+[[nodiscard]] Eigen::VectorXcd wide_riccati_poles(const RiccatiProblem& given,
+                                                  const RiccatiUnits& units,
+                                                  const Eigen::MatrixXd& K);
+
+/// Doubling and Newton's method with such exponents; nothing where they do not lead to a solution.
+[[nodiscard]] std::optional<RiccatiSolution> solve_riccati_wide(const RiccatiProblem& given,
+                                                                const RiccatiUnits& units);
 
 /// The same for data whose size has no room in doubles for products: in other units, by powers of
 /// two. K does not change when Q, R and N are multiplied by one number, nor X but for it.

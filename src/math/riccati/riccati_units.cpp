@@ -1,6 +1,6 @@
 #include <algorithm>
 #include <cmath>
-#include <vector>
+#include <utility>
 
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -15,18 +15,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXi;
 
-/// Exponents of powers of two: the states x = 2^states z, the inputs u = 2^inputs v, the cost in
-/// 2^weight, and, of a continuous equation, the rates in 2^rate.
-struct Units {
-  VectorXi states;
-  VectorXi inputs;
-  int weight = 0;
-  int rate = 0;
-};
-
 /// The units in which the entries that are not zero have the least sum of squared logarithms
 /// (Curtis and Reid, J. Inst. Maths Applics 10 (1972)).
-Units best_units(const RiccatiProblem& p) {
+RiccatiUnits best_units(const RiccatiProblem& p) {
   const Index n = p.A.rows();
   const Index m = p.B.cols();
   const Index weight = n + m;
@@ -103,10 +94,8 @@ MatrixXd gain_of(const RiccatiProblem& given, const MatrixXd& X) {
   return times_power(solve_linear(M, G), g - r);
 }
 
-}  // namespace
-
-Expected<RiccatiSolution> solve_riccati_in_other_units(const RiccatiProblem& given) {
-  const Units units = best_units(given);
+/// The answer of doubles in those units, which may have lost what is small there.
+Expected<RiccatiSolution> solve_in_doubles(const RiccatiProblem& given, const RiccatiUnits& units) {
   const VectorXi& x = units.states;
   const VectorXi& u = units.inputs;
   const RiccatiProblem p{times_powers(given.A, -x, x, -units.rate),
@@ -134,34 +123,61 @@ Expected<RiccatiSolution> solve_riccati_in_other_units(const RiccatiProblem& giv
     const MatrixXd direct = gain_of(given, X);
     K = (K.array() == 0.0 && direct.array().isFinite()).select(direct, K);
   }
-  solution.poles *= std::ldexp(1.0, units.rate);
-  if (!X.allFinite() || !K.allFinite() || !solution.poles.allFinite()) {
-    return tl::unexpected(
-        Error(RiccatiError::overflow)
-            .in(where)
-            .about(X.allFinite() ? "K" : "X")
-            .hint("choose units in which the numbers are nearer to 1: weights may be multiplied "
-                  "by any number"));
-  }
-  // As they stand: X may have lost digits where it is nearly too small for a double. And by its
-  // largest entries in the units of the states and the inputs that it was given in.
-  solution.X = times_powers(X, x, x, -units.weight);
-  solution.K = times_powers(K, -u, x, -units.rate);
-  FLYBALL_CHECK(check_riccati(p, solution));
-  const int rate = given.continuous ? exponent(given.A) : 0;
-  const int weight =
-      std::max({exponent(given.Q) - rate, exponent(given.R) + rate, exponent(given.N)});
-  const VectorXi none = VectorXi::Zero(std::max(given.A.rows(), given.B.cols()));
-  solution.X = times_powers(X, none, none, -weight);
-  solution.K = times_powers(K, none, none, -rate);
-  FLYBALL_CHECK(check_riccati({times_powers(given.A, none, none, -rate), given.B,
-                               times_powers(given.Q, none, none, -weight - rate),
-                               times_powers(given.R, none, none, -weight + rate),
-                               times_powers(given.N, none, none, -weight), given.continuous},
-                              solution));
   solution.X = X;
   solution.K = K;
   return solution;
+}
+
+Error beyond_doubles(const RiccatiSolution& solution, const char* where) {
+  return Error(RiccatiError::overflow)
+      .in(where)
+      .about(!solution.X.allFinite()   ? "X"
+             : !solution.K.allFinite() ? "K"
+                                       : "A - BK")
+      .hint(
+          "choose units in which the numbers are nearer to 1: weights may be multiplied by any "
+          "number");
+}
+
+/// Whether X and K, as they are answered, leave little of their equations in the units that were
+/// given and in those of the entries, and A - BK is stable; its poles, and the larger residual.
+Expected<void> vouch(const RiccatiProblem& given, const RiccatiUnits& units,
+                     RiccatiSolution& solution) {
+  const char* const where = given.continuous ? "care" : "dare";
+  if (!solution.X.allFinite() || !solution.K.allFinite()) {
+    return tl::unexpected(beyond_doubles(solution, where));
+  }
+  const RiccatiUnits none{VectorXi::Zero(given.A.rows()), VectorXi::Zero(given.B.cols()), 0, 0};
+  FLYBALL_CHECK(judge_riccati(given, wide_riccati_residual(given, units, solution), solution));
+  FLYBALL_CHECK(judge_riccati(given, wide_riccati_residual(given, none, solution), solution));
+  solution.poles = wide_riccati_poles(given, units, solution.K);
+  if (!solution.poles.allFinite()) {
+    return tl::unexpected(beyond_doubles(solution, where));
+  }
+  return check_stable(given, solution);
+}
+
+}  // namespace
+
+Expected<RiccatiSolution> solve_riccati_in_other_units(const RiccatiProblem& given) {
+  const RiccatiUnits units = best_units(given);
+  auto solution = solve_in_doubles(given, units);
+  if (!solution && !solution.error().is(RiccatiError::no_convergence)) {
+    return solution;
+  }
+  if (solution) {
+    const Expected<void> vouched = vouch(given, units, *solution);
+    if (vouched) {
+      return solution;
+    }
+    solution = tl::unexpected(vouched.error());
+  }
+  auto wide = solve_riccati_wide(given, units);
+  if (!wide) {
+    return solution;
+  }
+  FLYBALL_CHECK(vouch(given, units, *wide));
+  return std::move(*wide);
 }
 
 }  // namespace flyball::detail

@@ -103,6 +103,43 @@ TEST(MatrixPower, NegativePowers) {
   EXPECT_TRUE(powm(singular, -0.5).error().is(MatrixFunctionError::singular));
 }
 
+// Small entries that are rounding themselves pull the balanced units apart; what rounding is in
+// those is not lost of the large entries. The closed form without them: log of a triangle by
+// Parlett's recurrence, root of a matrix of rank one, c rᵀ/√(rᵀc).
+TEST(MatrixFunctions, RoundingErrorsAmongTheEntries) {
+  Eigen::Matrix3d A;
+  A << 2.0, 2.0, 1.0, -1e-20, 0.28125, 0.96875, 1e-20, 2.2e-16, 0.5;
+  const Eigen::MatrixXd L = logm(A).value();
+  const double l0 = std::log(2.0);
+  const double l1 = std::log(0.28125);
+  const double l2 = std::log(0.5);
+  const double l01 = 2.0 * (l0 - l1) / (2.0 - 0.28125);
+  const double l12 = 0.96875 * (l1 - l2) / (0.28125 - 0.5);
+  const double l02 = ((l0 - l2) + l01 * 0.96875 - 2.0 * l12) / (2.0 - 0.5);
+  const Eigen::Matrix3d wanted =
+      (Eigen::Matrix3d() << l0, l01, l02, 0.0, l1, l12, 0.0, 0.0, l2).finished();
+  EXPECT_LE((L - wanted).cwiseAbs().maxCoeff(), 1e-14);
+
+  const Eigen::Vector4d column(0.084808349609375, -0.993408203125, 0.7135009765625, -5e-17);
+  const Eigen::RowVector4d row(4.4e-16, -2e-16, 1.0, 1.9267578125);
+  const Eigen::MatrixXd rank_one = column * row;
+  const auto root = powm(rank_one, 0.5);
+  if (root) {
+    EXPECT_LE((*root * *root - rank_one).cwiseAbs().maxCoeff(), 1e-10);
+  } else {
+    EXPECT_EQ(root.error().kind(), ErrorKind::no_answer) << to_string(root.error());
+  }
+  // 1e20 beside eigenvalues of one: the root of the small ones is not nothing.
+  Eigen::Matrix3d B;
+  B << 0.62, 100.0, 6.4e10, 0.016, 1e20, 2.2e-7, -1e-11, 1e-9, 1.2;
+  const auto far = powm(B, 0.5);
+  if (far) {
+    EXPECT_LE((*far * *far - B).cwiseAbs().maxCoeff(), 1e10);
+  } else {
+    EXPECT_TRUE(far.error().is(MatrixFunctionError::not_accurate)) << to_string(far.error());
+  }
+}
+
 TEST(MatrixPower, Errors) {
   const Eigen::Matrix2d A = Eigen::Matrix2d::Identity();
   EXPECT_TRUE(powm(A, 1e10).error().is(ArgumentError::out_of_range));

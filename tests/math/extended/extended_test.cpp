@@ -1,4 +1,5 @@
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -8,8 +9,9 @@
 #include "math/extended/double_double.hpp"
 #include "math/extended/exact_sum.hpp"
 #include "math/extended/quad_double.hpp"
+#include "math/extended/wide_matrix.hpp"
 
-// Both types against sums without rounding. The bounds are a few units in the last place that a sum
+// The types against sums without rounding. The bounds are a few units in the last place that a sum
 // of two (106 bits) or four doubles (212 bits) has: an error term or a product that is left out is
 // 2^53 larger than they are.
 namespace flyball::detail {
@@ -25,6 +27,11 @@ std::vector<double> parts(const DoubleDoubleMatrix& M, Index i, Index j) {
 }
 std::vector<double> parts(const QuadDoubleMatrix& M, Index i, Index j) {
   return {M.part[0](i, j), M.part[1](i, j), M.part[2](i, j), M.part[3](i, j)};
+}
+std::vector<double> parts(const WideMatrix& M, Index i, Index j) {
+  const WideNumber& x = M(i, j);
+  return {std::ldexp(x.hi, static_cast<int>(x.exponent)),
+          std::ldexp(x.lo, static_cast<int>(x.exponent))};
 }
 
 /// Random numbers of all their digits: each part is below half a unit in the last place of the one
@@ -57,6 +64,11 @@ QuadDoubleMatrix random_matrix(Index rows, Index columns, Random& random) {
   }
   return M;
 }
+template <>
+WideMatrix random_matrix(Index rows, Index columns, Random& random) {
+  const MatrixXd M = first(rows, columns, random);
+  return sum(WideMatrix(M), 1.0, WideMatrix(below(M, random)));
+}
 
 template <class Matrix>
 struct Extended : ::testing::Test {};
@@ -67,8 +79,10 @@ template <>
 constexpr int bound<DoubleDoubleMatrix> = 102;
 template <>
 constexpr int bound<QuadDoubleMatrix> = 205;
+template <>
+constexpr int bound<WideMatrix> = 102;
 
-using Types = ::testing::Types<DoubleDoubleMatrix, QuadDoubleMatrix>;
+using Types = ::testing::Types<DoubleDoubleMatrix, QuadDoubleMatrix, WideMatrix>;
 TYPED_TEST_SUITE(Extended, Types);
 
 /// c0 + sign Σ a b - c, exactly, over |c0| + Σ |a b|.
@@ -240,6 +254,31 @@ TYPED_TEST(Extended, Reciprocals) {
               std::ldexp(1.0, -bound<TypeParam>));
     expect_normal(X);
   }
+}
+
+// (2^900)³ (2^-1000)³ = 2^-300 by way of numbers that are no doubles, sums beside them included.
+TEST(WideMatrix, KeepsEveryExponent) {
+  const WideMatrix large(MatrixXd::Constant(1, 1, 0x1p900));
+  const WideMatrix small(MatrixXd::Constant(1, 1, 0x1p-1000));
+  const WideMatrix cube = product(large, product(large, large));
+  EXPECT_EQ(cube.exponent(), 2700);
+  EXPECT_EQ(cube.norm(), std::numeric_limits<double>::infinity());
+  const WideMatrix back = product(product(cube, small), product(small, small));
+  EXPECT_EQ(back.rounded()(0, 0), 0x1p-300);
+  EXPECT_EQ(back.rounded(300)(0, 0), 1.0);
+  const WideMatrix nothing = product(small, product(small, small));
+  EXPECT_EQ(nothing.norm(), 0.0);
+  EXPECT_EQ(sum(sum(nothing, 1.0, cube), -1.0, cube).exponent(), WideMatrix::zero(1, 1).exponent());
+  EXPECT_EQ(share_of(nothing, cube), 0.0);
+  EXPECT_EQ(share_of(product(small, cube), product(cube, small)), 1.0);
+  EXPECT_EQ(share_of(scaled(nothing, -3.0), nothing), 3.0);
+  EXPECT_TRUE(std::isnan(share_of(scaled(cube, std::nan("")), cube)));
+  const Eigen::VectorXi row = Eigen::VectorXi::Constant(1, -2000);
+  EXPECT_EQ(cube.times_powers(row, row, 1300).rounded()(0, 0), 1.0);
+  EXPECT_EQ(scaled(large, -1.0).magnitudes().rounded()(0, 0), 0x1p900);
+  const WideMatrix subnormal(MatrixXd::Constant(1, 1, 5e-324));
+  EXPECT_EQ(subnormal.exponent(), -1074);
+  EXPECT_EQ(subnormal.rounded()(0, 0), 5e-324);
 }
 
 }  // namespace

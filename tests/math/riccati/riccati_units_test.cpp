@@ -181,5 +181,116 @@ TEST(RiccatiUnits, PolesWhoseSquaresAreNoDoubles) {
   }
 }
 
+// What is small beside other entries has its value: X where weights and plants are far apart. The
+// closed forms of X = a²X - n²/r and 2aX = n²/r; what the inputs add is below the last digit.
+TEST(RiccatiUnits, SmallAnswersAreNotLost) {
+  const double a = 0.76641845703125;
+  const auto weights = dare(scalar(a), Eigen::RowVector3d(-1e20, -0.47, 1e155), scalar(0),
+                            1e300 * MatrixXd::Identity(3, 3), Eigen::RowVector3d(-3.0, 0.0, 0.0));
+  ASSERT_TRUE(weights.has_value()) << to_string(weights.error());
+  EXPECT_NEAR(weights->X(0, 0) / (-9e-300 / (1.0 - a * a)), 1.0, 1e-13);
+  EXPECT_NEAR(weights->K(0, 0) / -3e-300, 1.0, 1e-13);
+
+  // 2 X₀₀ = -n²/r, 1.03125 X₀₁ = X₀₀ and 0.03125 X₁₁ = X₀₁.
+  const MatrixXd A = (MatrixXd(2, 2) << -1.0, 1.0, 0.0, -0.03125).finished();
+  const auto cross = care(A, Eigen::Vector2d(0.0, -0.5), MatrixXd::Zero(2, 2), scalar(1e300),
+                          Eigen::Vector2d(-0.5, 0.0));
+  ASSERT_TRUE(cross.has_value()) << to_string(cross.error());
+  EXPECT_NEAR(cross->X(0, 0) / -1.25e-301, 1.0, 1e-13);
+  EXPECT_NEAR(cross->X(0, 1) / (-1.25e-301 / 1.03125), 1.0, 1e-13);
+  EXPECT_NEAR(cross->X(1, 1) / (-1.25e-301 / 1.03125 / 0.03125), 1.0, 1e-13);
+
+  // A plant of -1.7e308 has X = q/3.4e308 and K = (b X + n)/r.
+  const auto fast = care(-1.7e308 * MatrixXd::Identity(2, 2), Eigen::Vector2d(1e8, 1.0),
+                         Eigen::Vector2d(0.75, 2.0).asDiagonal().toDenseMatrix(), scalar(1e-155),
+                         Eigen::Vector2d(-1e-300, 0.0));
+  ASSERT_TRUE(fast.has_value()) << to_string(fast.error());
+  EXPECT_NEAR(fast->X(0, 0) / (0.75 / 1.7e308 / 2.0), 1.0, 1e-12);
+  EXPECT_NEAR(fast->X(1, 1) / (1.0 / 1.7e308), 1.0, 1e-12);
+  EXPECT_NEAR(fast->K(0, 0) / -7.794117647058824e-146, 1.0, 1e-12);
+
+  // K = aXb/(r + b²X) for an input whose square weight is the least of the doubles.
+  const auto least = dare(scalar(-0.625), Eigen::RowVector2d(1.5, 1e25), scalar(1e-308),
+                          10.0 * MatrixXd::Identity(2, 2));
+  ASSERT_TRUE(least.has_value()) << to_string(least.error());
+  const double X = 1e-308 / (1.0 - 0.625 * 0.625);
+  EXPECT_NEAR(least->X(0, 0) / X, 1.0, 1e-13);
+  EXPECT_NEAR(least->K(1, 0) / (-0.625 * X * 1e24), 1.0, 1e-13);
+}
+
+// The poles are those of A - BK with the K that is answered, however small.
+TEST(RiccatiUnits, PolesOfWhatIsAnswered) {
+  const auto slow = dare(scalar(-1e-300), Eigen::RowVector2d(-0.54, -5e-324), scalar(4.84e-32),
+                         0.25 * MatrixXd::Identity(2, 2))
+                        .value();
+  EXPECT_EQ(slow.poles(0), -1e-300);
+
+  const auto cheap = dare(scalar(2.3e-308), Eigen::RowVector2d(1.0, 1.0), scalar(1.0),
+                          Eigen::Vector2d(1e-154, 1e300).asDiagonal().toDenseMatrix())
+                         .value();
+  EXPECT_EQ(cheap.K(0, 0), 2.3e-308);
+  EXPECT_EQ(cheap.poles(0), 0.0);
+
+  const auto driven = dare(MatrixXd::Zero(2, 2), Eigen::Vector2d(0.5, 0.0), MatrixXd::Zero(2, 2),
+                           scalar(1e300), Eigen::Vector2d(-0.75, 1.5))
+                          .value();
+  const Eigen::Vector2d poles = driven.poles.real();
+  EXPECT_EQ(poles.cwiseAbs().minCoeff(), 0.0);
+  EXPECT_NEAR(poles.sum() / 3.75e-301, 1.0, 1e-14);
+
+  const MatrixXd A = 2.3e-308 * MatrixXd::Identity(4, 4);
+  const auto subnormal =
+      dare(A, Eigen::Vector4d(2.0, 1.75, 1e-20, -3.0),
+           Eigen::Vector4d(1e20, 1.0, 1e-8, 2.0).asDiagonal().toDenseMatrix(), scalar(1.0))
+          .value();
+  EXPECT_EQ((subnormal.poles.real().array() == 2.3e-308).count(), 3);
+}
+
+// States whose units, √X_ii, are far apart: each pole p is an eigenvalue of A - BK for errors of
+// rounding in the units that were given, σ_min(A - BK - p) <= ε-ish of its norm.
+TEST(RiccatiUnits, PolesInTheGivenUnits) {
+  const auto expect_poles = [](const MatrixXd& A, const MatrixXd& B, const RiccatiSolution& s) {
+    const MatrixXd S = (wide(A) - wide(B) * wide(s.K)).cast<double>();
+    const double size = (A.cwiseAbs() + B.cwiseAbs() * s.K.cwiseAbs()).maxCoeff();
+    for (const std::complex<double>& pole : s.poles) {
+      Eigen::MatrixXcd shifted = S.cast<std::complex<double>>();
+      shifted.diagonal().array() -= pole;
+      const Eigen::VectorXd values = Eigen::JacobiSVD<Eigen::MatrixXcd>(shifted).singularValues();
+      EXPECT_LE(values(values.size() - 1), 1e-13 * size) << pole;
+    }
+  };
+  const Eigen::Vector4d column(-1.5, 5.3453125, 4.09296875, 1.68359375);
+  MatrixXd A = column * Eigen::RowVector4d(0.0, 1.0, -1.0 / 3.0, 1.0);
+  MatrixXd B = Eigen::Vector4d(-1.0, -0.000509765625, 11.140625, -8.0e-9);
+  MatrixXd Q = MatrixXd::Zero(4, 4);
+  Q.bottomRightCorner(3, 3) = Eigen::Vector3d(0.3, 8.2, 7.6).asDiagonal();
+  expect_poles(A, B, dare(A, B, Q, scalar(0.73), Eigen::Vector4d(0.34, 0.0, 0.0, 0.0)).value());
+
+  // Seven equal poles, coupled by 1e-8.
+  A = -0.523681640625 * MatrixXd::Identity(7, 7);
+  A.diagonal(1).setConstant(1e-8);
+  B = (MatrixXd(7, 1) << 1.9, 2.0, -1.3, 1e-8, 0.17, -1.87, -0.91).finished();
+  Q = MatrixXd::Zero(7, 7);
+  Q(0, 0) = 0.25;
+  const MatrixXd N = (MatrixXd(7, 1) << 0.36, -0.7, 1e-20, 2.0, -1.3, -0.28, -0.5).finished();
+  expect_poles(A, B, care(A, B, Q, scalar(2.0), N).value());
+}
+
+// What the doubles cannot hold is refused: X's small entries have no double, and are not nothing.
+TEST(RiccatiUnits, WhatIsLostIsRefused) {
+  const MatrixXd A = (MatrixXd(2, 2) << -0.25, -1e-16, 1e155, 1.0).finished();
+  const MatrixXd B = (MatrixXd(2, 2) << 0.0, 5e-324, 1.5, 1.0).finished();
+  const auto lost = care(A, B, MatrixXd(1e-155 * MatrixXd::Identity(2, 2)),
+                         Eigen::Vector2d(1e-308, 0.25).asDiagonal().toDenseMatrix());
+  ASSERT_FALSE(lost.has_value());
+  EXPECT_EQ(lost.error().kind(), ErrorKind::no_answer) << to_string(lost.error());
+  const MatrixXd fast = (MatrixXd(2, 2) << 1e20, 2.0, -3.0, 99999999.0).finished();
+  const auto cancels = care(fast, Eigen::Vector2d(-1.66748046875, 0.0),
+                            Eigen::Vector2d(0.0, 0.5540771484375).asDiagonal().toDenseMatrix(),
+                            scalar(0.8377685546875), Eigen::Vector2d(-1.12225341796875, 0.0));
+  ASSERT_FALSE(cancels.has_value());
+  EXPECT_EQ(cancels.error().kind(), ErrorKind::no_answer) << to_string(cancels.error());
+}
+
 }  // namespace
 }  // namespace flyball
