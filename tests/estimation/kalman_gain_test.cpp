@@ -341,8 +341,8 @@ TEST(KalmanGain, PredictorOfASubnormalPlant) {
   EXPECT_EQ(gain->L(0, 0), A(0, 0) * gain->K(0, 0));
 }
 
-// P⁺ = P - KCP holds in the units that were given, too, or there is no answer. Here: outputs without
-// noise of states 1e16 and rows of C 1e30 apart, whose K cannot be told in 31 digits.
+// P⁺ = P - KCP holds in the units that were given, too, or there is no answer. Here: outputs
+// without noise of states 1e16 and rows of C 1e30 apart, whose K cannot be told in 31 digits.
 TEST(KalmanGain, PosteriorInTheGivenUnits) {
   const Eigen::Matrix2d A = Eigen::Vector2d(1e-20, 0.0).asDiagonal();
   Eigen::MatrixXd C(2, 2);

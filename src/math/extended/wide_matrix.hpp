@@ -45,6 +45,7 @@ class WideMatrix {
   [[nodiscard]] double norm() const;
   [[nodiscard]] bool all_finite() const;
   [[nodiscard]] WideMatrix transpose() const;
+  [[nodiscard]] WideMatrix columns_from(Eigen::Index first, Eigen::Index count) const;
   [[nodiscard]] WideMatrix left(Eigen::Index columns) const;
   [[nodiscard]] WideMatrix right(Eigen::Index columns) const;
   [[nodiscard]] WideMatrix magnitudes() const;
@@ -57,7 +58,6 @@ class WideMatrix {
  private:
   WideMatrix(Eigen::Index rows, Eigen::Index columns)
       : rows_(rows), columns_(columns), entries_(static_cast<std::size_t>(rows * columns)) {}
-  [[nodiscard]] WideMatrix columns_from(Eigen::Index first, Eigen::Index count) const;
 
   Eigen::Index rows_ = 0;
   Eigen::Index columns_ = 0;

@@ -79,9 +79,15 @@ double wide_riccati_residual(const RiccatiProblem& given, const RiccatiUnits& un
   gain_terms =
       add_product(std::move(gain_terms), 1.0, weight,
                   gain_in(units, WideMatrix(MatrixXd::Constant(K.rows(), K.cols(), least))));
-  const double closed_loop = share_of(left, terms);
-  const double of_gain = share_of(gain, gain_terms);
-  return std::isnan(closed_loop) || closed_loop > of_gain ? closed_loop : of_gain;
+  double worst = share_of(left, terms);
+  // Input by input: each has a unit of its own.
+  const WideMatrix inputs = gain.transpose();
+  const WideMatrix input_terms = gain_terms.transpose();
+  for (Index i = 0; i < inputs.cols() && !std::isnan(worst); ++i) {
+    const double share = share_of(inputs.columns_from(i, 1), input_terms.columns_from(i, 1));
+    worst = share <= worst ? worst : share;
+  }
+  return worst;
 }
 
 Eigen::VectorXcd wide_riccati_poles(const RiccatiProblem& given, const RiccatiUnits& units,
