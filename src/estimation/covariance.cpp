@@ -62,4 +62,15 @@ Expected<void> check_covariance(const MatrixRef& S, std::string_view where, std:
                             .with("that variance, of variances scaled to one", least));
 }
 
+namespace detail {
+
+Expected<void> unusable_covariance(std::string_view where, std::string_view name) {
+  return refusal(ArgumentError::out_of_range, where, name)
+      .got("a covariance that this form cannot carry")
+      .expected(
+          "variances of at most 1e200, and for an information form none of zero in any direction");
+}
+
+}  // namespace detail
+
 }  // namespace flyball

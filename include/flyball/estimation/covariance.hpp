@@ -28,4 +28,11 @@ using Covariance = MatrixArgument<struct CovarianceTag>;
 [[nodiscard]] Expected<void> check_covariance(const MatrixRef& S, std::string_view where,
                                               std::string_view name);
 
+namespace detail {
+
+/// ArgumentError::out_of_range: a covariance that is one, but not one that a filter can carry.
+[[nodiscard]] Expected<void> unusable_covariance(std::string_view where, std::string_view name);
+
+}  // namespace detail
+
 }  // namespace flyball

@@ -1,17 +1,9 @@
 #pragma once
 
 #include <flyball/estimation/kalman_gain.hpp>
+#include <flyball/estimation/update_status.hpp>
 
 namespace flyball {
-
-/// How an update ended.
-enum class UpdateStatus {
-  updated,  ///< The measurement is in the estimate.
-  /// The measurement has a NaN, an infinity or what is beyond `largest_signal`, or would take the
-  /// estimate beyond it; it was left out.
-  not_finite,
-  singular_innovation,  ///< C P Cᵀ + R is not positive definite; the measurement was left out.
-};
 
 /// The Kalman filter of a discrete plant. Theorem 9.6.3.
 ///

@@ -5,6 +5,8 @@
 
 #include <Eigen/Core>
 
+#include <flyball/estimation/forms/cholesky.hpp>
+
 /// Covariances that cannot become negative: P = U D Uᵀ with U unit upper triangular and D diagonal,
 /// D >= 0. Every entry of D below is a sum of products that are not negative, so that P is positive
 /// semidefinite whatever is rounded.
@@ -12,11 +14,6 @@
 /// (factorisation), 5 (measurement) and 6 (time); Thornton and Bierman, "Gram-Schmidt algorithms
 /// for covariance propagation", International Journal of Control 25 (1977).
 namespace flyball::detail {
-
-/// What a variance is kept between, the squares of 1/largest_signal and largest_signal: a sensor
-/// without noise then still finds something to correct after each prediction.
-inline constexpr double least_variance = 1e-200;
-inline constexpr double largest_variance = 1e200;
 
 /// P = U D Uᵀ; a pivot that is rounding alone counts as zero. Reads the upper triangle.
 template <class Matrix, class Vector>
