@@ -19,6 +19,7 @@ void add_design_command(CLI::App& program, Invocation& invocation);
 void add_simulate_command(CLI::App& program, Invocation& invocation);
 void add_tune_command(CLI::App& program, Invocation& invocation);
 void add_motor_curves_command(CLI::App& program, Invocation& invocation);
+void add_localize_command(CLI::App& program, Invocation& invocation);
 void add_motors_command(CLI::App& program, Invocation& invocation);
 void add_book_command(CLI::App& program, Invocation& invocation);
 void add_analyze_command(CLI::App& program, Invocation& invocation);

@@ -58,6 +58,7 @@ int run(int argc, char** argv) {
       "  flyball experiment elevator.toml           which tests tell the gains best\n"
       "  flyball motors krakenX60                   what the motor table knows\n"
       "  flyball motor-curves cim.csv               a motor's constants from a dynamometer\n"
+      "  flyball localize Robot1/                   a drive among landmarks, to path and map\n"
       "  flyball analyze elevator.toml              poles, what can be moved and seen, gains\n"
       "  flyball solve dare < problems.jsonl        any kernel, from any language\n"
       "  flyball book 6.3                           a figure of the book, from this library\n"
@@ -78,6 +79,7 @@ int run(int argc, char** argv) {
   flyball::app::add_experiment_command(program, invocation);
   flyball::app::add_motors_command(program, invocation);
   flyball::app::add_motor_curves_command(program, invocation);
+  flyball::app::add_localize_command(program, invocation);
   flyball::app::add_book_command(program, invocation);
   flyball::app::add_analyze_command(program, invocation);
   flyball::app::add_solve_command(program, invocation);

@@ -87,6 +87,20 @@ WpilogWriter::Id WpilogWriter::start(std::string_view name, std::string_view typ
   return next_++;
 }
 
+WpilogWriter::Id WpilogWriter::start_pose(std::string_view name, double time) {
+  if (!has_pose_schema_) {
+    has_pose_schema_ = true;
+    constexpr std::pair<std::string_view, std::string_view> schemas[] = {
+        {"/.schema/struct:Rotation2d", "double value"},
+        {"/.schema/struct:Translation2d", "double x;double y"},
+        {"/.schema/struct:Pose2d", "Translation2d translation;Rotation2d rotation"}};
+    for (const auto& [type, members] : schemas) {
+      append(start(type, "structschema", {}, time), time, members);
+    }
+  }
+  return start(name, "struct:Pose2d", {}, time);
+}
+
 void WpilogWriter::finish(Id id, double time) {
   std::string payload(1, '\1');
   put(payload, id);

@@ -172,6 +172,23 @@ def check_motors(folder):
     check_answer(["motor-curves", "cim.csv", "--motor", "nothing"], 2, folder)
 
 
+def check_localize(folder):
+    (folder / "odometry.csv").write_text(
+        "time,v,w\n" + "\n".join(f"{0.1 * k:.2f},0.2,0.1" for k in range(100)))
+    (folder / "landmarks.csv").write_text("1,4,1\n2,4,-1\n3,3,3\n")
+    rows = []
+    for k in range(50):
+        t = 0.2 * k
+        heading, x, y = 0.1 * t, 2 * math.sin(0.1 * t), 2 * (1 - math.cos(0.1 * t))
+        for mark, mx, my in ((1, 4, 1), (2, 4, -1), (3, 3, 3)):
+            bearing = math.atan2(my - y, mx - x) - heading
+            rows.append(f"{t},{mark},{math.hypot(mx - x, my - y)},{bearing}")
+    (folder / "sightings.csv").write_text("\n".join(rows))
+    files = ["localize", "odometry.csv", "landmarks.csv", "sightings.csv"]
+    check_answer(files, 0, folder)
+    check_answer(files[:3], 2, folder)
+
+
 def check_places(folder):
     """Every error of a file has its line and column."""
     (folder / "place.toml").write_text('[mechanism]\ntype = "elevator"\nmass = 8\n  gearng = 2\n')
@@ -250,6 +267,7 @@ with tempfile.TemporaryDirectory() as name:
     check_answers(pathlib.Path(name))
     check_drivetrain(pathlib.Path(name))
     check_refusals(pathlib.Path(name))
+    check_localize(pathlib.Path(name))
     check_motors(pathlib.Path(name))
     check_places(pathlib.Path(name))
     check_reader_and_schema(pathlib.Path(name))

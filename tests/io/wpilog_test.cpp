@@ -302,5 +302,32 @@ TEST(Wpilog, WritesAFile) {
   EXPECT_EQ(folder.get("a.wpilog"), to_wpilog(example_log(3)).value());
 }
 
+// What AdvantageScope needs to show a pose on its field: the schemas once, then 24 bytes a pose.
+TEST(Wpilog, WritesPosesWithTheirSchemas) {
+  WpilogWriter writer;
+  const auto first = writer.start_pose("/a");
+  const auto second = writer.start_pose("/b");
+  EXPECT_NE(first, second);
+  const std::array<double, 3> pose{1.0, 2.0, 0.5};
+  writer.append(first, 0.25, std::span<const double>(pose));
+  const std::string& bytes = writer.bytes();
+  const auto count = [&](std::string_view word) {
+    std::size_t n = 0;
+    for (std::size_t at = bytes.find(word); at != std::string::npos;
+         at = bytes.find(word, at + 1)) {
+      ++n;
+    }
+    return n;
+  };
+  EXPECT_EQ(count("/.schema/struct:Pose2d"), 1U);
+  EXPECT_EQ(count("Translation2d translation;Rotation2d rotation"), 1U);
+  EXPECT_EQ(count("double x;double y"), 1U);
+  EXPECT_EQ(count("double value"), 1U);
+  EXPECT_EQ(bytes.substr(bytes.size() - 24),
+            std::string(reinterpret_cast<const char*>(pose.data()), 24));
+  const auto log = parse(bytes);
+  EXPECT_FALSE(log && !log->signals.empty());  // No plain number is in it.
+}
+
 }  // namespace
 }  // namespace flyball

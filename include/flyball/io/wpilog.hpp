@@ -37,6 +37,9 @@ class WpilogWriter {
   /// @param metadata  The unit's name, or JSON. @param time  s, as all times here.
   Id start(std::string_view name, std::string_view type, std::string_view metadata = {},
            double time = 0.0);
+  /// Opens a channel of poses of the plane (struct:Pose2d), which AdvantageScope shows on its
+  /// field; what is appended is {x, y, angle}, m and rad.
+  Id start_pose(std::string_view name, double time = 0.0);
   void finish(Id id, double time);
   void set_metadata(Id id, std::string_view metadata, double time);
 
@@ -58,6 +61,7 @@ class WpilogWriter {
 
   std::string bytes_;
   Id next_ = 1;
+  bool has_pose_schema_ = false;
 };
 
 /// Writes the signals (as double, their unit as metadata) and texts (as string) of a log in time

@@ -1,0 +1,305 @@
+#include <flyball/estimation/localization/landmark_filter.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/try.hpp"
+
+namespace flyball {
+
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Matrix = TangentMatrix<LandmarkFilter::State>;
+
+enum Column : int {
+  velocity_error = 3,
+  turn_error = 4,
+  velocity_scale = 5,
+  turn_scale,
+  turn_per_velocity,
+  delay,
+  range_scale,
+  range_offset,
+  depth_exponent,
+  bearing_scale,
+  bearing_offset,
+};
+
+/// Beyond this angle off its axis no camera tells a depth.
+constexpr double least_cosine = 0.1;
+
+Matrix start_covariance(const LandmarkOptions& options) {
+  Matrix P = Matrix::Zero();
+  P(0, 0) = P(1, 1) = options.position_std * options.position_std;
+  P(2, 2) = options.heading_std * options.heading_std;
+  P(velocity_error, velocity_error) = options.velocity_error * options.velocity_error;
+  P(turn_error, turn_error) = options.turn_error * options.turn_error;
+  const auto std = options.calibration_std.vector();
+  for (int i = 0; i < SensorCalibration::size; ++i) {
+    P(velocity_scale + i, velocity_scale + i) = std(i) * std(i);
+  }
+  return P;
+}
+
+JosephCovariance<LandmarkFilter::size> start_form(const LandmarkOptions& options) {
+  JosephCovariance<LandmarkFilter::size> form;
+  form.set(start_covariance(options));
+  return form;
+}
+
+LandmarkFilter::State start_state(const LandmarkOptions& options, const Pose2d& pose) {
+  return LandmarkFilter::State(pose, Vector2d::Zero(), options.calibration.vector());
+}
+
+}  // namespace
+
+Expected<LandmarkFilter> LandmarkFilter::create(const LandmarkOptions& options) {
+  FLYBALL_CHECK(check_landmark_log({}, options));
+  FLYBALL_TRY(const auto guard, OutlierGuard::create({.treatment = OutlierTreatment::student,
+                                                      .freedom = options.freedom,
+                                                      .iterations = 5}));
+  return LandmarkFilter(options, guard);
+}
+
+LandmarkFilter::LandmarkFilter(const LandmarkOptions& options, const OutlierGuard& guard) noexcept
+    : options_(options),
+      estimate_(start_state(options, Pose2d()), start_form(options)),
+      guard_(guard),
+      noise_(MeasurementNoise<2>::independent(
+          {options.range_std * options.range_std, options.bearing_std * options.bearing_std})) {}
+
+bool LandmarkFilter::reset(const Pose2d& pose) noexcept {
+  if (!is_signal(pose.matrix())) {
+    return false;
+  }
+  // What is known of the sensors stays; the pose's own errors are independent of it.
+  Matrix P = estimate_.P();
+  P.topRows<5>().setZero();
+  P.leftCols<5>().setZero();
+  const Matrix start = start_covariance(options_);
+  P.topLeftCorner<5, 5>() = start.topLeftCorner<5, 5>();
+  State state = estimate_.x_hat();
+  state.get<0>() = pose;
+  state.get<1>().setZero();
+  located_ = estimate_.reset(state, P);
+  guard_.reset();
+  relocalizer_.clear();
+  return located_;
+}
+
+bool LandmarkFilter::odometry(double time, double velocity, double turn_rate) noexcept {
+  constexpr double shortest = 0.004;  // s
+  if (!is_signal(time) || !is_signal(velocity) || !is_signal(turn_rate)) {
+    return false;
+  }
+  if (sample_count_ == 0) {
+    samples_[0] = {time, 0.0, 0.0, velocity, turn_rate};
+    next_sample_ = 1;
+    sample_count_ = 1;
+    if (!started_) {
+      time_ = time;
+      started_ = true;
+    }
+    return true;
+  }
+  Sample& last = samples_[static_cast<std::size_t>((next_sample_ - 1 + memory) % memory)];
+  const double dt = time - last.time;
+  if (!(dt >= 0.0)) {
+    return false;
+  }
+  if (dt < shortest) {
+    last.velocity = velocity;
+    last.turn_rate = turn_rate;
+    return true;
+  }
+  samples_[static_cast<std::size_t>(next_sample_)] = {
+      time, last.way + dt * last.velocity, last.turned + dt * last.turn_rate, velocity, turn_rate};
+  next_sample_ = (next_sample_ + 1) % memory;
+  sample_count_ = std::min(sample_count_ + 1, memory);
+  return true;
+}
+
+LandmarkFilter::Driven LandmarkFilter::driven(double time) const noexcept {
+  if (sample_count_ == 0) {
+    return {};
+  }
+  // Back from the newest: that is where a time of now is found at once.
+  int back = 0;
+  const auto sample = [&](int k) -> const Sample& {
+    return samples_[static_cast<std::size_t>((next_sample_ - 1 - k + 2 * memory) % memory)];
+  };
+  while (back + 1 < sample_count_ && sample(back).time > time) {
+    ++back;
+  }
+  const Sample& at = sample(back);
+  const double dt = time - at.time;
+  if (dt < 0.0) {  // Before all that is known: it stood.
+    return {at.way, at.turned, 0.0, 0.0, false};
+  }
+  return {at.way + dt * at.velocity, at.turned + dt * at.turn_rate, at.velocity, at.turn_rate,
+          dt > options_.longest_gap};
+}
+
+void LandmarkFilter::step(double from, double to) noexcept {
+  const State& x = estimate_.x_hat();
+  const Calibration& k = x.get<2>();
+  const Errors& e = x.get<1>();
+  const double dt = to - from;
+  const double late = std::clamp(k(3), 0.0, 2.0);
+  const Driven a = driven(from - late);
+  const Driven b = driven(to - late);
+  const double way = b.way - a.way;
+  const double turned = b.turned - a.turned;
+  const double dv = b.velocity - a.velocity;
+  const double dw = b.turn_rate - a.turn_rate;
+  const Vector3d tau(k(0) * way + e(0) * dt, 0.0, k(1) * turned + k(2) * way + e(1) * dt);
+  const Pose2d moved = Pose2d::exp(tau);
+  Eigen::Matrix<double, 3, 6> by = Eigen::Matrix<double, 3, 6>::Zero();  // ∂τ/∂(errors, k₀ … k₃)
+  by(0, 0) = dt;
+  by(2, 1) = dt;
+  by(0, 2) = way;
+  by(2, 3) = turned;
+  by(2, 4) = way;
+  by(0, 5) = -k(0) * dv;
+  by(2, 5) = -k(1) * dw - k(2) * dv;
+  const double stays = std::exp(-dt / options_.error_time);
+  Matrix F = Matrix::Identity();
+  F.topLeftCorner<3, 3>() = moved.inverse().adjoint();
+  F.block<3, 6>(0, velocity_error) = Pose2d::right_jacobian(tau) * by;
+  F(velocity_error, velocity_error) = F(turn_error, turn_error) = stays;
+
+  const auto square = [](double value) { return value * value; };
+  const double speed = way / dt;
+  const double rate = turned / dt;
+  const double moving = way != 0.0 || turned != 0.0 ? 1.0 : options_.standstill;
+  const double missing = a.missing || b.missing ? 1.0 : 0.0;
+  Matrix Q = Matrix::Zero();
+  Q(0, 0) =
+      dt * (square(moving * options_.velocity_density) + square(options_.relative_density * speed));
+  Q(1, 1) = square(options_.slip_density) * std::abs(way);
+  Q(2, 2) =
+      dt * (square(moving * options_.turn_density) + square(options_.relative_density * rate));
+  const double fresh = 1.0 - stays * stays;
+  Q(velocity_error, velocity_error) =
+      fresh * square(moving * options_.velocity_error + missing * options_.gap_velocity_error);
+  Q(turn_error, turn_error) =
+      fresh * square(moving * options_.turn_error + missing * options_.gap_turn_error);
+  // Calibrations drift by 1 % of what was unknown of them in the root of a second.
+  const auto std = options_.calibration_std.vector();
+  for (int i = 0; i < SensorCalibration::size; ++i) {
+    Q(velocity_scale + i, velocity_scale + i) = dt * square(0.002 * std(i));
+  }
+  State next = x;
+  next.get<0>() = x.get<0>() * moved;
+  next.get<1>() = stays * e;
+  estimate_.predict(next, F, PlainNoise<size>(Q));
+  dead_reckoned_ = dead_reckoned_ * moved;
+}
+
+bool LandmarkFilter::predict(double time) noexcept {
+  constexpr double longest_step = 0.05;  // s
+  constexpr double most_steps = 400.0;
+  if (!is_signal(time) || (started_ && time < time_)) {
+    return false;
+  }
+  if (!started_) {
+    time_ = time;
+    started_ = true;
+  }
+  const double total = time - time_;
+  const double steps = std::clamp(std::ceil(total / longest_step), 1.0, most_steps);
+  const double begin = time_;
+  for (int i = 0; i < static_cast<int>(steps); ++i) {
+    const double from = begin + total * (i / steps);
+    const double to = begin + total * ((i + 1) / steps);
+    if (to > from) {
+      step(from, to);
+    }
+  }
+  time_ = time;
+  return true;
+}
+
+Correction<2> LandmarkFilter::sighting(double time, const Vector2d& landmark, double range,
+                                       double bearing) noexcept {
+  predict(time);
+  Correction<2> result;
+  if (!is_signal(landmark) || !is_signal(range) || !is_signal(bearing) || !(range > 0.0)) {
+    return result;
+  }
+  const Calibration known = estimate_.x_hat().get<2>();
+  const double direction = (bearing - known(8)) / (1.0 + known(7));
+  const double depth = std::pow(std::max(std::cos(direction), least_cosine), known(6));
+  const double distance = std::max(0.0, (range - known(5)) / ((1.0 + known(4)) * depth));
+  relocalizer_.add(time_, dead_reckoned_,
+                   distance * Vector2d(std::cos(direction), std::sin(direction)), landmark);
+  if (!located_) {
+    relocalize();
+    result.status = located_ ? UpdateStatus::updated : UpdateStatus::rejected;
+    return result;
+  }
+  const State x = estimate_.x_hat();
+  const auto linearize = [&](const State::Tangent& delta, Estimate<State>::Linearization<2>& at) {
+    const State moved = x.plus(delta);
+    const Calibration& k = moved.get<2>();
+    const Vector2d seen = moved.get<0>().inverse() * landmark;
+    const double d = std::max(seen.norm(), 1e-3);
+    const double beta = std::atan2(seen(1), seen(0));
+    const double cosine = std::max(std::cos(beta), least_cosine);
+    const double falls = std::pow(cosine, k(6));
+    const double g = (1.0 + k(4)) * d * falls;
+    const double g_by_beta = cosine > least_cosine ? -g * k(6) * std::sin(beta) / cosine : 0.0;
+    // ∂(d, β)/∂seen and ∂seen/∂pose.
+    Eigen::Matrix2d polar;
+    polar << seen(0) / d, seen(1) / d, -seen(1) / (d * d), seen(0) / (d * d);
+    Eigen::Matrix<double, 2, 3> by_pose;
+    by_pose << -1.0, 0.0, seen(1), 0.0, -1.0, -seen(0);
+    const Eigen::Matrix<double, 2, 3> inner =
+        polar * by_pose * Pose2d::right_jacobian(Vector3d(delta.head<3>()));
+    at.H.setZero();
+    at.H.block<1, 3>(0, 0) = (g / d) * inner.row(0) + g_by_beta * inner.row(1);
+    at.H.block<1, 3>(1, 0) = (1.0 + k(7)) * inner.row(1);
+    at.H(0, range_scale) = d * falls;
+    at.H(0, range_offset) = 1.0;
+    at.H(0, depth_exponent) = g * std::log(cosine);
+    at.H(1, bearing_scale) = beta;
+    at.H(1, bearing_offset) = 1.0;
+    at.residual(0) = range - g - k(5);
+    at.residual(1) = std::remainder(bearing - (1.0 + k(7)) * beta - k(8), 2.0 * std::numbers::pi);
+  };
+  // Student's noise still lets what is far off pull a little, and a landmark that is taken for
+  // another pulls at every sighting: below this weight it does not count at all.
+  constexpr double least_weight = 0.05;
+  constexpr double doubtful = 0.5;
+  Estimate<State> trial = estimate_;
+  result = trial.correct_by<2>(linearize, noise_, {.guard = &guard_, .iterations = 5});
+  if (result.accepted() && result.weight >= least_weight) {
+    estimate_ = trial;
+  } else if (result.accepted()) {
+    result.status = UpdateStatus::rejected;
+  }
+  if (options_.relocalize && (!result.accepted() || result.weight < doubtful)) {
+    relocalize();
+  }
+  return result;
+}
+
+void LandmarkFilter::relocalize() noexcept {
+  constexpr int least_at_start = 4;
+  constexpr int least_anew = 5;
+  const auto found = relocalizer_.find(dead_reckoned_, located_ ? least_anew : least_at_start);
+  if (!found) {
+    return;
+  }
+  if (located_ &&
+      3 * relocalizer_.agreeing(pose(), dead_reckoned_, found->considered) > found->considered) {
+    return;
+  }
+  if (reset(found->pose)) {
+    ++relocalizations_;
+  }
+}
+
+}  // namespace flyball

@@ -1,0 +1,114 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <flyball/geometry/se2.hpp>
+#include <flyball/systems/model.hpp>
+
+/// Residuals of a drive among landmarks, over a generic scalar, whitened. Errors are (speed, turn
+/// rate); calibrations stand in the order of SensorCalibration.
+namespace flyball::localization {
+
+/// Beyond this angle off its axis no camera tells a depth.
+inline constexpr double least_cosine = 0.1;
+
+/// From one pose to the next by the odometry between them.
+struct OdometryResidual {
+  double way, turned;               ///< By the odometry, with the delay of `delay`.
+  double velocity_gain, turn_gain;  ///< How the rates change from the begin to the end.
+  double delay;
+  double dt;
+  Eigen::Vector3d inverse_std;
+
+  template <class Pose, class Errors, class Calibration>
+  auto operator()(const Pose& from, const Pose& to, const Errors& e, const Calibration& k) const {
+    using Scalar = typename Pose::Scalar;
+    const Scalar late = k(3) - delay;
+    const Scalar w = way - velocity_gain * late;
+    const Scalar a = turned - turn_gain * late;
+    const Eigen::Matrix<Scalar, 3, 1> tau{k(0) * w + e(0) * dt, Scalar(0.0),
+                                          k(1) * a + k(2) * w + e(1) * dt};
+    const Eigen::Matrix<Scalar, 3, 1> r = Pose::exp(tau).between(from.between(to)).log();
+    return Eigen::Matrix<Scalar, 3, 1>{r(0) * inverse_std(0), r(1) * inverse_std(1),
+                                       r(2) * inverse_std(2)};
+  }
+};
+
+/// Errors that decay: e⁺ = stays e + noise.
+struct ErrorResidual {
+  double stays;
+  Eigen::Vector2d inverse_std;
+
+  template <class Errors>
+  auto operator()(const Errors& before, const Errors& after) const {
+    using Scalar = typename Errors::Scalar;
+    return Eigen::Matrix<Scalar, 2, 1>{(after(0) - stays * before(0)) * inverse_std(0),
+                                       (after(1) - stays * before(1)) * inverse_std(1)};
+  }
+};
+
+/// What was known beforehand of a vector.
+template <int N>
+struct PriorResidual {
+  Eigen::Matrix<double, N, 1> mean;
+  Eigen::Matrix<double, N, 1> inverse_std;
+
+  template <class Vector>
+  auto operator()(const Vector& x) const {
+    using Scalar = typename Vector::Scalar;
+    Eigen::Matrix<Scalar, N, 1> r;
+    for (int i = 0; i < N; ++i) {
+      r(i) = (x(i) - mean(i)) * inverse_std(i);
+    }
+    return r;
+  }
+};
+
+/// What was known beforehand of a pose.
+struct PosePrior {
+  Pose2d mean;
+  Eigen::Vector3d inverse_std;
+
+  template <class Pose>
+  auto operator()(const Pose& x) const {
+    using Scalar = typename Pose::Scalar;
+    const Eigen::Matrix<Scalar, 3, 1> r = mean.cast<Scalar>().between(x).log();
+    return Eigen::Matrix<Scalar, 3, 1>{r(0) * inverse_std(0), r(1) * inverse_std(1),
+                                       r(2) * inverse_std(2)};
+  }
+};
+
+/// A landmark seen from a pose.
+struct SightingResidual {
+  Eigen::Vector2d landmark;
+  double range, bearing;
+  double inverse_range_std, inverse_bearing_std;
+
+  template <class Pose, class Calibration>
+  auto operator()(const Pose& pose, const Calibration& k) const {
+    using Scalar = typename Pose::Scalar;
+    using std::atan2;
+    using std::cos;
+    using std::exp;
+    using std::log;
+    using std::sqrt;
+    const Eigen::Matrix<Scalar, 2, 1> off{Scalar(landmark(0)) - pose.x(),
+                                          Scalar(landmark(1)) - pose.y()};
+    const Eigen::Matrix<Scalar, 2, 1> seen = pose.rotation().inverse() * off;
+    const Scalar d = sqrt(seen(0) * seen(0) + seen(1) * seen(1));
+    const Scalar beta = atan2(seen(1), seen(0));
+    Scalar cosine = cos(beta);
+    if (cosine < least_cosine) {
+      cosine = Scalar(least_cosine);
+    }
+    const Scalar expected = (1.0 + k(4)) * d * exp(k(6) * log(cosine)) + k(5);
+    const Scalar direction = (1.0 + k(7)) * beta + k(8);
+    return Eigen::Matrix<Scalar, 2, 1>{
+        (range - expected) * inverse_range_std,
+        angle_difference(Scalar(bearing), direction) * inverse_bearing_std};
+  }
+};
+
+}  // namespace flyball::localization

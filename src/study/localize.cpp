@@ -1,0 +1,351 @@
+#include <flyball/study/localize.hpp>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/io/file.hpp>
+#include <flyball/io/log_error.hpp>
+#include <flyball/io/number_table.hpp>
+
+#include "core/diagnose.hpp"
+#include "core/try.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+constexpr std::string_view where = "localize";
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+/// The files of a drive.
+struct DriveFiles {
+  std::string odometry, sightings, landmarks, barcodes, truth;
+};
+
+/// What a file is by its name; null where the name says nothing.
+std::string DriveFiles::* member_of(const std::string& path) {
+  const std::string name = lower(std::filesystem::path(path).filename().string());
+  const auto has = [&](std::string_view word) { return name.find(word) != std::string::npos; };
+  if (has("odometry")) {
+    return &DriveFiles::odometry;
+  }
+  if (has("landmark")) {
+    return &DriveFiles::landmarks;
+  }
+  if (has("barcode")) {
+    return &DriveFiles::barcodes;
+  }
+  if (has("measurement") || has("sighting")) {
+    return &DriveFiles::sightings;
+  }
+  return has("truth") ? &DriveFiles::truth : nullptr;
+}
+
+Expected<std::vector<std::string>> files_of(const LocalizeJob& job) {
+  std::vector<std::string> files;
+  for (const std::string& path : job.paths) {
+    std::error_code error;
+    if (!std::filesystem::is_directory(path, error)) {
+      files.push_back(path);
+      continue;
+    }
+    for (const auto& entry : std::filesystem::directory_iterator(path, error)) {
+      if (entry.is_regular_file(error) && member_of(entry.path().string()) != nullptr) {
+        files.push_back(entry.path().string());
+      }
+    }
+    if (error) {
+      return refusal(ArgumentError::empty, where, path)
+          .got("a folder that cannot be read: " + error.message())
+          .expected("the files of a drive");
+    }
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+Expected<DriveFiles> sort_out(const LocalizeJob& job) {
+  FLYBALL_TRY(const std::vector<std::string> files, files_of(job));
+  DriveFiles drive;
+  const std::string robot = lower(job.robot);
+  for (const std::string& path : files) {
+    const auto member = member_of(path);
+    if (member == nullptr) {
+      return refusal(ArgumentError::unknown_name, where, path)
+          .got("a name that does not say what it holds")
+          .expected(
+              "\"odometry\", \"measurement\" or \"sighting\", \"landmark\", \"barcode\" or "
+              "\"truth\" in it");
+    }
+    const std::string name = lower(std::filesystem::path(path).filename().string());
+    const bool one_robots = member != &DriveFiles::landmarks && member != &DriveFiles::barcodes;
+    if (one_robots && !robot.empty() && name.find(robot) == std::string::npos) {
+      continue;
+    }
+    if (!(drive.*member).empty()) {
+      return refusal(ArgumentError::ambiguous_name, where, path)
+          .got("a second file of its kind beside " + drive.*member)
+          .expected("one")
+          .hint(one_robots ? "name the robot, as its files do: --robot Robot1"
+                           : "name the files of one drive");
+    }
+    drive.*member = path;
+  }
+  for (const auto& [path, what] :
+       {std::pair(&drive.odometry, "odometry (time, speed, turn rate)"),
+        std::pair(&drive.sightings, "sightings (time, landmark, range, bearing)"),
+        std::pair(&drive.landmarks, "landmarks (number, x, y)")}) {
+    if (path->empty()) {
+      return refusal(ArgumentError::empty, where, "the files")
+          .got(fmt::format("{} file{}, none with the {}", files.size(),
+                           files.size() == 1 ? "" : "s", what))
+          .expected(
+              "a file whose name says \"odometry\", one that says \"measurement\" or "
+              "\"sighting\", and one that says \"landmark\"");
+    }
+  }
+  return drive;
+}
+
+Expected<NumberTable> read_table(const std::string& path, std::size_t columns) {
+  FLYBALL_TRY(const std::string text, read_file(path));
+  constexpr std::string_view gzip = "\x1F\x8B";
+  if (text.starts_with(gzip)) {
+    return refusal(LogError::not_a_log, path, "the file")
+        .got("compressed")
+        .expected("a table of numbers")
+        .hint("unpack it first: gunzip " + path);
+  }
+  return parse_number_table(text, path, columns);
+}
+
+/// Rows in the order of their times; loggers swap neighbours.
+void sort_by_time(NumberTable& table, const std::string& path,
+                  std::vector<Diagnostic>& diagnostics) {
+  const auto earlier = [](const auto& a, const auto& b) { return a[0] < b[0]; };
+  if (!std::is_sorted(table.rows.begin(), table.rows.end(), earlier)) {
+    std::stable_sort(table.rows.begin(), table.rows.end(), earlier);
+    warn(diagnostics, "unsorted", "{}: rows were not in the order of their times and are sorted",
+         path);
+  }
+}
+
+Expected<void> read_log(const DriveFiles& files, LocalizeResult& result) {
+  FLYBALL_TRY(NumberTable odometry, read_table(files.odometry, 3));
+  sort_by_time(odometry, files.odometry, result.diagnostics);
+  for (const auto& row : odometry.rows) {
+    result.log.odometry.push_back({row[0], row[1], row[2]});
+  }
+  FLYBALL_TRY(const NumberTable landmarks, read_table(files.landmarks, 3));
+  std::map<long long, std::size_t> by_number;
+  for (std::size_t i = 0; i < landmarks.rows.size(); ++i) {
+    const auto& row = landmarks.rows[i];
+    const long long number = std::llround(row[0]);
+    if (!by_number.emplace(number, i).second) {
+      return refusal(ArgumentError::ambiguous_name,
+                     fmt::format("{}:{}", files.landmarks, landmarks.lines[i]), "the landmark")
+          .got(fmt::format("{} for the second time", number))
+          .expected("each number once");
+    }
+    result.log.landmarks.push_back({std::to_string(number), {row[1], row[2]}});
+  }
+  // A sighting names a landmark, or the barcode on it.
+  std::map<long long, long long> by_barcode;
+  if (!files.barcodes.empty()) {
+    FLYBALL_TRY(const NumberTable barcodes, read_table(files.barcodes, 2));
+    for (const auto& row : barcodes.rows) {
+      by_barcode[std::llround(row[1])] = std::llround(row[0]);
+    }
+  }
+  FLYBALL_TRY(NumberTable sightings, read_table(files.sightings, 4));
+  sort_by_time(sightings, files.sightings, result.diagnostics);
+  std::size_t unknown = 0;
+  std::size_t bad = 0;
+  for (const auto& row : sightings.rows) {
+    long long number = std::llround(row[1]);
+    if (!by_barcode.empty()) {
+      const auto known = by_barcode.find(number);
+      if (known == by_barcode.end()) {
+        ++unknown;
+        continue;
+      }
+      number = known->second;
+    }
+    const auto landmark = by_number.find(number);
+    if (landmark == by_number.end()) {
+      ++result.other_sightings;
+    } else if (!(row[2] > 0.0) || !(std::abs(row[3]) <= 2.0 * std::numbers::pi)) {
+      ++bad;
+    } else {
+      result.log.sightings.push_back({row[0], landmark->second, row[2], row[3]});
+    }
+  }
+  if (unknown > 0) {
+    warn(result.diagnostics, "unknown_barcode",
+         "{} of {} sightings have a barcode that {} does not list, and are left out", unknown,
+         sightings.rows.size(), files.barcodes);
+  }
+  if (bad > 0) {
+    warn(result.diagnostics, "impossible_sighting",
+         "{} sightings without a positive range or with a bearing beyond a full turn are left out "
+         "(m and rad are expected)",
+         bad);
+  }
+  return {};
+}
+
+Expected<void> read_truth(const std::string& path, LocalizeResult& result) {
+  FLYBALL_TRY(NumberTable truth, read_table(path, 4));
+  sort_by_time(truth, path, result.diagnostics);
+  const auto& log = result.log;
+  for (const auto& row : truth.rows) {
+    if (row[0] >= log.odometry.front().time && row[0] <= log.odometry.back().time) {
+      result.truth.time.push_back(row[0]);
+      result.truth.pose.emplace_back(row[1], row[2], row[3]);
+    }
+  }
+  if (result.truth.time.empty()) {
+    warn(result.diagnostics, "no_common_time",
+         "{}: none of its times lies within those of the odometry; nothing is compared with it",
+         path);
+  }
+  return {};
+}
+
+PathError error_of(const LocalizedPath& path, const LocalizedPath& truth) {
+  PathError error;
+  std::vector<double> distances;
+  double square = 0.0;
+  double heading = 0.0;
+  double nees = 0.0;
+  std::size_t k = 0;
+  for (std::size_t i = 0; i < path.time.size(); ++i) {
+    while (truth.time[k] < path.time[i]) {
+      ++k;
+    }
+    const Eigen::Vector3d e = truth.pose[k].minus(path.pose[i]);
+    const double distance = (truth.pose[k].translation() - path.pose[i].translation()).norm();
+    distances.push_back(distance);
+    square += distance * distance;
+    heading += e(2) * e(2);
+    const Eigen::Matrix2d P = path.covariance[i].topLeftCorner<2, 2>();
+    const double determinant = P(0, 0) * P(1, 1) - P(0, 1) * P(1, 0);
+    if (determinant > 0.0) {
+      nees += (P(1, 1) * e(0) * e(0) - 2.0 * P(0, 1) * e(0) * e(1) + P(0, 0) * e(1) * e(1)) /
+              determinant;
+    }
+  }
+  if (distances.empty()) {
+    return error;
+  }
+  const auto n = static_cast<double>(distances.size());
+  error.points = distances.size();
+  error.rms = std::sqrt(square / n);
+  error.heading_rms = std::sqrt(heading / n);
+  error.nees = nees / n / 2.0;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  error.median = *middle;
+  error.worst = *std::max_element(distances.begin(), distances.end());
+  return error;
+}
+
+/// Where the path is wanted: at the truth's times, or ten times a second.
+std::vector<double> wanted_times(const LocalizeResult& result) {
+  if (!result.truth.time.empty()) {
+    return result.truth.time;
+  }
+  const double first = result.log.odometry.front().time;
+  const double last = result.log.odometry.back().time;
+  constexpr double step = 0.1;
+  constexpr double most = 200000.0;
+  const double count = std::min(std::floor((last - first) / step), most);
+  std::vector<double> times;
+  for (double k = 0.0; k <= count; k += 1.0) {
+    times.push_back(first + (last - first) * (count > 0.0 ? k / count : 0.0));
+  }
+  return times;
+}
+
+}  // namespace
+
+Expected<LocalizeResult> localize(const LocalizeJob& job) {
+  FLYBALL_TRY(const DriveFiles files, sort_out(job));
+  LocalizeResult result;
+  for (const std::string* path :
+       {&files.odometry, &files.sightings, &files.landmarks, &files.barcodes, &files.truth}) {
+    if (!path->empty()) {
+      result.files.push_back(*path);
+    }
+  }
+  FLYBALL_CHECK(read_log(files, result));
+  if (!files.truth.empty()) {
+    FLYBALL_CHECK(read_truth(files.truth, result));
+  }
+  LandmarkOptions options;
+  options.range_std = job.range_std.value_or(options.range_std);
+  options.bearing_std = job.bearing_std.value_or(options.bearing_std);
+  if (!job.calibrate) {
+    options.calibration = {};
+    options.calibration_std =
+        SensorCalibration::from(Eigen::Matrix<double, SensorCalibration::size, 1>::Zero());
+  }
+  std::optional<Pose2d> start;
+  if (job.start) {
+    start = Pose2d((*job.start)[0], (*job.start)[1], (*job.start)[2]);
+  }
+  const std::vector<double> times = wanted_times(result);
+  FLYBALL_TRY(result.filter, filter_landmarks(result.log, options, times, start));
+  if (job.smooth) {
+    FLYBALL_TRY(result.smoother, smooth_landmarks(result.log, options, times, start));
+    if (!result.smoother->converged) {
+      warn(result.diagnostics, "not_converged",
+           "the smoother ended before it had settled (optimality {:.1e}); its path may improve",
+           result.smoother->optimality);
+    }
+  }
+  const LocalizedPath& best = result.smoother ? result.smoother->path : result.filter.path;
+  if (best.time.empty()) {
+    return refusal(LocalizationError::too_few_sightings, where, "the path")
+        .got("no time of the odometry at which the pose is known")
+        .expected("sightings that begin before the odometry ends");
+  }
+  FLYBALL_TRY(result.odometry,
+              dead_reckon_landmarks(result.log, options, best.time, best.pose.front()));
+  const auto left_out = static_cast<std::size_t>(
+      std::count_if(result.filter.weight.begin(), result.filter.weight.end(),
+                    [](double weight) { return weight == 0.0; }));
+  constexpr double many = 0.1;
+  if (static_cast<double>(left_out) > many * static_cast<double>(result.filter.weight.size())) {
+    warn(result.diagnostics, "many_outliers",
+         "the filter left out {} of {} sightings: landmarks that are taken for another, or moved",
+         left_out, result.filter.weight.size());
+  }
+  if (result.filter.relocalizations > (start ? 0 : 1)) {
+    warn(result.diagnostics, "carried_away",
+         "the pose was found anew {} times: the robot was carried away, or its odometry failed",
+         result.filter.relocalizations - (start ? 0 : 1));
+  }
+  if (!result.truth.time.empty()) {
+    result.odometry_error = error_of(result.odometry, result.truth);
+    result.filter_error = error_of(result.filter.path, result.truth);
+    if (result.smoother) {
+      result.smoother_error = error_of(result.smoother->path, result.truth);
+    }
+  }
+  return result;
+}
+
+}  // namespace flyball::study

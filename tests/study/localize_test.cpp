@@ -1,0 +1,151 @@
+#include <flyball/study/localize.hpp>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/io/file.hpp>
+#include <flyball/io/log_error.hpp>
+
+#include "io/temporary_folder.hpp"
+
+namespace flyball::study {
+namespace {
+
+using Json = nlohmann::json;
+
+const std::string drive = FLYBALL_EXAMPLES "/drive";
+
+/// The example's files in a folder of its own, to be changed.
+class Localize : public testing::Test {
+ protected:
+  void SetUp() override {
+    for (const auto& entry : std::filesystem::directory_iterator(drive)) {
+      std::filesystem::copy(entry.path(), folder_.file(entry.path().filename().string()));
+    }
+  }
+  void write(const std::string& name, const std::string& text) { folder_.put(name, text); }
+  void remove(const std::string& name) { std::filesystem::remove(folder_.file(name)); }
+  [[nodiscard]] LocalizeJob job() const { return {.paths = {folder_.file("")}}; }
+
+  template <class Code>
+  void expect_refused(Code code, const std::string& words, const LocalizeJob& of) {
+    const auto result = localize(of);
+    ASSERT_FALSE(result);
+    EXPECT_TRUE(result.error().is(code)) << to_string(result.error());
+    EXPECT_NE(to_string(result.error()).find(words), std::string::npos)
+        << to_string(result.error());
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(Localize, FindsTheExamplesPathAndSensors) {
+  const auto result = localize({.paths = {drive}});
+  ASSERT_TRUE(result) << to_string(result.error());
+  EXPECT_GT(result->odometry_error->rms, 0.5);
+  EXPECT_LT(result->filter_error->rms, 0.15);
+  EXPECT_LT(result->smoother_error->rms, 0.03);
+  EXPECT_NEAR(result->smoother->calibration.depth_exponent, 1.0, 0.1);
+  EXPECT_NEAR(result->smoother->calibration.velocity_scale, 0.96, 0.05);
+  const Answer answer = answer_of(*result);
+  const Json json = Json::parse(answer.json);
+  EXPECT_EQ(json.at("paths").size(), 3U);
+  EXPECT_EQ(json.at("paths")[2].at("error").at("rms").get<double>(), result->smoother_error->rms);
+  EXPECT_EQ(answer.figures.size(), 3U);
+  EXPECT_EQ(answer.files.size(), 4U);
+  EXPECT_FALSE(answer.refusal);
+}
+
+TEST_F(Localize, WithoutTruthCalibrationOrSmootherItAnswersToo) {
+  remove("truth.csv");
+  LocalizeJob of = job();
+  of.calibrate = false;
+  of.smooth = false;
+  of.start = {-1.0, -0.5, 0.3};
+  const auto result = localize(of);
+  ASSERT_TRUE(result) << to_string(result.error());
+  EXPECT_FALSE(result->filter_error);
+  EXPECT_EQ(result->filter.calibration.velocity_scale, 1.0);
+  EXPECT_EQ(result->filter.relocalizations, 0);
+  EXPECT_EQ(Json::parse(answer_of(*result).json).at("paths").size(), 2U);
+}
+
+TEST_F(Localize, FilesThatAreMissingOrTwiceAreNamed) {
+  LocalizeJob of = job();
+  write("other_odometry.csv", "0,0,0\n");
+  expect_refused(ArgumentError::ambiguous_name, "--robot", of);
+  remove("other_odometry.csv");
+  write("notes.txt", "not of the drive");
+  EXPECT_TRUE(localize(of));
+  of.paths.push_back(folder_.file("notes.txt"));
+  expect_refused(ArgumentError::unknown_name, "notes.txt", of);
+  remove("landmarks.csv");
+  expect_refused(ArgumentError::empty, "landmarks (number, x, y)", job());
+}
+
+TEST_F(Localize, WrongRowsAreToldWithTheirLine) {
+  write("odometry.csv", "time,v,w\n0,0.1,0\n0.1,0.1\n");
+  expect_refused(LogError::malformed, "odometry.csv:3", job());
+  write("odometry.csv", "\x1F\x8B compressed");
+  expect_refused(LogError::not_a_log, "gunzip", job());
+  write("odometry.csv", "");
+  expect_refused(LogError::no_data, "odometry.csv", job());
+  remove("odometry.csv");
+  std::filesystem::copy(drive + "/odometry.csv", folder_.file("odometry.csv"));
+  write("landmarks.csv", "1,0,0\n1,2,2\n");
+  expect_refused(ArgumentError::ambiguous_name, "landmarks.csv:2", job());
+  write("landmarks.csv", "1,0,0\n");
+  expect_refused(LocalizationError::too_few_sightings, "two landmarks", job());
+}
+
+TEST_F(Localize, WhatIsLeftOutIsTold) {
+  write("barcodes.csv", "1,1\n2,2\n3,3\n4,4\n5,5\n6,6\n7,7\n8,8\n9,9\n10,10\n11,11\n20,12\n");
+  const auto sightings = read_file(folder_.file("sightings.csv")).value();
+  write("sightings.csv", sightings + "90,77,1,0\n90,1,-1,0\n3,2,2.5,0.1\n");
+  const auto result = localize(job());
+  ASSERT_TRUE(result) << to_string(result.error());
+  EXPECT_GT(result->other_sightings, 0U);  // Barcode 12 is no landmark now.
+  std::string codes;
+  for (const Diagnostic& diagnostic : result->diagnostics) {
+    codes += diagnostic.code + " ";
+  }
+  for (const char* code : {"unknown_barcode", "impossible_sighting", "unsorted"}) {
+    EXPECT_NE(codes.find(code), std::string::npos) << codes;
+  }
+}
+
+#ifdef FLYBALL_TEST_DATA
+// UTIAS multi-robot data, set 6, robot 1, with motion capture for truth; docs/localization.md.
+TEST_F(Localize, TheUtiasRobotIsFound) {
+  const std::string data = FLYBALL_TEST_DATA "/benchmarks/";
+  if (!std::filesystem::exists(data + "mrclam6_robot1_Odometry.dat.gz")) {
+    GTEST_SKIP() << "without the recordings";
+  }
+  const TemporaryFolder unpacked;
+  const std::string to = unpacked.file("");
+  for (const std::string name : {"Odometry", "Measurement", "Groundtruth_every5th"}) {
+    const std::string command = "gzip -cd '" + data + "mrclam6_robot1_" + name + ".dat.gz' > '" +
+                                to + "robot1_" + name + ".dat'";
+    ASSERT_EQ(std::system(command.c_str()), 0);
+  }
+  for (const std::string name : {"mrclam6_Barcodes.dat", "mrclam6_Landmark_Groundtruth.dat"}) {
+    std::filesystem::copy(data + name, to + name);
+  }
+  const auto result = localize({.paths = {to}});
+  ASSERT_TRUE(result) << to_string(result.error());
+  EXPECT_LT(result->filter_error->rms, 0.14);
+  EXPECT_LT(result->smoother_error->rms, 0.08);
+  EXPECT_LT(result->smoother_error->worst, 0.25);
+  EXPECT_NEAR(result->smoother->calibration.depth_exponent, 1.0, 0.15);
+  EXPECT_NEAR(result->smoother->calibration.delay, 0.2, 0.06);
+  EXPECT_LT(result->smoother_error->nees, 1.2);
+}
+#endif
+
+}  // namespace
+}  // namespace flyball::study
