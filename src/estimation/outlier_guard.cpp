@@ -20,20 +20,6 @@ double wilson_hilferty(double normal, double freedom) noexcept {
   return freedom * std::max(root, 0.0) * root * root;
 }
 
-/// x with P(X > x) = tail, by bisection: it is done once for each sensor.
-double chi_squared_quantile(double tail, double freedom) noexcept {
-  double low = 0.0;
-  double high = freedom + 10.0;
-  while (chi_squared_tail(high, freedom) > tail) {
-    high *= 2.0;
-  }
-  for (int k = 0; k < 100; ++k) {
-    const double middle = 0.5 * (low + high);
-    (chi_squared_tail(middle, freedom) > tail ? low : high) = middle;
-  }
-  return high;
-}
-
 }  // namespace
 
 Expected<OutlierGuard> OutlierGuard::create(const OutlierOptions& options) {
@@ -50,7 +36,7 @@ Expected<OutlierGuard> OutlierGuard::create(const OutlierOptions& options) {
   guard.normal_quantile_ = normal_quantile(options.probability);
   for (std::size_t i = 0; i < known; ++i) {
     guard.thresholds_[i] =
-        chi_squared_quantile(1.0 - options.probability, static_cast<double>(i + 1));
+        chi_squared_quantile(options.probability, static_cast<double>(i + 1));
   }
   return guard;
 }
