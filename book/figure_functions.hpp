@@ -36,6 +36,10 @@ namespace flyball::book {
 [[nodiscard]] FigureResult figure_9_7();
 [[nodiscard]] FigureResult figure_9_8();
 [[nodiscard]] FigureResult figure_9_9();
+[[nodiscard]] FigureResult figure_10_1();
+[[nodiscard]] FigureResult figure_10_2();
+[[nodiscard]] FigureResult figure_10_3();
+[[nodiscard]] FigureResult figure_10_4();
 [[nodiscard]] FigureResult figure_B_1();
 [[nodiscard]] FigureResult figure_B_2();
 [[nodiscard]] FigureResult figure_B_3();

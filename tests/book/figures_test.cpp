@@ -45,13 +45,13 @@ TEST(Figures, TheListHasThemInOrderWithTitleAndSection) {
     EXPECT_EQ(figure->title, entry.title);
     EXPECT_GE(figure->columns.size(), 2u);
   }
-  EXPECT_EQ(ids,
-            (std::vector<std::string_view>{
-                "2.3", "2.5",  "2.6",       "2.7",       "2.9",      "6.1", "6.3", "6.5", "6.6",
-                "6.7", "6.9",  "7.1",       "7.2",       "7.3",      "7.4", "7.5", "7.6", "7.7",
-                "7.8", "7.10", "9.1",       "9.2",       "9.3",      "9.4", "9.5", "9.6", "9.7",
-                "9.8", "9.9",  "B.1",       "B.2",       "B.3",      "B.4", "B.5", "B.6", "C.1",
-                "C.2", "C.3",  "table 7.1", "table 7.2", "table 7.3"}));
+  EXPECT_EQ(ids, (std::vector<std::string_view>{
+                     "2.3",  "2.5", "2.6",       "2.7",       "2.9",      "6.1",  "6.3",  "6.5",
+                     "6.6",  "6.7", "6.9",       "7.1",       "7.2",      "7.3",  "7.4",  "7.5",
+                     "7.6",  "7.7", "7.8",       "7.10",      "9.1",      "9.2",  "9.3",  "9.4",
+                     "9.5",  "9.6", "9.7",       "9.8",       "9.9",      "10.1", "10.2", "10.3",
+                     "10.4", "B.1", "B.2",       "B.3",       "B.4",      "B.5",  "B.6",  "C.1",
+                     "C.2",  "C.3", "table 7.1", "table 7.2", "table 7.3"}));
 }
 
 TEST(Figures, AreFoundAsPeopleWriteThem) {
