@@ -9,9 +9,9 @@
 #include <Eigen/Cholesky>
 
 #include <flyball/core/random.hpp>
+#include <flyball/estimation/pose_residuals.hpp>
 #include <flyball/geometry/se2.hpp>
 #include <flyball/optimization/factor_graph.hpp>
-#include <flyball/systems/model.hpp>
 
 #include "pose_graph.hpp"
 #include "timing.hpp"
@@ -25,41 +25,14 @@ using flyball::Pose2d;
 using flyball::optimization::FactorGraph;
 using flyball::optimization::Variable;
 
-/// U (R_aᵀ (p_b - p_a) - p, θ_b - θ_a - θ): the residual of Ceres' example.
-struct Between {
-  Eigen::Vector2d way;
-  flyball::SO2<double> turn;
-  Eigen::Matrix3d root;
-
-  template <class A, class B>
-  auto operator()(const A& a, const B& b) const {
-    using Scalar = typename A::Scalar;
-    const auto seen = a.between(b);
-    const Scalar angle = (turn.template cast<Scalar>().inverse() * seen.rotation()).angle();
-    Eigen::Matrix<Scalar, 3, 1> r;
-    for (int i = 0; i < 3; ++i) {
-      r(i) =
-          root(i, 0) * (seen.x() - way(0)) + root(i, 1) * (seen.y() - way(1)) + root(i, 2) * angle;
-    }
-    return r;
-  }
-};
-
+/// A known landmark seen.
 struct Seen {
   Eigen::Vector2d landmark;
-  double range, bearing;
+  flyball::RangeAndBearing sighting;
 
   template <class Pose>
   auto operator()(const Pose& pose) const {
-    using Scalar = typename Pose::Scalar;
-    const Eigen::Matrix<Scalar, 2, 1> off{Scalar(landmark(0)) - pose.x(),
-                                          Scalar(landmark(1)) - pose.y()};
-    const Eigen::Matrix<Scalar, 2, 1> seen = pose.rotation().inverse() * off;
-    using std::atan2;
-    using std::sqrt;
-    return Eigen::Matrix<Scalar, 2, 1>{
-        (range - sqrt(seen(0) * seen(0) + seen(1) * seen(1))) * 20.0,
-        flyball::angle_difference(Scalar(bearing), Scalar(atan2(seen(1), seen(0)))) * 50.0};
+    return sighting(pose, landmark);
   }
 };
 
@@ -74,8 +47,9 @@ Solved solve(const PoseGraph& graph) {
         }
         factors.fix(poses[0]);
         for (const Edge& edge : graph.edges) {
-          factors.add_factor(Between{{edge.x, edge.y}, flyball::SO2<double>(edge.angle), edge.root},
-                             poses[edge.a], poses[edge.b]);
+          factors.add_factor(
+              flyball::RelativePoseByCoordinates{{edge.x, edge.y}, edge.angle, edge.root},
+              poses[edge.a], poses[edge.b]);
         }
         const auto result = factors.solve();
         if (result) {
@@ -204,8 +178,10 @@ void path_among_landmarks() {
     const auto i = static_cast<std::size_t>(5 * k);
     const Eigen::Vector2d& landmark = landmarks[static_cast<std::size_t>(k % 30)];
     const Eigen::Vector2d seen = truth[i].inverse() * landmark;
-    sightings.push_back({5 * k, Seen{landmark, seen.norm() + 0.05 * random.normal(),
-                                     std::atan2(seen(1), seen(0)) + 0.02 * random.normal()}});
+    sightings.push_back(
+        {5 * k, Seen{landmark,
+                     {seen.norm() + 0.05 * random.normal(),
+                      std::atan2(seen(1), seen(0)) + 0.02 * random.normal(), 0.05, 0.02}}});
   }
   // A filter would begin nearer.
   std::vector<Pose2d> start;
@@ -223,8 +199,7 @@ void path_among_landmarks() {
           }
           const Eigen::Matrix3d root = Eigen::Vector3d(500.0, 1000.0, 500.0).asDiagonal();
           for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
-            graph.add_factor(Between{steps[i].translation(), steps[i].rotation(), root}, poses[i],
-                             poses[i + 1]);
+            graph.add_factor(flyball::RelativePose<Pose2d>{steps[i], root}, poses[i], poses[i + 1]);
           }
           for (const auto& [pose, seen] : sightings) {
             graph.add_factor(seen, poses[static_cast<std::size_t>(pose)]);

@@ -35,8 +35,7 @@ Expected<OutlierGuard> OutlierGuard::create(const OutlierOptions& options) {
   guard.options_ = options;
   guard.normal_quantile_ = normal_quantile(options.probability);
   for (std::size_t i = 0; i < known; ++i) {
-    guard.thresholds_[i] =
-        chi_squared_quantile(options.probability, static_cast<double>(i + 1));
+    guard.thresholds_[i] = chi_squared_quantile(options.probability, static_cast<double>(i + 1));
   }
   return guard;
 }
