@@ -68,8 +68,9 @@ class Bundle : public LieGroup<Bundle<Parts...>, typename detail::ScalarOfFirst<
   /// The identity.
   Bundle() noexcept : parts_(identity_of<Parts>()...) {}
   explicit Bundle(const Parts&... parts) noexcept : parts_(parts...) {}
-  [[nodiscard]] static Bundle identity() noexcept { return {}; }
+  [[nodiscard]] static Bundle identity() noexcept { return {}; }  ///< 1.
 
+  /// A part by its place.
   template <std::size_t I>
   [[nodiscard]] const Part<I>& get() const noexcept {
     return std::get<I>(parts_);
@@ -106,6 +107,7 @@ class Bundle : public LieGroup<Bundle<Parts...>, typename detail::ScalarOfFirst<
       }
     });
   }
+  /// Of each part; of vectors the vector.
   [[nodiscard]] static Bundle exp(const Tangent& tau) noexcept {
     return make([&]<std::size_t I>(Index<I>) -> Part<I> {
       if constexpr (is_vector<I>) {

@@ -33,7 +33,7 @@ class SE2 : public LieGroup<SE2<ScalarType>, ScalarType, 3> {
   /// @param x, y  m. @param angle  rad.
   SE2(const Scalar& x, const Scalar& y, const Scalar& angle) noexcept
       : translation_(x, y), rotation_(angle) {}
-  [[nodiscard]] static SE2 identity() noexcept { return {}; }
+  [[nodiscard]] static SE2 identity() noexcept { return {}; }  ///< 1.
 
   [[nodiscard]] const Point& translation() const noexcept { return translation_; }
   [[nodiscard]] const Rotation& rotation() const noexcept { return rotation_; }
@@ -97,6 +97,7 @@ class SE2 : public LieGroup<SE2<ScalarType>, ScalarType, 3> {
     J(1, 2) = w(1);
     return J;
   }
+  /// Its inverse; singular at whole turns.
   [[nodiscard]] static Jacobian left_jacobian_inverse(const Tangent& tau) noexcept {
     const Arc arc(tau(2));
     const Point w = arc.V_inverse(arc.turned(tau.template head<2>()));

@@ -29,7 +29,7 @@ class SE3 : public LieGroup<SE3<ScalarType>, ScalarType, 6> {
   SE3() noexcept : translation_(Point::Zero()) {}
   SE3(const Point& translation, const Rotation& rotation) noexcept
       : translation_(translation), rotation_(rotation) {}
-  [[nodiscard]] static SE3 identity() noexcept { return {}; }
+  [[nodiscard]] static SE3 identity() noexcept { return {}; }  ///< 1.
 
   [[nodiscard]] const Point& translation() const noexcept { return translation_; }
   [[nodiscard]] const Rotation& rotation() const noexcept { return rotation_; }

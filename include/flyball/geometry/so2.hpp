@@ -43,7 +43,7 @@ class SO2 : public LieGroup<SO2<ScalarType>, ScalarType, 1> {
     const Scalar r = hypot(x, y);
     return r > Scalar(0.0) ? from_unit(x / r, y / r) : SO2();
   }
-  [[nodiscard]] static SO2 identity() noexcept { return {}; }
+  [[nodiscard]] static SO2 identity() noexcept { return {}; }  ///< 1.
 
   [[nodiscard]] const Scalar& cos() const noexcept { return cos_; }
   [[nodiscard]] const Scalar& sin() const noexcept { return sin_; }
@@ -76,13 +76,17 @@ class SO2 : public LieGroup<SO2<ScalarType>, ScalarType, 1> {
   }
   [[nodiscard]] SO2 inverse() const noexcept { return from_unit(cos_, -sin_); }
 
+  /// @param theta  rad, any.
   [[nodiscard]] static SO2 exp(const Tangent& theta) noexcept { return SO2(theta(0)); }
   /// In [-π, π].
   [[nodiscard]] Tangent log() const noexcept { return Tangent(angle()); }
+  /// 1: rotations of the plane commute.
   [[nodiscard]] Jacobian adjoint() const noexcept { return Jacobian::Identity(); }
+  /// 1.
   [[nodiscard]] static Jacobian left_jacobian(const Tangent& /*theta*/) noexcept {
     return Jacobian::Identity();
   }
+  /// 1.
   [[nodiscard]] static Jacobian left_jacobian_inverse(const Tangent& /*theta*/) noexcept {
     return Jacobian::Identity();
   }

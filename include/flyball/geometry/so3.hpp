@@ -37,7 +37,7 @@ class SO3 : public LieGroup<SO3<ScalarType>, ScalarType, 3> {
     result.q_ = q;
     return result;
   }
-  [[nodiscard]] static SO3 identity() noexcept { return {}; }
+  [[nodiscard]] static SO3 identity() noexcept { return {}; }  ///< 1.
 
   /// (w, x, y, z), of norm 1.
   [[nodiscard]] const Quaternion& quaternion() const noexcept { return q_; }
@@ -71,6 +71,7 @@ class SO3 : public LieGroup<SO3<ScalarType>, ScalarType, 3> {
   }
   [[nodiscard]] SO3 inverse() const noexcept { return from_unit({q_(0), -q_(1), -q_(2), -q_(3)}); }
 
+  /// @param phi  rad, any length.
   [[nodiscard]] static SO3 exp(const Tangent& phi) noexcept {
     const Scalar s = Scalar(0.25) * phi.squaredNorm();  // (θ/2)²
     const Scalar half_sinc = Scalar(0.5) * detail::stumpff<1>(s);

@@ -14,6 +14,7 @@ struct ChassisSpeeds {
 
   /// (vx, vy, ω), the tangent of SE(2).
   [[nodiscard]] Eigen::Vector3d vector() const noexcept { return {vx, vy, omega}; }
+  /// The speeds of such a vector.
   [[nodiscard]] static ChassisSpeeds from(const Eigen::Vector3d& twist) noexcept {
     return {twist(0), twist(1), twist(2)};
   }
