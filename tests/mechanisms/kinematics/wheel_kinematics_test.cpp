@@ -127,8 +127,8 @@ TEST(WheelKinematics, RefusesWhatSeesNotEveryMotion) {
       WheelMount{{0.7, 0.1}, 0.0}, WheelMount{{0.4, 0.4}, pi / 2}, WheelMount{{0.4, 0.1}, 1.0}});
   EXPECT_FALSE(elsewhere);
   EXPECT_TRUE(through.error().is(ArgumentError::out_of_range));
-  const std::array<Eigen::Vector2d, 4> point{};
-  EXPECT_FALSE(mecanum_kinematics(point));
+  const Eigen::Vector2d point(0.3, 0.2);
+  EXPECT_FALSE(mecanum_kinematics({point, point, point, point}));
   EXPECT_EQ(to_string(wheel_kinematics(std::array{WheelMount{{0.3, 0.0}, 0.0, pi / 2}, WheelMount{},
                                                   WheelMount{}})
                           .error()),

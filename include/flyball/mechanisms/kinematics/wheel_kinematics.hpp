@@ -73,8 +73,8 @@ using MecanumKinematics = WheelKinematics<4>;
 
 /// A wheel with rollers, fixed to the robot.
 struct WheelMount {
-  Eigen::Vector2d position;   ///< m, of its contact in the robot's frame.
-  double direction = 0.0;     ///< rad, in which it rolls; 0 is forward.
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();  ///< m, of its contact in the robot's frame.
+  double direction = 0.0;                              ///< rad, in which it rolls; 0 is forward.
   double roller_angle = 0.0;  ///< rad, from that direction to the rollers' axis: what moves across
                               ///< the axis the rollers give way to. An omni wheel has 0, a
                               ///< mecanum wheel ±π/4.
