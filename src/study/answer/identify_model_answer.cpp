@@ -237,7 +237,7 @@ Verdict verdict_of(const ModelIdentification& result) {
   verdict.line =
       fmt::format("The simulation explains {} of {}.", text::percent(std::max(0.0, least)),
                   result.validation.empty() ? "what was fitted" : "the part that was kept aside");
-  add_warnings(verdict, result.diagnostics, "the fit");
+  add_warnings(verdict, result.diagnostics, "about the fit");
   return verdict;
 }
 
