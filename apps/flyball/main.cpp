@@ -54,6 +54,7 @@ int run(int argc, char** argv) {
       "  flyball tune lift.wpilog --mechanism elevator --period 20ms --out report/\n"
       "  flyball identify shooter.json --json       only the gains, for other programs\n"
       "  flyball design elevator.toml               no robot yet: mass, gearing and motors\n"
+      "  flyball estimate swing.csv pendulum.toml   states from a log, by filter and smoother\n"
       "  flyball simulate pendulum.toml             a mechanism, or a model by formula\n"
       "  flyball experiment elevator.toml           which tests tell the gains best\n"
       "  flyball motors krakenX60                   what the motor table knows\n"
@@ -76,6 +77,7 @@ int run(int argc, char** argv) {
   flyball::app::add_design_command(program, invocation);
   flyball::app::add_simulate_command(program, invocation);
   flyball::app::add_tune_command(program, invocation);
+  flyball::app::add_estimate_command(program, invocation);
   flyball::app::add_experiment_command(program, invocation);
   flyball::app::add_motors_command(program, invocation);
   flyball::app::add_motor_curves_command(program, invocation);

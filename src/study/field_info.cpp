@@ -119,7 +119,11 @@ Names sections_of(JobKind job) {
   static constexpr std::array<std::string_view, 5> experiment{"experiment", "log", "mechanism",
                                                               "gains", "sensor"};
   static constexpr std::array<std::string_view, 3> identify{"log", "fit", "model.parameters"};
+  static constexpr std::array<std::string_view, 6> estimate{
+      "estimate", "fit.period", "fit.from", "fit.to", "fit.hold", "model.parameters"};
   switch (job) {
+    case JobKind::estimate:
+      return estimate;
     case JobKind::experiment:
       return experiment;
     case JobKind::identify:

@@ -10,6 +10,7 @@
 #include <flyball/math/expression/formula.hpp>
 #include <flyball/systems/formula_model.hpp>
 
+#include "study/estimate_project.hpp"
 #include "study/fit_project.hpp"
 #include "study/model_project.hpp"
 #include "study/named_values.hpp"
@@ -58,6 +59,7 @@ class ModelReader : private NamedValues {
       return std::nullopt;
     }
     ModelFit fit = model_fit(document_, project_, *model, point.x);
+    ModelEstimate estimate = model_estimate(document_, project_, *model, point.x);
     return ModelJob{.path = project_.path,
                     .model = *model,
                     .outputs_are_states = said_.outputs.empty(),
@@ -71,7 +73,8 @@ class ModelReader : private NamedValues {
                     .limit = std::move(limit),
                     .reference = std::move(reference),
                     .run = std::move(simulation),
-                    .fit = std::move(fit)};
+                    .fit = std::move(fit),
+                    .estimate = std::move(estimate)};
   }
 
  private:

@@ -440,6 +440,49 @@ constexpr std::array fit_fields{
          "Whether intervals come from the profile of the likelihood")
         .without("false")};
 
+Expected<void> check_filter(const std::string& text) {
+  return check_choice(text, {"extended", "unscented"});
+}
+
+Expected<void> check_outliers(const std::string& text) {
+  return check_choice(text, {"none", "gate", "huber", "student"});
+}
+
+constexpr std::array estimate_fields{
+    text("filter", at<&EstimateSection::filter>(), "\"unscented\"", "Which Kalman filter")
+        .one_of("extended, unscented")
+        .checked(check_filter)
+        .without("extended"),
+    flag("smoother", at<&EstimateSection::smoother>(), "true",
+         "Whether the record is smoothed, too (Rauch, Tung and Striebel)")
+        .without("true"),
+    map("process_noise", at<&EstimateSection::process_noise>(), "{ omega = \"0.5 rad/s\" }",
+        "How far a state errs in one second, as a random walk: standard deviation")
+        .without("none")
+        .no_option(),
+    map("measurement_noise", at<&EstimateSection::measurement_noise>(), "{ theta = \"1 deg\" }",
+        "Standard deviation of a reading of each output")
+        .without("it must be there")
+        .no_option(),
+    map("initial", at<&EstimateSection::initial>(), "{ theta = \"10 deg\" }",
+        "The states at the first sample")
+        .without("the point")
+        .no_option(),
+    map("initial_std", at<&EstimateSection::initial_std>(), "{ theta = \"5 deg\" }",
+        "How far they may be off: standard deviation")
+        .without("1 in the state's SI unit")
+        .no_option(),
+    text("outliers", at<&EstimateSection::outliers>(), "\"huber\"",
+         "What becomes of a reading that does not fit: it is taken, left out, or counts for less")
+        .one_of("none, gate, huber, student")
+        .checked(check_outliers)
+        .without("none"),
+    flag("tune", at<&EstimateSection::tune>(), "true",
+         "Whether the standard deviations of process and measurement noise are found first, by "
+         "maximum likelihood from where they are; what is zero stays")
+        .called("tune-noise")
+        .without("false")};
+
 constexpr std::array sections{
     Section{"mechanism", mechanism_fields, &within<&Project::parts>,
             "What the mechanism is, and the parts it is made of.", "every mechanism", mechanism},
@@ -454,6 +497,10 @@ constexpr std::array sections{
             "What `flyball simulate` does."},
     Section{"fit", fit_fields, &within<&Project::fit>,
             "What `flyball identify LOG PROJECT.toml` finds of a model.", "", model},
+    Section{"estimate", estimate_fields, &within<&Project::estimate>,
+            "What `flyball estimate LOG PROJECT.toml` does with a model; channels and times of the "
+            "log are those of [fit].",
+            "", model},
     Section{"gains", gains_fields, &within<&Project::gains>,
             "Feedforward gains that are known, in place of those that follow from the parts. With "
             "kV no part is needed.",

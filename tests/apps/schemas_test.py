@@ -160,6 +160,20 @@ def check_model_fit(folder):
         check("project", tomllib.loads((examples / f"{name}.toml").read_text()), name)
 
 
+def check_estimate(folder):
+    """The lag of check_model_fit, whose readings err by 1 mm, and one output without a noise."""
+    model = (folder / "lag.toml").read_text().split("[fit]")[0].replace('"1 m"', '"2 m"').replace("0.2 s", "0.5 s")
+    fit = '[fit]\nchannels = { u = "command" }\n[estimate]\n'
+    (folder / "lag_estimate.toml").write_text(
+        model + fit + 'process_noise = { x = "1 mm" }\nmeasurement_noise = { x = "1 mm" }\n')
+    check("project", tomllib.loads((folder / "lag_estimate.toml").read_text()), "lag_estimate.toml")
+    files = ["estimate", "lag.csv", "lag_estimate.toml"]
+    for more in ([], ["--filter", "unscented", "--out", "estimate"], ["--tune-noise", "--smoother=false"]):
+        check_answer([*files, *more], 0, folder)
+    (folder / "lag_silent.toml").write_text(model + fit)
+    check_answer(["estimate", "lag.csv", "lag_silent.toml"], 2, folder)
+
+
 def check_motors(folder):
     check_answer(["motors"], 0, folder)
     check_answer(["motors", "NEO"], 0, folder)
@@ -268,6 +282,7 @@ with tempfile.TemporaryDirectory() as name:
     check_drivetrain(pathlib.Path(name))
     check_refusals(pathlib.Path(name))
     check_localize(pathlib.Path(name))
+    check_estimate(pathlib.Path(name))
     check_motors(pathlib.Path(name))
     check_places(pathlib.Path(name))
     check_reader_and_schema(pathlib.Path(name))

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <flyball/core/quantity.hpp>
+#include <flyball/estimation/outlier_guard.hpp>
 #include <flyball/identification/prediction_error.hpp>
 #include <flyball/math/expression/tape.hpp>
 #include <flyball/systems/any_model.hpp>
@@ -76,6 +77,27 @@ struct ModelFit {
   identification::PredictionErrorOptions options{};
 };
 
+/// [estimate]: what `flyball estimate LOG PROJECT.toml` does with a model; channels and times are
+/// those of [fit].
+struct EstimateSection {
+  std::string filter{}, outliers{};
+  std::optional<bool> smoother{};
+  bool tune = false;
+  NamedTexts process_noise{}, measurement_noise{}, initial{}, initial_std{};
+};
+
+/// The same, checked, in SI.
+struct ModelEstimate {
+  bool is_unscented = false;
+  bool smoother = true;
+  bool tune = false;
+  Eigen::VectorXd process_noise{};      ///< n, the random walk's standard deviation after 1 s.
+  Eigen::VectorXd measurement_noise{};  ///< p, standard deviation of a sample; NaN: not said.
+  Eigen::VectorXd initial{};            ///< n
+  Eigen::VectorXd initial_std{};        ///< n
+  std::optional<OutlierTreatment> outliers{};
+};
+
 /// The inputs of an open loop, over time.
 class InputSignals {
  public:
@@ -120,6 +142,7 @@ struct ModelJob {
   Eigen::VectorXd reference{};  ///< n, where the loop goes; NaN: the point.
   ModelRun run{};
   ModelFit fit{};
+  ModelEstimate estimate{};
 };
 
 }  // namespace flyball::study

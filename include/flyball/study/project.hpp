@@ -71,6 +71,7 @@ struct Project {
   SimulationSection simulation{};
   ExperimentLimits experiment{};
   FitSection fit{};
+  EstimateSection estimate{};
   DesignJob job;  ///< Its plant comes from the parts and the gains.
   /// Why the file does not define a mechanism, if it does not: all that is missing.
   std::optional<Errors> plant_error{};
@@ -133,7 +134,7 @@ struct KeyComment {
                                                         std::span<const Override> overrides = {});
 
 /// The jobs whose fields a person may set.
-enum class JobKind { identify, design, tune, analyze, simulate, experiment };
+enum class JobKind { identify, design, tune, analyze, simulate, experiment, estimate };
 
 /// A field of a job, for whoever asks a person for it: a command line, a form, a binding.
 struct FieldInfo {

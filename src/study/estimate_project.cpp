@@ -1,0 +1,67 @@
+#include <limits>
+
+#include "study/estimate_project.hpp"
+#include "study/named_values.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+class EstimateReader : private NamedValues {
+ public:
+  EstimateReader(TomlDocument& document, const Project& project, const AnyModel& model)
+      : NamedValues(document, project, model.names().states, model.names().inputs),
+        outputs_(model.names().outputs),
+        said_(project.estimate) {}
+
+  ModelEstimate estimate(const Eigen::VectorXd& x) {
+    using enum OutlierTreatment;
+    ModelEstimate made{.is_unscented = said_.filter == "unscented",
+                       .smoother = said_.smoother.value_or(true),
+                       .tune = said_.tune,
+                       .process_noise = Eigen::VectorXd::Zero(x.size()),
+                       .measurement_noise = of_outputs(),
+                       .initial = x,
+                       .initial_std = Eigen::VectorXd::Ones(x.size())};
+    if (!said_.outliers.empty() && said_.outliers != "none") {
+      made.outliers = said_.outliers == "gate" ? gate : said_.outliers == "huber" ? huber : student;
+    }
+    const auto read = [&](const char* section, const NamedTexts& said, Range range,
+                          Eigen::VectorXd& values) {
+      read_values(section, said, range, &values, nullptr);
+    };
+    read("estimate.process_noise", said_.process_noise, Range::not_negative, made.process_noise);
+    read("estimate.initial", said_.initial, Range::any, made.initial);
+    read("estimate.initial_std", said_.initial_std, Range::not_negative, made.initial_std);
+    return made;
+  }
+
+ private:
+  Eigen::VectorXd of_outputs() {
+    constexpr const char* section = "estimate.measurement_noise";
+    Eigen::VectorXd values = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(outputs_.size()),
+                                                       std::numeric_limits<double>::quiet_NaN());
+    for (const NamedText& one : said_.measurement_noise) {
+      const std::size_t output = place_of(outputs_, one.name);
+      if (output == outputs_.size()) {
+        document_.refuse(section, one.name, unknown(one.name, {&outputs_}, "an output"),
+                         TomlDocument::Fault::key);
+      } else if (const auto si = value(section, one, outputs_[output].unit, Range::positive)) {
+        values(static_cast<Eigen::Index>(output)) = *si;
+      }
+    }
+    return values;
+  }
+
+  const std::vector<Coordinate>& outputs_;
+  const EstimateSection& said_;
+};
+
+}  // namespace
+
+ModelEstimate model_estimate(TomlDocument& document, const Project& project, const AnyModel& model,
+                             const Eigen::VectorXd& x) {
+  return EstimateReader(document, project, model).estimate(x);
+}
+
+}  // namespace flyball::study
