@@ -89,15 +89,17 @@ class Search {
   std::vector<Index> free_;
 };
 
-/// A step uphill from a place, along H g and shortened until it is one; the same place if none is.
-Search::Place uphill(const Search& search, const Search::Place& from, const VectorXd& direction) {
+/// A step uphill from a place, along H g and shortened until it is one, not below the least
+/// logarithms; the same place if none is.
+Search::Place uphill(const Search& search, const Search::Place& from, const VectorXd& direction,
+                     const VectorXd& least) {
   constexpr double longest = 2.0;  // a factor of e² of any deviation
   constexpr double sufficient = 1e-4;
   constexpr int halvings = 40;
   const double slope = from.gradient.dot(direction);
   double share = std::min(1.0, longest / std::max(1e-300, direction.cwiseAbs().maxCoeff()));
   for (int k = 0; k < halvings; ++k, share *= 0.5) {
-    const auto next = search.at(from.log + share * direction);
+    const auto next = search.at((from.log + share * direction).cwiseMax(least));
     if (next && next->value >= from.value + sufficient * share * slope &&
         next->value > from.value) {
       return *next;
@@ -180,14 +182,23 @@ Expected<NoiseFit> fit_noise(std::span<const NoiseRecord> records, const VectorX
   fit.start_log_likelihood = place.value;
   // Of a deviation that all readings tell, the variance of its logarithm.
   MatrixXd H = MatrixXd::Identity(size, size) / (2.0 * search.readings());
+  constexpr double smallest = 1e-6;
+  const VectorXd least = (place.log.array() + std::log(smallest)).matrix();
+  // Zero where a deviation is at its least and would go on.
+  const auto climbing = [&](VectorXd values) {
+    for (Index i = 0; i < size; ++i) {
+      values(i) = place.log(i) <= least(i) && place.gradient(i) < 0.0 ? 0.0 : values(i);
+    }
+    return values;
+  };
   for (bool fresh = true; fit.iterations < options.iterations; ++fit.iterations) {
-    const VectorXd direction = detail::product(H, place.gradient);
-    fit.expected_gain = 0.5 * place.gradient.dot(direction);
+    const VectorXd direction = climbing(detail::product(H, climbing(place.gradient)));
+    fit.expected_gain = 0.5 * climbing(place.gradient).dot(direction);
     if (!fresh && fit.expected_gain <= options.tolerance) {
       fit.converged = true;
       break;
     }
-    const Search::Place next = uphill(search, place, direction);
+    const Search::Place next = uphill(search, place, direction, least);
     if (next.value == place.value) {
       // Rounding hides what is left, or H is wrong: it begins anew once.
       constexpr double rounding = 1e-11;
@@ -211,7 +222,8 @@ Expected<NoiseFit> fit_noise(std::span<const NoiseRecord> records, const VectorX
     without(i) -= much_less;
     const auto found = search.at(without);
     constexpr double hardly = 1e-3;  // of log p
-    negligible[static_cast<std::size_t>(i)] = found && found->value >= place.value - hardly;
+    negligible[static_cast<std::size_t>(i)] =
+        place.log(i) <= least(i) || (found && found->value >= place.value - hardly);
   }
   const VectorXd errors = errors_of(search, place, negligible);
   for (const double value : process) {
@@ -227,7 +239,8 @@ Expected<NoiseFit> fit_noise(std::span<const NoiseRecord> records, const VectorX
         .value = std::exp(place.log(i)),
         .relative_error = errors(i),
         .is_free = true,
-        .is_negligible = negligible[static_cast<std::size_t>(i)]};
+        .is_negligible = negligible[static_cast<std::size_t>(i)],
+        .vanishes = place.log(i) <= least(i)};
   }
   return fit;
 }

@@ -174,6 +174,18 @@ TEST(NoiseFit, ANoiseThatIsNotThereGoesToZero) {
   EXPECT_NEAR(fit->measurement[0].value, 0.2, 0.02);
 }
 
+// Readings that are the prediction exactly: each smaller noise is more likely.
+TEST(NoiseFit, WhatVanishesEndsAtAMillionth) {
+  NoiseRecord record = walk(50, 0.0, 0.0);
+  record.x0(0) = 1.0;
+  const auto fit = fit_noise({&record, 1}, vector({0.0}), vector({0.3}));
+  ASSERT_TRUE(fit);
+  EXPECT_TRUE(fit->converged);
+  EXPECT_TRUE(fit->measurement[0].vanishes);
+  EXPECT_NEAR(fit->measurement[0].value, 0.3e-6, 1e-12);
+  EXPECT_TRUE(std::isinf(fit->measurement[0].relative_error));
+}
+
 TEST(NoiseFit, WhatIsZeroStays) {
   const NoiseRecord record = walk(300, 0.5, 0.2);
   const auto fit = fit_noise({&record, 1}, vector({0.0}), vector({0.1}));

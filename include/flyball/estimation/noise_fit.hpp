@@ -58,6 +58,9 @@ struct NoiseDeviation {
   double relative_error = 0.0;
   bool is_free = false;
   bool is_negligible = false;  ///< The records are as likely with a hundredth of it.
+  /// A millionth of where the search began, where it ends: the records are ever more likely the
+  /// smaller it is, as where readings repeat exactly.
+  bool vanishes = false;
 };
 
 /// Options of `fit_noise`.
