@@ -211,7 +211,13 @@ void notice_tuning(const ModelDescription& names, const TunedNoise& tuned,
                            text::number(tuned.fit.expected_gain, 2)));
   }
   const auto tell = [&](const NoiseDeviation& one, const std::string& name, std::string_view kind) {
-    if (one.is_negligible) {
+    if (one.vanishes) {
+      warn(
+          all, "noise_vanishes",
+          "the log is ever more likely the smaller the {} noise of {} is, as where readings repeat "
+          "exactly: it ends at a millionth of the one given",
+          kind, name);
+    } else if (one.is_negligible) {
       note(all, "noise_not_seen", "the log is as likely without {} noise of {}", kind, name);
     } else if (one.is_free && !std::isfinite(one.relative_error)) {
       warn(all, "not_determined", "the log does not determine the {} noise of {}", kind, name);

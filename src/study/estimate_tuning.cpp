@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -103,21 +104,24 @@ class Linearization {
 };
 
 /// @return The largest change of a logarithm, in its standard errors where there are any.
-double take(const NoiseFit& fit, const std::vector<Index>& noisy, ModelEstimate& settings) {
+double take(const NoiseFit& fit, const std::vector<Index>& noisy, const ModelEstimate& given,
+            ModelEstimate& settings) {
   double largest = 0.0;
-  const auto put = [&](const NoiseDeviation& found, double& value) {
+  const auto put = [&](const NoiseDeviation& found, double first, double& value) {
     if (!found.is_negligible) {
       const double change = std::abs(std::log(found.value / value));
       const bool known = std::isfinite(found.relative_error) && found.relative_error > 0.0;
       largest = std::max(largest, known ? change / found.relative_error : change);
     }
-    value = found.value;
+    // One that vanishes would go on to do so from where it is.
+    value = std::max(found.value, 1e-6 * first);
   };
   for (std::size_t s = 0; s < noisy.size(); ++s) {
-    put(fit.process[s], settings.process_noise(noisy[s]));
+    put(fit.process[s], given.process_noise(noisy[s]), settings.process_noise(noisy[s]));
   }
   for (std::size_t i = 0; i < fit.measurement.size(); ++i) {
-    put(fit.measurement[i], settings.measurement_noise(static_cast<Index>(i)));
+    const auto k = static_cast<Index>(i);
+    put(fit.measurement[i], given.measurement_noise(k), settings.measurement_noise(k));
   }
   return largest;
 }
@@ -129,6 +133,7 @@ Expected<TunedNoise> tune_noise(const AnyModel& model, const std::vector<Experim
   constexpr Index most = 20;
   constexpr double settled = 0.02;  // of a standard error
   const std::vector<Index> noisy = noisy_states(settings.process_noise);
+  const ModelEstimate given = settings;
   TunedNoise tuned;
   while (tuned.relinearizations < most && !tuned.settled) {
     FLYBALL_TRY(const auto passes, estimate_runs(model, runs, settings, hold, true));
@@ -145,7 +150,7 @@ Expected<TunedNoise> tune_noise(const AnyModel& model, const std::vector<Experim
       fit.start_log_likelihood = tuned.fit.start_log_likelihood;
       fit.iterations += tuned.fit.iterations;
     }
-    tuned.settled = take(fit, noisy, settings) <= settled;
+    tuned.settled = take(fit, noisy, given, settings) <= settled;
     tuned.fit = std::move(fit);
     ++tuned.relinearizations;
   }
