@@ -80,10 +80,7 @@ class DelayedFilter {
       outcome.status = DelayStatus::in_the_future;
       return outcome;
     }
-    std::size_t before = count_;
-    while (before > 0 && entry(before - 1).time > time) {
-      --before;
-    }
+    const std::size_t before = reached_by(time);
     if (before == 0) {
       outcome.status = DelayStatus::too_old;
       return outcome;
@@ -125,6 +122,22 @@ class DelayedFilter {
   [[nodiscard]] double now() const noexcept { return entry(count_ - 1).time; }
   /// The oldest time at which a measurement is taken.
   [[nodiscard]] double oldest() const noexcept { return entry(0).time; }
+  /// The estimate of a time, from the samples up to it; none before the oldest and after now.
+  /// @param time  s. Cost: one prediction.
+  [[nodiscard]] std::optional<Snapshot> at(double time) const noexcept {
+    const std::size_t before = is_signal(time) && time <= now() ? reached_by(time) : 0;
+    if (before == 0) {
+      return std::nullopt;
+    }
+    const Entry& base = entry(before - 1);
+    if (time == base.time) {
+      return base.after;
+    }
+    Filter then = filter_;
+    then.restore(base.after);
+    then.predict(entry(before).u, time - base.time);
+    return then.estimate();
+  }
   /// Starts again, with nothing to go back to. @param start  s.
   void reset(const Snapshot& estimate, double start) noexcept {
     filter_.restore(estimate);
@@ -149,6 +162,14 @@ class DelayedFilter {
       u = Input{};
     }
     return u;
+  }
+  /// How many entries are of a time or of before it.
+  [[nodiscard]] std::size_t reached_by(double time) const noexcept {
+    std::size_t before = count_;
+    while (before > 0 && entry(before - 1).time > time) {
+      --before;
+    }
+    return before;
   }
   [[nodiscard]] Entry& entry(std::size_t k) noexcept { return *entries_[(begin_ + k) % Capacity]; }
   [[nodiscard]] const Entry& entry(std::size_t k) const noexcept {
