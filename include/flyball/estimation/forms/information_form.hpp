@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 
 #include <flyball/estimation/forms/joseph_covariance.hpp>
 
@@ -66,6 +67,10 @@ class InformationForm {
   [[nodiscard]] Matrix P() const noexcept {
     const Matrix Z = inverse_factor();
     const Eigen::Index n = R_.rows();
+    // Beside the diagonal smaller by more than what rounding did: the rounded matrix stays a
+    // covariance.
+    const double towards_zero =
+        1.0 - 2.0 * static_cast<double>(n * n) * std::numeric_limits<double>::epsilon();
     Matrix P(n, n);
     for (Eigen::Index j = 0; j < n; ++j) {
       for (Eigen::Index i = j; i < n; ++i) {
@@ -73,6 +78,7 @@ class InformationForm {
         for (Eigen::Index k = i; k < n; ++k) {
           sum += Z(i, k) * Z(j, k);
         }
+        sum *= i == j ? 1.0 : towards_zero;
         P(i, j) = P(j, i) = std::clamp(sum, -detail::largest_variance, detail::largest_variance);
       }
     }
