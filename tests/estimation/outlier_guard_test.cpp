@@ -138,12 +138,15 @@ TEST(OutlierGuard, EachTreatmentHoldsAgainstOutliers) {
   }
 }
 
-// The noise that the corrections show goes to the true one, from ten times more and ten times less.
+// The noise that the corrections show goes to the true one, from ten times more and ten times less,
+// where it is what the innovations are made of: their S holds R and the states' part, and what is a
+// small part of S is found slowly and to the digits that S is known to.
 TEST(AdaptedNoise, GoesToTheTruth) {
   for (const double guess : {0.1, 10.0}) {
     Random random(72);
     test::LinearCase c = test::linear_case(random);
     c.plant.A *= 0.8 / c.plant.A.norm();  // Stable, so that x keeps its digits.
+    c.Q *= 0.01;
     const Eigen::Matrix2d truth = c.R;
     c.R *= guess;
     test::LinearFilter<JosephCovariance> filter(c);
@@ -194,6 +197,24 @@ TEST(MeasurementNoise, RefusesWhatIsNone) {
   EXPECT_EQ(correct(estimate, one, one, MeasurementNoise<1>(Vector1(-1.0))).status,
             UpdateStatus::invalid_noise);
   EXPECT_EQ(estimate.x_hat()(0), 0.0);
+  // Sizes that are known at run time only and do not fit.
+  auto of_two = Estimate<Eigen::VectorXd>::create(Eigen::Vector2d(0.0, 0.0),
+                                                  Eigen::MatrixXd(Eigen::Matrix2d::Identity()))
+                    .value();
+  using Noises = MeasurementNoise<Eigen::Dynamic>;
+  const Eigen::VectorXd y = Eigen::VectorXd::Ones(1);
+  EXPECT_EQ(of_two
+                .correct<Eigen::Dynamic>(y, Eigen::MatrixXd(Eigen::Matrix2d::Identity()),
+                                         Noises(Eigen::MatrixXd(one)))
+                .status,
+            UpdateStatus::invalid_noise);
+  EXPECT_EQ(
+      of_two.correct<Eigen::Dynamic>(y, Eigen::MatrixXd(one), Noises(Eigen::MatrixXd(one))).status,
+      UpdateStatus::invalid_noise);
+  EXPECT_EQ(
+      of_two.correct<Eigen::Dynamic>(y, Eigen::MatrixXd::Ones(1, 2), Noises(Eigen::MatrixXd(one)))
+          .status,
+      UpdateStatus::updated);
   // L D Lᵀ is R, also of a singular one.
   Random random(73);
   for (int run = 0; run < 100; ++run) {

@@ -114,51 +114,58 @@ double between(double low, double high) {
 // Newton's laws on the motors' own equation: m dv/dt is the sum of the sides' forces, J dω/dt r_b
 // times their difference; a gearing of its own for each side.
 TEST(DifferentialDrive, IsNewtonsLawOnTheMotors) {
-  rc::check([] {
-    const DcMotor drive = neo(*rc::gen::inRange(1, 4));
-    const DifferentialDriveParameters made{.motor = drive,
-                                           .left_gearing = between(2.0, 15.0),
-                                           .right_gearing = between(2.0, 15.0),
-                                           .mass = Mass(between(5.0, 80.0)),
-                                           .wheel_radius = Length(between(0.03, 0.1)),
-                                           .trackwidth = Length(between(0.3, 0.9)),
-                                           .moment_of_inertia = MomentOfInertia(between(0.3, 9.0))};
-    const DifferentialDrive model = differential_drive(made).value();
-    const Eigen::Vector2d x(between(-4.0, 4.0), between(-4.0, 4.0));
-    const Eigen::Vector2d u(between(-12.0, 12.0), between(-12.0, 12.0));
-    const double r = made.wheel_radius.si();
-    const auto force = [&](double G, double v, double V) {
-      return G * drive.torque(G * v / r, V) / r;
-    };
-    const double left = force(made.left_gearing, x(0), u(0));
-    const double right = force(made.right_gearing, x(1), u(1));
-    const double dv = (left + right) / made.mass.si();
-    const double r_b = 0.5 * made.trackwidth.si();
-    const double domega = r_b * (right - left) / made.moment_of_inertia.si();
-    const Eigen::Vector2d found = model.derivative(x, u);
-    const double scale =
-        (model.A.cwiseAbs() * x.cwiseAbs() + model.B.cwiseAbs() * u.cwiseAbs()).norm();
-    RC_ASSERT(std::abs(found(0) - (dv - r_b * domega)) <= 1e-13 * scale);
-    RC_ASSERT(std::abs(found(1) - (dv + r_b * domega)) <= 1e-13 * scale);
-  });
+  {
+    const bool holds = rc::check([] {
+      const DcMotor drive = neo(*rc::gen::inRange(1, 4));
+      const DifferentialDriveParameters made{
+          .motor = drive,
+          .left_gearing = between(2.0, 15.0),
+          .right_gearing = between(2.0, 15.0),
+          .mass = Mass(between(5.0, 80.0)),
+          .wheel_radius = Length(between(0.03, 0.1)),
+          .trackwidth = Length(between(0.3, 0.9)),
+          .moment_of_inertia = MomentOfInertia(between(0.3, 9.0))};
+      const DifferentialDrive model = differential_drive(made).value();
+      const Eigen::Vector2d x(between(-4.0, 4.0), between(-4.0, 4.0));
+      const Eigen::Vector2d u(between(-12.0, 12.0), between(-12.0, 12.0));
+      const double r = made.wheel_radius.si();
+      const auto force = [&](double G, double v, double V) {
+        return G * drive.torque(G * v / r, V) / r;
+      };
+      const double left = force(made.left_gearing, x(0), u(0));
+      const double right = force(made.right_gearing, x(1), u(1));
+      const double dv = (left + right) / made.mass.si();
+      const double r_b = 0.5 * made.trackwidth.si();
+      const double domega = r_b * (right - left) / made.moment_of_inertia.si();
+      const Eigen::Vector2d found = model.derivative(x, u);
+      const double scale =
+          (model.A.cwiseAbs() * x.cwiseAbs() + model.B.cwiseAbs() * u.cwiseAbs()).norm();
+      RC_ASSERT(std::abs(found(0) - (dv - r_b * domega)) <= 1e-13 * scale);
+      RC_ASSERT(std::abs(found(1) - (dv + r_b * domega)) <= 1e-13 * scale);
+    });
+    EXPECT_TRUE(holds);
+  }
 }
 
 TEST(DifferentialDrive, GainsComeBack) {
-  rc::check([] {
-    const DriveGains gains{.kS_left = between(0.0, 1.0),
-                           .kS_right = between(0.0, 1.0),
-                           .kV_linear = between(0.5, 8.0),
-                           .kA_linear = between(0.05, 3.0),
-                           .kV_angular = between(0.5, 8.0),
-                           .kA_angular = between(0.05, 3.0)};
-    const DriveGains back = drive_gains(differential_drive(gains).value()).value();
-    const auto same = [](double a, double b) { return std::abs(a - b) <= 1e-12 * std::abs(b); };
-    RC_ASSERT(same(back.kV_linear, gains.kV_linear));
-    RC_ASSERT(same(back.kA_linear, gains.kA_linear));
-    RC_ASSERT(same(back.kV_angular, gains.kV_angular));
-    RC_ASSERT(same(back.kA_angular, gains.kA_angular));
-    RC_ASSERT(back.kS_left == gains.kS_left && back.kS_right == gains.kS_right);
-  });
+  {
+    const bool holds = rc::check([] {
+      const DriveGains gains{.kS_left = between(0.0, 1.0),
+                             .kS_right = between(0.0, 1.0),
+                             .kV_linear = between(0.5, 8.0),
+                             .kA_linear = between(0.05, 3.0),
+                             .kV_angular = between(0.5, 8.0),
+                             .kA_angular = between(0.05, 3.0)};
+      const DriveGains back = drive_gains(differential_drive(gains).value()).value();
+      const auto same = [](double a, double b) { return std::abs(a - b) <= 1e-12 * std::abs(b); };
+      RC_ASSERT(same(back.kV_linear, gains.kV_linear));
+      RC_ASSERT(same(back.kA_linear, gains.kA_linear));
+      RC_ASSERT(same(back.kV_angular, gains.kV_angular));
+      RC_ASSERT(same(back.kA_angular, gains.kA_angular));
+      RC_ASSERT(back.kS_left == gains.kS_left && back.kS_right == gains.kS_right);
+    });
+    EXPECT_TRUE(holds);
+  }
 }
 
 // Friction opposes each side's own motion; at rest it is not a derivative.

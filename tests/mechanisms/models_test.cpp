@@ -134,54 +134,63 @@ DcMotor any_motor() {
 // Newton's law on the motor's own equation, which knows nothing of the theorems' fractions:
 // J dω/dt = G τ(G ω, V) for a flywheel and an arm, m dv/dt = G τ(G v/r, V)/r for an elevator.
 TEST(Models, AreNewtonsLawOnTheMotor) {
-  rc::check([] {
-    const DcMotor drive = any_motor();
-    const double G = between(0.2, 300.0);
-    const double J = between(1e-4, 10.0);
-    const double m = between(0.1, 100.0);
-    const double r = between(0.005, 0.3);
-    const double V = between(-12.0, 12.0);
-    const double speed = between(-20.0, 20.0);
+  {
+    const bool holds = rc::check([] {
+      const DcMotor drive = any_motor();
+      const double G = between(0.2, 300.0);
+      const double J = between(1e-4, 10.0);
+      const double m = between(0.1, 100.0);
+      const double r = between(0.005, 0.3);
+      const double V = between(-12.0, 12.0);
+      const double speed = between(-20.0, 20.0);
 
-    const Flywheel wheel =
-        flywheel({.motor = drive, .gearing = G, .moment_of_inertia = MomentOfInertia(J)}).value();
-    const Arm limb =
-        arm({.motor = drive, .gearing = G, .moment_of_inertia = MomentOfInertia(J)}).value();
-    const double angular = G * drive.torque(G * speed, V) / J;
-    // Torque is the difference of two terms; rounding is relative to the larger.
-    const double angular_scale = std::abs(wheel.A(0, 0) * speed) + std::abs(wheel.B(0, 0) * V);
-    RC_ASSERT(std::abs(wheel.A(0, 0) * speed + wheel.B(0, 0) * V - angular) <=
-              1e-13 * angular_scale);
-    RC_ASSERT(std::abs(limb.A(1, 1) * speed + limb.B(1, 0) * V - angular) <= 1e-13 * angular_scale);
+      const Flywheel wheel =
+          flywheel({.motor = drive, .gearing = G, .moment_of_inertia = MomentOfInertia(J)}).value();
+      const Arm limb =
+          arm({.motor = drive, .gearing = G, .moment_of_inertia = MomentOfInertia(J)}).value();
+      const double angular = G * drive.torque(G * speed, V) / J;
+      // Torque is the difference of two terms; rounding is relative to the larger.
+      const double angular_scale = std::abs(wheel.A(0, 0) * speed) + std::abs(wheel.B(0, 0) * V);
+      RC_ASSERT(std::abs(wheel.A(0, 0) * speed + wheel.B(0, 0) * V - angular) <=
+                1e-13 * angular_scale);
+      RC_ASSERT(std::abs(limb.A(1, 1) * speed + limb.B(1, 0) * V - angular) <=
+                1e-13 * angular_scale);
 
-    const Elevator lift =
-        elevator({.motor = drive, .gearing = G, .mass = Mass(m), .drum_radius = Length(r)}).value();
-    const double linear = G * drive.torque(G * speed / r, V) / r / m;
-    const double linear_scale = std::abs(lift.A(1, 1) * speed) + std::abs(lift.B(1, 0) * V);
-    RC_ASSERT(std::abs(lift.A(1, 1) * speed + lift.B(1, 0) * V - linear) <= 1e-13 * linear_scale);
-  });
+      const Elevator lift =
+          elevator({.motor = drive, .gearing = G, .mass = Mass(m), .drum_radius = Length(r)})
+              .value();
+      const double linear = G * drive.torque(G * speed / r, V) / r / m;
+      const double linear_scale = std::abs(lift.A(1, 1) * speed) + std::abs(lift.B(1, 0) * V);
+      RC_ASSERT(std::abs(lift.A(1, 1) * speed + lift.B(1, 0) * V - linear) <= 1e-13 * linear_scale);
+    });
+    EXPECT_TRUE(holds);
+  }
 }
 
 // What holds a mechanism still makes the motor's torque balance gravity: G K_t kG/R = m g r
 // (elevator), m g l (arm, level).
 TEST(Models, GravityIsHeldByItsVoltage) {
-  rc::check([] {
-    const DcMotor drive = any_motor();
-    const double G = between(0.2, 300.0);
-    const double m = between(0.1, 100.0);
-    const double l = between(0.005, 1.5);
-    const Elevator lift =
-        elevator({.motor = drive, .gearing = G, .mass = Mass(m), .drum_radius = Length(l)}).value();
-    const double torque = m * 9.80665 * l;
-    RC_ASSERT(std::abs(G * drive.torque(0.0, lift.gains.kG) - torque) <= 1e-13 * torque);
-    const Arm limb = arm({.motor = drive,
-                          .gearing = G,
-                          .moment_of_inertia = MomentOfInertia(m * l * l),
-                          .mass = Mass(m),
-                          .center_of_mass = Length(l)})
-                         .value();
-    RC_ASSERT(std::abs(G * drive.torque(0.0, limb.gains.kG) - torque) <= 1e-13 * torque);
-  });
+  {
+    const bool holds = rc::check([] {
+      const DcMotor drive = any_motor();
+      const double G = between(0.2, 300.0);
+      const double m = between(0.1, 100.0);
+      const double l = between(0.005, 1.5);
+      const Elevator lift =
+          elevator({.motor = drive, .gearing = G, .mass = Mass(m), .drum_radius = Length(l)})
+              .value();
+      const double torque = m * 9.80665 * l;
+      RC_ASSERT(std::abs(G * drive.torque(0.0, lift.gains.kG) - torque) <= 1e-13 * torque);
+      const Arm limb = arm({.motor = drive,
+                            .gearing = G,
+                            .moment_of_inertia = MomentOfInertia(m * l * l),
+                            .mass = Mass(m),
+                            .center_of_mass = Length(l)})
+                           .value();
+      RC_ASSERT(std::abs(G * drive.torque(0.0, limb.gains.kG) - torque) <= 1e-13 * torque);
+    });
+    EXPECT_TRUE(holds);
+  }
 }
 
 // Two motors carry twice the mass in the same way, but for the gravity.

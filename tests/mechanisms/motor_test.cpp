@@ -142,20 +142,23 @@ TEST(MotorTable, FunctionsAreTheTablesRows) {
 
 // n motors in one gearbox: torque and current times n at the same speed, so R/n, K_t and K_v stay.
 TEST(Motor, CountMultipliesTorqueAndCurrent) {
-  rc::check([] {
-    const int n = *rc::gen::inRange(1, 20);
-    const auto index = *rc::gen::inRange<std::size_t>(0, motor_table().size());
-    const double omega = *rc::gen::inRange(-2000, 2001);
-    const double V = 0.1 * *rc::gen::inRange(-120, 121);
-    const DcMotor one = motor(motor_table()[index].name).value();
-    const DcMotor many = motor(motor_table()[index].name, n).value();
-    RC_ASSERT(std::abs(many.R - one.R / n) <= 1e-14 * one.R);
-    RC_ASSERT(std::abs(many.Kt - one.Kt) <= 1e-14 * one.Kt);
-    RC_ASSERT(std::abs(many.Kv - one.Kv) <= 1e-14 * one.Kv);
-    RC_ASSERT(many.free_speed == one.free_speed);
-    const double scale = one.stall_current * n;
-    RC_ASSERT(std::abs(many.current(omega, V) - n * one.current(omega, V)) <= 1e-12 * scale);
-  });
+  {
+    const bool holds = rc::check([] {
+      const int n = *rc::gen::inRange(1, 20);
+      const auto index = *rc::gen::inRange<std::size_t>(0, motor_table().size());
+      const double omega = *rc::gen::inRange(-2000, 2001);
+      const double V = 0.1 * *rc::gen::inRange(-120, 121);
+      const DcMotor one = motor(motor_table()[index].name).value();
+      const DcMotor many = motor(motor_table()[index].name, n).value();
+      RC_ASSERT(std::abs(many.R - one.R / n) <= 1e-14 * one.R);
+      RC_ASSERT(std::abs(many.Kt - one.Kt) <= 1e-14 * one.Kt);
+      RC_ASSERT(std::abs(many.Kv - one.Kv) <= 1e-14 * one.Kv);
+      RC_ASSERT(many.free_speed == one.free_speed);
+      const double scale = one.stall_current * n;
+      RC_ASSERT(std::abs(many.current(omega, V) - n * one.current(omega, V)) <= 1e-12 * scale);
+    });
+    EXPECT_TRUE(holds);
+  }
 }
 
 // R = V/I_stall = 24/120 = 0.2 Ω (12.5), K_t = 6/120 = 0.05 N m/A (12.4),
@@ -261,17 +264,20 @@ TEST(MotorName, CaseSpacesAndPunctuationDoNotMatter) {
 
 // Any mixture of case, and separators between any two letters, is the same name.
 TEST(MotorName, AnySpellingOfANameIsTheName) {
-  rc::check([] {
-    const auto index = *rc::gen::inRange<std::size_t>(0, motor_table().size());
-    std::string spelled;
-    for (const char c : motor_table()[index].name) {
-      spelled += *rc::gen::element<std::string>("", " ", "-", "_", "\t", ".");
-      const auto byte = static_cast<unsigned char>(c);
-      spelled +=
-          static_cast<char>(*rc::gen::arbitrary<bool>() ? std::toupper(byte) : std::tolower(byte));
-    }
-    RC_ASSERT(motor(spelled).value().name == motor_table()[index].name);
-  });
+  {
+    const bool holds = rc::check([] {
+      const auto index = *rc::gen::inRange<std::size_t>(0, motor_table().size());
+      std::string spelled;
+      for (const char c : motor_table()[index].name) {
+        spelled += *rc::gen::element<std::string>("", " ", "-", "_", "\t", ".");
+        const auto byte = static_cast<unsigned char>(c);
+        spelled += static_cast<char>(*rc::gen::arbitrary<bool>() ? std::toupper(byte)
+                                                                 : std::tolower(byte));
+      }
+      RC_ASSERT(motor(spelled).value().name == motor_table()[index].name);
+    });
+    EXPECT_TRUE(holds);
+  }
 }
 
 TEST(MotorName, AnAmbiguousNameIsAnsweredWithTheCandidates) {
