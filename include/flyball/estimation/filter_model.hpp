@@ -44,8 +44,9 @@ struct FilterModel {
       return {};
     }
   }
-  /// The numbers of states, inputs and outputs.
+  /// The number of states.
   [[nodiscard]] static Eigen::Index state_count(const M& model) { return model.states(); }
+  /// The number of inputs.
   [[nodiscard]] static Eigen::Index input_count(const M& model) { return model.inputs(); }
 };
 
@@ -65,7 +66,9 @@ struct FilterModel<DiscreteSystem<States, Inputs, Outputs>> {
     return (model.C.lazyProduct(x) + model.D.lazyProduct(u)).eval();
   }
   [[nodiscard]] static std::vector<Coordinate> outputs(const M&) { return {}; }
+  /// The number of states.
   [[nodiscard]] static Eigen::Index state_count(const M& model) { return model.A.rows(); }
+  /// The number of inputs.
   [[nodiscard]] static Eigen::Index input_count(const M& model) { return model.B.cols(); }
 };
 

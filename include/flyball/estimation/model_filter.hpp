@@ -15,8 +15,10 @@ namespace flyball {
 class ProcessNoise {
  public:
   // NOLINTBEGIN(google-explicit-constructor): being implicit is its purpose.
+  /// A covariance per sample.
   template <std::convertible_to<Covariance> C>
   ProcessNoise(C&& covariance) : value_(Covariance(std::forward<C>(covariance))) {}
+  /// A spectral density.
   ProcessNoise(ProcessDensity density) : value_(std::move(density)) {}
   // NOLINTEND(google-explicit-constructor)
 

@@ -41,6 +41,7 @@ struct InnovationTest {
 
 /// A log's states by a model, and what the residuals say of it.
 struct Estimation {
+  /// Of a model, the rest to be filled in.
   explicit Estimation(AnyModel of) : model(std::move(of)) {}
 
   AnyModel model;

@@ -21,6 +21,7 @@ template <int N>
 struct FactoredNoise {
   Eigen::Matrix<double, N, N> G;  ///< n x n, lower triangular.
 
+  /// @param covariance  Q, n x n.
   explicit FactoredNoise(const Eigen::Matrix<double, N, N>& covariance) noexcept {
     cholesky_factor(covariance, G);
   }

@@ -11,6 +11,7 @@ struct UdNoise {
   Eigen::Matrix<double, N, N> G;  ///< n x n, unit upper triangular.
   Eigen::Matrix<double, N, 1> q;  ///< n x 1, not negative.
 
+  /// @param covariance  Q, n x n.
   explicit UdNoise(const Eigen::Matrix<double, N, N>& covariance) noexcept {
     detail::ud_factorize(covariance, G, q);
   }
