@@ -100,7 +100,7 @@ class Estimate {
   }
   /// P <- factor P: the estimate is doubted. @param factor  More than 0, finite.
   bool inflate(double factor) noexcept {
-    return factor > 0.0 && is_signal(factor) && form_.scale(factor);
+    return factor == 1.0 || (factor > 0.0 && is_signal(factor) && form_.scale(factor));
   }
 
   /// x_hat <- next, P <- F P Fᵀ + Q (9.20, 9.21).
@@ -236,7 +236,7 @@ class Estimate {
     c.innovation = at.residual;
     c.L.setIdentity(m, m);
     c.D.setZero(m);
-    if (!noise.usable()) {
+    if (!noise.usable() || noise.size() != m || at.H.rows() != m || at.H.cols() != form_size()) {
       c.status = UpdateStatus::invalid_noise;
       return c;
     }
@@ -280,7 +280,7 @@ class Estimate {
       weight = guard->weight(c.nis, static_cast<int>(c.entries));
       if (weight == 0.0 && guard->options().treatment == OutlierTreatment::gate) {
         form_ = prior;
-        doubt(guard->judged(weight));
+        inflate(guard->judged(weight));
         c.status = UpdateStatus::rejected;
         return c;
       }
@@ -297,18 +297,12 @@ class Estimate {
     }
     transport(delta);
     if (guard != nullptr) {
-      doubt(guard->judged(weight));
+      inflate(guard->judged(weight));
     }
     x_hat_ = next;
     c.weight = weight;
     c.status = UpdateStatus::updated;
     return c;
-  }
-
-  void doubt(double factor) noexcept {
-    if (factor > 1.0) {
-      form_.scale(factor);
-    }
   }
 
   /// Gauss and Newton's iteration of the most probable δ, the measurement linearised and weighed

@@ -10,7 +10,8 @@ enum class UpdateStatus {
   not_finite,
   singular_innovation,  ///< C P Cᵀ + R is not positive definite; the measurement was left out.
   rejected,             ///< The measurement does not fit the estimate: an OutlierGuard refused it.
-  invalid_noise,        ///< R is not positive semidefinite or not finite.
+  /// R is not positive semidefinite or not finite; or it, H and the residual differ in size.
+  invalid_noise,
 };
 
 }  // namespace flyball
