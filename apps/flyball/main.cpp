@@ -59,6 +59,7 @@ int run(int argc, char** argv) {
       "  flyball experiment elevator.toml           which tests tell the gains best\n"
       "  flyball motors krakenX60                   what the motor table knows\n"
       "  flyball motor-curves cim.csv               a motor's constants from a dynamometer\n"
+      "  flyball estimate log.csv pendulum.toml     a model's states, by filter and smoother\n"
       "  flyball localize Robot1/                   a drive among landmarks, to path and map\n"
       "  flyball analyze elevator.toml              poles, what can be moved and seen, gains\n"
       "  flyball solve dare < problems.jsonl        any kernel, from any language\n"

@@ -82,6 +82,9 @@ Expected<DriveFiles> sort_out(const LocalizeJob& job) {
   const std::string robot = lower(job.robot);
   for (const std::string& path : files) {
     const auto member = member_of(path);
+    if (std::error_code error; !std::filesystem::exists(path, error)) {
+      FLYBALL_CHECK(read_file(path));  // Why it cannot be read.
+    }
     if (member == nullptr) {
       return refusal(ArgumentError::unknown_name, where, path)
           .got("a name that does not say what it holds")
@@ -108,9 +111,8 @@ Expected<DriveFiles> sort_out(const LocalizeJob& job) {
         std::pair(&drive.sightings, "sightings (time, landmark, range, bearing)"),
         std::pair(&drive.landmarks, "landmarks (number, x, y)")}) {
     if (path->empty()) {
-      return refusal(ArgumentError::empty, where, "the files")
-          .got(fmt::format("{} file{}, none with the {}", files.size(),
-                           files.size() == 1 ? "" : "s", what))
+      return refusal(ArgumentError::empty, where, "the list of files")
+          .got(fmt::format("without the {}", what))
           .expected(
               "a file whose name says \"odometry\", one that says \"measurement\" or "
               "\"sighting\", and one that says \"landmark\"");

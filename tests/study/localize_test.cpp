@@ -84,6 +84,8 @@ TEST_F(Localize, FilesThatAreMissingOrTwiceAreNamed) {
   EXPECT_TRUE(localize(of));
   of.paths.push_back(folder_.file("notes.txt"));
   expect_refused(ArgumentError::unknown_name, "notes.txt", of);
+  of.paths = {folder_.file("nowhere")};
+  expect_refused(FileError::not_found, "nowhere", of);
   remove("landmarks.csv");
   expect_refused(ArgumentError::empty, "landmarks (number, x, y)", job());
 }
