@@ -104,7 +104,8 @@ class InformationForm {
     using Joint = Eigen::Matrix<double, both, both>;
     Joint joint = Joint::Zero(2 * n, 2 * n);
     joint.topLeftCorner(n, n).setIdentity();
-    const Matrix MG = M.lazyProduct(noise.G);
+    // A noise too small to count bounds what is known of a state that goes to zero by itself.
+    const Matrix MG = M.lazyProduct(noise.G) + M * least_noise;
     for (Eigen::Index i = 0; i < n; ++i) {
       Eigen::Matrix<double, both, 1> row(2 * n);
       for (Eigen::Index j = 0; j < n; ++j) {
@@ -153,6 +154,8 @@ class InformationForm {
   bool scale(double factor) noexcept { return take(R_ * (1.0 / std::sqrt(factor))); }
 
  private:
+  static constexpr double least_noise = 1e-98;
+
   /// Adds a row's information by plane rotations. The rows of R are zero or begin with a positive
   /// entry on the diagonal.
   template <class Triangle, class Row>
