@@ -175,7 +175,9 @@ Expected<void> read_log(const DriveFiles& files, LocalizeResult& result) {
   sort_by_time(sightings, files.sightings, result.diagnostics);
   std::size_t unknown = 0;
   std::size_t bad = 0;
+  std::size_t beyond_a_turn = 0;
   for (const auto& row : sightings.rows) {
+    beyond_a_turn += std::abs(row[3]) > 2.0 * std::numbers::pi ? 1 : 0;
     long long number = std::llround(row[1]);
     if (!by_barcode.empty()) {
       const auto known = by_barcode.find(number);
@@ -194,6 +196,13 @@ Expected<void> read_log(const DriveFiles& files, LocalizeResult& result) {
       result.log.sightings.push_back({row[0], landmark->second, row[2], row[3]});
     }
   }
+  if (20 * beyond_a_turn > sightings.rows.size()) {
+    return refusal(ArgumentError::wrong_unit, files.sightings, "the column of bearings")
+        .got(fmt::format("beyond a full turn in {} of {} rows", beyond_a_turn,
+                         sightings.rows.size()))
+        .expected("rad")
+        .hint("of degrees, divide by 57.3");
+  }
   if (unknown > 0) {
     warn(result.diagnostics, "unknown_barcode",
          "{} of {} sightings have a barcode that {} does not list, and are left out", unknown,
@@ -206,6 +215,62 @@ Expected<void> read_log(const DriveFiles& files, LocalizeResult& result) {
          bad);
   }
   return {};
+}
+
+/// The value that a share of them does not exceed.
+double quantile(std::vector<double> values, double share) {
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// What no wheeled robot does in s and rad.
+Expected<void> check_odometry_units(const std::vector<OdometrySample>& odometry,
+                                    const std::string& path) {
+  constexpr double longest_period = 2.0;    // s
+  constexpr double fastest_turning = 15.0;  // rad/s, most of the time
+  std::vector<double> apart;
+  std::vector<double> turning;
+  for (std::size_t i = 0; i < odometry.size(); ++i) {
+    turning.push_back(std::abs(odometry[i].turn_rate));
+    if (i > 0) {
+      apart.push_back(odometry[i].time - odometry[i - 1].time);
+    }
+  }
+  if (!apart.empty() && quantile(apart, 0.5) > longest_period) {
+    return refusal(ArgumentError::wrong_unit, path, "the column of times")
+        .got(fmt::format("{:.4g} apart from row to row", quantile(apart, 0.5)))
+        .expected("s, and rows no more than 2 s apart")
+        .hint("of milliseconds, divide by 1000");
+  }
+  if (quantile(turning, 0.9) > fastest_turning) {
+    return refusal(ArgumentError::wrong_unit, path, "the column of turn rates")
+        .got(fmt::format("above {:.4g} in a tenth of the rows", quantile(turning, 0.9)))
+        .expected("rad/s")
+        .hint("of degrees per second, divide by 57.3");
+  }
+  return {};
+}
+
+/// Constants that no sensor in m, s and rad has: a unit, a sense or a clock is wrong.
+void notice_calibration(const SensorCalibration& found, const LandmarkOptions& options,
+                        std::vector<Diagnostic>& diagnostics) {
+  constexpr double far = 4.0;  // standard deviations of what is expected
+  const auto value = found.vector();
+  const auto mean = options.calibration.vector();
+  const auto std = options.calibration_std.vector();
+  for (int i = 0; i < SensorCalibration::size; ++i) {
+    const std::string_view unit = SensorCalibration::name(i).unit;
+    if (std(i) > 0.0 && std::abs(value(i) - mean(i)) > far * std(i)) {
+      warn(diagnostics, "implausible_calibration",
+           "{} was found to be {:.3g}{}{}, where {:.3g} ± {:.2g} is expected: look for a unit (a "
+           "foot "
+           "is 0.305 m, a degree 0.0175 rad), a sense of turning or two clocks",
+           SensorCalibration::name(i).name, value(i), unit.empty() ? "" : " ", unit, mean(i),
+           std(i));
+    }
+  }
 }
 
 Expected<void> read_truth(const std::string& path, LocalizeResult& result) {
@@ -293,6 +358,7 @@ Expected<LocalizeResult> localize(const LocalizeJob& job) {
     }
   }
   FLYBALL_CHECK(read_log(files, result));
+  FLYBALL_CHECK(check_odometry_units(result.log.odometry, files.odometry));
   if (!files.truth.empty()) {
     FLYBALL_CHECK(read_truth(files.truth, result));
   }
@@ -311,13 +377,21 @@ Expected<LocalizeResult> localize(const LocalizeJob& job) {
   const std::vector<double> times = wanted_times(result);
   FLYBALL_TRY(result.filter, filter_landmarks(result.log, options, times, start));
   if (job.smooth) {
-    FLYBALL_TRY(result.smoother, smooth_landmarks(result.log, options, times, start));
-    if (!result.smoother->converged) {
-      warn(result.diagnostics, "not_converged",
-           "the smoother ended before it had settled (optimality {:.1e}); its path may improve",
-           result.smoother->optimality);
+    auto smoothed = smooth_landmarks(result.log, options, times, start);
+    if (!smoothed) {
+      warn(result.diagnostics, "no_smoother", "the smoother has no answer: {}",
+           to_string(smoothed.error()));
+    } else {
+      result.smoother = *std::move(smoothed);
+      if (!result.smoother->converged) {
+        warn(result.diagnostics, "not_converged",
+             "the smoother ended before it had settled (optimality {:.1e}); its path may improve",
+             result.smoother->optimality);
+      }
     }
   }
+  notice_calibration(result.smoother ? result.smoother->calibration : result.filter.calibration,
+                     options, result.diagnostics);
   const LocalizedPath& best = result.smoother ? result.smoother->path : result.filter.path;
   if (best.time.empty()) {
     return refusal(LocalizationError::too_few_sightings, where, "the path")

@@ -1,7 +1,9 @@
 #include <flyball/study/localize.hpp>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <sstream>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -118,6 +120,58 @@ TEST_F(Localize, WhatIsLeftOutIsTold) {
   }
   for (const char* code : {"unknown_barcode", "impossible_sighting", "unsorted"}) {
     EXPECT_NE(codes.find(code), std::string::npos) << codes;
+  }
+}
+
+/// A column of the example's file in another unit.
+std::string scaled(const std::string& name, std::size_t column, double factor) {
+  std::istringstream in(read_file(drive + "/" + name).value());
+  std::string line;
+  std::string out;
+  for (bool header = true; std::getline(in, line); header = false) {
+    std::istringstream cells(line);
+    std::string cell;
+    for (std::size_t k = 0; std::getline(cells, cell, ','); ++k) {
+      out += (k == 0 ? "" : ",") +
+             (k == column && !header ? std::to_string(factor * std::stod(cell)) : cell);
+    }
+    out += "\n";
+  }
+  return out;
+}
+
+TEST_F(Localize, OtherUnitsAreToldOrFound) {
+  constexpr double degrees = 57.29578;
+  write("sightings.csv", scaled("sightings.csv", 3, degrees));
+  expect_refused(ArgumentError::wrong_unit, "divide by 57.3", job());
+  write("sightings.csv", scaled("sightings.csv", 3, 1.0));
+  write("odometry.csv", scaled("odometry.csv", 2, degrees));
+  expect_refused(ArgumentError::wrong_unit, "turn rates", job());
+  write("odometry.csv", scaled("odometry.csv", 0, 1000.0));
+  expect_refused(ArgumentError::wrong_unit, "divide by 1000", job());
+
+  const auto told = [](const LocalizeResult& result, const char* code) {
+    return std::any_of(result.diagnostics.begin(), result.diagnostics.end(),
+                       [&](const Diagnostic& diagnostic) { return diagnostic.code == code; });
+  };
+  // Feet per second, and a gyro of the other sense: the path is found, and the constant is told.
+  for (const auto& [column, factor] : {std::pair(1, 3.28084), std::pair(2, -1.0)}) {
+    write("odometry.csv", scaled("odometry.csv", static_cast<std::size_t>(column), factor));
+    const auto result = localize(job());
+    ASSERT_TRUE(result) << to_string(result.error());
+    EXPECT_TRUE(told(*result, "implausible_calibration"));
+    EXPECT_EQ(answer_of(*result).document.verdict.tone, Tone::caution);
+  }
+  // Bearings of the other sense, ranges in feet: nothing fits, and nothing is claimed.
+  write("odometry.csv", scaled("odometry.csv", 1, 1.0));
+  for (const auto& [column, factor] : {std::pair(3, -1.0), std::pair(2, 3.28084)}) {
+    write("sightings.csv", scaled("sightings.csv", static_cast<std::size_t>(column), factor));
+    const auto result = localize(job());
+    if (result) {
+      EXPECT_EQ(answer_of(*result).document.verdict.tone, Tone::bad);
+    } else {
+      EXPECT_TRUE(result.error().is(LocalizationError::too_few_sightings));
+    }
   }
 }
 

@@ -290,7 +290,11 @@ Figure sightings_figure(const LocalizeResult& result) {
   PlotLine taken{.label = "taken", .style = LineStyle::points, .color = 0};
   PlotLine left{.label = "left out", .style = LineStyle::crosses, .color = 3};
   constexpr double most = 20.0;
+  const double start = result.filter.path.time.front();
   for (std::size_t i = 0; i < result.log.sightings.size(); ++i) {
+    if (result.log.sightings[i].time < start) {
+      continue;
+    }
     const double off =
         result.smoother ? result.smoother->distance[i] : std::sqrt(result.filter.nis[i]);
     const bool used = result.smoother ? result.smoother->used[i] : result.filter.weight[i] > 0.0;
@@ -368,8 +372,18 @@ Verdict verdict_of(const LocalizeResult& result) {
   for (const Eigen::Matrix3d& P : best.covariance) {
     sum += spread(P);
   }
-  verdict.line = fmt::format("the path is known, to {} m on average by its own account",
-                             number(sum / static_cast<double>(best.time.size()), 2));
+  const auto left_out = static_cast<double>(result.log.sightings.size() - used_by_filter(result));
+  constexpr double too_many = 0.3;
+  const bool believed = left_out <= too_many * static_cast<double>(result.log.sightings.size());
+  const std::string spread_text = number(sum / static_cast<double>(best.time.size()), 2);
+  verdict.line =
+      believed
+          ? fmt::format("the path is known, to {} m on average by its own account", spread_text)
+          : "the path cannot be trusted: sightings, odometry and map contradict each "
+            "other";
+  if (!believed) {
+    verdict.tone = Tone::bad;
+  }
   for (const Diagnostic& diagnostic : result.diagnostics) {
     if (diagnostic.severity != Severity::info) {
       verdict.add(tone_of(diagnostic.severity), diagnostic.message);
