@@ -24,6 +24,7 @@ struct DriveSettings {
   double turn_std = 0.05;     ///< rad/s
   double carried_at = -1.0;   ///< s; then the robot is put elsewhere.
   double mistaken = 0.0;      ///< Share of the sightings that name another landmark.
+  bool abrupt = false;        ///< It stops and turns at once, which tells the delay.
 };
 
 /// A log and the truth behind it.
@@ -50,6 +51,10 @@ inline SimulatedDrive landmark_drive(std::uint64_t seed, const DriveSettings& se
   const int steps = static_cast<int>(settings.duration / dt);
   const double phase = random.uniform(0.0, 6.0);
   const auto commanded = [&](double t) {
+    if (settings.abrupt) {
+      const double turn = std::fmod(t, 6.0) < 3.0 ? 0.5 : -0.3;
+      return std::pair(std::fmod(t, 4.0) < 2.5 ? 0.4 : 0.0, std::fmod(t, 2.0) < 1.0 ? turn : 0.0);
+    }
     return std::pair(0.25 + 0.1 * std::sin(0.3 * t + phase),
                      0.35 * std::sin(0.5 * t + phase) + 0.15);
   };

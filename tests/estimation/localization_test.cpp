@@ -255,6 +255,41 @@ TEST(SmoothLandmarks, IsNearerThanTheFilterAndKnowsItsSensors) {
   }
 }
 
+// Expected to be none, and in truth a fifth of a second: where the robot stops and turns at once,
+// both find it, and what else was unknown.
+TEST(SmoothLandmarks, AbruptMotionTellsTheDelay) {
+  for (const std::uint64_t seed : {31U, 32U}) {
+    const SimulatedDrive drive = landmark_drive(seed, {.duration = 150.0, .abrupt = true});
+    LandmarkOptions options;
+    options.calibration.delay = 0.0;
+    const auto filtered = filter_landmarks(drive.log, options, drive.time);
+    ASSERT_TRUE(filtered) << to_string(filtered.error());
+    EXPECT_NEAR(filtered->calibration.delay, 0.2, 0.04);
+    const auto smoothed = smooth_landmarks(drive.log, options, drive.time);
+    ASSERT_TRUE(smoothed) << to_string(smoothed.error());
+    EXPECT_NEAR(smoothed->calibration.delay, 0.2, 0.03);
+    EXPECT_LE(score(smoothed->path, drive).rms, 0.05);
+  }
+}
+
+// While the odometry is silent the robot may do anything: three seconds later its heading is not
+// known to a tenth of a radian, as it is where the odometry says that it stands.
+TEST(LandmarkFilter, SilentOdometryIsNoOdometryOfRest) {
+  const auto heading_std = [](bool silent) {
+    auto filter = LandmarkFilter::create().value();
+    filter.reset(Pose2d());
+    for (int i = 0; i <= 400; ++i) {
+      if (i <= 100 || !silent) {
+        filter.odometry(0.01 * i, 0.0, 0.0);
+      }
+    }
+    filter.predict(4.0);
+    return std::sqrt(filter.pose_covariance()(2, 2));
+  };
+  EXPECT_GE(heading_std(true), 0.3);
+  EXPECT_LE(heading_std(false), 0.11);
+}
+
 TEST(SmoothLandmarks, TheSameLogGivesTheSameBytes) {
   const SimulatedDrive drive = landmark_drive(21, {.duration = 30.0});
   const auto first = smooth_landmarks(drive.log, {}, drive.time);

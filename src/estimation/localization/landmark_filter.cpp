@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
+
+#include <flyball/math/derivatives/differentiation.hpp>
 
 #include "core/try.hpp"
+#include "estimation/localization/residuals.hpp"
 
 namespace flyball {
 
@@ -13,22 +17,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Matrix = TangentMatrix<LandmarkFilter::State>;
 
-enum Column : int {
-  velocity_error = 3,
-  turn_error = 4,
-  velocity_scale = 5,
-  turn_scale,
-  turn_per_velocity,
-  delay,
-  range_scale,
-  range_offset,
-  depth_exponent,
-  bearing_scale,
-  bearing_offset,
-};
-
-/// Beyond this angle off its axis no camera tells a depth.
-constexpr double least_cosine = 0.1;
+/// Where the parts' errors begin.
+enum Column : int { velocity_error = 3, turn_error = 4, velocity_scale = 5 };
 
 Matrix start_covariance(const LandmarkOptions& options) {
   Matrix P = Matrix::Zero();
@@ -145,30 +135,29 @@ LandmarkFilter::Driven LandmarkFilter::driven(double time) const noexcept {
 void LandmarkFilter::step(double from, double to) noexcept {
   const State& x = estimate_.x_hat();
   const Calibration& k = x.get<2>();
-  const Errors& e = x.get<1>();
   const double dt = to - from;
   const double late = std::clamp(k(3), 0.0, 2.0);
   const Driven a = driven(from - late);
   const Driven b = driven(to - late);
   const double way = b.way - a.way;
   const double turned = b.turned - a.turned;
-  const double dv = b.velocity - a.velocity;
-  const double dw = b.turn_rate - a.turn_rate;
-  const Vector3d tau(k(0) * way + e(0) * dt, 0.0, k(1) * turned + k(2) * way + e(1) * dt);
-  const Pose2d moved = Pose2d::exp(tau);
-  Eigen::Matrix<double, 3, 6> by = Eigen::Matrix<double, 3, 6>::Zero();  // ∂τ/∂(errors, k₀ … k₃)
-  by(0, 0) = dt;
-  by(2, 1) = dt;
-  by(0, 2) = way;
-  by(2, 3) = turned;
-  by(2, 4) = way;
-  by(0, 5) = -k(0) * dv;
-  by(2, 5) = -k(1) * dw - k(2) * dv;
+  const localization::Driven between{
+      way, turned, b.velocity - a.velocity, b.turn_rate - a.turn_rate, k(3), dt};
   const double stays = std::exp(-dt / options_.error_time);
-  Matrix F = Matrix::Identity();
-  F.topLeftCorner<3, 3>() = moved.inverse().adjoint();
-  F.block<3, 6>(0, velocity_error) = Pose2d::right_jacobian(tau) * by;
-  F(velocity_error, velocity_error) = F(turn_error, turn_error) = stays;
+  const auto moved = [&](const auto& state) {
+    auto after = state;
+    after.template get<0>() = state.template get<0>().plus(
+        localization::twist(between, state.template get<1>(), state.template get<2>()));
+    after.template get<1>() *= stays;
+    return after;
+  };
+  const State next = moved(x);
+  const Matrix F = jacobian(
+      [&](const auto& error) {
+        using Scalar = typename std::remove_cvref_t<decltype(error)>::Scalar;
+        return moved(x.cast<Scalar>().plus(error)).minus(next.cast<Scalar>());
+      },
+      State::Tangent(State::Tangent::Zero()));
 
   const auto square = [](double value) { return value * value; };
   const double speed = way / dt;
@@ -191,11 +180,8 @@ void LandmarkFilter::step(double from, double to) noexcept {
   for (int i = 0; i < SensorCalibration::size; ++i) {
     Q(velocity_scale + i, velocity_scale + i) = dt * square(0.002 * std(i));
   }
-  State next = x;
-  next.get<0>() = x.get<0>() * moved;
-  next.get<1>() = stays * e;
+  dead_reckoned_ = dead_reckoned_ * x.get<0>().between(next.get<0>());
   estimate_.predict(next, F, PlainNoise<size>(Q));
-  dead_reckoned_ = dead_reckoned_ * moved;
 }
 
 bool LandmarkFilter::predict(double time) noexcept {
@@ -231,7 +217,8 @@ Correction<2> LandmarkFilter::sighting(double time, const Vector2d& landmark, do
   }
   const Calibration known = estimate_.x_hat().get<2>();
   const double direction = (bearing - known(8)) / (1.0 + known(7));
-  const double depth = std::pow(std::max(std::cos(direction), least_cosine), known(6));
+  const double depth =
+      std::pow(std::max(std::cos(direction), localization::least_cosine), known(6));
   const double distance = std::max(0.0, (range - known(5)) / ((1.0 + known(4)) * depth));
   relocalizer_.add(time_, dead_reckoned_,
                    distance * Vector2d(std::cos(direction), std::sin(direction)), landmark);
@@ -241,33 +228,15 @@ Correction<2> LandmarkFilter::sighting(double time, const Vector2d& landmark, do
     return result;
   }
   const State x = estimate_.x_hat();
+  const auto expected = [&](const auto& delta) {
+    using Scalar = typename std::remove_cvref_t<decltype(delta)>::Scalar;
+    const auto at = x.cast<Scalar>().plus(delta);
+    return localization::sighting(at.template get<0>(), at.template get<2>(), landmark);
+  };
   const auto linearize = [&](const State::Tangent& delta, Estimate<State>::Linearization<2>& at) {
-    const State moved = x.plus(delta);
-    const Calibration& k = moved.get<2>();
-    const Vector2d seen = moved.get<0>().inverse() * landmark;
-    const double d = std::max(seen.norm(), 1e-3);
-    const double beta = std::atan2(seen(1), seen(0));
-    const double cosine = std::max(std::cos(beta), least_cosine);
-    const double falls = std::pow(cosine, k(6));
-    const double g = (1.0 + k(4)) * d * falls;
-    const double g_by_beta = cosine > least_cosine ? -g * k(6) * std::sin(beta) / cosine : 0.0;
-    // ∂(d, β)/∂seen and ∂seen/∂pose.
-    Eigen::Matrix2d polar;
-    polar << seen(0) / d, seen(1) / d, -seen(1) / (d * d), seen(0) / (d * d);
-    Eigen::Matrix<double, 2, 3> by_pose;
-    by_pose << -1.0, 0.0, seen(1), 0.0, -1.0, -seen(0);
-    const Eigen::Matrix<double, 2, 3> inner =
-        polar * by_pose * Pose2d::right_jacobian(Vector3d(delta.head<3>()));
-    at.H.setZero();
-    at.H.block<1, 3>(0, 0) = (g / d) * inner.row(0) + g_by_beta * inner.row(1);
-    at.H.block<1, 3>(1, 0) = (1.0 + k(7)) * inner.row(1);
-    at.H(0, range_scale) = d * falls;
-    at.H(0, range_offset) = 1.0;
-    at.H(0, depth_exponent) = g * std::log(cosine);
-    at.H(1, bearing_scale) = beta;
-    at.H(1, bearing_offset) = 1.0;
-    at.residual(0) = range - g - k(5);
-    at.residual(1) = std::remainder(bearing - (1.0 + k(7)) * beta - k(8), 2.0 * std::numbers::pi);
+    const Vector2d h = expected(delta);
+    at.residual = {range - h(0), angle_difference(bearing, h(1))};
+    at.H = jacobian(expected, delta);
   };
   // Student's noise still lets what is far off pull a little, and a landmark that is taken for
   // another pulls at every sighting: below this weight it does not count at all.

@@ -14,23 +14,58 @@ namespace flyball::localization {
 /// Beyond this angle off its axis no camera tells a depth.
 inline constexpr double least_cosine = 0.1;
 
-/// From one pose to the next by the odometry between them.
-struct OdometryResidual {
-  double way, turned;               ///< By the odometry, with the delay of `delay`.
+/// What the odometry says of the motion between two times.
+struct Driven {
+  double way, turned;               ///< m and rad, with the delay of `delay`.
   double velocity_gain, turn_gain;  ///< How the rates change from the begin to the end.
   double delay;
   double dt;
+};
+
+/// The twist of it, (way, 0, angle), under errors and calibration; linear in the delay.
+template <class Errors, class Calibration>
+[[nodiscard]] auto twist(const Driven& d, const Errors& e, const Calibration& k) {
+  using Scalar = typename Errors::Scalar;
+  const Scalar late = k(3) - d.delay;
+  const Scalar way = d.way - d.velocity_gain * late;
+  const Scalar turned = d.turned - d.turn_gain * late;
+  return Eigen::Matrix<Scalar, 3, 1>{k(0) * way + e(0) * d.dt, Scalar(0.0),
+                                     k(1) * turned + k(2) * way + e(1) * d.dt};
+}
+
+/// The range and the bearing at which a landmark is seen.
+template <class Pose, class Calibration>
+[[nodiscard]] auto sighting(const Pose& pose, const Calibration& k,
+                            const Eigen::Vector2d& landmark) {
+  using Scalar = typename Pose::Scalar;
+  using std::atan2;
+  using std::cos;
+  using std::exp;
+  using std::log;
+  using std::sqrt;
+  const Eigen::Matrix<Scalar, 2, 1> off{Scalar(landmark(0)) - pose.x(),
+                                        Scalar(landmark(1)) - pose.y()};
+  const Eigen::Matrix<Scalar, 2, 1> seen = pose.rotation().inverse() * off;
+  const Scalar d = sqrt(seen(0) * seen(0) + seen(1) * seen(1));
+  const Scalar beta = atan2(seen(1), seen(0));
+  Scalar cosine = cos(beta);
+  if (cosine < least_cosine) {
+    cosine = Scalar(least_cosine);
+  }
+  return Eigen::Matrix<Scalar, 2, 1>{(1.0 + k(4)) * d * exp(k(6) * log(cosine)) + k(5),
+                                     (1.0 + k(7)) * beta + k(8)};
+}
+
+/// From one pose to the next by the odometry between them.
+struct OdometryResidual {
+  Driven driven;
   Eigen::Vector3d inverse_std;
 
   template <class Pose, class Errors, class Calibration>
   auto operator()(const Pose& from, const Pose& to, const Errors& e, const Calibration& k) const {
     using Scalar = typename Pose::Scalar;
-    const Scalar late = k(3) - delay;
-    const Scalar w = way - velocity_gain * late;
-    const Scalar a = turned - turn_gain * late;
-    const Eigen::Matrix<Scalar, 3, 1> tau{k(0) * w + e(0) * dt, Scalar(0.0),
-                                          k(1) * a + k(2) * w + e(1) * dt};
-    const Eigen::Matrix<Scalar, 3, 1> r = Pose::exp(tau).between(from.between(to)).log();
+    const Eigen::Matrix<Scalar, 3, 1> r =
+        Pose::exp(twist(driven, e, k)).between(from.between(to)).log();
     return Eigen::Matrix<Scalar, 3, 1>{r(0) * inverse_std(0), r(1) * inverse_std(1),
                                        r(2) * inverse_std(2)};
   }
@@ -89,25 +124,10 @@ struct SightingResidual {
   template <class Pose, class Calibration>
   auto operator()(const Pose& pose, const Calibration& k) const {
     using Scalar = typename Pose::Scalar;
-    using std::atan2;
-    using std::cos;
-    using std::exp;
-    using std::log;
-    using std::sqrt;
-    const Eigen::Matrix<Scalar, 2, 1> off{Scalar(landmark(0)) - pose.x(),
-                                          Scalar(landmark(1)) - pose.y()};
-    const Eigen::Matrix<Scalar, 2, 1> seen = pose.rotation().inverse() * off;
-    const Scalar d = sqrt(seen(0) * seen(0) + seen(1) * seen(1));
-    const Scalar beta = atan2(seen(1), seen(0));
-    Scalar cosine = cos(beta);
-    if (cosine < least_cosine) {
-      cosine = Scalar(least_cosine);
-    }
-    const Scalar expected = (1.0 + k(4)) * d * exp(k(6) * log(cosine)) + k(5);
-    const Scalar direction = (1.0 + k(7)) * beta + k(8);
+    const auto expected = sighting(pose, k, landmark);
     return Eigen::Matrix<Scalar, 2, 1>{
-        (range - expected) * inverse_range_std,
-        angle_difference(Scalar(bearing), direction) * inverse_bearing_std};
+        (range - expected(0)) * inverse_range_std,
+        angle_difference(Scalar(bearing), Scalar(expected(1))) * inverse_bearing_std};
   }
 };
 

@@ -121,11 +121,11 @@ class Drive {
                               std::sqrt(dt * (square(moving * options_.turn_density) +
                                               square(options_.relative_density * rate))) +
                                   least);
-    graph_.add_factor(
-        localization::OdometryResidual{way, turned, b.velocity - a.velocity,
-                                       b.turn_rate - a.turn_rate, delay, dt, std.cwiseInverse()},
-        optimization::RobustLoss{optimization::Loss::cauchy, 5.0}, nodes_[i - 1], nodes_[i],
-        node_errors_[i - 1], constants_);
+    graph_.add_factor(localization::OdometryResidual{{way, turned, b.velocity - a.velocity,
+                                                      b.turn_rate - a.turn_rate, delay, dt},
+                                                     std.cwiseInverse()},
+                      optimization::RobustLoss{optimization::Loss::cauchy, 5.0}, nodes_[i - 1],
+                      nodes_[i], node_errors_[i - 1], constants_);
     const double stays = std::exp(-dt / options_.error_time);
     const double fresh = std::sqrt(1.0 - stays * stays);
     const Eigen::Vector2d error_std(
