@@ -310,4 +310,42 @@ double share_of(const WideMatrix& left, const WideMatrix& terms) {
                         : ldexp_of(std::abs(rest.hi / whole.hi), rest.exponent - whole.exponent);
 }
 
+WideMatrix balanced(WideMatrix M) {
+  constexpr int most_sweeps = 100;
+  const Index n = M.rows();
+  const auto larger = [](std::optional<long>& largest, const WideNumber& entry) {
+    if (entry.hi != 0.0 && (!largest || *largest < entry.exponent)) {
+      largest = entry.exponent;
+    }
+  };
+  bool changed = true;
+  for (int sweep = 0; changed && sweep < most_sweeps; ++sweep) {
+    changed = false;
+    for (Index i = 0; i < n; ++i) {
+      std::optional<long> row;
+      std::optional<long> column;
+      for (Index j = 0; j < n; ++j) {
+        if (j != i) {
+          larger(row, M(i, j));
+          larger(column, M(j, i));
+        }
+      }
+      if (!row && !column) {
+        continue;
+      }
+      const long power = row && column ? (*row - *column) / 2 : 0;
+      for (Index j = 0; j < n; ++j) {
+        if (j != i && row && column) {
+          M(i, j).exponent -= power;
+          M(j, i).exponent += power;
+        } else if (j != i) {
+          M(i, j) = M(j, i) = {};
+        }
+      }
+      changed = changed || power != 0 || !row || !column;
+    }
+  }
+  return M;
+}
+
 }  // namespace flyball::detail

@@ -73,6 +73,10 @@ class WideMatrix {
 [[nodiscard]] WideMatrix symmetrized(const WideMatrix& A);
 [[nodiscard]] WideMatrix beside(const WideMatrix& A, const WideMatrix& B);
 [[nodiscard]] std::optional<WideMatrix> solve(WideMatrix A, WideMatrix B);
+/// D⁻¹MD, with the powers of two D for which the largest entries beside the diagonal of each row
+/// and its column are alike; entries that move no eigenvalue, the other of both being empty, are
+/// zero. Source: Osborne, "On pre-conditioning of matrices", J. ACM 7 (1960), in the maximum norm.
+[[nodiscard]] WideMatrix balanced(WideMatrix M);
 
 /// The largest of what is left of an equation beside the largest of its terms: 0 where nothing is
 /// left, not a number where one is not finite.

@@ -93,7 +93,7 @@ double wide_riccati_residual(const RiccatiProblem& given, const RiccatiUnits& un
 Eigen::VectorXcd wide_riccati_poles(const RiccatiProblem& given, const RiccatiUnits& units,
                                     const MatrixXd& K) {
   const Equation<WideMatrix> e = equation_in(given, units);
-  const WideMatrix S = add_product(e.A, -1.0, e.B, gain_in(units, WideMatrix(K)));
+  const WideMatrix S = balanced(add_product(e.A, -1.0, e.B, gain_in(units, WideMatrix(K))));
   const Index n = S.rows();
   const long unit = S.exponent();
   DoubleDoubleMatrix digits(S.rounded(-unit));

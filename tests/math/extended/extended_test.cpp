@@ -257,6 +257,22 @@ TYPED_TEST(Extended, Reciprocals) {
 }
 
 // (2^900)³ (2^-1000)³ = 2^-300 by way of numbers that are no doubles, sums beside them included.
+// A chain in units 2^1500 apart, back and forth, has its product left; what hangs on nothing goes.
+TEST(WideMatrix, BalancesWhatNoDoubleHolds) {
+  MatrixXd M = MatrixXd::Zero(3, 3);
+  M(0, 0) = 0.25;
+  M(0, 1) = 2.0;
+  M(1, 0) = -0.5;
+  M(2, 0) = 3.0;
+  const Eigen::Vector3i d(-750, 750, 4000);
+  const MatrixXd level = balanced(WideMatrix(M).times_powers(d, -d, 0)).rounded();
+  EXPECT_EQ(level(0, 0), 0.25);
+  EXPECT_EQ(level(0, 1) * level(1, 0), -1.0);
+  EXPECT_LE(std::abs(level(0, 1)), 2.0);
+  EXPECT_LE(std::abs(level(1, 0)), 2.0);
+  EXPECT_TRUE((level.row(2).array() == 0.0).all());
+}
+
 TEST(WideMatrix, KeepsEveryExponent) {
   const WideMatrix large(MatrixXd::Constant(1, 1, 0x1p900));
   const WideMatrix small(MatrixXd::Constant(1, 1, 0x1p-1000));

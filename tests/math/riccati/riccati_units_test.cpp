@@ -276,6 +276,35 @@ TEST(RiccatiUnits, PolesInTheGivenUnits) {
   expect_poles(A, B, care(A, B, Q, scalar(2.0), N).value());
 }
 
+// A chain whose link back is a gain: in the units of the solution 1 and -0.37 are 2^1000 apart, and
+// the pair of poles is theirs.
+TEST(RiccatiUnits, PolesOfStatesFarApart) {
+  MatrixXd A = -5e-324 * MatrixXd::Identity(8, 8);
+  A.diagonal(1).setOnes();
+  MatrixXd B = MatrixXd::Zero(8, 4);
+  B(0, 0) = -1e154;
+  B(1, 1) = 1e20;
+  B(3, 3) = -1.08062744140625;
+  MatrixXd N = MatrixXd::Zero(8, 4);
+  N(0, 1) = N(1, 2) = N(2, 3) = 1.0;
+  N.row(7) << -1.745849609375, -1.75091552734375, -1e-154, 0.5;
+  MatrixXd Q(8, 8);
+  const double steps[] = {-1.152587890625,   1.0,
+                          1.82421875,        -5e-324,
+                          -0.95111083984375, -1.43072509765625,
+                          -1.1966552734375,  -0.08001708984375};
+  for (Index i = 0; i < 8; ++i) {
+    Q.block(i, i, 8 - i, 8 - i).setConstant(steps[i]);
+  }
+  const auto s = dare(A, B, Q, MatrixXd::Identity(4, 4), N).value();
+  // Of [0 1; -B K], the chain's states two and three: x² + k₃ x + k₂.
+  const double k2 = -1.08062744140625 * s.K(3, 2);
+  const double k3 = -1.08062744140625 * s.K(3, 3);
+  const std::complex<double> pole(-0.5 * k3, std::sqrt(k2 - 0.25 * k3 * k3));
+  EXPECT_LE((s.poles.array() - pole).abs().minCoeff(), 1e-15);
+  EXPECT_LE((s.poles.array() - std::conj(pole)).abs().minCoeff(), 1e-15);
+}
+
 // What the doubles cannot hold is refused: X's small entries have no double, and are not nothing.
 TEST(RiccatiUnits, WhatIsLostIsRefused) {
   const MatrixXd A = (MatrixXd(2, 2) << -0.25, -1e-16, 1e155, 1.0).finished();
