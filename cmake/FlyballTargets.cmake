@@ -35,6 +35,10 @@ if(FLYBALL_SANITIZER)
   endif()
 endif()
 
+if(FLYBALL_WITHOUT_FMT)
+  target_compile_definitions(flyball_options INTERFACE FLYBALL_WITHOUT_FMT)
+endif()
+
 set_property(GLOBAL PROPERTY FLYBALL_DOMAINS "")
 
 # flyball_precompile(<target>)

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <flyball/core/progress.hpp>
 #include <flyball/report/terminal.hpp>
 #include <flyball/report/write_report.hpp>
 
@@ -10,6 +11,7 @@ namespace flyball::app {
 int tell(const Answer& answer, const CommonOptions& options, bool by_default) {
   std::string written;
   if (const auto folder = report_folder(options, by_default)) {
+    tell_progress("writes the report");
     if (auto report = report::write_report(answer, *folder, {.command = options.typed})) {
       written = *folder;
       if (const auto& problems = report->problems; !problems.empty()) {

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <flyball/core/progress.hpp>
 #include <flyball/core/text.hpp>
 #include <flyball/io/json_writer.hpp>
 #include <flyball/report/terminal.hpp>
@@ -157,7 +158,9 @@ int draw(const Options& options) {
   json.add("schema", schema);
   json.key("figures");
   json.open('[');
+  std::size_t done = 0;
   for (const std::string& id : options.figures) {
+    tell_progress("draws figures", done++, options.figures.size());
     const auto entry = book::find_figure(id);
     if (!entry) {
       return fail(entry.error(), options.common, schema);

@@ -24,6 +24,9 @@ void add_localize_command(CLI::App& program, Invocation& invocation);
 void add_motors_command(CLI::App& program, Invocation& invocation);
 void add_book_command(CLI::App& program, Invocation& invocation);
 void add_analyze_command(CLI::App& program, Invocation& invocation);
+void add_units_command(CLI::App& program, Invocation& invocation);
+/// help, version, completion and manual, which speak of all the others.
+void add_help_commands(CLI::App& program, Invocation& invocation);
 void add_solve_command(CLI::App& program, Invocation& invocation);
 
 }  // namespace flyball::app

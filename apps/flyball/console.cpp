@@ -3,12 +3,14 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <flyball/core/text.hpp>
 #include <flyball/io/json_writer.hpp>
 
 #include "console.hpp"
+#include "progress_line.hpp"
 
 namespace flyball::app {
 
@@ -104,13 +106,67 @@ void add_field_options(CLI::App& command, study::JobKind job, std::vector<study:
   }
 }
 
+namespace {
+
+/// A variable that is set to something, or nothing.
+const char* environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr || *value == '\0' ? nullptr : value;
+}
+
+/// Whether what reads this file shows ASCII alone.
+bool shows_ascii_alone(int file) {
+  const char* locale = nullptr;
+  for (const char* name : {"LC_ALL", "LC_CTYPE", "LANG"}) {
+    locale = locale == nullptr ? environment(name) : locale;
+  }
+  if (locale == nullptr) {
+    return ::isatty(file) == 1;
+  }
+  std::string folded;
+  for (const char c : std::string_view(locale)) {
+    folded += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  }
+  return folded.find("utf-8") == std::string::npos && folded.find("utf8") == std::string::npos;
+}
+
+std::size_t columns() {
+  constexpr std::size_t narrowest = 40;
+  constexpr std::size_t widest = 160;
+  constexpr std::size_t ordinary = 100;
+  winsize size{};
+  std::size_t found = 0;
+  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0) {
+    found = size.ws_col;
+  }
+  if (const char* given = environment("COLUMNS"); found == 0 && given != nullptr) {
+    found = std::strtoul(given, nullptr, 10);
+  }
+  return found == 0 ? ordinary : std::clamp(found, narrowest, widest);
+}
+
+}  // namespace
+
 report::TerminalStyle terminal_style() {
-  const char* no_color = std::getenv("NO_COLOR");
-  const bool wanted = no_color == nullptr || *no_color == '\0';
-  return {.color = wanted && ::isatty(STDOUT_FILENO) == 1};
+  return {.color = environment("NO_COLOR") == nullptr && ::isatty(STDOUT_FILENO) == 1,
+          .width = columns(),
+          .ascii = shows_ascii_alone(STDOUT_FILENO)};
+}
+
+void print_usage_error(const std::string& text) {
+  JsonWriter json;
+  json.object([&] {
+    json.add("schema", "flyball.usage/1");
+    json.object("error", [&] {
+      json.add("code", "usage");
+      json.add("message", text);
+    });
+  });
+  print(json.text());
 }
 
 void print(const std::string& text) {
+  ProgressLine::end();
   std::fwrite(text.data(), 1, text.size(), stdout);
   if (text.empty() || text.back() != '\n') {
     std::fputc('\n', stdout);
@@ -138,8 +194,11 @@ int fail(const Errors& errors, const CommonOptions& options, const std::string& 
 }
 
 void say(const std::string& text) {
+  ProgressLine::end();
   std::fflush(stdout);
-  std::fprintf(stderr, "flyball: %s\n", printable(text).c_str());
+  const std::string words = printable(text);
+  std::fprintf(stderr, "flyball: %s\n",
+               (shows_ascii_alone(STDERR_FILENO) ? ascii(words) : words).c_str());
 }
 
 void tell(const Error& error) {

@@ -38,7 +38,9 @@ void add_common_options(CLI::App& command, CommonOptions& options, const std::st
 /// Adds the options of a job's fields, by its table. @param given  What is typed goes there.
 void add_field_options(CLI::App& command, study::JobKind job, std::vector<study::Override>& given);
 
-/// Colours when standard output is a terminal and NO_COLOR is not set.
+/// Colours when standard output is a terminal and NO_COLOR is not set; its width (else COLUMNS,
+/// else 100); ASCII where the locale is not of UTF-8. Without a word of a locale only a terminal is
+/// taken for one that knows no more.
 [[nodiscard]] report::TerminalStyle terminal_style();
 
 /// Prints a result on standard output.
@@ -63,6 +65,10 @@ int guarded(const Run& run, const CommonOptions& options, const std::string& sch
 /// Where a report goes: --out, or `flyball-report` unless --json was asked for.
 [[nodiscard]] std::optional<std::string> report_folder(const CommonOptions& options,
                                                        bool by_default);
+
+/// A wrong command line as an object on standard output, for who asked for --json; schema
+/// "flyball.usage/1".
+void print_usage_error(const std::string& text);
 
 /// A line of words on standard error; control characters, which a terminal would obey, as '?'.
 void say(const std::string& text);

@@ -16,6 +16,7 @@
 
 #include "commands.hpp"
 #include "console.hpp"
+#include "progress_line.hpp"
 #include "session.hpp"
 
 namespace {
@@ -59,7 +60,7 @@ int run(int argc, char** argv) {
       "  flyball experiment elevator.toml           which tests tell the gains best\n"
       "  flyball motors krakenX60                   what the motor table knows\n"
       "  flyball motor-curves cim.csv               a motor's constants from a dynamometer\n"
-      "  flyball estimate log.csv pendulum.toml     a model's states, by filter and smoother\n"
+      "  flyball units velocity                     the units that quantities are read in\n"
       "  flyball localize Robot1/                   a drive among landmarks, to path and map\n"
       "  flyball analyze elevator.toml              poles, what can be moved and seen, gains\n"
       "  flyball solve dare < problems.jsonl        any kernel, from any language\n"
@@ -86,11 +87,23 @@ int run(int argc, char** argv) {
   flyball::app::add_book_command(program, invocation);
   flyball::app::add_analyze_command(program, invocation);
   flyball::app::add_solve_command(program, invocation);
+  flyball::app::add_units_command(program, invocation);
+  flyball::app::add_help_commands(program, invocation);
 
-  if (const std::string unknown = unknown_command(program, argc, argv); !unknown.empty()) {
-    flyball::app::say(flyball::shortened(unknown));
+  const auto refuse = [&](const std::string& text) {
+    for (int i = 1; i < argc; ++i) {
+      if (std::string_view(argv[i]) == "--json") {
+        flyball::app::print_usage_error(text);
+        break;
+      }
+    }
+    flyball::app::say(text);
     return flyball::app::bad_input;
+  };
+  if (const std::string unknown = unknown_command(program, argc, argv); !unknown.empty()) {
+    return refuse(flyball::shortened(unknown));
   }
+  const flyball::app::ProgressLine progress;
   try {
     program.parse(argc, argv);
   } catch (const CLI::Success& answer) {
@@ -102,10 +115,9 @@ int run(int argc, char** argv) {
     }
     const auto commands = program.get_subcommands();
     const std::string command = commands.empty() ? "" : commands.front()->get_name();
-    flyball::app::say(fmt::format("{}{}{}\n`flyball{}{} --help` tells what it takes.", command,
-                                  command.empty() ? "" : ": ", flyball::shortened(problem.what()),
-                                  command.empty() ? "" : " ", command));
-    return flyball::app::bad_input;
+    return refuse(fmt::format("{}{}{}\n`flyball{}{} --help` tells what it takes.", command,
+                              command.empty() ? "" : ": ", flyball::shortened(problem.what()),
+                              command.empty() ? "" : " ", command));
   }
   return invocation.status;
 }
@@ -120,10 +132,23 @@ int give_up_for_memory() noexcept {
   return flyball::app::bad_input;
 }
 
+/// `flyball help NAME` is `flyball NAME --help`.
+std::vector<char*> with_help_last(int argc, char** argv) {
+  std::vector<char*> arguments(argv, argv + argc);
+  static std::string flag = "--help";
+  if (argc >= 2 && std::string_view(argv[1]) == "help") {
+    arguments.erase(arguments.begin() + 1);
+    arguments.push_back(flag.data());
+  }
+  arguments.push_back(nullptr);
+  return arguments;
+}
+
 int guarded_run(int argc, char** argv) {
   try {
     flyball::app::begin_session();
-    return run(argc, argv);
+    std::vector<char*> arguments = with_help_last(argc, argv);
+    return run(static_cast<int>(arguments.size()) - 1, arguments.data());
   } catch (const std::bad_alloc&) {
     return give_up_for_memory();
   } catch (const std::exception& defect) {

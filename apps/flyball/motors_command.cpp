@@ -23,12 +23,15 @@ int run(const Options& options) {
     for (const mechanisms::MotorTableEntry& entry : mechanisms::motor_table()) {
       motors.push_back(mechanisms::motor(entry.name).value());
     }
+  } else if (auto motor = mechanisms::motor(options.name)) {
+    motors.push_back(*std::move(motor));
   } else {
-    auto motor = mechanisms::motor(options.name);
-    if (!motor) {
+    for (const std::string_view name : mechanisms::motors_like(options.name)) {
+      motors.push_back(mechanisms::motor(name).value());
+    }
+    if (motors.empty()) {
       return fail(motor.error(), options.common, schema);
     }
-    motors.push_back(*std::move(motor));
   }
   return tell(study::answer_of(motors), options.common, false);
 }
@@ -40,7 +43,8 @@ void add_motors_command(CLI::App& program, Invocation& invocation) {
       program.add_subcommand("motors", "List the motors by their datasheet numbers");
   auto options = std::make_shared<Options>();
   command->add_option("NAME", options->name,
-                      "One motor; case, spaces and punctuation do not matter (krakenX60foc)");
+                      "A motor, or a part of several names (kraken); case, spaces and punctuation "
+                      "do not matter (krakenX60foc)");
   command->add_flag("--json", options->common.json, "Answer one JSON object on one line");
   command->callback([options, &invocation] {
     invocation.status =

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <flyball/core/progress.hpp>
 #include <flyball/solve/documentation.hpp>
 #include <flyball/solve/solver.hpp>
 
@@ -37,6 +38,7 @@ class Stream {
     std::fwrite(answer.json.data(), 1, answer.json.size(), stdout);
     written_ = std::fflush(stdout) == 0;  // as they come: whoever asked may wait for it
     ++count_;
+    tell_progress("solves", count_);
     if (!answer.solved) {
       status_ = std::max<int>(status_, answer.kind == ErrorKind::no_answer ? no_answer : bad_input);
     }

@@ -12,15 +12,15 @@
 namespace flyball {
 
 template <class... T>
-void warn(std::vector<Diagnostic>& diagnostics, std::string code, fmt::format_string<T...> message,
-          T&&... arguments) {
+void warn(std::vector<Diagnostic>& diagnostics, std::string code,
+          detail::FormatString<T...> message, T&&... arguments) {
   diagnostics.push_back(
       {std::move(code), Severity::warning, detail::format(message, std::forward<T>(arguments)...)});
 }
 
 template <class... T>
-void note(std::vector<Diagnostic>& diagnostics, std::string code, fmt::format_string<T...> message,
-          T&&... arguments) {
+void note(std::vector<Diagnostic>& diagnostics, std::string code,
+          detail::FormatString<T...> message, T&&... arguments) {
   diagnostics.push_back(
       {std::move(code), Severity::info, detail::format(message, std::forward<T>(arguments)...)});
 }

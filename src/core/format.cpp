@@ -1,5 +1,7 @@
 #include "core/format.hpp"
 
+#ifndef FLYBALL_WITHOUT_FMT
+
 namespace flyball::detail {
 
 std::string format_arguments(fmt::string_view pattern, fmt::format_args arguments) {
@@ -7,3 +9,5 @@ std::string format_arguments(fmt::string_view pattern, fmt::format_args argument
 }
 
 }  // namespace flyball::detail
+
+#endif

@@ -13,5 +13,7 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <fmt/core.h>
 #include <tl/expected.hpp>
+#ifndef FLYBALL_WITHOUT_FMT
+#include <fmt/core.h>
+#endif

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <vector>
 
@@ -16,7 +17,6 @@ namespace flyball {
 
 namespace {
 
-using detail::NamedUnit;
 using detail::units;
 using enum Dimension;
 
@@ -136,6 +136,37 @@ constexpr DimensionTexts texts_of(Dimension dimension) {
   return index < std::size(dimension_texts) ? dimension_texts[index] : DimensionTexts{};
 }
 
+/// What stands between two dimensions that are taken for each other.
+struct Confusion {
+  Dimension given;
+  Dimension wanted;
+  std::string_view hint;
+};
+constexpr std::string_view over_radius =
+    "what turns and what goes straight on differ by the radius of drum or wheel: multiply radians "
+    "by it";
+constexpr Confusion confusions[] = {
+    {angle, length, over_radius},
+    {angular_velocity, velocity, over_radius},
+    {angular_acceleration, acceleration, over_radius},
+    {length, angle, "an angle is the way over the radius of drum or wheel"},
+    {velocity, angular_velocity, "radians a second are the speed over the radius"},
+    {acceleration, angular_acceleration, "it is the acceleration over the radius"},
+    {torque, force, "a force is the torque over the lever's length"},
+    {force, torque, "a torque is the force times the lever's length"},
+    {mass, force, "a force of one pound is written \"1 lbf\", of a kilogram's weight \"9.81 N\""},
+    {force, mass, "a mass is written in kg or lb"},
+    {frequency, time, "a period is one over the frequency"},
+    {time, frequency, "a frequency is one over the period"},
+};
+
+std::string_view confusion(Dimension given, Dimension wanted) {
+  const auto* const found = std::find_if(
+      std::begin(confusions), std::end(confusions),
+      [&](const Confusion& one) { return one.given == given && one.wanted == wanted; });
+  return found == std::end(confusions) ? std::string_view() : found->hint;
+}
+
 std::string article(Dimension dimension) {
   const std::string_view name = to_string(dimension);
   const bool vowel = std::string_view("aeiou").find(name.front()) != std::string_view::npos;
@@ -143,6 +174,15 @@ std::string article(Dimension dimension) {
 }
 
 }  // namespace
+
+std::vector<NamedUnit> units_of(Dimension dimension) {
+  std::vector<NamedUnit> found;
+  std::copy_if(units.begin(), units.end(), std::back_inserter(found),
+               [&](const NamedUnit& unit) { return unit.dimension == dimension; });
+  std::stable_partition(found.begin(), found.end(),
+                        [](const NamedUnit& unit) { return unit.factor == 1.0; });
+  return found;
+}
 
 const NamedUnit* detail::find_unit(std::string_view text) {
   const std::string exact = canonical(trim(text));
@@ -215,19 +255,33 @@ Expected<double> parse_quantity(std::string_view text, Dimension dimension, std:
         .got(detail::format("\"{}\", without a unit", text))
         .expected(expected());
   }
+  if (dimension == dimensionless && unit_text.starts_with(':')) {
+    // A ratio, as gearings are written.
+    const std::string_view second = trim(unit_text.substr(1));
+    double below = 0.0;
+    const auto [stop, read] = std::from_chars(second.data(), second.data() + second.size(), below);
+    const double ratio = number / below;
+    if (read != std::errc{} || stop != second.data() + second.size() || !std::isfinite(ratio)) {
+      return refusal(ArgumentError::malformed, {}, name)
+          .got(detail::format("\"{}\"", text))
+          .expected("a ratio of two numbers such as \"3:2\"");
+    }
+    return ratio;
+  }
   const NamedUnit* const unit = detail::find_unit(unit_text);
   if (unit == nullptr) {
     const std::string nearest = nearest_unit(unit_text, dimension);
     return refusal(ArgumentError::wrong_unit, {}, name)
         .got(detail::format("\"{}\", in an unknown unit", text))
         .expected(expected())
-        .hint(nearest.empty() ? std::string("see the list of units in the docs")
+        .hint(nearest.empty() ? std::string("`flyball units` and docs/units.md list them")
                               : detail::format("did you mean \"{}\"?", nearest));
   }
   if (unit->dimension != dimension) {
     return refusal(ArgumentError::wrong_unit, {}, name)
         .got(detail::format("\"{}\", {}", text, article(unit->dimension)))
-        .expected(expected());
+        .expected(expected())
+        .hint(std::string(confusion(unit->dimension, dimension)));
   }
   const double si = number * unit->factor;
   if (!std::isfinite(si)) {

@@ -1,6 +1,7 @@
 #include <flyball/core/text.hpp>
 
 #include <algorithm>
+#include <iterator>
 #include <vector>
 
 #include "core/wording.hpp"
@@ -49,6 +50,46 @@ std::string cut(std::string_view text, std::size_t most) {
     }
   }
   return std::string(text);
+}
+
+std::string ascii(std::string_view text) {
+  struct Spelling {
+    std::string_view symbol;
+    std::string_view ascii;
+  };
+  static constexpr Spelling spellings[] = {
+      {"⁻¹", "^-1"},  {"⁻²", "^-2"},  {"²", "^2"},     {"³", "^3"},    {"¹", "^1"},
+      {"⁺", "+"},     {"⁻", "-"},     {"ᵀ", "'"},      {"ᵖ", "^p"},    {"₀", "0"},
+      {"₁", "1"},     {"₂", "2"},     {"₃", "3"},      {"·", "*"},     {"⋅", "*"},
+      {"×", "x"},     {"±", "+-"},    {"−", "-"},      {"–", "-"},     {"—", "-"},
+      {"…", "..."},   {"°", " deg"},  {"Ω", "Ohm"},    {"µ", "u"},     {"μ", "u"},
+      {"σ", "sigma"}, {"Σ", "sum"},   {"π", "pi"},     {"β", "beta"},  {"ω", "omega"},
+      {"ζ", "zeta"},  {"χ", "chi"},   {"θ", "theta"},  {"τ", "tau"},   {"λ", "lambda"},
+      {"φ", "phi"},   {"Δ", "Delta"}, {"∞", "inf"},    {"√", "sqrt "}, {"∫", "int "},
+      {"≤", "<="},    {"≥", ">="},    {"≠", "!="},     {"≈", "~"},     {"‖", "|"},
+      {"“", "\""},    {"”", "\""},    {"‘", "'"},      {"’", "'"},     {"─", "-"},
+      {"│", "|"},     {"✔", "ok"},    {"✖", "x"},      {"▲", "^"},     {"ŷ", "y^"},
+      {"Ĝ", "G^"},    {"→", "->"},    {"\u0302", "^"}, {"é", "e"},     {"è", "e"},
+      {"ä", "ae"},    {"ö", "oe"},    {"ü", "ue"},     {"ß", "ss"}};
+  const std::string valid = text::valid_utf8(text);
+  std::string out;
+  for (std::size_t at = 0; at < valid.size();) {
+    if (static_cast<unsigned char>(valid[at]) < 0x80) {
+      out += valid[at++];
+      continue;
+    }
+    const std::string_view rest = std::string_view(valid).substr(at);
+    const auto* const found =
+        std::find_if(std::begin(spellings), std::end(spellings),
+                     [&](const Spelling& s) { return rest.starts_with(s.symbol); });
+    const bool known = found != std::end(spellings);
+    out += known ? found->ascii : "?";
+    at += known ? found->symbol.size() : 1;
+    while (!known && at < valid.size() && continues(valid[at])) {
+      ++at;
+    }
+  }
+  return out;
 }
 
 std::string printable(std::string_view text) {

@@ -8,13 +8,6 @@
 
 namespace flyball::detail {
 
-/// A unit by one of its names.
-struct NamedUnit {
-  std::string_view text;  ///< As `canonical` leaves it.
-  Dimension dimension;
-  double factor;  ///< To SI.
-};
-
 /// Written as `canonical` leaves them: no spaces, no "^", "·" or "*", "per" as "/", squares as a
 /// trailing 2. Where only the case of a prefix tells units apart (mN, MN) the short form keeps it.
 inline constexpr std::array units{
@@ -33,6 +26,7 @@ inline constexpr std::array units{
     NamedUnit{"m", Dimension::length, 1.0},
     NamedUnit{"cm", Dimension::length, 1e-2},
     NamedUnit{"mm", Dimension::length, 1e-3},
+    NamedUnit{"km", Dimension::length, 1e3},
     NamedUnit{"in", Dimension::length, 0.0254},
     NamedUnit{"\"", Dimension::length, 0.0254},
     NamedUnit{"ft", Dimension::length, 0.3048},
@@ -65,6 +59,24 @@ inline constexpr std::array units{
     NamedUnit{"revolution", Dimension::angle, 2.0 * std::numbers::pi},
     NamedUnit{"m/s", Dimension::velocity, 1.0},
     NamedUnit{"mps", Dimension::velocity, 1.0},
+    NamedUnit{"m/min", Dimension::velocity, 1.0 / 60.0},
+    NamedUnit{"cm/min", Dimension::velocity, 1e-2 / 60.0},
+    NamedUnit{"mm/min", Dimension::velocity, 1e-3 / 60.0},
+    NamedUnit{"in/min", Dimension::velocity, 0.0254 / 60.0},
+    NamedUnit{"ft/min", Dimension::velocity, 0.3048 / 60.0},
+    NamedUnit{"fpm", Dimension::velocity, 0.3048 / 60.0},
+    NamedUnit{"mph", Dimension::velocity, 0.44704},
+    NamedUnit{"mi/h", Dimension::velocity, 0.44704},
+    NamedUnit{"mile/hour", Dimension::velocity, 0.44704},
+    NamedUnit{"km/h", Dimension::velocity, 1.0 / 3.6},
+    NamedUnit{"kph", Dimension::velocity, 1.0 / 3.6},
+    NamedUnit{"kmh", Dimension::velocity, 1.0 / 3.6},
+    NamedUnit{"kilometer/hour", Dimension::velocity, 1.0 / 3.6},
+    NamedUnit{"meter/minute", Dimension::velocity, 1.0 / 60.0},
+    NamedUnit{"inch/minute", Dimension::velocity, 0.0254 / 60.0},
+    NamedUnit{"inche/minute", Dimension::velocity, 0.0254 / 60.0},
+    NamedUnit{"foot/minute", Dimension::velocity, 0.3048 / 60.0},
+    NamedUnit{"feet/minute", Dimension::velocity, 0.3048 / 60.0},
     NamedUnit{"cm/s", Dimension::velocity, 1e-2},
     NamedUnit{"mm/s", Dimension::velocity, 1e-3},
     NamedUnit{"in/s", Dimension::velocity, 0.0254},
@@ -84,6 +96,7 @@ inline constexpr std::array units{
     NamedUnit{"rpm", Dimension::angular_velocity, std::numbers::pi / 30.0},
     NamedUnit{"rot/min", Dimension::angular_velocity, std::numbers::pi / 30.0},
     NamedUnit{"rev/min", Dimension::angular_velocity, std::numbers::pi / 30.0},
+    NamedUnit{"deg/min", Dimension::angular_velocity, std::numbers::pi / 10800.0},
     NamedUnit{"radian/second", Dimension::angular_velocity, 1.0},
     NamedUnit{"degree/second", Dimension::angular_velocity, std::numbers::pi / 180.0},
     NamedUnit{"rotation/second", Dimension::angular_velocity, 2.0 * std::numbers::pi},

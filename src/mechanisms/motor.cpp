@@ -58,6 +58,35 @@ std::vector<std::string> folded_names(const MotorTableEntry& entry) {
   return names;
 }
 
+/// Whether a folded text is words of a name: "vortex" of "NEO Vortex", not "neo5" of "NEO 550".
+bool is_words_of(std::string_view name, std::string_view wanted) {
+  std::string folded;
+  std::vector<std::size_t> bounds{0};
+  for (const char c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (std::isalnum(byte) == 0) {
+      bounds.push_back(folded.size());
+      continue;
+    }
+    if (!folded.empty() && (std::isdigit(byte) != 0) !=
+                               (std::isdigit(static_cast<unsigned char>(folded.back())) != 0)) {
+      bounds.push_back(folded.size());
+    }
+    folded += static_cast<char>(std::tolower(byte));
+  }
+  bounds.push_back(folded.size());
+  const auto is_bound = [&](std::size_t at) {
+    return std::find(bounds.begin(), bounds.end(), at) != bounds.end();
+  };
+  for (std::size_t at = folded.find(wanted); at != std::string::npos;
+       at = folded.find(wanted, at + 1)) {
+    if (is_bound(at) && is_bound(at + wanted.size())) {
+      return true;
+    }
+  }
+  return false;
+}
+
 MotorDatasheet datasheet(const MotorTableEntry& entry) {
   return {.nominal_voltage = Voltage(entry.nominal_voltage),
           .stall_torque = Torque(entry.stall_torque),
@@ -126,28 +155,40 @@ Expected<DcMotor> motor(std::string_view name, const MotorDatasheet& one, int co
       .map([&] { return std::move(result); });
 }
 
+std::vector<std::string_view> motors_like(std::string_view part) {
+  const std::string wanted = fold(part);
+  std::vector<std::string_view> names;
+  for (const MotorTableEntry& entry : table) {
+    const std::vector<std::string> known = folded_names(entry);
+    if (!wanted.empty() && std::any_of(known.begin(), known.end(), [&](const std::string& one) {
+          return one.find(wanted) != std::string::npos;
+        })) {
+      names.push_back(entry.name);
+    }
+  }
+  return names;
+}
+
 Expected<DcMotor> motor(std::string_view name, int count) {
   FLYBALL_CHECK(check_count(count));
   const std::string wanted = fold(name);
-  std::vector<std::string_view> candidates;
   for (const MotorTableEntry& entry : table) {
     for (const std::string& known : folded_names(entry)) {
       if (known == wanted) {
         return from_datasheet(entry.name, datasheet(entry), count);
       }
-      if (!wanted.empty() && known.find(wanted) != std::string::npos &&
-          (candidates.empty() || candidates.back() != entry.name)) {
-        candidates.push_back(entry.name);
-      }
     }
   }
-  if (candidates.size() == 1) {
-    return table_motor(candidates.front(), count);
-  }
-  if (!candidates.empty()) {
+  if (const auto candidates = motors_like(name); candidates.size() > 1) {
     return refusal(ArgumentError::ambiguous_name, {}, "motor")
         .got(detail::format("\"{}\", which fits several", name))
         .expected(detail::format("one of {}", detail::comma_separated("{}", candidates)));
+  } else if (candidates.size() == 1 && is_words_of(candidates.front(), wanted)) {
+    return table_motor(candidates.front(), count);
+  } else if (candidates.size() == 1) {
+    return refusal(ArgumentError::unknown_name, {}, "motor")
+        .got(detail::format("\"{}\", which is not in the table", name))
+        .hint(detail::format("is it \"{}\"?", candidates.front()));
   }
   std::vector<std::string_view> names;
   names.reserve(table.size());

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <flyball/core/text.hpp>
+
 #include "core/wording.hpp"
 #include "report/format.hpp"
 
@@ -110,63 +112,47 @@ std::string render(const Code& code, const TerminalStyle& style) {
   return out;
 }
 
-std::string render(const Table& table, const TerminalStyle& style) {
-  const std::size_t columns = table.header.size();
-  std::vector<std::size_t> width(columns, 0);
-  for (std::size_t c = 0; c < columns; ++c) {
-    width[c] = display_width(table.header[c]);
-    for (const auto& row : table.rows) {
-      width[c] = std::max(width[c], c < row.size() ? display_width(row[c].text) : 0);
-    }
-  }
-  std::size_t total = indent.size() + gap * (columns - std::min<std::size_t>(columns, 1));
-  for (const std::size_t w : width) {
-    total += w;
-  }
-  if (table.wide_column < columns && total > style.width) {
-    std::size_t& wide = width[table.wide_column];
-    wide = std::max<std::size_t>(12, wide - std::min(wide, total - style.width));
-  }
-
+/// Lines of cells below each other, one group of columns.
+std::string render_columns(const Table& table, const std::vector<std::size_t>& columns,
+                           const std::vector<std::size_t>& width, const TerminalStyle& style) {
   const auto line = [&](const std::vector<std::vector<std::string>>& cells, std::size_t row,
                         const auto& code_of) {
     std::string out(indent);
-    for (std::size_t c = 0; c < columns; ++c) {
-      const std::string text = c < cells.size() && row < cells[c].size() ? cells[c][row] : "";
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const std::size_t c = columns[k];
+      const std::string text = row < cells[k].size() ? cells[k][row] : "";
       const std::string pad = spaces(width[c] - std::min(width[c], display_width(text)));
-      const bool words = table.is_words(c);
       const std::string painted = paint(text, code_of(c), style);
-      out += c == 0 ? "" : spaces(gap);
-      out += words ? painted + pad : pad + painted;
+      out += k == 0 ? "" : spaces(gap);
+      out += table.is_words(c) ? painted + pad : pad + painted;
     }
     out.erase(out.find_last_not_of(' ') + 1);
     return out + "\n";
   };
-
-  std::string out;
-  if (!table.caption.empty()) {
-    out += beside("", 0, table.caption, Tone::plain, style);
-  }
   std::vector<std::vector<std::string>> head;
-  for (const std::string& name : table.header) {
-    head.push_back({name});
+  std::size_t head_height = 1;
+  for (const std::size_t c : columns) {
+    head.push_back(wrap(table.header[c], width[c]));
+    head_height = std::max(head_height, head.back().size());
   }
-  out += line(head, 0, [](std::size_t) { return std::string_view("\x1b[1m"); });
+  std::string out;
+  for (std::size_t i = 0; i < head_height; ++i) {
+    out += line(head, i, [](std::size_t) { return std::string_view("\x1b[1m"); });
+  }
   std::string rule(indent);
-  for (std::size_t c = 0; c < columns; ++c) {
-    rule += c == 0 ? "" : spaces(gap);
-    for (std::size_t i = 0; i < width[c]; ++i) {
-      rule += "─";
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    rule += k == 0 ? "" : spaces(gap);
+    for (std::size_t i = 0; i < width[columns[k]]; ++i) {
+      rule += style.ascii ? "-" : "─";
     }
   }
   out += paint(rule, escape_code(Tone::quiet), style) + "\n";
   for (const auto& row : table.rows) {
     std::vector<std::vector<std::string>> cells;
     std::size_t height = 1;
-    for (std::size_t c = 0; c < row.size() && c < columns; ++c) {
-      const std::string text = printable(row[c].text);
-      cells.push_back(c == table.wide_column ? wrap(text, width[c])
-                                             : std::vector<std::string>{text});
+    for (const std::size_t c : columns) {
+      const std::string text = c < row.size() ? printable(row[c].text) : "";
+      cells.push_back(wrap(text, width[c]));
       height = std::max(height, cells.back().size());
     }
     for (std::size_t i = 0; i < height; ++i) {
@@ -178,10 +164,95 @@ std::string render(const Table& table, const TerminalStyle& style) {
   return out;
 }
 
+std::string render(const Table& table, const TerminalStyle& style) {
+  const std::size_t columns = table.header.size();
+  std::vector<std::size_t> width(columns, 0);
+  for (std::size_t c = 0; c < columns; ++c) {
+    width[c] = display_width(table.header[c]);
+    for (const auto& row : table.rows) {
+      width[c] = std::max(width[c], c < row.size() ? display_width(row[c].text) : 0);
+    }
+  }
+  const std::size_t room = std::max<std::size_t>(20, style.width) - indent.size();
+  std::size_t total = gap * (columns - std::min<std::size_t>(columns, 1));
+  for (const std::size_t w : width) {
+    total += w;
+  }
+  constexpr std::size_t narrow = 12;
+  if (table.wide_column < columns && total > room) {
+    std::size_t& wide = width[table.wide_column];
+    const std::size_t least = std::min(wide, narrow);
+    const std::size_t cut = std::min(wide - least, total - room);
+    wide -= cut;
+    total -= cut;
+  }
+  std::string out;
+  if (!table.caption.empty()) {
+    out += beside("", 0, table.caption, Tone::plain, style);
+  }
+  if (total > room) {
+    // Words that fill half of the line are folded; what is still too wide follows below.
+    for (std::size_t c = 0; c < columns; ++c) {
+      width[c] = table.is_words(c) ? std::min(width[c], std::max(narrow, room / 2)) : width[c];
+    }
+  }
+  std::vector<std::size_t> group;
+  std::size_t taken = 0;
+  for (std::size_t c = 0; c < columns; ++c) {
+    if (group.size() > 1 && taken + gap + width[c] > room) {
+      out += render_columns(table, group, width, style) + "\n";
+      group = {0};
+      taken = width[0];
+    }
+    taken += (group.empty() ? 0 : gap) + width[c];
+    group.push_back(c);
+  }
+  return group.empty() ? out : out + render_columns(table, group, width, style);
+}
+
+/// Every text of a document in ASCII.
+Document in_ascii(Document document) {
+  const auto change = [](std::string& text) { text = ascii(text); };
+  const auto change_value = [&](Value& value) { change(value.text); };
+  change(document.title);
+  change(document.verdict.line);
+  for (std::string& reason : document.verdict.reasons) {
+    change(reason);
+  }
+  for (Section& section : document.sections) {
+    change(section.title);
+    for (Block& block : section.blocks) {
+      if (auto* facts = std::get_if<Facts>(&block)) {
+        for (Facts::Fact& fact : facts->facts) {
+          change(fact.name);
+          change_value(fact.value);
+        }
+      } else if (auto* table = std::get_if<Table>(&block)) {
+        change(table->caption);
+        std::for_each(table->header.begin(), table->header.end(), change);
+        for (auto& row : table->rows) {
+          std::for_each(row.begin(), row.end(), change_value);
+        }
+      } else if (auto* paragraph = std::get_if<Paragraph>(&block)) {
+        change(paragraph->text);
+      } else if (auto* findings = std::get_if<Findings>(&block)) {
+        for (Diagnostic& diagnostic : findings->diagnostics) {
+          change(diagnostic.message);
+        }
+      } else if (auto* code = std::get_if<Code>(&block)) {
+        change(code->title);
+        change(code->text);
+      }
+    }
+  }
+  return document;
+}
+
 }  // namespace
 
-std::string to_terminal(const Document& document, const TerminalStyle& style,
+std::string to_terminal(const Document& given, const TerminalStyle& style,
                         std::string_view report_folder) {
+  const Document document = style.ascii ? in_ascii(given) : given;
   std::string out;
   const auto begin_line = [&] { out += out.empty() ? "" : "\n"; };
   if (!document.title.empty()) {

@@ -163,6 +163,8 @@ Expected<void> ProblemReader::read_value(const Field& field, const Json& json, V
     case FieldType::flag:
     case FieldType::text:
     case FieldType::matrices:
+    case FieldType::record:
+    case FieldType::records:
       break;  // of answers alone
   }
   return {};
@@ -249,6 +251,22 @@ Expected<ContinuousSystem<>> ProblemReader::system(const Field& field, const Jso
   const std::array<Field, 4> fields = fields_of_system(field);
   const std::string prefix = full(field.name) + '.';
   Problem inner;
+  const auto stateless = [&](const char* name) {
+    const auto found = json.find(name);
+    return found == json.end() || found->is_null() || (found->is_array() && found->empty());
+  };
+  if (stateless("A") && stateless("B") && stateless("C") && json.contains("D")) {
+    // A static gain, y = D u.
+    Json gain = json;
+    for (const char* name : {"A", "B", "C"}) {
+      gain.erase(name);
+    }
+    sizes_.bind(field.rows, 0);
+    FLYBALL_CHECK(
+        ProblemReader(gain, where_, prefix, sizes_).read(std::span(fields).last(1), inner));
+    const MatrixXd& D = inner.matrix("D");
+    return ContinuousSystem<>{MatrixXd(0, 0), MatrixXd(0, D.cols()), MatrixXd(D.rows(), 0), D};
+  }
   FLYBALL_CHECK(ProblemReader(json, where_, prefix, sizes_).read(fields, inner));
   return inner.system();
 }

@@ -82,12 +82,13 @@ double measurement_std(const DesignJob& job) {
   if (job.estimator.measurement_std) {
     return *job.estimator.measurement_std;
   }
-  // A quantised reading errs uniformly over one step: q/√12.
-  const double quantisation = job.sensor.resolution / std::sqrt(12.0);
-  const double floor = job.plant.kind == MechanismKind::flywheel ? 0.005 * top_speed(job.plant)
-                       : job.plant.unit == "m"                   ? 5e-4
-                                                                 : 1e-3;
-  return std::max(quantisation, floor);
+  if (job.sensor.resolution > 0.0) {
+    // A quantised reading errs uniformly over one step: q/√12.
+    return job.sensor.resolution / std::sqrt(12.0);
+  }
+  return job.plant.kind == MechanismKind::flywheel ? 0.005 * top_speed(job.plant)
+         : job.plant.unit == "m"                   ? 5e-4
+                                                   : 1e-3;
 }
 
 Expected<LinearModel> linear_model(const PlantDescription& plant, double period) {

@@ -150,7 +150,8 @@ Json schema_of(const Field& field, const std::string& description) {
   switch (field.type) {
     case FieldType::quantity:
       if (plain) {
-        schema["type"] = "number";
+        schema["type"] = {"number", "string"};
+        schema["pattern"] = "^[^:]*[0-9]\\s*:\\s*[0-9.]+([eE][-+]?[0-9]+)?\\s*$";  // a ratio
         if (field.range == Range::not_zero) {
           schema["not"] = {{"const", 0}};
         } else if (field.range != Range::any) {

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include <flyball/core/argument.hpp>
+#include <flyball/core/progress.hpp>
 #include <flyball/io/file.hpp>
 #include <flyball/io/log_error.hpp>
 #include <flyball/io/number_table.hpp>
@@ -375,8 +376,10 @@ Expected<LocalizeResult> localize(const LocalizeJob& job) {
     start = Pose2d((*job.start)[0], (*job.start)[1], (*job.start)[2]);
   }
   const std::vector<double> times = wanted_times(result);
+  tell_progress("filters the drive");
   FLYBALL_TRY(result.filter, filter_landmarks(result.log, options, times, start));
   if (job.smooth) {
+    tell_progress("smooths the drive");
     auto smoothed = smooth_landmarks(result.log, options, times, start);
     if (!smoothed) {
       warn(result.diagnostics, "no_smoother", "the smoother has no answer: {}",

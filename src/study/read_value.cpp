@@ -64,14 +64,18 @@ Expected<double> quantity(const toml::node& node, Range range, Dimension dimensi
                           const std::string& name) {
   const auto number = node.value_exact<double>();
   const auto whole = node.value_exact<long long>();
-  if (node.is_string() && dimension != Dimension::dimensionless) {
+  const std::string ratio = node.is_string() ? *node.value<std::string>() : std::string();
+  if (node.is_string() &&
+      (dimension != Dimension::dimensionless || ratio.find(':') != std::string::npos)) {
     FLYBALL_TRY(const double value,
                 parse_quantity(*node.value<std::string_view>(), dimension, name));
     return in_range(value, range, dimension, name);
   }
   if (dimension == Dimension::dimensionless) {
-    return number || whole ? in_range(*node.value<double>(), range, dimension, name)
-                           : wrong_type(node, name, "a plain number, without quotes");
+    return number || whole
+               ? in_range(*node.value<double>(), range, dimension, name)
+               : wrong_type(node, name,
+                            "a plain number, without quotes, or a ratio such as \"3:2\"");
   }
   const std::string unit(si_unit(dimension));
   if (number || whole) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include <flyball/core/progress.hpp>
+
 #include "core/try.hpp"
 
 namespace flyball::study {
@@ -31,6 +33,7 @@ PlantDescription plant_from_fit(const identification::FeedforwardFit& fit) {
 }
 
 ExpectedAll<TuneResult> tune(const TuneJob& job) {
+  tell_progress("reads and identifies the log");
   FLYBALL_TRY(auto identified, identify(job.identification));
   TuneResult result{.identification = std::move(identified), .design = std::nullopt};
   if (!result.identification.report.fit) {
@@ -61,6 +64,7 @@ ExpectedAll<TuneResult> tune(const TuneJob& job) {
   if (!velocity_loop && design_job.sensor.resolution == 0.0) {
     design_job.sensor.resolution = result.identification.report.prepared.position_quantum;
   }
+  tell_progress("designs and simulates the loop");
   result.design = design(design_job);
   return result;
 }

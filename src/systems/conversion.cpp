@@ -159,13 +159,16 @@ Expected<ConversionMethod> parse_conversion_method(std::string_view name) {
 Expected<DiscreteSystem<>> convert_to_discrete(const ContinuousSystem<>& system, Time period,
                                                ConversionMethod method, AngularVelocity prewarp) {
   constexpr std::string_view where = "discretize";
-  FLYBALL_CHECK(check_system(system, where));
+  FLYBALL_CHECK(check_system_or_gain(system, where));
   FLYBALL_CHECK(check_arguments(period, method, prewarp, where));
   const auto& [A, B, C, D] = system;
   const Index n = A.rows();
   const double T =
       method == ConversionMethod::tustin ? warped(period.si(), prewarp.si()) : period.si();
   DiscreteSystem<> discrete{A, B, C, D, period};
+  if (n == 0) {
+    return discrete;
+  }
   switch (method) {
     case ConversionMethod::zoh: {
       FLYBALL_TRY(auto held, discretize_zoh(A, B, period));
@@ -206,7 +209,7 @@ Expected<ContinuousSystem<>> convert_to_continuous(const DiscreteSystem<>& syste
                                                    ConversionMethod method,
                                                    AngularVelocity prewarp) {
   constexpr std::string_view where = "undiscretize";
-  FLYBALL_CHECK(check_system(system, where));
+  FLYBALL_CHECK(check_system_or_gain(system, where));
   FLYBALL_CHECK(check_arguments(system.period, method, prewarp, where));
   const auto& [A, B, C, D, period] = system;
   const Index n = A.rows();
@@ -214,6 +217,9 @@ Expected<ContinuousSystem<>> convert_to_continuous(const DiscreteSystem<>& syste
   const double T =
       method == ConversionMethod::tustin ? warped(period.si(), prewarp.si()) : period.si();
   ContinuousSystem<> continuous{A, B, C, D};
+  if (n == 0) {
+    return continuous;
+  }
   switch (method) {
     case ConversionMethod::zoh:
     case ConversionMethod::foh: {

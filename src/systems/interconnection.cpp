@@ -30,8 +30,8 @@ MatrixXd diagonal(const MatrixXd& first, const MatrixXd& second) {
 
 Expected<void> check_both(const Continuous& first, const Continuous& second,
                           std::string_view where) {
-  auto checked = check_system(first, where);
-  return checked ? check_system(second, where) : checked;
+  auto checked = check_system_or_gain(first, where);
+  return checked ? check_system_or_gain(second, where) : checked;
 }
 
 Expected<void> check_count(Index got, Index expected, std::string_view where,
@@ -129,7 +129,7 @@ template <class Connect>
 Expected<Discrete> discrete(const Discrete& first, const Discrete& second, std::string_view where,
                             Connect&& connect) {
   for (const Discrete* system : {&first, &second}) {
-    FLYBALL_CHECK(check_system(*system, where));
+    FLYBALL_CHECK(check_system_or_gain(*system, where));
   }
   const double T = first.period.si();
   if (!(std::abs(second.period.si() - T) <= 1e-12 * T)) {
@@ -150,7 +150,7 @@ Expected<Continuous> checked_feedback(const Continuous& forward, const Continuou
 }
 
 Expected<Continuous> unity_feedback(const Continuous& forward, FeedbackSign sign) {
-  FLYBALL_CHECK(check_system(forward, "feedback"));
+  FLYBALL_CHECK(check_system_or_gain(forward, "feedback"));
   const Index p = forward.C.rows();
   FLYBALL_CHECK(
       check_count(p, forward.B.cols(), "feedback", "the number of outputs", "as there are inputs"));
@@ -214,18 +214,18 @@ Expected<Continuous> feedback(const Continuous& forward, FeedbackSign sign) {
   return unity_feedback(forward, sign);
 }
 Expected<Discrete> feedback(const Discrete& forward, FeedbackSign sign) {
-  FLYBALL_CHECK(check_system(forward, "feedback"));
+  FLYBALL_CHECK(check_system_or_gain(forward, "feedback"));
   return unity_feedback(bare(forward), sign).map([&](const Continuous& loop) {
     return detail::timed(loop, forward.period);
   });
 }
 
 Expected<Eigen::MatrixXcd> transfer_at(const Continuous& system, std::complex<double> s) {
-  FLYBALL_CHECK(check_system(system, "transfer_at"));
+  FLYBALL_CHECK(check_system_or_gain(system, "transfer_at"));
   return evaluate(system, s);
 }
 Expected<Eigen::MatrixXcd> transfer_at(const Discrete& system, std::complex<double> z) {
-  FLYBALL_CHECK(check_system(system, "transfer_at"));
+  FLYBALL_CHECK(check_system_or_gain(system, "transfer_at"));
   return evaluate(bare(system), z);
 }
 

@@ -253,6 +253,9 @@ Expected<HInfinityNorm> largest_gain(const ContinuousSystem<>& system, std::stri
 }
 
 Expected<double> root_of_power(const ContinuousSystem<>& system, TimeDomain domain) {
+  if (system.A.size() == 0) {
+    return domain == TimeDomain::continuous ? 0.0 : system.D.norm();
+  }
   const ContinuousSystem<> s = scaled(system);
   FLYBALL_TRY(auto L, detail::gramian_factor(s.A, s.B, domain, "h2_norm"));
   const double energy = product(s.C, L).norm();
@@ -263,7 +266,7 @@ Expected<double> root_of_power(const ContinuousSystem<>& system, TimeDomain doma
 
 Expected<double> h2_norm(const ContinuousSystem<>& system) {
   constexpr std::string_view where = "h2_norm";
-  FLYBALL_CHECK(check_system(system, where));
+  FLYBALL_CHECK(check_system_or_gain(system, where));
   if (!system.D.isZero(0.0)) {
     return refusal(SystemError::infinite_norm, where, "D")
         .got("not zero")
@@ -274,20 +277,28 @@ Expected<double> h2_norm(const ContinuousSystem<>& system) {
 }
 
 Expected<double> h2_norm(const DiscreteSystem<>& system) {
-  FLYBALL_CHECK(check_system(system, "h2_norm"));
+  FLYBALL_CHECK(check_system_or_gain(system, "h2_norm"));
   return root_of_power({system.A, system.B, system.C, system.D}, TimeDomain::discrete);
 }
 
 Expected<HInfinityNorm> h_infinity_norm(const ContinuousSystem<>& system) {
   constexpr std::string_view where = "h_infinity_norm";
-  FLYBALL_CHECK(check_system(system, where));
+  FLYBALL_CHECK(check_system_or_gain(system, where));
+  if (system.A.size() == 0) {
+    return HInfinityNorm{.norm = largest_singular_value(system.D),
+                         .upper_bound = largest_singular_value(system.D)};
+  }
   FLYBALL_CHECK(detail::check_stable(system.A, TimeDomain::continuous, where));
   return largest_gain(scaled(system), where);
 }
 
 Expected<HInfinityNorm> h_infinity_norm(const DiscreteSystem<>& system) {
   constexpr std::string_view where = "h_infinity_norm";
-  FLYBALL_CHECK(check_system(system, where));
+  FLYBALL_CHECK(check_system_or_gain(system, where));
+  if (system.A.size() == 0) {
+    return HInfinityNorm{.norm = largest_singular_value(system.D),
+                         .upper_bound = largest_singular_value(system.D)};
+  }
   FLYBALL_CHECK(detail::check_stable(system.A, TimeDomain::discrete, where));
   // With T = 2, s = (z - 1)/(z + 1) = j tan(ωT/2).
   FLYBALL_TRY(auto mapped,

@@ -338,12 +338,18 @@ Expected<BalancedRealization<Discrete>> balanced_truncation(const Discrete& syst
 
 Expected<MinimalRealization<Continuous>> minimal_realization(const Continuous& system,
                                                              double tolerance) {
-  FLYBALL_CHECK(check_system(system, "minimal_realization"));
+  FLYBALL_CHECK(check_system_or_gain(system, "minimal_realization"));
+  if (system.A.size() == 0) {
+    return MinimalRealization<Continuous>{.system = system, .T = MatrixXd(0, 0)};
+  }
   return minimal(system, tolerance);
 }
 Expected<MinimalRealization<Discrete>> minimal_realization(const Discrete& system,
                                                            double tolerance) {
-  FLYBALL_CHECK(check_system(system, "minimal_realization"));
+  FLYBALL_CHECK(check_system_or_gain(system, "minimal_realization"));
+  if (system.A.size() == 0) {
+    return MinimalRealization<Discrete>{.system = system, .T = MatrixXd(0, 0)};
+  }
   return minimal(bare(system), tolerance).map([&](MinimalRealization<Continuous>&& s) {
     return MinimalRealization<Discrete>{timed(s.system, system.period), s.unreached, s.unseen,
                                         std::move(s.T)};

@@ -38,7 +38,7 @@ Expected<void> check_input(Index input, Index inputs, std::string_view where) {
 
 Expected<LinearResponse> respond(const DiscreteSystem<>& system, const MatrixRef& u,
                                  const MatrixRef& x0, std::string_view where) {
-  FLYBALL_CHECK(check_system(system, where));
+  FLYBALL_CHECK(check_system_or_gain(system, where));
   const auto& [A, B, C, D, period] = system;
   const Index samples = u.rows();
   FLYBALL_CHECK(Checks(where)
@@ -68,9 +68,12 @@ Expected<LinearResponse> respond(const DiscreteSystem<>& system, const MatrixRef
 /// The instants that were asked for, or those that the poles ask for.
 Expected<ResponseTimes> chosen(const ContinuousSystem<>& system,
                                const std::optional<ResponseTimes>& times, std::string_view where) {
-  FLYBALL_CHECK(check_system(system, where));
+  FLYBALL_CHECK(check_system_or_gain(system, where));
   if (times) {
     return check_times(*times, where).map([&] { return *times; });
+  }
+  if (system.A.size() == 0) {
+    return response_times({});
   }
   return analyze_modes(system).map(
       [](const ModalAnalysis& modes) { return response_times(modes); });
@@ -78,7 +81,10 @@ Expected<ResponseTimes> chosen(const ContinuousSystem<>& system,
 
 Expected<ResponseTimes> chosen(const DiscreteSystem<>& system,
                                const std::optional<ResponseTimes>& times, std::string_view where) {
-  FLYBALL_CHECK(check_system(system, where));
+  FLYBALL_CHECK(check_system_or_gain(system, where));
+  if (!times && system.A.size() == 0) {
+    return response_times({}, system.period);
+  }
   if (!times) {
     return analyze_modes(system).map(
         [&](const ModalAnalysis& modes) { return response_times(modes, system.period); });
@@ -136,7 +142,7 @@ Expected<LinearResponse> forced_response(const DiscreteSystem<>& system, const M
 
 Expected<LinearResponse> forced_response(const ContinuousSystem<>& system, const MatrixRef& u,
                                          const MatrixRef& x0, Time step) {
-  FLYBALL_CHECK(check_system(system, "forced_response"));
+  FLYBALL_CHECK(check_system_or_gain(system, "forced_response"));
   FLYBALL_TRY(const auto held, discretize(system, step));
   return respond(held, u, x0, "forced_response");
 }

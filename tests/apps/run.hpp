@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -31,6 +32,8 @@ class Command : public ::testing::Test {
   void SetUp() override {
     std::string pattern = (std::filesystem::temp_directory_path() / "flyball-apps-XXXXXX").string();
     ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    ::setenv("LC_ALL", "C.UTF-8", 1);
+    ::unsetenv("COLUMNS");
     folder_ = pattern;
     std::filesystem::create_directory(work());
   }

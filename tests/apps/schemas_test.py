@@ -174,6 +174,12 @@ def check_estimate(folder):
     check_answer(["estimate", "lag.csv", "lag_silent.toml"], 2, folder)
 
 
+def check_units(folder):
+    check_answer(["units"], 0, folder)
+    check_answer(["units", "velocity"], 0, folder)
+    check_answer(["units", "taste"], 2, folder)
+
+
 def check_motors(folder):
     check_answer(["motors"], 0, folder)
     check_answer(["motors", "NEO"], 0, folder)
@@ -284,6 +290,7 @@ with tempfile.TemporaryDirectory() as name:
     check_localize(pathlib.Path(name))
     check_estimate(pathlib.Path(name))
     check_motors(pathlib.Path(name))
+    check_units(pathlib.Path(name))
     check_places(pathlib.Path(name))
     check_reader_and_schema(pathlib.Path(name))
 check_project_schema()

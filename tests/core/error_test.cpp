@@ -154,5 +154,22 @@ TEST(Error, KeepsItsPartsWhenAssignedToItself) {
   EXPECT_EQ(error.evidence()[0].name, "pivot");
 }
 
+// A program that ends with `.value()` prints what is wrong.
+TEST(Error, IsWhatValueThrows) {
+  const Expected<int> none = tl::unexpected(Error(KettleError::too_hot).about("tea").got("140"));
+  const ExpectedAll<int> nothing = tl::unexpected(Errors(none.error()));
+  const auto text_of = [](const auto& expected) -> std::string {
+    try {
+      return std::to_string(expected.value());
+    } catch (const std::exception& thrown) {
+      return thrown.what();
+    }
+  };
+  EXPECT_EQ(text_of(none), to_string(none.error()));
+  EXPECT_EQ(text_of(nothing), to_string(none.error()));
+  EXPECT_NE(text_of(none).find("tea is 140"), std::string::npos);
+  EXPECT_EQ(text_of(Expected<int>(3)), "3");
+}
+
 }  // namespace
 }  // namespace flyball

@@ -149,6 +149,12 @@ constexpr std::array accepted{
     Accepted{"1 kHz", Dimension::frequency, 1000.0},
     Accepted{"0.5", Dimension::dimensionless, 0.5},
     Accepted{"50 %", Dimension::dimensionless, 0.5},
+    Accepted{"3:2", Dimension::dimensionless, 1.5},
+    Accepted{" 60 : 8 ", Dimension::dimensionless, 7.5},
+    Accepted{"30 in/min", Dimension::velocity, 0.0127},
+    Accepted{"10 mph", Dimension::velocity, 4.4704},
+    Accepted{"36 km/h", Dimension::velocity, 10.0},
+    Accepted{"6 feet per minute", Dimension::velocity, 0.03048},
 };
 
 TEST(ParseQuantity, ReadsWhatPeopleWrite) {
@@ -194,6 +200,10 @@ constexpr std::array refused{
     Refused{"- 8 kg", Dimension::mass, ArgumentError::malformed},
     Refused{"+-8 kg", Dimension::mass, ArgumentError::malformed},
     Refused{"++8 kg", Dimension::mass, ArgumentError::malformed},
+    Refused{"3:", Dimension::dimensionless, ArgumentError::malformed},
+    Refused{"3:0", Dimension::dimensionless, ArgumentError::malformed},
+    Refused{"3:2:1", Dimension::dimensionless, ArgumentError::malformed},
+    Refused{"3:2", Dimension::length, ArgumentError::wrong_unit},
     // No finite number, or none in SI.
     Refused{"1e400 kg", Dimension::mass, ArgumentError::not_finite},
     Refused{"-1e400 kg", Dimension::mass, ArgumentError::not_finite},
@@ -230,6 +240,13 @@ TEST(ParseQuantity, MessagesNameTheThingAndWhatToDo) {
   EXPECT_EQ(message("8 lbs ft", Dimension::mass, "mass"),
             "mass is \"8 lbs ft\", in an unknown unit; it must be a mass such as \"8 kg\" or \"18 "
             "lb\"; did you mean \"lbs\"?");
+  // What turns for what goes straight on.
+  EXPECT_EQ(message("300 rpm", Dimension::velocity, "max_velocity"),
+            "max_velocity is \"300 rpm\", an angular velocity; it must be a velocity such as \"1.5 "
+            "m/s\"; what turns and what goes straight on differ by the radius of drum or wheel: "
+            "multiply radians by it");
+  EXPECT_NE(message("2 m", Dimension::angle, "x").find("over the radius"), std::string::npos);
+  EXPECT_NE(message("5 quux", Dimension::mass, "x").find("flyball units"), std::string::npos);
   EXPECT_EQ(message("20 s m", Dimension::time, "period").find("cm"), std::string::npos);
 }
 
@@ -259,6 +276,25 @@ TEST(ParseUnit, AnswersAnUnknownUnitWithTheNearest) {
   EXPECT_EQ(to_string(far.error()),
             "unit is \"quuxquuxquux\", which is not known; units are written like kg, cm, in, rpm, "
             "V");
+}
+
+// Each name reads back to its unit; the SI unit leads.
+TEST(Units, AreListed) {
+  std::size_t names = 0;
+  for (int d = 0; d <= static_cast<int>(Dimension::frequency); ++d) {
+    const auto dimension = static_cast<Dimension>(d);
+    const auto units = units_of(dimension);
+    ASSERT_FALSE(units.empty());
+    EXPECT_EQ(units.front().factor, 1.0);
+    for (const NamedUnit& unit : units) {
+      const auto read = parse_unit(unit.text);
+      ASSERT_TRUE(read) << unit.text;
+      EXPECT_EQ(read->dimension, dimension) << unit.text;
+      EXPECT_EQ(read->factor, unit.factor) << unit.text;
+    }
+    names += units.size();
+  }
+  EXPECT_GE(names, 120U);
 }
 
 TEST(ToText, PrintsSiWithItsUnit) {

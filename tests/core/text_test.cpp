@@ -82,5 +82,13 @@ TEST(NearestName, AnswersNothingIfNothingIsNear) {
   EXPECT_EQ(nearest_name("mass", {}), "");
 }
 
+TEST(Ascii, SpellsWhatItCan) {
+  EXPECT_EQ(ascii("2.5 ± 0.1 m/s², 3 kg·m²"), "2.5 +- 0.1 m/s^2, 3 kg*m^2");
+  EXPECT_EQ(ascii("s⁻¹, 15 mΩ, σ = 90°"), "s^-1, 15 mOhm, sigma = 90 deg");
+  EXPECT_EQ(ascii("plain\n"), "plain\n");
+  EXPECT_EQ(ascii("日本"), "??");
+  EXPECT_EQ(ascii("\xff"), "?");
+}
+
 }  // namespace
 }  // namespace flyball

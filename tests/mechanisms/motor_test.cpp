@@ -257,7 +257,7 @@ TEST(MotorName, CaseSpacesAndPunctuationDoNotMatter) {
   EXPECT_EQ(motor("neo").value().name, "NEO");
   EXPECT_EQ(motor("cim").value().name, "CIM");
   EXPECT_EQ(motor("kraken x60").value().name, "Kraken X60");
-  // A part that only one motor has is enough.
+  // A word that only one motor has is enough.
   EXPECT_EQ(motor("vortex").value().name, "NEO Vortex");
   EXPECT_EQ(motor("romi").value().name, "Romi built-in");
 }
@@ -296,6 +296,21 @@ TEST(MotorName, AnAmbiguousNameIsAnsweredWithTheCandidates) {
   EXPECT_TRUE(of_775.is(ArgumentError::ambiguous_name));
   const std::string text = to_string(of_775);
   EXPECT_EQ(text.find("AndyMark RS775-125"), text.rfind("AndyMark RS775-125"));
+}
+
+// Part of a word is no word: who writes "NEO 5" may mean another motor than the NEO 550.
+TEST(MotorName, APartOfAWordIsNoName) {
+  for (const auto& [part, whole] : {std::pair{"NEO 5", "NEO 550"},
+                                    {"neo55", "NEO 550"},
+                                    {"vort", "NEO Vortex"},
+                                    {"falcon 50", "Falcon 500"}}) {
+    const auto found = motor(part);
+    ASSERT_FALSE(found) << part;
+    EXPECT_TRUE(mentions(found.error(), whole)) << to_string(found.error());
+  }
+  EXPECT_EQ(motors_like("kraken").size(), 4U);
+  EXPECT_EQ(motors_like("NEO 5"), std::vector<std::string_view>{"NEO 550"});
+  EXPECT_TRUE(motors_like("").empty());
 }
 
 TEST(MotorName, AnUnknownNameIsAnsweredWithTheNearest) {

@@ -111,6 +111,46 @@ TEST(Terminal, IsWithinItsWidthAndAligned) {
   }
 }
 
+// Of 40 columns each table is folded into parts, its first column beside each; no cell is lost.
+TEST(Terminal, ATableWiderThanTheTerminalIsFolded) {
+  Table table{.header = {"name", "first number", "second number", "third number", "in words"},
+              .words = {0, 4},
+              .wide_column = 4};
+  for (const char* name : {"one", "two"}) {
+    table.rows.push_back(
+        {name, "1.25", "-3.5e-7", "42", "a sentence that has to be folded into several lines"});
+  }
+  const Document document{.sections = {{"t", "", {table}}}};
+  for (const std::size_t width : {30, 40, 60, 200}) {
+    const std::string text = to_terminal(document, {.width = width});
+    std::size_t names = 0;
+    for (const std::string& line : lines_of(text)) {
+      EXPECT_LE(display_width(line), width) << line;
+      names += line.starts_with("  one") ? 1 : 0;
+    }
+    EXPECT_EQ(names, width == 30 ? 3U : width == 40 || width == 60 ? 2U : 1U) << text;
+    for (const char* cell : {"1.25", "-3.5e-7", "42", "sentence", "several"}) {
+      EXPECT_TRUE(has(text, cell)) << width << cell;
+    }
+  }
+}
+
+TEST(Terminal, AsciiWhereThereIsNoUtf8) {
+  const Document document{
+      .title = "10 rad/s²",
+      .verdict = {.line = "±2σ"},
+      .sections = {{"t", "", {Table{.header = {"Ω"}, .rows = {{"15 mΩ"}}}, Paragraph{"kg·m²"}}}}};
+  const std::string text = to_terminal(document, {.ascii = true});
+  for (const char c : text) {
+    EXPECT_LT(static_cast<unsigned char>(c), 0x80) << text;
+  }
+  EXPECT_TRUE(has(text, "10 rad/s^2"));
+  EXPECT_TRUE(has(text, "+-2sigma"));
+  EXPECT_TRUE(has(text, "15 mOhm"));
+  EXPECT_TRUE(has(text, "kg*m^2"));
+  EXPECT_TRUE(has(text, "-------"));
+}
+
 TEST(Terminal, WithoutColourThereIsNoEscape) {
   const study::TuneResult result = tune_result(MechanismKind::elevator);
   const std::string plain = text_of(result);

@@ -71,6 +71,8 @@ TEST_F(WriteReport, HoldsEverythingThatATuneGives) {
                            "result.json",
                            "gains.toml",
                            "ElevatorLoop.hpp",
+                           "ElevatorLoop.java",
+                           "elevator_loop.py",
                            "data/closed_loop.csv",
                            "data/robustness.csv",
                            "data/run_1_quasistatic-forward.csv",

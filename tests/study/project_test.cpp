@@ -85,6 +85,9 @@ TEST(Project, RefusesMeaninglessValues) {
   refused("10.0", "nan", error_info(ArgumentError::not_finite));
   refused("10.0", "\"ten\"", error_info(ProjectError::wrong_type));
   refused("10.0", "\"10\"", error_info(ProjectError::wrong_type));  // the schema says number
+  refused("10.0", "\"3:0\"", error_info(ArgumentError::malformed));
+  refused("10.0", "\"0:3\"", error_info(ArgumentError::not_positive));
+  refused("10.0", "\"3:2:1\"", error_info(ArgumentError::malformed));
   refused("10.0", "1e200", error_info(ArgumentError::out_of_range));
   refused("\"8 kg\"", "\"1e-200 kg\"", error_info(ArgumentError::out_of_range));
   refused("\"NEO\"", "\"NE0\"", error_info(ArgumentError::unknown_name));
@@ -193,7 +196,10 @@ TEST(Project, AJobWithoutAFileTakesItsOptions) {
   const auto ten = tune_job("arm.json", "", std::vector<Override>{{"--gearing", "ten"}});
   ASSERT_FALSE(ten);
   EXPECT_EQ(to_string(ten.error()),
-            "--gearing is \"ten\"; it must be a plain number, without quotes");
+            "--gearing is \"ten\"; it must be a plain number, without quotes, or a ratio such as "
+            "\"3:2\"");
+  const auto ratio = tune_job("arm.json", "", std::vector<Override>{{"--gearing", "60:8"}});
+  ASSERT_TRUE(ratio) << to_string(ratio.error());
 }
 
 TEST(Project, TheLogIsOfTheMechanismOfTheFile) {

@@ -4,6 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <flyball/systems/conversion.hpp>
+#include <flyball/systems/norms.hpp>
+#include <flyball/systems/realization.hpp>
+#include <flyball/systems/response.hpp>
+
 #include "math/matrices_json.hpp"
 #include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
@@ -123,6 +128,47 @@ TEST(Interconnection, DiscreteSystems) {
   EXPECT_TRUE(feedback(G, H).error().is(SystemError::period_mismatch));
 }
 
+// Zero states are a system: y = D u.
+TEST(Interconnection, StaticGains) {
+  const auto gain = [](double k) {
+    return ContinuousSystem<>{MatrixXd(0, 0), MatrixXd(0, 1), MatrixXd(1, 0),
+                              MatrixXd::Constant(1, 1, k)};
+  };
+  const auto G = from_polynomials({1.0}, {1.0, 1.0});
+  const Complex s(0.0, 1.0);
+  const auto at = [&](const Expected<ContinuousSystem<>>& system) {
+    return transfer_at(system.value(), s).value()(0, 0);
+  };
+  EXPECT_LT(std::abs(at(feedback(G, gain(2.0))) - 1.0 / (s + 3.0)), 1e-15);
+  EXPECT_LT(std::abs(at(feedback(gain(2.0), G)) - 2.0 * (s + 1.0) / (s + 3.0)), 1e-15);
+  EXPECT_LT(std::abs(at(series(gain(3.0), G)) - 3.0 / (s + 1.0)), 1e-15);
+  EXPECT_LT(std::abs(at(parallel(G, gain(-1.0))) + s / (s + 1.0)), 1e-15);
+  EXPECT_EQ(at(feedback(gain(3.0))), 0.75);
+  EXPECT_EQ(append(gain(1.0), gain(2.0)).value().D(1, 1), 2.0);
+  EXPECT_TRUE(feedback(gain(-1.0)).error().is(SystemError::algebraic_loop));
+  const auto sampled = convert_to_discrete(gain(2.0), Time(0.02), ConversionMethod::tustin).value();
+  EXPECT_EQ(transfer_at(sampled, -1.0).value()(0, 0), 2.0);
+  EXPECT_EQ(convert_to_continuous(sampled, ConversionMethod::matched).value().D(0, 0), 2.0);
+  EXPECT_EQ(step_response(gain(2.0)).value().y.minCoeff(), 2.0);
+  EXPECT_EQ(step_response(sampled).value().y.maxCoeff(), 2.0);
+  EXPECT_EQ(h_infinity_norm(gain(-2.0)).value().norm, 2.0);
+  EXPECT_EQ(h2_norm(sampled).value(), 2.0);
+  EXPECT_TRUE(h2_norm(gain(1.0)).error().is(SystemError::infinite_norm));
+  EXPECT_EQ(minimal_realization(gain(2.0)).value().system.D(0, 0), 2.0);
+}
+
+// A wrong shape is told with the matrix that it has to fit.
+TEST(Interconnection, ShapesNameWhatTheyFollowFrom) {
+  ContinuousSystem<> G{MatrixXd::Zero(2, 2), MatrixXd::Zero(3, 1), MatrixXd::Zero(1, 2),
+                       MatrixXd::Zero(1, 1)};
+  EXPECT_EQ(to_string(transfer_at(G, 1.0).error()),
+            "transfer_at: B is 3x1; it must be states x inputs, A having 2 states (2x1)");
+  G.B = MatrixXd::Zero(2, 1);
+  G.C = MatrixXd::Zero(2, 1);
+  EXPECT_EQ(to_string(transfer_at(G, 1.0).error()),
+            "transfer_at: C is 2x1; it must be outputs x states, A having 2 states (2x2)");
+}
+
 TEST(Interconnection, Errors) {
   Random random(83);
   const auto G = test::random_system(random, 2, 1, 2);
@@ -131,6 +177,7 @@ TEST(Interconnection, Errors) {
   EXPECT_TRUE(
       parallel(G, test::random_system(random, 2, 2, 2)).error().is(ArgumentError::wrong_shape));
   EXPECT_TRUE(series(G, ContinuousSystem<>{}).error().is(ArgumentError::empty));
+  EXPECT_TRUE(analyze_modes(ContinuousSystem<>{}).error().is(ArgumentError::empty));
   // y = -(y - u): D₁D₂ = -1.
   auto H = test::random_system(random, 1, 1, 1);
   H.D(0, 0) = -1.0;

@@ -1,11 +1,16 @@
 #pragma once
 
+#include <flyball/core/instantiated.hpp>
 #include <flyball/core/signal.hpp>
 #include <flyball/math/dense/linear_algebra.hpp>
 #include <flyball/mechanisms/mechanism.hpp>
 #include <flyball/systems/system.hpp>
 
 namespace flyball {
+
+namespace detail {
+struct LinearPlantInversionDefinitions;  ///< Complete where the .tpp is included.
+}
 
 /// Linear plant inversion: the input that takes a discrete plant from one reference to the next.
 ///
@@ -14,6 +19,10 @@ namespace flyball {
 template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic>
 class LinearPlantInversion {
  public:
+  static_assert(
+      detail::has_definitions<detail::LinearPlantInversionDefinitions, States, Inputs>,
+      "the library has no code for this size: #include <flyball/control/feedforward.tpp> first");
+
   using StateVector = Eigen::Matrix<double, States, 1>;
   using InputVector = Eigen::Matrix<double, Inputs, 1>;
   using StateMatrix = Eigen::Matrix<double, States, States>;

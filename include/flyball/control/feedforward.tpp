@@ -4,6 +4,10 @@
 
 namespace flyball {
 
+namespace detail {
+struct LinearPlantInversionDefinitions {};
+}  // namespace detail
+
 template <int States, int Inputs>
 auto LinearPlantInversion<States, Inputs>::calculate(const StateVector& r,
                                                      const StateVector& r_next) const noexcept

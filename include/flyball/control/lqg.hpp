@@ -4,9 +4,15 @@
 
 #include <flyball/control/feedforward.hpp>
 #include <flyball/control/state_feedback.hpp>
+#include <flyball/core/instantiated.hpp>
+#include <flyball/core/sizes.hpp>
 #include <flyball/estimation/observer.hpp>
 
 namespace flyball {
+
+namespace detail {
+struct LqgDefinitions;  ///< Complete where the .tpp is included.
+}
 
 /// The observer-based regulator: steady-state Kalman filter, LQR state feedback and plant
 /// inversion.
@@ -25,6 +31,9 @@ namespace flyball {
 template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic, int Outputs = Eigen::Dynamic>
 class Lqg {
  public:
+  static_assert(detail::has_definitions<detail::LqgDefinitions, States, Inputs, Outputs>,
+                "the library has no code for this size: #include <flyball/control/lqg.tpp> first");
+
   using Plant = DiscreteSystem<States, Inputs, Outputs>;
   using StateVector = Eigen::Matrix<double, States, 1>;
   using InputVector = Eigen::Matrix<double, Inputs, 1>;
@@ -56,6 +65,12 @@ class Lqg {
   [[nodiscard]] InputVector step(const StateVector& r, const StateVector& r_next,
                                  const OutputVector& y, const InputVector& extra,
                                  double rail_voltage) noexcept;
+  /// A vector of another size.
+  template <class R, class Next, class Y, class... More>
+    requires(wrong_size<R, StateVector> || wrong_size<Next, StateVector> ||
+             wrong_size<Y, OutputVector>)
+  InputVector step(const Eigen::MatrixBase<R>&, const Eigen::MatrixBase<Next>&,
+                   const Eigen::MatrixBase<Y>&, const More&...) = delete;
 
   /// Declares a state to be an angle that wraps, see StateFeedback.
   void set_angle(int state, double turn) noexcept { feedback_.set_angle(state, turn); }

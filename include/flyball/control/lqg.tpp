@@ -13,6 +13,8 @@ namespace flyball {
 
 namespace detail {
 
+struct LqgDefinitions {};
+
 /// What Lqg::create asks of its arguments.
 [[nodiscard]] Expected<void> check_lqg(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
                                        const MatrixRef& D, Time period, const MatrixRef& K,

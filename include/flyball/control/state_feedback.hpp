@@ -2,9 +2,15 @@
 
 #include <Eigen/Core>
 
+#include <flyball/core/instantiated.hpp>
 #include <flyball/core/signal.hpp>
+#include <flyball/core/sizes.hpp>
 
 namespace flyball {
+
+namespace detail {
+struct StateFeedbackDefinitions;  ///< Complete where the .tpp is included.
+}
 
 /// State feedback with input limits: u = clamp(K (r - x) + u_ff, u_min, u_max) (7.15).
 ///
@@ -13,6 +19,10 @@ namespace flyball {
 template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic>
 class StateFeedback {
  public:
+  static_assert(
+      detail::has_definitions<detail::StateFeedbackDefinitions, States, Inputs>,
+      "the library has no code for this size: #include <flyball/control/state_feedback.tpp> first");
+
   using StateVector = Eigen::Matrix<double, States, 1>;
   using InputVector = Eigen::Matrix<double, Inputs, 1>;
   using Gain = Eigen::Matrix<double, Inputs, States>;
@@ -35,6 +45,10 @@ class StateFeedback {
   [[nodiscard]] InputVector calculate(const StateVector& x, const StateVector& r,
                                       const InputVector& u_ff) const noexcept;
   [[nodiscard]] InputVector calculate(const StateVector& x, const StateVector& r) const noexcept;
+  /// A vector of another size.
+  template <class A, class B>
+    requires(wrong_size<A, StateVector> || wrong_size<B, StateVector>)
+  InputVector calculate(const Eigen::MatrixBase<A>&, const Eigen::MatrixBase<B>&) const = delete;
 
   /// u within the limits; NaN becomes the limit nearest to zero.
   [[nodiscard]] InputVector clamp(const InputVector& u) const noexcept;

@@ -6,6 +6,10 @@
 
 namespace flyball {
 
+namespace detail {
+struct StateFeedbackDefinitions {};
+}  // namespace detail
+
 template <int States, int Inputs>
 auto StateFeedback<States, Inputs>::clamp(const InputVector& u) const noexcept -> InputVector {
   InputVector limited = u;

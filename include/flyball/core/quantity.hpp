@@ -3,6 +3,8 @@
 #include <compare>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <vector>
 
 #include <flyball/core/expected.hpp>
 
@@ -43,7 +45,13 @@ class Quantity {
 
   constexpr Quantity() noexcept = default;
   /// @param si  The value in the SI unit of the dimension.
-  constexpr explicit Quantity(double si) noexcept : si_(si) {}
+  template <class Number>
+    requires std::is_arithmetic_v<Number>
+  constexpr explicit Quantity(Number si) noexcept : si_(static_cast<double>(si)) {}
+  /// `mass = 8.0` comes here: a quantity needs its unit, 8_kg, or Mass(8.0) of the SI unit.
+  template <class Number_without_a_unit, class... None>
+    requires(std::is_arithmetic_v<Number_without_a_unit> && sizeof...(None) == 0)
+  constexpr Quantity(Number_without_a_unit, None...) = delete;
 
   [[nodiscard]] constexpr double si() const noexcept { return si_; }
   constexpr Quantity operator-() const noexcept { return Quantity(-si_); }
@@ -81,10 +89,21 @@ struct Unit {
 /// @errors ArgumentError::wrong_unit with the nearest known unit as hint.
 [[nodiscard]] Expected<Unit> parse_unit(std::string_view text);
 
-/// Reads "8 kg", "2.54cm", "-1.5e3 rpm" into SI.
+/// A unit by one of its names.
+struct NamedUnit {
+  std::string_view text;  ///< Without spaces, "^", "·": "kgm2".
+  Dimension dimension = Dimension::dimensionless;
+  double factor = 1.0;  ///< To SI.
+};
+
+/// Every name that a unit is known by, of a dimension, the SI unit first.
+[[nodiscard]] std::vector<NamedUnit> units_of(Dimension dimension);
+
+/// Reads "8 kg", "2.54cm", "-1.5e3 rpm" into SI; a plain number also as a ratio, "3:2", or "5 %".
 /// @param dimension  What is expected. @param name  The thing's name, for the message.
 /// @errors ArgumentError::wrong_unit (a unit of another dimension, an unknown one, or none where
-///         one is needed), malformed (no number), not_finite.
+///         one is needed), malformed (no number), not_finite. A turning where something is wanted
+///         that goes straight on, and the other way round, is explained.
 [[nodiscard]] Expected<double> parse_quantity(std::string_view text, Dimension dimension,
                                               std::string_view name);
 

@@ -14,6 +14,10 @@ namespace flyball {
 /// and what is not UTF-8 as U+FFFD.
 [[nodiscard]] std::string printable(std::string_view text);
 
+/// A UTF-8 text in ASCII, for a terminal that shows nothing else: "m/s^2", "+-", "Ohm", "sigma";
+/// '?' for what has no such spelling.
+[[nodiscard]] std::string ascii(std::string_view text);
+
 /// A message, printable, in which what it quotes is cut to 80 characters, a word of 240 or more to
 /// its two ends, and the whole to 4000: what comes from outside may be of any length.
 [[nodiscard]] std::string shortened(std::string_view message);

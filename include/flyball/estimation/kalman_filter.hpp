@@ -1,9 +1,15 @@
 #pragma once
 
+#include <flyball/core/instantiated.hpp>
+#include <flyball/core/sizes.hpp>
 #include <flyball/estimation/kalman_gain.hpp>
 #include <flyball/estimation/update_status.hpp>
 
 namespace flyball {
+
+namespace detail {
+struct KalmanFilterDefinitions;  ///< Complete where the .tpp is included.
+}
 
 /// The Kalman filter of a discrete plant. Theorem 9.6.3.
 ///
@@ -20,6 +26,10 @@ namespace flyball {
 template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic, int Outputs = Eigen::Dynamic>
 class KalmanFilter {
  public:
+  static_assert(detail::has_definitions<detail::KalmanFilterDefinitions, States, Inputs, Outputs>,
+                "the library has no code for this size: #include "
+                "<flyball/estimation/kalman_filter.tpp> first");
+
   using Plant = DiscreteSystem<States, Inputs, Outputs>;
   using StateVector = Eigen::Matrix<double, States, 1>;
   using InputVector = Eigen::Matrix<double, Inputs, 1>;
@@ -47,10 +57,18 @@ class KalmanFilter {
   /// `largest_signal`
   ///          (P: its square) stays where it is.
   bool predict(const InputVector& u) noexcept;
+  /// A vector of another size.
+  template <class A>
+    requires wrong_size<A, InputVector>
+  bool predict(const Eigen::MatrixBase<A>&) = delete;
 
   /// Corrects with a measurement of now (9.22 to 9.24).
   /// @param y  The measurement. @param u  The input at the time of it; only D uses it.
   UpdateStatus update(const OutputVector& y, const InputVector& u) noexcept;
+  /// A vector of another size.
+  template <class A, class B>
+    requires(wrong_size<A, OutputVector> || wrong_size<B, InputVector>)
+  UpdateStatus update(const Eigen::MatrixBase<A>&, const Eigen::MatrixBase<B>&) = delete;
 
   [[nodiscard]] const StateVector& x_hat() const noexcept { return x_hat_; }
   [[nodiscard]] const StateMatrix& P() const noexcept { return P_; }

@@ -8,6 +8,8 @@ namespace flyball {
 
 namespace detail {
 
+struct KalmanFilterDefinitions {};
+
 /// What KalmanFilter::create asks of its arguments.
 [[nodiscard]] Expected<void> check_kalman_filter(const MatrixRef& A, const MatrixRef& B,
                                                  const MatrixRef& C, const MatrixRef& D,

@@ -1,8 +1,14 @@
 #pragma once
 
+#include <flyball/core/instantiated.hpp>
+#include <flyball/core/sizes.hpp>
 #include <flyball/estimation/kalman_gain.hpp>
 
 namespace flyball {
+
+namespace detail {
+struct ObserverDefinitions;  ///< Complete where the .tpp is included.
+}
 
 /// An observer with a constant gain: the Kalman filter after it has settled, without covariances.
 ///
@@ -13,6 +19,10 @@ namespace flyball {
 template <int States = Eigen::Dynamic, int Inputs = Eigen::Dynamic, int Outputs = Eigen::Dynamic>
 class Observer {
  public:
+  static_assert(
+      detail::has_definitions<detail::ObserverDefinitions, States, Inputs, Outputs>,
+      "the library has no code for this size: #include <flyball/estimation/observer.tpp> first");
+
   using Plant = DiscreteSystem<States, Inputs, Outputs>;
   using StateVector = Eigen::Matrix<double, States, 1>;
   using InputVector = Eigen::Matrix<double, Inputs, 1>;
@@ -30,9 +40,17 @@ class Observer {
   /// @return  Whether u was used and x_hat has moved: one that would grow beyond `largest_signal`
   ///          stays where it is.
   bool predict(const InputVector& u) noexcept;
+  /// A vector of another size.
+  template <class A>
+    requires wrong_size<A, InputVector>
+  bool predict(const Eigen::MatrixBase<A>&) = delete;
   /// Corrects; a measurement that is not finite, or that would take the estimate beyond
   /// `largest_signal`, is left out and answered with false.
   bool update(const OutputVector& y, const InputVector& u) noexcept;
+  /// A vector of another size.
+  template <class A, class B>
+    requires(wrong_size<A, OutputVector> || wrong_size<B, InputVector>)
+  bool update(const Eigen::MatrixBase<A>&, const Eigen::MatrixBase<B>&) = delete;
 
   [[nodiscard]] const StateVector& x_hat() const noexcept { return x_hat_; }
   [[nodiscard]] const Plant& plant() const noexcept { return plant_; }

@@ -5,6 +5,10 @@
 
 namespace flyball {
 
+namespace detail {
+struct ObserverDefinitions {};
+}  // namespace detail
+
 template <int States, int Inputs, int Outputs>
 bool Observer<States, Inputs, Outputs>::take(const StateVector& x_hat) noexcept {
   const bool usable = is_signal(x_hat);

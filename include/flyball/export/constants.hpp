@@ -3,12 +3,10 @@
 #include <string>
 #include <vector>
 
+#include <flyball/export/language.hpp>
 #include <flyball/mechanisms/mechanism_kind.hpp>
 
 namespace flyball::exports {
-
-/// A language that robot code is written in.
-enum class Language { cpp, java };
 
 /// Gains in the unit that another tool wants, per output unit named by `per`.
 struct UnitGains {

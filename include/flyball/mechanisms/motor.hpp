@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <vector>
 
 #include <flyball/core/expected.hpp>
 #include <flyball/core/quantity.hpp>
@@ -59,7 +60,11 @@ struct DcMotor {
 [[nodiscard]] Expected<DcMotor> motor(std::string_view name, const MotorDatasheet& datasheet,
                                       int count = 1);
 
-/// A motor of the table by name; case, spaces and punctuation do not matter ("krakenX60foc").
+/// The table's motors of whose name, or one of its other names, the text is a part ("kraken").
+[[nodiscard]] std::vector<std::string_view> motors_like(std::string_view part);
+
+/// A motor of the table by name; case, spaces and punctuation do not matter ("krakenX60foc"). Words
+/// that only one motor has are enough ("vortex"), parts of words are not: "NEO 5" is no NEO 550.
 /// @errors ArgumentError::unknown_name with the nearest name, ambiguous_name with the candidates
 ///         ("kraken" fits four), out_of_range (count < 1).
 [[nodiscard]] Expected<DcMotor> motor(std::string_view name, int count = 1);

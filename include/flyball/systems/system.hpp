@@ -66,6 +66,15 @@ template <int States, int Inputs, int Outputs>
   return check_system(system.A, system.B, system.C, system.D, where);
 }
 
+/// The same, and a static gain, y = D u of no states, is a system, too.
+[[nodiscard]] Expected<void> check_system_or_gain(const MatrixRef& A, const MatrixRef& B,
+                                                  const MatrixRef& C, const MatrixRef& D,
+                                                  std::string_view where);
+[[nodiscard]] Expected<void> check_system_or_gain(const ContinuousSystem<>& system,
+                                                  std::string_view where);
+[[nodiscard]] Expected<void> check_system_or_gain(const DiscreteSystem<>& system,
+                                                  std::string_view where);
+
 /// As for a continuous system; the period must be positive.
 template <int States, int Inputs, int Outputs>
 [[nodiscard]] Expected<void> check_system(const DiscreteSystem<States, Inputs, Outputs>& system,

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <flyball/export/generated_header.hpp>
+#include <flyball/export/generated_loop.hpp>
 #include <flyball/study/design_exports.hpp>
 #include <flyball/study/project.hpp>
 #include <flyball/study/simulate_design.hpp>
@@ -181,12 +181,15 @@ void add_design_files(Answer& answer, const DesignResult& result,
                       const identification::FeedforwardFit* fit) {
   const PlantDescription& plant = result.job.plant;
   answer.files.push_back({"gains.toml", gains_toml(result, fit)});
-  const std::string name = exports::header_class_name(plant.kind);
-  if (auto header = exports::generate_header(controller_of(result), name, plant.unit)) {
-    answer.files.push_back({name + ".hpp", *std::move(header)});
-  } else {
-    answer.document.sections.back().blocks.emplace_back(
-        Paragraph{"No C++ header: " + to_string(header.error()) + ".", Tone::bad});
+  const std::string name = exports::loop_class_name(plant.kind);
+  for (const exports::Language language : exports::languages) {
+    auto loop = exports::generate_loop(controller_of(result), language, name, plant.unit);
+    if (!loop) {
+      answer.document.sections.back().blocks.emplace_back(
+          Paragraph{"No source of the loop: " + to_string(loop.error()) + ".", Tone::bad});
+      break;
+    }
+    answer.files.push_back({exports::loop_file_name(language, name), *std::move(loop)});
   }
   for (const exports::PasteText& paste : exports::paste_constants(constants_of(result))) {
     answer.files.push_back({paste.file, paste.text});

@@ -347,8 +347,24 @@ Section motion_section(const DesignResult& result) {
 
 Section constants_section(const DesignResult& result) {
   Section section{"constants", "Constants to paste", {}};
-  for (const exports::PasteText& paste : exports::paste_constants(constants_of(result))) {
+  const std::vector<exports::PasteText> all = exports::paste_constants(constants_of(result));
+  for (const exports::PasteText& paste : all) {
     section.blocks.emplace_back(Code{paste.title, paste.text, paste.file});
+  }
+  const PlantDescription& plant = result.job.plant;
+  const bool per_rotation =
+      std::any_of(all.begin(), all.end(), [](const exports::PasteText& paste) {
+        return paste.file.find("revlib") != std::string::npos;
+      });
+  if (!per_rotation) {
+    const bool drum = plant.unit == "m";
+    section.blocks.emplace_back(Paragraph{
+        fmt::format("Phoenix 6 and REVLib count rotations, which {} would tell: put gearing{} into "
+                    "gains.toml beside this page, [mechanism], and design again with it: flyball "
+                    "design gains.toml (or flyball tune LOG gains.toml).",
+                    drum ? "the gearing and the drum's radius" : "the gearing",
+                    drum ? " = 10.0 and drum_radius = \"1 in\"" : " = 10.0"),
+        Tone::quiet});
   }
   return section;
 }

@@ -1,4 +1,4 @@
-// error: no matching function
+// error: (use of deleted function|invokes a deleted function|call to deleted|deleted constructor)
 #include <flyball/systems/discretize.hpp>
 
 using namespace flyball::literals;

@@ -1,4 +1,4 @@
-// error: no conversion
+// error: (use of deleted function|invokes a deleted function|call to deleted|deleted constructor)
 #include <flyball/core/quantity.hpp>
 
 using namespace flyball::literals;
