@@ -42,6 +42,10 @@ std::string type_of(const Field& field) {
       return fmt::format("list of {} complex numbers", shape);
     case FieldType::matrices:
       return fmt::format("list of matrices, {}", shape);
+    case FieldType::record:
+    case FieldType::records:
+      return fmt::format("{}{}", field.type == FieldType::records ? "list of, each with " : "",
+                         fmt::join(text::split(field.choices, " "), ", "));
     case FieldType::system:
       return fmt::format("system of {}", shape);
   }

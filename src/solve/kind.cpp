@@ -48,6 +48,7 @@ std::span<const Kind> kinds() {
     add("Matrix equations and functions", matrix_equation_kinds());
     add("Systems", system_kinds());
     add("Responses", response_kinds());
+    add("Transfer functions", transfer_function_kinds());
     add("Realizations", realization_kinds());
     add("Interconnections", interconnection_kinds());
     add("Regulators", regulator_kinds());

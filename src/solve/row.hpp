@@ -64,6 +64,15 @@ constexpr Field matrices(std::string_view name, std::string_view rows, std::stri
   return {
       .name = name, .type = FieldType::matrices, .rows = rows, .columns = columns, .help = help};
 }
+/// @param names  Of its numbers, separated by spaces. They may be null where there is none.
+constexpr Field record(std::string_view name, std::string_view names, std::string_view help) {
+  return {
+      .name = name, .type = FieldType::record, .help = help, .choices = names, .unbounded = true};
+}
+constexpr Field records(std::string_view name, std::string_view names, std::string_view help) {
+  return {
+      .name = name, .type = FieldType::records, .help = help, .choices = names, .unbounded = true};
+}
 constexpr Field system(std::string_view name, std::string_view states, std::string_view inputs,
                        std::string_view outputs, std::string_view help) {
   return {.name = name,
@@ -163,6 +172,7 @@ template <class Function>
 [[nodiscard]] std::vector<Kind> matrix_equation_kinds();
 [[nodiscard]] std::vector<Kind> system_kinds();
 [[nodiscard]] std::vector<Kind> response_kinds();
+[[nodiscard]] std::vector<Kind> transfer_function_kinds();
 [[nodiscard]] std::vector<Kind> realization_kinds();
 [[nodiscard]] std::vector<Kind> interconnection_kinds();
 [[nodiscard]] std::vector<Kind> regulator_kinds();

@@ -50,6 +50,18 @@ Json type_of(const Field& field, bool problem) {
                              : reference("complex"));
     case FieldType::matrices:
       return list_of(reference("matrix"));
+    case FieldType::record:
+    case FieldType::records: {
+      Json properties = Json::object();
+      for (const std::string_view name : text::split(field.choices, " ")) {
+        properties[std::string(name)] = reference("number");
+      }
+      Json record = {{"type", "object"},
+                     {"properties", std::move(properties)},
+                     {"required", text::split(field.choices, " ")},
+                     {"additionalProperties", false}};
+      return field.type == FieldType::record ? record : list_of(std::move(record));
+    }
     case FieldType::system:
       return reference("system");
   }
@@ -90,7 +102,8 @@ std::string json_schema() {
   const Json matrix = any_of(reference("matrix"), reference("number"));
   Json system = {{"type", "object"},
                  {"properties", {{"A", matrix}, {"B", matrix}, {"C", matrix}, {"D", matrix}}},
-                 {"required", Json::array({"A", "B"})},
+                 {"anyOf", Json::array({{{"required", Json::array({"A", "B"})}},
+                                        {{"required", Json::array({"D"})}}})},
                  {"additionalProperties", false}};
   Json definitions = {
       {"number", any_of({{"type", "number"}}, {{"enum", Json::array({"inf", "-inf", nullptr})}})},

@@ -74,6 +74,12 @@ bool is_as_told(const Json& value, const Field& field, Letters& letters) {
       return value.is_string();
     case FieldType::matrix:
       return is_matrix(value, field, letters);
+    case FieldType::record:
+      return value.is_object();
+    case FieldType::records:
+      return value.is_array() && std::all_of(value.begin(), value.end(), [](const Json& one) {
+               return one.is_object() && !one.empty();
+             });
     case FieldType::list:
       return value.is_array() && letters.fits(std::string(field.rows), value.size()) &&
              std::all_of(value.begin(), value.end(), is_number);

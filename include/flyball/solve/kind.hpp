@@ -27,6 +27,8 @@ enum class FieldType {
   list,          ///< [1, 2, 3]
   complex_list,  ///< [[-1, 2], [-1, -2]]; of a problem also -1, which is real.
   matrices,      ///< A list of matrices.
+  record,        ///< Of an answer: numbers by name, {"w": 1.5, "gm": 3}; `choices` are the names.
+  records,       ///< A list of such.
   system,        ///< {"A": …, "B": …, "C": …, "D": …}; C left out is the identity, D zero.
 };
 

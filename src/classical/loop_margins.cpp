@@ -1,0 +1,390 @@
+#include <flyball/classical/loop_margins.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include <flyball/math/search/roots.hpp>
+#include <flyball/systems/system_error.hpp>
+
+#include "classical/polynomial.hpp"
+#include "core/try.hpp"
+
+namespace flyball::classical {
+
+namespace {
+
+using detail::plus;
+using detail::Polynomial;
+using detail::times;
+using Eigen::Index;
+using Eigen::VectorXd;
+using Complex = std::complex<double>;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double pi = std::numbers::pi;
+
+tl::unexpected<Error> no_convergence() {
+  return refusal(SystemError::no_convergence, "margins", "a polynomial's roots")
+      .got("not found: the iteration for the eigenvalues of its companion matrix did not end");
+}
+
+/// x p(x).
+Polynomial shifted(const Polynomial& p) {
+  Polynomial more = Polynomial::zero(p.rows() + 1, 1);
+  more.hi.topRows(p.rows()) = p.hi;
+  more.lo.topRows(p.rows()) = p.lo;
+  return more;
+}
+
+double at(const Polynomial& p, double x) {
+  return detail::value(p.rounded(), x).real();
+}
+
+/// |p(jω)|² as a polynomial in x = ω².
+Polynomial square(const detail::OnTheAxis& p) {
+  return plus(times(p.even, p.even), 1.0, shifted(times(p.odd, p.odd)));
+}
+
+/// d arg p(jω)/dω |p(jω)|², in x.
+Polynomial turning(const detail::OnTheAxis& p) {
+  const Polynomial inner = plus(p.odd, 2.0, shifted(detail::derivative(p.odd)));
+  return plus(times(p.even, inner), -2.0, shifted(times(p.odd, detail::derivative(p.even))));
+}
+
+/// A transfer function on the border of stability, in x: of a discrete one x = tan²(ωT/2).
+class Border {
+ public:
+  explicit Border(const TransferFunction& loop) : loop_(loop) {
+    num_ = detail::polynomial(loop.num());
+    den_ = detail::polynomial(loop.den());
+    if (loop.period()) {
+      // Its delay is poles at z = 0.
+      const auto periods = static_cast<Index>(std::lround(loop.delay() / loop.period()->si()));
+      for (Index i = 0; i < periods; ++i) {
+        den_ = shifted(den_);
+      }
+      const Index degree = den_.rows() - 1;
+      num_ = detail::bilinear(num_, degree);
+      den_ = detail::bilinear(den_, degree);
+    }
+    n_ = detail::on_the_axis(num_);
+    d_ = detail::on_the_axis(den_);
+  }
+
+  [[nodiscard]] const Polynomial& num() const { return num_; }
+  [[nodiscard]] const Polynomial& den() const { return den_; }
+  [[nodiscard]] const detail::OnTheAxis& n() const { return n_; }
+  [[nodiscard]] const detail::OnTheAxis& d() const { return d_; }
+  [[nodiscard]] Polynomial gain_above() const { return square(n_); }
+  [[nodiscard]] Polynomial gain_below() const { return square(d_); }
+
+  /// rad/s
+  [[nodiscard]] double frequency(double x) const {
+    return loop_.period() ? 2.0 * std::atan(std::sqrt(x)) / loop_.period()->si() : std::sqrt(x);
+  }
+  /// Of the rational part.
+  [[nodiscard]] double phase(double x) const {
+    const double w = std::sqrt(x);
+    return std::arg(Complex(at(n_.even, x), w * at(n_.odd, x))) -
+           std::arg(Complex(at(d_.even, x), w * at(d_.odd, x)));
+  }
+  [[nodiscard]] double gain(double x) const {
+    const double w = std::sqrt(x);
+    return std::abs(Complex(at(n_.even, x), w * at(n_.odd, x))) /
+           std::abs(Complex(at(d_.even, x), w * at(d_.odd, x)));
+  }
+  /// s, of a continuous one: what is not in the polynomials.
+  [[nodiscard]] double delay() const { return loop_.period() ? 0.0 : loop_.delay(); }
+
+ private:
+  const TransferFunction& loop_;
+  Polynomial num_;
+  Polynomial den_;
+  detail::OnTheAxis n_;
+  detail::OnTheAxis d_;
+};
+
+/// In (-180, 180].
+double wrapped(double degrees) {
+  const double turned = std::remainder(degrees, 360.0);
+  return turned == -180.0 ? 180.0 : turned;
+}
+
+/// The largest of a(x)/b(x) over x >= 0 and at infinity.
+Expected<std::pair<double, double>> largest_ratio(const Polynomial& a, const Polynomial& b) {
+  const Polynomial slope =
+      plus(times(detail::derivative(a), b), -1.0, times(a, detail::derivative(b)));
+  auto places = detail::positive_roots(slope);
+  const auto poles = detail::positive_roots(b);
+  if (!places || !poles) {
+    return no_convergence();
+  }
+  double best = -1.0;
+  double where = 0.0;
+  const auto take = [&](double x, double value) {
+    if (value > best) {
+      best = value;
+      where = x;
+    }
+  };
+  const double zero = at(b, 0.0);
+  take(0.0, zero != 0.0 ? at(a, 0.0) / zero : at(a, 0.0) != 0.0 ? infinity : 0.0);
+  for (const double x : *places) {
+    const double below = at(b, x);
+    const double above = at(a, x);
+    // Where both vanish the slope does, too, and says nothing.
+    take(x, below > 0.0 ? above / below : 0.0);
+  }
+  for (const double x : *poles) {
+    const double above = at(a, x);
+    const VectorXd sizes = a.rounded().cwiseAbs();
+    if (above > 1e-12 * detail::value(sizes, x).real()) {
+      take(x, infinity);
+    }
+  }
+  const Polynomial p = detail::trimmed(a);
+  const Polynomial q = detail::trimmed(b);
+  take(infinity, p.rows() < q.rows()   ? 0.0
+                 : p.rows() > q.rows() ? infinity
+                                       : p.hi(0, 0) / q.hi(0, 0));
+  return std::pair(best, where);
+}
+
+/// Unstable roots of a closed loop's denominator, those on the border included.
+Expected<int> unstable_roots(const TransferFunction& loop) {
+  Polynomial den = detail::polynomial(loop.den());
+  if (loop.period()) {
+    const auto periods = static_cast<Index>(std::lround(loop.delay() / loop.period()->si()));
+    for (Index i = 0; i < periods; ++i) {
+      den = shifted(den);
+    }
+  }
+  const Polynomial closed = plus(den, 1.0, detail::polynomial(loop.num()));
+  const auto roots = detail::roots(closed);
+  if (!roots) {
+    return no_convergence();
+  }
+  int count = 0;
+  for (const Complex& root : *roots) {
+    count += (loop.period() ? std::abs(root) >= 1.0 : root.real() >= 0.0) ? 1 : 0;
+  }
+  // A root at infinity: 1 + L(∞) = 0.
+  return count + static_cast<int>(den.rows() - detail::trimmed(closed).rows());
+}
+
+Expected<std::vector<double>> phase_places(const Border& border) {
+  const auto& n = border.n();
+  const auto& d = border.d();
+  if (border.delay() == 0.0) {
+    // Im(N D*) = ω (No De - Ne Do).
+    const auto places =
+        detail::positive_roots(plus(times(n.odd, d.even), -1.0, times(n.even, d.odd)));
+    if (!places) {
+      return no_convergence();
+    }
+    return *places;
+  }
+  // f(ω) = arg L - ωT is monotone between the roots of f'.
+  const Polynomial above = border.gain_above();
+  const Polynomial below = border.gain_below();
+  Polynomial slope = plus(times(turning(n), below), -1.0, times(turning(d), above));
+  slope = plus(slope, -border.delay(), times(above, below));
+  const auto stationary = detail::positive_roots(slope);
+  if (!stationary) {
+    return no_convergence();
+  }
+  double fastest = 1.0 / border.delay();
+  for (const Polynomial* p : {&border.num(), &border.den()}) {
+    const auto roots = detail::roots(*p);
+    if (!roots) {
+      return no_convergence();
+    }
+    for (const Complex& root : *roots) {
+      fastest = std::max(fastest, std::abs(root));
+    }
+  }
+  const double end = 10.0 * fastest;
+  std::vector<double> bounds{1e-9 * end / 10.0};
+  for (const double x : *stationary) {
+    const double w = std::sqrt(x);
+    if (w > bounds.front() && w < end) {
+      bounds.push_back(w);
+    }
+  }
+  bounds.push_back(end);
+  std::sort(bounds.begin(), bounds.end());
+  // The phase without jumps: between neighbours it turns by less than half a turn at a time.
+  const auto rational = [&](double w) { return border.phase(w * w); };
+  std::vector<double> places;
+  for (std::size_t i = 0; i + 1 < bounds.size(); ++i) {
+    constexpr int parts = 400;
+    double a = bounds[i];
+    double before = rational(a) - a * border.delay();
+    const double ratio = std::pow(bounds[i + 1] / a, 1.0 / parts);
+    for (int part = 0; part < parts; ++part) {
+      const double b = part + 1 == parts ? bounds[i + 1] : a * ratio;
+      const double turned =
+          std::remainder(rational(b) - rational(a), 2.0 * pi) - (b - a) * border.delay();
+      const double after = before + turned;
+      const double low = std::min(before, after);
+      const double high = std::max(before, after);
+      for (double level = pi + 2.0 * pi * std::ceil((low - pi) / (2.0 * pi)); level <= high;
+           level += 2.0 * pi) {
+        const double from = rational(a);
+        const double start = before;
+        const auto root = find_root(
+            [&](double w) {
+              return start + std::remainder(rational(w) - from, 2.0 * pi) -
+                     (w - a) * border.delay() - level;
+            },
+            a, b);
+        if (root) {
+          places.push_back(root->x * root->x);
+        }
+      }
+      before = after;
+      a = b;
+    }
+  }
+  std::sort(places.begin(), places.end());
+  return places;
+}
+
+}  // namespace
+
+Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
+  LoopMargins margins;
+  const Border border(loop);
+  const Polynomial above = border.gain_above();
+  const Polynomial below = border.gain_below();
+  const Polynomial difference = plus(above, -1.0, below);
+  const auto unit_gain = detail::positive_roots(difference);
+  if (!unit_gain) {
+    return no_convergence();
+  }
+  const Polynomial steepness = detail::derivative(difference);
+  FLYBALL_TRY(margins.unstable_poles, unstable_roots(loop));
+  double further = infinity;
+  for (const double x : *unit_gain) {
+    const double w = border.frequency(x);
+    const double rational = border.phase(x) * 180.0 / pi;
+    const double margin = wrapped(180.0 + rational - w * border.delay() * 180.0 / pi);
+    margins.gain_crossings.push_back({w, margin});
+    // Roots cross the axis at w when the delay is (φ + 2πk)/w, rightwards where |L| falls.
+    const double turn = std::fmod(180.0 + rational + 720.0, 360.0) * pi / 180.0;
+    const int direction = at(steepness, x) < 0.0 ? 2 : -2;
+    if (border.delay() > 0.0 && border.delay() * w > turn) {
+      const double crossings = std::floor((border.delay() * w - turn) / (2.0 * pi)) + 1.0;
+      margins.unstable_poles += direction * static_cast<int>(crossings);
+    }
+    const double ahead = margin > 0.0 ? margin : margin + 360.0;
+    further = std::min(further, ahead * pi / 180.0 / w);
+  }
+  margins.stable = margins.unstable_poles == 0;
+  margins.delay_margin = margins.stable ? further : 0.0;
+
+  FLYBALL_TRY(const auto places, phase_places(border));
+  for (const double x : places) {
+    const double gain = border.gain(x);
+    const double w = border.frequency(x);
+    const double turned = border.phase(x) - w * border.delay();
+    if (std::cos(turned) < 0.0 && gain > 0.0 && std::isfinite(gain)) {
+      margins.phase_crossings.push_back({w, 1.0 / gain});
+    }
+  }
+  if (loop.period()) {
+    const Complex end = loop.response(pi / loop.period()->si());
+    if (end.real() < 0.0 && std::isfinite(end.real())) {
+      margins.phase_crossings.push_back({pi / loop.period()->si(), 1.0 / std::abs(end.real())});
+    }
+  }
+  for (const PhaseCrossing& crossing : margins.phase_crossings) {
+    const auto off = [](double gain) { return std::abs(std::log(gain)); };
+    if (!margins.gain_margin || off(crossing.gain_margin) < off(*margins.gain_margin)) {
+      margins.gain_margin = crossing.gain_margin;
+    }
+  }
+  for (const GainCrossing& crossing : margins.gain_crossings) {
+    if (!margins.phase_margin ||
+        std::abs(crossing.phase_margin) < std::abs(*margins.phase_margin)) {
+      margins.phase_margin = crossing.phase_margin;
+    }
+  }
+
+  if (border.delay() == 0.0) {
+    const auto closed = detail::on_the_axis(plus(border.den(), 1.0, border.num()));
+    const auto opposite = detail::on_the_axis(plus(border.den(), -1.0, border.num()));
+    FLYBALL_TRY(const auto sensitivity, largest_ratio(below, square(closed)));
+    margins.sensitivity = {std::sqrt(sensitivity.first), border.frequency(sensitivity.second)};
+    FLYBALL_TRY(const auto spread, largest_ratio(square(opposite), square(closed)));
+    margins.disk_margin = margins.stable ? 2.0 / std::sqrt(spread.first) : 0.0;
+    return margins;
+  }
+  // With a delay on a grid that follows its turns, refined at the tops.
+  const auto refined = [&](auto&& gain) {
+    Peak peak;
+    double end = 10.0 / border.delay();
+    for (const GainCrossing& crossing : margins.gain_crossings) {
+      end = std::max(end, 10.0 * crossing.frequency);
+    }
+    const double begin = 1e-6 * end;
+    std::vector<double> grid;
+    const double turns = 0.02 / border.delay();
+    for (double w = begin; w < end && grid.size() < 200'000; w += std::min(0.002 * w, turns)) {
+      grid.push_back(w);
+    }
+    for (std::size_t i = 0; i < grid.size(); ++i) {
+      const double value = gain(grid[i]);
+      if (value > peak.value) {
+        peak = {value, grid[i]};
+      }
+    }
+    const double step = std::min(0.002 * peak.frequency, turns);
+    double low = std::max(begin, peak.frequency - step);
+    double high = peak.frequency + step;
+    constexpr double golden = 0.3819660112501051;
+    for (int i = 0; i < 80; ++i) {
+      const double a = low + golden * (high - low);
+      const double b = high - golden * (high - low);
+      (gain(a) > gain(b) ? high : low) = gain(a) > gain(b) ? b : a;
+    }
+    const double w = 0.5 * (low + high);
+    return gain(w) > peak.value ? Peak{gain(w), w} : peak;
+  };
+  margins.sensitivity = refined([&](double w) { return 1.0 / std::abs(1.0 + loop.response(w)); });
+  const Peak spread = refined([&](double w) {
+    const Complex L = loop.response(w);
+    return std::abs((1.0 - L) / (1.0 + L));
+  });
+  margins.disk_margin = margins.stable ? 2.0 / spread.value : 0.0;
+  return margins;
+}
+
+Expected<std::optional<double>> bandwidth(const TransferFunction& transfer, double factor) {
+  const double dc = std::abs(transfer.dc_gain());
+  if (!(dc > 0.0) || !std::isfinite(dc)) {
+    return std::nullopt;
+  }
+  const Border border(transfer);
+  const double level = factor * dc;
+  const Polynomial bound =
+      times(border.gain_below(), detail::polynomial(VectorXd::Constant(1, level * level)));
+  const auto places = detail::positive_roots(plus(border.gain_above(), -1.0, bound));
+  if (!places) {
+    return no_convergence();
+  }
+  if (places->empty()) {
+    return std::nullopt;
+  }
+  return std::optional(border.frequency(places->front()));
+}
+
+Expected<Peak> peak_gain(const TransferFunction& transfer) {
+  const Border border(transfer);
+  FLYBALL_TRY(const auto found, largest_ratio(border.gain_above(), border.gain_below()));
+  return Peak{std::sqrt(found.first), border.frequency(found.second)};
+}
+
+}  // namespace flyball::classical
