@@ -210,11 +210,12 @@ bool LandmarkFilter::predict(double time) noexcept {
 
 Correction<2> LandmarkFilter::sighting(double time, const Vector2d& landmark, double range,
                                        double bearing) noexcept {
-  predict(time);
   Correction<2> result;
-  if (!is_signal(landmark) || !is_signal(range) || !is_signal(bearing) || !(range > 0.0)) {
+  if (!is_signal(time) || !is_signal(landmark) || !is_signal(range) || !is_signal(bearing) ||
+      !(range > 0.0)) {
     return result;
   }
+  predict(time);
   const Calibration known = estimate_.x_hat().get<2>();
   const double direction = (bearing - known(8)) / (1.0 + known(7));
   const double depth =

@@ -1,5 +1,6 @@
 #include <flyball/estimation/localization/landmark_log.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -44,6 +45,17 @@ Refusal bad_row(ArgumentError code, std::string_view list, std::size_t row, std:
   return refusal(code, where, detail::format("{} {}", list, row + 1))
       .got(std::move(got))
       .expected(std::move(expected));
+}
+
+/// Of a robot's drive; a time that is farther off is another clock's.
+constexpr double longest_pause = 3600.0;  // s
+
+Refusal bad_clock(std::string_view list, std::size_t row, double time, double off,
+                  std::string_view from) {
+  return bad_row(ArgumentError::out_of_range, list, row,
+                 detail::format("at {} s, {:.4g} s from {}", time, off, from),
+                 "within an hour of it")
+      .hint("look for a clock that was set, for two clocks, or for milliseconds");
 }
 
 Expected<void> check_times(double before, double time, std::string_view list, std::size_t row) {
@@ -93,6 +105,9 @@ Expected<void> check_landmark_log(const LandmarkLog& log, const LandmarkOptions&
   for (std::size_t i = 0; i < log.odometry.size(); ++i) {
     const OdometrySample& sample = log.odometry[i];
     FLYBALL_CHECK(check_times(before, sample.time, "odometry row", i));
+    if (i > 0 && sample.time - before > longest_pause) {
+      return bad_clock("odometry row", i, sample.time, sample.time - before, "the row before");
+    }
     if (!std::isfinite(sample.velocity) || !std::isfinite(sample.turn_rate)) {
       return bad_row(ArgumentError::not_finite, "odometry row", i, "a rate that is not finite",
                      "m/s and rad/s");
@@ -108,6 +123,14 @@ Expected<void> check_landmark_log(const LandmarkLog& log, const LandmarkOptions&
   for (std::size_t i = 0; i < log.sightings.size(); ++i) {
     const Sighting& sighting = log.sightings[i];
     FLYBALL_CHECK(check_times(before, sighting.time, "sighting", i));
+    const bool alone = log.odometry.empty();
+    const double first = alone ? (i > 0 ? before : sighting.time) : log.odometry.front().time;
+    const double last = alone ? first : log.odometry.back().time;
+    const double off = std::max(first - sighting.time, sighting.time - last);
+    if (off > longest_pause) {
+      return bad_clock("sighting", i, sighting.time, off,
+                       alone ? "the one before" : "the odometry");
+    }
     before = sighting.time;
     if (sighting.landmark >= log.landmarks.size()) {
       return bad_row(ArgumentError::out_of_range, "sighting", i,

@@ -66,8 +66,10 @@ Expected<FilteredLandmarks> filter_landmarks(const LandmarkLog& log, const Landm
   FilteredLandmarks result;
   std::size_t odometry = 0;
   std::size_t sighting = 0;
-  if (start) {
-    filter.reset(*start);
+  if (start && !filter.reset(*start)) {
+    return refusal(ArgumentError::not_finite, "filter_landmarks", "the pose at the start")
+        .got("an entry that is NaN, infinite or beyond 1e100")
+        .expected("m and rad");
   }
   const auto take_until = [&](double time) {
     constexpr double never = std::numeric_limits<double>::infinity();

@@ -35,12 +35,21 @@ class Drive {
                 filter_landmarks(log_, options_, node_times_, start_));
     poses_ = filtered.path.pose;
     node_times_ = filtered.path.time;  // From the first at which there is a pose.
+    if (node_times_.size() < (start_ ? 1U : 2U)) {
+      return refusal(LocalizationError::too_few_sightings, "smooth_landmarks", "the sightings")
+          .got("those from which a pose follows end the log")
+          .expected("a drive that goes on after them");
+    }
     errors_.assign(node_times_.size(), Errors::Zero());
     calibration_ = filtered.calibration.vector();
     SmoothedLandmarks result;
     result.used.resize(log_.sightings.size());
     for (std::size_t i = 0; i < log_.sightings.size(); ++i) {
       result.used[i] = filtered.weight[i] > 0.0 && log_.sightings[i].time >= node_times_.front();
+    }
+    if (!start_ && std::count(result.used.begin(), result.used.end(), true) == 0) {
+      measure(result);  // Those that told the filter's first pose.
+      take_in(result);
     }
     // The odometry is linearised in the delay, and sightings come in that fit the result.
     constexpr int most_rounds = 4;
@@ -223,10 +232,11 @@ class Drive {
       if (time < node_times_.front() || time > node_times_.back()) {
         continue;
       }
-      const std::size_t after = std::max<std::size_t>(node_of(time), 1);
-      const std::size_t before = after - 1;
-      const double share =
-          (time - node_times_[before]) / (node_times_[after] - node_times_[before]);
+      const std::size_t after =
+          std::min<std::size_t>(std::max<std::size_t>(node_of(time), 1), node_times_.size() - 1);
+      const std::size_t before = after == 0 ? 0 : after - 1;
+      const double apart = node_times_[after] - node_times_[before];
+      const double share = apart > 0.0 ? (time - node_times_[before]) / apart : 0.0;
       result.path.time.push_back(time);
       result.path.pose.push_back(
           poses_[before].interpolate(poses_[after], std::clamp(share, 0.0, 1.0)));

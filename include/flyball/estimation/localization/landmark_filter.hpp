@@ -40,7 +40,8 @@ class LandmarkFilter {
   /// Goes on to a time. @return  Whether it did: times before that of now are left out.
   bool predict(double time) noexcept;
   /// What a sighting did. @param landmark  Where the landmark is, m. @param time  s; a sighting
-  /// before the filter's time counts as one of now.
+  /// before the filter's time counts as one of now, one after it predicts. What is not finite
+  /// changes nothing.
   Correction<2> sighting(double time, const Eigen::Vector2d& landmark, double range,
                          double bearing) noexcept;
 

@@ -112,9 +112,9 @@ struct LandmarkOptions {
 };
 
 /// The log and the options make sense together.
-/// @errors ArgumentError: not_finite, unordered times, an unknown landmark, a range that is not
-///         positive, a bearing beyond ±2π, a standard deviation that is not positive; each with the
-///         row.
+/// @errors ArgumentError: not_finite, unordered times, an hour between two rows of odometry or
+///         between a sighting and the odometry, an unknown landmark, a range that is not positive,
+///         a bearing beyond ±2π, a standard deviation that is not positive; each with the row.
 [[nodiscard]] Expected<void> check_landmark_log(const LandmarkLog& log,
                                                 const LandmarkOptions& options);
 
