@@ -7,7 +7,10 @@
 #include <vector>
 
 #include <flyball/math/exponential/matrix_exponential.hpp>
+#include <flyball/systems/system_error.hpp>
 
+#include "classical/polynomial.hpp"
+#include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
@@ -22,43 +25,128 @@ using Complex = std::complex<double>;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-/// y(t) = final + C e^{At} x(0), walked along in steps, exact at their ends.
-class Transient {
+/// What poles of like size add to a step response: C e^{At} x(0), exact at the ends of steps.
+class Part {
  public:
-  Transient(const ContinuousSystem<>& system, const VectorXd& start, double final_value)
-      : A_(system.A), C_(system.C), x_(start), final_(final_value) {}
+  /// @param transfer  Strictly proper and stable. @param fastest, slowest  |p| and -Re p.
+  Part(const TransferFunction& transfer, double fastest, double slowest)
+      : system_(transfer.to_state_space()),
+        // From rest to the final state: A⁻¹B is what is still missing, turned round.
+        x_(flyball::detail::solve_linear(system_.A, system_.B)),
+        fastest_(fastest),
+        slowest_(slowest) {}
 
-  [[nodiscard]] double value() const { return final_ + (C_ * x_)(0); }
-  [[nodiscard]] double time() const { return time_; }
+  [[nodiscard]] double value() const { return (system_.C * x_)(0); }
   [[nodiscard]] const VectorXd& state() const { return x_; }
-
-  /// @param propagator  e^{A step}.
-  void advance(const MatrixXd& propagator, double step) {
-    x_ = propagator * x_;
-    time_ += step;
+  [[nodiscard]] double fastest() const { return fastest_; }
+  /// Whether it is rounding of what it began with.
+  [[nodiscard]] bool is_over(double time) const {
+    return slowest_ * time > 40.0 + 6.0 * static_cast<double>(x_.size());
   }
+  [[nodiscard]] Expected<void> set_step(double step) {
+    FLYBALL_TRY(propagator_, expm(system_.A * step));
+    return {};
+  }
+  void advance() { x_ = propagator_ * x_; }
+  void end() { x_.setZero(); }
 
-  /// y and dy/dt a little after a state, by the exponential's series: ‖A h‖ is below one.
+  /// y and dy/dt a little after a state, by the exponential's series.
   [[nodiscard]] std::pair<double, double> after(const VectorXd& x, double h) const {
     VectorXd term = x;
     VectorXd sum = x;
-    for (int k = 1; k <= 40; ++k) {
-      term = (A_ * term * (h / k)).eval();
+    for (int k = 1; k <= 60; ++k) {
+      term = (system_.A * term * (h / k)).eval();
       sum += term;
       if (term.cwiseAbs().maxCoeff() <= 1e-18 * sum.cwiseAbs().maxCoeff()) {
         break;
       }
     }
-    return {final_ + (C_ * sum)(0), (C_ * (A_ * sum))(0)};
+    return {(system_.C * sum)(0), (system_.C * (system_.A * sum))(0)};
   }
 
  private:
-  const MatrixXd& A_;
-  const MatrixXd& C_;
+  ContinuousSystem<> system_;
   VectorXd x_;
-  double final_;
-  double time_ = 0.0;
+  MatrixXd propagator_{};
+  double fastest_;
+  double slowest_;
 };
+
+/// The strictly proper part of G as a sum of parts whose poles are of like size, so that fast ones
+/// can be left out once they are over and slow ones are not lost beside them.
+Expected<std::vector<Part>> parts_of(const TransferFunction& transfer,
+                                     const Eigen::VectorXcd& poles) {
+  using detail::Polynomial;
+  constexpr double apart = 10.0;
+  std::vector<Complex> sorted(poles.begin(), poles.end());
+  std::sort(sorted.begin(), sorted.end(),
+            [](const Complex& a, const Complex& b) { return std::abs(a) < std::abs(b); });
+  std::vector<std::vector<Complex>> groups;
+  for (const Complex& pole : sorted) {
+    if (groups.empty() || std::abs(pole) > apart * std::abs(groups.back().back())) {
+      groups.emplace_back();
+    }
+    groups.back().push_back(pole);
+  }
+  std::vector<Polynomial> dens;
+  for (const auto& group : groups) {
+    FLYBALL_TRY(const auto of_group,
+                TransferFunction::from_zeros(
+                    Eigen::VectorXcd(0),
+                    Eigen::Map<const Eigen::VectorXcd>(group.data(),
+                                                       static_cast<Index>(group.size())),
+                    1.0));
+    dens.push_back(detail::polynomial(of_group.den()));
+  }
+  // Σ N_g Π_{h≠g} D_h = R: the unknown coefficients of all N_g, in 31 digits.
+  const Index n = poles.size();
+  VectorXd scaled = VectorXd::Zero(n + 1);
+  scaled.tail(transfer.num().size()) = transfer.num();
+  const Polynomial den = detail::polynomial(transfer.den());
+  Polynomial rest = detail::polynomial(scaled);
+  const double feedthrough = scaled(0) / transfer.den()(0);
+  rest = detail::plus(rest, -1.0,
+                      detail::times(detail::polynomial(VectorXd::Constant(1, feedthrough)), den));
+  Polynomial matrix = Polynomial::zero(n, n);
+  Polynomial right = Polynomial::zero(n, 1);
+  right.hi = rest.hi.bottomRows(n) / transfer.den()(0);
+  right.lo = rest.lo.bottomRows(n) / transfer.den()(0);
+  Index column = 0;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    Polynomial others = detail::polynomial(VectorXd::Ones(1));
+    for (std::size_t h = 0; h < groups.size(); ++h) {
+      others = h == g ? others : detail::times(others, dens[h]);
+    }
+    for (std::size_t k = 0; k < groups[g].size(); ++k, ++column) {
+      // s^{size - 1 - k} of N_g.
+      const auto power = static_cast<Index>(groups[g].size() - 1 - k);
+      const Index first = n - power - others.rows();
+      matrix.hi.block(first, column, others.rows(), 1) = others.hi;
+      matrix.lo.block(first, column, others.rows(), 1) = others.lo;
+    }
+  }
+  const auto found = flyball::detail::solve(std::move(matrix), std::move(right));
+  if (!found || !found->all_finite()) {
+    return refusal(SystemError::no_convergence, "step_metrics", "the partial fractions")
+        .got("not found")
+        .hint("choose a unit of time in which the poles are nearer to 1");
+  }
+  const VectorXd nums = found->rounded();
+  std::vector<Part> parts;
+  column = 0;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const auto size = static_cast<Index>(groups[g].size());
+    double slowest = std::numeric_limits<double>::infinity();
+    for (const Complex& pole : groups[g]) {
+      slowest = std::min(slowest, -pole.real());
+    }
+    FLYBALL_TRY(const auto of_group, TransferFunction::create(nums.segment(column, size),
+                                                              VectorXd(dens[g].rounded())));
+    parts.emplace_back(of_group, std::abs(groups[g].back()), slowest);
+    column += size;
+  }
+  return parts;
+}
 
 /// Where a function changes its sign in [0, h], by halving and secants.
 template <class F>
@@ -181,74 +269,99 @@ Expected<StepMetrics> step_metrics(const TransferFunction& transfer, double band
     }
     return sampled(transfer, dc, band, slowest);
   }
-  const ContinuousSystem<> s = transfer.to_state_space();
   const double delay = transfer.delay();
   Judge judge(band);
-  if (s.A.rows() == 0) {
+  if (transfer.order() == 0) {
     judge.point(0.0, 1.0);
     judge.reaches(0.1, 0.0);
     judge.reaches(0.9, 0.0);
     return judge.metrics(dc, delay);
   }
-  // x(0) = A⁻¹ B: the way from rest to the final state, from which y departs by C e^{At} x(0).
-  const VectorXd start = flyball::detail::solve_linear(s.A, s.B);
-  Transient way(s, start, dc);
+  FLYBALL_TRY(auto parts, parts_of(transfer, poles));
   double slowest = std::numeric_limits<double>::infinity();
   for (const Complex& pole : poles) {
     slowest = std::min(slowest, -pole.real());
   }
-  // Steps in which no mode that is still there turns by more than a tenth.
-  std::vector<Complex> modes(poles.begin(), poles.end());
   const double end = 36.0 / slowest;
-  const auto fastest_at = [&](double time) {
-    double rate = 0.0;
-    for (const Complex& pole : modes) {
-      if (-pole.real() * time < 40.0 + 6.0 * static_cast<double>(modes.size())) {
-        rate = std::max(rate, std::abs(pole));
+  const auto now = [&] {
+    double y = 1.0;
+    for (const Part& part : parts) {
+      y += part.value() / dc;
+    }
+    return y;
+  };
+  double before = now();
+  judge.point(0.0, before);
+  for (const double level : {0.1, 0.9}) {
+    if (before >= level) {
+      judge.reaches(level, 0.0);
+    }
+  }
+  // Steps in which no part that is still there turns by more than a tenth.
+  double step = 0.0;
+  double time = 0.0;
+  std::vector<bool> over(parts.size(), false);
+  std::vector<VectorXd> from(parts.size());
+  constexpr long most_points = 2'000'000;
+  for (long point = 0; time < end; ++point) {
+    if (point == most_points) {
+      return refusal(SystemError::no_convergence, where, "the step response")
+          .got(flyball::detail::format("not settled after {} points", most_points))
+          .hint("a mode that turns a million times before it decays has no settling to speak of");
+    }
+    double rate = slowest;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      if (!over[i] && parts[i].is_over(time)) {
+        over[i] = true;
+        parts[i].end();
+        step = 0.0;
+      }
+      rate = over[i] ? rate : std::max(rate, parts[i].fastest());
+    }
+    if (step == 0.0) {
+      step = std::min(0.1 / rate, 0.02 / slowest);
+      for (std::size_t i = 0; i < parts.size(); ++i) {
+        if (!over[i]) {
+          FLYBALL_CHECK(parts[i].set_step(step));
+        }
       }
     }
-    return rate;
-  };
-  double step = 0.0;
-  MatrixXd propagator;
-  long points = 0;
-  judge.point(0.0, way.value() / dc);
-  if (way.value() / dc >= 0.1) {
-    judge.reaches(0.1, 0.0);
-  }
-  if (way.value() / dc >= 0.9) {
-    judge.reaches(0.9, 0.0);
-  }
-  while (way.time() < end && points < 2'000'000) {
-    const double rate = std::max(fastest_at(way.time()), slowest);
-    const double wanted = std::min(0.1 / rate, 0.02 / slowest);
-    if (!(wanted <= step && wanted > 0.5 * step)) {
-      step = wanted;
-      FLYBALL_TRY(propagator, expm(s.A * step));
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      from[i] = parts[i].state();
     }
-    const VectorXd from = way.state();
-    const double begin = way.time();
-    const double before = way.value() / dc;
-    const double slope_before = way.after(from, 0.0).second / dc;
-    way.advance(propagator, step);
-    ++points;
-    const double after = way.value() / dc;
-    const double slope_after = way.after(way.state(), 0.0).second / dc;
-    const auto y = [&](double h) { return way.after(from, h).first / dc; };
-    // Parts between a top or bottom, in which y is monotone.
-    std::vector<std::pair<double, double>> parts{{0.0, before}};
+    const auto at = [&](double h) {
+      std::pair<double, double> y{1.0, 0.0};
+      for (std::size_t i = 0; i < parts.size(); ++i) {
+        if (!over[i]) {
+          const auto [value, slope] = parts[i].after(from[i], h);
+          y.first += value / dc;
+          y.second += slope / dc;
+        }
+      }
+      return y;
+    };
+    const double slope_before = at(0.0).second;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      if (!over[i]) {
+        parts[i].advance();
+      }
+    }
+    const double after = now();
+    const double slope_after = at(step).second;
+    // Pieces between a top or bottom, in which y is monotone.
+    std::vector<std::pair<double, double>> pieces{{0.0, before}};
     if ((slope_before > 0.0) != (slope_after > 0.0)) {
-      const double top = crossing([&](double h) { return way.after(from, h).second / dc; }, step);
-      parts.emplace_back(top, y(top));
-      judge.point(begin + top, parts.back().second);
+      const double top = crossing([&](double h) { return at(h).second; }, step);
+      pieces.emplace_back(top, at(top).first);
+      judge.point(time + top, pieces.back().second);
     }
-    parts.emplace_back(step, after);
-    judge.point(begin + step, after);
-    for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
-      const auto [h0, y0] = parts[i];
-      const auto [h1, y1] = parts[i + 1];
+    pieces.emplace_back(step, after);
+    judge.point(time + step, after);
+    for (std::size_t i = 0; i + 1 < pieces.size(); ++i) {
+      const auto [h0, y0] = pieces[i];
+      const auto [h1, y1] = pieces[i + 1];
       const auto place = [&](double level) {
-        return begin + h0 + crossing([&](double h) { return y(h0 + h) - level; }, h1 - h0);
+        return time + h0 + crossing([&](double h) { return at(h0 + h).first - level; }, h1 - h0);
       };
       for (const double level : {0.1, 0.9}) {
         if (judge.waits_for(level) && y0 < level && y1 >= level) {
@@ -258,13 +371,15 @@ Expected<StepMetrics> step_metrics(const TransferFunction& transfer, double band
       for (const double level : {1.0 - band, 1.0 + band}) {
         if ((y0 - level) * (y1 - level) <= 0.0 && y0 != y1) {
           // Inwards or outwards; the last of them counts.
-          judge.outside_until(std::abs(y1 - 1.0) > band ? begin + h1 : place(level));
+          judge.outside_until(std::abs(y1 - 1.0) > band ? time + h1 : place(level));
         }
       }
       if (std::abs(y1 - 1.0) > band) {
-        judge.outside_until(begin + h1);
+        judge.outside_until(time + h1);
       }
     }
+    before = after;
+    time += step;
   }
   return judge.metrics(dc, delay);
 }
