@@ -7,6 +7,7 @@
 
 #include "identification/robust_fit.hpp"
 #include "identification/soft_loss.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball::identification {
 namespace {
@@ -15,38 +16,41 @@ constexpr double bin_width = 0.02;    // s
 constexpr int lags = 30;              // bins: correlation is followed for 0.6 s
 constexpr double block_length = 0.6;  // s
 
-/// A run's residuals and Jacobians summed over bins of time, per channel.
+/// A run's residuals and Jacobians summed over bins of time, a bin a column.
+struct ChannelBins {
+  Eigen::VectorXd residual;  // sum of ψ
+  Eigen::VectorXd count;
+  Eigen::MatrixXd jacobian;
+  Eigen::MatrixXd score;
+};
 struct Bins {
-  struct ChannelBin {
-    double residual = 0.0;  // sum of ψ
-    int count = 0;
-    LocalVector jacobian = LocalVector::Zero();
-    LocalVector score = LocalVector::Zero();
-  };
-  std::array<std::vector<ChannelBin>, 2> channels;
+  std::array<ChannelBins, 2> channels;
+  std::vector<Eigen::Index> columns;  ///< The parameters of the Jacobians' rows.
   bool ramp = false;
 };
 
-/// Adds one channel of a run to its bins; returns what it adds to Σ Jᵀ ψ'(z) J.
-LocalMatrix bin_channel(const Eigen::VectorXd& residuals, const ResidualBlock::Jacobian& jacobian,
+/// The bins of one channel of a run; adds to Σ Jᵀ ψ'(z) J.
+ChannelBins bin_channel(const Eigen::VectorXd& residuals, const ResidualBlock::Jacobian& jacobian,
                         double inverse_scale, const std::vector<double>& times,
-                        std::vector<Bins::ChannelBin>& bins) {
-  LocalMatrix hessian = LocalMatrix::Zero();
+                        Eigen::MatrixXd& hessian) {
+  const double last = times.empty() ? -bin_width : *std::max_element(times.begin(), times.end());
+  const auto bins = static_cast<Eigen::Index>(last / bin_width) + 1;
+  const Eigen::Index columns = jacobian.cols();
+  ChannelBins channel{Eigen::VectorXd::Zero(bins), Eigen::VectorXd::Zero(bins),
+                      Eigen::MatrixXd::Zero(columns, bins), Eigen::MatrixXd::Zero(columns, bins)};
+  Eigen::VectorXd weights(residuals.size());
   for (Eigen::Index row = 0; row < residuals.size(); ++row) {
     const double z = residuals[row] * inverse_scale;
     const double w = weight(z);
-    const LocalVector j = jacobian.row(row).transpose() * inverse_scale;
-    const auto at = static_cast<std::size_t>(times[static_cast<std::size_t>(row)] / bin_width);
-    if (at >= bins.size()) {
-      bins.resize(at + 1);
-    }
-    bins[at].residual += w * z;
-    bins[at].count += 1;
-    bins[at].jacobian += j;
-    bins[at].score += w * z * j;
-    add_square(hessian, w * w * w, j);  // ψ' = w³
+    const auto at = static_cast<Eigen::Index>(times[static_cast<std::size_t>(row)] / bin_width);
+    channel.residual[at] += w * z;
+    channel.count[at] += 1.0;
+    channel.jacobian.col(at) += inverse_scale * jacobian.row(row).transpose();
+    channel.score.col(at) += (w * z * inverse_scale) * jacobian.row(row).transpose();
+    weights[row] = w * w * w * square(inverse_scale);  // ψ' = w³
   }
-  return hessian;
+  add_squares(hessian, jacobian, weights);
+  return channel;
 }
 
 std::vector<double> residual_times(const OutputErrorProblem& problem, std::size_t index,
@@ -74,11 +78,6 @@ double bartlett(int lag) {
   return 1.0 - static_cast<double>(lag) / (lags + 1);
 }
 
-/// Means of a bin's residuals; NaN-free: bins without rows have weight 0.
-double mean_residual(const Bins::ChannelBin& bin) {
-  return bin.count > 0 ? bin.residual / bin.count : 0.0;
-}
-
 /// Autocovariance and cross-covariance of the binned residuals of ramps or of steps.
 using Covariogram = std::array<std::array<std::array<double, lags + 1>, 2>, 2>;
 Covariogram covariogram(const std::vector<Bins>& runs, bool ramps) {
@@ -90,13 +89,15 @@ Covariogram covariogram(const std::vector<Bins>& runs, bool ramps) {
     }
     for (std::size_t a = 0; a < 2; ++a) {
       for (std::size_t b = 0; b < 2; ++b) {
-        for (std::size_t i = 0; i < run.channels[a].size(); ++i) {
-          for (std::size_t lag = 0; lag <= lags && i + lag < run.channels[b].size(); ++lag) {
-            const Bins::ChannelBin& first = run.channels[a][i];
-            const Bins::ChannelBin& second = run.channels[b][i + lag];
-            if (first.count > 0 && second.count > 0) {
-              sum[a][b][lag] += mean_residual(first) * mean_residual(second);
-              count[a][b][lag] += 1.0;
+        const ChannelBins& first = run.channels[a];
+        const ChannelBins& second = run.channels[b];
+        for (Eigen::Index i = 0; i < first.count.size(); ++i) {
+          for (Eigen::Index lag = 0; lag <= lags && i + lag < second.count.size(); ++lag) {
+            if (first.count[i] > 0.0 && second.count[i + lag] > 0.0) {
+              const auto at = static_cast<std::size_t>(lag);
+              sum[a][b][at] += first.residual[i] / first.count[i] * second.residual[i + lag] /
+                               second.count[i + lag];
+              count[a][b][at] += 1.0;
             }
           }
         }
@@ -112,81 +113,72 @@ Covariogram covariogram(const std::vector<Bins>& runs, bool ramps) {
   }
   return sum;
 }
-LocalVector score_at(const Bins& run, std::size_t bin) {
-  LocalVector score = LocalVector::Zero();
-  for (const auto& channel : run.channels) {
-    if (bin < channel.size()) {
-      score += channel[bin].score;
-    }
-  }
-  return score;
+
+/// A run's scores of both channels.
+Eigen::MatrixXd scores_of(const Bins& run) {
+  const auto& [first, second] = run.channels;
+  Eigen::MatrixXd scores =
+      Eigen::MatrixXd::Zero(first.score.rows(), std::max(first.score.cols(), second.score.cols()));
+  scores.leftCols(first.score.cols()) += first.score;
+  scores.leftCols(second.score.cols()) += second.score;
+  return scores;
 }
 
-std::size_t bin_count(const Bins& run) {
-  return std::max(run.channels[0].size(), run.channels[1].size());
+/// To each of `count` columns the sum of it and of those of M up to 0.6 s later, with a weight for
+/// each lag.
+Eigen::MatrixXd sum_later(const Eigen::MatrixXd& M, Eigen::Index count,
+                          const std::array<double, lags + 1>& weights) {
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(M.rows(), count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    for (Eigen::Index lag = 0; lag <= lags && i + lag < M.cols(); ++lag) {
+      sums.col(i) += weights[static_cast<std::size_t>(lag)] * M.col(i + lag);
+    }
+  }
+  return sums;
+}
+
+/// A Bᵀ + B Aᵀ.
+Eigen::MatrixXd both_orders(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B) {
+  const Eigen::MatrixXd product = detail::product_transposed(A, B);
+  return product + product.transpose();
 }
 
 /// Newey–West: the scores' own covariances up to 0.6 s under a Bartlett window.
-LocalMatrix hac_middle(const Bins& run) {
-  LocalMatrix middle = LocalMatrix::Zero();
-  const std::size_t bins = bin_count(run);
-  std::vector<LocalVector> scores(bins);
-  for (std::size_t i = 0; i < bins; ++i) {
-    scores[i] = score_at(run, i);
+Eigen::MatrixXd hac_middle(const Eigen::MatrixXd& scores) {
+  std::array<double, lags + 1> weights{0.5};
+  for (int lag = 1; lag <= lags; ++lag) {
+    weights[static_cast<std::size_t>(lag)] = bartlett(lag);
   }
-  for (std::size_t i = 0; i < bins; ++i) {
-    LocalVector later = 0.5 * scores[i];
-    for (std::size_t lag = 1; lag <= lags && i + lag < bins; ++lag) {
-      later += bartlett(static_cast<int>(lag)) * scores[i + lag];
-    }
-    const LocalMatrix cross = scores[i] * later.transpose();
-    middle += cross + cross.transpose();
-  }
-  return middle;
+  return both_orders(scores, sum_later(scores, scores.cols(), weights));
 }
 
 /// Sums of scores over blocks of 0.6 s count as independent.
-LocalMatrix block_middle(const Bins& run, std::size_t& blocks) {
-  LocalMatrix middle = LocalMatrix::Zero();
-  const auto length = static_cast<std::size_t>(block_length / bin_width);
-  const std::size_t bins = bin_count(run);
-  for (std::size_t begin = 0; begin < bins; begin += length) {
-    LocalVector sum = LocalVector::Zero();
-    for (std::size_t i = begin; i < std::min(bins, begin + length); ++i) {
-      sum += score_at(run, i);
-    }
-    if (sum.squaredNorm() > 0.0) {
-      middle += sum * sum.transpose();
-      ++blocks;
-    }
+Eigen::MatrixXd block_middle(const Eigen::MatrixXd& scores, std::size_t& blocks) {
+  constexpr auto length = static_cast<Eigen::Index>(block_length / bin_width);
+  Eigen::MatrixXd sums(scores.rows(), (scores.cols() + length - 1) / length);
+  for (Eigen::Index k = 0; k < sums.cols(); ++k) {
+    const Eigen::Index begin = k * length;
+    sums.col(k) = scores.middleCols(begin, std::min(length, scores.cols() - begin)).rowwise().sum();
+    blocks += sums.col(k).squaredNorm() > 0.0 ? 1U : 0U;
   }
-  return middle;
+  return detail::product_transposed(sums, sums);
 }
 
 /// Jᵀ Γ J with the residuals' autocovariance Γ, tapered so that it stays positive.
-LocalMatrix correlation_middle(const Bins& run, const Covariogram& gamma) {
-  LocalMatrix middle = LocalMatrix::Zero();
+Eigen::MatrixXd correlation_middle(const Bins& run, const Covariogram& gamma) {
+  const Eigen::Index columns = run.channels[0].jacobian.rows();
+  Eigen::MatrixXd middle = Eigen::MatrixXd::Zero(columns, columns);
   for (std::size_t a = 0; a < 2; ++a) {
     for (std::size_t b = 0; b < 2; ++b) {
-      const auto& first = run.channels[a];
-      const auto& second = run.channels[b];
-      for (std::size_t i = 0; i < first.size(); ++i) {
-        if (first[i].count == 0) {
-          continue;
-        }
-        LocalVector sum = LocalVector::Zero();
-        for (std::size_t lag = 0; lag <= lags && i + lag < second.size(); ++lag) {
-          sum += (bartlett(static_cast<int>(lag)) * gamma[a][b][lag]) * second[i + lag].jacobian;
-        }
-        const LocalMatrix cross = first[i].jacobian * sum.transpose();
-        middle += cross + cross.transpose();
-        // Lag 0 must count once; both orders of a pair of channels are in the sum over a and b.
-        if (i < second.size()) {
-          const LocalMatrix same =
-              gamma[a][b][0] * first[i].jacobian * second[i].jacobian.transpose();
-          middle -= 0.5 * (same + same.transpose());
-        }
+      const Eigen::MatrixXd& first = run.channels[a].jacobian;
+      const Eigen::MatrixXd& second = run.channels[b].jacobian;
+      // Lag 0 must count once; both orders of a pair of channels are in the sum over a and b.
+      std::array<double, lags + 1> weights{0.5 * gamma[a][b][0]};
+      for (int lag = 1; lag <= lags; ++lag) {
+        weights[static_cast<std::size_t>(lag)] =
+            bartlett(lag) * gamma[a][b][static_cast<std::size_t>(lag)];
       }
+      middle += both_orders(first, sum_later(second, first.cols(), weights));
     }
   }
   return middle;
@@ -229,14 +221,17 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
   std::vector<Bins> runs(problem.runs().size());
   ResidualBlock block;
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    problem.evaluate(i, x, true, block);
+    problem.evaluate(i, x, free, block);
+    const auto columns = static_cast<Eigen::Index>(block.columns.size());
+    Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(columns, columns);
     runs[i].ramp = problem.runs()[i].ramp;
-    LocalMatrix hessian =
+    runs[i].columns = block.columns;
+    runs[i].channels = {
         bin_channel(block.difference, block.difference_jacobian, inverse(scales.difference),
-                    residual_times(problem, i, Channel::position), runs[i].channels[0]);
-    hessian += bin_channel(block.velocity, block.velocity_jacobian, inverse(scales.velocity),
-                           residual_times(problem, i, Channel::velocity), runs[i].channels[1]);
-    scatter(bread, hessian, i);
+                    residual_times(problem, i, Channel::position), hessian),
+        bin_channel(block.velocity, block.velocity_jacobian, inverse(scales.velocity),
+                    residual_times(problem, i, Channel::velocity), hessian)};
+    scatter(bread, hessian, block.columns);
   }
 
   // The same holds, more weakly, for what only nuisance parameters and kA may lack: data.
@@ -250,10 +245,11 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
   std::array<Eigen::MatrixXd, 3> middles;
   middles.fill(Eigen::MatrixXd::Zero(n, n));
   std::size_t blocks = 0;
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    scatter(middles[0], hac_middle(runs[i]), i);
-    scatter(middles[1], block_middle(runs[i], blocks), i);
-    scatter(middles[2], correlation_middle(runs[i], runs[i].ramp ? ramp_gamma : step_gamma), i);
+  for (const Bins& run : runs) {
+    const Eigen::MatrixXd scores = scores_of(run);
+    scatter(middles[0], hac_middle(scores), run.columns);
+    scatter(middles[1], block_middle(scores, blocks), run.columns);
+    scatter(middles[2], correlation_middle(run, run.ramp ? ramp_gamma : step_gamma), run.columns);
   }
 
   std::vector<Eigen::Index> active;

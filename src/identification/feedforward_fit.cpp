@@ -51,7 +51,7 @@ void add_runs(OutputErrorProblem& problem, const Eigen::VectorXd& x, Feedforward
   for (std::size_t index = 0; index < problem.runs().size(); ++index) {
     const ResidualRun& run = problem.runs()[index];
     const PreparedRun& prepared = recording.runs[run.prepared];
-    problem.evaluate(index, x, false, block);
+    problem.evaluate(index, x, block);
     difference_residuals.insert(difference_residuals.end(), block.difference.begin(),
                                 block.difference.end());
     FittedRun& fitted = fit.runs[run.prepared];

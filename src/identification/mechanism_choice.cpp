@@ -95,7 +95,7 @@ double misfit(Hypothesis& made) {
   for (std::size_t index = 0; index < made.problem->runs().size(); ++index) {
     const ResidualRun& run = made.problem->runs()[index];
     const TestRun& source = made.prepared.runs[run.prepared].run;
-    made.problem->evaluate(index, made.fit.x, false, block);
+    made.problem->evaluate(index, made.fit.x, block);
     const auto add = [&](double residual, double velocity) {
       squares += residual * residual;
       sum += velocity;

@@ -86,8 +86,9 @@ RobustFit refit(OutputErrorProblem& problem, const RobustFit& from, const Bounds
 }
 
 /// The best fit with a current limit, looked for from several.
+/// @param gain  What it must gain to count.
 RobustFit with_limit(OutputErrorProblem& problem, const RobustFit& base, const Bounds& bounds,
-                     const ChannelScales& scales) {
+                     const ChannelScales& scales, double gain) {
   const double most = largest_across(problem);
   RobustFit best = base;
   for (const double share : {0.8, 0.6, 0.4}) {
@@ -95,7 +96,8 @@ RobustFit with_limit(OutputErrorProblem& problem, const RobustFit& base, const B
     start[parameter::headroom] = share * most;
     // Less voltage speeds the same mechanism up as fast only if there is less inertia.
     start[parameter::log_time_constant] += std::log(0.5 * (1.0 + share));
-    RobustFit fit = minimize(problem, start, problem.free_parameters(), bounds, scales, 12, 0.1);
+    RobustFit fit = minimize(problem, start, problem.free_parameters(), bounds, scales, 12, 0.1,
+                             base.cost - gain);
     if (fit.cost < best.cost) {
       best = std::move(fit);
     }
@@ -105,8 +107,9 @@ RobustFit with_limit(OutputErrorProblem& problem, const RobustFit& base, const B
 
 /// The best fit with backlash, from sensors that are as late as usual: without it they are found so
 /// early, and the inertia so large, that to first order nothing is left for it to explain.
+/// @param gain  What it must gain to count.
 RobustFit with_take_up(OutputErrorProblem& problem, const RobustFit& base, const Bounds& bounds,
-                       const ChannelScales& scales) {
+                       const ChannelScales& scales, double gain) {
   const std::vector<bool> free = problem.free_parameters();
   RobustFit fit = base;
   for (const OutputErrorProblem::Prior& prior : problem.priors()) {
@@ -122,7 +125,7 @@ RobustFit with_take_up(OutputErrorProblem& problem, const RobustFit& base, const
   double best_time = take_up_times.front();
   for (const double time : take_up_times) {
     problem.cross_backlash_in(time);
-    RobustFit tried = minimize(problem, fit.x, free, bounds, scales, 8, 0.3);
+    RobustFit tried = minimize(problem, fit.x, free, bounds, scales, 8, 0.3, base.cost - gain);
     if (tried.cost < best.cost && tried.x[parameter::take_up] > 0.0) {
       best = std::move(tried);
       best_time = time;
@@ -156,10 +159,17 @@ std::vector<Candidate> candidates(OutputErrorProblem& problem, const Bounds& bou
       found.push_back({absent[k], all[k].gain / beyond_doubt(absent[k]), best});
     }
   }
+  const auto worthwhile = [&found](const Term& term) {
+    double most = 1.0;
+    for (const Candidate& other : found) {
+      most = std::max(most, other.evidence);
+    }
+    return worth_a_fit * most * beyond_doubt(term);
+  };
   if (problem.can_extend(parameter::take_up) && !problem.is_extended(parameter::take_up)) {
     const Term backlash{parameter::take_up};
     extend(problem, backlash, true);
-    RobustFit ahead = with_take_up(problem, best, bounds, scales);
+    RobustFit ahead = with_take_up(problem, best, bounds, scales, worthwhile(backlash));
     extend(problem, backlash, false);
     const double gain = best.cost - ahead.cost;
     found.push_back({backlash, gain / beyond_doubt(backlash), std::move(ahead)});
@@ -167,7 +177,7 @@ std::vector<Candidate> candidates(OutputErrorProblem& problem, const Bounds& bou
   const Term limit{parameter::headroom};
   if (!problem.is_extended(parameter::headroom)) {
     extend(problem, limit, true);
-    RobustFit limited = with_limit(problem, best, bounds, scales);
+    RobustFit limited = with_limit(problem, best, bounds, scales, worthwhile(limit));
     extend(problem, limit, false);
     const double gain = best.cost - limited.cost;
     found.push_back({limit, gain / beyond_doubt(limit), std::move(limited)});

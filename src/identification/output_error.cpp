@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
 #include <utility>
 
@@ -15,18 +16,8 @@ constexpr double tail = 0.06;         // s, simulated beyond the window for nega
 constexpr double lead = 0.1;          // s, compared before a step that starts from rest
 constexpr double longest_span = 0.2;  // s, of a position difference
 constexpr double crowding_distance =
-    0.018;                               // s, differences closer than this add nothing on a ramp
-constexpr double shortest_width = 1e-3;  // s, below this an average is a sample
-constexpr double battery = 12.0;         // V, of which the voltage is a share
-
-SimulationVector simulation_parameters(const Eigen::VectorXd& x, std::size_t run) {
-  SimulationVector simulated{};
-  for (int k = 0; k < parameter::initial_velocity; ++k) {
-    simulated[static_cast<std::size_t>(k)] = x[k];
-  }
-  simulated[parameter::initial_velocity] = x[initial_velocity_of(run)];
-  return simulated;
-}
+    0.018;                        // s, differences closer than this add nothing on a ramp
+constexpr double battery = 12.0;  // V, of which the voltage is a share
 
 /// Keeps one value of `thinning`.
 template <class Value>
@@ -92,54 +83,6 @@ ResidualRun make_run(const PreparedRun& prepared, std::size_t index, const FitOp
                  std::back_inserter(run.velocities), usable);
   }
   return run;
-}
-
-/// The moving average of the velocity and its derivative by every parameter.
-struct Averaged {
-  double value;
-  double by_delay;
-  double by_width;
-  SimulationGradient gradient;
-};
-
-struct Hints {
-  std::size_t early = 0;
-  std::size_t late = 0;
-};
-
-Averaged moving_average(const Response& response, double time, double width, bool gradient,
-                        Hints& hints) {
-  const double half = 0.5 * std::max(width, shortest_width);
-  const Response::Sample late = response.at(time + half, gradient, hints.late);
-  const Response::Sample early = response.at(time - half, gradient, hints.early);
-  Averaged average;
-  average.value = (late.position - early.position) / (2.0 * half);
-  average.by_delay = -(late.velocity - early.velocity) / (2.0 * half);
-  average.by_width = (0.5 * (late.velocity + early.velocity) - average.value) / (2.0 * half);
-  if (gradient) {
-    average.gradient = (late.position_gradient - early.position_gradient) / (2.0 * half);
-  }
-  return average;
-}
-
-constexpr int local_initial_velocity = shared_parameter_count;
-constexpr int local_extra_delay = shared_parameter_count + 1;
-
-/// How much of the backlash a run from rest has crossed: quadratic in time, as a push does.
-double taken_up(const ResidualRun& run, double time, double duration) {
-  if (!run.starts_at_rest) {
-    return 0.0;
-  }
-  const double place = std::clamp((time - run.input.time.front()) / duration, 0.0, 1.0);
-  return place * place;
-}
-
-/// The initial velocity is the first own column; those before it are shared.
-template <class Row>
-void store_gradient(Row&& row, const SimulationGradient& gradient, double factor) {
-  row.template head<parameter::initial_velocity>() =
-      factor * gradient.template head<parameter::initial_velocity>();
-  row[local_initial_velocity] = factor * gradient[parameter::initial_velocity];
 }
 
 }  // namespace
@@ -210,7 +153,7 @@ void OutputErrorProblem::refresh_forces(const Eigen::VectorXd& x) {
     const bool simulated =
         kV > 0.0 && (is_extended(parameter::drag) || is_extended(parameter::sag));
     if (simulated) {
-      responses_[index].simulate(run.input, simulation_parameters(x, index), false);
+      responses_[index].simulate(run.input, simulation_parameters(x, index));
     }
     std::array<std::vector<double>, force_count> forces;
     const auto force = [&](int of) -> std::vector<double>& {
@@ -226,11 +169,13 @@ void OutputErrorProblem::refresh_forces(const Eigen::VectorXd& x) {
     const bool arm = mechanism_ == MechanismKind::arm && !run.angle.empty();
     const bool travels = mechanism_ != MechanismKind::flywheel && !run.angle.empty();
     std::size_t hint = 0;
+    Interpolation angle(run.angle_time, run.angle);
+    Interpolation smoothed(prepared.run.time, prepared.smoothed_velocity);
     for (std::size_t i = 0; i < rows; ++i) {
       // The middle of the interval that the input is held for.
       const double next = i + 1 < rows ? run.input.time[i + 1] : run.input.time[i];
       const double time = 0.5 * (run.input.time[i] + next);
-      const double position = travels ? interpolate(run.angle_time, run.angle, time + delay) : 0.0;
+      const double position = travels ? angle.at(time + delay) : 0.0;
       if (arm) {
         force(parameter::gravity_cosine)[i] = std::cos(position);
         force(parameter::gravity_sine)[i] = std::sin(position);
@@ -239,16 +184,17 @@ void OutputErrorProblem::refresh_forces(const Eigen::VectorXd& x) {
         force(parameter::spring)[i] = position - middle;
         if (field_) {
           const double turn = 2.0 * std::numbers::pi * (position - low_) / (high_ - low_);
-          for (int k = 0; k < field_count; ++k) {
-            const double angle = turn * (1 + k / 2);
-            force(parameter::friction_field + k)[i] =
-                prepared.direction * (k % 2 == 0 ? std::sin(angle) : std::cos(angle));
+          const std::complex<double> wave = std::polar(1.0, turn);
+          std::complex<double> waves = wave;
+          for (int k = 0; k < field_count; k += 2, waves *= wave) {
+            force(parameter::friction_field + k)[i] = prepared.direction * waves.imag();
+            force(parameter::friction_field + k + 1)[i] = prepared.direction * waves.real();
           }
         }
       }
-      const double velocity =
-          simulated ? responses_[index].at(time, false, hint).velocity
-                    : interpolate(prepared.run.time, prepared.smoothed_velocity, time);
+      const double velocity = simulated
+                                  ? responses_[index].velocity(responses_[index].place(time, hint))
+                                  : smoothed.at(time);
       force(parameter::drag)[i] = velocity * std::abs(velocity);
       // Battery and wires lose what the motor's resistance drops, times the duty squared: the
       // current is that of the battery times the duty, and so is what its loss takes off.
@@ -279,94 +225,6 @@ bool OutputErrorProblem::can_extend(int parameter) const {
     default:
       return true;
   }
-}
-
-void OutputErrorProblem::evaluate(std::size_t index, const Eigen::VectorXd& x, bool jacobian,
-                                  ResidualBlock& block) {
-  const ResidualRun& run = runs_[index];
-  const TestRun& source = recording_.runs[run.prepared].run;
-  const double direction = recording_.runs[run.prepared].direction;
-  Response& response = responses_[index];
-  response.simulate(run.input, simulation_parameters(x, index), jacobian);
-
-  const auto differences = static_cast<Eigen::Index>(run.differences.size());
-  const auto velocities = static_cast<Eigen::Index>(run.velocities.size());
-  // Made anew: resizing frees the old memory before the new is there.
-  if (block.difference.size() != differences || block.velocity.size() != velocities) {
-    block.difference = Eigen::VectorXd(differences);
-    block.velocity = Eigen::VectorXd(velocities);
-  }
-  if (jacobian) {
-    using Jacobian = ResidualBlock::Jacobian;
-    block.difference_jacobian = Jacobian(Jacobian::Zero(differences, local_parameter_count));
-    block.velocity_jacobian = Jacobian(Jacobian::Zero(velocities, local_parameter_count));
-  }
-  Hints hints;
-  const double position_delay = x[parameter::position_delay] + x[extra_delay_of(index)];
-  const double velocity_delay = x[parameter::velocity_delay] + x[extra_delay_of(index)];
-  for (Eigen::Index row = 0; row < differences; ++row) {
-    const auto [from, to] = run.differences[static_cast<std::size_t>(row)];
-    const Response::Sample early =
-        response.at(source.time[from] - position_delay, jacobian, hints.early);
-    const Response::Sample late =
-        response.at(source.time[to] - position_delay, jacobian, hints.late);
-    const double taken =
-        direction * (taken_up(run, source.time[to] - position_delay, take_up_time_) -
-                     taken_up(run, source.time[from] - position_delay, take_up_time_));
-    block.difference[row] = (source.position[to] - source.position[from]) -
-                            (late.position - early.position) - x[parameter::take_up] * taken;
-    if (jacobian) {
-      store_gradient(block.difference_jacobian.row(row),
-                     late.position_gradient - early.position_gradient, -1.0);
-      block.difference_jacobian(row, parameter::take_up) = -taken;
-      block.difference_jacobian(row, parameter::position_delay) = late.velocity - early.velocity;
-      block.difference_jacobian(row, local_extra_delay) = late.velocity - early.velocity;
-    }
-  }
-  for (Eigen::Index row = 0; row < velocities; ++row) {
-    const std::size_t at = run.velocities[static_cast<std::size_t>(row)];
-    const double time = source.time[at] - velocity_delay;
-    const double width = std::max(x[parameter::averaging_width], shortest_width);
-    Averaged average = moving_average(response, time, width, jacobian, hints);
-    const double taken = direction *
-                         (taken_up(run, time + 0.5 * width, take_up_time_) -
-                          taken_up(run, time - 0.5 * width, take_up_time_)) /
-                         width;
-    average.value += x[parameter::take_up] * taken;
-    const double scale = x[parameter::velocity_scale];
-    block.velocity[row] = source.velocity[at] - scale * average.value;
-    if (jacobian) {
-      store_gradient(block.velocity_jacobian.row(row), average.gradient, -scale);
-      block.velocity_jacobian(row, parameter::take_up) = -scale * taken;
-      block.velocity_jacobian(row, parameter::velocity_delay) = -scale * average.by_delay;
-      block.velocity_jacobian(row, local_extra_delay) = -scale * average.by_delay;
-      block.velocity_jacobian(row, parameter::averaging_width) = -scale * average.by_width;
-      block.velocity_jacobian(row, parameter::velocity_scale) = -average.value;
-    }
-  }
-}
-
-double OutputErrorProblem::velocity_shown(std::size_t run, const Eigen::VectorXd& x,
-                                          double time) const {
-  Hints hints;
-  const double shown = time - x[parameter::velocity_delay] - x[extra_delay_of(run)];
-  const double width = std::max(x[parameter::averaging_width], shortest_width);
-  const double taken = recording_.runs[runs_[run].prepared].direction *
-                       (taken_up(runs_[run], shown + 0.5 * width, take_up_time_) -
-                        taken_up(runs_[run], shown - 0.5 * width, take_up_time_)) /
-                       width;
-  return x[parameter::velocity_scale] *
-         (moving_average(responses_[run], shown, width, false, hints).value +
-          x[parameter::take_up] * taken);
-}
-
-double OutputErrorProblem::position_shown(std::size_t run, const Eigen::VectorXd& x,
-                                          double time) const {
-  std::size_t hint = 0;
-  const double delay = x[parameter::position_delay] + x[extra_delay_of(run)];
-  return responses_[run].at(time - delay, false, hint).position +
-         x[parameter::take_up] * recording_.runs[runs_[run].prepared].direction *
-             taken_up(runs_[run], time - delay, take_up_time_);
 }
 
 std::vector<bool> OutputErrorProblem::free_parameters() const {

@@ -35,14 +35,23 @@ enum Shared : int {
 
 inline constexpr int shared_parameter_count = parameter::end_of_shared;
 inline constexpr int own_parameter_count = 2;
-/// Columns of a run's Jacobian: the shared parameters and its own.
-inline constexpr int local_parameter_count = shared_parameter_count + own_parameter_count;
 
 [[nodiscard]] inline Eigen::Index initial_velocity_of(std::size_t run) {
   return shared_parameter_count + own_parameter_count * static_cast<Eigen::Index>(run);
 }
 [[nodiscard]] inline Eigen::Index extra_delay_of(std::size_t run) {
   return initial_velocity_of(run) + 1;
+}
+
+/// What the simulation of a run depends on. @param x  All parameters.
+[[nodiscard]] inline SimulationVector simulation_parameters(const Eigen::VectorXd& x,
+                                                            std::size_t run) {
+  SimulationVector simulated{};
+  for (int k = 0; k < parameter::initial_velocity; ++k) {
+    simulated[static_cast<std::size_t>(k)] = x[k];
+  }
+  simulated[parameter::initial_velocity] = x[initial_velocity_of(run)];
+  return simulated;
 }
 
 enum class Channel { position, velocity };
@@ -65,13 +74,15 @@ struct ResidualRun {
 /// s, kA/kV of a mechanism of which nothing is known, give or take a factor of e.
 inline constexpr double usual_time_constant = 0.1;
 
-/// Measured − simulated with its Jacobian, in units of the channel; differences first.
+/// Measured − simulated with its Jacobian, in units of the channel.
 struct ResidualBlock {
   Eigen::VectorXd difference;
   Eigen::VectorXd velocity;
-  using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, local_parameter_count, Eigen::RowMajor>;
+  using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   Jacobian difference_jacobian;
   Jacobian velocity_jacobian;
+  /// Of all parameters, that of each column of both; -1 for a column of zeros.
+  std::vector<Eigen::Index> columns;
 };
 
 class OutputErrorProblem {
@@ -110,8 +121,11 @@ class OutputErrorProblem {
   /// Whether that term can be told from the model's others: no spring without a travel.
   [[nodiscard]] bool can_extend(int parameter) const;
 
-  /// Residuals (and Jacobians) of one run. @param x  All parameters.
-  void evaluate(std::size_t run, const Eigen::VectorXd& x, bool jacobian, ResidualBlock& block);
+  /// Residuals of one run. @param x  All parameters.
+  void evaluate(std::size_t run, const Eigen::VectorXd& x, ResidualBlock& block);
+  /// And Jacobians. @param wanted  Those of all parameters that they are taken by, at least.
+  void evaluate(std::size_t run, const Eigen::VectorXd& x, const std::vector<bool>& wanted,
+                ResidualBlock& block);
 
   /// The velocity (as the column shows it) and the position at the given times of a run.
   [[nodiscard]] double velocity_shown(std::size_t run, const Eigen::VectorXd& x, double time) const;
@@ -138,6 +152,9 @@ class OutputErrorProblem {
   [[nodiscard]] std::vector<bool> free_parameters() const;
 
  private:
+  template <int width>
+  void linearize(std::size_t run, const Eigen::VectorXd& x, ResidualBlock& block);
+
   const PreparedRecording& recording_;
   mechanisms::MechanismKind mechanism_;
   std::vector<ResidualRun> runs_;

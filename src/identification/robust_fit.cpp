@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "identification/robust_fit.hpp"
 #include "identification/soft_loss.hpp"
@@ -9,40 +10,52 @@
 namespace flyball::identification {
 namespace {
 
+/// Iterations before a search may be given up as not worth it.
+constexpr int patience = 3;
+
 struct NormalEquations {
   Eigen::MatrixXd hessian;
   Eigen::VectorXd gradient;
   double cost = 0.0;
 };
 
+/// Adds a channel of a run to the sums of its columns and to the cost.
 void accumulate(const Eigen::VectorXd& residuals, const ResidualBlock::Jacobian& jacobian,
-                double inverse_scale, LocalMatrix& hessian, LocalVector& gradient, double& cost) {
+                double inverse_scale, Eigen::MatrixXd& hessian, Eigen::VectorXd& gradient,
+                double& cost) {
+  if (inverse_scale == 0.0) {
+    return;
+  }
+  Eigen::VectorXd weights(residuals.size());
   for (Eigen::Index row = 0; row < residuals.size(); ++row) {
     const double z = residuals[row] * inverse_scale;
-    const double w = weight(z);
-    const LocalVector j = jacobian.row(row).transpose() * inverse_scale;
-    add_square(hessian, w, j);
-    gradient.noalias() += (w * z) * j;
+    weights[row] = weight(z) * square(inverse_scale);
     cost += loss(z);
   }
+  add_squares(hessian, jacobian, weights);
+  gradient.noalias() += jacobian.transpose() * weights.cwiseProduct(residuals);
 }
 
+/// @param wanted  The parameters that it is asked for, at least.
 NormalEquations normal_equations(OutputErrorProblem& problem, const Eigen::VectorXd& x,
-                                 const ChannelScales& scales) {
+                                 const std::vector<bool>& wanted, const ChannelScales& scales) {
   const Eigen::Index n = x.size();
   NormalEquations equations{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n), 0.0};
   ResidualBlock block;
   for (std::size_t run = 0; run < problem.runs().size(); ++run) {
-    problem.evaluate(run, x, true, block);
-    LocalMatrix hessian = LocalMatrix::Zero();
-    LocalVector gradient = LocalVector::Zero();
+    problem.evaluate(run, x, wanted, block);
+    const auto columns = static_cast<Eigen::Index>(block.columns.size());
+    Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(columns, columns);
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(columns);
     accumulate(block.difference, block.difference_jacobian, inverse(scales.difference), hessian,
                gradient, equations.cost);
     accumulate(block.velocity, block.velocity_jacobian, inverse(scales.velocity), hessian, gradient,
                equations.cost);
-    scatter(equations.hessian, hessian, run);
-    for (int a = 0; a < local_parameter_count; ++a) {
-      equations.gradient[global_index(a, run)] += gradient[a];
+    scatter(equations.hessian, hessian, block.columns);
+    for (Eigen::Index k = 0; k < columns; ++k) {
+      if (const Eigen::Index at = block.columns[static_cast<std::size_t>(k)]; at >= 0) {
+        equations.gradient[at] += gradient[k];
+      }
     }
   }
   for (const auto& [i, mean, deviation] : problem.priors()) {
@@ -79,7 +92,7 @@ double cost_at(OutputErrorProblem& problem, const Eigen::VectorXd& x, const Chan
   ResidualBlock block;
   double cost = 0.0;
   for (std::size_t run = 0; run < problem.runs().size(); ++run) {
-    problem.evaluate(run, x, false, block);
+    problem.evaluate(run, x, block);
     for (const double residual : block.difference) {
       cost += loss(residual * inverse(scales.difference));
     }
@@ -95,11 +108,12 @@ double cost_at(OutputErrorProblem& problem, const Eigen::VectorXd& x, const Chan
 
 RobustFit minimize(OutputErrorProblem& problem, const Eigen::VectorXd& start,
                    const std::vector<bool>& free, const Bounds& bounds, const ChannelScales& scales,
-                   int max_iterations, double tolerance) {
+                   int max_iterations, double tolerance, double worthwhile) {
   RobustFit fit;
   fit.x = start.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
   double damping = 1e-3;
-  NormalEquations equations = normal_equations(problem, fit.x, scales);
+  bool rejected = false;
+  NormalEquations equations = normal_equations(problem, fit.x, free, scales);
   fit.cost = equations.cost;
   while (fit.iterations < max_iterations) {
     ++fit.iterations;
@@ -119,8 +133,17 @@ RobustFit minimize(OutputErrorProblem& problem, const Eigen::VectorXd& start,
       trial[active[static_cast<std::size_t>(i)]] += std::isfinite(step[i]) ? step[i] : 0.0;
     }
     trial = trial.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
-    const double trial_cost = cost_at(problem, trial, scales);
-    if (trial_cost < fit.cost) {
+    // The fall of the quadratic model, -2 gᵀs - sᵀHs = -gᵀs + damping sᵀDs.
+    const double promised = -gradient.dot(step) + damping * step.cwiseAbs2().dot(diagonal);
+    // Where another step will follow, the derivatives of this one are found with its cost.
+    const bool goes_on = !rejected && promised > 10.0 * tolerance;
+    NormalEquations next;
+    if (goes_on) {
+      next = normal_equations(problem, trial, free, scales);
+    }
+    const double trial_cost = goes_on ? next.cost : cost_at(problem, trial, scales);
+    rejected = !(trial_cost < fit.cost);
+    if (!rejected) {
       const double gain = fit.cost - trial_cost;
       fit.x = trial;
       fit.cost = trial_cost;
@@ -129,11 +152,16 @@ RobustFit minimize(OutputErrorProblem& problem, const Eigen::VectorXd& start,
         fit.converged = true;
         break;
       }
-      equations = normal_equations(problem, fit.x, scales);
+      if (fit.iterations >= patience &&
+          fit.cost - gain * (max_iterations - fit.iterations) > worthwhile) {
+        break;
+      }
+      equations = goes_on ? std::move(next) : normal_equations(problem, fit.x, free, scales);
     } else {
       damping *= 8.0;
-      if (damping > 1e8) {
-        fit.converged = true;  // no descent left at machine precision
+      // What was promised less than is asked for, and not kept, is not found with smaller steps.
+      if (promised < tolerance || damping > 1e8) {
+        fit.converged = true;
         break;
       }
     }
@@ -145,7 +173,13 @@ std::vector<Score> scores(OutputErrorProblem& problem, const Eigen::VectorXd& x,
                           const std::vector<bool>& free, const Bounds& bounds,
                           const ChannelScales& scales,
                           const std::vector<std::vector<Eigen::Index>>& groups) {
-  const NormalEquations equations = normal_equations(problem, x, scales);
+  std::vector<bool> wanted = free;
+  for (const std::vector<Eigen::Index>& group : groups) {
+    for (const Eigen::Index k : group) {
+      wanted[static_cast<std::size_t>(k)] = true;
+    }
+  }
+  const NormalEquations equations = normal_equations(problem, x, wanted, scales);
   const std::vector<Eigen::Index> active = active_parameters(x, equations, free, bounds);
   const Eigen::MatrixXd hessian = equations.hessian(active, active);
   std::vector<Score> all;
@@ -173,7 +207,7 @@ ChannelScales residual_scales(OutputErrorProblem& problem, const Eigen::VectorXd
   std::vector<double> velocities;
   ResidualBlock block;
   for (std::size_t run = 0; run < problem.runs().size(); ++run) {
-    problem.evaluate(run, x, false, block);
+    problem.evaluate(run, x, block);
     differences.insert(differences.end(), block.difference.begin(), block.difference.end());
     velocities.insert(velocities.end(), block.velocity.begin(), block.velocity.end());
   }

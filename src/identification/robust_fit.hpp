@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
@@ -29,11 +30,14 @@ struct RobustFit {
 };
 
 /// Minimises Σ ρ(r/σ), ρ(z) = 2δ²(√(1 + (z/δ)²) − 1), δ = 1.5, over the free parameters in their
-/// bounds, until a step gains less than `tolerance` (in units of the loss, that is of χ²). Source:
-/// Moré, "The Levenberg–Marquardt algorithm" (1978); bounds by projection.
+/// bounds, until a step gains, or promised and did not keep, less than `tolerance` (in units of the
+/// loss, that is of χ²); or until the cost would not get below `worthwhile` if all iterations that
+/// are left gained as much as the last one. Source: Moré, "The Levenberg–Marquardt algorithm"
+/// (1978); bounds by projection.
 [[nodiscard]] RobustFit minimize(OutputErrorProblem& problem, const Eigen::VectorXd& start,
                                  const std::vector<bool>& free, const Bounds& bounds,
-                                 const ChannelScales& scales, int max_iterations, double tolerance);
+                                 const ChannelScales& scales, int max_iterations, double tolerance,
+                                 double worthwhile = std::numeric_limits<double>::infinity());
 
 /// Robust scales of the residuals at x, floored by what the columns' resolution allows.
 [[nodiscard]] ChannelScales residual_scales(OutputErrorProblem& problem, const Eigen::VectorXd& x);

@@ -22,7 +22,7 @@ struct TimedResidual {
 std::vector<TimedResidual> residuals_of(OutputErrorProblem& problem, std::size_t index,
                                         const Eigen::VectorXd& x) {
   ResidualBlock block;
-  problem.evaluate(index, x, false, block);
+  problem.evaluate(index, x, block);
   const ResidualRun& run = problem.runs()[index];
   const std::vector<double>& time = problem.recording().runs[run.prepared].run.time;
   std::vector<TimedResidual> all;

@@ -1,18 +1,17 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <vector>
 
 #include <Eigen/Core>
 
 #include "identification/output_error.hpp"
 
-/// The soft-L1 loss and how a run's parameters lie among all of them; shared by the minimisation
-/// and the variance of its answer.
+/// The soft-L1 loss and the sums of a run's Jacobian; shared by the minimisation and the variance
+/// of its answer.
 namespace flyball::identification {
-
-using LocalMatrix = Eigen::Matrix<double, local_parameter_count, local_parameter_count>;
-using LocalVector = Eigen::Matrix<double, local_parameter_count, 1>;
 
 inline constexpr double soft_limit = 1.5;  // δ: residuals beyond 1.5 σ count linearly
 
@@ -29,36 +28,48 @@ inline double weight(double z) {
   return 1.0 / std::sqrt(1.0 + square(z / soft_limit));
 }
 
-/// Adds weight j jᵀ; most terms of the model are absent, and their entries of j zero.
-inline void add_square(LocalMatrix& sum, double weight, const LocalVector& j) {
-  for (int k = 0; k < local_parameter_count; ++k) {
-    if (const double factor = weight * j[k]; factor != 0.0) {
-      double* column = sum.data() + static_cast<std::ptrdiff_t>(k) * local_parameter_count;
-      for (int i = 0; i < local_parameter_count; ++i) {
-        column[i] += factor * j[i];
-      }
-    }
-  }
-}
-
 /// 1/scale, and 0 for a channel that is switched off.
 inline double inverse(double scale) {
   return scale > 0.0 ? 1.0 / scale : 0.0;
 }
 
-inline Eigen::Index global_index(int local, std::size_t run) {
-  return local < shared_parameter_count
-             ? local
-             : initial_velocity_of(run) + (local - shared_parameter_count);
-}
-
-/// Adds a run's matrix to that of all parameters.
-inline void scatter(Eigen::MatrixXd& global, const LocalMatrix& local, std::size_t run) {
-  for (int a = 0; a < local_parameter_count; ++a) {
-    for (int b = 0; b < local_parameter_count; ++b) {
-      global(global_index(a, run), global_index(b, run)) += local(a, b);
+/// Adds the lower triangle of a run's symmetric matrix, by the columns of its Jacobian, to the
+/// matrix of all parameters.
+inline void scatter(Eigen::MatrixXd& all, const Eigen::MatrixXd& lower,
+                    const std::vector<Eigen::Index>& columns) {
+  const auto count = static_cast<Eigen::Index>(columns.size());
+  for (Eigen::Index a = 0; a < count; ++a) {
+    for (Eigen::Index b = 0; b < count; ++b) {
+      const Eigen::Index row = columns[static_cast<std::size_t>(a)];
+      const Eigen::Index column = columns[static_cast<std::size_t>(b)];
+      if (row >= 0 && column >= 0) {
+        all(row, column) += lower(std::max(a, b), std::min(a, b));
+      }
     }
   }
+}
+
+/// Adds Σ weight j jᵀ over the rows j of a Jacobian to the lower triangle of `sum`.
+/// @param weights  Of its rows.
+inline void add_squares(Eigen::MatrixXd& sum, const ResidualBlock::Jacobian& jacobian,
+                        const Eigen::VectorXd& weights) {
+  // The sensors' own columns are six.
+  with_width(static_cast<std::size_t>(jacobian.cols()) - 6, [&](auto width) {
+    constexpr int count = width() + 6;
+    using Column = Eigen::Matrix<double, count, 1>;
+    Eigen::Matrix<double, count, count> square = Eigen::Matrix<double, count, count>::Zero();
+    for (Eigen::Index row = 0; row < jacobian.rows(); ++row) {
+      const Eigen::Map<const Column> j(jacobian.data() + row * count);
+      const Column weighed = weights[row] * j;
+      for (int k = 0; k < count; ++k) {
+        // From an even row on, so that pairs of them are added at once.
+        for (int i = k & ~1; i < count; ++i) {
+          square(i, k) += weighed[k] * j[i];
+        }
+      }
+    }
+    sum += square;
+  });
 }
 
 }  // namespace flyball::identification

@@ -1,4 +1,6 @@
 #include <cmath>
+#include <numeric>
+#include <vector>
 
 #include <flyball/core/random.hpp>
 
@@ -36,19 +38,34 @@ SimulationVector at_velocity(double initial, double force = 0.0) {
 
 double velocity_at(const Response& response, double time) {
   std::size_t hint = 0;
-  return response.at(time, false, hint).velocity;
+  return response.velocity(response.place(time, hint));
 }
 
 double position_at(const Response& response, double time) {
   std::size_t hint = 0;
-  return response.at(time, false, hint).position;
+  return response.position(response.place(time, hint));
+}
+
+/// The position's derivatives by the columns.
+std::vector<double> gradient_at(const RunInput& input, const SimulationVector& x,
+                                const SimulationColumns& columns, double time) {
+  Response response;
+  response.simulate(input, x, columns);
+  std::vector<double> gradient;
+  with_width(columns.size(), [&](auto width) {
+    gradient.assign(static_cast<std::size_t>(width()), 0.0);
+    std::size_t hint = 0;
+    response.add_gradient<width()>(response.place(time, hint), 1.0, gradient.data());
+  });
+  gradient.resize(columns.size());
+  return gradient;
 }
 
 // v(t) = (V − kS)/kV (1 − e^(−t/τ)), p(t) = (V − kS)/kV (t − τ (1 − e^(−t/τ)))
 TEST(Response, StepFromRestIsExponential) {
   const RunInput input = steady(3.0, 1.0, 0.02);
   Response response;
-  response.simulate(input, at_velocity(0.0), false);
+  response.simulate(input, at_velocity(0.0));
   for (const double time : {0.1, 0.38, 0.9}) {
     const double rise = 1.0 - std::exp(-time / tau);
     EXPECT_NEAR(velocity_at(response, time), 1.3 * rise, 1e-12);
@@ -62,7 +79,7 @@ TEST(Response, CoastsToRestWithinAStepAndSticks) {
   const RunInput input = steady(0.0, 1.0, 0.1);
   Response response;
   const double v0 = 1.1;
-  response.simulate(input, at_velocity(v0), false);
+  response.simulate(input, at_velocity(v0));
   const double stop = tau * std::log(1.0 + v0 * kV / kS);
   EXPECT_NEAR(position_at(response, 0.9), v0 * tau - stop * kS / kV, 1e-12);
   EXPECT_EQ(velocity_at(response, 0.9), 0.0);
@@ -72,10 +89,10 @@ TEST(Response, SticksBelowBreakawayAndSlipsBackAboveIt) {
   const RunInput below = steady(0.39, 1.0, 0.05);
   const RunInput above = steady(-0.6, 1.0, 0.05);
   Response response;
-  response.simulate(below, at_velocity(0.0), false);
+  response.simulate(below, at_velocity(0.0));
   EXPECT_EQ(position_at(response, 1.0), 0.0);
   // Reverses: forward friction until rest, then backwards towards (V + kS)/kV = −0.1.
-  response.simulate(above, at_velocity(0.5), false);
+  response.simulate(above, at_velocity(0.5));
   EXPECT_NEAR(velocity_at(response, 1.0), -0.1, 1e-3);
 }
 
@@ -83,17 +100,17 @@ TEST(Response, GravityActsLikeVoltage) {
   RunInput input = steady(3.0, 1.0, 0.02);
   input.forces[0].assign(input.time.size(), 1.0);
   Response with_gravity;
-  with_gravity.simulate(input, at_velocity(0.0, 0.7), false);
+  with_gravity.simulate(input, at_velocity(0.0, 0.7));
   const RunInput lower = steady(2.3, 1.0, 0.02);
   Response without;
-  without.simulate(lower, at_velocity(0.0), false);
+  without.simulate(lower, at_velocity(0.0));
   EXPECT_NEAR(velocity_at(with_gravity, 0.7), velocity_at(without, 0.7), 1e-13);
 }
 
 TEST(Response, StaysAtTheInitialVelocityBeforeItsStart) {
   const RunInput input = steady(3.0, 0.2, 0.02);
   Response response;
-  response.simulate(input, at_velocity(0.8), false);
+  response.simulate(input, at_velocity(0.8));
   EXPECT_NEAR(position_at(response, -0.05), -0.04, 1e-15);
 }
 
@@ -104,7 +121,7 @@ TEST(Response, TheCurrentLimitMakesAStraightRise) {
   const double headroom = 3.0;
   x[parameter::headroom] = headroom;
   Response response;
-  response.simulate(input, x, false);
+  response.simulate(input, x);
   const double slope = (headroom - kS) / (kV * tau);
   const double leaves = (6.0 - headroom) / kV / slope;
   EXPECT_NEAR(velocity_at(response, 0.1), 0.1 * slope, 1e-12);
@@ -121,7 +138,7 @@ TEST(Response, TheCurrentLimitHoldsWhenBraking) {
   SimulationVector x = at_velocity(2.0);
   x[parameter::headroom] = 3.0;
   Response response;
-  response.simulate(input, x, false);
+  response.simulate(input, x);
   const double braking = (3.0 + kS) / (kV * tau);
   const double rest = 2.0 / braking;
   EXPECT_NEAR(position_at(response, rest), 0.5 * 2.0 * rest, 1e-3);
@@ -132,7 +149,7 @@ TEST(Response, TheCurrentLimitHoldsWhenBraking) {
 TEST(Response, AtItsFirstAndLastRows) {
   const RunInput input = steady(3.0, 0.2, 0.02);
   Response response;
-  response.simulate(input, at_velocity(0.8), false);
+  response.simulate(input, at_velocity(0.8));
   EXPECT_EQ(position_at(response, 0.0), 0.0);
   EXPECT_EQ(velocity_at(response, 0.0), 0.8);
   const double last = input.time.back();
@@ -172,12 +189,22 @@ TEST(Response, SensitivitiesAreDerivatives) {
     x[parameter::spring] = -0.3;
     x[parameter::drag] = 0.15;
     x[parameter::headroom] = seed % 2 == 0 ? no_limit : random.uniform(1.0, 3.0);
-    Response response;
-    response.simulate(input, x, true);
-    std::size_t hint = 0;
+    SimulationColumns all(simulation_parameter_count);
+    std::iota(all.begin(), all.end(), 0);
     const double time = random.uniform(0.2, 1.0);
-    const SimulationGradient gradient = response.at(time, true, hint).position_gradient;
+    const std::vector<double> gradient = gradient_at(input, x, all, time);
     limited += gradient[parameter::headroom] != 0.0 ? 1 : 0;
+    // Each width that is computed, and columns that leave some out.
+    for (const SimulationColumns& columns :
+         {SimulationColumns{0, 1, 2}, SimulationColumns{0, 1, 2, 5, 16},
+          SimulationColumns{0, 1, 2, 3, 4, 6, 15},
+          SimulationColumns{0, 1, 2, 5, 6, 7, 8, 15, 16}}) {
+      const std::vector<double> some = gradient_at(input, x, columns, time);
+      for (std::size_t k = 0; k < columns.size(); ++k) {
+        EXPECT_NEAR(some[k], gradient[static_cast<std::size_t>(columns[k])], 1e-14)
+            << "seed " << seed << " parameter " << columns[k];
+      }
+    }
     for (std::size_t j = 0; j < x.size(); ++j) {
       const double step = j == parameter::headroom ? 1e-5 : 1e-6;
       SimulationVector high = x;
@@ -185,11 +212,11 @@ TEST(Response, SensitivitiesAreDerivatives) {
       high[j] += step;
       low[j] -= step;
       Response shifted;
-      shifted.simulate(input, high, false);
+      shifted.simulate(input, high);
       const double above = position_at(shifted, time);
-      shifted.simulate(input, low, false);
+      shifted.simulate(input, low);
       const double below = position_at(shifted, time);
-      EXPECT_NEAR(gradient[static_cast<Eigen::Index>(j)], (above - below) / (2.0 * step), 3e-6)
+      EXPECT_NEAR(gradient[j], (above - below) / (2.0 * step), 3e-6)
           << "seed " << seed << " parameter " << j;
     }
   }
