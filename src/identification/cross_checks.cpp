@@ -122,18 +122,21 @@ void compare_channels(OutputErrorProblem& problem, const RobustFit& best, const 
 }
 
 void compare_repeats(const FeedforwardFit& fit, std::vector<Diagnostic>& diagnostics) {
-  // Measured over simulated speed of each run; per kind the least and the greatest.
-  std::map<TestKind, std::pair<double, double>> extremes;
+  // Measured over simulated speed of each run, of all its stretches; per kind the least and the
+  // greatest.
+  std::map<std::pair<TestKind, std::size_t>, std::pair<double, double>> sums;
   for (const FittedRun& run : fit.runs) {
-    double product = 0.0;
-    double square = 0.0;
+    auto& [product, square] = sums[{run.kind, run.source}];
     for (std::size_t i = 0; i < run.velocity.size(); ++i) {
       product += run.velocity[i] * run.velocity_hat[i];
       square += run.velocity_hat[i] * run.velocity_hat[i];
     }
-    if (run.used && square > 0.0) {
-      const double ratio = product / square;
-      const auto [entry, first] = extremes.try_emplace(run.kind, ratio, ratio);
+  }
+  std::map<TestKind, std::pair<double, double>> extremes;
+  for (const auto& [run, sum] : sums) {
+    if (sum.second > 0.0) {
+      const double ratio = sum.first / sum.second;
+      const auto [entry, first] = extremes.try_emplace(run.first, ratio, ratio);
       if (!first) {
         entry->second = {std::min(entry->second.first, ratio),
                          std::max(entry->second.second, ratio)};

@@ -14,6 +14,7 @@
 #include "identification/cross_checks.hpp"
 #include "identification/estimates.hpp"
 #include "identification/gain_fit.hpp"
+#include "identification/long_runs.hpp"
 #include "identification/model_terms.hpp"
 #include "identification/output_error.hpp"
 #include "identification/plausibility.hpp"
@@ -269,23 +270,31 @@ FitReport identify_feedforward(const Recording& recording, const FitOptions& opt
   if (options.mechanism) {
     preparation.mechanism = options.mechanism;
   }
-  auto prepared = prepare(recording, preparation);
+  std::vector<Diagnostic> of_length;
+  const auto coarse = at_coarser_rows(recording, of_length);
+  auto prepared = prepare(coarse ? *coarse : recording, preparation);
   if (!prepared) {
     return {{}, {}, tl::unexpected(std::move(prepared).error())};
   }
   FitReport report{*std::move(prepared), {}, refusal(IdentificationError::no_data)};
   report.diagnostics = report.prepared.diagnostics;
-  const bool said = report.prepared.mechanism.has_value();
+  auto part = representative_part(report.prepared, of_length);
+  report.diagnostics.insert(report.diagnostics.end(), of_length.begin(), of_length.end());
+  PreparedRecording& fitted = part ? *part : report.prepared;
+  const bool said = fitted.mechanism.has_value();
   if (!said) {
-    if (auto proposed = propose_mechanism(report.prepared, options, report.diagnostics);
-        !proposed) {
+    if (auto proposed = propose_mechanism(fitted, options, report.diagnostics); !proposed) {
       report.fit = tl::unexpected(std::move(proposed).error());
       return report;
     }
+    report.prepared.mechanism = fitted.mechanism;
   }
-  report.fit = fit_prepared(report.prepared, options, true, report.diagnostics);
+  report.fit = fit_prepared(fitted, options, true, report.diagnostics);
   if (said) {
-    doubt_mechanism(report.prepared, options, report.fit, report.diagnostics);
+    doubt_mechanism(fitted, options, report.fit, report.diagnostics);
+  }
+  if (report.fit) {
+    join_stretches(*report.fit);
   }
   return report;
 }
