@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <flyball/identification/identification_error.hpp>
 #include <flyball/math/riccati/riccati.hpp>
@@ -189,6 +191,72 @@ MatrixXd reflected(const MatrixXd& A) {
       .real();
 }
 
+/// What the states and what follows are told by: [x⁺; y] over the past's coordinates.
+struct Future {
+  const MatrixXd& X;
+  const MatrixXd& target;
+  Index columns;
+};
+
+/// The model of A and C: its gain by what they leave of the future, B, D and x0 by the whole
+/// record; in the record's units.
+Expected<InnovationsModel> complete(const ScaledSignals& record, const Future& future,
+                                    const MatrixXd& A, const MatrixXd& C, Time period,
+                                    const SubspaceOptions& options, bool& noise_determined) {
+  const Index n = A.rows();
+  const Index m = record.u.cols();
+  const Index p = C.rows();
+  MatrixXd left = future.target;
+  left.topLeftCorner(n, future.X.cols()) -= A * future.X;
+  left.bottomLeftCorner(p, future.X.cols()) -= C * future.X;
+  const MatrixXd covariance = detail::symmetrized(detail::product_transposed(left, left)) /
+                              static_cast<double>(future.columns);
+  const NoiseGain gain = noise_gain(A, C, covariance);
+  noise_determined = gain.determined;
+  InnovationsModel model;
+  model.system = {A, MatrixXd::Zero(n, m), C, MatrixXd::Zero(p, m), period};
+  model.K = gain.K;
+  model.x0 = VectorXd::Zero(n);
+  model.noise = gain.noise;
+
+  MatrixXd W = MatrixXd::Identity(p, p);
+  if (gain.determined) {
+    if (const auto factor = detail::cholesky_of(gain.noise)) {
+      W = lower_solve(*factor, W);
+    }
+  }
+  FLYBALL_TRY(const VectorXd inputs, regress_inputs(record, model, W, options, gain.determined));
+  const Index start = options.initial_state ? n : 0;
+  if (start > 0) {
+    model.x0 = inputs.head(n);
+  }
+  for (Index j = 0; j < m; ++j) {
+    model.system.B.col(j) = inputs.segment(start + j * n, n);
+    if (options.feedthrough) {
+      model.system.D.col(j) = inputs.segment(start + n * m + j * p, p);
+    }
+  }
+  return model;
+}
+
+bool is_stable(const MatrixXd& A) {
+  return detail::eigenvalues_of(A).cwiseAbs().maxCoeff() < 1.0;
+}
+
+/// -2 log likelihood of normal errors one sample ahead, but for a constant; infinite where the
+/// predictor is of no use.
+double misfit(const ScaledSignals& record, const InnovationsModel& model) {
+  const auto ahead = predict(model, record.u, record.y);
+  if (!ahead) {
+    return std::numeric_limits<double>::infinity();
+  }
+  const MatrixXd errors = record.y - *ahead;
+  const auto samples = static_cast<double>(errors.rows());
+  const auto L = detail::cholesky_of(detail::transposed_product(errors, errors) / samples);
+  return L ? 2.0 * samples * L->diagonal().array().log().sum()
+           : std::numeric_limits<double>::infinity();
+}
+
 Expected<void> check(const MatrixRef& u, const MatrixRef& y, Time period,
                      const SubspaceOptions& options) {
   FLYBALL_CHECK(Checks(where)
@@ -300,38 +368,23 @@ Expected<SubspaceFit> fit_subspace(const MatrixRef& u, const MatrixRef& y, Time 
     A = both.topRows(n);
     C = both.bottomRows(p);
   }
-  if (options.stable) {
-    A = reflected(A);
-  }
-  MatrixXd left = target;
-  left.topLeftCorner(n, parts.past()) -= A * X;
-  left.bottomLeftCorner(p, parts.past()) -= C * X;
-  const MatrixXd covariance = detail::symmetrized(detail::product_transposed(left, left)) /
-                              static_cast<double>(data.columns);
-  const NoiseGain gain = noise_gain(A, C, covariance);
-  fit.noise_determined = gain.determined;
-  model.system = {A, MatrixXd::Zero(n, m), C, MatrixXd::Zero(p, m), period};
-  model.K = gain.K;
-  model.x0 = VectorXd::Zero(n);
-
-  MatrixXd W = MatrixXd::Identity(p, p);
-  if (gain.determined) {
-    if (const auto factor = detail::cholesky_of(gain.noise)) {
-      W = lower_solve(*factor, W);
+  const Future future{X, target, data.columns};
+  const bool unstable = !is_stable(A);
+  FLYBALL_TRY(model, complete(record, future, options.stable ? reflected(A) : A, C, period, options,
+                              fit.noise_determined));
+  if (unstable && !options.stable) {
+    // A stable plant's pole near the circle may come out beyond it, and its free run then grows:
+    // such a pole stays only where the record is predicted worse without.
+    bool determined = false;
+    FLYBALL_TRY(InnovationsModel inside,
+                complete(record, future, reflected(A), C, period, options, determined));
+    constexpr double clearly = 12.0;  // χ², of about as many states
+    if (misfit(record, inside) < misfit(record, model) + clearly) {
+      model = std::move(inside);
+      fit.noise_determined = determined;
+      fit.stabilized = true;
     }
   }
-  FLYBALL_TRY(const VectorXd inputs, regress_inputs(record, model, W, options));
-  const Index start = options.initial_state ? n : 0;
-  if (start > 0) {
-    model.x0 = inputs.head(n);
-  }
-  for (Index j = 0; j < m; ++j) {
-    model.system.B.col(j) = inputs.segment(start + j * n, n);
-    if (options.feedthrough) {
-      model.system.D.col(j) = inputs.segment(start + n * m + j * p, p);
-    }
-  }
-  model.noise = gain.noise;
 
   model.system.B *= record.u_unit.cwiseInverse().asDiagonal();
   model.system.C = record.y_unit.asDiagonal() * model.system.C;

@@ -28,10 +28,13 @@ struct ScaledSignals {
 ///
 /// ŷ = C x̂ + D u, x̂⁺ = Φ x̂ + (B - K D) u + K y with Φ = A - K C. The part of C x̂ that an input
 /// makes through column b of B is zᵀ b with z⁺ = Φᵀ z + Cᵀ u: one state a pair of output and input.
+/// @param noisy  The record has noise, beside which the normal equations lose nothing where they
+/// are
+///               well enough conditioned; else, and without noise, by QR.
 /// @return  x0, B and D, column by column, those that are not fitted left out.
 [[nodiscard]] Expected<Eigen::VectorXd> regress_inputs(const ScaledSignals& record,
                                                        const InnovationsModel& model,
                                                        const Eigen::MatrixXd& W,
-                                                       const SubspaceOptions& options);
+                                                       const SubspaceOptions& options, bool noisy);
 
 }  // namespace flyball::identification

@@ -24,7 +24,7 @@ struct SubspaceOptions {
                                 ///< and order.
   SubspaceWeighting weighting = SubspaceWeighting::cva;
   bool feedthrough = true;    ///< Whether D is estimated; else it is zero.
-  bool stable = false;        ///< Poles outside the unit circle are reflected into it.
+  bool stable = false;        ///< All poles outside the unit circle are reflected into it.
   bool initial_state = true;  ///< Whether x0 is estimated; else it is zero.
 };
 
@@ -41,6 +41,9 @@ struct SubspaceFit {
   Eigen::Index block_rows = 0;
   bool noise_determined = true;  ///< K is that of the residuals; else they are too small to tell,
                                  ///< and it is zero.
+  /// Poles came out outside the unit circle and were reflected into it, as the record is predicted
+  /// as well with them there (χ² within 12); unstable ones that it asks for stay.
+  bool stabilized = false;
 };
 
 /// A model of several inputs and outputs from a record, without a search: the order from singular
