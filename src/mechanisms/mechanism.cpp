@@ -105,6 +105,16 @@ Expected<Flywheel> flywheel(const FlywheelParameters& parameters) {
   });
 }
 
+Expected<ContinuousSystem<1, 1, 1>> flywheel_without_encoder(const FlywheelParameters& parameters) {
+  return flywheel(parameters).map([&](const Flywheel& wheel) {
+    const DcMotor& motor = parameters.motor;
+    ContinuousSystem<1, 1, 1> system = wheel;
+    system.C << -parameters.gearing / (motor.Kv * motor.R);
+    system.D << 1.0 / motor.R;
+    return system;
+  });
+}
+
 Expected<Elevator> elevator(const ElevatorParameters& parameters) {
   constexpr std::string_view where = "elevator";
   const auto& [motor, G, mass, drum_radius] = parameters;

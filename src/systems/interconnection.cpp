@@ -124,6 +124,17 @@ Expected<Continuous> connect_feedback(const Continuous& forward, const Continuou
   return loop_system;
 }
 
+Expected<Continuous> close_loop(const Continuous& plant, const MatrixRef& K) {
+  constexpr std::string_view where = "closed_loop";
+  FLYBALL_CHECK(check_system(plant, where));
+  FLYBALL_CHECK(Checks(where)
+                    .shape(K, plant.B.cols(), plant.A.rows(), "K", "inputs x states")
+                    .finite(K, "K"));
+  const MatrixXd BK = product(plant.B, K);
+  const MatrixXd DK = product(plant.D, K);
+  return Continuous{plant.A - BK, BK, plant.C - DK, DK};
+}
+
 /// The same of discrete systems, whose periods must agree.
 template <class Connect>
 Expected<Discrete> discrete(const Discrete& first, const Discrete& second, std::string_view where,
@@ -217,6 +228,16 @@ Expected<Discrete> feedback(const Discrete& forward, FeedbackSign sign) {
   FLYBALL_CHECK(check_system_or_gain(forward, "feedback"));
   return unity_feedback(bare(forward), sign).map([&](const Continuous& loop) {
     return detail::timed(loop, forward.period);
+  });
+}
+
+Expected<Continuous> closed_loop(const Continuous& plant, const MatrixRef& K) {
+  return close_loop(plant, K);
+}
+Expected<Discrete> closed_loop(const Discrete& plant, const MatrixRef& K) {
+  FLYBALL_CHECK(check_system(plant, "closed_loop"));
+  return close_loop(bare(plant), K).map([&](const Continuous& loop) {
+    return detail::timed(loop, plant.period);
   });
 }
 

@@ -49,6 +49,44 @@ TEST(LinearPlantInversion, FollowsWhatThePlantCanDo) {
   }
 }
 
+// Section 7.8.3: with B⁺(r_{k+1} - A r_k) beside the feedback, two starts still come together by
+// A - BK a step, as without it: the poles are the same. Where the plant has as many inputs as
+// states, B B⁺ = I and the error itself goes by A - BK.
+TEST(LinearPlantInversion, DoesNotMoveThePoles) {
+  Random random(783);
+  const auto any = [&](Eigen::Index rows, Eigen::Index columns) {
+    return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return random.normal(); }).eval();
+  };
+  for (int trial = 0; trial < 50; ++trial) {
+    const Eigen::Index n = 1 + trial % 3;
+    const Eigen::Index m = 1 + trial % n;
+    const DiscreteSystem<> plant{any(n, n), any(n, m), any(1, n), any(1, m), 20_ms};
+    const Eigen::MatrixXd K = any(m, n);
+    const auto inversion = linear_plant_inversion(plant).value();
+    const Eigen::VectorXd r = any(n, 1);
+    const Eigen::VectorXd r_next = any(n, 1);
+    const auto next = [&](const Eigen::VectorXd& x, bool with_feedforward) {
+      Eigen::VectorXd u = K * (r - x);
+      if (with_feedforward) {
+        u += inversion.calculate(r, r_next);
+      }
+      return Eigen::VectorXd(plant.A * x + plant.B * u);
+    };
+    const Eigen::VectorXd x = any(n, 1);
+    const Eigen::VectorXd other = any(n, 1);
+    const Eigen::MatrixXd loop = plant.A - plant.B * K;
+    for (const bool with : {false, true}) {
+      EXPECT_LT((next(x, with) - next(other, with) - loop * (x - other)).norm(),
+                1e-11 * (1.0 + inversion.B_pinv().norm()));
+    }
+    EXPECT_GT((next(x, true) - next(x, false)).norm(), 1e-6);
+    if (m == n) {
+      EXPECT_LT((next(x, true) - r_next - loop * (x - r)).norm(),
+                1e-11 * (1.0 + inversion.B_pinv().squaredNorm()));
+    }
+  }
+}
+
 TEST(LinearPlantInversion, FixedIsDynamicAndAllocatesNothing) {
   const auto elevator = mechanisms::elevator({.kS = 0.1, .kV = 4.0, .kA = 0.3, .kG = 0.6}).value();
   const auto plant = discretize(elevator, 20_ms).value();

@@ -48,6 +48,22 @@ TEST(Flywheel, Theorem6101) {
   EXPECT_EQ(model.disturbance(1.0, 100.0), 0.0);
 }
 
+// C = -G/(K_v R) = -10/(20·0.2) = -2.5 A s/rad, D = 1/0.2 = 5 A/V: the current of the motor at the
+// speed G ω, which the state's dynamics do not depend on.
+TEST(Flywheel, Theorem6102) {
+  const FlywheelParameters parameters{
+      .motor = round_motor(), .gearing = 10.0, .moment_of_inertia = 0.5_kg_m2};
+  const auto model = flywheel_without_encoder(parameters).value();
+  EXPECT_EQ(model.A, flywheel(parameters)->A);
+  EXPECT_EQ(model.B, flywheel(parameters)->B);
+  EXPECT_DOUBLE_EQ(model.C(0), -2.5);
+  EXPECT_DOUBLE_EQ(model.D(0), 5.0);
+  const double current = model.C(0) * 3.0 + model.D(0) * 8.0;
+  EXPECT_DOUBLE_EQ(current, parameters.motor.current(10.0 * 3.0, 8.0));
+  EXPECT_TRUE(
+      flywheel_without_encoder({.motor = round_motor()}).error().is(ArgumentError::not_positive));
+}
+
 // -G² K_t/(R r² m K_v) = -100·0.05/(0.2·0.0025·8·20) = -62.5, G K_t/(R r m) = 0.5/(0.2·0.05·8) =
 // 6.25; held by R r m g/(G K_t) = 0.2·0.05·8·g/0.5 = 0.16 g volts.
 TEST(Elevator, Theorem691) {

@@ -6,6 +6,8 @@
 
 #include <flyball/core/random.hpp>
 #include <flyball/math/exponential/matrix_exponential.hpp>
+#include <flyball/math/integration/adaptive.hpp>
+#include <flyball/math/integration/quadrature.hpp>
 
 namespace flyball {
 namespace {
@@ -41,6 +43,47 @@ TEST(Discretize, BooksElevator) {
   EXPECT_NEAR(coarse.A(0, 1), 0.0060897978971460095, 1e-16);
   EXPECT_NEAR(coarse.A(1, 1), 7.387399396604512e-08, 1e-20);
   EXPECT_NEAR(coarse.B(1), 0.13067109386810719, 1e-15);
+}
+
+// The steps of D.1, each as an identity: d/dt e^{At} = A e^{At} = e^{At} A; B_d is the integral of
+// e^{Av} over a period, A⁻¹(e^{AT} - I)B where A has an inverse; and x(T) = A_d x + B_d u is what
+// integrating dx/dt = A x + B u gives.
+TEST(Discretize, TheBooksDerivation) {
+  Random random(111);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Eigen::Index n = 1 + trial % 4;
+    const Eigen::MatrixXd A = Eigen::MatrixXd::NullaryExpr(n, n, [&] { return random.normal(); });
+    const Eigen::MatrixXd B = Eigen::MatrixXd::NullaryExpr(n, 1, [&] { return random.normal(); });
+    const Eigen::VectorXd x0 = Eigen::VectorXd::NullaryExpr(n, [&] { return random.normal(); });
+    const double T = random.uniform(0.05, 1.0);
+    const double u = random.normal();
+    const auto discrete = discretize_zoh(A, B, Time(T)).value();
+    const auto entry = [&](double t, Eigen::Index i, Eigen::Index j) {
+      return expm(A * t).value()(i, j);
+    };
+    const Eigen::MatrixXd slope = A * discrete.A;
+    EXPECT_LT((slope - discrete.A * A).norm(), 1e-13 * (1.0 + slope.norm()));
+    Eigen::MatrixXd integral(n, n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index j = 0; j < n; ++j) {
+        // e^{A(T + h)} by Richardson's differences of the entry.
+        const double h = 1e-3;
+        const double d1 = (entry(T + h, i, j) - entry(T - h, i, j)) / (2.0 * h);
+        const double d2 = (entry(T + 2.0 * h, i, j) - entry(T - 2.0 * h, i, j)) / (4.0 * h);
+        EXPECT_NEAR((4.0 * d1 - d2) / 3.0, slope(i, j), 1e-9 * (1.0 + slope.norm()));
+        integral(i, j) = quadrature([&](double v) { return entry(v, i, j); }, 0.0, T)->value;
+      }
+    }
+    EXPECT_LT((integral * B - discrete.B).norm(), 1e-12 * (1.0 + discrete.B.norm()));
+    const Eigen::MatrixXd I = Eigen::MatrixXd::Identity(n, n);
+    EXPECT_LT((A * discrete.B - (discrete.A - I) * B).norm(), 1e-13 * (1.0 + slope.norm()));
+    const auto path =
+        integrate([&](double, const Eigen::VectorXd& x) { return Eigen::VectorXd(A * x + B * u); },
+                  0.0, x0, T, {.relative_tolerance = 1e-12, .absolute_tolerance = 1e-12})
+            .value();
+    EXPECT_LT((discrete.A * x0 + discrete.B * u - path.final_state()).norm(),
+              1e-10 * (1.0 + x0.norm()));
+  }
 }
 
 // Two periods are one of twice the length: A(2T) = A(T)², B(2T) = A(T) B(T) + B(T), whatever the

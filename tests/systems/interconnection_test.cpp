@@ -1,5 +1,6 @@
 #include <flyball/systems/interconnection.hpp>
 
+#include <cmath>
 #include <complex>
 
 #include <gtest/gtest.h>
@@ -8,6 +9,7 @@
 #include <flyball/systems/norms.hpp>
 #include <flyball/systems/realization.hpp>
 #include <flyball/systems/response.hpp>
+#include <flyball/core/random.hpp>
 
 #include "math/matrices_json.hpp"
 #include "support/oracle.hpp"
@@ -36,6 +38,43 @@ ContinuousSystem<> from_polynomials(std::vector<double> num, std::vector<double>
   }
   s.B(0, 0) = 1.0;
   return s;
+}
+
+// dx/dt = -x + 2u, y = 3x + 0.5u under u = 4 (r - x): A - BK = -9, BK = 8, C - DK = 1, DK = 2
+// ((6.3), (6.4); (7.12), (7.13)); in Tables 6.2's and 7.4's sizes for any others, where the law
+// itself, put into (6.1) and (6.2), gives the same.
+TEST(Interconnection, StateFeedbackInClosedForm) {
+  const auto number = [](double x) { return MatrixXd::Constant(1, 1, x).eval(); };
+  const ContinuousSystem<> plant{number(-1.0), number(2.0), number(3.0), number(0.5)};
+  const auto loop = closed_loop(plant, number(4.0)).value();
+  EXPECT_EQ(loop.A(0), -9.0);
+  EXPECT_EQ(loop.B(0), 8.0);
+  EXPECT_EQ(loop.C(0), 1.0);
+  EXPECT_EQ(loop.D(0), 2.0);
+  Random random(61);
+  const auto any = [&](Eigen::Index rows, Eigen::Index columns) {
+    return MatrixXd::NullaryExpr(rows, columns, [&] { return random.normal(); }).eval();
+  };
+  for (int trial = 0; trial < 50; ++trial) {
+    const Eigen::Index n = 1 + trial % 5;
+    const Eigen::Index m = 1 + trial % 3;
+    const Eigen::Index p = 1 + trial % 4;
+    const DiscreteSystem<> sampled{any(n, n), any(n, m), any(p, n), any(p, m), Time(0.02)};
+    const MatrixXd K = any(m, n);
+    const auto closed = closed_loop(sampled, K).value();
+    ASSERT_EQ(closed.B.cols(), n);
+    ASSERT_EQ(closed.C.rows(), p);
+    const MatrixXd x = any(n, 1);
+    const MatrixXd r = any(n, 1);
+    const MatrixXd u = K * (r - x);
+    EXPECT_LT((closed.A * x + closed.B * r - sampled.A * x - sampled.B * u).norm(), 1e-12);
+    EXPECT_LT((closed.C * x + closed.D * r - sampled.C * x - sampled.D * u).norm(), 1e-12);
+    EXPECT_EQ(closed.period.si(), 0.02);
+    // A reference is held without error exactly if A r = r (7.5); if A r = 0 (6.5).
+    EXPECT_NEAR((closed.A * r + closed.B * r - r).norm(), (sampled.A * r - r).norm(), 1e-12);
+  }
+  EXPECT_TRUE(closed_loop(plant, any(1, 2)).error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(closed_loop(plant, number(NAN)).error().is(ArgumentError::not_finite));
 }
 
 // G = 1/(s + 1), H = 1/(s + 2): 1/((s+1)(s+2)), (2s + 3)/((s+1)(s+2)), (s + 2)/(s² + 3s + 3).

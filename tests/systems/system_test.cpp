@@ -5,6 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include <flyball/systems/controllability.hpp>
+#include <flyball/systems/response.hpp>
+
 namespace flyball {
 namespace {
 
@@ -36,6 +39,33 @@ TEST(System, Stability) {
   EXPECT_TRUE(discrete(-0.99));
   EXPECT_FALSE(discrete(1.0));
   EXPECT_FALSE(discrete(-1.01));
+}
+
+// Section 6.8: dx/dt = v, dv/dt = a, by hand from e^{At} = I + At, for A² = 0.
+TEST(System, DoubleIntegrator) {
+  ContinuousSystem<2, 1, 1> cart;
+  cart.A << 0.0, 1.0, 0.0, 0.0;
+  cart.B << 0.0, 1.0;
+  cart.C << 1.0, 0.0;
+  cart.D << 0.0;
+  EXPECT_TRUE(check_system(cart, "test").has_value());
+  EXPECT_EQ(cart.derivative(Eigen::Vector2d(3.0, 2.0), Eigen::Vector<double, 1>(5.0)),
+            Eigen::Vector2d(2.0, 5.0));
+  EXPECT_TRUE(poles(cart).value().isZero(0.0));
+  EXPECT_FALSE(is_stable(cart).value());
+  const auto reach = analyze_controllability(cart.A, cart.B, TimeDomain::continuous).value();
+  EXPECT_EQ(reach.rank, 2);
+  const ResponseTimes times{Time(0.25), 9};
+  const auto step =
+      step_response(ContinuousSystem<>{cart.A, cart.B, cart.C, cart.D}, 0, times).value();
+  const auto coast = initial_response(ContinuousSystem<>{cart.A, cart.B, cart.C, cart.D},
+                                      Eigen::Vector2d(3.0, 2.0), times)
+                         .value();
+  for (Eigen::Index k = 0; k < 9; ++k) {
+    const double t = 0.25 * static_cast<double>(k);
+    EXPECT_NEAR(step.y(k, 0), 0.5 * t * t, 1e-15);
+    EXPECT_NEAR(coast.y(k, 0), 3.0 + 2.0 * t, 1e-15);
+  }
 }
 
 TEST(System, ChecksShapes) {

@@ -20,6 +20,13 @@ using Flywheel = Mechanism<1>;
 /// not. Source: book, Theorem 6.10.1.
 [[nodiscard]] Expected<Flywheel> flywheel(const FlywheelParameters& parameters);
 
+/// The flywheel whose current is measured and whose speed is not: x = angular velocity (rad/s),
+/// y = current of all motors (A), u = voltage (V). A and B as above, C = -G/(K_v R), D = 1/R: the
+/// speed can be estimated from it. The book's C has no G, as if the flywheel were on the motor's
+/// shaft. @errors As above. Source: book, Theorem 6.10.2.
+[[nodiscard]] Expected<ContinuousSystem<1, 1, 1>> flywheel_without_encoder(
+    const FlywheelParameters& parameters);
+
 /// The same model from identified gains: A = -kV/kA, B = 1/kA (section 14.3).
 /// @param gains  kV in V·s/rad and kA in V·s²/rad, both positive; kS in V, not negative.
 /// @errors ArgumentError::not_positive, out_of_range, not_finite.

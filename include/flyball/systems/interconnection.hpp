@@ -52,6 +52,14 @@ enum class FeedbackSign { negative, positive };
 [[nodiscard]] Expected<DiscreteSystem<>> feedback(const DiscreteSystem<>& forward,
                                                   FeedbackSign sign = FeedbackSign::negative);
 
+/// A plant under state feedback u = K (r - x), as a system from r to y: A - BK, BK, C - DK, DK.
+/// @param K  m x n. @return n states, n inputs. @errors ArgumentError for shapes and entries.
+/// Source: book, (6.3) and (6.4); (7.12) and (7.13).
+[[nodiscard]] Expected<ContinuousSystem<>> closed_loop(const ContinuousSystem<>& plant,
+                                                       const MatrixRef& K);
+[[nodiscard]] Expected<DiscreteSystem<>> closed_loop(const DiscreteSystem<>& plant,
+                                                     const MatrixRef& K);
+
 /// The transfer matrix C (sI - A)⁻¹B + D at one point s (z, for a discrete system).
 /// @return outputs x inputs. @errors ArgumentError for the system and a point that is not finite;
 ///         SystemError::no_image if the point is a pole. Cost: O(n³), allocates.

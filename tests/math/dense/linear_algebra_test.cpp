@@ -1,8 +1,9 @@
 #include <flyball/math/dense/linear_algebra.hpp>
 
+#include <algorithm>
 #include <cmath>
 
-#include <Eigen/LU>
+#include <Eigen/Dense>
 #include <gtest/gtest.h>
 
 #include <flyball/core/random.hpp>
@@ -110,6 +111,97 @@ TEST(Definiteness, Products) {
     EXPECT_TRUE(is_positive_definite(scaled).value());
     EXPECT_FALSE(is_positive_definite(P - (P.norm() + 1.0) * MatrixXd::Identity(n, n)).value());
   }
+}
+
+// Table 5.2 is Table 5.1: the sign of xᵀMx over directions is what the eigenvalues say. Of a matrix
+// V diag(λ) Vᵀ the columns of V reach the extremes λ, any x stays between them.
+TEST(Definiteness, SignsOfTheQuadraticForm) {
+  Random random(9);
+  for (int trial = 0; trial < 500; ++trial) {
+    const Index n = 2 + trial % 4;
+    const Eigen::HouseholderQR<MatrixXd> qr(random_matrix(random, n, n));
+    const MatrixXd V = qr.householderQ();
+    const double shift = trial % 3 - 1.0;  // all negative, either sign, all positive
+    const Eigen::VectorXd lambda = Eigen::VectorXd::NullaryExpr(n, [&] {
+      const double size = random.uniform(0.1, 1.0);
+      return shift == 0.0 ? size : shift * size;
+    });
+    Eigen::VectorXd signed_lambda = lambda;
+    if (shift == 0.0) {
+      signed_lambda(0) = -lambda(0);
+    }
+    const MatrixXd M = V * signed_lambda.asDiagonal() * V.transpose();
+    double least = 1.0;
+    double most = -1.0;
+    for (int direction = 0; direction < 20; ++direction) {
+      const Eigen::VectorXd x =
+          direction < n ? Eigen::VectorXd(V.col(direction)) : random_matrix(random, n, 1).col(0);
+      const double form = x.dot(M * x) / x.squaredNorm();
+      least = std::min(least, form);
+      most = std::max(most, form);
+    }
+    const auto found = test_definiteness(0.5 * (M + M.transpose())).value();
+    EXPECT_NEAR(least, found.eigenvalues(0), 1e-14);
+    EXPECT_NEAR(most, found.eigenvalues(n - 1), 1e-14);
+    EXPECT_EQ(found.definiteness, least > 0.0  ? Definiteness::positive_definite
+                                  : most < 0.0 ? Definiteness::negative_definite
+                                               : Definiteness::indefinite);
+  }
+}
+
+// The operators of 5.4 to 5.9 in Eigen's words, and the laws that later chapters use.
+TEST(LinearAlgebra, TheBooksOperators) {
+  Random random(59);
+  for (int trial = 0; trial < 100; ++trial) {
+    const MatrixXd A = random_matrix(random, 4, 3);
+    const MatrixXd B = random_matrix(random, 3, 4);
+    const MatrixXd M = random_matrix(random, 3, 3);
+    const MatrixXd N = random_matrix(random, 3, 3);
+    EXPECT_LT(((A * B).transpose() - B.transpose() * A.transpose()).norm(), 1e-14);
+    EXPECT_NEAR((A * B).trace(), (B * A).trace(), 1e-13);
+    EXPECT_NEAR((M * N).determinant(), M.determinant() * N.determinant(), 1e-13);
+    EXPECT_LT((M * M.partialPivLu().solve(N) - N).norm(), 1e-11);
+    // B⁺ = (BᵀB)⁻¹Bᵀ where the columns are independent.
+    const MatrixXd normal = (A.transpose() * A).ldlt().solve(A.transpose());
+    EXPECT_LT((pseudoinverse(A).value().X - normal).norm(), 1e-11 * normal.squaredNorm());
+    // The trace is the sum of the eigenvalues, the determinant their product (5.8).
+    const Eigen::VectorXcd eigenvalues = M.eigenvalues();
+    EXPECT_LT(std::abs(eigenvalues.sum() - M.trace()), 1e-13);
+    EXPECT_LT(std::abs(eigenvalues.prod() - M.determinant()), 1e-13);
+    // The null space of a wide matrix is what its pseudoinverse leaves (5.6, 5.7).
+    const MatrixXd null = MatrixXd::Identity(4, 4) - pseudoinverse(B).value().X * B;
+    EXPECT_LT((B * null).norm(), 1e-13);
+    EXPECT_NEAR(null.trace(), 1.0, 1e-13);
+  }
+  MatrixXd diagonal(3, 3);
+  diagonal << 1, 0, 0, 0, 0.25, 0, 0, 0, 0.0625;
+  const Eigen::Vector3d x(1.0, 2.0, 4.0);
+  EXPECT_EQ(MatrixXd(x.array().square().inverse().matrix().asDiagonal()), diagonal);
+  // diag(A, B) of 5.9.2.
+  MatrixXd A(2, 2);
+  A << 1, 2, 3, 4;
+  MatrixXd B(3, 3);
+  B << 1, 2, 3, 4, 5, 6, 7, 8, 9;
+  MatrixXd whole(5, 5);
+  whole << 1, 2, 0, 0, 0, 3, 4, 0, 0, 0, 0, 0, 1, 2, 3, 0, 0, 4, 5, 6, 0, 0, 7, 8, 9;
+  EXPECT_EQ(block_diagonal({A, B}), whole);
+}
+
+// Snippets 6.1 and 6.2: one matrix of four blocks, in a row of commas and slice by slice.
+TEST(LinearAlgebra, TheBooksBlocks) {
+  const Eigen::Matrix2d A{{1, 2}, {3, 4}};
+  const Eigen::Vector2d B(5, 6);
+  const Eigen::RowVector2d C(7, 8);
+  const Eigen::Matrix<double, 1, 1> D(9);
+  MatrixXd packed(3, 3);
+  packed << A, B, C, D;
+  MatrixXd sliced(3, 3);
+  sliced.topLeftCorner(2, 2) = A;
+  sliced.topRightCorner(2, 1) = B;
+  sliced.bottomLeftCorner(1, 2) = C;
+  sliced.bottomRightCorner(1, 1) = D;
+  EXPECT_EQ(packed, (MatrixXd(3, 3) << 1, 2, 5, 3, 4, 6, 7, 8, 9).finished());
+  EXPECT_EQ(sliced, packed);
 }
 
 TEST(BlockDiagonal, Places) {

@@ -223,6 +223,39 @@ TEST(Differentiation, TheBooksMatrixIdentities) {
   }
 }
 
+// The book's rules of 4.1: power, product, chain, with its own examples (3x + 2)⁵ and 3xy + 2x; and
+// of a change of variables (4.3), by which ∫cos ωt dt = sin(ωt)/ω.
+TEST(Differentiation, TheBooksRules) {
+  const auto slope = [](auto f, double x) {
+    return gradient([&](const auto& at) { return f(at(0)); }, Eigen::Vector<double, 1>(x))(0);
+  };
+  const auto f = [](const auto& x) { return sin(x) / (1.0 + x * x); };
+  const auto g = [](const auto& x) { return exp(-0.5 * x); };
+  Random random(41);
+  for (int trial = 0; trial < 100; ++trial) {
+    const double x = random.uniform(-2.0, 2.0);
+    const double y = random.uniform(-2.0, 2.0);
+    const double w = random.uniform(0.1, 5.0);
+    for (const int n : {1, 2, 3, 7}) {
+      EXPECT_NEAR(slope([&](const auto& v) { return pow(v, double(n)); }, x),
+                  n * std::pow(x, n - 1), 1e-14 * n * std::pow(2.0, n - 1));
+    }
+    const double product = slope([&](const auto& v) { return f(v) * g(v); }, x);
+    const double fx = std::sin(x) / (1.0 + x * x);
+    const double gx = std::exp(-0.5 * x);
+    EXPECT_NEAR(product, slope(f, x) * gx + fx * slope(g, x), 1e-14);
+    EXPECT_NEAR(slope([&](const auto& v) { return f(g(v)); }, x), slope(f, gx) * slope(g, x),
+                1e-14);
+    EXPECT_NEAR(slope([](const auto& v) { return pow(3.0 * v + 2.0, 5.0); }, x),
+                15.0 * std::pow(3.0 * x + 2.0, 4), 1e-14 * 15.0 * 4096.0);
+    const Vector2d partial =
+        gradient([](const auto& at) { return 3.0 * at(0) * at(1) + 2.0 * at(0); }, Vector2d(x, y));
+    EXPECT_DOUBLE_EQ(partial(0), 3.0 * y + 2.0);
+    EXPECT_DOUBLE_EQ(partial(1), 3.0 * x);
+    EXPECT_NEAR(slope([&](const auto& t) { return sin(w * t) / w; }, x), std::cos(w * x), 1e-15);
+  }
+}
+
 // Each row of the book's Table 4.2, at points on both sides of 1: the integral's derivative is f,
 // and that of f is f'.
 TEST(Differentiation, TheBooksTableOfDerivatives) {
