@@ -24,6 +24,7 @@ int main() {
     std::fprintf(stderr, "%s\n", to_string(model.error()).c_str());
     return 1;
   }
+  //! [design]
   // Small deviations from the pole standing at the middle of the track, sampled.
   const Time period = 20_ms;
   const Vector4d upright(0.0, pi, 0.0, 0.0);
@@ -31,12 +32,14 @@ int main() {
   const auto plant = discretize(linear, period).value();
   // No more than 20 cm, 3 degrees, 1 m/s and 1 rad/s of error with no more than 40 N.
   const auto design = lqr(plant, bryson({0.2, 0.05, 1.0, 1.0}), bryson({40.0})).value();
+  //! [design]
   std::printf("K = [%.2f N/m, %.2f N/rad, %.2f N/(m/s), %.2f N/(rad/s)]\n", design.K(0),
               design.K(1), design.K(2), design.K(3));
   for (const auto& pole : design.poles) {
     std::printf("closed-loop pole %.4f%+.4fi\n", pole.real(), pole.imag());
   }
 
+  //! [loop]
   // The loop around the nonlinear model, no more than 80 N either way: u = K (r - x), the angle's
   // error the shorter way round, for one turn more is upright, too.
   Vector4d start(0.0, 3.0 * pi + 20.0 * pi / 180.0, 0.0, 0.0);
@@ -51,6 +54,7 @@ int main() {
   };
   const auto result = simulate_closed_loop(truth, feedback, loop).value();
 
+  //! [loop]
   std::printf("\n%6s %12s %14s %10s\n", "t (s)", "position (m)", "off upright", "force (N)");
   const auto column = [&](const char* name, std::size_t row) {
     return (*result.series.find(name))[row];

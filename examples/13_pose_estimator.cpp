@@ -2,8 +2,6 @@
 // slips when it is pushed) and cameras, before and behind, that see the field's tags: 60 ms late,
 // seldom when the robot turns fast, blind for some seconds, with two solutions where a tag is far
 // off, and sometimes with the wrong tag. Prints how far off odometry alone is, and the estimator.
-#include <flyball/estimation/pose_estimator.hpp>
-
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -12,6 +10,7 @@
 #include <Eigen/Core>
 
 #include <flyball/core/random.hpp>
+#include <flyball/estimation/pose_estimator.hpp>
 
 namespace {
 
@@ -61,6 +60,7 @@ int main() {
   Random random(2026);
   const Pose2d start(8.0, 4.0, 0.0);
   const Vector3d start_sigmas(0.1, 0.1, 0.05);
+  //! [create]
   PoseEstimatorOptions options;
   options.odometry.per_metre = {0.1, 0.1, 0.02};
   options.odometry.per_radian = {0.03, 0.03, 0.05};
@@ -70,6 +70,7 @@ int main() {
     return 1;
   }
   PoseEstimator& estimator = *created;
+  //! [create]
 
   Pose2d truth = start;
   Pose2d odometry = start;
@@ -122,6 +123,7 @@ int main() {
         }
         const MeasurementNoise<3> noise(Eigen::Matrix3d(sigmas.cwiseAbs2().asDiagonal()));
         const double stamp = dt * (k - delay);
+        //! [correct]
         PoseOutcome outcome;
         if (range > 3.0) {
           // Far off a flat tag looks the same tilted either way: the robot's place mirrored at the
@@ -134,6 +136,7 @@ int main() {
         } else {
           outcome = estimator.correct(stamp, seen, noise);
         }
+        //! [correct]
         taken += outcome.status == PoseStatus::taken ? 1 : 0;
         ambiguous += outcome.status == PoseStatus::ambiguous ? 1 : 0;
         rejected += outcome.status == PoseStatus::rejected ? 1 : 0;
