@@ -48,8 +48,10 @@ lint:  ## clang-tidy over all sources; CHANGED=1: only what differs from main
 	@scripts/install-deps --dev
 	@scripts/lint $(if $(CHANGED),--changed)
 
-docs:  ## Doxygen pages of the public headers, in docs/html
+docs:  ## The guide and the pages of the public headers, in docs/html
 	@scripts/install-deps --dev
+	@$(MAKE) --no-print-directory configure TESTS=
+	@cmake --build $(BUILD) --parallel $(JOBS) --target flyball_command flyball_guide_examples
 	@scripts/docs
 
 install: build  ## Install library and command; PREFIX=... says where
