@@ -16,6 +16,7 @@
 #include "core/try.hpp"
 #include "io/signals.hpp"
 #include "io/text.hpp"
+#include "io/urcl.hpp"
 
 namespace flyball {
 namespace {
@@ -61,11 +62,13 @@ struct Type {
   Scalar scalar = Scalar::none;
   bool array = false;
   bool text = false;
+  bool frames = false;  ///< Of URCL.
 };
 
 Type parse_type(std::string_view name) {
   Type type;
   type.text = name == "string" || name == "json";
+  type.frames = io::UrclDecoder::knows(name);
   if (name.ends_with("[]")) {
     type.array = true;
     name.remove_suffix(2);
@@ -282,6 +285,8 @@ class Reader {
     ++channel.records;
     if (channel.type.text) {
       append_text(channel, time, payload);
+    } else if (channel.type.frames) {
+      wrong_size_ += urcl_.take(channel.name, channel.type_name, payload) ? 0 : 1;
     } else if (channel.type.scalar == Scalar::none) {
       ++channel.skipped;
     } else {
@@ -337,6 +342,7 @@ class Reader {
   }
 
   Expected<Log> finish() {
+    urcl_.finish(log_.signals, log_.diagnostics, max_channels);
     tell(bad_control_, "damaged_records", "control record", "could not be read and were skipped");
     tell(orphans_, "unknown_entries", "record", "belong to no open entry and were skipped");
     tell(wrong_size_, "wrong_sizes", "record",
@@ -375,6 +381,7 @@ class Reader {
   const std::string& source_;
   std::size_t at_ = 0;
   Log log_;
+  io::UrclDecoder urcl_;
   std::vector<Channel> channels_;
   std::map<std::pair<std::string, std::string>, std::size_t> by_name_;
   std::unordered_map<std::uint32_t, std::size_t> entries_;

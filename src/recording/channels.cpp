@@ -24,8 +24,8 @@ constexpr std::array<std::string_view, 2> voltage_words{"volt", "appliedv"};
 constexpr std::array<std::string_view, 4> position_words{"position", "angle", "distance", "pos"};
 constexpr std::array<std::string_view, 4> velocity_words{"velocity", "speed", "rate", "vel"};
 // Channels of these names are not what was applied to the mechanism, or where it was.
-constexpr std::array<std::string_view, 8> other_words{"battery", "bus",       "target",  "setpoint",
-                                                      "goal",    "reference", "desired", "error"};
+constexpr std::array<std::string_view, 9> other_words{
+    "battery", "bus", "inputvolt", "target", "setpoint", "goal", "reference", "desired", "error"};
 
 bool fits(const Signal& signal, Channel quantity) {
   const std::string name = lower(signal.name);

@@ -14,9 +14,11 @@ namespace flyball {
 /// Decodes a WPILOG 1.x, WPILib's robot data log.
 ///
 /// Decoded: double, float, int64, boolean, their arrays (element i of `name` is `name[i]`, up to 64
-/// of them), string and json. Everything else is listed in `Log::skipped`. A channel's unit is its
-/// metadata ("Volt"), or the "unit" of metadata that is JSON. Entries of one name and type are one
-/// channel, also when an id is finished and reused.
+/// of them), string and json; and the raw CAN frames of REV motor controllers that URCL (revisions
+/// 1 to 3, AdvantageKit's too) logs, as "root/SparkMax-3/AppliedOutputVoltage",
+/// "…/MotorVelocityRPM" and so on, at the times that they arrived at. Everything else is listed in
+/// `Log::skipped`. A channel's unit is its metadata ("Volt"), or the "unit" of metadata that is
+/// JSON. Entries of one name and type are one channel, also when an id is finished and reused.
 ///
 /// No length in the file is believed before it is compared with the bytes that are there; a record
 /// that does not fit ends the log (`truncated_log`), which is what a power cut leaves behind.
