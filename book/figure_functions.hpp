@@ -40,6 +40,7 @@ namespace flyball::book {
 [[nodiscard]] FigureResult figure_10_2();
 [[nodiscard]] FigureResult figure_10_3();
 [[nodiscard]] FigureResult figure_10_4();
+[[nodiscard]] FigureResult figure_12_2();
 [[nodiscard]] FigureResult figure_B_1();
 [[nodiscard]] FigureResult figure_B_2();
 [[nodiscard]] FigureResult figure_B_3();
