@@ -13,7 +13,7 @@ constexpr std::string_view where = "MechanismController";
 
 // @param wanted  The states of the class that is asked; two when it was not said.
 Expected<void> check_states(const MechanismControllerDesign& design, Eigen::Index wanted) {
-  const bool flywheel = design.kind == mechanisms::MechanismKind::flywheel;
+  const bool flywheel = controls_velocity(design.kind);
   const Eigen::Index n = design.plant.A.rows();
   if (n == wanted && !(flywheel && n == 2)) {
     return {};
@@ -107,9 +107,7 @@ template <int States>
 auto MechanismController<States>::states_of(const MotionState& motion) const noexcept
     -> StateVector {
   if constexpr (States == 1) {
-    return StateVector(feedforward_.kind() == mechanisms::MechanismKind::flywheel
-                           ? motion.velocity
-                           : motion.position);
+    return StateVector(controls_velocity(feedforward_.kind()) ? motion.velocity : motion.position);
   } else {
     return StateVector(motion.position, motion.velocity);
   }
@@ -120,7 +118,7 @@ double MechanismController<States>::update(double measurement, const MotionState
                                            const MotionState& r_next,
                                            double rail_voltage) noexcept {
   using Scalar = Eigen::Matrix<double, 1, 1>;
-  const bool flywheel = feedforward_.kind() == mechanisms::MechanismKind::flywheel;
+  const bool flywheel = controls_velocity(feedforward_.kind());
   const double rate = flywheel ? (r_next.velocity - r.velocity) / period_ : r.velocity;
   const double y = delay_ > 0.0 ? measurement + delay_ * rate : measurement;
   const double direction = r.velocity != 0.0 ? r.velocity : r_next.velocity;

@@ -103,7 +103,7 @@ Expected<LoopProgram> loop_program(const MechanismControllerDesign& design, std:
   FLYBALL_TRY(const auto predictor, predictor_of(design));
   program.moves_measurement = design.measurement_delay.si() > 0.0 && !predictor;
   program.on_the_way = predictor ? predictor->on_the_way() : 0;
-  program.gravity = design.feed_forward_gravity && !flywheel;
+  program.gravity = design.feed_forward_gravity && has_gravity(design.kind);
   program.friction = design.feed_forward_friction;
   program.compensates = design.compensate_voltage;
   program.constants = constants_of(program, design, predictor, controller.B_pinv());

@@ -48,7 +48,7 @@ struct LoopProgram {
   std::string inversion{};                ///< Of demand.
   std::string feedback{};                 ///< Of error.
 
-  [[nodiscard]] bool flywheel() const { return kind == mechanisms::MechanismKind::flywheel; }
+  [[nodiscard]] bool flywheel() const { return controls_velocity(kind); }
   [[nodiscard]] bool arm() const { return kind == mechanisms::MechanismKind::arm; }
   [[nodiscard]] double period() const { return constants.front().value(0, 0); }
 };

@@ -13,8 +13,14 @@ std::string literal(double value, int digits) {
 }
 
 std::string capitalized(mechanisms::MechanismKind kind) {
-  std::string name(to_string(kind));
-  name.front() = static_cast<char>(name.front() - 'a' + 'A');
+  std::string name;
+  bool first = true;
+  for (const char c : to_string(kind)) {
+    if (c != ' ') {
+      name += first ? static_cast<char>(c - 'a' + 'A') : c;
+    }
+    first = c == ' ';
+  }
   return name;
 }
 

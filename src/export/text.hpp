@@ -12,7 +12,7 @@ namespace flyball::exports {
 /// @param digits  Significant ones; 0 for as many as it takes to read back the same double.
 [[nodiscard]] std::string literal(double value, int digits = 0);
 
-/// "Elevator".
+/// "Elevator", "SwerveSteer".
 [[nodiscard]] std::string capitalized(mechanisms::MechanismKind kind);
 
 /// One line that cannot end a comment, whatever a log says: no line break, no control character, no

@@ -31,7 +31,7 @@ using mechanisms::MechanismKind;
 constexpr std::string_view where = "identify";
 
 std::string named(MechanismKind kind) {
-  return std::string(kind == MechanismKind::flywheel ? "a " : "an ") + std::string(to_string(kind));
+  return std::string(has_gravity(kind) ? "an " : "a ") + std::string(to_string(kind));
 }
 
 /// What the simulation says about each run, and how well.
@@ -243,13 +243,17 @@ void doubt_mechanism(const PreparedRecording& prepared, const FitOptions& option
     return;
   }
   const auto choice = choose_mechanism(prepared, options);
-  if (!choice ||
-      std::find(choice->fitting.begin(), choice->fitting.end(), said) != choice->fitting.end()) {
+  // Without gravity one model is that of every kind.
+  const auto model = [](MechanismKind kind) {
+    return has_gravity(kind) ? kind : MechanismKind::flywheel;
+  };
+  if (!choice || std::any_of(choice->fitting.begin(), choice->fitting.end(),
+                             [&](MechanismKind kind) { return model(kind) == model(said); })) {
     return;
   }
   const auto winner =
       std::find_if(choice->compared.begin(), choice->compared.end(),
-                   [&](const KindEvidence& k) { return k.kind == choice->fitting.front(); });
+                   [&](const KindEvidence& k) { return k.kind == model(choice->fitting.front()); });
   // A travel alone contradicts nothing, nor does a force that friction of one direction may be.
   const bool steady = winner->kind == MechanismKind::elevator;
   constexpr double clear = 24.0;

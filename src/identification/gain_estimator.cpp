@@ -171,7 +171,7 @@ std::array<double, 4> GainEstimator::shares() const noexcept {
     return gain > 0.0 && relative * gain > 0.0 ? std::min(half / (relative * gain), largest_signal)
                                                : largest_signal;
   };
-  const bool gravity = settings_.mechanism != mechanisms::MechanismKind::flywheel;
+  const bool gravity = has_gravity(settings_.mechanism);
   return {voltage_share(width.kS, k.kS), share(width.kV, k.kV), share(width.kA, k.kA),
           gravity ? voltage_share(width.kG, k.kG) : 0.0};
 }

@@ -239,7 +239,9 @@ Expected<MechanismChoice> choose_mechanism(const PreparedRecording& prepared,
       const bool turns = gravity_of(arm);
       choice.fitting = {MechanismKind::arm};
       choice.evidence = travel + ", and " + (turns ? gravity_text(arm) : no_gravity_text(arm));
-      if (!turns || constant.evidence > arm.evidence + beyond_doubt) {
+      if (!turns) {
+        choice.fitting.push_back(MechanismKind::turret);
+      } else if (constant.evidence > arm.evidence + beyond_doubt) {
         choice.fitting.push_back(MechanismKind::flywheel);
       }
       return choice;

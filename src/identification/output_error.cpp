@@ -167,7 +167,7 @@ void OutputErrorProblem::refresh_forces(const Eigen::VectorXd& x) {
       force(parameter::bias).assign(rows, 1.0);
     }
     const bool arm = mechanism_ == MechanismKind::arm && !run.angle.empty();
-    const bool travels = mechanism_ != MechanismKind::flywheel && !run.angle.empty();
+    const bool travels = !controls_velocity(mechanism_) && !run.angle.empty();
     std::size_t hint = 0;
     Interpolation angle(run.angle_time, run.angle);
     Interpolation smoothed(prepared.run.time, prepared.smoothed_velocity);
@@ -208,7 +208,7 @@ void OutputErrorProblem::refresh_forces(const Eigen::VectorXd& x) {
 }
 
 bool OutputErrorProblem::can_extend(int parameter) const {
-  const bool travels = mechanism_ != MechanismKind::flywheel && recording_.has_position;
+  const bool travels = !controls_velocity(mechanism_) && recording_.has_position;
   if (parameter >= parameter::friction_field && parameter < parameter::headroom) {
     return travels && !hides_friction_ && high_ > low_;
   }
@@ -230,7 +230,7 @@ bool OutputErrorProblem::can_extend(int parameter) const {
 std::vector<bool> OutputErrorProblem::free_parameters() const {
   std::vector<bool> free(static_cast<std::size_t>(parameters()), true);
   free[parameter::static_friction] = !hides_friction_;
-  free[parameter::gravity_cosine] = mechanism_ != MechanismKind::flywheel;
+  free[parameter::gravity_cosine] = has_gravity(mechanism_);
   free[parameter::gravity_sine] = mechanism_ == MechanismKind::arm;
   for (int term = parameter::bias; term <= parameter::headroom; ++term) {
     free[static_cast<std::size_t>(term)] = is_extended(term) && can_extend(term);

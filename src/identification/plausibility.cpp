@@ -26,11 +26,12 @@ struct Speeds {
 
 Speeds speeds_of(MechanismKind kind, bool linear) {
   if (linear) {
-    return kind == MechanismKind::flywheel ? Speeds{0.3, 150.0, 0.003, 800.0}
-                                           : Speeds{0.02, 12.0, 0.002, 40.0};
+    return kind == MechanismKind::flywheel || kind == MechanismKind::roller
+               ? Speeds{0.3, 150.0, 0.003, 800.0}
+               : Speeds{0.02, 12.0, 0.002, 40.0};
   }
-  return kind == MechanismKind::flywheel ? Speeds{20.0, 2000.0, 1.0, 8000.0}
-                                         : Speeds{0.1, 60.0, 0.01, 1000.0};
+  return controls_velocity(kind) ? Speeds{20.0, 2000.0, 1.0, 8000.0}
+                                 : Speeds{0.1, 60.0, 0.01, 1000.0};
 }
 
 /// What the positions may be in truth, by how far the speed is off.

@@ -1,6 +1,8 @@
 #include <flyball/mechanisms/arm.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/mechanisms/flywheel.hpp>
+#include <flyball/mechanisms/swerve_drive.hpp>
+#include <flyball/mechanisms/turret.hpp>
 #include <flyball/mechanisms/velocity_servo.hpp>
 
 #include "core/try.hpp"
@@ -22,13 +24,13 @@ Expected<void> check_gains(const FeedforwardGains& gains, std::string_view where
       .finite(gains.angle_offset, "angle_offset");
 }
 
-Flywheel velocity_model(const FeedforwardGains& gains, double nominal_voltage) {
+Flywheel velocity_model(MechanismKind kind, const FeedforwardGains& gains, double nominal_voltage) {
   Flywheel model;
   model.A << -gains.kV / gains.kA;
   model.B << 1.0 / gains.kA;
   model.C << 1.0;
   model.D << 0.0;
-  model.kind = MechanismKind::flywheel;
+  model.kind = kind;
   model.gains = gains;
   model.nominal_voltage = nominal_voltage;
   return model;
@@ -51,6 +53,40 @@ Mechanism<2> position_model(MechanismKind kind, const FeedforwardGains& gains,
 // kV = G/K_v volts a rad/s at the output, kA = R J/(G K_t).
 FeedforwardGains rotational_gains(const DcMotor& motor, double G, double J) {
   return {.kS = 0.0, .kV = G / motor.Kv, .kA = motor.R * J / (G * motor.Kt)};
+}
+
+Expected<Flywheel> flywheel_like(MechanismKind kind, const FlywheelParameters& parameters,
+                                 std::string_view where) {
+  const auto& [motor, G, J] = parameters;
+  FLYBALL_CHECK(Checks(where)
+                    .also([&] { return check_drive(motor, G, where); })
+                    .positive(J.si(), "moment_of_inertia", "kg m^2"));
+  const FeedforwardGains gains = rotational_gains(motor, G, J.si());
+  return check_gains(gains, where).map([&] {
+    return velocity_model(kind, gains, motor.nominal_voltage);
+  });
+}
+
+Expected<Turret> turret_like(MechanismKind kind, const TurretParameters& parameters,
+                             std::string_view where) {
+  const auto& [motor, G, J] = parameters;
+  FLYBALL_CHECK(Checks(where)
+                    .also([&] { return check_drive(motor, G, where); })
+                    .positive(J.si(), "moment_of_inertia", "kg m^2"));
+  const FeedforwardGains gains = rotational_gains(motor, G, J.si());
+  return check_gains(gains, where).map([&] {
+    return position_model(kind, gains, motor.nominal_voltage);
+  });
+}
+
+Expected<Flywheel> velocity_model_of(MechanismKind kind, const FeedforwardGains& gains,
+                                     std::string_view where) {
+  return check_gains(gains, where).map([&] { return velocity_model(kind, gains, 12.0); });
+}
+
+Expected<Mechanism<2>> position_model_of(MechanismKind kind, const FeedforwardGains& gains,
+                                         std::string_view where) {
+  return check_gains(gains, where).map([&] { return position_model(kind, gains, 12.0); });
 }
 
 }  // namespace
@@ -86,7 +122,7 @@ ModelDescription description_of(MechanismKind kind, const FeedforwardGains& gain
                                               {"kA", "V·s²/" + unit, gains.kA},
                                               {"kG", "V", gains.kG},
                                               {"angle_offset", "rad", gains.angle_offset}}};
-  if (kind == MechanismKind::flywheel) {
+  if (controls_velocity(kind)) {
     description.states.erase(description.states.begin());
     description.outputs = description.states;
   }
@@ -94,14 +130,34 @@ ModelDescription description_of(MechanismKind kind, const FeedforwardGains& gain
 }
 
 Expected<Flywheel> flywheel(const FlywheelParameters& parameters) {
-  constexpr std::string_view where = "flywheel";
-  const auto& [motor, G, J] = parameters;
+  return flywheel_like(MechanismKind::flywheel, parameters, "flywheel");
+}
+
+Expected<Flywheel> roller(const FlywheelParameters& parameters) {
+  return flywheel_like(MechanismKind::roller, parameters, "roller");
+}
+
+Expected<Turret> turret(const TurretParameters& parameters) {
+  return turret_like(MechanismKind::turret, parameters, "turret");
+}
+
+Expected<Turret> swerve_steer(const TurretParameters& parameters) {
+  return turret_like(MechanismKind::swerve_steer, parameters, "swerve_steer");
+}
+
+Expected<SwerveDrive> swerve_drive(const SwerveDriveParameters& parameters) {
+  constexpr std::string_view where = "swerve_drive";
+  const auto& [motor, G, mass, wheel_radius] = parameters;
+  const double m = mass.si();
+  const double r = wheel_radius.si();
   FLYBALL_CHECK(Checks(where)
                     .also([&] { return check_drive(motor, G, where); })
-                    .positive(J.si(), "moment_of_inertia", "kg m^2"));
-  const FeedforwardGains gains = rotational_gains(motor, G, J.si());
+                    .positive(m, "mass", "kg")
+                    .positive(r, "wheel_radius", "m"));
+  const FeedforwardGains gains{
+      .kS = 0.0, .kV = G / (motor.Kv * r), .kA = motor.R * r * m / (G * motor.Kt)};
   return check_gains(gains, where).map([&] {
-    return velocity_model(gains, motor.nominal_voltage);
+    return velocity_model(MechanismKind::swerve_drive, gains, motor.nominal_voltage);
   });
 }
 
@@ -151,19 +207,31 @@ Expected<Arm> arm(const ArmParameters& parameters) {
 }
 
 Expected<Flywheel> flywheel(const FeedforwardGains& gains) {
-  return check_gains(gains, "flywheel").map([&] { return velocity_model(gains, 12.0); });
+  return velocity_model_of(MechanismKind::flywheel, gains, "flywheel");
+}
+
+Expected<Flywheel> roller(const FeedforwardGains& gains) {
+  return velocity_model_of(MechanismKind::roller, gains, "roller");
+}
+
+Expected<SwerveDrive> swerve_drive(const FeedforwardGains& gains) {
+  return velocity_model_of(MechanismKind::swerve_drive, gains, "swerve_drive");
 }
 
 Expected<Elevator> elevator(const FeedforwardGains& gains) {
-  return check_gains(gains, "elevator").map([&] {
-    return position_model(MechanismKind::elevator, gains, 12.0);
-  });
+  return position_model_of(MechanismKind::elevator, gains, "elevator");
 }
 
 Expected<Arm> arm(const FeedforwardGains& gains) {
-  return check_gains(gains, "arm").map([&] {
-    return position_model(MechanismKind::arm, gains, 12.0);
-  });
+  return position_model_of(MechanismKind::arm, gains, "arm");
+}
+
+Expected<Turret> turret(const FeedforwardGains& gains) {
+  return position_model_of(MechanismKind::turret, gains, "turret");
+}
+
+Expected<Turret> swerve_steer(const FeedforwardGains& gains) {
+  return position_model_of(MechanismKind::swerve_steer, gains, "swerve_steer");
 }
 
 ContinuousSystem<1, 1, 1> velocity_servo() {

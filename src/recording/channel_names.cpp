@@ -57,6 +57,23 @@ std::string position_unit_of_velocity(std::string_view unit) {
 
 std::optional<MechanismKind> kind_from_name(std::string_view name) {
   const std::string text = lower(name);
+  // What a swerve module's steering is called, and the routines of CTRE's swerve projects.
+  constexpr std::array<std::string_view, 2> steer{"steer", "azimuth"};
+  constexpr std::array<std::string_view, 2> drive{"sysidtranslation", "moduledrive"};
+  constexpr std::array<std::string_view, 1> turret{"turret"};
+  constexpr std::array<std::string_view, 1> roller{"roller"};
+  if (contains_any(text, steer)) {
+    return MechanismKind::swerve_steer;
+  }
+  if (contains_any(text, drive)) {
+    return MechanismKind::swerve_drive;
+  }
+  if (contains_any(text, turret)) {
+    return MechanismKind::turret;
+  }
+  if (contains_any(text, roller)) {
+    return MechanismKind::roller;
+  }
   constexpr std::array<std::string_view, 2> elevator{"elevator", "lift"};
   constexpr std::array<std::string_view, 2> flywheel{"flywheel", "shooter"};
   if (contains_any(text, elevator)) {

@@ -41,18 +41,18 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
     if (!selection.drivetrain && lower(reason).find("swerve") != std::string::npos) {
       return refusal(RecordingError::drivetrain, log.source, "mechanism")
           .got("a swerve drive: " + reason)
-          .expected("a mechanism of one motor, or a drivetrain of a left and a right side")
+          .expected("one of its motions, or a drivetrain of a left and a right side")
           .hint(
-              "identify a module's drive and steering motor each as --mechanism flywheel, with its "
-              "channels by --voltage, --position and --velocity; if it is a left and a right "
-              "side, say --mechanism drivetrain");
+              "say which the tests drive, --mechanism \"swerve drive\" or --mechanism \"swerve "
+              "steer\", and a module's channels by --voltage, --position and --velocity if it "
+              "asks for them; if it is a left and a right side, say --mechanism drivetrain");
     }
     return drive_from_channels(log, selection, std::move(tests), std::move(loaded))
         .map_error([&](Error error) {
           return selection.drivetrain ? error
                                       : std::move(error).with(
                                             "taken for a drivetrain (else say --mechanism "
-                                            "flywheel, elevator or arm)",
+                                            "flywheel, elevator, arm, …)",
                                             reason);
         });
   }
@@ -83,6 +83,15 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
        channels.voltage->name,
        channels.position ? "\"" + channels.position->name + "\"" : "nowhere",
        channels.velocity ? "\"" + channels.velocity->name + "\"" : "nowhere");
+  const auto said = kind_from_name(tests.state_name + " " + channels.voltage->name);
+  const auto kind = selection.mechanism ? selection.mechanism : said;
+  Signal unwrapped;  // before rows of another clock fall into a leap
+  if (channels.position != nullptr && !(kind && position_unit(*kind) == "m")) {
+    unwrapped = *channels.position;
+    const std::size_t leaps = unwrap_turns(unwrapped.value);
+    tell_unwrapped(loaded.diagnostics, leaps);
+    channels.position = &unwrapped;
+  }
   loaded.recording.runs = join_channels(
       channels, tests.windows,
       fullest_of({channels.voltage, channels.position, channels.velocity}, tests.windows));
@@ -97,8 +106,6 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
   RecordedUnits units;
   FLYBALL_TRY_IN(log.source, units, channel_units(selection, channels));
   FLYBALL_TRY_IN(log.source, units, settle_units(units, ratio, loaded.diagnostics));
-  const auto said = kind_from_name(tests.subject + " " + channels.voltage->name);
-  const auto kind = selection.mechanism ? selection.mechanism : said;
   if (said) {
     tell_said_kind(loaded.diagnostics, "the names in the log say", *said, selection.mechanism);
   }

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "recording/recorded_motion.hpp"
 
@@ -23,6 +24,21 @@ bool are_coarse(const std::vector<TestRun>& runs) {
     }
   }
   return step > coarse * fastest;
+}
+
+/// The turn that positions keep within, in their own unit; 0 if it is none.
+double turn_of(const std::vector<double>& positions) {
+  if (positions.empty()) {
+    return 0.0;
+  }
+  const auto [low, high] = std::minmax_element(positions.begin(), positions.end());
+  const double range = *high - *low;
+  for (const double turn : {1.0, 2.0 * std::numbers::pi, 360.0}) {
+    if (range > 0.9 * turn && range < 1.01 * turn) {
+      return turn;
+    }
+  }
+  return 0.0;
 }
 
 }  // namespace
@@ -86,6 +102,41 @@ std::optional<double> velocity_ratio(const std::vector<TestRun>& runs) {
     }
   }
   return ratio;
+}
+
+std::size_t unwrap_turns(std::vector<double>& positions) {
+  const double turn = turn_of(positions);
+  if (turn == 0.0) {
+    return 0;
+  }
+  // The motion before and after a row, over rows that repeat a value.
+  const std::size_t n = positions.size();
+  std::vector<double> before(n, 0.0);
+  std::vector<double> after(n, 0.0);
+  for (std::size_t i = 1; i < n; ++i) {
+    const double moved = positions[i] - positions[i - 1];
+    before[i] = moved != 0.0 ? moved : before[i - 1];
+  }
+  for (std::size_t i = n - 1; i > 0; --i) {
+    const double moved = positions[i] - positions[i - 1];
+    after[i - 1] = moved != 0.0 ? moved : after[i];
+  }
+  std::size_t leaps = 0;
+  double turned = 0.0;
+  double last = positions.front();
+  for (std::size_t i = 1; i < n; ++i) {
+    const double leap = positions[i] - last;
+    const auto against = [&](double motion) {
+      return motion * leap < 0.0 && std::abs(motion) < 0.5 * turn;
+    };
+    if (std::abs(leap) > 0.6 * turn && against(before[i - 1]) && against(after[i])) {
+      turned -= std::copysign(turn, leap);
+      ++leaps;
+    }
+    last = positions[i];
+    positions[i] += turned;
+  }
+  return leaps;
 }
 
 double speed_at_full_voltage(const std::vector<TestRun>& runs, std::optional<double> ratio) {

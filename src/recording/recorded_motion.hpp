@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -19,5 +20,10 @@ namespace flyball::recording {
 /// nothing moved. @param ratio  Of `velocity_ratio`.
 [[nodiscard]] double speed_at_full_voltage(const std::vector<identification::TestRun>& runs,
                                            std::optional<double> ratio);
+
+/// Undoes the wrap of an absolute encoder's angles: values that keep within one turn (1, 2π or 360)
+/// and leap by most of it, against the motion before and after. What moves past where it began
+/// again then goes on. @return  The leaps.
+std::size_t unwrap_turns(std::vector<double>& positions);
 
 }  // namespace flyball::recording

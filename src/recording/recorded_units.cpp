@@ -387,8 +387,10 @@ bool has_usual_speed(std::optional<MechanismKind> kind, double speed) {
   constexpr double fastest_arm = 40.0;
   constexpr double slowest_flywheel = 40.0;
   constexpr double fastest_flywheel = 1600.0;
-  return speed >= (kind == MechanismKind::flywheel ? slowest_flywheel : slowest_arm) &&
-         speed <= (kind == MechanismKind::arm ? fastest_arm : fastest_flywheel);
+  const bool spins = kind && controls_velocity(*kind);
+  const bool swings = kind && !spins && kind != MechanismKind::elevator;
+  return speed >= (spins ? slowest_flywheel : slowest_arm) &&
+         speed <= (swings ? fastest_arm : fastest_flywheel);
 }
 
 RecordedUnit likely_angle_unit(const std::vector<TestRun>& runs, std::optional<double> ratio,

@@ -119,6 +119,13 @@ Expected<LoadedRecording> from_sysid_json(const Log& log, const LogSelection& se
   if (selection.no_velocity) {
     leave_velocity_out(loaded.recording);
   }
+  if (!drive && !(kind && position_unit(*kind) == "m")) {
+    std::size_t leaps = 0;
+    for (TestRun& run : loaded.recording.runs) {
+      leaps += unwrap_turns(run.position);
+    }
+    tell_unwrapped(loaded.diagnostics, leaps);
+  }
   const std::optional<double> ratio = velocity_ratio(loaded.recording.runs);
   RecordedUnits units;
   FLYBALL_TRY_IN(log.source, units.position, said_unit(selection.unit, false));
@@ -141,7 +148,9 @@ Expected<LoadedRecording> from_sysid_json(const Log& log, const LogSelection& se
   }
   // SysId's own scale turns rows into its unit; what angles of a drum or a wheel are in metres it
   // is not.
-  const bool rolled = (kind == MechanismKind::elevator || drive) && !units.position.linear;
+  const bool rolled =
+      (kind == MechanismKind::elevator || kind == MechanismKind::swerve_drive || drive) &&
+      !units.position.linear;
   const double metres = rolled ? selection.scale : scale;
   FLYBALL_TRY_IN(
       log.source, auto output,

@@ -14,13 +14,21 @@ using identification::Recording;
 using identification::TestRun;
 using mechanisms::MechanismKind;
 
+namespace {
+
+std::string named(MechanismKind kind) {
+  return fmt::format("{} {}", has_gravity(kind) ? "an" : "a", to_string(kind));
+}
+
+}  // namespace
+
 Expected<OutputScale> output_scale(const RecordedUnit& unit, double scale,
                                    std::optional<MechanismKind> kind) {
   if (unit.linear) {
-    if (kind == MechanismKind::arm) {
+    if (kind && !controls_velocity(*kind) && position_unit(*kind) == "rad") {
       return refusal(RecordingError::unit_mismatch, {}, "position unit")
           .got(fmt::format("\"{}\", a length", unit.text))
-          .expected("an angle for an arm")
+          .expected(fmt::format("an angle for {}", named(*kind)))
           .hint("check --mechanism, or say the unit with --unit");
     }
     return OutputScale{unit.factor * scale, "m"};
@@ -36,12 +44,14 @@ Expected<OutputScale> output_scale(const RecordedUnit& unit, double scale,
     }
     return OutputScale{scale, "m"};
   }
+  if (kind == MechanismKind::swerve_drive && scale != 1.0) {
+    return OutputScale{scale, "m"};  // of a wheel whose size was said
+  }
   return OutputScale{unit.factor * scale, "rad"};
 }
 
 Expected<OutputScale> drive_scale(const RecordedUnit& unit, double scale) {
-  return !unit.linear && scale != 1.0 ? Expected<OutputScale>(OutputScale{scale, "m"})
-                                      : output_scale(unit, scale, std::nullopt);
+  return output_scale(unit, scale, MechanismKind::swerve_drive);
 }
 
 Expected<RecordedUnit> said_unit(const std::string& text, bool rate) {
@@ -87,14 +97,22 @@ void leave_velocity_out(Recording& recording) {
 
 void tell_said_kind(std::vector<Diagnostic>& notes, std::string_view how, MechanismKind said,
                     std::optional<MechanismKind> selected) {
-  const auto named = [](MechanismKind kind) {
-    return fmt::format("{} {}", kind == MechanismKind::flywheel ? "a" : "an", to_string(kind));
-  };
-  if (selected && *selected != said) {
+  // Whatever has no gravity is "simple" to SysId.
+  const bool alike = selected && !has_gravity(*selected) && !has_gravity(said);
+  if (selected && *selected != said && !alike) {
     warn(notes, "mechanism_overruled", "{} that it is {}: it is taken for {}, as was said", how,
          named(said), named(*selected));
   } else if (!selected) {
     note(notes, "assumed", "{} that it is {}", how, named(said));
+  }
+}
+
+void tell_unwrapped(std::vector<Diagnostic>& notes, std::size_t leaps) {
+  if (leaps > 0) {
+    note(notes, "angle_unwrapped",
+         "the positions keep within one turn and leap by a whole one {} times, as an absolute "
+         "encoder's do: they were made to go on",
+         leaps);
   }
 }
 

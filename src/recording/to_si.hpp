@@ -40,6 +40,9 @@ void tell_said_kind(std::vector<Diagnostic>& notes, std::string_view how,
                     mechanisms::MechanismKind said,
                     std::optional<mechanisms::MechanismKind> selected);
 
+/// Tells that an absolute encoder's angles were made continuous.
+void tell_unwrapped(std::vector<Diagnostic>& notes, std::size_t leaps);
+
 /// Tells first what was assumed and nothing can check.
 void tell_assumed_unit(std::vector<Diagnostic>& notes, const RecordedUnit& unit);
 

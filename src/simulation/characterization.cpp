@@ -28,7 +28,7 @@ constexpr double sensor_memory = 0.5;   // s of rest before the first row that s
 constexpr double max_duration = 120.0;  // s, of one test
 
 Expected<void> check_options(const CharacterizationOptions& options) {
-  const bool travels = options.mechanism != MechanismKind::flywheel;
+  const bool travels = !controls_velocity(options.mechanism);
   return Checks(where)
       .not_negative(options.kS, "kS", "V")
       .positive(options.kV, "kV")
@@ -131,7 +131,7 @@ class Truth {
   }
   /// What acts against the load besides friction and damping.
   [[nodiscard]] double opposed() const {
-    const double middle = options_.mechanism == MechanismKind::flywheel
+    const double middle = controls_velocity(options_.mechanism)
                               ? 0.0
                               : 0.5 * (options_.travel_low + options_.travel_high);
     return mechanisms::gravity_voltage(options_.mechanism, options_.kG, position(), 0.0) +
@@ -140,7 +140,7 @@ class Truth {
   }
   /// Hard stops at the ends of the travel.
   void stop_at_ends() {
-    if (options_.mechanism == MechanismKind::flywheel) {
+    if (controls_velocity(options_.mechanism)) {
       return;
     }
     if (position() <= options_.travel_low) {
@@ -181,7 +181,7 @@ class Truth {
   }
 
   [[nodiscard]] double friction_here(double velocity, double drive) const {
-    const double length = options_.mechanism == MechanismKind::flywheel
+    const double length = controls_velocity(options_.mechanism)
                               ? 2.0 * std::numbers::pi
                               : 0.5 * (options_.travel_high - options_.travel_low);
     const double sign = velocity != 0.0 ? velocity : drive;
@@ -228,7 +228,7 @@ struct Applied {
 Applied drive(const CharacterizationOptions& options, TestKind kind, Random random) {
   const double sign = identification::is_forward(kind) ? 1.0 : -1.0;
   const bool ramp = identification::is_quasistatic(kind);
-  const bool travels = options.mechanism != MechanismKind::flywheel;
+  const bool travels = !controls_velocity(options.mechanism);
   const double start = travels ? (sign > 0.0 ? options.travel_low : options.travel_high) : 0.0;
   const double end = sign > 0.0 ? options.travel_high - options.travel_margin
                                 : options.travel_low + options.travel_margin;

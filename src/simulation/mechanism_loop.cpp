@@ -98,7 +98,7 @@ class PoweredMechanism final : public SimulatedPlant {
 
  private:
   [[nodiscard]] bool measures_velocity() const noexcept {
-    return mechanism_.kind() == mechanisms::MechanismKind::flywheel;
+    return controls_velocity(mechanism_.kind());
   }
   [[nodiscard]] double duty(const VectorIn& u) const noexcept {
     return std::clamp(u(0) / nominal_voltage_, -1.0, 1.0);
@@ -204,7 +204,7 @@ Expected<MechanismResponse> simulate_mechanism(const MechanismLoop& loop) {
   FLYBALL_TRY(const auto result, simulate_closed_loop(plant, law, closed));
   take_means();
 
-  const bool flywheel = design.kind == mechanisms::MechanismKind::flywheel;
+  const bool flywheel = controls_velocity(design.kind);
   FLYBALL_TRY(auto series,
               series_of(result.series, columns, flywheel, flywheel || design.plant.A.rows() == 2));
   const TrackingError& error = result.tracking[flywheel ? 1 : 0];

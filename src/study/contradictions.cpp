@@ -38,9 +38,9 @@ std::string cause_of(double ratio, const PlantDescription& said) {
   constexpr double turn = 2.0 * std::numbers::pi;
   const double G = said.gearing;
   const bool straight = said.unit == "m";
-  const std::string_view logged = said.kind == MechanismKind::flywheel ? "velocities"
-                                  : straight                           ? "distances"
-                                                                       : "angles";
+  const std::string_view logged = controls_velocity(said.kind) ? "velocities"
+                                  : straight                   ? "distances"
+                                                               : "angles";
   std::vector<Cause> causes;
   if (straight) {
     causes = {{0.5,

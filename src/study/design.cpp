@@ -38,7 +38,7 @@ void fill_defaults(DesignJob& job, std::vector<Diagnostic>& diagnostics) {
     job.estimator.measurement_std = measurement_std(job);
     note(diagnostics, "assumed", "the sensor's noise is taken as {} {}{} a sample",
          format_number(*job.estimator.measurement_std, 3), job.plant.unit,
-         job.plant.kind == MechanismKind::flywheel ? "/s" : "");
+         controls_velocity(job.plant.kind) ? "/s" : "");
   }
 }
 

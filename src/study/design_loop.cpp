@@ -15,6 +15,8 @@
 #include <flyball/mechanisms/arm.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/mechanisms/flywheel.hpp>
+#include <flyball/mechanisms/swerve_drive.hpp>
+#include <flyball/mechanisms/turret.hpp>
 #include <flyball/mechanisms/velocity_servo.hpp>
 #include <flyball/systems/discretize.hpp>
 
@@ -36,15 +38,25 @@ void take(LinearModel& model, const Mechanism& mechanism) {
   model.C = mechanism.C;
 }
 
-/// Theorems 6.9.1, 6.10.1 and 6.11.1.
+/// Theorems 6.9.1, 6.10.1 and 6.11.1, which the other kinds share.
 Expected<void> build(LinearModel& model, const PlantDescription& plant) {
-  if (plant.kind == MechanismKind::flywheel) {
-    return mechanisms::flywheel(plant.gains).map([&](const auto& built) { take(model, built); });
+  const auto into = [&](const auto& built) { take(model, built); };
+  switch (plant.kind) {
+    case MechanismKind::flywheel:
+      return mechanisms::flywheel(plant.gains).map(into);
+    case MechanismKind::roller:
+      return mechanisms::roller(plant.gains).map(into);
+    case MechanismKind::swerve_drive:
+      return mechanisms::swerve_drive(plant.gains).map(into);
+    case MechanismKind::elevator:
+      return mechanisms::elevator(plant.gains).map(into);
+    case MechanismKind::arm:
+      return mechanisms::arm(plant.gains).map(into);
+    case MechanismKind::turret:
+      return mechanisms::turret(plant.gains).map(into);
+    case MechanismKind::swerve_steer:
+      return mechanisms::swerve_steer(plant.gains).map(into);
   }
-  FLYBALL_TRY(const auto built, plant.kind == MechanismKind::elevator
-                                    ? mechanisms::elevator(plant.gains)
-                                    : mechanisms::arm(plant.gains));
-  take(model, built);
   return {};
 }
 
@@ -86,16 +98,16 @@ double measurement_std(const DesignJob& job) {
     // A quantised reading errs uniformly over one step: q/√12.
     return job.sensor.resolution / std::sqrt(12.0);
   }
-  return job.plant.kind == MechanismKind::flywheel ? 0.005 * top_speed(job.plant)
-         : job.plant.unit == "m"                   ? 5e-4
-                                                   : 1e-3;
+  return controls_velocity(job.plant.kind) ? 0.005 * top_speed(job.plant)
+         : job.plant.unit == "m"           ? 5e-4
+                                           : 1e-3;
 }
 
 Expected<LinearModel> linear_model(const PlantDescription& plant, double period) {
   LinearModel model;
   const Coordinate position{"position", plant.unit};
   const Coordinate velocity{"velocity", plant.unit + "/s"};
-  const bool flywheel = plant.kind == MechanismKind::flywheel;
+  const bool flywheel = controls_velocity(plant.kind);
   const auto zero = Eigen::MatrixXd::Zero(1, 1);
   if (!plant.kA_determined) {
     model.states = {flywheel ? velocity : position};
@@ -128,7 +140,7 @@ Expected<LinearModel> linear_model(const PlantDescription& plant, double period)
 
 Diagnostic unknown_kA(const PlantDescription& plant) {
   return {"kA_not_determined", Severity::info,
-          plant.kind == MechanismKind::flywheel
+          controls_velocity(plant.kind)
               ? "kA is not known: the flywheel is taken to follow its voltage within a period, and "
                 "feedforward alone drives it"
               : "kA is not known: the velocity is taken to follow the voltage (Theorem 14.3.2)"};
@@ -156,7 +168,7 @@ Expected<std::vector<PossiblePlant>> possible_plants(const LinearModel& model,
 std::vector<double> default_tolerances(const PlantDescription& plant, std::size_t states) {
   const double speed = top_speed(plant);
   std::vector<double> tolerances;
-  if (plant.kind == MechanismKind::flywheel) {
+  if (controls_velocity(plant.kind)) {
     tolerances = {0.01 * speed};
   } else {
     const double position = plant.unit == "m" ? 0.005 : std::numbers::pi / 360.0;

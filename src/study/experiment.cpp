@@ -44,7 +44,7 @@ struct Trial {
 };
 
 bool travels(const ExperimentJob& job) {
-  return job.plant.kind != MechanismKind::flywheel;
+  return !controls_velocity(job.plant.kind);
 }
 
 /// kA that is simulated: half of its bound where it is not known.

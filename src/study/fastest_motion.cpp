@@ -90,7 +90,7 @@ Expected<FastestMotion> fastest_motion(const DesignJob& job) {
   };
   const double v_top = top / gains.kV;
 
-  if (plant.kind == MechanismKind::flywheel) {
+  if (controls_velocity(plant.kind)) {
     const double goal = job.profile.goal.value_or(0.75 * v_top);
     if (std::abs(goal) >= v_top) {
       return refusal(DesignError::no_motion_possible, "design", "profile.goal")
@@ -131,7 +131,7 @@ Expected<FastestMotion> fastest_motion(const DesignJob& job) {
 }
 
 std::vector<PasteGains> paste_gains(const PlantDescription& plant, const Eigen::MatrixXd& K) {
-  const bool flywheel = plant.kind == MechanismKind::flywheel;
+  const bool flywheel = controls_velocity(plant.kind);
   const mechanisms::FeedforwardGains& gains = plant.gains;
   const double kD = K.cols() > 1 ? K(0, 1) : 0.0;
   PasteGains si{.per = plant.unit,

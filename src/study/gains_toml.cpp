@@ -33,7 +33,7 @@ void describe(const PlantDescription& plant, Project& project) {
   if (plant.kA_determined) {
     project.gains.kA = gains.kA;
   }
-  if (plant.kind != MechanismKind::flywheel) {
+  if (has_gravity(plant.kind)) {
     project.gains.kG = gains.kG;
   }
   if (plant.kind == MechanismKind::arm) {
@@ -46,8 +46,10 @@ void describe(const PlantDescription& plant, Project& project) {
   const auto known = mechanisms::motor(motor.name, motor.count);
   project.parts.motor_count = motor.count;
   project.parts.gearing = plant.gearing;
-  if (plant.kind == MechanismKind::elevator && plant.drum_radius > 0.0) {
+  if (plant.drum_radius > 0.0 && plant.kind == MechanismKind::elevator) {
     project.parts.drum_radius = Length(plant.drum_radius);
+  } else if (plant.drum_radius > 0.0 && plant.kind == MechanismKind::swerve_drive) {
+    project.parts.wheel_radius = Length(plant.drum_radius);
   }
   if (known && known->R == motor.R && known->Kt == motor.Kt && known->Kv == motor.Kv) {
     project.parts.motor = motor.name;
@@ -92,7 +94,7 @@ std::vector<KeyComment> comments(const PlantDescription& plant, const Feedforwar
       {"gains.kS", "V" + of(&FeedforwardFit::kS)},
       {"gains.kV", fmt::format("V·s/{}{}", plant.unit, of(&FeedforwardFit::kV))},
       {"gains.kA", kA}};
-  if (plant.kind != MechanismKind::flywheel) {
+  if (has_gravity(plant.kind)) {
     all.push_back({"gains.kG", "V" + of_some(&FeedforwardFit::kG)});
   }
   if (plant.kind == MechanismKind::arm) {
@@ -132,8 +134,7 @@ std::string gains_toml(const DesignResult& result, const FeedforwardFit* fit) {
   DesignJob& job = project.job;
   std::vector<KeyComment> beside = comments(job.plant, fit);
   std::vector<double>& tolerances = job.controller.state_tolerance;
-  if (result.velocity_servo && job.plant.kind != MechanismKind::flywheel &&
-      tolerances.size() == 1) {
+  if (result.velocity_servo && !controls_velocity(job.plant.kind) && tolerances.size() == 1) {
     // A project gives a position and a velocity; the plant without kA has the first alone.
     tolerances.push_back(job.plant.nominal_voltage / job.plant.gains.kV);
     beside.push_back({"controller.state_tolerance", "without kA the velocity's is not used"});

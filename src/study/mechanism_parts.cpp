@@ -4,6 +4,8 @@
 #include <flyball/mechanisms/arm.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/mechanisms/flywheel.hpp>
+#include <flyball/mechanisms/swerve_drive.hpp>
+#include <flyball/mechanisms/turret.hpp>
 
 #include "study/mechanism_parts.hpp"
 
@@ -22,11 +24,30 @@ Expected<void> take(PlantDescription& plant, const Expected<Mechanism>& mechanis
   });
 }
 
-Expected<void> make_flywheel(const MechanismParts& parts, PlantDescription& plant) {
-  return take(plant, mechanisms::flywheel(mechanisms::FlywheelParameters{
-                         .motor = *plant.motor,
-                         .gearing = *parts.gearing,
-                         .moment_of_inertia = *parts.moment_of_inertia}));
+template <MechanismKind Kind>
+Expected<void> make_wheel(const MechanismParts& parts, PlantDescription& plant) {
+  const mechanisms::FlywheelParameters of{.motor = *plant.motor,
+                                          .gearing = *parts.gearing,
+                                          .moment_of_inertia = *parts.moment_of_inertia};
+  return take(plant,
+              Kind == MechanismKind::roller ? mechanisms::roller(of) : mechanisms::flywheel(of));
+}
+
+template <MechanismKind Kind>
+Expected<void> make_turret(const MechanismParts& parts, PlantDescription& plant) {
+  const mechanisms::TurretParameters of{.motor = *plant.motor,
+                                        .gearing = *parts.gearing,
+                                        .moment_of_inertia = *parts.moment_of_inertia};
+  return take(
+      plant, Kind == MechanismKind::turret ? mechanisms::turret(of) : mechanisms::swerve_steer(of));
+}
+
+Expected<void> make_swerve_drive(const MechanismParts& parts, PlantDescription& plant) {
+  return take(plant, mechanisms::swerve_drive(
+                         mechanisms::SwerveDriveParameters{.motor = *plant.motor,
+                                                           .gearing = *parts.gearing,
+                                                           .mass = *parts.mass,
+                                                           .wheel_radius = *parts.wheel_radius}));
 }
 
 Expected<void> make_elevator(const MechanismParts& parts, PlantDescription& plant) {
@@ -49,8 +70,10 @@ Expected<void> make_arm(const MechanismParts& parts, PlantDescription& plant) {
 constexpr std::array flywheel_states{angular_velocity};
 constexpr std::array elevator_states{length, velocity};
 constexpr std::array arm_states{angle, angular_velocity};
+constexpr std::array drive_states{velocity};
 
-constexpr std::array<std::string_view, 3> flywheel_needs{"motor", "gearing", "moment_of_inertia"};
+constexpr std::array<std::string_view, 3> wheel_needs{"motor", "gearing", "moment_of_inertia"};
+constexpr std::array<std::string_view, 4> drive_needs{"motor", "gearing", "mass", "wheel_radius"};
 constexpr std::array<std::string_view, 4> elevator_needs{"motor", "gearing", "mass", "drum_radius"};
 constexpr std::array<std::string_view, 5> arm_needs{"motor", "gearing", "moment_of_inertia", "mass",
                                                     "center_of_mass"};
@@ -58,8 +81,8 @@ constexpr std::array<std::string_view, 5> arm_needs{"motor", "gearing", "moment_
 constexpr std::array rows{
     MechanismRow{MechanismKind::flywheel,
                  {flywheel_states, angular_velocity, angular_acceleration, angular_acceleration},
-                 flywheel_needs,
-                 &make_flywheel},
+                 wheel_needs,
+                 &make_wheel<MechanismKind::flywheel>},
     MechanismRow{MechanismKind::elevator,
                  {elevator_states, length, velocity, acceleration},
                  elevator_needs,
@@ -67,7 +90,23 @@ constexpr std::array rows{
     MechanismRow{MechanismKind::arm,
                  {arm_states, angle, angular_velocity, angular_acceleration},
                  arm_needs,
-                 &make_arm}};
+                 &make_arm},
+    MechanismRow{MechanismKind::roller,
+                 {flywheel_states, angular_velocity, angular_acceleration, angular_acceleration},
+                 wheel_needs,
+                 &make_wheel<MechanismKind::roller>},
+    MechanismRow{MechanismKind::turret,
+                 {arm_states, angle, angular_velocity, angular_acceleration},
+                 wheel_needs,
+                 &make_turret<MechanismKind::turret>},
+    MechanismRow{MechanismKind::swerve_steer,
+                 {arm_states, angle, angular_velocity, angular_acceleration},
+                 wheel_needs,
+                 &make_turret<MechanismKind::swerve_steer>},
+    MechanismRow{MechanismKind::swerve_drive,
+                 {drive_states, velocity, acceleration, acceleration},
+                 drive_needs,
+                 &make_swerve_drive}};
 
 }  // namespace
 

@@ -197,7 +197,7 @@ ExpectedAll<ModelFile> model_of(const Project& project) {
   model.outputs = {model.states.front()};
   model.plant = plant;
   const DiscreteSystem<>& discrete = linear.discrete;
-  if (plant.kA_determined || plant.kind != MechanismKind::flywheel) {
+  if (plant.kA_determined || !controls_velocity(plant.kind)) {
     model.system = {linear.A, linear.B, linear.C, discrete.D};
   } else {
     // What happens within the period is not known.

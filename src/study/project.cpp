@@ -90,7 +90,8 @@ void take_parts(TomlDocument& document, Project& project) {
   const MechanismParts& parts = project.parts;
   PlantDescription& plant = project.job.plant;
   plant.gearing = parts.gearing.value_or(plant.gearing);
-  plant.drum_radius = parts.drum_radius.value_or(Length(plant.drum_radius)).si();
+  plant.drum_radius =
+      parts.drum_radius.value_or(parts.wheel_radius.value_or(Length(plant.drum_radius))).si();
   if (!document.has(part_section, "motor")) {
     return;
   }
@@ -149,8 +150,8 @@ void refuse_other_kinds(TomlDocument& document, const MechanismRow& row) {
       refuse(part_section, field.key, fmt::format("it is made of {}", fmt::join(row.needs, ", ")));
     }
   }
-  if (row.kind == mechanisms::MechanismKind::flywheel) {
-    refuse("gains", "kG", "gravity does not turn it");
+  if (!has_gravity(row.kind)) {
+    refuse("gains", "kG", "gravity does not move it");
   }
   if (row.kind != mechanisms::MechanismKind::arm) {
     refuse("gains", "angle_offset", "it is of an arm");

@@ -82,7 +82,8 @@ Expected<void> check_choice(const std::string& text,
       .expected(fmt::format("{}", fmt::join(choices, ", ")));
 }
 
-constexpr std::string_view kinds = "elevator, arm, flywheel";
+constexpr std::string_view kinds =
+    "elevator, arm, flywheel, roller, turret, swerve steer, swerve drive";
 
 constexpr std::array mechanism_fields{
     text("type", at<&MechanismParts::type>(), "\"elevator\"", "What it is")
@@ -103,6 +104,8 @@ constexpr std::array mechanism_fields{
              "What gravity pulls"),
     quantity("drum_radius", at<&MechanismParts::drum_radius>(), length, positive, "\"1 in\"",
              "Radius at which the drum moves the carriage"),
+    quantity("wheel_radius", at<&MechanismParts::wheel_radius>(), length, positive, "\"2 in\"",
+             "Radius of a swerve module's wheel"),
     quantity("moment_of_inertia", at<&MechanismParts::moment_of_inertia>(), moment_of_inertia,
              positive, "\"0.003 kg m^2\"", "Inertia at the output, about its axis")
         .takes("INERTIA"),
@@ -149,7 +152,7 @@ constexpr std::array gains_fields{
 
 constexpr std::array log_fields{
     text("mechanism", log_kind, "\"arm\"", "What the log is of")
-        .one_of("elevator, arm, flywheel, drivetrain")
+        .one_of("elevator, arm, flywheel, roller, turret, swerve steer, swerve drive, drivetrain")
         .checked(check_log_kind)
         .without("the type in [mechanism], else what the log says")
         .takes("KIND"),

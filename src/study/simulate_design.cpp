@@ -51,7 +51,7 @@ std::vector<MotionState> reference_of(const DesignResult& design, std::optional<
   const auto rows =
       static_cast<std::size_t>(std::min(periods_of(design, duration), most_periods)) + 1;
   std::vector<MotionState> reference(rows);
-  if (design.job.plant.kind == MechanismKind::flywheel) {
+  if (controls_velocity(design.job.plant.kind)) {
     // A flywheel's motion is a ramp of its velocity.
     const double a = std::copysign(design.motion.max_acceleration, goal);
     for (std::size_t k = 0; k < rows; ++k) {

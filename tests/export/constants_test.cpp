@@ -17,7 +17,7 @@ using mechanisms::MechanismKind;
 MechanismConstants constants(MechanismKind kind, double turn = 2.0 * std::numbers::pi) {
   MechanismConstants of;
   of.kind = kind;
-  of.unit = kind == MechanismKind::elevator ? "m" : "rad";
+  of.unit = position_unit(kind);
   of.gearing = 10.0;
   of.angle_offset = kind == MechanismKind::arm ? 0.2 : 0.0;
   const UnitGains own{
@@ -76,9 +76,10 @@ void expect_gains(const std::string& text, const UnitGains& gains, bool gravity)
 
 TEST(Constants, CarryTheDesignsGainsInEveryUnitAndLanguage) {
   for (const MechanismKind kind :
-       {MechanismKind::flywheel, MechanismKind::elevator, MechanismKind::arm}) {
+       {MechanismKind::flywheel, MechanismKind::elevator, MechanismKind::arm, MechanismKind::turret,
+        MechanismKind::swerve_steer, MechanismKind::swerve_drive}) {
     const MechanismConstants of = constants(kind);
-    const bool gravity = kind != MechanismKind::flywheel;
+    const bool gravity = kind == MechanismKind::elevator || kind == MechanismKind::arm;
     for (const Language language : {Language::cpp, Language::java}) {
       expect_gains(wpilib_constants(of, language), gains_per(of, of.unit), gravity);
       expect_gains(phoenix_constants(of, language), gains_per(of, "rotation"), gravity);
@@ -115,6 +116,60 @@ TEST(Constants, NameTheClassesThatTakeThem) {
   const MechanismConstants flywheel = constants(MechanismKind::flywheel);
   has(wpilib_constants(flywheel, Language::java), "new SimpleMotorFeedforward(kS, kV, kA");
   has(rev_constants(flywheel, Language::java), "velocityFF(kV / 12.0)");
+}
+
+// What turns endlessly takes the shorter way; a wheel on the floor has metres and a velocity.
+TEST(Constants, OfTurretsAndSwerveModules) {
+  const auto has = [](const std::string& text, const char* name) {
+    EXPECT_NE(text.find(name), std::string::npos) << name << " is not in\n" << text;
+  };
+  const MechanismConstants steer = constants(MechanismKind::swerve_steer);
+  has(wpilib_constants(steer, Language::java), "public final class SwerveSteerConstants");
+  has(wpilib_constants(steer, Language::java), "enableContinuousInput(-Math.PI, Math.PI)");
+  has(wpilib_constants(steer, Language::cpp), "frc::SimpleMotorFeedforward<units::radians> ");
+  has(phoenix_constants(steer, Language::cpp), "ClosedLoopGeneral.ContinuousWrap = true");
+  has(phoenix_constants(steer, Language::cpp), "PositionVoltage");
+  has(rev_constants(steer, Language::java), "positionWrappingInputRange(0, 1)");
+  has(rev_constants(steer, Language::java), "closedLoop.d(kD");
+  EXPECT_EQ(wpilib_constants(steer, Language::cpp).find("cable"), std::string::npos);
+  has(wpilib_constants(constants(MechanismKind::turret), Language::cpp), "unless a cable");
+  const MechanismConstants drive = constants(MechanismKind::swerve_drive, 0.3);
+  has(wpilib_constants(drive, Language::cpp), "frc::SimpleMotorFeedforward<units::meters> ");
+  has(phoenix_constants(drive, Language::java), "VelocityVoltage");
+  has(phoenix_constants(drive, Language::java), "one rotation is one of the wheel");
+  EXPECT_EQ(wpilib_constants(drive, Language::java).find("ontinuousInput"), std::string::npos);
+  EXPECT_EQ(rev_constants(drive, Language::java).find("closedLoop.d("), std::string::npos);
+}
+
+// A motor controller's own loop has its own gains; the robot's loop keeps those of its period.
+TEST(Constants, OfLoopsOnMotorControllers) {
+  MechanismConstants of = constants(MechanismKind::arm);
+  of.delay = 0.0425;
+  of.on_board = of.gains;
+  for (UnitGains& gains : of.on_board) {
+    gains.kP *= 2.0;
+    gains.kD *= 3.0;
+  }
+  for (const Language language : {Language::cpp, Language::java}) {
+    expect_gains(wpilib_constants(of, language), gains_per(of, "rad"), true);
+    const auto own = [&](std::string_view per) {
+      return *std::find_if(of.on_board.begin(), of.on_board.end(),
+                           [&](const auto& gains) { return gains.per == per; });
+    };
+    expect_gains(phoenix_constants(of, language), own("rotation"), true);
+    expect_gains(rev_constants(of, language), own("RPM"), true);
+  }
+  const auto has = [](const std::string& text, const std::string& part) {
+    EXPECT_NE(text.find(part), std::string::npos) << part << " is not in\n" << text;
+  };
+  has(rev_constants(of, Language::java),
+      "Loop period 1 ms, on the controller, and a measurement that is 42.5 ms old");
+  has(wpilib_constants(of, Language::java),
+      "Loop period 20 ms and a measurement that is 42.5 ms old");
+  // 2 · 61.2345678 · 2π V a rotation of 12 V; 60 · 3 · 3.21 · 2π/60 V s a rotation over 1 ms and 12
+  // V.
+  has(rev_constants(of, Language::java), "closedLoop.p(kP / 12.0);  // 64.1247 of the voltage per");
+  has(rev_constants(of, Language::java), "// 5042.26 per change of rotations");
 }
 
 // kD e' with e' = (e_k - e_(k-1))/1 ms: WPILib's SysId divides a position loop's kD by 12 V and by

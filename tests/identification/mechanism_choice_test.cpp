@@ -58,8 +58,30 @@ TEST(MechanismChoice, TellsItsNumbers) {
 TEST(MechanismChoice, AsksForWhatTurnsWithinATurnWithoutGravity) {
   auto options = scenarios::session(scenarios::mechanisms[recordings::arm], 2);
   options.kG = 0.0;
-  EXPECT_EQ(choose(recorded(options)).fitting,
-            (Kinds{MechanismKind::arm, MechanismKind::flywheel}));
+  EXPECT_EQ(choose(recorded(options)).fitting, (Kinds{MechanismKind::arm, MechanismKind::turret}));
+}
+
+// Said to be one of those without gravity, its fit is that of the flywheel's model, with the
+// position: nothing contradicts it, and the gains are the session's.
+TEST(MechanismChoice, ATurretThatIsSaidIsBelieved) {
+  auto options = scenarios::session(scenarios::mechanisms[recordings::arm], 2);
+  options.kG = 0.0;
+  for (const MechanismKind kind : {MechanismKind::turret, MechanismKind::swerve_steer}) {
+    Recording recording = recorded(options);
+    recording.mechanism = kind;
+    const auto report = identify_feedforward(recording);
+    ASSERT_TRUE(report.fit) << to_string(report.fit.error());
+    EXPECT_EQ(report.fit->mechanism, kind);
+    EXPECT_FALSE(report.fit->kG);
+    EXPECT_FALSE(report.fit->angle_offset);
+    EXPECT_NEAR(report.fit->kV.value, options.kV, 0.01 * options.kV);
+    EXPECT_NEAR(report.fit->kS.value, options.kS, 0.02);
+    EXPECT_EQ(find(report.diagnostics, "mechanism_contradicted"), nullptr);
+  }
+  // With gravity it is an arm, whatever is said.
+  Recording arm = record(recordings::arm);
+  arm.mechanism = MechanismKind::turret;
+  EXPECT_NE(find(identify_feedforward(arm).diagnostics, "mechanism_contradicted"), nullptr);
 }
 
 TEST(MechanismChoice, AsksForAForceThatMayBeADrumsGravityOrFriction) {

@@ -8,6 +8,8 @@
 #include <flyball/mechanisms/arm.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/mechanisms/flywheel.hpp>
+#include <flyball/mechanisms/swerve_drive.hpp>
+#include <flyball/mechanisms/turret.hpp>
 #include <flyball/mechanisms/velocity_servo.hpp>
 
 #include "mechanisms/expect_model.hpp"
@@ -39,6 +41,11 @@ TEST(IdentifiedGains, ElevatorAndArm) {
   };
   check(elevator(gains).value(), MechanismKind::elevator);
   check(arm(gains).value(), MechanismKind::arm);
+  check(turret(gains).value(), MechanismKind::turret);
+  check(swerve_steer(gains).value(), MechanismKind::swerve_steer);
+  test::expect_first_order(roller(gains).value(), -16.0, 4.0);
+  test::expect_first_order(swerve_drive(gains).value(), -16.0, 4.0);
+  EXPECT_EQ(swerve_drive(gains)->gains.gravity_voltage(MechanismKind::turret, 0.3), 0.0);
 }
 
 // The book's flywheel (K_v 0.011 V s/rad, K_a 0.005515 V s²/rad) and drivetrain (3.02 V s/m,

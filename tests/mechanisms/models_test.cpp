@@ -8,6 +8,8 @@
 #include <flyball/mechanisms/arm.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/mechanisms/flywheel.hpp>
+#include <flyball/mechanisms/swerve_drive.hpp>
+#include <flyball/mechanisms/turret.hpp>
 
 #include "mechanisms/expect_model.hpp"
 
@@ -62,6 +64,42 @@ TEST(Flywheel, Theorem6102) {
   EXPECT_DOUBLE_EQ(current, parameters.motor.current(10.0 * 3.0, 8.0));
   EXPECT_TRUE(
       flywheel_without_encoder({.motor = round_motor()}).error().is(ArgumentError::not_positive));
+}
+
+// The flywheel's numbers, of a position too: no gravity, whatever the angle.
+TEST(Turret, IsAnArmWithoutGravity) {
+  const TurretParameters parameters{
+      .motor = round_motor(), .gearing = 10.0, .moment_of_inertia = 0.5_kg_m2};
+  for (const auto& [model, kind] :
+       {std::pair(turret(parameters).value(), MechanismKind::turret),
+        {swerve_steer(parameters).value(), MechanismKind::swerve_steer}}) {
+    test::expect_second_order(model, -2.5, 5.0);
+    EXPECT_EQ(model.kind, kind);
+    EXPECT_EQ(model.nominal_voltage, 24.0);
+    EXPECT_EQ(model.gains.kG, 0.0);
+    EXPECT_EQ(model.disturbance(0.3, 0.0), 0.0);
+    EXPECT_EQ(model.description().states.size(), 2U);
+  }
+  EXPECT_EQ(roller({.motor = round_motor(), .gearing = 10.0, .moment_of_inertia = 0.5_kg_m2})
+                .value()
+                .kind,
+            MechanismKind::roller);
+  EXPECT_EQ(turret({.motor = round_motor(), .gearing = 10.0}).error().subject(),
+            "moment_of_inertia");
+}
+
+// The elevator's numbers below, of its velocity: -62.5 and 6.25, kV = G/(K_v r) = 10 V s/m.
+TEST(SwerveDrive, IsAnElevatorsVelocityWithoutGravity) {
+  const SwerveDrive model =
+      swerve_drive({.motor = round_motor(), .gearing = 10.0, .mass = 8_kg, .wheel_radius = 5_cm})
+          .value();
+  test::expect_first_order(model, -62.5, 6.25);
+  EXPECT_EQ(model.kind, MechanismKind::swerve_drive);
+  EXPECT_DOUBLE_EQ(model.gains.kV, 10.0);
+  EXPECT_EQ(model.gains.kG, 0.0);
+  EXPECT_EQ(model.description().states.at(0).unit, "m/s");
+  EXPECT_EQ(swerve_drive({.motor = round_motor(), .gearing = 10.0, .mass = 8_kg}).error().subject(),
+            "wheel_radius");
 }
 
 // -G² K_t/(R r² m K_v) = -100·0.05/(0.2·0.0025·8·20) = -62.5, G K_t/(R r m) = 0.5/(0.2·0.05·8) =

@@ -323,7 +323,7 @@ TEST(Recording, ADrivetrainIsToldByItsName) {
     const auto swerve = recording_from_log(four_controllers(name), {});
     ASSERT_FALSE(swerve) << name;
     EXPECT_TRUE(swerve.error().is(RecordingError::drivetrain)) << name;
-    EXPECT_NE(to_string(swerve.error()).find("--mechanism flywheel"), std::string::npos);
+    EXPECT_NE(to_string(swerve.error()).find("--mechanism \"swerve steer\""), std::string::npos);
   }
   // Four motors that show the same are one mechanism's.
   EXPECT_EQ(refusal_of(four_controllers("sysid-test-state-Wrist"), {}), "accepted");
@@ -554,6 +554,70 @@ TEST(Recording, WordsForADrivetrain) {
   for (const char* text : {"", "arm", "driver", "drivetrain (angular)"}) {
     EXPECT_FALSE(means_drivetrain(text)) << text;
   }
+}
+
+// Names tell a turret, a roller and the motions of a swerve module apart.
+TEST(Recording, KindsByName) {
+  const std::vector<std::pair<std::string, MechanismKind>> names{
+      {"sysid-test-state-Turret", MechanismKind::turret},
+      {"sysid-test-state-IntakeRollers", MechanismKind::roller},
+      {"sysid-test-state-SwerveSteer", MechanismKind::swerve_steer},
+      {"SysIdSteer_State", MechanismKind::swerve_steer},
+      {"SysIdTranslation_State", MechanismKind::swerve_drive},
+      {"/RealOutputs/Elevator/SysIdState", MechanismKind::elevator}};
+  for (const auto& [name, kind] : names) {
+    Log log = wpilog(kind == MechanismKind::elevator ? "Meter" : "Rotation");
+    log.texts.front().name = name;
+    log.signals.resize(3);
+    const auto loaded = recording_from_log(log, {});
+    ASSERT_TRUE(loaded) << name << ": " << to_string(loaded.error());
+    EXPECT_EQ(loaded->recording.mechanism, kind) << name;
+  }
+}
+
+// A wheel's rotations become metres once the person says how many one is; a turret has angles.
+TEST(Recording, UnitsOfSwerveModulesAndTurrets) {
+  LogSelection selection{.mechanism = MechanismKind::swerve_drive};
+  EXPECT_EQ(recording_from_log(wpilog("Rotation"), selection)->recording.unit, "rad");
+  selection.scale = 0.3;
+  const auto metres = recording_from_log(wpilog("Rotation"), selection);
+  ASSERT_TRUE(metres) << to_string(metres.error());
+  EXPECT_EQ(metres->recording.unit, "m");
+  EXPECT_NEAR(metres->recording.runs[0].velocity[9], 0.3, 1e-12);
+  EXPECT_EQ(code_of(wpilog("Meter"), {.mechanism = MechanismKind::turret}), "unit_mismatch");
+}
+
+// An absolute encoder of 0 to 1 rotations under a motion of 1 rotation/s, rows 4 ms off the
+// voltage's: the leaps are undone before rows fall into them. A step that is no leap stays.
+TEST(Recording, AnglesThatWrapGoOn) {
+  Log log = wpilog("Rotation");
+  log.texts.front().name = "sysid-test-state-SwerveSteer";
+  log.signals.resize(3);
+  for (double& value : log.signals[1].value) {
+    value -= std::floor(value);
+  }
+  const auto loaded = recording_from_log(log, {});
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  const identification::TestRun& run = loaded->recording.runs[0];
+  for (std::size_t i = 1; i < run.time.size(); ++i) {
+    EXPECT_NEAR(run.position[i] - run.position[i - 1], two_pi * (run.time[i] - run.time[i - 1]),
+                1e-9);
+  }
+  const auto told =
+      std::find_if(loaded->diagnostics.begin(), loaded->diagnostics.end(),
+                   [](const Diagnostic& found) { return found.code == "angle_unwrapped"; });
+  ASSERT_NE(told, loaded->diagnostics.end());
+  EXPECT_NE(told->message.find(" 7 times"), std::string::npos) << told->message;
+
+  Log stale = wpilog("Rotation");  // begins with the last value of another test
+  stale.signals.resize(3);
+  std::vector<double>& values = stale.signals[1].value;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    values[i] = i == 0 ? 0.95 : 0.95 * static_cast<double>(i) / static_cast<double>(values.size());
+  }
+  const auto kept = recording_from_log(stale, {});
+  ASSERT_TRUE(kept) << to_string(kept.error());
+  EXPECT_LT(kept->recording.runs.back().position.back(), two_pi);
 }
 
 // Two tests of one kind whose clocks begin anew are two runs, although no state lies between them.

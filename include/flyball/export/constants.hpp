@@ -24,10 +24,13 @@ struct MechanismConstants {
   mechanisms::MechanismKind kind = mechanisms::MechanismKind::flywheel;
   std::string unit = "rad";        ///< "m" or "rad", for which there are gains.
   std::vector<UnitGains> gains{};  ///< Per that unit and, where it is known, "rotation" and "RPM".
-  double period = 0.020;           ///< s
-  double nominal_voltage = 12.0;   ///< V
-  double gearing = 1.0;            ///< Motor turns per output turn.
-  double angle_offset = 0.0;  ///< rad, true angle from horizontal less the measured one (arms).
+  /// The same units with gains for a loop of 1 ms on the motor controller; empty: those above.
+  std::vector<UnitGains> on_board{};
+  double period = 0.020;          ///< s
+  double delay = 0.0;             ///< s, age of the measurement that the gains are designed for.
+  double nominal_voltage = 12.0;  ///< V
+  double gearing = 1.0;           ///< Motor turns per output turn.
+  double angle_offset = 0.0;      ///< rad, true angle from horizontal less the measured one (arms).
   bool kA_determined = true;
   double kA_upper_bound = 0.0;  ///< V·s²/unit, if not determined.
   std::string kA_reason{};      ///< Why it is not determined, if that is known.
@@ -46,14 +49,16 @@ struct PasteText {
 /// @return Empty if there are no gains per the mechanism's own unit.
 [[nodiscard]] std::string wpilib_constants(const MechanismConstants& constants, Language language);
 
-/// For CTRE Phoenix 6, a Slot0Configs per rotation of the mechanism, all in volts.
+/// For CTRE Phoenix 6, a Slot0Configs per rotation of the mechanism, all in volts; the gains are
+/// those of its own loop where there are some.
 /// @return Empty if there are no gains per rotation (an elevator without a drum radius).
 [[nodiscard]] std::string phoenix_constants(const MechanismConstants& constants, Language language);
 
-/// For REVLib, per rotation and RPM of the mechanism; says what is in volts and what SPARKs want as
-/// a share of the full voltage. A SPARK adds kD (e_k - e_(k-1)) every millisecond without dividing
-/// by the time between, so its kD is the one in V/RPM times 60 s/min, over 1 ms, over the voltage.
-/// Source: the preset of WPILib's SysId for REV controllers (period 1 ms, not time-normalised).
+/// For REVLib, per rotation and RPM of the mechanism, of a SPARK's own loop where there are some;
+/// says what is in volts and what SPARKs want as a share of the full voltage. A SPARK adds kD (e_k
+/// - e_(k-1)) every millisecond without dividing by the time between, so its kD is the one in V/RPM
+/// times 60 s/min, over 1 ms, over the voltage. Source: the preset of WPILib's SysId for REV
+/// controllers (period 1 ms, not time-normalised).
 /// @return Empty if there are no gains per RPM.
 [[nodiscard]] std::string rev_constants(const MechanismConstants& constants, Language language);
 

@@ -34,7 +34,7 @@ struct MechanismChoice {
 /// Weighs no gravity (flywheel), a constant one (elevator) and one with the angle's cosine (arm):
 /// each is fitted, and the falls of the cost are compared as those of other terms of the model.
 /// Beside gravity the travel speaks: an arm keeps within a turn, an elevator within a few metres,
-/// a flywheel within neither.
+/// a flywheel within neither; what keeps within a turn without gravity may be a turret.
 ///
 /// @param prepared  With or without a mechanism, which is not looked at.
 /// @errors IdentificationError, as `identify_feedforward` for tests that give no gains.

@@ -32,4 +32,9 @@ using Flywheel = Mechanism<1>;
 /// @errors ArgumentError::not_positive, out_of_range, not_finite.
 [[nodiscard]] Expected<Flywheel> flywheel(const FeedforwardGains& gains);
 
+/// `flywheel` as a roller of an intake or an indexer. @errors The same.
+[[nodiscard]] Expected<Flywheel> roller(const FlywheelParameters& parameters);
+/// The same from identified gains. @errors The same.
+[[nodiscard]] Expected<Flywheel> roller(const FeedforwardGains& gains);
+
 }  // namespace flyball::mechanisms

@@ -10,7 +10,7 @@ namespace flyball::mechanisms {
 /// g, standard gravity, m/s². The book's figures use 9.81.
 inline constexpr double standard_gravity = 9.80665;
 
-/// What holds a mechanism against gravity, V, over generic scalars: 0 for a flywheel, kG for an
+/// What holds a mechanism against gravity, V, over generic scalars: 0 without gravity, kG for an
 /// elevator, kG cos(position + angle_offset) for an arm.
 /// @param kG  V; an arm's when it is level. @param position  m or rad. @param angle_offset  rad,
 /// true angle from horizontal less the measured one.
@@ -20,15 +20,10 @@ template <class Gain, class Position, class Offset>
     MechanismKind kind, const Gain& kG, const Position& position, const Offset& angle_offset) {
   using std::cos;
   using Scalar = std::common_type_t<Gain, Position, Offset>;
-  switch (kind) {
-    case MechanismKind::flywheel:
-      return Scalar(0.0);
-    case MechanismKind::elevator:
-      return Scalar(kG);
-    case MechanismKind::arm:
-      return kG * cos(Scalar(position + angle_offset));
+  if (kind == MechanismKind::arm) {
+    return kG * cos(Scalar(position + angle_offset));
   }
-  return Scalar(0.0);
+  return kind == MechanismKind::elevator ? Scalar(kG) : Scalar(0.0);
 }
 
 }  // namespace flyball::mechanisms

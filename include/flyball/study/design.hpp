@@ -27,8 +27,8 @@ struct PlantDescription {
   std::string kA_reason{};                     ///< Why it is not determined, if a log says so.
   std::optional<mechanisms::DcMotor> motor{};  ///< If known: current and battery sag are simulated.
   double gearing = 1.0;                        ///< Motor turns per output turn.
-  double drum_radius = 0.0;                    ///< m, elevators with a known drum, else 0.
-  double nominal_voltage = 12.0;               ///< V
+  double drum_radius = 0.0;       ///< m, of a known drum (of a swerve drive: wheel), else 0.
+  double nominal_voltage = 12.0;  ///< V
 };
 
 /// What the controller has to do and what it works with. Empty optionals get a default that the

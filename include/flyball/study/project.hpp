@@ -42,6 +42,7 @@ struct MechanismParts {
   std::optional<double> gearing{};            ///< Motor turns per output turn.
   std::optional<Mass> mass{};
   std::optional<Length> drum_radius{};
+  std::optional<Length> wheel_radius{};
   std::optional<MomentOfInertia> moment_of_inertia{};
   std::optional<Length> center_of_mass{};
 };

@@ -38,7 +38,7 @@ PlotPanel response_panel(const TimeSeries& series, const Coordinate& shown,
 /// What of position and velocity a mechanism's loop controls.
 std::vector<Coordinate> controlled(const PlantDescription& plant) {
   std::vector<Coordinate> states{{"velocity", plant.unit + "/s"}};
-  if (plant.kind != mechanisms::MechanismKind::flywheel) {
+  if (!controls_velocity(plant.kind)) {
     states.insert(states.begin(), {"position", plant.unit});
   }
   return states;
@@ -48,9 +48,8 @@ Figure response_figure(const DesignResult& result) {
   const PlantDescription& plant = result.job.plant;
   const TimeSeries& series = result.response;
   Figure figure = over_time("motion", "closed_loop",
-                            plant.kind == mechanisms::MechanismKind::flywheel
-                                ? "Closed loop: a ramp of the speed"
-                                : "Closed loop: a trapezoid",
+                            controls_velocity(plant.kind) ? "Closed loop: a ramp of the speed"
+                                                          : "Closed loop: a trapezoid",
                             "Reference, truth and estimate of the simulated closed loop with "
                             "noise, delay and battery sag, and the voltage it takes.");
   std::vector<PlotPanel>& panels = figure.plot.panels;

@@ -169,13 +169,13 @@ Section plant_section(const DesignResult& result) {
 Section controller_section(const DesignResult& result) {
   const ControllerOptions& controller = result.job.controller;
   const PlantDescription& plant = result.job.plant;
-  const bool has_gravity = plant.kind != MechanismKind::flywheel;
+  const bool gravity = has_gravity(plant.kind);
   const double delay = controller.delay.value_or(0.0);
   Section section{"controller", "Controller", {}};
   section.blocks.emplace_back(Paragraph{fmt::format(
       "Every {}: u = K (r − x̂) + B⁺ (r_next − A r){}, limited to ±{} V; x̂ is "
       "predicted by the plant and corrected by the measured {}{}.",
-      seconds(controller.period), has_gravity ? " + kS sgn(v) + gravity" : " + kS sgn(v)",
+      seconds(controller.period), gravity ? " + kS sgn(v) + gravity" : " + kS sgn(v)",
       number(controller.max_voltage), measured_name(plant.kind),
       result.predicts ? fmt::format(", then carried over the {} of delay by the voltages that the "
                                     "motor saw in them",
@@ -317,7 +317,7 @@ Section robustness_section(const DesignResult& result) {
 Section motion_section(const DesignResult& result) {
   const FastestMotion& motion = result.motion;
   const PlantDescription& plant = result.job.plant;
-  const bool flywheel = plant.kind == MechanismKind::flywheel;
+  const bool flywheel = controls_velocity(plant.kind);
   Section section{"motion", flywheel ? "Fastest ramp" : "Fastest trapezoid", {}};
   Facts facts;
   facts.add("velocity", quantity(motion.max_velocity, plant.unit + "/s"));
@@ -372,11 +372,11 @@ Section constants_section(const DesignResult& result) {
 }  // namespace
 
 std::string measured_name(MechanismKind kind) {
-  return kind == MechanismKind::flywheel ? "velocity" : "position";
+  return controls_velocity(kind) ? "velocity" : "position";
 }
 
 std::string controlled_unit(const PlantDescription& plant) {
-  return plant.kind == MechanismKind::flywheel ? plant.unit + "/s" : plant.unit;
+  return controls_velocity(plant.kind) ? plant.unit + "/s" : plant.unit;
 }
 
 Facts plant_facts(const PlantDescription& plant) {
@@ -391,7 +391,8 @@ Facts plant_facts(const PlantDescription& plant) {
     facts.add("gearing", quantity(plant.gearing, "motor turns per output turn"));
   }
   if (plant.drum_radius > 0.0) {
-    facts.add("drum radius", quantity(plant.drum_radius, "m"));
+    facts.add(plant.kind == MechanismKind::elevator ? "drum radius" : "wheel radius",
+              quantity(plant.drum_radius, "m"));
   }
   std::string gains =
       fmt::format("kS {} V, kV {} V·s/{}", number(plant.gains.kS), number(plant.gains.kV), unit);
@@ -399,7 +400,7 @@ Facts plant_facts(const PlantDescription& plant) {
            : plant.kA_upper_bound > 0.0
                ? fmt::format(", kA below {} V·s²/{}", number(plant.kA_upper_bound), unit)
                : std::string(", kA not known");
-  if (plant.kind != MechanismKind::flywheel) {
+  if (has_gravity(plant.kind)) {
     gains += fmt::format(", kG {} V", number(plant.gains.kG));
   }
   if (plant.kind == MechanismKind::arm) {

@@ -166,8 +166,7 @@ Answer answer_of(const ExperimentResult& result) {
   document.title = fmt::format("Tests of {} {}", kind == "flywheel" ? "a" : "an", kind);
   document.verdict = verdict_of(result);
   Section tests{"tests", "Tests", {tests_table(result)}};
-  if (result.job.limits.travel_low &&
-      result.job.plant.kind != mechanisms::MechanismKind::flywheel) {
+  if (result.job.limits.travel_low && !controls_velocity(result.job.plant.kind)) {
     tests.blocks.emplace_back(Paragraph{
         fmt::format("Between {} and {} {}; each test starts at rest near one end and is ended "
                     "before the other.",
