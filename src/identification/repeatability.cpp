@@ -1,6 +1,7 @@
 #include <flyball/identification/repeatability.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string_view>
 #include <utility>
@@ -95,9 +96,8 @@ std::optional<std::size_t> outlier_of(const std::vector<Reading>& readings) {
   return best >= GainComparison::least_p_value ? std::optional(readings[odd].log) : std::nullopt;
 }
 
-GainComparison compare(std::string_view name, std::string unit,
-                       const std::vector<Reading>& readings) {
-  GainComparison comparison{.name = std::string(name), .unit = std::move(unit)};
+GainComparison compare(std::string name, std::string unit, const std::vector<Reading>& readings) {
+  GainComparison comparison{.name = std::move(name), .unit = std::move(unit)};
   const Scatter scatter = scatter_of(readings);
   comparison.between = std::sqrt(scatter.between_squared);
   comparison.ratio = scatter.ratio;
@@ -126,6 +126,63 @@ GainComparison compare(std::string_view name, std::string unit,
   return comparison;
 }
 
+/// A gain of a joint fit with the scatter among the logs.
+void widen(GainEstimate& estimate, std::string_view name,
+           const std::vector<GainComparison>& comparisons) {
+  const auto found = std::find_if(comparisons.begin(), comparisons.end(),
+                                  [&](const GainComparison& c) { return c.name == name; });
+  if (found == comparisons.end() || !estimate.determined) {
+    return;
+  }
+  if (found->agrees()) {
+    estimate.standard_error *= found->ratio;
+    for (double& end : estimate.interval) {
+      end = estimate.value + found->ratio * (end - estimate.value);
+    }
+    return;
+  }
+  const auto k = static_cast<double>(found->logs.size());
+  const double own = sigma_of(estimate) * sigma_of(estimate);
+  const double scatter = found->between * found->between / k;
+  const double freedom = (k - 1.0) * std::pow((own + scatter) / scatter, 2);
+  estimate.standard_error = std::sqrt(own + scatter);
+  const double half = student_quantile(0.975, freedom) * estimate.standard_error;
+  estimate.interval = {estimate.value - half, estimate.value + half};
+}
+
+Error few_fits(std::size_t fits) {
+  return refusal(ArgumentError::wrong_shape, "compare_fits", "fits")
+      .got(fits == 0 ? "none" : "one")
+      .expected("two or more");
+}
+
+constexpr std::array drive_gains{"kS_linear",  "kV_linear", "kA_linear", "kS_angular", "kV_angular",
+                                 "kA_angular", "kS_left",   "kS_right",  "trackwidth"};
+
+/// A gain of a drivetrain, or of one that may be changed; null if it has none.
+template <class Fit>
+auto* gain_in(Fit& fit, std::string_view name) {
+  if (name == "kS_left" || name == "kS_right" || name == "trackwidth") {
+    auto& gain = name == "kS_left"    ? fit.kS_left
+                 : name == "kS_right" ? fit.kS_right
+                                      : fit.trackwidth;
+    return gain ? &*gain : nullptr;
+  }
+  auto& mode = name.ends_with("_linear") ? fit.linear : fit.angular;
+  return !mode                    ? nullptr
+         : name.starts_with("kS") ? &mode->kS
+         : name.starts_with("kV") ? &mode->kV
+                                  : &mode->kA;
+}
+
+/// V, V·s/m and so on.
+std::string drive_unit(std::string_view name, const std::string& unit) {
+  return name == "trackwidth"     ? "m"
+         : name.starts_with("kS") ? "V"
+         : name.starts_with("kV") ? "V·s/" + unit
+                                  : "V·s²/" + unit;
+}
+
 void keep_shared_channels(Recording& recording, bool position, bool velocity) {
   for (TestRun& run : recording.runs) {
     if (!position) {
@@ -139,12 +196,22 @@ void keep_shared_channels(Recording& recording, bool position, bool velocity) {
 
 }  // namespace
 
+std::optional<GainComparison> compare_gain(std::string name, std::string unit,
+                                           std::span<const GainEstimate* const> gains) {
+  std::vector<Reading> readings;
+  for (std::size_t log = 0; log < gains.size(); ++log) {
+    if (gains[log] != nullptr && gains[log]->determined && sigma_of(*gains[log]) > 0.0) {
+      readings.push_back({log, gains[log]->value, sigma_of(*gains[log])});
+    }
+  }
+  return readings.size() > 1 ? std::optional(compare(std::move(name), std::move(unit), readings))
+                             : std::nullopt;
+}
+
 Expected<std::vector<GainComparison>> compare_fits(const std::vector<FeedforwardFit>& fits) {
   constexpr std::string_view where = "compare_fits";
   if (fits.size() < 2) {
-    return refusal(ArgumentError::wrong_shape, where, "fits")
-        .got(fits.empty() ? "none" : "one")
-        .expected("two or more");
+    return tl::unexpected(few_fits(fits.size()));
   }
   std::vector<FeedforwardFit> copies = fits;
   for (const FeedforwardFit& fit : fits) {
@@ -157,44 +224,73 @@ Expected<std::vector<GainComparison>> compare_fits(const std::vector<Feedforward
   }
   std::vector<GainComparison> comparisons;
   for (const Gain& first : gains_of(copies[0])) {
-    std::vector<Reading> readings;
+    std::vector<const GainEstimate*> estimates(copies.size(), nullptr);
     for (std::size_t log = 0; log < copies.size(); ++log) {
       for (const Gain& gain : gains_of(copies[log])) {
-        if (gain.name == first.name && gain.estimate->determined &&
-            sigma_of(*gain.estimate) > 0.0) {
-          readings.push_back({log, gain.estimate->value, sigma_of(*gain.estimate)});
-        }
+        estimates[log] = gain.name == first.name ? gain.estimate : estimates[log];
       }
     }
-    if (readings.size() > 1) {
-      comparisons.push_back(compare(first.name, first.unit, readings));
+    if (auto compared = compare_gain(std::string(first.name), first.unit, estimates)) {
+      comparisons.push_back(*std::move(compared));
     }
   }
   return comparisons;
 }
 
+const GainEstimate* drive_gain(const DriveFit& fit, std::string_view name) {
+  return gain_in(fit, name);
+}
+
+Expected<std::vector<GainComparison>> compare_fits(const std::vector<DriveFit>& fits) {
+  if (fits.size() < 2) {
+    return tl::unexpected(few_fits(fits.size()));
+  }
+  std::vector<GainComparison> comparisons;
+  for (const std::string_view name : drive_gains) {
+    std::vector<const GainEstimate*> estimates;
+    for (const DriveFit& fit : fits) {
+      if (fit.unit != fits[0].unit) {
+        return refusal(ArgumentError::wrong_unit, "compare_fits", "a fit")
+            .got("a drivetrain in " + fit.unit)
+            .expected("in " + fits[0].unit + ", as the first");
+      }
+      estimates.push_back(drive_gain(fit, name));
+    }
+    if (auto compared =
+            compare_gain(std::string(name), drive_unit(name, fits[0].unit), estimates)) {
+      comparisons.push_back(*std::move(compared));
+    }
+  }
+  return comparisons;
+}
+
+void widen_by_scatter(DriveFit& joint, const std::vector<GainComparison>& comparisons) {
+  for (const std::string_view name : drive_gains) {
+    if (GainEstimate* gain = gain_in(joint, name)) {
+      widen(*gain, name, comparisons);
+    }
+  }
+}
+
+Expected<DriveRecording> joined(const std::vector<DriveRecording>& recordings) {
+  if (recordings.empty()) {
+    return refusal(ArgumentError::empty, "joined", "recordings");
+  }
+  DriveRecording all{.unit = recordings[0].unit};
+  for (const DriveRecording& recording : recordings) {
+    if (recording.unit != all.unit) {
+      return refusal(ArgumentError::wrong_unit, "joined", "a recording")
+          .got("a drivetrain in " + recording.unit)
+          .expected("in " + all.unit + ", as the first");
+    }
+    all.runs.insert(all.runs.end(), recording.runs.begin(), recording.runs.end());
+  }
+  return all;
+}
+
 void widen_by_scatter(FeedforwardFit& joint, const std::vector<GainComparison>& comparisons) {
   for (const Gain& gain : gains_of(joint)) {
-    const auto found = std::find_if(comparisons.begin(), comparisons.end(),
-                                    [&](const GainComparison& c) { return c.name == gain.name; });
-    GainEstimate& estimate = *gain.estimate;
-    if (found == comparisons.end() || !estimate.determined) {
-      continue;
-    }
-    if (found->agrees()) {
-      estimate.standard_error *= found->ratio;
-      for (double& end : estimate.interval) {
-        end = estimate.value + found->ratio * (end - estimate.value);
-      }
-      continue;
-    }
-    const auto k = static_cast<double>(found->logs.size());
-    const double own = sigma_of(estimate) * sigma_of(estimate);
-    const double scatter = found->between * found->between / k;
-    const double freedom = (k - 1.0) * std::pow((own + scatter) / scatter, 2);
-    estimate.standard_error = std::sqrt(own + scatter);
-    const double half = student_quantile(0.975, freedom) * estimate.standard_error;
-    estimate.interval = {estimate.value - half, estimate.value + half};
+    widen(*gain.estimate, gain.name, comparisons);
   }
 }
 

@@ -185,8 +185,8 @@ Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
     warn(result.diagnostics, "no_feedback",
          "there is no feedback, feedforward alone drives the {}: {}; an error of the model stays "
          "as one of the {}",
-         to_string(job.plant.kind), result.no_feedback,
-         job.plant.kind == MechanismKind::flywheel ? "speed" : "position");
+         job.plant.name.empty() ? to_string(job.plant.kind) : job.plant.name, result.no_feedback,
+         controls_velocity(job.plant.kind) ? "speed" : "position");
   } else if (chosen) {
     tell_tolerances(loop, model, job, result.diagnostics);
   } else {
@@ -232,6 +232,9 @@ Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
          "controller.predict_delay is not used: there is no delay (set controller.delay)");
   }
   result.paste = paste_gains(job.plant, gain_to_paste(loop, model, job, result.diagnostics));
+  if (result.feedback) {
+    result.paste_on_board = on_board_gains(job);
+  }
   FLYBALL_CHECK(simulate_response(result));
   return {};
 }

@@ -91,6 +91,16 @@ struct LoopDesign {
 /// The fastest trapezoid over a distance that needs no more volts than there are.
 [[nodiscard]] Expected<FastestMotion> fastest_motion(const DesignJob& job);
 
+/// Of the loops that run on motor controllers (SPARK, Phoenix 6), s.
+inline constexpr double on_board_period = 1e-3;
+
+/// Gains for those loops: of the stiffest LQR gain of that period, compensated for the job's delay,
+/// with which a PID on the sensor's value keeps a gain margin of 2, a phase margin of 45° and stays
+/// stable over ±20 % of inertia and gain. None without a kA, since what happens within a
+/// millisecond hangs on it, where the job's own period is no longer, or where no gain keeps those
+/// margins.
+[[nodiscard]] std::vector<PasteGains> on_board_gains(const DesignJob& job);
+
 /// The gains in the units of other tools.
 [[nodiscard]] std::vector<PasteGains> paste_gains(const PlantDescription& plant,
                                                   const Eigen::MatrixXd& K);

@@ -41,13 +41,15 @@ bool same_motion(const identification::Recording& a, const identification::Recor
                                         });
 }
 
-IdentifyResult identify_drivetrain(const IdentifyJob& job, recording::LoadedRecording source) {
+}  // namespace
+
+IdentifyResult identify_drivetrain(recording::LoadedRecording source) {
   identification::DriveReport drive = identification::identify_drive(*source.drive);
   // Whoever wants the gains of one mechanism, to design with them, learns that there are none.
-  Error none = drive.fit ? Error(refusal(recording::RecordingError::drivetrain, job.log)
+  Error none = drive.fit ? Error(refusal(recording::RecordingError::drivetrain, source.path)
                                      .got("a drivetrain's")
-                                     .hint("flyball identify gives the gains of its two modes; a "
-                                           "controller is designed for one mechanism"))
+                                     .hint("flyball identify gives the gains of its two modes, and "
+                                           "flyball tune the loops of its sides"))
                          : drive.fit.error();
   identification::FitReport report{
       .prepared = {}, .diagnostics = drive.diagnostics, .fit = tl::unexpected(std::move(none))};
@@ -59,12 +61,10 @@ IdentifyResult identify_drivetrain(const IdentifyJob& job, recording::LoadedReco
                         .drive = std::move(drive)};
 }
 
-}  // namespace
-
 ExpectedAll<IdentifyResult> identify(const IdentifyJob& job) {
   FLYBALL_TRY(auto source, load_recording(job.log, job.selection));
   if (source.drive) {
-    return identify_drivetrain(job, std::move(source));
+    return identify_drivetrain(std::move(source));
   }
   identification::FitReport report = identification::identify_feedforward(source.recording);
   if (!report.fit &&

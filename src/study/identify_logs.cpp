@@ -20,9 +20,15 @@ using identification::GainComparison;
 using identification::IdentificationError;
 using identification::Recording;
 
+/// What the logs with gains recorded: of mechanisms or of drivetrains.
+struct Recordings {
+  std::vector<Recording> mechanisms{};
+  std::vector<identification::DriveRecording> drives{};
+};
+
 /// One log by itself; its recording is kept where it has gains.
 LogOutcome outcome_of(const std::string& path, const recording::LogSelection& selection,
-                      std::vector<Recording>& recordings) {
+                      Recordings& recordings) {
   auto found = identify({path, selection});
   if (!found) {
     return {.path = path, .diagnostics = {}, .fit = tl::unexpected(std::move(found).error())};
@@ -33,13 +39,25 @@ LogOutcome outcome_of(const std::string& path, const recording::LogSelection& se
   for (const identification::TestRun& run : found->source.recording.runs) {
     outcome.rows += run.time.size();
   }
+  if (found->drive) {
+    for (const identification::DriveRun& run : found->drive->recording.runs) {
+      outcome.rows += run.time.size();
+    }
+    if (found->drive->fit) {
+      outcome.drive = *std::move(found->drive->fit);
+      recordings.drives.push_back(*std::move(found->source.drive));
+      return outcome;
+    }
+    outcome.fit = tl::unexpected(Errors(std::move(found->drive->fit).error()));
+    return outcome;
+  }
   if (!found->report.fit) {
     outcome.fit = tl::unexpected(Errors(std::move(found->report.fit).error()));
     return outcome;
   }
   found->report.fit->runs.clear();
   outcome.fit = *std::move(found->report.fit);
-  recordings.push_back(std::move(found->source.recording));
+  recordings.mechanisms.push_back(std::move(found->source.recording));
   return outcome;
 }
 
@@ -53,7 +71,7 @@ Error few_logs(std::size_t logs) {
 Errors reasons(const std::vector<LogOutcome>& logs) {
   std::vector<QuotedError> all;
   for (const LogOutcome& log : logs) {
-    if (!log.fit) {
+    if (!log.has_gains()) {
       for (QuotedError error : log.fit.error().all()) {
         if (error.where().find(log.path) == std::string::npos) {
           static_cast<Error&>(error) = Error(error).in(log.path + ": " + error.where());
@@ -67,6 +85,23 @@ Errors reasons(const std::vector<LogOutcome>& logs) {
 
 Expected<void> check_one_mechanism(const std::vector<LogOutcome>& logs,
                                    const std::vector<std::size_t>& used) {
+  const auto words = [](const LogOutcome& log) {
+    return log.drive ? "of a drivetrain in " + log.drive->unit : "of a mechanism";
+  };
+  for (const std::size_t log : used) {
+    const bool drives = logs[used[0]].drive && logs[log].drive;
+    if (logs[log].drive.has_value() != logs[used[0]].drive.has_value() ||
+        (drives && logs[log].drive->unit != logs[used[0]].drive->unit)) {
+      return refusal(ArgumentError::wrong_unit, logs[log].path, "the log")
+          .got(words(logs[log]))
+          .expected(fmt::format("logs of one drivetrain or mechanism: {} is {}", logs[used[0]].path,
+                                words(logs[used[0]])))
+          .hint("identify the logs of each on their own, or say --mechanism and --unit");
+    }
+  }
+  if (logs[used[0]].drive) {
+    return {};
+  }
   const FeedforwardFit& first = *logs[used[0]].fit;
   for (const std::size_t log : used) {
     const FeedforwardFit& fit = *logs[log].fit;
@@ -88,15 +123,18 @@ Expected<void> check_one_mechanism(const std::vector<LogOutcome>& logs,
 Expected<void> check_one_speed(const IdentifyLogsResult& result) {
   constexpr double most = 0.1;
   for (const GainComparison& gain : result.gains) {
-    if (gain.name != "kV" || gain.agrees() || gain.between < most * std::abs(gain.mean)) {
+    if (!gain.name.starts_with("kV") || gain.agrees() ||
+        gain.between < most * std::abs(gain.mean)) {
       continue;
     }
     const auto path = [&](std::size_t used) { return result.logs[result.used[used]].path; };
     const auto value = [&](std::size_t used) {
-      return format_number(result.logs[result.used[used]].fit->kV.value, 4);
+      const LogOutcome& log = result.logs[result.used[used]];
+      return format_number(log.drive ? drive_gain(*log.drive, gain.name)->value : log.fit->kV.value,
+                           4);
     };
     const auto [a, b] = gain.pair;
-    return refusal(IdentificationError::logs_differ, "identify", "kV")
+    return refusal(IdentificationError::logs_differ, "identify", gain.name)
         .got(fmt::format("{} {} in {} and {} in {}", value(a), gain.unit, path(a), value(b),
                          path(b)))
         .expected("the same in each, within a tenth")
@@ -128,15 +166,41 @@ void tell_differences(IdentifyLogsResult& result) {
   }
   for (const LogOutcome& log : result.logs) {
     for (const Diagnostic& found : log.diagnostics) {
-      if (log.fit && found.code == "mechanism_assumed") {
+      if (log.has_gains() && found.code == "mechanism_assumed") {
         told.insert(told.begin(), found);
         told.front().message = log.path + ": " + found.message;
       }
     }
-    if (!log.fit) {
+    if (!log.has_gains()) {
       warn(told, "log_left_out", "{} was left out: {}", log.path, to_string(log.fit.error()));
     }
   }
+}
+
+/// Several logs of one drivetrain.
+ExpectedAll<IdentifyLogsResult> identify_drive_logs(
+    std::vector<LogOutcome> logs, std::vector<std::size_t> used,
+    const std::vector<identification::DriveRecording>& recordings) {
+  std::vector<identification::DriveFit> fits;
+  for (const std::size_t log : used) {
+    fits.push_back(*logs[log].drive);
+  }
+  FLYBALL_TRY(auto gains, identification::compare_fits(fits));
+  recording::LoadedRecording source{.path = fmt::format("{} logs", used.size())};
+  FLYBALL_TRY(source.drive, identification::joined(recordings));
+  IdentifyLogsResult result{.logs = std::move(logs),
+                            .used = std::move(used),
+                            .gains = std::move(gains),
+                            .joint = identify_drivetrain(std::move(source))};
+  auto& fit = result.joint.drive->fit;
+  if (fit) {
+    identification::widen_by_scatter(*fit, result.gains);
+  }
+  if (auto same = check_one_speed(result); !same) {
+    fit = tl::unexpected(std::move(same).error());
+  }
+  tell_differences(result);
+  return result;
 }
 
 }  // namespace
@@ -152,10 +216,10 @@ ExpectedAll<IdentifyLogsResult> identify_logs(const IdentifyLogsJob& job) {
   }
   std::vector<LogOutcome> logs;
   std::vector<std::size_t> used;
-  std::vector<Recording> recordings;
+  Recordings recordings;
   for (const std::string& path : job.logs) {
     logs.push_back(outcome_of(path, job.selection, recordings));
-    if (logs.back().fit) {
+    if (logs.back().has_gains()) {
       used.push_back(logs.size() - 1);
     }
   }
@@ -163,10 +227,13 @@ ExpectedAll<IdentifyLogsResult> identify_logs(const IdentifyLogsJob& job) {
     return tl::unexpected(reasons(logs));
   }
   FLYBALL_CHECK(check_one_mechanism(logs, used));
-  for (Recording& recording : recordings) {
+  if (logs[used[0]].drive) {
+    return identify_drive_logs(std::move(logs), std::move(used), recordings.drives);
+  }
+  for (Recording& recording : recordings.mechanisms) {
     recording.mechanism = logs[used[0]].fit->mechanism;
   }
-  FLYBALL_TRY(auto together, identification::joined(recordings));
+  FLYBALL_TRY(auto together, identification::joined(recordings.mechanisms));
   std::vector<FeedforwardFit> fits;
   for (const std::size_t log : used) {
     fits.push_back(*logs[log].fit);

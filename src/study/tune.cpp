@@ -32,10 +32,65 @@ PlantDescription plant_from_fit(const identification::FeedforwardFit& fit) {
   return plant;
 }
 
+namespace {
+
+/// A job for the loop that a fit's sensors and gains call for.
+DesignJob loop_job(const DesignJob& said, const identification::FeedforwardFit& fit) {
+  DesignJob job = said;
+  job.plant = plant_from_fit(fit);
+  job.plant.motor = said.plant.motor;
+  job.plant.gearing = said.plant.gearing;
+  job.plant.drum_radius = said.plant.drum_radius;
+  const bool velocity_loop = controls_velocity(fit.mechanism);
+  if (!job.controller.delay) {
+    // A sensor cannot show the future; a negative delay is skew between the logger's channels.
+    job.controller.delay = std::max(0.0, velocity_loop ? fit.velocity_delay : fit.position_delay);
+  }
+  const double seen_noise = velocity_loop ? fit.velocity_noise : fit.position_noise;
+  if (!job.estimator.measurement_std && seen_noise > 0.0) {
+    job.estimator.measurement_std = seen_noise;
+  }
+  return job;
+}
+
+DriveDesign design_drive(const DesignJob& said, const identification::DriveFit& fit) {
+  DriveDesign drive;
+  const auto mode = [&](const std::optional<identification::FeedforwardFit>& of, const char* name) {
+    std::optional<ExpectedAll<DesignResult>> made;
+    if (of) {
+      DesignJob job = loop_job(said, *of);
+      job.plant.name = name;
+      made = design(job);
+    }
+    return made;
+  };
+  drive.linear = mode(fit.linear, "drivetrain, straight on");
+  drive.angular = mode(fit.angular, "drivetrain, turning");
+  const auto gain = [](const std::optional<ExpectedAll<DesignResult>>& of) {
+    return of && *of ? std::optional((*of)->paste.front().kP) : std::nullopt;
+  };
+  const auto linear = gain(drive.linear);
+  const auto angular = gain(drive.angular);
+  drive.kP =
+      linear && angular ? std::min(*linear, *angular) : linear.value_or(angular.value_or(0.0));
+  if (linear && angular) {
+    const double own = 0.5 * (*linear + *angular);
+    const double other = 0.5 * (*linear - *angular);
+    drive.K = Eigen::Matrix2d{{own, other}, {other, own}};
+  }
+  return drive;
+}
+
+}  // namespace
+
 ExpectedAll<TuneResult> tune(const TuneJob& job) {
   tell_progress("reads and identifies the log");
   FLYBALL_TRY(auto identified, identify(job.identification));
-  TuneResult result{.identification = std::move(identified), .design = std::nullopt};
+  TuneResult result{.identification = std::move(identified)};
+  if (result.identification.drive && result.identification.drive->fit) {
+    result.drive = design_drive(job.design, *result.identification.drive->fit);
+    return result;
+  }
   if (!result.identification.report.fit) {
     return result;
   }
@@ -44,24 +99,8 @@ ExpectedAll<TuneResult> tune(const TuneJob& job) {
   std::vector<Diagnostic>& told = result.identification.report.diagnostics;
   told.insert(told.end(), more.begin(), more.end());
 
-  DesignJob design_job = job.design;
-  PlantDescription plant = plant_from_fit(fit);
-  plant.motor = job.design.plant.motor;
-  plant.gearing = job.design.plant.gearing;
-  plant.drum_radius = job.design.plant.drum_radius;
-  design_job.plant = std::move(plant);
-
-  const bool velocity_loop = fit.mechanism == mechanisms::MechanismKind::flywheel;
-  const double seen_delay = velocity_loop ? fit.velocity_delay : fit.position_delay;
-  if (!design_job.controller.delay) {
-    // A sensor cannot show the future; a negative delay is skew between the logger's channels.
-    design_job.controller.delay = std::max(0.0, seen_delay);
-  }
-  const double seen_noise = velocity_loop ? fit.velocity_noise : fit.position_noise;
-  if (!design_job.estimator.measurement_std && seen_noise > 0.0) {
-    design_job.estimator.measurement_std = seen_noise;
-  }
-  if (!velocity_loop && design_job.sensor.resolution == 0.0) {
+  DesignJob design_job = loop_job(job.design, fit);
+  if (!controls_velocity(fit.mechanism) && design_job.sensor.resolution == 0.0) {
     design_job.sensor.resolution = result.identification.report.prepared.position_quantum;
   }
   tell_progress("designs and simulates the loop");

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "drive_sessions.hpp"
 #include "recordings.hpp"
 
 namespace {
@@ -114,15 +115,55 @@ TEST(Repeatability, LeavesOutAChannelThatOneLogHasNot) {
   EXPECT_TRUE(joined({both, one}).error().is(ArgumentError::wrong_shape));
   one.unit = "m";
   EXPECT_TRUE(joined({both, one}).error().is(ArgumentError::wrong_unit));
-  EXPECT_TRUE(joined({}).error().is(ArgumentError::empty));
+  EXPECT_TRUE(joined(std::vector<Recording>()).error().is(ArgumentError::empty));
 }
 
 TEST(Repeatability, Errors) {
-  EXPECT_TRUE(compare_fits({}).error().is(ArgumentError::wrong_shape));
+  EXPECT_TRUE(compare_fits(std::vector<FeedforwardFit>()).error().is(ArgumentError::wrong_shape));
   EXPECT_TRUE(compare_fits({fit_with(1.0, 0.1)}).error().is(ArgumentError::wrong_shape));
   FeedforwardFit other = fit_with(1.0, 0.1);
   other.unit = "m";
   EXPECT_TRUE(compare_fits({fit_with(1.0, 0.1), other}).error().is(ArgumentError::wrong_unit));
+}
+
+// Three sessions of one drivetrain agree; one whose kV is a tenth larger is named, and what the
+// joint fit says of it holds the difference.
+TEST(Repeatability, LogsOfADrivetrain) {
+  std::vector<DriveFit> fits;
+  std::vector<DriveRecording> recordings;
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    recordings.push_back(drives::record({.seed = seed}));
+    fits.push_back(*identify_drive(recordings.back()).fit);
+  }
+  const auto agreeing = compare_fits(fits);
+  ASSERT_TRUE(agreeing) << to_string(agreeing.error());
+  for (const char* name : {"kV_linear", "kA_linear", "kV_angular", "trackwidth", "kS_left"}) {
+    EXPECT_TRUE(named(*agreeing, name).agrees()) << name;
+    EXPECT_EQ(named(*agreeing, name).logs.size(), 3U);
+  }
+  EXPECT_EQ(named(*agreeing, "kV_angular").unit, "V·s/m");
+  EXPECT_NEAR(named(*agreeing, "kV_linear").mean, drives::truth.kV_linear,
+              0.01 * drives::truth.kV_linear);
+  const auto joint = joined(recordings);
+  ASSERT_TRUE(joint);
+  EXPECT_EQ(joint->runs.size(), 3 * recordings[0].runs.size());
+
+  fits[2].linear->kV.value *= 1.1;
+  for (double& end : fits[2].linear->kV.interval) {
+    end *= 1.1;
+  }
+  const auto odd = compare_fits(fits);
+  const GainComparison& kV = named(*odd, "kV_linear");
+  EXPECT_FALSE(kV.agrees());
+  EXPECT_EQ(kV.outlier, std::optional<std::size_t>(2));
+  DriveFit together = fits[0];
+  const double before = together.linear->kV.interval[1] - together.linear->kV.interval[0];
+  widen_by_scatter(together, *odd);
+  EXPECT_GT(together.linear->kV.interval[1] - together.linear->kV.interval[0], 3.0 * before);
+
+  recordings[1].unit = "rad";
+  EXPECT_TRUE(joined(recordings).error().is(ArgumentError::wrong_unit));
+  EXPECT_TRUE(compare_fits(std::vector<DriveFit>(1)).error().is(ArgumentError::wrong_shape));
 }
 
 }  // namespace

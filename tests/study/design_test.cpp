@@ -296,5 +296,58 @@ TEST(SimulateDesign, IsDeterministicAndSeeded) {
   EXPECT_FALSE(simulate_design(*result, {.inertia_factor = 0.0}));
 }
 
+/// Growth of a loop of 1 ms: a PID on values that are `late` periods old, its kD on their
+/// difference, a plant that the exact discretisation of kA dv/dt = u - kV v moves.
+bool settles(const DesignJob& job, double gain, const PasteGains& gains, int late) {
+  constexpr double T = 1e-3;
+  const bool velocity = controls_velocity(job.plant.kind);
+  const double decay = std::exp(-job.plant.gains.kV / job.plant.gains.kA * T);
+  const double tau = job.plant.gains.kA / job.plant.gains.kV;
+  std::vector<double> seen(static_cast<std::size_t>(late) + 1, 1.0);
+  double x = 1.0;
+  double v = velocity ? 1.0 : 0.0;
+  double last = 1.0;
+  double early = 0.0;
+  double end = 0.0;
+  for (int k = 0; k < 8000; ++k) {
+    const double y = seen.back();
+    const double u = -gain * (gains.kP * y + (velocity ? 0.0 : gains.kD * (y - last) / T));
+    last = y;
+    const double steady = u / job.plant.gains.kV;
+    x += steady * T + (v - steady) * tau * (1.0 - decay);
+    v = steady + (v - steady) * decay;
+    seen.insert(seen.begin(), velocity ? v : x);
+    seen.pop_back();
+    (k < 500 ? early : end) =
+        std::max(k < 500 || k >= 7500 ? std::abs(velocity ? v : x) : 0.0, k < 500 ? early : end);
+  }
+  return std::isfinite(end) && end < 0.05 * early;
+}
+
+// Gains for motor controllers hold with the delay that the log told: stable at 1.9 times the gain,
+// as a gain margin of 2 promises, and not at 30 times, so that they are not merely small.
+TEST(Design, GainsForMotorControllersKeepTheirMarginWithTheDelay) {
+  for (const DesignJob& job : {arm_job(), elevator_job(), flywheel_job()}) {
+    const auto result = design(job);
+    ASSERT_TRUE(result) << to_string(result.error());
+    ASSERT_FALSE(result->paste_on_board.empty()) << to_string(job.plant.kind);
+    const PasteGains& gains = result->paste_on_board.front();
+    EXPECT_EQ(gains.per, job.plant.unit);
+    EXPECT_EQ(gains.kV, job.plant.gains.kV);
+    const int late = static_cast<int>(std::lround(*job.controller.delay / 1e-3));
+    EXPECT_TRUE(settles(job, 1.0, gains, late)) << to_string(job.plant.kind);
+    EXPECT_TRUE(settles(job, 1.9, gains, late)) << to_string(job.plant.kind);
+    EXPECT_FALSE(settles(job, 30.0, gains, late)) << to_string(job.plant.kind);
+    // Faster than the robot's loop, which holds its voltage for 20 ms.
+    EXPECT_GT(gains.kP, result->paste.front().kP) << to_string(job.plant.kind);
+  }
+  DesignJob unknown = arm_job();
+  unknown.plant.kA_determined = false;
+  unknown.plant.kA_upper_bound = 0.1;
+  const auto result = design(unknown);
+  ASSERT_TRUE(result) << to_string(result.error());
+  EXPECT_TRUE(result->paste_on_board.empty());
+}
+
 }  // namespace
 }  // namespace flyball::study

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <flyball/study/answer.hpp>
+#include <flyball/study/identify_logs.hpp>
 #include <flyball/study/tune.hpp>
 
 namespace flyball::study {
@@ -161,11 +163,23 @@ TEST(RealLogDrivetrains, GiveWhatLeastSquaresGives) {
   }
   EXPECT_TRUE(codes.contains("gyro_clockwise"));
   EXPECT_TRUE(codes.contains("gyro_rate"));
-  // A controller is not designed for it.
+  // Both motions get their loops, and the sides one gain that serves both.
   const auto tuned = tune({.identification = job, .design = {}});
   ASSERT_TRUE(tuned);
   EXPECT_FALSE(tuned->design);
-  EXPECT_EQ(tuned->identification.report.fit.error().code(), "drivetrain");
+  ASSERT_TRUE(tuned->drive && tuned->drive->linear && tuned->drive->angular);
+  ASSERT_TRUE(*tuned->drive->linear) << to_string(tuned->drive->linear->error());
+  ASSERT_TRUE(*tuned->drive->angular) << to_string(tuned->drive->angular->error());
+  EXPECT_TRUE((*tuned->drive->linear)->robust && (*tuned->drive->angular)->robust);
+  EXPECT_FALSE(answer_of(*tuned).refusal);
+
+  // The two logs beside each other tell the same as the one with the other.
+  const auto logs =
+      identify_logs({.logs = {straight.string(), rotations.string()}, .selection = {}});
+  ASSERT_TRUE(logs) << to_string(logs.error());
+  ASSERT_TRUE(logs->joint.drive && logs->joint.drive->fit);
+  EXPECT_DOUBLE_EQ(logs->joint.drive->fit->linear->kV.value, fit.linear->kV.value);
+  EXPECT_DOUBLE_EQ(logs->joint.drive->fit->angular->kV.value, fit.angular->kV.value);
 }
 
 // One drive, as its vendor's raw frames and as an exporter's channels: no name says a side's
@@ -182,15 +196,16 @@ TEST(RealLogDrivetrains, AreAskedForTheirSides) {
     EXPECT_EQ(result.error().code(), "no_channel") << file;
     EXPECT_NE(to_string(result.error()).find("--voltage LEFT,RIGHT"), std::string::npos) << file;
   }
-  IdentifyJob job{
-      .log = (folder / "miami_drive_FRC_20240119_152551_advantagescope_export.wpilog").string(),
-      .selection = {}};
-  job.selection.voltage_channel =
-      "NT:/URCL/SparkMax-14/AppliedOutputVoltage,NT:/URCL/SparkMax-11/AppliedOutputVoltage";
-  const auto named = identify(job);
-  ASSERT_TRUE(named) << to_string(named.error());
-  ASSERT_TRUE(named->drive && named->drive->fit && named->drive->fit->linear);
-  EXPECT_NEAR(named->drive->fit->linear->kV.value, 2.25, 0.1);
+  for (const char* file : {"miami_drive_FRC_20240119_152551.wpilog",
+                           "miami_drive_FRC_20240119_152551_advantagescope_export.wpilog"}) {
+    IdentifyJob job{.log = (folder / file).string(), .selection = {}};
+    job.selection.voltage_channel =
+        "NT:/URCL/SparkMax-14/AppliedOutputVoltage,NT:/URCL/SparkMax-11/AppliedOutputVoltage";
+    const auto named = identify(job);
+    ASSERT_TRUE(named) << file << ": " << to_string(named.error());
+    ASSERT_TRUE(named->drive && named->drive->fit && named->drive->fit->linear) << file;
+    EXPECT_NEAR(named->drive->fit->linear->kV.value, 2.25, 0.1) << file;
+  }
 }
 
 }  // namespace

@@ -3,10 +3,13 @@
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <flyball/core/expected.hpp>
+#include <flyball/identification/drive_fit.hpp>
 #include <flyball/identification/feedforward_fit.hpp>
 
 namespace flyball::identification {
@@ -30,15 +33,20 @@ struct GainComparison {
   static constexpr double least_p_value = 0.01;
 };
 
-/// The gains that at least two of the fits determine, compared.
+/// One gain of several logs, compared; nothing where fewer than two determine it.
+/// @param gains  Of each log; null for one that has no such gain.
 ///
 /// With x_i ± σ_i of k logs, w_i = 1/σ_i² and x̄ = Σ w x/Σ w, Q = Σ w (x − x̄)² has the
 /// chi-squared distribution of k − 1 degrees of freedom where the logs measure one value;
 /// between² = max(0, (Q − k + 1)/(Σ w − Σ w²/Σ w)).
-/// @errors ArgumentError::wrong_shape for less than two fits, wrong_unit for different mechanisms
-/// or units.
 /// Source: Cochran, "The combination of estimates from different experiments", Biometrics 10
 /// (1954); DerSimonian and Laird, Controlled Clinical Trials 7 (1986).
+[[nodiscard]] std::optional<GainComparison> compare_gain(
+    std::string name, std::string unit, std::span<const GainEstimate* const> gains);
+
+/// The gains that at least two of the fits determine, compared.
+/// @errors ArgumentError::wrong_shape for less than two fits, wrong_unit for different mechanisms
+/// or units.
 [[nodiscard]] Expected<std::vector<GainComparison>> compare_fits(
     const std::vector<FeedforwardFit>& fits);
 
@@ -48,6 +56,20 @@ struct GainComparison {
 /// Source: Birge, Physical Review 40 (1932); Particle Data Group, "Review of Particle Physics",
 /// section 5.2.2.
 void widen_by_scatter(FeedforwardFit& joint, const std::vector<GainComparison>& comparisons);
+
+/// A gain of a drivetrain by its name: "kS_linear", "kV_linear", "kA_linear", those of "angular"
+/// (per unit of a wheel's way), "kS_left", "kS_right", "trackwidth". @return  Null if it has none.
+[[nodiscard]] const GainEstimate* drive_gain(const DriveFit& fit, std::string_view name);
+
+/// The gains of a drivetrain that at least two of its logs determine. @errors As those of fits.
+[[nodiscard]] Expected<std::vector<GainComparison>> compare_fits(const std::vector<DriveFit>& fits);
+
+/// The same for a drivetrain's joint fit.
+void widen_by_scatter(DriveFit& joint, const std::vector<GainComparison>& comparisons);
+
+/// The runs of several logs of one drivetrain, in their order.
+/// @errors ArgumentError::empty; wrong_unit for different units.
+[[nodiscard]] Expected<DriveRecording> joined(const std::vector<DriveRecording>& recordings);
 
 /// The runs of several recordings of one mechanism, in their order. A channel that not every
 /// recording has is left out.

@@ -20,6 +20,7 @@ namespace flyball::study {
 /// The mechanism to be controlled: gains (identified, or computed from mass, gearing and motors).
 struct PlantDescription {
   mechanisms::MechanismKind kind{};
+  std::string name{};        ///< What to call it, if not by its kind.
   std::string unit = "rad";  ///< "m" or "rad".
   mechanisms::FeedforwardGains gains{};
   bool kA_determined = true;                   ///< If not, Theorem 14.3.2 is the plant.
@@ -168,6 +169,9 @@ struct DesignResult {
 
   /// Of other tools' controllers, which cannot predict: with the delay compensated in the gain.
   std::vector<PasteGains> paste{};
+  /// The same for loops on motor controllers, of 1 ms and without an observer, with the same delay;
+  /// empty where there are none.
+  std::vector<PasteGains> paste_on_board{};
   std::vector<Diagnostic> diagnostics{};
 };
 

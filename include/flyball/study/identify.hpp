@@ -39,4 +39,7 @@ struct IdentifyResult {
 ///         several kinds, together with RecordingError::unit_unknown where the unit is open too.
 [[nodiscard]] ExpectedAll<IdentifyResult> identify(const IdentifyJob& job);
 
+/// The same of a drivetrain's recording in memory. @param source  With its `drive`.
+[[nodiscard]] IdentifyResult identify_drivetrain(recording::LoadedRecording source);
+
 }  // namespace flyball::study

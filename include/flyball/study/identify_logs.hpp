@@ -10,7 +10,7 @@
 
 namespace flyball::study {
 
-/// Identify one mechanism from several logs of it.
+/// Identify one mechanism or drivetrain from several logs of it.
 struct IdentifyLogsJob {
   std::vector<std::string> logs{};    ///< Paths; two or more.
   recording::LogSelection selection;  ///< Of each of them.
@@ -23,6 +23,9 @@ struct LogOutcome {
   std::vector<Diagnostic> diagnostics{};
   /// Its gains (without its runs), or why there are none.
   ExpectedAll<identification::FeedforwardFit> fit;
+  std::optional<identification::DriveFit> drive{};  ///< In its place, of a drivetrain.
+
+  [[nodiscard]] bool has_gains() const { return fit.has_value() || drive.has_value(); }
 };
 
 /// The logs one by one, what they say of each gain, and the fit of all runs together.

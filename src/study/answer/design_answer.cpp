@@ -73,8 +73,8 @@ void write_motion(JsonWriter& json, const DesignResult& result) {
   });
 }
 
-void write_paste(JsonWriter& json, const DesignResult& result) {
-  json.list("paste", result.paste, [&](const PasteGains& gains) {
+void write_paste(JsonWriter& json, std::string_view name, const std::vector<PasteGains>& all) {
+  json.list(name, all, [&](const PasteGains& gains) {
     json.object([&] {
       json.add("per", gains.per);
       json.add({{"kP", gains.kP},
@@ -125,7 +125,8 @@ void write_design(JsonWriter& json, const DesignResult& result) {
     json.add("Q", result.Q);
     json.add("R", result.R);
   });
-  write_paste(json, result);
+  write_paste(json, "paste", result.paste);
+  write_paste(json, "paste_on_board", result.paste_on_board);
   json.add("diagnostics", result.diagnostics);
 }
 

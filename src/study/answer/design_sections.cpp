@@ -382,7 +382,7 @@ std::string controlled_unit(const PlantDescription& plant) {
 Facts plant_facts(const PlantDescription& plant) {
   const std::string& unit = plant.unit;
   Facts facts;
-  facts.add("mechanism", std::string(to_string(plant.kind)));
+  facts.add("mechanism", plant.name.empty() ? std::string(to_string(plant.kind)) : plant.name);
   if (plant.motor) {
     const mechanisms::DcMotor& motor = *plant.motor;
     facts.add("motor",

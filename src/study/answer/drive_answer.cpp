@@ -146,34 +146,36 @@ Verdict drive_verdict(const IdentifyResult& result) {
   return verdict;
 }
 
-void write_drive(JsonWriter& json, const IdentifyResult& result) {
-  const DriveFit& fit = *result.drive->fit;
+void write_drive_gains(JsonWriter& json, const DriveFit& fit) {
   const bool width = fit.trackwidth && fit.trackwidth->determined;
   const auto angular = [&](const identification::GainEstimate& gain) {
     return width ? identification::per_radian(gain, *fit.trackwidth) : gain;
   };
   const std::string turning = width ? "rad" : fit.unit;
+  if (fit.linear) {
+    write_gain(json, "kS", fit.linear->kS, "V");
+    write_gain(json, "kV", fit.linear->kV, "V·s/" + fit.unit);
+    write_gain(json, "kA", fit.linear->kA, "V·s²/" + fit.unit);
+  }
+  if (fit.angular) {
+    write_gain(json, "kS_angular", fit.angular->kS, "V");
+    write_gain(json, "kV_angular", angular(fit.angular->kV), "V·s/" + turning);
+    write_gain(json, "kA_angular", angular(fit.angular->kA), "V·s²/" + turning);
+  }
+  if (fit.kS_left) {
+    write_gain(json, "kS_left", *fit.kS_left, "V");
+    write_gain(json, "kS_right", *fit.kS_right, "V");
+  }
+  if (fit.trackwidth) {
+    write_gain(json, "trackwidth", *fit.trackwidth, "m");
+  }
+}
+
+void write_drive(JsonWriter& json, const IdentifyResult& result) {
+  const DriveFit& fit = *result.drive->fit;
   json.add("mechanism", "drivetrain");
   json.add("unit", fit.unit);
-  json.object("gains", [&] {
-    if (fit.linear) {
-      write_gain(json, "kS", fit.linear->kS, "V");
-      write_gain(json, "kV", fit.linear->kV, "V·s/" + fit.unit);
-      write_gain(json, "kA", fit.linear->kA, "V·s²/" + fit.unit);
-    }
-    if (fit.angular) {
-      write_gain(json, "kS_angular", fit.angular->kS, "V");
-      write_gain(json, "kV_angular", angular(fit.angular->kV), "V·s/" + turning);
-      write_gain(json, "kA_angular", angular(fit.angular->kA), "V·s²/" + turning);
-    }
-    if (fit.kS_left) {
-      write_gain(json, "kS_left", *fit.kS_left, "V");
-      write_gain(json, "kS_right", *fit.kS_right, "V");
-    }
-    if (fit.trackwidth) {
-      write_gain(json, "trackwidth", *fit.trackwidth, "m");
-    }
-  });
+  json.object("gains", [&] { write_drive_gains(json, fit); });
   json.object("modes", [&] {
     write_mode(json, "linear", fit.linear);
     write_mode(json, "angular", fit.angular);

@@ -1,5 +1,7 @@
 // What several logs of one mechanism say together.
+#include <algorithm>
 #include <array>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -25,6 +27,20 @@ double half_width(const GainEstimate& gain) {
   return 0.5 * (gain.interval[1] - gain.interval[0]);
 }
 
+/// Of a mechanism or, in its place, a drivetrain.
+std::optional<double> r_squared(const LogOutcome& log) {
+  if (log.fit) {
+    return log.fit->r_squared;
+  }
+  if (!log.drive) {
+    return std::nullopt;
+  }
+  const auto of = [](const std::optional<FeedforwardFit>& mode) {
+    return mode ? mode->r_squared : 1.0;
+  };
+  return std::min(of(log.drive->linear), of(log.drive->angular));
+}
+
 /// A gain of a fit by its name, or null.
 const GainEstimate* named(const FeedforwardFit& fit, std::string_view name) {
   const std::array<std::pair<std::string_view, const GainEstimate*>, 5> all{
@@ -41,9 +57,13 @@ const GainEstimate* named(const FeedforwardFit& fit, std::string_view name) {
   return nullptr;
 }
 
-Value cell_of(const GainEstimate* gain) {
+Value cell_of(const LogOutcome& log, std::string_view name) {
+  if (!log.has_gains()) {
+    return {"", Tone::quiet};
+  }
+  const GainEstimate* gain = log.drive ? drive_gain(*log.drive, name) : named(*log.fit, name);
   if (gain == nullptr || !gain->determined) {
-    return {"not determined", Tone::caution};
+    return {gain == nullptr ? "not excited" : "not determined", Tone::caution};
   }
   Value value = with_half_width(gain->value, half_width(*gain));
   value.number = gain->value;
@@ -63,10 +83,11 @@ Table logs_table(const IdentifyLogsResult& result) {
   for (const LogOutcome& log : result.logs) {
     std::vector<Value> row{log.path, fmt::to_string(log.rows)};
     for (const GainComparison& gain : result.gains) {
-      row.push_back(log.fit ? cell_of(named(*log.fit, gain.name)) : Value("", Tone::quiet));
+      row.push_back(cell_of(log, gain.name));
     }
-    row.push_back(log.fit ? Value(text::number(log.fit->r_squared, 4))
-                          : Value("left out", Tone::caution));
+    const auto explained = r_squared(log);
+    row.push_back(explained ? Value(text::number(*explained, 4))
+                            : Value("left out", Tone::caution));
     table.rows.push_back(std::move(row));
   }
   return table;
@@ -113,6 +134,16 @@ void write_comparison(JsonWriter& json, const IdentifyLogsResult& result,
   });
 }
 
+bool has_joint_gains(const IdentifyLogsResult& result) {
+  return result.joint.drive ? result.joint.drive->fit.has_value()
+                            : result.joint.report.fit.has_value();
+}
+
+/// Why there are no joint gains.
+const Error& joint_refusal(const IdentifyLogsResult& result) {
+  return result.joint.drive ? result.joint.drive->fit.error() : result.joint.report.fit.error();
+}
+
 Verdict verdict_of_logs(const IdentifyLogsResult& result) {
   Verdict verdict = verdict_of(result.joint);
   std::string differing;
@@ -121,12 +152,15 @@ Verdict verdict_of_logs(const IdentifyLogsResult& result) {
       differing += (differing.empty() ? "" : ", ") + gain.name;
     }
   }
-  if (!result.joint.report.fit) {
+  if (!has_joint_gains(result)) {
     verdict.line = "The logs give no joint gains.";
     return verdict;
   }
-  verdict.line += differing.empty() ? fmt::format(" The {} logs agree.", result.used.size())
-                                    : fmt::format(" The logs do not agree on {}.", differing);
+  verdict.line +=
+      result.gains.empty()
+          ? std::string(" No gain is told by two of the logs, so that none is compared.")
+      : differing.empty() ? fmt::format(" The {} logs agree.", result.used.size())
+                          : fmt::format(" The logs do not agree on {}.", differing);
   return verdict;
 }
 
@@ -136,10 +170,12 @@ std::string to_json(const IdentifyLogsResult& result) {
   JsonWriter json;
   json.object([&] {
     json.add("schema", schema);
-    if (result.joint.report.fit) {
-      write_fit(json, *result.joint.report.fit);
+    if (!has_joint_gains(result)) {
+      json.add("error", joint_refusal(result));
+    } else if (result.joint.drive) {
+      write_drive(json, result.joint);
     } else {
-      json.add("error", result.joint.report.fit.error());
+      write_fit(json, *result.joint.report.fit);
     }
     json.add("repeats", result.repeats());
     json.list("comparisons", result.gains,
@@ -148,11 +184,15 @@ std::string to_json(const IdentifyLogsResult& result) {
       json.object([&] {
         json.add("path", log.path);
         json.add("rows", log.rows);
-        if (log.fit) {
+        if (log.drive) {
+          json.object("gains", [&] { write_drive_gains(json, *log.drive); });
+        } else if (log.fit) {
           write_gains(json, *log.fit);
-          json.add("r_squared", log.fit->r_squared);
         } else {
           json.add("error", log.fit.error());
+        }
+        if (const auto explained = r_squared(log)) {
+          json.add("r_squared", *explained);
         }
         json.add("diagnostics", log.diagnostics);
       });
@@ -169,17 +209,24 @@ Answer answer_of(const IdentifyLogsResult& result) {
   document.verdict = verdict_of_logs(result);
   Section repeats{"repeatability", "Repeatability", {}};
   repeats.blocks.emplace_back(logs_table(result));
-  repeats.blocks.emplace_back(scatter_table(result));
+  if (!result.gains.empty()) {
+    repeats.blocks.emplace_back(scatter_table(result));
+  }
+  if (result.joint.drive) {
+    repeats.blocks.emplace_back(
+        Paragraph{"Gains of turning are compared per " + result.joint.unit +
+                  " of a wheel's way; below, they are per radian where the trackwidth is known."});
+  }
   document.sections = {std::move(repeats), gains_section(result.joint), data_section(result.joint),
                        diagnostics_section(result.joint.diagnostics())};
   for (const LogOutcome& log : result.logs) {
     document.origins.add("log", log.path);
   }
   answer.figures = figures_of(result.joint);
-  if (result.joint.report.fit) {
+  if (!has_joint_gains(result)) {
+    answer.refusal = joint_refusal(result);
+  } else if (!result.joint.drive) {
     answer.files.push_back({"gains.toml", gains_toml(result.joint)});
-  } else {
-    answer.refusal = result.joint.report.fit.error();
   }
   append(answer.files, data_files(result.joint));
   return answer;

@@ -48,6 +48,8 @@ void write_quality(JsonWriter& json, const identification::FeedforwardFit& fit);
 [[nodiscard]] std::vector<Figure> drive_figures(const IdentifyResult& result);
 [[nodiscard]] std::vector<AnswerFile> drive_files(const IdentifyResult& result);
 void write_drive(JsonWriter& json, const IdentifyResult& result);
+/// The members of a drivetrain's "gains".
+void write_drive_gains(JsonWriter& json, const identification::DriveFit& fit);
 
 [[nodiscard]] Section data_section(const IdentifyResult& result);
 /// Gains and the quality of the fit; for a refused fit, its reason.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "study/answer/drive_design.hpp"
 #include "study/answer/parts.hpp"
 
 namespace flyball::study {
@@ -13,6 +14,12 @@ const DesignResult* design_in(const TuneResult& result) {
 }
 
 std::optional<Error> refusal_of(const TuneResult& result) {
+  if (result.drive) {
+    return refusal_of(*result.drive);
+  }
+  if (result.identification.drive && !result.identification.drive->fit) {
+    return result.identification.drive->fit.error();
+  }
   if (!result.identification.report.fit) {
     return result.identification.report.fit.error();
   }
@@ -26,12 +33,17 @@ std::vector<Diagnostic> diagnostics_of(const TuneResult& result) {
     append(all,
            *result.design ? (*result.design)->diagnostics : result.design->error().diagnostics());
   }
+  if (result.drive) {
+    append(all, diagnostics_of(*result.drive));
+  }
   return all;
 }
 
 Verdict verdict_of(const TuneResult& result) {
   Verdict verdict = verdict_of(result.identification);
-  if (const DesignResult* design = design_in(result)) {
+  if (result.drive) {
+    add_verdict(verdict, *result.drive);
+  } else if (const DesignResult* design = design_in(result)) {
     const Verdict more = verdict_of(*design);
     verdict.line += " " + more.line;
     verdict.tone = worse(verdict.tone, more.tone);
@@ -57,6 +69,8 @@ std::string to_json(const TuneResult& result) {
     write_identification(json, result.identification);
     if (design != nullptr) {
       json.object("design", [&] { write_design(json, *design); });
+    } else if (result.drive && !refusal_of(result)) {
+      json.object("drive", [&] { write_drive_design(json, result); });
     } else {
       json.add("diagnostics", diagnostics_of(result));
     }
@@ -72,7 +86,9 @@ Answer answer_of(const TuneResult& result) {
   Document& document = answer.document;
   document.verdict = verdict_of(result);
   document.sections.pop_back();  // of the log's diagnostics alone
-  if (const DesignResult* design = design_in(result)) {
+  if (result.drive) {
+    add_drive_design(answer, result);
+  } else if (const DesignResult* design = design_in(result)) {
     append(document.sections, design_sections(*design));
     document.origins.add("seed", fmt::to_string(design->job.seed));
     append(answer.figures, figures_of(*design));

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <flyball/export/constants.hpp>
+
+namespace flyball::exports {
+
+/// Gains of one of a drivetrain's modes, per unit of a wheel's way.
+struct DriveModeGains {
+  double kS = 0.0;  ///< V
+  double kV = 0.0;  ///< V·s/unit
+  double kA = 0.0;  ///< V·s²/unit, 0 if not determined.
+};
+
+/// A drivetrain as other tools know it.
+struct DriveConstants {
+  std::string unit = "m";                   ///< "m", or "rad" of wheels whose size is not known.
+  std::optional<DriveModeGains> linear{};   ///< Of half the sum of the sides.
+  std::optional<DriveModeGains> angular{};  ///< Of half their difference.
+  std::optional<double> trackwidth{};       ///< m
+  double kP = 0.0;                          ///< V/(unit/s), of either side's velocity loop.
+  double period = 0.020;                    ///< s
+};
+
+/// For WPILib 2025: the gains of both modes, those of turning per radian where the trackwidth is
+/// known (Theorem 14.5.1), and the objects that take them: LinearSystemId,
+/// DifferentialDriveFeedforward, DifferentialDriveKinematics and a PIDController a side. A mode
+/// that is not known is left out.
+[[nodiscard]] std::string wpilib_drive_constants(const DriveConstants& constants,
+                                                 Language language);
+
+/// In both languages.
+[[nodiscard]] std::vector<PasteText> paste_drive_constants(const DriveConstants& constants);
+
+}  // namespace flyball::exports
