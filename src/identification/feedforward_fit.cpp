@@ -189,6 +189,7 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
   compare_repeats(fit, diagnostics);
   detect_elasticity(prepared, fit, diagnostics);
   report_terms(fit, diagnostics);
+  report_open_terms(extension, fit, diagnostics);
   report_fit(prepared, fit, diagnostics);
   return fit;
 }

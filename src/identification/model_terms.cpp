@@ -285,6 +285,7 @@ Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds, Channe
     if (better == all.end() || better->evidence < 1.0) {
       for (const Judged& judged : all) {
         extension.doubts.push_back(doubt(judged, std::sqrt(probability(judged))));
+        extension.open.push_back({static_cast<int>(judged.term.front()), judged.moved});
       }
       break;
     }

@@ -9,6 +9,12 @@ namespace flyball::identification {
 
 /// What an extension did.
 struct Extension {
+  /// A term that the log leaves open, and what it would make of the parameters.
+  struct Open {
+    int term;  ///< Its first parameter.
+    Eigen::VectorXd moved;
+  };
+  std::vector<Open> open{};
   bool extended = false;
   /// By how much each term that was not taken in, though something spoke for it, would move the
   /// parameters, times the root of its weight. As standard errors they keep intervals true where
@@ -28,6 +34,10 @@ struct Extension {
 [[nodiscard]] std::vector<ModelTerm> estimate_terms(const OutputErrorProblem& problem,
                                                     const RobustFit& best,
                                                     const Covariances& spread);
+
+/// Tells of a term that the log leaves open where it is what makes an interval wide.
+void report_open_terms(const Extension& extension, const FeedforwardFit& fit,
+                       std::vector<Diagnostic>& diagnostics);
 
 /// What there is to say of them.
 void report_terms(const FeedforwardFit& fit, std::vector<Diagnostic>& diagnostics);

@@ -76,15 +76,50 @@ std::vector<ModelTerm> estimate_terms(const OutputErrorProblem& problem, const R
   return terms;
 }
 
+void report_open_terms(const Extension& extension, const FeedforwardFit& fit,
+                       std::vector<Diagnostic>& diagnostics) {
+  constexpr double large = 0.4;  // of half an interval
+  const double kV_half = 0.5 * (fit.kV.interval[1] - fit.kV.interval[0]);
+  const double kS_half = 0.5 * (fit.kS.interval[1] - fit.kS.interval[0]);
+  for (const Extension::Open& open : extension.open) {
+    const double kV = fit.kV.value + open.moved[parameter::velocity_gain];
+    const double kS = fit.kS.value + open.moved[parameter::static_friction];
+    if (std::abs(kV - fit.kV.value) < large * kV_half &&
+        std::abs(kS - fit.kS.value) < large * kS_half) {
+      continue;
+    }
+    const bool lift = fit.mechanism == mechanisms::MechanismKind::elevator;
+    const char* const what =
+        open.term == parameter::bias   ? "friction that differs by direction"
+        : open.term == parameter::drag ? "drag that grows with the square of the speed"
+        : open.term == parameter::sag  ? "a battery that sags while the command was recorded"
+        : open.term == parameter::friction_field ? "friction that varies along the travel"
+        : open.term == parameter::take_up        ? "backlash"
+        : open.term == parameter::headroom       ? "a current limit"
+        : lift ? "a force that grows along the travel (a spring, a cable, or a further stage that is "
+                 "lifted from some height on)"
+               : "a force that grows along the travel (a spring, a counterbalance or a cable)";
+    note(diagnostics, "term_in_doubt",
+         "the log leaves open whether there is {}: with it kV would be {:.4g} V·s/{} and kS {:.3g} V. "
+         "The intervals hold both and are that wide for it; a second log, or tests over more of the "
+         "travel, decide",
+         what, kV, fit.unit, kS);
+    return;  // the one that matters most
+  }
+}
+
 void report_terms(const FeedforwardFit& fit, std::vector<Diagnostic>& diagnostics) {
   for (const ModelTerm& term : fit.terms) {
     const double value = term.value.value;
     if (term.name == "spring") {
       warn(diagnostics, "spring",
            "a force that {} with the position by {:.3g} {} ({:.2g} V at an end of the travel) "
-           "explains the log: a spring, a counterbalance or a cable. The gains hold beside it; a "
+           "explains the log: a spring, a counterbalance, a cable{}. The gains hold beside it; a "
            "feedforward of kS, kV, kA and kG alone lacks it",
-           value > 0.0 ? "grows" : "falls", std::abs(value), term.unit, term.largest);
+           value > 0.0 ? "grows" : "falls", std::abs(value), term.unit, term.largest,
+           fit.mechanism == mechanisms::MechanismKind::elevator && value > 0.0
+               ? ", or a further stage that is lifted from some height on"
+               : "");
     } else if (term.name == "drag") {
       warn(diagnostics, "drag",
            "a drag of {:.3g} {} that grows with the square of the speed explains the log ({:.2g} V "
