@@ -91,11 +91,10 @@ Expected<std::vector<Part>> parts_of(const TransferFunction& transfer,
   std::vector<Polynomial> dens;
   for (const auto& group : groups) {
     FLYBALL_TRY(const auto of_group,
-                TransferFunction::from_zeros(
-                    Eigen::VectorXcd(0),
-                    Eigen::Map<const Eigen::VectorXcd>(group.data(),
-                                                       static_cast<Index>(group.size())),
-                    1.0));
+                TransferFunction::from_zeros(Eigen::VectorXcd(0),
+                                             Eigen::Map<const Eigen::VectorXcd>(
+                                                 group.data(), static_cast<Index>(group.size())),
+                                             1.0));
     dens.push_back(detail::polynomial(of_group.den()));
   }
   // Σ N_g Π_{h≠g} D_h = R: the unknown coefficients of all N_g, in 31 digits.
@@ -140,8 +139,8 @@ Expected<std::vector<Part>> parts_of(const TransferFunction& transfer,
     for (const Complex& pole : groups[g]) {
       slowest = std::min(slowest, -pole.real());
     }
-    FLYBALL_TRY(const auto of_group, TransferFunction::create(nums.segment(column, size),
-                                                              VectorXd(dens[g].rounded())));
+    FLYBALL_TRY(const auto of_group,
+                TransferFunction::create(nums.segment(column, size), VectorXd(dens[g].rounded())));
     parts.emplace_back(of_group, std::abs(groups[g].back()), slowest);
     column += size;
   }

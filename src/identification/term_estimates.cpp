@@ -96,14 +96,17 @@ void report_open_terms(const Extension& extension, const FeedforwardFit& fit,
         : open.term == parameter::friction_field ? "friction that varies along the travel"
         : open.term == parameter::take_up        ? "backlash"
         : open.term == parameter::headroom       ? "a current limit"
-        : lift ? "a force that grows along the travel (a spring, a cable, or a further stage that is "
-                 "lifted from some height on)"
-               : "a force that grows along the travel (a spring, a counterbalance or a cable)";
-    note(diagnostics, "term_in_doubt",
-         "the log leaves open whether there is {}: with it kV would be {:.4g} V·s/{} and kS {:.3g} V. "
-         "The intervals hold both and are that wide for it; a second log, or tests over more of the "
-         "travel, decide",
-         what, kV, fit.unit, kS);
+        : lift
+            ? "a force that grows along the travel (a spring, a cable, or a further stage that is "
+              "lifted from some height on)"
+            : "a force that grows along the travel (a spring, a counterbalance or a cable)";
+    note(
+        diagnostics, "term_in_doubt",
+        "the log leaves open whether there is {}: with it kV would be {:.4g} V·s/{} and kS {:.3g} "
+        "V. "
+        "The intervals hold both and are that wide for it; a second log, or tests over more of the "
+        "travel, decide",
+        what, kV, fit.unit, kS);
     return;  // the one that matters most
   }
 }

@@ -33,8 +33,7 @@ class UrclDecoder {
 
   /// Appends the signals, named as AdvantageScope names them; tells whose they are.
   /// @param most  Signals at most.
-  void finish(std::vector<Signal>& signals, std::vector<Diagnostic>& diagnostics,
-              std::size_t most);
+  void finish(std::vector<Signal>& signals, std::vector<Diagnostic>& diagnostics, std::size_t most);
 
  private:
   struct Frame {

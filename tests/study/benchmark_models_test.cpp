@@ -86,17 +86,17 @@ TEST(BenchmarkModels, WienerHammersteinFromItsFilterDesigns) {
 }
 // Told nothing of the filters: all poles at one place, damped, no zeros. The same optimum is found.
 TEST(BenchmarkModels, WienerHammersteinFromAGenericStart) {
-  EXPECT_LT(validation_error("wiener_hammerstein_WienerHammerBenchmark.csv.gz",
-                             "wiener_hammerstein.toml",
-                             {{"w1", "20000 1/s"},
-                              {"w2", "20000 1/s"},
-                              {"d2", "1"},
-                              {"w3", "20000 1/s"},
-                              {"w4", "20000 1/s"},
-                              {"d4", "1"},
-                              {"m1", "0"},
-                              {"m2", "0"}}),
-            0.3e-3);
+  EXPECT_LT(
+      validation_error("wiener_hammerstein_WienerHammerBenchmark.csv.gz", "wiener_hammerstein.toml",
+                       {{"w1", "20000 1/s"},
+                        {"w2", "20000 1/s"},
+                        {"d2", "1"},
+                        {"w3", "20000 1/s"},
+                        {"w4", "20000 1/s"},
+                        {"d4", "1"},
+                        {"m1", "0"},
+                        {"m2", "0"}}),
+      0.3e-3);
 }
 }  // namespace
 }  // namespace flyball::study

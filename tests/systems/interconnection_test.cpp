@@ -5,11 +5,11 @@
 
 #include <gtest/gtest.h>
 
+#include <flyball/core/random.hpp>
 #include <flyball/systems/conversion.hpp>
 #include <flyball/systems/norms.hpp>
 #include <flyball/systems/realization.hpp>
 #include <flyball/systems/response.hpp>
-#include <flyball/core/random.hpp>
 
 #include "math/matrices_json.hpp"
 #include "support/oracle.hpp"
