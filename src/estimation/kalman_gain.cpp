@@ -13,6 +13,7 @@
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "estimation/steady_filter.hpp"
+#include "math/extended/extended_eigenvalues.hpp"
 
 namespace flyball {
 
@@ -153,6 +154,14 @@ Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const
   gain.P_prior = filter->covariance(filter->P);
   gain.P_posterior = filter->covariance(filter->update.P);
   gain.poles = *poles;
+  if (constexpr double nearly_nothing = 1e-150;
+      gain.K.allFinite() && gain.poles.cwiseAbs().maxCoeff() < nearly_nothing) {
+    // In the filter's units what such poles come from may have vanished: A - AKC as it is answered.
+    using detail::WideMatrix;
+    const WideMatrix wide_A(A);
+    gain.poles = detail::wide_eigenvalues_of(detail::add_product(
+        wide_A, -1.0, detail::product(wide_A, WideMatrix(gain.K)), WideMatrix(C)));
+  }
   if (!gain.K.allFinite() || !gain.L.allFinite() || !gain.P_prior.allFinite()) {
     return refusal(RiccatiError::overflow, where, "K")
         .hint("measure states and outputs in other units");

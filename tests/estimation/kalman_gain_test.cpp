@@ -356,6 +356,18 @@ TEST(KalmanGain, PosteriorInTheGivenUnits) {
 
 // The residual that is told is the larger of the dual equation's and of the filter's own, which
 // random plants have either way round.
+// The poles of what is answered: A (I - K C) has the trace -1e-300 · 1e16 · 1.2.
+TEST(KalmanGain, PolesBelowWhatItsUnitsHold) {
+  const Eigen::MatrixXd A = (Eigen::MatrixXd(2, 2) << 1e-310, -1e-300, 0.0, 1e-310).finished();
+  const Eigen::MatrixXd C =
+      (Eigen::MatrixXd(2, 2) << 1.20343017578125, -1e-16, 0.0, 1e20).finished();
+  const auto gain = kalman_gain(A, C, Eigen::Vector2d(0.0, 1e-100).asDiagonal().toDenseMatrix(),
+                                Eigen::Vector2d(1e-308, 1.0).asDiagonal().toDenseMatrix())
+                        .value();
+  const double trace = 1e-300 * gain.K(1, 0) * C(0, 0);
+  EXPECT_NEAR(gain.poles.real().sum() / trace, 1.0, 1e-12);
+}
+
 TEST(KalmanGain, TellsTheLargerResidual) {
   Random random(151);
   bool of_filter = false;

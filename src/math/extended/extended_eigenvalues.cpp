@@ -267,4 +267,22 @@ std::optional<Eigen::VectorXcd> balanced_extended_eigenvalues_of(DoubleDoubleMat
   return extended_eigenvalues_of(M);
 }
 
+Eigen::VectorXcd wide_eigenvalues_of(WideMatrix M, long rate) {
+  const WideMatrix S = balanced(std::move(M));
+  const Index n = S.rows();
+  const long unit = S.exponent();
+  DoubleDoubleMatrix digits(S.rounded(-unit));
+  digits.lo = sum(S, -1.0,
+                  WideMatrix(digits.hi).times_powers(Eigen::VectorXi::Zero(n),
+                                                     Eigen::VectorXi::Zero(n), unit))
+                  .rounded(-unit);
+  const auto extended = balanced_extended_eigenvalues_of(digits);
+  Eigen::VectorXcd values = extended ? *extended : eigenvalues_of(digits.hi);
+  for (Complex& value : values) {
+    const int power = static_cast<int>(std::clamp(unit + rate, -9999L, 9999L));
+    value = {std::ldexp(value.real(), power), std::ldexp(value.imag(), power)};
+  }
+  return values;
+}
+
 }  // namespace flyball::detail

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "math/extended/double_double.hpp"
+#include "math/extended/wide_matrix.hpp"
 
 namespace flyball::detail {
 
@@ -17,5 +18,9 @@ namespace flyball::detail {
 /// The same of D⁻¹MD with the powers of two D that balance M.
 [[nodiscard]] std::optional<Eigen::VectorXcd> balanced_extended_eigenvalues_of(
     DoubleDoubleMatrix M);
+
+/// Those of a matrix whose entries no double holds, times 2^rate: balanced by their exponents
+/// first. In doubles' precision where the iteration does not end.
+[[nodiscard]] Eigen::VectorXcd wide_eigenvalues_of(WideMatrix M, long rate = 0);
 
 }  // namespace flyball::detail

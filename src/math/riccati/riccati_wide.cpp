@@ -93,21 +93,8 @@ double wide_riccati_residual(const RiccatiProblem& given, const RiccatiUnits& un
 Eigen::VectorXcd wide_riccati_poles(const RiccatiProblem& given, const RiccatiUnits& units,
                                     const MatrixXd& K) {
   const Equation<WideMatrix> e = equation_in(given, units);
-  const WideMatrix S = balanced(add_product(e.A, -1.0, e.B, gain_in(units, WideMatrix(K))));
-  const Index n = S.rows();
-  const long unit = S.exponent();
-  DoubleDoubleMatrix digits(S.rounded(-unit));
-  digits.lo = sum(S, -1.0,
-                  WideMatrix(digits.hi).times_powers(Eigen::VectorXi::Zero(n),
-                                                     Eigen::VectorXi::Zero(n), unit))
-                  .rounded(-unit);
-  const auto extended = balanced_extended_eigenvalues_of(digits);
-  Eigen::VectorXcd poles = extended ? *extended : eigenvalues_of(digits.hi);
-  for (std::complex<double>& pole : poles) {
-    const int power = static_cast<int>(std::clamp(unit + units.rate, -9999L, 9999L));
-    pole = {std::ldexp(pole.real(), power), std::ldexp(pole.imag(), power)};
-  }
-  return poles;
+  return wide_eigenvalues_of(add_product(e.A, -1.0, e.B, gain_in(units, WideMatrix(K))),
+                             units.rate);
 }
 
 std::optional<RiccatiSolution> solve_riccati_wide(const RiccatiProblem& given,
