@@ -65,7 +65,7 @@ FigureResult table_7_1() {
   Plot plot = pole_plot(figure.title, {group}, true);
   plot.x_label = "Real part of z";
   plot.panels[0].y_label = "Imaginary part of z";
-  plot.panels[0].lines[0].label = "z = exp(s T) for s in rad/s and T = 1 s";
+  plot.panels[0].lines.back().label = "z = exp(s T) for s in rad/s and T = 1 s";
   plot.panels[0].notes = std::move(notes);
   figure.picture = std::move(plot);
   return figure;

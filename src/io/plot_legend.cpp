@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <iterator>
 
@@ -51,7 +52,11 @@ std::vector<std::string_view> panel_colors(const PlotPanel& panel) {
     add(band.color);
   }
   for (const PlotLine& line : panel.lines) {
-    add(line.color);
+    if (line.style == LineStyle::guide) {
+      colors.push_back("#C4C4C4");
+    } else {
+      add(line.color);
+    }
   }
   return colors;
 }
@@ -67,6 +72,8 @@ std::string stroke(LineStyle style, std::size_t points) {
       return "lw 1.8 dt (20,6,4,6)";
     case LineStyle::dotted:
       return "lw 2 dt (4,5)";
+    case LineStyle::guide:
+      return "lw 0.8";
     case LineStyle::samples:
       return "lw 0.8 pt 7 ps 0.5";
     case LineStyle::crosses:
@@ -84,8 +91,8 @@ std::string stroke(LineStyle style, std::size_t points) {
 Legend::Legend(const PlotPanel& panel, int width) {
   const std::vector<std::string_view> colors = panel_colors(panel);
   double x = 0.0;
-  const auto add = [&](const std::string& label, std::string drawn, std::size_t color, bool band,
-                       bool points) {
+  const auto add = [&](const std::string& label, std::string drawn, std::string_view color,
+                       std::string_view fill, bool points) {
     if (label.empty()) {
       return;
     }
@@ -94,16 +101,23 @@ Legend::Legend(const PlotPanel& panel, int width) {
       ++rows_;
       x = 0.0;
     }
-    entries_.push_back({label, std::move(drawn), colors[color], band, points, x, rows_ - 1});
+    entries_.push_back({label, std::move(drawn), color, fill, points, x, rows_ - 1});
     x += wide + entry_gap;
   };
   for (std::size_t i = 0; i < panel.bands.size(); ++i) {
-    add(panel.bands[i].label, {}, i, true, false);
+    add(panel.bands[i].label, {}, colors[i], "transparent solid 0.2", false);
   }
   for (std::size_t i = 0; i < panel.lines.size(); ++i) {
     const PlotLine& line = panel.lines[i];
     // One entry, however many points: dots too small to tell their colour are larger here.
-    add(line.label, stroke(line.style, 1), panel.bands.size() + i, false, scattered(line.style));
+    add(line.label, stroke(line.style, 1), colors[panel.bands.size() + i], {},
+        scattered(line.style));
+  }
+  for (auto span = panel.spans.begin(); span != panel.spans.end(); ++span) {
+    const auto same = [&](const PlotSpan& other) { return other.label == span->label; };
+    if (std::none_of(panel.spans.begin(), span, same)) {
+      add(span->label, {}, span_color, "solid", false);
+    }
   }
 }
 
@@ -115,11 +129,11 @@ std::string Legend::commands(int left, int bottom, int width, int height) const 
     const double from = (left + entry.x) / width;
     const double to = (left + entry.x + sample_width) / width;
     const double half = 6.0 / height;
-    if (entry.band) {
+    if (!entry.fill.empty()) {
       fmt::format_to(out,
                      "set object rectangle from screen {}, screen {} to screen {}, screen {} "
-                     "fc rgb '{}' fs transparent solid 0.2 noborder\n",
-                     from, y - half, to, y + half, entry.color);
+                     "fc rgb '{}' fs {} noborder\n",
+                     from, y - half, to, y + half, entry.color, entry.fill);
     } else if (entry.scattered) {
       fmt::format_to(out, "set label '' at screen {}, screen {} point {} lc rgb '{}' front\n",
                      0.5 * (from + to), y, entry.stroke, entry.color);

@@ -10,6 +10,9 @@
 /// Strokes, colours and legends of panels; private to io.
 namespace flyball::io {
 
+/// Of stretches that are shaded over a whole panel.
+inline constexpr std::string_view span_color = "#ECECEC";
+
 /// Of every text of a picture, in its pixels.
 inline constexpr int font_size = 14;
 
@@ -44,7 +47,7 @@ class Legend {
     std::string label;
     std::string stroke;
     std::string_view color;
-    bool band;
+    std::string_view fill;  ///< "transparent solid 0.2" of a band, "solid" of a span; empty: none.
     bool scattered;
     double x;  ///< Pixels from the left edge.
     int row;

@@ -140,8 +140,10 @@ class Script {
     bool scatter = true;  // nothing but points: they should not lie on the frame
     for (const PlotPanel& panel : plot_.panels) {
       for (const PlotLine& line : panel.lines) {
-        x_.include(line.x);
-        scatter = scatter && scattered(line.style);
+        if (line.style != LineStyle::guide) {
+          x_.include(line.x);
+          scatter = scatter && scattered(line.style);
+        }
       }
       for (const PlotBand& band : panel.bands) {
         x_.include(band.x);
@@ -150,6 +152,10 @@ class Script {
         if (mark.vertical) {
           x_.include(mark.at);
         }
+      }
+      for (const PlotSpan& span : panel.spans) {
+        x_.include(span.from);
+        x_.include(span.to);
       }
     }
     if (plot_.unit_circle) {
@@ -178,7 +184,9 @@ class Script {
       return range;
     }
     for (const PlotLine& line : panel.lines) {
-      range.include(line.y);
+      if (line.style != LineStyle::guide) {
+        range.include(line.y);
+      }
     }
     for (const PlotBand& band : panel.bands) {
       range.include(band.low);
@@ -273,7 +281,9 @@ class Script {
                    1.0 - static_cast<double>(right_margin) / plot_.width,
                    1.0 - static_cast<double>(box.top) / height_,
                    1.0 - static_cast<double>(box.bottom) / height_, box.y.low(), box.y.high(),
-                   ticks('y', box.y, (box.bottom - box.top) / y_tick_pixels, panel.log_y),
+                   panel.y_ticks.empty()
+                       ? ticks('y', box.y, (box.bottom - box.top) / y_tick_pixels, panel.log_y)
+                       : word_ticks(panel.y_ticks),
                    literal(panel.y_label), 16.0 / plot_.width,
                    1.0 - 0.5 * (box.top + box.bottom) / height_);
     script_ += panel.log_y ? "set logscale y\n" : "unset logscale y\n";
@@ -292,7 +302,23 @@ class Script {
     script_ += "unset label\nunset arrow\nunset object\n";
   }
 
+  static std::string word_ticks(const std::vector<PlotTick>& ticks) {
+    std::string words;
+    for (const PlotTick& tick : ticks) {
+      words += fmt::format("{}{} {}", words.empty() ? "" : ", ", literal(tick.label), tick.at);
+    }
+    return fmt::format("set ytics ({})\n", words);
+  }
+
   void draw_marks(const PlotPanel& panel) {
+    for (const PlotSpan& span : panel.spans) {
+      if (std::isfinite(span.from) && std::isfinite(span.to)) {
+        fmt::format_to(out(),
+                       "set object rectangle from first {}, graph 0 to first {}, graph 1 behind "
+                       "fc rgb '{}' fs solid noborder\n",
+                       span.from, span.to, span_color);
+      }
+    }
     for (std::size_t i = 0; i < panel.marks.size(); ++i) {
       const PlotMark& mark = panel.marks[i];
       if (!std::isfinite(mark.at)) {

@@ -21,6 +21,7 @@ enum class LineStyle {
   dash_dot,
   dotted,
   samples,  ///< Points joined by a thin line: few values at whole steps.
+  guide,    ///< Thin and grey behind the data, such as a grid; axes are not stretched to it.
 };
 
 /// One curve of a panel.
@@ -48,6 +49,19 @@ struct PlotMark {
   bool vertical = false;
 };
 
+/// A stretch of the x axis that is shaded over the whole panel, such as rows that were not used.
+struct PlotSpan {
+  double from = 0.0;
+  double to = 0.0;
+  std::string label = {};  ///< In the legend, once for all of one label; empty: not in it.
+};
+
+/// A word in place of a number on an axis.
+struct PlotTick {
+  double at = 0.0;
+  std::string label = {};
+};
+
 /// Words beside a point of a panel.
 struct PlotNote {
   double x = 0.0;
@@ -70,6 +84,8 @@ struct PlotPanel {
   bool log_y = false;
   std::vector<PlotNote> notes = {};
   std::optional<PlotLimits> y_limits = {};  ///< Curves are cut there; absent: all is shown.
+  std::vector<PlotSpan> spans = {};
+  std::vector<PlotTick> y_ticks = {};  ///< In place of numbers; empty: numbers.
 };
 
 /// A picture of one or more panels above each other.
@@ -83,6 +99,8 @@ struct Plot {
   int width = 900;      ///< Pixels.
   int height = 0;       ///< Pixels; 0: what the panels need.
   double x_step = 0.0;  ///< Between two ticks of the x axis; 0: chosen.
+  /// Plots of one clock are zoomed and read together along x; empty: each alone.
+  std::string clock = {};
 };
 
 /// A function of two variables: a surface in perspective, or coloured from above. Viridis, which
@@ -114,7 +132,7 @@ struct PolePlotGroup {
   std::vector<std::complex<double>> poles = {};
   std::vector<std::complex<double>> zeros = {};
 };
-/// A pole map.
+/// A pole map over a grid of equal damping ratios and natural frequencies.
 /// @param groups  Each with a colour and a legend of its own. @param discrete  Draws the unit
 /// circle.
 [[nodiscard]] Plot pole_plot(std::string title, const std::vector<PolePlotGroup>& groups,
