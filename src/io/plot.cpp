@@ -1,7 +1,9 @@
 #include <flyball/io/plot.hpp>
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
+#include <string_view>
 #include <utility>
 
 #include <flyball/io/file.hpp>
@@ -93,19 +95,85 @@ std::string tidy_svg(std::string svg, const std::string& title) {
   return svg;
 }
 
+constexpr std::string_view png_signature = "\x89PNG\r\n\x1A\n";
+
+/// What gnuplot answered, if it is one picture.
+Expected<std::string> picture_of(std::string answer, const std::string& title,
+                                 PictureFormat format) {
+  const bool vector = format == PictureFormat::svg;
+  if (vector) {
+    answer = tidy_svg(std::move(answer), title);
+  }
+  if (!(vector ? io::is_plain_svg(answer) : answer.starts_with(png_signature))) {
+    return refusal(PlotError::not_a_picture, "plot");
+  }
+  return answer;
+}
+
 /// Draws, and looks at what came.
 template <class AnyPlot>
 Expected<std::string> drawn(const AnyPlot& plot, PictureFormat format, double seconds) {
   FLYBALL_TRY(const std::string script, io::gnuplot_script(plot, format));
-  FLYBALL_TRY(std::string picture, run_gnuplot(script, seconds));
-  const bool vector = format == PictureFormat::svg;
-  if (vector) {
-    picture = tidy_svg(std::move(picture), plot.title);
+  FLYBALL_TRY(std::string answer, run_gnuplot(script, seconds));
+  return picture_of(std::move(answer), plot.title, format);
+}
+
+/// The pictures that stand one after the other: each begins where the last ended.
+std::vector<std::string> parted(std::string_view answer, PictureFormat format) {
+  constexpr std::string_view svg_end = "</svg>";  // Nowhere else: texts are escaped.
+  std::vector<std::string> parts;
+  while (!answer.empty()) {
+    std::size_t end =
+        format == PictureFormat::svg ? answer.find(svg_end) : answer.find(png_signature, 1);
+    end = end == std::string_view::npos  ? answer.size()
+          : format == PictureFormat::svg ? end + svg_end.size()
+                                         : end;
+    if (io::trim(answer.substr(0, end)).empty()) {
+      break;
+    }
+    parts.emplace_back(answer.substr(0, end));
+    answer.remove_prefix(end);
   }
-  if (!(vector ? io::is_plain_svg(picture) : picture.starts_with("\x89PNG\r\n\x1A\n"))) {
-    return refusal(PlotError::not_a_picture, "plot");
+  return parts;
+}
+
+std::vector<Expected<std::string>> drawn_together(std::span<const Plot* const> plots,
+                                                  PictureFormat format, double seconds) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  std::vector<Expected<std::string>> pictures;
+  std::vector<std::size_t> asked;
+  std::string script;
+  for (const Plot* plot : plots) {
+    pictures.push_back(io::gnuplot_script(*plot, format));
+    if (pictures.back()) {
+      asked.push_back(pictures.size() - 1);
+      script += *pictures.back() + "reset session\n";
+    }
   }
-  return picture;
+  if (asked.empty()) {
+    return pictures;
+  }
+  const Expected<std::string> answer = run_gnuplot(script, seconds);
+  if (!answer && answer.error().is(PlotError::gnuplot_missing)) {
+    for (const std::size_t i : asked) {
+      pictures[i] = tl::unexpected(answer.error());
+    }
+    return pictures;
+  }
+  const std::vector<std::string> parts =
+      answer ? parted(*answer, format) : std::vector<std::string>();
+  for (std::size_t k = 0; k < asked.size(); ++k) {
+    const Plot& plot = *plots[asked[k]];
+    Expected<std::string>& picture = pictures[asked[k]];
+    if (parts.size() == asked.size()) {
+      picture = picture_of(parts[k], plot.title, format);
+    } else {
+      // One of them was refused: which, and with what words, is known of each alone.
+      const std::chrono::duration<double> left = end - std::chrono::steady_clock::now();
+      picture = drawn(plot, format, std::max(0.0, left.count()));
+    }
+  }
+  return pictures;
 }
 
 template <class AnyPlot>
@@ -146,6 +214,13 @@ Expected<std::string> render_png(const Plot& plot, double seconds) {
 }
 Expected<std::string> render_png(const SurfacePlot& plot, double seconds) {
   return png_of(plot, seconds);
+}
+
+std::vector<Expected<std::string>> render_svgs(std::span<const Plot* const> plots, double seconds) {
+  return drawn_together(plots, PictureFormat::svg, seconds);
+}
+std::vector<Expected<std::string>> render_pngs(std::span<const Plot* const> plots, double seconds) {
+  return drawn_together(plots, PictureFormat::png, seconds);
 }
 
 Expected<void> write_svg(const std::string& path, const Plot& plot) {

@@ -1,7 +1,6 @@
 #include <algorithm>
-#include <atomic>
-#include <chrono>
-#include <new>
+#include <exception>
+#include <functional>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -12,58 +11,77 @@
 
 namespace flyball::report {
 
+namespace {
+
+using Drawn = std::vector<Expected<std::string>>;
+
+/// What one gnuplot draws: some of the figures, as SVG or PNG.
+struct Batch {
+  bool raster = false;
+  std::vector<std::size_t> figures{};
+  std::exception_ptr failure{};
+};
+
+void draw(Batch& batch, std::vector<Picture>& pictures, double seconds) {
+  std::vector<const Plot*> plots;
+  for (const std::size_t i : batch.figures) {
+    plots.push_back(&pictures[i].figure.plot);
+  }
+  Drawn drawn = batch.raster ? render_pngs(plots, seconds) : render_svgs(plots, seconds);
+  for (std::size_t k = 0; k < drawn.size(); ++k) {
+    Picture& picture = pictures[batch.figures[k]];
+    if (!drawn[k]) {
+      (batch.raster ? picture.png_problem : picture.problem) = to_string(drawn[k].error());
+    } else {
+      (batch.raster ? picture.png : picture.svg) = *std::move(drawn[k]);
+    }
+  }
+}
+
+}  // namespace
+
 std::vector<Picture> draw(const std::vector<Figure>& figures, bool png, double seconds) {
-  using Clock = std::chrono::steady_clock;
-  const auto end = Clock::now() + std::chrono::duration<double>(seconds);
   std::vector<Picture> pictures(figures.size());
+  // All SVGs take one gnuplot less than a tenth of a second; of PNGs each takes that, so that every
+  // processor gets its share of them.
+  const std::size_t raster_batches =
+      png ? std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, 8) : 0;
+  std::vector<Batch> batches(1 + raster_batches);
   for (std::size_t i = 0; i < figures.size(); ++i) {
     pictures[i].figure = figures[i];
+    batches[0].figures.push_back(i);
+    if (png) {
+      batches[1 + i % raster_batches].figures.push_back(i);
+    }
   }
-  const std::size_t jobs = pictures.size() * (png ? 2 : 1);
-  std::vector<std::string> problems(jobs);
-  std::atomic<std::size_t> next{0};
-  std::atomic<bool> short_of_memory{false};
-  const auto draw_all = [&] {
-    for (std::size_t job = next++; job < jobs; job = next++) {
-      const bool raster = job >= pictures.size();
-      Picture& target = pictures[job % pictures.size()];
-      const double left = std::max(0.0, std::chrono::duration<double>(end - Clock::now()).count());
-      Expected<std::string> picture =
-          raster ? render_png(target.figure.plot, left) : render_svg(target.figure.plot, left);
-      if (!picture) {
-        problems[job] = to_string(picture.error());
-      } else if (raster) {
-        target.png = *std::move(picture);
-      } else {
-        target.svg = *std::move(picture);
+  const auto work = [&](Batch& batch) {
+    try {
+      draw(batch, pictures, seconds);
+    } catch (...) {
+      batch.failure = std::current_exception();  // A thread that an exception leaves ends all.
+    }
+  };
+  {
+    std::vector<std::jthread> workers;
+    for (std::size_t b = 1; b < batches.size(); ++b) {
+      batches[b].raster = true;
+      try {
+        workers.emplace_back(work, std::ref(batches[b]));
+      } catch (const std::system_error&) {
+        work(batches[b]);  // The system has no more threads.
       }
     }
-  };
-  const auto work = [&] {
-    try {
-      draw_all();
-    } catch (const std::bad_alloc&) {
-      short_of_memory = true;  // A thread that an exception leaves ends the process.
-    }
-  };
-  // Each picture is a process of its own; waiting for one costs nothing.
-  std::vector<std::jthread> workers;
-  const std::size_t threads =
-      std::min<std::size_t>(jobs, std::clamp(std::thread::hardware_concurrency(), 1U, 8U));
-  try {
-    for (std::size_t i = 1; i < threads; ++i) {
-      workers.emplace_back(work);
-    }
-  } catch (const std::system_error&) {
-    // The system has no more threads: those that there are do the work.
+    work(batches[0]);
   }
-  work();
-  workers.clear();
-  if (short_of_memory) {
-    throw std::bad_alloc();
+  for (Batch& batch : batches) {
+    if (batch.failure) {
+      std::rethrow_exception(batch.failure);
+    }
   }
-  for (std::size_t i = 0; i < pictures.size(); ++i) {
-    pictures[i].problem = !png || !problems[i].empty() ? problems[i] : problems[i + figures.size()];
+  for (Picture& picture : pictures) {
+    if (picture.problem.empty()) {
+      picture.problem = std::move(picture.png_problem);
+    }
   }
   return pictures;
 }

@@ -13,9 +13,10 @@ struct Picture {
   std::string svg{};  ///< Empty if it could not be drawn.
   std::string png{};  ///< Empty if it could not be drawn or was not asked for.
   std::string problem{};
+  std::string png_problem{};  ///< Taken for `problem` if there is no other.
 };
 
-/// Draws them, a few at a time. @param png  Whether PNGs are wanted too. @param seconds  What all
+/// Draws them by a few gnuplots. @param png  Whether PNGs are wanted too. @param seconds  What all
 /// of them have together; those that are not drawn then have a problem.
 [[nodiscard]] std::vector<Picture> draw(const std::vector<Figure>& figures, bool png,
                                         double seconds = 60.0);

@@ -70,6 +70,78 @@ TEST(Plot, TheSamePlotGivesTheSameBytes) {
   EXPECT_EQ(render_png(example(50)).value(), render_png(example(50)).value());
 }
 
+TEST(Plot, PicturesOfOneGnuplotAreThoseOfManyAndARefusedOneCostsItself) {
+  Plot marked = example(10);
+  marked.panels[0].spans = {{0.0, 3.0, "unused"}, {5.0, 6.0, "unused"}};
+  marked.panels[1].y_ticks = {{1.0, "kS"}};
+  const Plot wrong;  // No panel.
+  const Plot first = example(50);
+  const std::vector<const Plot*> plots{&first, &wrong, &marked, &first};
+  const auto svgs = render_svgs(plots);
+  const auto pngs = render_pngs(plots);
+  for (const auto& drawn : {svgs, pngs}) {
+    ASSERT_EQ(drawn.size(), plots.size());
+    EXPECT_TRUE(drawn[1].error().is(ArgumentError::empty));
+  }
+  for (const std::size_t i : {0U, 2U, 3U}) {
+    ASSERT_TRUE(svgs[i]) << to_string(svgs[i].error());
+    EXPECT_EQ(*svgs[i], render_svg(*plots[i]).value());
+    EXPECT_EQ(*pngs[i], render_png(*plots[i]).value());
+  }
+  EXPECT_TRUE(contains(*svgs[2], "kS"));
+  // A label once, however many stretches have it.
+  EXPECT_EQ(svgs[2]->find("unused"), svgs[2]->rfind("unused"));
+}
+
+// What gnuplot refuses of several is told of that one alone.
+TEST(Plot, OneThatGnuplotRefusesLeavesTheOthers) {
+  const TemporaryFolder folder;
+  const std::string fake = folder.file("gnuplot");
+  std::ofstream(fake) << "#!/bin/sh\nif grep -q poison /dev/stdin; then echo no >&2; exit 3; fi\n"
+                         "exec /usr/bin/gnuplot -d /dev/stdin\n";
+  std::filesystem::permissions(fake, std::filesystem::perms::owner_all);
+  Plot poisoned = example(3);
+  poisoned.title = "poison";
+  const Plot good = example(3);
+  const std::vector<const Plot*> plots{&good, &poisoned, &good};
+  const std::string expected = render_svg(good).value();
+  const std::string before = ::getenv("PATH");
+  ::setenv("PATH", (fake.substr(0, fake.rfind('/')) + ":" + before).c_str(), 1);
+  const auto svgs = render_svgs(plots);
+  ::setenv("PATH", before.c_str(), 1);
+  EXPECT_EQ(svgs[0].value(), expected);
+  EXPECT_EQ(svgs[2].value(), expected);
+  ASSERT_FALSE(svgs[1]);
+  EXPECT_TRUE(svgs[1].error().is(PlotError::gnuplot_failed));
+}
+
+// ln z = -ζω ± jω√(1 - ζ²) on each curve: one of the two is the same along it.
+TEST(Plot, AGridOfDampingLiesBehindThePoles) {
+  for (const bool discrete : {true, false}) {
+    const Plot plot = pole_plot("", {{"a", {{-0.5, 0.0}, {-0.2, 0.3}}, {}}}, discrete);
+    const std::vector<PlotLine>& lines = plot.panels[0].lines;
+    ASSERT_EQ(lines[0].style, LineStyle::guide);
+    EXPECT_EQ(lines[1].style, LineStyle::crosses);
+    std::size_t curves = 0;
+    std::vector<std::complex<double>> curve;
+    for (std::size_t i = 0; i < lines[0].x.size(); ++i) {
+      const std::complex<double> at(lines[0].x[i], lines[0].y[i]);
+      if (!std::isnan(at.real())) {
+        curve.push_back(discrete ? std::log(at) : at);
+        continue;
+      }
+      ++curves;
+      const std::complex<double> a = curve[10];
+      const std::complex<double> b = curve[30];
+      const bool same_frequency = std::abs(std::abs(a) - std::abs(b)) < 1e-9;
+      const bool same_ratio = std::abs(a.real() / std::abs(a) - b.real() / std::abs(b)) < 1e-9;
+      EXPECT_NE(same_frequency, same_ratio);
+      curve.clear();
+    }
+    EXPECT_EQ(curves, 20U);
+  }
+}
+
 TEST(Plot, TextIsNeverAProgram) {
   const TemporaryFolder folder;
   const std::string bait = folder.file("owned");

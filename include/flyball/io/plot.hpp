@@ -1,6 +1,8 @@
 #pragma once
 
+#include <span>
 #include <string>
+#include <vector>
 
 #include <flyball/core/expected.hpp>
 #include <flyball/core/figure.hpp>
@@ -24,13 +26,21 @@ enum class PlotError {
 /// @errors PlotError, ArgumentError::wrong_shape (columns of unequal length), out_of_range (size,
 /// axes of a map that do not ascend evenly), empty (no panel, no finite value).
 /// Of what gnuplot answers only elements that draw are taken. @param seconds  The time it has.
-/// Cost: starts gnuplot, about 0.1 s.
+/// Cost: starts gnuplot: about 20 ms, a PNG 80 ms.
 [[nodiscard]] Expected<std::string> render_svg(const Plot& plot, double seconds = 30.0);
 [[nodiscard]] Expected<std::string> render_svg(const SurfacePlot& plot, double seconds = 30.0);
 
 /// The bytes of a PNG at 1.5 times the size in pixels. @errors As `render_svg`.
 [[nodiscard]] Expected<std::string> render_png(const Plot& plot, double seconds = 30.0);
 [[nodiscard]] Expected<std::string> render_png(const SurfacePlot& plot, double seconds = 30.0);
+
+/// Several pictures by one gnuplot, each what it is alone, or the reason why there is none:
+/// starting gnuplot takes as long as drawing an SVG. @param seconds  What all of them have
+/// together.
+[[nodiscard]] std::vector<Expected<std::string>> render_svgs(std::span<const Plot* const> plots,
+                                                             double seconds = 60.0);
+[[nodiscard]] std::vector<Expected<std::string>> render_pngs(std::span<const Plot* const> plots,
+                                                             double seconds = 60.0);
 
 /// The same into a file, atomically. @errors As `render_svg`, and FileError.
 [[nodiscard]] Expected<void> write_svg(const std::string& path, const Plot& plot);
