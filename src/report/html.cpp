@@ -1,12 +1,15 @@
 #include <flyball/report/html.hpp>
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include <flyball/core/version.hpp>
 
 #include "report/format.hpp"
-#include "report/page_style.hpp"
+#include "report/page_parts.hpp"
 #include "report/pictures.hpp"
+#include "report/plot_data.hpp"
 
 namespace flyball::report {
 
@@ -108,6 +111,14 @@ std::string render(const Code& code) {
                      escape_html(code.title), escape_html(code.text));
 }
 
+std::string render(const Steps& steps) {
+  std::string out = "<ol class=\"steps\">\n";
+  for (const std::string& step : steps.steps) {
+    out += "<li>" + escape_html(step) + "</li>\n";
+  }
+  return out + "</ol>\n";
+}
+
 /// The <svg> element without what may stand before it in a file.
 std::string_view svg_element(std::string_view svg) {
   const std::size_t at = svg.find("<svg");
@@ -144,17 +155,40 @@ std::string with_own_ids(std::string_view svg, std::size_t number) {
 std::string render(const Picture& picture, std::size_t number) {
   const Figure& figure = picture.figure;
   const std::string label = escape_html(figure.title + ". " + figure.description);
-  std::string out = "<figure>\n";
   const std::string_view svg = svg_element(picture.svg);
+  std::string out = fmt::format("<figure class=\"plot{}\" data-name=\"{}\">\n",
+                                svg.empty() ? "" : " drawn", escape_html(figure.name));
   if (svg.empty()) {
-    out += fmt::format("<p class=\"caution\">▲ The picture “{}” could not be drawn: {}</p>\n",
-                       escape_html(figure.title), escape_html(picture.problem));
+    out +=
+        fmt::format("<div class=\"still\"><p>▲ The picture “{}” could not be drawn: {}</p></div>\n",
+                    escape_html(figure.title), escape_html(picture.problem));
   } else {
-    out += fmt::format("<div class=\"picture\" role=\"img\" aria-label=\"{}\">\n{}</div>\n", label,
+    out += fmt::format("<div class=\"still\" role=\"img\" aria-label=\"{}\">\n{}</div>\n", label,
                        with_own_ids(svg, number));
   }
-  return out +
-         fmt::format("<figcaption>{}</figcaption>\n</figure>\n", escape_html(figure.description));
+  return out + fmt::format(
+                   "<script type=\"application/json\">{}</script>\n"
+                   "<figcaption>{}</figcaption>\n</figure>\n",
+                   plot_data(figure), escape_html(figure.description));
+}
+
+/// That still pictures are missing, and what there is in their place.
+std::string missing_stills(const std::vector<Picture>& pictures) {
+  const auto missing = [](const Picture& picture) { return svg_element(picture.svg).empty(); };
+  const auto first = std::find_if(pictures.begin(), pictures.end(), missing);
+  if (first == pictures.end()) {
+    return "";
+  }
+  return fmt::format(
+      "<p class=\"caution\">▲ {} of {} still pictures could not be drawn: {}. The interactive "
+      "plots "
+      "are here, where scripts run; prints and other pages lack those pictures.</p>\n",
+      std::count_if(first, pictures.end(), missing), pictures.size(), escape_html(first->problem));
+}
+
+/// Plots that answer: dygraphs' script and the page's own. It needs no more, whatever a text says.
+std::string scripts() {
+  return fmt::format("<script>{}</script>\n<script>\n{}</script>\n", dygraphs_script, page_script);
 }
 
 std::string heading(const Section& section) {
@@ -188,6 +222,8 @@ std::string page_of(const Document& document, const std::vector<Picture>& pictur
   std::string out = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
+      "style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:\">\n"
       "<meta name=\"generator\" content=\"Flyball {}\">\n<title>{} – Flyball</title>\n"
       "<style>{}</style>\n</head>\n<body>\n",
       version, escape_html(document.title), page_style);
@@ -202,7 +238,7 @@ std::string page_of(const Document& document, const std::vector<Picture>& pictur
     }
     out += "</ul>\n";
   }
-  out += "</div>\n<nav aria-label=\"Sections\"><ul>\n";
+  out += "</div>\n" + missing_stills(pictures) + "<nav aria-label=\"Sections\"><ul>\n";
   for (const Section& section : document.sections) {
     out += fmt::format("<li><a href=\"#{}\">{}</a></li>\n", section.id, escape_html(section.title));
   }
@@ -221,7 +257,8 @@ std::string page_of(const Document& document, const std::vector<Picture>& pictur
     out += "</section>\n";
   }
   out += origin_section(document.origins, provenance);
-  return out + "</main>\n</body>\n</html>\n";
+  out += "</main>\n";
+  return out + (pictures.empty() ? "" : scripts()) + "</body>\n</html>\n";
 }
 
 std::string to_html(const Answer& answer, const Provenance& provenance) {

@@ -104,6 +104,14 @@ std::string render(const Findings& findings, const TerminalStyle& style) {
   return out;
 }
 
+std::string render(const Steps& steps, const TerminalStyle& style) {
+  std::string out;
+  for (std::size_t i = 0; i < steps.steps.size(); ++i) {
+    out += beside(std::to_string(i + 1) + ".", 3, steps.steps[i], Tone::plain, style);
+  }
+  return out;
+}
+
 std::string render(const Code& code, const TerminalStyle& style) {
   std::string out = std::string(indent) + bold(code.title, style) + "\n";
   for (const std::string_view line : text::split(code.text, "\n")) {

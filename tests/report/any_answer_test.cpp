@@ -24,6 +24,7 @@ Answer pendulum() {
       .verdict = {Tone::caution, "It swings.", {"nothing slows it"}},
       .sections = {{"motion", "Motion", {facts, table, Paragraph{"Undamped."}}},
                    {"code", "Code", {Code{"C", "swing();\n", "c.txt"}}},
+                   {"next", "Next", {Steps{{"Push it.", "Watch <it>."}}}},
                    diagnostics_section({{"no_air", Severity::warning, "a vacuum"}})}};
   answer.document.origins.add("seed", "4");
   Figure angle{"motion", "angle", "Angle", "The angle over time.", {}};
@@ -55,6 +56,10 @@ TEST(AnyAnswer, OnATerminal) {
             "  C\n"
             "  swing();\n"
             "\n"
+            "Next\n"
+            "  1. Push it.\n"
+            "  2. Watch <it>.\n"
+            "\n"
             "What was noticed\n"
             "  warning  a vacuum [no_air]\n");
 }
@@ -76,8 +81,10 @@ TEST(AnyAnswer, AsAPageWithItsFilesBesideIt) {
   const std::string page = read_file(folder + "/index.html").value();
   for (const char* part :
        {"<h1>Pendulum</h1>", "▲ It swings.", "<li>nothing slows it</li>", "2.006 s", "<svg",
-        "<caption>Energy:</caption>", "swing();", "a vacuum", "no_air", "pendulum --go",
-        "href=\"result.json\"", "href=\"data/angle.csv\"", "href=\"pictures/angle.png\"",
+        "<caption>Energy:</caption>", "swing();",
+        "<ol class=\"steps\">\n<li>Push it.</li>\n<li>Watch &lt;it&gt;.</li>\n</ol>", "a vacuum",
+        "no_air", "pendulum --go", "href=\"result.json\"", "href=\"data/angle.csv\"",
+        "href=\"pictures/angle.png\"",
         "<th scope=\"row\" class=\"w\">seed</th><td class=\"w\">4</td>"}) {
     EXPECT_NE(page.find(part), std::string::npos) << part;
   }

@@ -6,14 +6,35 @@
 #include <gtest/gtest.h>
 
 #include "fixtures.hpp"
+#include "report/page_parts.hpp"
 
 namespace flyball::report {
 namespace {
 
-/// The page of a result's answer.
+/// The page without its scripts: the two that are its own and the data of its plots, which hold no
+/// markup.
+std::string without_scripts(std::string page) {
+  constexpr std::string_view data = "<script type=\"application/json\">";
+  constexpr std::string_view end = "</script>\n";
+  for (std::size_t at = page.find(data); at != std::string::npos; at = page.find(data, at)) {
+    const std::size_t stop = page.find('<', at + data.size());
+    EXPECT_EQ(page.compare(stop, end.size(), end), 0) << "markup in the data";
+    page.erase(at, stop + end.size() - at);
+  }
+  for (const std::string& script : {"<script>" + std::string(dygraphs_script) + "</script>\n",
+                                    "<script>\n" + std::string(page_script) + "</script>\n"}) {
+    const std::size_t at = page.find(script);
+    if (at != std::string::npos) {
+      page.erase(at, script.size());
+    }
+  }
+  return page;
+}
+
+/// The page of a result's answer, without its scripts.
 template <class Result>
 std::string page_of(const Result& result, const Provenance& provenance = {}) {
-  return to_html(study::answer_of(result), provenance);
+  return without_scripts(to_html(study::answer_of(result), provenance));
 }
 
 bool has(const std::string& text, const std::string& part) {
@@ -97,13 +118,18 @@ TEST(Html, ATunesPageHasEverythingAndNeedsNothing) {
     expect_well_formed(page);
     expect_self_contained(page);
     for (const char* id : {"data", "gains", "plant", "controller", "robustness", "motion",
-                           "constants", "diagnostics", "origin"}) {
+                           "constants", "next", "diagnostics", "origin"}) {
       EXPECT_TRUE(has(page, std::string("<section id=\"") + id + "\"")) << id;
       EXPECT_TRUE(has(page, std::string("href=\"#") + id + "\"")) << id;
     }
-    // Four runs, the pole map, the closed loop, the estimate; each with words for it.
-    EXPECT_EQ(occurrences(page, "<svg"), 7u);
-    EXPECT_EQ(occurrences(page, "role=\"img\" aria-label=\""), 7u);
+    // Each with words for it.
+    const std::size_t figures = study::answer_of(result).figures.size();
+    EXPECT_EQ(occurrences(page, "<svg"), figures);
+    EXPECT_EQ(occurrences(page, "role=\"img\" aria-label=\""), figures);
+    for (const char* name : {"intervals", "fit_1_quasistatic-forward", "fit_3_dynamic-forward",
+                             "poles", "small_step", "bode", "nyquist", "closed_loop", "estimate"}) {
+      EXPECT_TRUE(has(page, std::string(" data-name=\"") + name + "\"")) << name;
+    }
     EXPECT_EQ(occurrences(page, "<details>"), 6u);
     EXPECT_TRUE(has(page, "flyball tune lift.wpilog"));
     EXPECT_TRUE(has(page, "prefers-color-scheme:dark"));
@@ -155,7 +181,23 @@ TEST(Html, ADesignThatIsRefusedKeepsTheIdentification) {
   expect_well_formed(page);
   EXPECT_TRUE(has(page, "No controller"));
   EXPECT_TRUE(has(page, "the motor cannot hold the mechanism"));
-  EXPECT_EQ(occurrences(page, "<svg"), 4u);
+  EXPECT_TRUE(has(page, "<li>No controller could be designed"));
+  EXPECT_EQ(occurrences(page, "<svg"), study::answer_of(result.identification).figures.size());
+}
+
+// It must need no network, whatever a script or a text in it says.
+TEST(Html, ThePageForbidsItselfTheNetworkAndHoldsItsScripts) {
+  const Answer answer = study::answer_of(design_result(MechanismKind::arm));
+  const std::string page = to_html(answer);
+  EXPECT_TRUE(has(page, "http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "));
+  EXPECT_EQ(occurrences(page, std::string(page_script)), 1u);
+  EXPECT_EQ(occurrences(page, std::string(dygraphs_script)), 1u);
+  EXPECT_EQ(dygraphs_script.find("</script"), std::string_view::npos);
+  EXPECT_EQ(page_script.find("</script"), std::string_view::npos);
+  EXPECT_EQ(occurrences(page, "type=\"application/json\""), answer.figures.size());
+  Answer words = answer;
+  words.figures.clear();
+  EXPECT_FALSE(has(to_html(words), "<script"));
 }
 
 TEST(Html, NoNaNIsPrintedAsANumber) {

@@ -208,6 +208,14 @@ TEST_F(WriteReport, AGnuplotThatHangsCostsThePicturesAndABoundedTime) {
   EXPECT_EQ(written->problems.size(), pictures.size());
   EXPECT_EQ(files_in(folder()).count("index.html"), 1u);
   EXPECT_EQ(files_in(folder()).count("pictures/poles.svg"), 0u);
+  // The page says so once on top, and still has its data, tables and interactive plots.
+  const std::string page = text_of(folder() + "/index.html");
+  const std::size_t said = page.find(" still pictures could not be drawn: ");
+  ASSERT_NE(said, std::string::npos);
+  EXPECT_LT(said, page.find("<main>"));
+  EXPECT_NE(page.find("data-name=\"poles\""), std::string::npos);
+  EXPECT_NE(page.find("\"title\":\"Poles in the z plane\""), std::string::npos);
+  EXPECT_EQ(page.find("<svg"), page.find("<svg", page.find("<script>"))) << "in scripts alone";
 }
 
 TEST_F(WriteReport, AnEarlierReportIsReplacedAndNothingElse) {

@@ -79,8 +79,13 @@ struct Code {
   std::string file{};  ///< Its name in the report's folder.
 };
 
+/// What to do, one thing after the other.
+struct Steps {
+  std::vector<std::string> steps{};
+};
+
 /// What a section is made of.
-using Block = std::variant<Facts, Table, Paragraph, Findings, Code>;
+using Block = std::variant<Facts, Table, Paragraph, Findings, Code, Steps>;
 
 /// A part of an answer under its title.
 struct Section {
