@@ -151,6 +151,8 @@ Expected<LoopStep> step_of(const RunningLoop& loop, const MatrixRef& F) {
   const auto count = static_cast<std::size_t>(y.size());
   FLYBALL_TRY(step.metrics,
               response_metrics({response.time.data(), count}, {y.data(), count}, step.final_value));
+  step.time.assign(response.time.data(), response.time.data() + count);
+  step.values.assign(y.data(), y.data() + count);
   return step;
 }
 

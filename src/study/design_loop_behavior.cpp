@@ -91,7 +91,37 @@ Expected<LoopBehavior> behavior_of(const LoopDesign& loop, const LinearModel& mo
   behavior.rise_time = step.metrics.rise_time_10_90;
   behavior.settling_time = step.metrics.settling_time;
   behavior.overshoot = step.metrics.overshoot;
+  if (std::abs(step.final_value) > 0.0) {
+    behavior.step_time = step.time;
+    behavior.step = step.values;
+    for (double& value : behavior.step) {
+      value /= step.final_value;
+    }
+  }
   return behavior;
+}
+
+Expected<std::vector<LoopPoint>> frequency_response(const LoopDesign& loop,
+                                                    const LinearModel& model,
+                                                    const DesignJob& job) {
+  const auto& [believed, K, K_e] = loop.regulator;
+  FLYBALL_TRY(const auto opened,
+              observer_regulator_loop(model.A, model.B, model.C, believed, K, K_e, delay_of(job)));
+  constexpr int points = 300;
+  constexpr double decades = 3.0;
+  const double nyquist = std::numbers::pi / job.controller.period;
+  std::vector<LoopPoint> response;
+  for (int i = 0; i < points; ++i) {
+    const double frequency = nyquist * std::pow(10.0, decades * (i / (points - 1.0) - 1.0));
+    FLYBALL_TRY(const auto gain, loop_response(opened, std::min(frequency, nyquist)));
+    LoopPoint point{frequency, std::abs(gain), std::arg(gain)};
+    if (!response.empty()) {
+      const double turn = 2.0 * std::numbers::pi;
+      point.phase += turn * std::round((response.back().phase - point.phase) / turn);
+    }
+    response.push_back(point);
+  }
+  return response;
 }
 
 Expected<void> tell_cost_of_delay(const LoopDesign& loop, const LoopBehavior& runs,

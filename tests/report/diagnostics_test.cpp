@@ -154,10 +154,12 @@ TEST(Diagnostics, OfADrivetrain) {
   const Answer answer = study::answer_of(drive_result(false));
   EXPECT_FALSE(answer.refusal);
   expect_nothing_lost(answer, {"source", "fit"});
-  // Left, right, heading and the voltages of each test.
-  ASSERT_EQ(answer.figures.size(), 8u);
-  EXPECT_EQ(answer.figures[0].plot.panels.size(), 4u);
-  EXPECT_EQ(answer.figures[0].plot.panels[2].lines.size(), 2u);
+  // The gains' intervals; left, right, heading and the voltages of each of eight tests, and the
+  // transients of the four steps.
+  ASSERT_EQ(answer.figures.size(), 13u);
+  EXPECT_EQ(answer.figures[0].name, "intervals");
+  EXPECT_EQ(answer.figures[1].plot.panels.size(), 4u);
+  EXPECT_EQ(answer.figures[1].plot.panels[2].lines.size(), 2u);
   EXPECT_EQ(answer.files.size(), 8u);
 }
 

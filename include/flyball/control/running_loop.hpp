@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include <flyball/control/response_metrics.hpp>
 #include <flyball/systems/system.hpp>
 
@@ -30,8 +32,10 @@ struct RunningLoop {
 
 /// What a loop does when its reference steps.
 struct LoopStep {
-  double final_value = 0.0;   ///< Where the output ends, of a step of one.
-  ResponseMetrics metrics{};  ///< Against that final value, sampled each period.
+  double final_value = 0.0;      ///< Where the output ends, of a step of one.
+  ResponseMetrics metrics{};     ///< Against that final value, sampled each period.
+  std::vector<double> time{};    ///< s, from the step on, each period.
+  std::vector<double> values{};  ///< Of the output, as many.
 };
 
 /// The small-signal step of a loop's first output, until what is left of it is below 1e-9, for at

@@ -88,6 +88,8 @@ struct LoopBehavior {
   std::optional<double> rise_time{};      ///< s, of a small step from 10 % to 90 %.
   std::optional<double> settling_time{};  ///< s, until it stays within 2 % of its end.
   double overshoot = 0.0;                 ///< As a share of the step.
+  std::vector<double> step_time{};        ///< s, each period of the small step.
+  std::vector<double> step{};             ///< The controlled output over where it ends.
 };
 
 /// Robustness of the loop broken at the plant input, with the delay in it. Without a kA the worst
@@ -99,6 +101,13 @@ struct LoopMargins {
   double delay_margin = 0.0;    ///< s, further delay that is tolerated.
   double disk_margin = 0.0;     ///< Symmetric disk margin α.
   double crossover = 0.0;       ///< rad/s, gain crossover that limits the phase; 0 if none.
+};
+
+/// The loop opened at the plant input, with the delay in it, at one frequency.
+struct LoopPoint {
+  double frequency = 0.0;  ///< rad/s, below Nyquist's.
+  double gain = 0.0;       ///< |L|
+  double phase = 0.0;      ///< rad, of L, continuous along the frequencies.
 };
 
 /// One point of the grid over inertia and gain errors.
@@ -157,6 +166,7 @@ struct DesignResult {
   bool feedback = true;       ///< Whether the gain makes a difference anywhere below Nyquist.
   std::string no_feedback{};  ///< Why there is none.
   LoopMargins margins;
+  std::vector<LoopPoint> frequency_response{};  ///< On the model; empty without feedback.
   std::vector<RobustnessPoint> robustness{};
   bool robust = false;  ///< Whether every point of the grid is stable.
   double worst_overshoot = 0.0;

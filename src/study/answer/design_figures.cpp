@@ -15,6 +15,9 @@ namespace flyball::study {
 
 namespace {
 
+/// Of the pictures of one simulated motion.
+constexpr const char* motion_clock = "motion";
+
 /// A column of the response, and how it is drawn.
 struct Curve {
   std::string column;
@@ -52,12 +55,13 @@ Figure response_figure(const DesignResult& result) {
                                                           : "Closed loop: a trapezoid",
                             "Reference, truth and estimate of the simulated closed loop with "
                             "noise, delay and battery sag, and the voltage it takes.");
+  figure.plot.clock = motion_clock;
   std::vector<PlotPanel>& panels = figure.plot.panels;
   for (const Coordinate& state : controlled(plant)) {
     panels.push_back(response_panel(
         series, {text::capitalized(state.name), state.unit},
         {{state.name, "truth", measured_color},
-         {"estimated_" + state.name, "estimate", quiet_color},
+         {"estimated_" + state.name, "estimate", quiet_color, LineStyle::dotted},
          {"reference_" + state.name, "reference", simulated_color, LineStyle::dashed}}));
   }
   panels.push_back(response_panel(series, {"Voltage", "V"},
@@ -74,6 +78,7 @@ Figure estimate_figure(const DesignResult& result) {
   Figure figure = over_time("motion", "estimate", "Estimate against truth",
                             "Errors of the simulated closed loop: the estimate less the truth, and "
                             "the reference less the truth.");
+  figure.plot.clock = motion_clock;
   for (const Coordinate& state : controlled(result.job.plant)) {
     const std::vector<double>* truth = series.find(state.name);
     if (truth == nullptr) {
@@ -104,7 +109,9 @@ Figure pole_figure(const DesignResult& result) {
   return {
       "controller", "poles", title,
       "Poles of the loop as it runs, with observer and delay, beside those of the design and of "
-      "the estimator; inside the unit circle is stable, nearer to the origin is faster.",
+      "the estimator; inside the unit circle is stable, nearer to the origin is faster. The grey "
+      "grid: equal damping ratios ζ, and natural frequencies of 0.2, 0.4, … of half the sampling "
+      "frequency.",
       pole_plot(title,
                 {{"running loop", list(result.loop.poles), {}},
                  {"undelayed design", list(result.poles), {}},
@@ -116,8 +123,15 @@ Figure pole_figure(const DesignResult& result) {
 
 std::vector<Figure> figures_of(const DesignResult& result) {
   std::vector<Figure> figures{pole_figure(result)};
+  append(figures, loop_figures(result));
   if (result.response.rows() > 0) {
     figures.push_back(response_figure(result));
+    const std::string& shown = controlled(result.job.plant).back().name;
+    if (const std::vector<double>* truth = result.response.find(shown)) {
+      if (const auto stretch = transient_of(result.response.time(), *truth)) {
+        figures.push_back(transient(figures.back(), *stretch));
+      }
+    }
     figures.push_back(estimate_figure(result));
   }
   return figures;
@@ -125,6 +139,19 @@ std::vector<Figure> figures_of(const DesignResult& result) {
 
 std::vector<AnswerFile> data_files(const DesignResult& result) {
   std::vector<AnswerFile> files;
+  if (!result.loop.step.empty()) {
+    TimeSeries step(result.loop.step_time);
+    static_cast<void>(step.add("share_of_step", "", result.loop.step));
+    files.push_back({"data/small_step.csv", to_csv(step)});
+  }
+  if (!result.frequency_response.empty()) {
+    std::string loop = "frequency_rad_per_s,gain,phase_rad\n";
+    for (const LoopPoint& point : result.frequency_response) {
+      loop += fmt::format("{},{},{}\n", text::exact(point.frequency), text::exact(point.gain),
+                          text::exact(point.phase));
+    }
+    files.push_back({"data/loop_response.csv", std::move(loop)});
+  }
   if (result.response.rows() > 0) {
     files.push_back({"data/closed_loop.csv", to_csv(result.response)});
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +17,7 @@ constexpr int measured_color = 0;
 constexpr int simulated_color = 1;
 constexpr int quiet_color = 2;
 constexpr int voltage_color = 3;
+constexpr int unused_color = 6;
 
 /// A picture over time, without panels yet.
 [[nodiscard]] inline Figure over_time(std::string section, std::string name, std::string title,
@@ -43,5 +45,16 @@ constexpr int voltage_color = 3;
   }
   return made;
 }
+
+/// Times counted from a beginning.
+[[nodiscard]] std::vector<double> since(double beginning, const std::vector<double>& time);
+
+/// Where four fifths of a curve's ups and downs are, with some room, if that is less than a quarter
+/// of its time: too short to be read where the whole is shown.
+[[nodiscard]] std::optional<PlotLimits> transient_of(const std::vector<double>& time,
+                                                     const std::vector<double>& value);
+
+/// A stretch of a figure over time as a figure of its own, "…, its transient".
+[[nodiscard]] Figure transient(const Figure& whole, const PlotLimits& stretch);
 
 }  // namespace flyball::study

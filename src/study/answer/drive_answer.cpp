@@ -26,10 +26,12 @@ std::string run_name(std::string_view prefix, std::size_t index, const DriveRun&
 }
 
 PlotPanel compared(const Coordinate& shown, const FittedDriveRun& run,
-                   const std::vector<double>& measured, const std::vector<double>& simulated) {
-  std::vector<PlotLine> lines{line("measured", run.time, measured, measured_color)};
+                   const std::vector<double>& measured, const std::vector<double>& simulated,
+                   double begin) {
+  const std::vector<double> time = since(begin, run.time);
+  std::vector<PlotLine> lines{line("measured", time, measured, measured_color)};
   if (!simulated.empty()) {
-    lines.push_back(line("simulated", run.time, simulated, simulated_color));
+    lines.push_back(line("simulated", time, simulated, simulated_color, LineStyle::dashed));
   }
   return panel(shown, std::move(lines));
 }
@@ -43,17 +45,20 @@ Figure drive_figure(const DriveReport& report, const FittedDriveRun& fitted, std
       fitted.used ? "Measured velocities and heading against those that the whole model makes in "
                     "free run from both recorded voltages, and the voltages."
                   : "Velocities, heading and voltages as the log has them.");
-  figure.plot.panels = {
-      compared({"Left velocity", rate}, fitted, fitted.left_velocity, fitted.left_velocity_hat),
-      compared({"Right velocity", rate}, fitted, fitted.right_velocity, fitted.right_velocity_hat)};
+  const double begin = run.time.empty() ? 0.0 : run.time.front();
+  const std::vector<double> time = since(begin, run.time);
+  figure.plot.panels = {compared({"Left velocity", rate}, fitted, fitted.left_velocity,
+                                 fitted.left_velocity_hat, begin),
+                        compared({"Right velocity", rate}, fitted, fitted.right_velocity,
+                                 fitted.right_velocity_hat, begin)};
   if (!fitted.heading.empty()) {
     figure.plot.panels.push_back(
-        compared({"Heading", "rad"}, fitted, fitted.heading, fitted.heading_hat));
+        compared({"Heading", "rad"}, fitted, fitted.heading, fitted.heading_hat, begin));
   }
   figure.plot.panels.push_back(
       panel({"Voltage", "V"},
-            {line("left", run.time, run.left.voltage, voltage_color),
-             line("right", run.time, run.right.voltage, quiet_color, LineStyle::dashed)},
+            {line("left", time, run.left.voltage, voltage_color),
+             line("right", time, run.right.voltage, quiet_color, LineStyle::dashed)},
             true));
   return figure;
 }
@@ -193,8 +198,26 @@ void write_drive(JsonWriter& json, const IdentifyResult& result) {
 std::vector<Figure> drive_figures(const IdentifyResult& result) {
   const DriveReport& report = *result.drive;
   std::vector<Figure> figures;
+  if (report.fit) {
+    std::vector<std::pair<std::string, const FeedforwardFit*>> fits;
+    for (const auto& [prefix, fit] :
+         {std::pair{"linear ", &report.fit->linear}, std::pair{"angular ", &report.fit->angular}}) {
+      if (*fit) {
+        fits.emplace_back(prefix, &**fit);
+      }
+    }
+    figures = interval_figures(fits);
+  }
   for (std::size_t i = 0; i < report.runs.size(); ++i) {
-    figures.push_back(drive_figure(report, report.runs[i], i));
+    const FittedDriveRun& run = report.runs[i];
+    figures.push_back(drive_figure(report, run, i));
+    if (run.time.empty()) {
+      continue;
+    }
+    const double begin = report.recording.runs[i].time.front();
+    if (const auto stretch = transient_of(since(begin, run.time), run.left_velocity_hat)) {
+      figures.push_back(transient(figures.back(), *stretch));
+    }
   }
   return figures;
 }

@@ -63,6 +63,8 @@ Figure states_figure(const Estimation& result, const EstimatedRun& run) {
                             result.model.names().name,
                             is_smoothed(run) ? ", of the filter and of the smoother" : ""));
   const std::vector<Coordinate>& states = result.model.names().states;
+  const Row time = since(run.time.front(), run.time);
+  figure.plot.clock = run.name;
   for (std::size_t i = 0; i < states.size(); ++i) {
     const auto k = static_cast<Index>(i);
     PlotPanel shown = panel(states[i], {});
@@ -70,16 +72,15 @@ Figure states_figure(const Estimation& result, const EstimatedRun& run) {
       PlotLine readings{.label = "measured", .style = LineStyle::points, .color = quiet_color};
       for (std::size_t s = 0; s < run.time.size(); ++s) {
         if (const double y = run.measured(output, static_cast<Index>(s)); !std::isnan(y)) {
-          readings.x.push_back(run.time[s]);
+          readings.x.push_back(time[s]);
           readings.y.push_back(y);
         }
       }
       shown.lines.push_back(std::move(readings));
     }
     const auto add = [&](const char* name, const MatrixXd& x, const MatrixXd& std, int color) {
-      shown.lines.push_back(line(name, run.time, row(x, k), color));
-      shown.bands.push_back(
-          {"± 2 σ", run.time, row(x - band * std, k), row(x + band * std, k), color});
+      shown.lines.push_back(line(name, time, row(x, k), color));
+      shown.bands.push_back({"± 2 σ", time, row(x - band * std, k), row(x + band * std, k), color});
     };
     add("filter", run.filtered, run.filtered_std, simulated_color);
     if (is_smoothed(run)) {
@@ -96,12 +97,13 @@ Figure innovations_figure(const Estimation& result, const EstimatedRun& run) {
                             "What each reading differs from the filter's prediction, in standard "
                             "deviations: 95 % of right ones are between the lines.");
   const std::vector<Coordinate>& outputs = result.model.names().outputs;
+  figure.plot.clock = run.name;
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     PlotLine points{.style = LineStyle::points, .color = measured_color};
     for (std::size_t k = 0; k < run.time.size(); ++k) {
       const double value = run.innovations(static_cast<Index>(i), static_cast<Index>(k));
       if (!std::isnan(value)) {
-        points.x.push_back(run.time[k]);
+        points.x.push_back(run.time[k] - run.time.front());
         points.y.push_back(value);
       }
     }

@@ -1,6 +1,7 @@
 // Pictures and tables of a log and its fit.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include <fmt/format.h>
 
@@ -42,23 +43,87 @@ std::string by_hand(const TestRun& run) {
   return fmt::format(", {} to {} by hand", text::seconds(run.from), text::seconds(end));
 }
 
-Figure fitted_figure(const IdentifyResult& result, const FittedRun& run, const TestRun& recorded) {
+/// When the test began, on the log's clock: its first row, also one that a person cut.
+double beginning(const PreparedRun& prepared) {
+  const TestRun& run = prepared.run;
+  return run.time.empty() ? 0.0 : run.time.front() - (prepared.begins_cut ? run.from : 0.0);
+}
+
+/// The rows of a run's window that have a residual: those with a new value, not where the sensors
+/// look back before the start of a run that begins in motion.
+std::vector<std::size_t> compared_rows(const PreparedRun& prepared, const FittedRun& run) {
+  const double settling = prepared.starts_at_rest ? 0.0 : identification::FitOptions().settling;
+  std::vector<std::size_t> rows;
+  std::copy_if(run.fresh.begin(), run.fresh.end(), std::back_inserter(rows),
+               [&](std::size_t row) { return run.time[row] >= run.time.front() + settling; });
+  return rows;
+}
+
+constexpr const char* not_used = "not used by the fit";
+
+/// The rows of a velocity that the fit did not use, as far as the axis of the used ones shows them:
+/// where a mechanism stalls or falls, they would leave nothing of the others.
+PlotLine unused_rows(const PreparedRun& prepared, const FittedRun& run, double begin) {
+  const std::vector<double>& velocity =
+      prepared.run.velocity.empty() ? prepared.smoothed_velocity : prepared.run.velocity;
+  const auto [least, greatest] = std::minmax_element(run.velocity.begin(), run.velocity.end());
+  const double room = 0.5 * (*greatest - *least);
+  PlotLine rows{.label = not_used, .style = LineStyle::dotted, .color = unused_color};
+  for (std::size_t i = 0; i < std::min(velocity.size(), prepared.run.time.size()); ++i) {
+    const double time = prepared.run.time[i];
+    const bool used = time > run.time.front() && time < run.time.back();
+    const bool shown = velocity[i] >= *least - room && velocity[i] <= *greatest + room;
+    rows.x.push_back(time - begin);
+    rows.y.push_back(!used && shown ? velocity[i] : NAN);
+  }
+  return rows;
+}
+
+/// Whole, as recorded; what the fit did not use is marked, and has no residual.
+Figure fitted_figure(const IdentifyResult& result, const FittedRun& run,
+                     const PreparedRun& prepared) {
   const std::string rate = result.unit + "/s";
+  const TestRun& recorded = prepared.run;
+  const double begin = beginning(prepared);
+  const std::vector<double> time = since(begin, run.time);
+  const std::vector<double> whole = since(begin, recorded.time);
+  const std::vector<std::size_t> compared = compared_rows(prepared, run);
   Figure figure = over_time(
       "gains", run_name("fit", run.source, run.kind),
       fmt::format("Run {}: {}{}", run.source + 1, to_string(run.kind), by_hand(recorded)),
-      fmt::format("Measured velocity against the velocity simulated in free run from the recorded "
-                  "voltage, their difference where the velocity is new, and "
-                  "the voltage, over {}.",
-                  text::seconds(run.time.empty() ? 0.0 : run.time.back() - run.time.front())));
+      fmt::format("Measured velocity and, dashed, the velocity simulated in free run from the "
+                  "recorded voltage; their difference in the rows that the fit compares; the "
+                  "voltage. Time counts from the start of the test; the fit uses {} of its {}.",
+                  text::seconds(time.back() - time.front()),
+                  text::seconds(whole.back() - whole.front())));
+  std::vector<PlotSpan> unused;
+  if (time.front() > whole.front()) {
+    unused.push_back({whole.front(), time.front(), not_used});
+  }
+  if (time.back() < whole.back()) {
+    unused.push_back({time.back(), whole.back(), not_used});
+  }
+  PlotPanel velocity = panel({"Velocity", rate}, {});
+  if (!unused.empty()) {
+    velocity.lines.push_back(unused_rows(prepared, run, begin));
+  }
+  velocity.lines.push_back(line("measured", time, run.velocity, measured_color));
+  velocity.lines.push_back(
+      line("simulated", time, run.velocity_hat, simulated_color, LineStyle::dashed));
   figure.plot.panels = {
-      panel({"Velocity", rate}, {line("measured", run.time, run.velocity, measured_color),
-                                 line("simulated", run.time, run.velocity_hat, simulated_color)}),
+      std::move(velocity),
       panel({"Residual", rate},
-            {line("measured − simulated", at_rows(run.time, run.fresh),
-                  at_rows(run.velocity_residual, run.fresh), quiet_color)},
+            {line("measured − simulated", at_rows(time, compared),
+                  at_rows(run.velocity_residual, compared), quiet_color)},
             true),
-      panel({"Voltage", "V"}, {line("", run.time, run.voltage, voltage_color)}, true)};
+      panel({"Voltage", "V"}, {line("", whole, recorded.voltage, voltage_color)}, true)};
+  for (PlotPanel& shown : figure.plot.panels) {
+    shown.spans = unused;
+  }
+  // The curves say it themselves where they are drawn.
+  for (PlotSpan& span : figure.plot.panels.front().spans) {
+    span.label.clear();
+  }
   return figure;
 }
 
@@ -67,10 +132,12 @@ Figure recorded_figure(const IdentifyResult& result, const PreparedRun& prepared
   Figure figure = over_time("data", run_name("recorded", prepared.source, run.kind),
                             fmt::format("Run {}: {}, as recorded{}", prepared.source + 1,
                                         to_string(run.kind), by_hand(run)),
-                            "Voltage, velocity and position as the log has them.");
+                            "Voltage, velocity and position as the log has them; time counts from "
+                            "the start of the test.");
+  const std::vector<double> time = since(beginning(prepared), run.time);
   const auto add = [&](const Coordinate& shown, const std::vector<double>& values, int color) {
     if (!values.empty()) {
-      figure.plot.panels.push_back(panel(shown, {line("", run.time, values, color)}));
+      figure.plot.panels.push_back(panel(shown, {line("", time, values, color)}));
     }
   };
   add({"Voltage", "V"}, run.voltage, voltage_color);
@@ -114,12 +181,20 @@ std::vector<Figure> figures_of(const IdentifyResult& result) {
     return drive_figures(result);
   }
   std::vector<Figure> figures;
+  if (result.report.fit) {
+    figures = interval_figures({{"", &*result.report.fit}});
+  }
   for (const PreparedRun& prepared : shown_runs(result)) {
     const FittedRun* fitted = fitted_run(result, prepared.source);
     const bool simulated = fitted != nullptr && fitted->used && !fitted->time.empty() &&
                            fitted->velocity_hat.size() == fitted->time.size();
-    figures.push_back(simulated ? fitted_figure(result, *fitted, prepared.run)
+    figures.push_back(simulated ? fitted_figure(result, *fitted, prepared)
                                 : recorded_figure(result, prepared));
+    if (const auto stretch =
+            simulated ? transient_of(since(beginning(prepared), fitted->time), fitted->velocity_hat)
+                      : std::nullopt) {
+      figures.push_back(transient(figures.back(), *stretch));
+    }
   }
   return figures;
 }

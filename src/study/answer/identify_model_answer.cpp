@@ -107,19 +107,20 @@ Figure run_figure(const ModelIdentification& result, const RunFit& fit, const Ex
       "model", name, text::capitalized(fit.name),
       fmt::format("Measured and simulated outputs of {}, and their difference.", result.name));
   const std::vector<Coordinate>& outputs = result.fit.model.names().outputs;
+  const std::vector<double> time = since(run.time.empty() ? 0.0 : run.time.front(), run.time);
   for (std::size_t p = 0; p < outputs.size(); ++p) {
     const auto row = [&](const Eigen::MatrixXd& M) {
       const Eigen::VectorXd values = M.row(static_cast<Eigen::Index>(p));
       return std::vector<double>(values.begin(), values.end());
     };
-    made.plot.panels.push_back(panel(
-        outputs[p],
-        {line("measured", run.time, row(run.outputs), measured_color),
-         line("simulated", run.time, row(fit.simulated), simulated_color, LineStyle::dashed)}));
+    made.plot.panels.push_back(
+        panel(outputs[p],
+              {line("measured", time, row(run.outputs), measured_color),
+               line("simulated", time, row(fit.simulated), simulated_color, LineStyle::dashed)}));
     Coordinate error = outputs[p];
     error.name += " error";
     made.plot.panels.push_back(
-        panel(error, {line("", run.time, row(fit.residuals), quiet_color)}, true));
+        panel(error, {line("", time, row(fit.residuals), quiet_color)}, true));
   }
   return made;
 }

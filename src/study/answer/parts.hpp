@@ -3,6 +3,7 @@
 #include <iterator>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <flyball/io/json_writer.hpp>
@@ -65,9 +66,16 @@ void add_warnings(Verdict& verdict, const std::vector<Diagnostic>& diagnostics,
 
 [[nodiscard]] Document document_of(const ModelAnalysis& result);
 
+/// One picture of the intervals of all gains that are determined; none if none is.
+/// @param fits  Each with what stands before its gains' names.
+[[nodiscard]] std::vector<Figure> interval_figures(
+    const std::vector<std::pair<std::string, const identification::FeedforwardFit*>>& fits);
+/// Bode plot and Nyquist curve of the opened loop, and its small step.
+[[nodiscard]] std::vector<Figure> loop_figures(const DesignResult& result);
+
 /// Each run, measured against simulated; as recorded where nothing was simulated.
 [[nodiscard]] std::vector<Figure> figures_of(const IdentifyResult& result);
-/// Pole map, closed-loop response, estimate against truth.
+/// Pole map, Bode plot, Nyquist curve, small step, closed-loop response, estimate against truth.
 [[nodiscard]] std::vector<Figure> figures_of(const DesignResult& result);
 /// Pole map and step responses.
 [[nodiscard]] std::vector<Figure> figures_of(const ModelAnalysis& result);
