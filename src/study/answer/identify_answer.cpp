@@ -235,7 +235,7 @@ Answer answer_of(const IdentifyResult& result) {
   Document& document = answer.document;
   document.title = title_of(kind_of(result), result.source.subject, result.source.path);
   document.verdict = verdict_of(result);
-  document.sections = {data_section(result), gains_section(result),
+  document.sections = {data_section(result), gains_section(result), next_steps(result, nullptr),
                        diagnostics_section(result.diagnostics())};
   document.origins.add("log", result.source.path);
   answer.figures = figures_of(result);

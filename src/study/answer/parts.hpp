@@ -72,6 +72,11 @@ void add_warnings(Verdict& verdict, const std::vector<Diagnostic>& diagnostics,
     const std::vector<std::pair<std::string, const identification::FeedforwardFit*>>& fits);
 /// Bode plot and Nyquist curve of the opened loop, and its small step.
 [[nodiscard]] std::vector<Figure> loop_figures(const DesignResult& result);
+/// "What to do next", in plain words. @param design  Null: none was made of the gains.
+/// @param refused  Whether one was asked for.
+[[nodiscard]] Section next_steps(const IdentifyResult& result, const DesignResult* design,
+                                 bool refused = false);
+[[nodiscard]] Section next_steps(const DesignResult& result);
 
 /// Each run, measured against simulated; as recorded where nothing was simulated.
 [[nodiscard]] std::vector<Figure> figures_of(const IdentifyResult& result);

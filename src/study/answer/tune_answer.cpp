@@ -85,7 +85,7 @@ Answer answer_of(const TuneResult& result) {
   answer.refusal = refusal_of(result);
   Document& document = answer.document;
   document.verdict = verdict_of(result);
-  document.sections.pop_back();  // of the log's diagnostics alone
+  document.sections.resize(2);  // of the log; what is to do and was noticed follows from both
   if (result.drive) {
     add_drive_design(answer, result);
   } else if (const DesignResult* design = design_in(result)) {
@@ -102,6 +102,8 @@ Answer answer_of(const TuneResult& result) {
          "Controller",
          {Paragraph{"No controller: " + to_string(result.design->error()) + ".", Tone::bad}}});
   }
+  document.sections.push_back(
+      next_steps(result.identification, design_in(result), result.design && !*result.design));
   document.sections.push_back(diagnostics_section(diagnostics_of(result)));
   return answer;
 }
