@@ -186,7 +186,8 @@ ExpectedAll<IdentifyLogsResult> identify_drive_logs(
     fits.push_back(*logs[log].drive);
   }
   FLYBALL_TRY(auto gains, identification::compare_fits(fits));
-  recording::LoadedRecording source{.path = fmt::format("{} logs", used.size())};
+  recording::LoadedRecording source;
+  source.path = fmt::format("{} logs", used.size());
   FLYBALL_TRY(source.drive, identification::joined(recordings));
   IdentifyLogsResult result{.logs = std::move(logs),
                             .used = std::move(used),
