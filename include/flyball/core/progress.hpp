@@ -15,6 +15,7 @@ struct Progress {
 /// @param stage  A text that stays, a literal.
 void tell_progress(const char* stage, std::size_t done = 0, std::size_t of = 0) noexcept;
 
+/// What was told last; from any thread.
 [[nodiscard]] Progress progress() noexcept;
 
 }  // namespace flyball
