@@ -335,8 +335,9 @@ class Script {
       }
       const std::string label = literal(mark.label);
       if (mark.vertical) {
-        fmt::format_to(out(), "set label {} at first {}, graph 0.96 left offset character 0.5, 0",
-                       label, mark.at);
+        const bool at_end = mark.at > end_of_labels();
+        fmt::format_to(out(), "set label {} at first {}, graph 0.96 {} offset character {}, 0",
+                       label, mark.at, at_end ? "right" : "left", at_end ? -0.5 : 0.5);
       } else {
         fmt::format_to(out(),
                        "set label {} at graph 0.995, first {} right offset 0, character -0.6",
@@ -352,6 +353,13 @@ class Script {
                        literal(note.text), note.x, note.y);
       }
     }
+  }
+
+  /// Where a label that begins there may leave the box: four fifths of the x axis.
+  double end_of_labels() const {
+    constexpr double share = 0.8;
+    return plot_.log_x ? x_.low() * std::pow(x_.high() / x_.low(), share)
+                       : x_.low() + share * x_.span();
   }
 
   void draw_curves(const PlotPanel& panel) {

@@ -131,6 +131,9 @@ class Page(unittest.TestCase):
     def test_a_zoom_on_one_plot_zooms_its_neighbours(self):
         self.open()
         before = self.ranges()
+        for name, shown in before.items():
+            for panel in shown:
+                self.assertEqual(panel, shown[0], f"the panels of {name} share their axis")
         panel = self.find("[data-name=closed_loop] .panel")
         self.drag(panel, (-150, 0), (200, 0))
         zoomed = self.ranges()
@@ -318,7 +321,7 @@ class Page(unittest.TestCase):
             const panel = {y: 'y', lines: [{label: 'a', style: 'solid', color: 0, x, y}], bands: [],
                            marks: [], spans: [], notes: [], ticks: []};
             const plot = new flyball.TimePlot({title: 't', x: 'Time (s)', clock: '', panels: [panel]}, live);
-            const rows = plot.panels[0].rows(null);
+            const rows = plot.panels[0].rows(plot.extent);
             plot.show([200, 230]);
             return [rows.length, rows.some(row => row[1] === 7), rows.some(row => row[1] !== row[1]),
                     plot.panels[0].rows([100, 100.5]).filter(row => row[0] >= 100 && row[0] <= 100.5).length];""")

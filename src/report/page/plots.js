@@ -147,6 +147,12 @@ const flyball = (() => {
     return {element, at: text => { at.textContent = text; }, zoomed: yes => { back.hidden = !yes; }};
   }
 
+  /** A label to the right of a line, or to its left where there is no room. */
+  function beside(context, label, x, y, end) {
+    const wide = context.measureText(label).width + 4;
+    context.fillText(label, x + 4 + wide < end ? x + 4 : x - wide, y);
+  }
+
   /** Once a frame, however often it is asked for. */
   function each_frame(work) {
     let waiting = false;
@@ -197,5 +203,5 @@ const flyball = (() => {
     };
   }
 
-  return {all, color, lineColor, dashes, scattered, make, number, ticks, unpack, legend, bar, each_frame, touches};
+  return {all, color, lineColor, dashes, scattered, make, number, ticks, unpack, legend, bar, beside, each_frame, touches};
 })();

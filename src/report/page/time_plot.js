@@ -126,7 +126,7 @@ flyball.TimePlot = (() => {
 
     rows(range) {
       const width = Math.max(200, this.box.clientWidth) / (this.plot.clock.coarse ? 4 : 1.5);
-      const [from, to] = range || this.plot.extent;
+      const [from, to] = range;
       const parts = this.axes.map(x => {
         const own = this.series.filter(series => series.x === x);
         return {x, own, rows: chosen(x, own.map(series => series.y), from, to, width)};
@@ -194,9 +194,8 @@ flyball.TimePlot = (() => {
         reset: () => plot.reset(),
       };
       const labels = ['x', ...this.series.map((_, i) => 's' + i), ...this.levels.map((_, i) => 'm' + i)];
-      this.range = clock.range;
-      this.graph = new Dygraph(this.box, this.rows(clock.range), {
-        labels, ...this.styles(), visibility: this.visibility(), dateWindow: clock.range,
+      this.graph = new Dygraph(this.box, this.rows(plot.shown()), {
+        labels, ...this.styles(), visibility: this.visibility(), dateWindow: plot.shown(),
         ...(panel.limits ? {valueRange: panel.limits} : {}), connectSeparatedPoints: true, legend: 'never',
         highlightCircleSize: 0, gridLineWidth: 1, axisLabelFontSize: 12, yRangePad: 8, xRangePad: 0,
         xAxisHeight: last ? 22 : 8,
@@ -262,7 +261,7 @@ flyball.TimePlot = (() => {
           context.moveTo(x, area.y);
           context.lineTo(x, area.y + area.h);
           context.stroke();
-          context.fillText(mark.label, x + 4, area.y + 12);
+          flyball.beside(context, mark.label, x, area.y + 12, area.x + area.w);
         } else {
           context.textAlign = 'right';
           const y = graph.toDomYCoord(mark.at);
@@ -318,7 +317,8 @@ flyball.TimePlot = (() => {
       this.clock = clock_of(figure.clock);
       this.extent = [Infinity, -Infinity];
       for (const panel of figure.panels) {
-        for (const {x} of [...panel.lines, ...panel.bands]) {
+        const stretch = figure.logX ? [] : panel.spans.map(({from, to}) => [from, to]);
+        for (const x of [...stretch, ...panel.lines.map(line => line.x), ...panel.bands.map(band => band.x)]) {
           if (!x.length) continue;
           this.extent = [Math.min(this.extent[0], x[0]), Math.max(this.extent[1], x[x.length - 1])];
         }
@@ -331,7 +331,8 @@ flyball.TimePlot = (() => {
       this.clock.plots.push(this);
     }
 
-    /** @return What its x axis shows. */
+    /** What all of its panels show of x, also those whose curves are shorter. */
+    shown() { return this.clock.range || this.extent; }
     range() { return this.panels[0].graph.xAxisRange(); }
 
     show([from, to]) {
@@ -341,7 +342,7 @@ flyball.TimePlot = (() => {
       this.clock.show(span < last - first ? [low, low + span] : null);
     }
     moved(range) {
-      const now = this.clock.range || this.extent;
+      const now = this.shown();
       if (range[0] !== now[0] || range[1] !== now[1]) this.clock.show(range);
     }
     zoom(factor, about) {
@@ -358,7 +359,7 @@ flyball.TimePlot = (() => {
       this.clock.show(null);
     }
     refresh() {
-      this.panels.forEach(panel => panel.refresh(this.clock.range));
+      this.panels.forEach(panel => panel.refresh(this.shown()));
       this.bar.zoomed(this.clock.range !== null);
     }
     point(x) {

@@ -155,7 +155,8 @@ flyball.XyPlot = (() => {
         c.moveTo(mark.vertical ? p : area.x, mark.vertical ? area.y : p);
         c.lineTo(mark.vertical ? p : area.x + area.w, mark.vertical ? area.y + area.h : p);
         c.stroke();
-        c.fillText(mark.label, mark.vertical ? p + 4 : area.x + 6, mark.vertical ? area.y + 12 : p - 4);
+        if (mark.vertical) flyball.beside(c, mark.label, p, area.y + 12, area.x + area.w);
+        else c.fillText(mark.label, area.x + 6, p - 4);
       }
       c.setLineDash([]);
     }

@@ -83,7 +83,9 @@ Figure transient(const Figure& whole, const PlotLimits& stretch) {
     for (PlotLine& line : panel.lines) {
       keep(stretch, line.x, {&line.y});
     }
-    std::erase_if(panel.lines, [](const PlotLine& line) { return line.x.empty(); });
+    std::erase_if(panel.lines, [](const PlotLine& line) {
+      return std::none_of(line.y.begin(), line.y.end(), [](double y) { return std::isfinite(y); });
+    });
     for (PlotBand& band : panel.bands) {
       keep(stretch, band.x, {&band.low, &band.high});
     }

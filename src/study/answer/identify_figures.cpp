@@ -120,9 +120,11 @@ Figure fitted_figure(const IdentifyResult& result, const FittedRun& run,
   for (PlotPanel& shown : figure.plot.panels) {
     shown.spans = unused;
   }
-  // The curves say it themselves where they are drawn.
-  for (PlotSpan& span : figure.plot.panels.front().spans) {
-    span.label.clear();
+  // Said once; where the velocity is, its curve says it.
+  for (const std::size_t panel : {0U, 2U}) {
+    for (PlotSpan& span : figure.plot.panels[panel].spans) {
+      span.label.clear();
+    }
   }
   return figure;
 }
