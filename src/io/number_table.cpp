@@ -37,6 +37,7 @@ Expected<NumberTable> parse_number_table(std::string_view text, const std::strin
   while (!text.empty()) {
     ++number;
     const std::size_t end = std::min(text.find('\n'), text.size());
+    const bool ended = end < text.size();
     std::string_view line = io::trim(text.substr(0, end));
     text.remove_prefix(std::min(end + 1, text.size()));
     if (line.empty() || line.front() == '#' || line.front() == '%') {
@@ -45,6 +46,7 @@ Expected<NumberTable> parse_number_table(std::string_view text, const std::strin
     const std::string_view whole = line;
     std::vector<double> row;
     bool words = false;
+    bool cut = !ended && !table.rows.empty();
     while (row.size() < columns) {
       const std::string_view cell = next_cell(line);
       if (cell.empty()) {
@@ -53,12 +55,17 @@ Expected<NumberTable> parse_number_table(std::string_view text, const std::strin
       const auto value = io::parse_number(cell);
       if (!value || !std::isfinite(*value)) {
         words = true;
+        cut = cut && cell.find_first_not_of("+-.0123456789eE") == std::string_view::npos;
         break;
       }
       row.push_back(*value);
     }
     if (row.empty() && words && table.rows.empty()) {
       continue;  // The header.
+    }
+    if (row.size() < columns && cut && line.empty()) {
+      table.cut_line = number;
+      break;
     }
     if (row.size() < columns) {
       return refusal(LogError::malformed, fmt::format("{}:{}", source, number), "the row")

@@ -122,7 +122,8 @@ Expected<DriveFiles> sort_out(const LocalizeJob& job) {
   return drive;
 }
 
-Expected<NumberTable> read_table(const std::string& path, std::size_t columns) {
+Expected<NumberTable> read_table(const std::string& path, std::size_t columns,
+                                 std::vector<Diagnostic>& diagnostics) {
   FLYBALL_TRY(const std::string text, read_file(path));
   constexpr std::string_view gzip = "\x1F\x8B";
   if (text.starts_with(gzip)) {
@@ -131,7 +132,12 @@ Expected<NumberTable> read_table(const std::string& path, std::size_t columns) {
         .expected("a table of numbers")
         .hint("unpack it first: gunzip " + path);
   }
-  return parse_number_table(text, path, columns);
+  FLYBALL_TRY(NumberTable table, parse_number_table(text, path, columns));
+  if (table.cut_line > 0) {
+    warn(diagnostics, "truncated", "{}:{}: the file ends within a row, which is left out", path,
+         table.cut_line);
+  }
+  return table;
 }
 
 /// Rows in the order of their times; loggers swap neighbours.
@@ -146,12 +152,12 @@ void sort_by_time(NumberTable& table, const std::string& path,
 }
 
 Expected<void> read_log(const DriveFiles& files, LocalizeResult& result) {
-  FLYBALL_TRY(NumberTable odometry, read_table(files.odometry, 3));
+  FLYBALL_TRY(NumberTable odometry, read_table(files.odometry, 3, result.diagnostics));
   sort_by_time(odometry, files.odometry, result.diagnostics);
   for (const auto& row : odometry.rows) {
     result.log.odometry.push_back({row[0], row[1], row[2]});
   }
-  FLYBALL_TRY(const NumberTable landmarks, read_table(files.landmarks, 3));
+  FLYBALL_TRY(const NumberTable landmarks, read_table(files.landmarks, 3, result.diagnostics));
   std::map<long long, std::size_t> by_number;
   for (std::size_t i = 0; i < landmarks.rows.size(); ++i) {
     const auto& row = landmarks.rows[i];
@@ -167,12 +173,20 @@ Expected<void> read_log(const DriveFiles& files, LocalizeResult& result) {
   // A sighting names a landmark, or the barcode on it.
   std::map<long long, long long> by_barcode;
   if (!files.barcodes.empty()) {
-    FLYBALL_TRY(const NumberTable barcodes, read_table(files.barcodes, 2));
-    for (const auto& row : barcodes.rows) {
-      by_barcode[std::llround(row[1])] = std::llround(row[0]);
+    FLYBALL_TRY(const NumberTable barcodes, read_table(files.barcodes, 2, result.diagnostics));
+    for (std::size_t i = 0; i < barcodes.rows.size(); ++i) {
+      const long long number = std::llround(barcodes.rows[i][0]);
+      const long long barcode = std::llround(barcodes.rows[i][1]);
+      const auto [at, is_new] = by_barcode.emplace(barcode, number);
+      if (!is_new && at->second != number) {
+        return refusal(ArgumentError::ambiguous_name,
+                       fmt::format("{}:{}", files.barcodes, barcodes.lines[i]), "the barcode")
+            .got(fmt::format("{} for {} and for {}", barcode, at->second, number))
+            .expected("each barcode for one number");
+      }
     }
   }
-  FLYBALL_TRY(NumberTable sightings, read_table(files.sightings, 4));
+  FLYBALL_TRY(NumberTable sightings, read_table(files.sightings, 4, result.diagnostics));
   sort_by_time(sightings, files.sightings, result.diagnostics);
   std::size_t unknown = 0;
   std::size_t bad = 0;
@@ -231,10 +245,13 @@ Expected<void> check_odometry_units(const std::vector<OdometrySample>& odometry,
                                     const std::string& path) {
   constexpr double longest_period = 2.0;    // s
   constexpr double fastest_turning = 15.0;  // rad/s, most of the time
+  constexpr double fastest = 50.0;          // m/s, most of the time
   std::vector<double> apart;
   std::vector<double> turning;
+  std::vector<double> speed;
   for (std::size_t i = 0; i < odometry.size(); ++i) {
     turning.push_back(std::abs(odometry[i].turn_rate));
+    speed.push_back(std::abs(odometry[i].velocity));
     if (i > 0) {
       apart.push_back(odometry[i].time - odometry[i - 1].time);
     }
@@ -250,6 +267,12 @@ Expected<void> check_odometry_units(const std::vector<OdometrySample>& odometry,
         .got(fmt::format("above {:.4g} in a tenth of the rows", quantile(turning, 0.9)))
         .expected("rad/s")
         .hint("of degrees per second, divide by 57.3");
+  }
+  if (quantile(speed, 0.9) > fastest) {
+    return refusal(ArgumentError::wrong_unit, path, "the column of speeds")
+        .got(fmt::format("above {:.4g} in a tenth of the rows", quantile(speed, 0.9)))
+        .expected("m/s")
+        .hint("of millimetres per second, divide by 1000");
   }
   return {};
 }
@@ -275,7 +298,7 @@ void notice_calibration(const SensorCalibration& found, const LandmarkOptions& o
 }
 
 Expected<void> read_truth(const std::string& path, LocalizeResult& result) {
-  FLYBALL_TRY(NumberTable truth, read_table(path, 4));
+  FLYBALL_TRY(NumberTable truth, read_table(path, 4, result.diagnostics));
   sort_by_time(truth, path, result.diagnostics);
   const auto& log = result.log;
   for (const auto& row : truth.rows) {

@@ -43,6 +43,19 @@ TEST(NumberTable, TellsTheLineOfWhatIsWrong) {
   }
 }
 
+TEST(NumberTable, WhatPrecedesACutIsRead) {
+  for (const char* rest : {"4", "4 5", "4 -", "4 5 1e", "4 5 "}) {
+    const auto table = parse(std::string("1 2 3\n") + rest, 3);
+    ASSERT_TRUE(table) << rest << to_string(table.error());
+    EXPECT_EQ(table->rows.size(), 1U);
+    EXPECT_EQ(table->cut_line, 2);
+    EXPECT_FALSE(parse(std::string("1 2 3\n") + rest + "\n", 3)) << rest;
+  }
+  EXPECT_EQ(parse("1 2 3\n4 5 6", 3)->cut_line, 0);
+  EXPECT_FALSE(parse("1 2 3\n4 nan", 3));
+  EXPECT_FALSE(parse("4 5", 3));  // Nothing precedes it.
+}
+
 TEST(NumberTable, AnyBytesAreAnsweredOrRefused) {
   {
     const bool holds = rc::check([](const std::string& bytes) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
 #include <sstream>
 #include <string>
 
@@ -123,6 +124,29 @@ TEST_F(Localize, WhatIsLeftOutIsTold) {
   }
 }
 
+TEST_F(Localize, AFileThatIsCutOffIsReadUpToThere) {
+  const auto odometry = read_file(folder_.file("odometry.csv")).value();
+  write("odometry.csv", odometry.substr(0, odometry.rfind(',')));
+  LocalizeJob of = job();
+  of.smooth = false;
+  const auto result = localize(of);
+  ASSERT_TRUE(result) << to_string(result.error());
+  ASSERT_EQ(result->diagnostics.front().code, "truncated");
+}
+
+TEST_F(Localize, ContradictionsAreRefused) {
+  write("barcodes.csv", "1,11\n2,12\n3,11\n");
+  expect_refused(ArgumentError::ambiguous_name, "barcodes.csv:3", job());
+  remove("barcodes.csv");
+  const auto odometry = read_file(folder_.file("odometry.csv")).value();
+  write("odometry.csv", odometry + "1.2e9,0,0\n");
+  expect_refused(ArgumentError::out_of_range, "clock", job());
+  write("odometry.csv", odometry);
+  LocalizeJob of = job();
+  of.start = {0.0, std::numeric_limits<double>::quiet_NaN(), 0.0};
+  expect_refused(ArgumentError::not_finite, "start", of);
+}
+
 /// A column of the example's file in another unit.
 std::string scaled(const std::string& name, std::size_t column, double factor) {
   std::istringstream in(read_file(drive + "/" + name).value());
@@ -147,6 +171,8 @@ TEST_F(Localize, OtherUnitsAreToldOrFound) {
   write("sightings.csv", scaled("sightings.csv", 3, 1.0));
   write("odometry.csv", scaled("odometry.csv", 2, degrees));
   expect_refused(ArgumentError::wrong_unit, "turn rates", job());
+  write("odometry.csv", scaled("odometry.csv", 1, 1000.0));
+  expect_refused(ArgumentError::wrong_unit, "speeds", job());
   write("odometry.csv", scaled("odometry.csv", 0, 1000.0));
   expect_refused(ArgumentError::wrong_unit, "divide by 1000", job());
 

@@ -12,10 +12,12 @@ namespace flyball {
 struct NumberTable {
   std::vector<std::vector<double>> rows{};
   std::vector<int> lines{};  ///< Of each row, from 1.
+  int cut_line = 0;          ///< The last line, where the text ends within it; 0: it does not.
 };
 
 /// Reads rows of numbers: separated by blanks, tabs, commas or semicolons; lines that are empty,
-/// begin with '#' or '%', or are words before the first row are left out.
+/// begin with '#' or '%', or are words before the first row are left out, and so is a last line
+/// that the text ends in the middle of.
 /// @param columns  How many numbers each row has at least; what follows is left out.
 /// @errors LogError::malformed with the line: fewer numbers, words, what is not finite;
 ///         LogError::no_data without a row.
