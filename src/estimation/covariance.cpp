@@ -64,6 +64,12 @@ Expected<void> check_covariance(const MatrixRef& S, std::string_view where, std:
 
 namespace detail {
 
+Expected<void> unusable_state(std::string_view where, std::string_view name) {
+  return refusal(ArgumentError::not_finite, where, name)
+      .got("an entry that is NaN, infinite or beyond 1e100")
+      .expected("finite numbers");
+}
+
 Expected<void> unusable_covariance(std::string_view where, std::string_view name) {
   return refusal(ArgumentError::out_of_range, where, name)
       .got("a covariance that this form cannot carry")

@@ -30,6 +30,8 @@ using Covariance = MatrixArgument<struct CovarianceTag>;
 
 namespace detail {
 
+/// ArgumentError::not_finite: a state with what is no number.
+[[nodiscard]] Expected<void> unusable_state(std::string_view where, std::string_view name);
 /// ArgumentError::out_of_range: a covariance that is one, but not one that a filter can carry.
 [[nodiscard]] Expected<void> unusable_covariance(std::string_view where, std::string_view name);
 

@@ -50,8 +50,8 @@ class Estimate {
   static_assert(Form::size == size, "the covariance has a row for each entry of the state's error");
 
   /// @param P  The covariance of x_hat's error, in the frame of x_hat (`x_hat ⊕ e`); n x n.
-  /// @errors   Those of P's maker; ArgumentError::wrong_shape, not_finite, not_symmetric,
-  ///           not_positive; out_of_range for a P that the form cannot carry (of an
+  /// @errors   Those of P's maker; ArgumentError::wrong_shape, not_symmetric, not_positive,
+  ///           not_finite for either; out_of_range for a P that the form cannot carry (of an
   ///           InformationForm: one that is singular).
   [[nodiscard]] static Expected<Estimate> create(const X& x_hat, const Covariance& P) {
     const auto& given = P.get();
@@ -66,6 +66,11 @@ class Estimate {
     const auto checks = Checks("Estimate")
                             .square(*given, "P")
                             .shape(*given, n, n, "P", "states x states")
+                            .also([&]() -> Expected<void> {
+                              return detail::is_usable(x_hat, x_hat)
+                                         ? Expected<void>()
+                                         : detail::unusable_state("Estimate", "x_hat");
+                            })
                             .also([&] { return check_covariance(*given, "Estimate", "P"); })
                             .also([&]() -> Expected<void> {
                               if (form.set(Matrix(*given))) {

@@ -43,7 +43,7 @@ class MeasurementNoise {
   [[nodiscard]] const Vector& D() const noexcept { return D_; }
   /// R is diagonal.
   [[nodiscard]] bool is_diagonal() const noexcept { return diagonal_; }
-  /// R is finite and positive semidefinite.
+  /// R is finite, symmetric and positive semidefinite.
   [[nodiscard]] bool usable() const noexcept { return usable_; }
   [[nodiscard]] Eigen::Index size() const noexcept { return D_.size(); }
 
@@ -62,7 +62,7 @@ class MeasurementNoise {
     const Eigen::Index m = R_.rows();
     constexpr double eps = std::numeric_limits<double>::epsilon();
     const double rounding = 1e3 * eps * static_cast<double>(m);
-    usable_ = detail::is_variance(R_);
+    usable_ = detail::is_variance(R_) && detail::is_symmetric(R_);
     diagonal_ = true;
     L_.setIdentity(m, m);
     D_.resize(m);

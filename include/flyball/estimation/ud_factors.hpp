@@ -115,8 +115,8 @@ void ud_predict(const Matrix& A, const Matrix& G, const Vector& q, Matrix& U, Ve
 }
 
 /// The factors after one measurement c x with the noise r >= 0, and b = P cᵀ of before.
-/// @return  The innovation's variance c P cᵀ + r; the gain is b over it. Where it is zero nothing
-///          has changed.
+/// @return  The innovation's variance c P cᵀ + r; the gain is b over it. Zero where it is no number
+///          to divide by, and then the factors are of no use any more.
 template <class Row, class Matrix, class Vector>
 double ud_correct(const Row& c, double r, Matrix& U, Vector& d, Vector& b) noexcept {
   const Eigen::Index n = U.rows();
@@ -130,9 +130,9 @@ double ud_correct(const Row& c, double r, Matrix& U, Vector& d, Vector& b) noexc
     const double before = alpha;
     alpha += f * v;
     b(i) = v;
-    if (!(before > 0.0)) {
+    if (!(before >= least_divisor)) {
       // Nothing has been measured so far, and b is zero up to here.
-      d(i) = alpha > 0.0 ? 0.0 : d(i);
+      d(i) = alpha >= least_divisor ? 0.0 : d(i);
       for (Eigen::Index k = 0; k < i; ++k) {
         b(k) += U(k, i) * v;
       }
@@ -145,7 +145,7 @@ double ud_correct(const Row& c, double r, Matrix& U, Vector& d, Vector& b) noexc
       b(k) += u * v;
     }
   }
-  return alpha;
+  return is_divisor(alpha) ? alpha : 0.0;
 }
 
 }  // namespace flyball::detail

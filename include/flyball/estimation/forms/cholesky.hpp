@@ -17,6 +17,13 @@ namespace detail {
 /// without noise then still finds something to correct after each prediction.
 inline constexpr double least_variance = 1e-200;
 inline constexpr double largest_variance = 1e200;
+/// What is less counts as zero where it is divided by: its inverse may not be finite.
+inline constexpr double least_divisor = 1e-300;
+
+/// Whether an innovation of this variance can be divided by it.
+[[nodiscard]] constexpr bool is_divisor(double variance) noexcept {
+  return variance >= least_divisor && variance <= largest_variance;
+}
 
 /// Whether no entry is NaN or beyond `largest_variance`.
 template <class Derived>
@@ -25,6 +32,20 @@ template <class Derived>
   for (Eigen::Index j = 0; j < P.cols(); ++j) {
     for (Eigen::Index i = 0; i < P.rows(); ++i) {
       all = all & (__builtin_fabs(P(i, j)) <= largest_variance);
+    }
+  }
+  return all;
+}
+
+/// Whether P_ij is P_ji but for rounding, in the units of their variances.
+template <class Derived>
+[[nodiscard]] bool is_symmetric(const Eigen::MatrixBase<Derived>& P) noexcept {
+  constexpr double rounding = 1e-9;
+  bool all = true;
+  for (Eigen::Index j = 1; j < P.cols(); ++j) {
+    for (Eigen::Index i = 0; i < j; ++i) {
+      const double off = (P(i, j) - P(j, i)) / rounding;
+      all = all & (off * off <= __builtin_fabs(P(i, i) * P(j, j)));
     }
   }
   return all;

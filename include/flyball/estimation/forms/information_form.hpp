@@ -35,7 +35,7 @@ class InformationForm {
   bool set(const Matrix& P) noexcept {
     const Eigen::Index n = P.rows();
     Matrix S;
-    if (!detail::is_variance(P) || !cholesky_factor(P, S)) {
+    if (!detail::is_variance(P) || !detail::is_symmetric(P) || !cholesky_factor(P, S)) {
       return false;
     }
     // The rows of S⁻¹, one after the other.

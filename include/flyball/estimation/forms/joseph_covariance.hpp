@@ -60,7 +60,7 @@ class JosephCovariance {
   /// @param P  n x n, symmetric, positive semidefinite. @return  Whether it is and was taken.
   bool set(const Matrix& P) noexcept {
     Matrix S;
-    if (!detail::is_variance(P) || !cholesky_factor(P, S)) {
+    if (!detail::is_variance(P) || !detail::is_symmetric(P) || !cholesky_factor(P, S)) {
       return false;
     }
     P_ = P;
@@ -122,7 +122,8 @@ class JosephCovariance {
 
   /// P after one measurement h x with the noise r >= 0, P⁺ = (I - K h) P (I - K h)ᵀ + r K Kᵀ.
   /// @param h  n x 1, the row of C. @param K  n x 1, the gain P hᵀ/(h P hᵀ + r).
-  /// @return   The innovation's variance h P hᵀ + r; where it is not positive nothing has changed.
+  /// @return   The innovation's variance h P hᵀ + r; zero where it is no number to divide by, and
+  ///           then P is of no use any more: the caller has kept what it was.
   double correct(const Vector& h, double r, Vector& K) noexcept {
     const Eigen::Index n = P_.rows();
     Vector b = h;
@@ -140,9 +141,9 @@ class JosephCovariance {
       without_cancellation += h(i) * h(i) * P_(i, i);
     }
     const double variance = of_estimate + r;
-    if (!(variance > 0.0)) {
+    if (!detail::is_divisor(variance) || !(without_cancellation <= detail::largest_variance)) {
       K.setZero(n);
-      return variance;
+      return 0.0;
     }
     const double inverse = 1.0 / variance;
     for (Eigen::Index i = 0; i < n; ++i) {

@@ -27,7 +27,7 @@ class SquareRootCovariance {
   /// As JosephCovariance::set.
   bool set(const Matrix& P) noexcept {
     Matrix S;
-    const bool usable = detail::is_variance(P) && cholesky_factor(P, S);
+    const bool usable = detail::is_variance(P) && detail::is_symmetric(P) && cholesky_factor(P, S);
     if (usable) {
       S_ = S;
     }
@@ -103,6 +103,7 @@ class SquareRootCovariance {
   double correct(const Vector& h, double r, Vector& K) noexcept {
     const Eigen::Index n = S_.rows();
     double alpha = r;
+    double root = std::sqrt(r);
     Vector b = Vector::Zero(n);
     for (Eigen::Index j = n; j-- > 0;) {
       double f = 0.0;
@@ -111,26 +112,28 @@ class SquareRootCovariance {
       }
       const double before = alpha;
       alpha += f * f;
-      if (!(before > 0.0)) {
+      const double before_root = root;
+      root = std::sqrt(alpha);
+      if (!(before >= detail::least_divisor)) {
         // Nothing has been measured so far, and b is zero.
-        const bool measured = alpha > 0.0;
+        const bool measured = alpha >= detail::least_divisor;
         for (Eigen::Index i = j; i < n; ++i) {
           b(i) += S_(i, j) * f;
           S_(i, j) = measured ? 0.0 : S_(i, j);
         }
         continue;
       }
-      const double root = std::sqrt(before * alpha);
-      const double c = before / root;
-      const double g = f / root;
+      const double c = before_root / root;
+      const double g = f / (before_root * root);
       for (Eigen::Index i = j; i < n; ++i) {
         const double s = S_(i, j);
         S_(i, j) = s * c - b(i) * g;
         b(i) += s * f;
       }
     }
-    K = alpha > 0.0 ? Vector(b * (1.0 / alpha)) : b;
-    return alpha;
+    const bool usable = detail::is_divisor(alpha);
+    K = usable ? Vector(b * (1.0 / alpha)) : b;
+    return usable ? alpha : 0.0;
   }
 
   /// As JosephCovariance::scale.

@@ -45,7 +45,7 @@ class UdCovariance {
   /// As JosephCovariance::set.
   bool set(const Matrix& P) noexcept {
     Matrix S;
-    const bool usable = detail::is_variance(P) && cholesky_factor(P, S);
+    const bool usable = detail::is_variance(P) && detail::is_symmetric(P) && cholesky_factor(P, S);
     if (usable) {
       detail::ud_factorize(P, U_, d_);
     }
