@@ -161,6 +161,7 @@ class JosephCovariance {
     if (r < 1e-3 * variance) {
       stabilize(h, r, K, b, without_cancellation);
     }
+    bound_by_variances();
     return variance;
   }
 
@@ -207,8 +208,25 @@ class JosephCovariance {
           P_(i, j) = P_(j, i) = P(i, j);
         }
       }
+      bound_by_variances();
     }
     return bounded;
+  }
+  /// P_ii > 0 and |P_ij| <= √(P_ii P_jj): where numbers are as far apart as doubles can be, rounding
+  /// and underflow leave less than that.
+  void bound_by_variances() noexcept {
+    const Eigen::Index n = P_.rows();
+    for (Eigen::Index j = 0; j < n; ++j) {
+      P_(j, j) = std::max(P_(j, j), detail::least_variance);
+    }
+    for (Eigen::Index j = 0; j < n; ++j) {
+      for (Eigen::Index i = j + 1; i < n; ++i) {
+        if (P_(i, j) * P_(i, j) > P_(i, i) * P_(j, j)) [[unlikely]] {
+          const double most = std::sqrt(P_(i, i)) * std::sqrt(P_(j, j));
+          P_(i, j) = P_(j, i) = std::copysign(most, P_(i, j));
+        }
+      }
+    }
   }
 
   Matrix P_;
