@@ -151,17 +151,18 @@ class JosephCovariance {
     }
     // T = (I - K h) P
     const double allowance = rounding(n);
+    bool unstable = r < 1e-3 * variance;
     for (Eigen::Index j = 0; j < n; ++j) {
       for (Eigen::Index i = j; i < n; ++i) {
         P_(i, j) -= K(i) * b(j);
         P_(j, i) = P_(i, j);
       }
       P_(j, j) += allowance * P_(j, j) + detail::least_variance;
+      unstable = unstable | !(P_(j, j) > 0.0);
     }
-    if (r < 1e-3 * variance) {
+    if (unstable) {
       stabilize(h, r, K, b, without_cancellation);
     }
-    bound_by_variances();
     return variance;
   }
 
@@ -191,24 +192,31 @@ class JosephCovariance {
                                                             without_cancellation * K(j) * K(j));
       }
     }
+    bound_by_variances();
   }
   [[nodiscard]] static constexpr double rounding(Eigen::Index n) noexcept {
     return 2.0 * static_cast<double>(n * n) * std::numeric_limits<double>::epsilon();
   }
   /// Reads the lower triangle.
   bool take(const Matrix& P) noexcept {
+    constexpr double underflows = 1e-150;  // Its square.
     bool bounded = true;
+    bool odd = false;
     for (Eigen::Index i = 0; i < P.rows(); ++i) {
-      bounded = bounded & (P(i, i) <= detail::largest_variance);
+      bounded = bounded & (P(i, i) >= 0.0) & (P(i, i) <= detail::largest_variance);
+      odd = odd | (P(i, i) < underflows);
     }
     if (bounded) {
       P_.resize(P.rows(), P.cols());
       for (Eigen::Index j = 0; j < P.cols(); ++j) {
         for (Eigen::Index i = j; i < P.rows(); ++i) {
           P_(i, j) = P_(j, i) = P(i, j);
+          odd = odd | (P(i, j) * P(i, j) > P(i, i) * P(j, j));
         }
       }
-      bound_by_variances();
+      if (odd) [[unlikely]] {
+        bound_by_variances();
+      }
     }
     return bounded;
   }
@@ -221,10 +229,8 @@ class JosephCovariance {
     }
     for (Eigen::Index j = 0; j < n; ++j) {
       for (Eigen::Index i = j + 1; i < n; ++i) {
-        if (P_(i, j) * P_(i, j) > P_(i, i) * P_(j, j)) [[unlikely]] {
-          const double most = std::sqrt(P_(i, i)) * std::sqrt(P_(j, j));
-          P_(i, j) = P_(j, i) = std::copysign(most, P_(i, j));
-        }
+        const double most = std::sqrt(P_(i, i)) * std::sqrt(P_(j, j));
+        P_(i, j) = P_(j, i) = std::clamp(P_(i, j), -most, most);
       }
     }
   }
