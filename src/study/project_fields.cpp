@@ -101,7 +101,7 @@ constexpr std::array mechanism_fields{
     quantity("gearing", at<&MechanismParts::gearing>(), dimensionless, positive, "10.0",
              "Motor turns per output turn, > 1 is a reduction"),
     quantity("mass", at<&MechanismParts::mass>(), mass, not_negative, "\"8 kg\"",
-             "What gravity pulls"),
+             "What is moved, and gravity pulls"),
     quantity("drum_radius", at<&MechanismParts::drum_radius>(), length, positive, "\"1 in\"",
              "Radius at which the drum moves the carriage"),
     quantity("wheel_radius", at<&MechanismParts::wheel_radius>(), length, positive, "\"2 in\"",

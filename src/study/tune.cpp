@@ -88,6 +88,7 @@ ExpectedAll<TuneResult> tune(const TuneJob& job) {
   FLYBALL_TRY(auto identified, identify(job.identification));
   TuneResult result{.identification = std::move(identified)};
   if (result.identification.drive && result.identification.drive->fit) {
+    tell_progress("designs and simulates the loops of both motions");
     result.drive = design_drive(job.design, *result.identification.drive->fit);
     return result;
   }

@@ -63,6 +63,8 @@ PARTS = {
     "flywheel": 'moment_of_inertia = "0.003 kg m^2"',
     "elevator": 'mass = "8 kg"\ndrum_radius = "1 in"',
     "arm": 'moment_of_inertia = "1.1 kg m^2"\nmass = "3 kg"\ncenter_of_mass = "0.4 m"',
+    "turret": 'moment_of_inertia = "0.5 kg m^2"',
+    "swerve drive": 'mass = "15 kg"\nwheel_radius = "2 in"',
 }
 
 
@@ -98,7 +100,11 @@ def check_drivetrain(folder):
             failures.append(f"drivetrain: {name} is {gains[name]}, not {value}")
     check_answer(["identify", "straight.json"], 0, folder)
     check_answer(["identify", "turning.json"], 0, folder)
-    check_answer(["tune", "turning.json"], 1, folder)
+    check_answer(["identify", "straight.json", "turning.json"], 0, folder, "identify_logs")
+    check_answer(["tune", "turning.json"], 0, folder)
+    drive = check_answer(["tune", "straight.json", "--also", "turning.json"], 0, folder)["drive"]
+    if not drive["kP"] <= min(drive[mode]["paste"][0]["kP"] for mode in ("linear", "angular")):
+        failures.append(f"drivetrain: kP is {drive['kP']}")
     check_answer(["identify", examples / "logs/elevator.json", "--mechanism", "drivetrain"], 2, folder)
 
 
