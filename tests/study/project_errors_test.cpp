@@ -141,7 +141,7 @@ state_tolerance = ["1 m"]
       "reference",
       "p.toml:7:19: controller.state_tolerance is 1 value long; it must be one value a state (2)",
       "p.toml:7:19: controller.state_tolerance is \"1 m\", a length; it must be an angle such as "
-      "\"15 deg\""};
+      "\"15 deg\"; an angle is the way over the radius of drum or wheel"};
   std::vector<std::string> all;
   for (const char* part : {"motor is missing; an arm needs it, for example motor = \"NEO\"",
                            "gearing is missing; an arm needs it, for example gearing = 10.0",
