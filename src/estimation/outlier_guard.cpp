@@ -63,25 +63,19 @@ double OutlierGuard::weight(double distance, int freedom) const noexcept {
 double OutlierGuard::judged(double weight) noexcept {
   constexpr double hardly = 0.1;
   constexpr int convincing = 3;
+  auto& [rejected, fitting, doubting, since_fit] = memory_;
   if (weight >= hardly) {
-    rejected_ = 0;
-    since_fit_ = 0.0;
-    fitting_ = std::min(fitting_ + 1, convincing);
-    doubting_ = doubting_ && fitting_ < convincing;
+    rejected = 0;
+    since_fit = 0.0;
+    fitting = std::min(fitting + 1, convincing);
+    doubting = doubting && fitting < convincing;
     return 1.0;
   }
-  fitting_ = 0;
-  rejected_ += rejected_ < 1'000'000'000 ? 1 : 0;
-  doubting_ = doubting_ || (options_.recover_after > 0 && rejected_ >= options_.recover_after) ||
-              (options_.recover_time.si() > 0.0 && since_fit_ >= options_.recover_time.si());
-  return doubting_ ? options_.inflation : 1.0;
-}
-
-void OutlierGuard::reset() noexcept {
-  rejected_ = 0;
-  fitting_ = 0;
-  since_fit_ = 0.0;
-  doubting_ = false;
+  fitting = 0;
+  rejected += rejected < 1'000'000'000 ? 1 : 0;
+  doubting = doubting || (options_.recover_after > 0 && rejected >= options_.recover_after) ||
+             (options_.recover_time.si() > 0.0 && since_fit >= options_.recover_time.si());
+  return doubting ? options_.inflation : 1.0;
 }
 
 }  // namespace flyball

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <flyball/core/random.hpp>
+#include <flyball/estimation/guarded_filter.hpp>
 #include <flyball/estimation/model_filter.hpp>
 
 #include "field_drive.hpp"
@@ -148,6 +149,67 @@ TEST(DelayedFilter, SaysWhatItCannotTake) {
   filter.reset(made().estimate(), 7.0);
   EXPECT_EQ(filter.oldest(), 7.0);
   EXPECT_EQ(filter.measure(1.4, seen).status, DelayStatus::too_old);
+}
+
+using Guarded = GuardedFilter<Filter>;
+
+/// A beacon through the filter's guard.
+struct GuardedBeacon {
+  std::size_t number = 0;
+  Eigen::Vector2d y{};
+
+  UpdateStatus operator()(Guarded& guarded) const noexcept {
+    return guarded.filter()
+        .correct(y, test::Sighting{test::beacons[number]}, test::sighting_noise(),
+                 {.guard = guarded.guard()}, AngleDifference<1>{})
+        .status;
+  }
+};
+
+// The guard doubts the estimate after three in a row that do not fit: two of them, one that fits
+// and a third, the fitting one late. Replays that counted again would make four of the three.
+TEST(DelayedFilter, AGuardCountsReplaysOnce) {
+  const auto guard = OutlierGuard::create({.recover_after = 3, .recover_time = Time(0.3)}).value();
+  Vector5 x = Vector5::Zero();
+  const auto seen = [&](std::size_t number, double off) {
+    return GuardedBeacon{number,
+                         test::Sighting{test::beacons[number]}(x) + Eigen::Vector2d(off, 0.0)};
+  };
+  struct Look {
+    double time;
+    GuardedBeacon beacon;
+  };
+  const std::vector<Look> looks{{0.05, seen(0, 0.0)}, {0.11, seen(1, 9.0)}, {0.15, seen(2, 9.0)},
+                                {0.19, seen(3, 0.0)}, {0.25, seen(0, 9.0)}, {0.31, seen(1, 9.0)}};
+  const auto run = [&](const std::vector<std::size_t>& order, double until, bool at_once) {
+    DelayedFilter<Guarded, GuardedBeacon, 100> filter(Guarded(made(), {guard}), 0.0);
+    std::size_t next = 0;
+    for (int k = 1; k <= 50 && 0.02 * k <= until + 1e-9; ++k) {
+      filter.advance(0.02 * k, Eigen::Vector2d::Zero());
+      while (at_once && next < order.size() && looks[order[next]].time <= 0.02 * k) {
+        filter.measure(looks[order[next]].time, looks[order[next]].beacon);
+        ++next;
+      }
+    }
+    for (; next < order.size(); ++next) {
+      filter.measure(looks[order[next]].time, looks[order[next]].beacon);
+    }
+    return filter.filter();
+  };
+  const Guarded in_time = run({0, 1, 2, 3, 4, 5}, 0.4, true);
+  EXPECT_EQ(in_time.guard().rejected_in_a_row(), 2);
+  EXPECT_FALSE(in_time.guard().memory().doubting);
+  EXPECT_NEAR(in_time.guard().memory().since_fit, 0.21, 1e-12);
+  for (const std::vector<std::size_t>& order :
+       {std::vector<std::size_t>{0, 1, 2, 4, 5, 3}, {5, 4, 3, 2, 1, 0}, {3, 0, 5, 1, 4, 2}}) {
+    const Guarded late = run(order, 0.4, false);
+    EXPECT_EQ(late.guard().rejected_in_a_row(), 2);
+    EXPECT_FALSE(late.guard().memory().doubting);
+    EXPECT_NEAR(late.guard().memory().since_fit, 0.21, 1e-12);
+    EXPECT_LT((late.filter().x_hat() - in_time.filter().x_hat()).norm(), 1e-12);
+    EXPECT_LT((late.filter().P() - in_time.filter().P()).norm(),
+              1e-12 * in_time.filter().P().norm());
+  }
 }
 
 TEST(DelayedFilter, AllocatesNothing) {

@@ -27,8 +27,8 @@ enum class DelayStatus {
 ///
 /// @tparam Filter  Has `predict(u, dt)`, `estimate()` and `restore(estimate)`, as ModelFilter does.
 /// @tparam Measurement  A value that corrects: `measurement(filter)`; for several kinds of them a
-///                 std::variant in a struct. It is called again at each replay, so what it counts
-///                 (an OutlierGuard, say) counts replays too.
+///                 std::variant in a struct. It is called again at each replay: what counts
+///                 measurements belongs to what is restored (of OutlierGuards, a GuardedFilter).
 /// Run-time object: noexcept, allocation-free where the filter is. Cost: an input one prediction, a
 /// measurement at most `Capacity` predictions and corrections, which is the bound; the number of
 /// the samples since its time is what it usually is.

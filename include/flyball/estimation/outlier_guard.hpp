@@ -53,14 +53,26 @@ class OutlierGuard {
   [[nodiscard]] double weight(double distance, int freedom) const noexcept;
 
   /// Tells the time that goes by, for `recover_time`. @param dt  s.
-  void advance(double dt) noexcept { since_fit_ += dt > 0.0 ? dt : 0.0; }
+  void advance(double dt) noexcept { memory_.since_fit += dt > 0.0 ? dt : 0.0; }
   /// Tells what the last measurement counted for. @return  By what to multiply P: 1, or
   /// `inflation`.
   double judged(double weight) noexcept;
   /// How many in a row did not fit.
-  [[nodiscard]] int rejected_in_a_row() const noexcept { return rejected_; }
+  [[nodiscard]] int rejected_in_a_row() const noexcept { return memory_.rejected; }
   /// Starts again, as after a reset of the filter.
-  void reset() noexcept;
+  void reset() noexcept { memory_ = {}; }
+
+  /// What it remembers of the measurements that it has judged.
+  struct Memory {
+    int rejected = 0;        ///< In a row that did not fit,
+    int fitting = 0;         ///< that did, three at most.
+    bool doubting = false;   ///< Whether the estimate is.
+    double since_fit = 0.0;  ///< s
+    bool operator==(const Memory&) const = default;
+  };
+  [[nodiscard]] const Memory& memory() const noexcept { return memory_; }
+  /// Goes on from what was remembered, as where a filter goes back in time.
+  void restore(const Memory& memory) noexcept { memory_ = memory; }
 
  private:
   OutlierGuard() = default;
@@ -69,10 +81,7 @@ class OutlierGuard {
   OutlierOptions options_;
   std::array<double, known> thresholds_{};
   double normal_quantile_ = 0.0;
-  int rejected_ = 0;
-  int fitting_ = 0;
-  bool doubting_ = false;
-  double since_fit_ = 0.0;
+  Memory memory_;
 };
 
 }  // namespace flyball
