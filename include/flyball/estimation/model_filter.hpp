@@ -6,6 +6,7 @@
 
 #include <flyball/estimation/extended.hpp>
 #include <flyball/estimation/filter_model.hpp>
+#include <flyball/estimation/state_limits.hpp>
 #include <flyball/systems/discretize.hpp>
 
 namespace flyball {
@@ -167,6 +168,12 @@ class ModelFilter {
     requires std::invocable<const H&, const StateVector&>
   {
     return method_.correct(estimate_, y, h, R, options, subtract);
+  }
+
+  /// Cuts the estimate off where a state leaves its limits; as `truncate` of state_limits.hpp.
+  /// @param state  Its number. @param lower, upper  In its unit; either may be infinite.
+  bool limit(Eigen::Index state, double lower, double upper) noexcept {
+    return limit_state(estimate_, state, lower, upper);
   }
 
   [[nodiscard]] const StateVector& x_hat() const noexcept { return estimate_.x_hat(); }
