@@ -496,6 +496,56 @@ TEST(PoseEstimator, RefusesOptions) {
                   .is(ArgumentError::wrong_shape));
 }
 
+// The closed forms of odometry and of a whole pose are the estimate's own steps, for independent
+// and correlated noises, ones so small that they are left to it, and outliers.
+TEST(PoseEstimator, ClosedFormsAreTheEstimatesSteps) {
+  Random random(131);
+  const PoseEstimatorOptions options;
+  for (int run = 0; run < 200; ++run) {
+    const Matrix3d A = Matrix3d::NullaryExpr([&] { return 0.2 * random.normal(); });
+    const Matrix3d P0 = A * A.transpose() + 1e-4 * Matrix3d::Identity();
+    const Pose2d start(random.normal(), random.normal(), random.uniform(-3.1, 3.1));
+    const auto estimate = Estimate<Pose2d>::create(start, Eigen::MatrixXd(P0)).value();
+    auto guard = OutlierGuard::create({.probability = 0.999}).value();
+    detail::PoseFilter filter({estimate, estimate}, options, guard);
+    auto expected = estimate;
+    for (int k = 0; k < 5; ++k) {
+      const Vector3d twist(random.normal(), random.normal(), random.uniform(-2.0, 2.0));
+      const Vector3d rate = twist / dt;
+      filter.predict(rate, dt);
+      const Vector3d half = 0.5 * (options.odometry.per_metre.cwiseAbs2() * twist.head<2>().norm() +
+                                   options.odometry.per_radian.cwiseAbs2() * std::abs(twist(2)) +
+                                   options.odometry.per_second.cwiseAbs2() * dt);
+      const Pose2d step = Pose2d::exp(twist);
+      const Matrix3d F = step.inverse().adjoint();
+      const Matrix3d W = half.asDiagonal();
+      ASSERT_TRUE(expected.predict(expected.x_hat() * step, F,
+                                   PlainNoise<3>(Matrix3d(F * W * F.transpose() + W))));
+
+      Matrix3d R = drawn(random, {0.3, 0.3, 0.2}).cwiseAbs2().asDiagonal();
+      R += 1e-4 * Matrix3d::Identity();
+      if (run % 4 == 1) {
+        R(0, 1) = R(1, 0) = 0.9 * std::sqrt(R(0, 0) * R(1, 1));
+      } else if (run % 4 == 2) {
+        R(1, 1) = 1e-12;
+      }
+      const Vector3d off =
+          drawn(random, run % 4 == 3 ? Vector3d(5.0, 5.0, 1.0) : Vector3d(0.1, 0.1, 0.1));
+      const detail::SeenPose seen{{expected.x_hat() * Pose2d::exp(off)}, 1, MeasurementNoise<3>(R)};
+      const auto outcome = filter.take(seen);
+      const auto correction =
+          expected.correct<3>(seen.candidates[0].minus(expected.x_hat()), Matrix3d::Identity(),
+                              seen.noise, {.guard = &guard});
+      ASSERT_EQ(outcome.status == PoseStatus::taken, correction.accepted());
+      ASSERT_NEAR(outcome.nis, correction.nis, 1e-9 * correction.nis);
+      const auto& got = filter.estimate().estimate;
+      ASSERT_LT(got.x_hat().minus(expected.x_hat()).norm(), 1e-11);
+      ASSERT_LT((got.P() - expected.P()).norm(), 1e-11 * expected.P().norm());
+      ASSERT_EQ(got.P(), Matrix3d(got.P().transpose()));
+    }
+  }
+}
+
 TEST(PoseEstimator, AllocatesNothing) {
   if (!test::counts_allocations()) {
     GTEST_SKIP() << "a sanitizer has its own allocator";

@@ -96,6 +96,73 @@ struct PoseBelief {
   int relocations = 0;
 };
 
+/// The lower half of a pose's covariance, in closed forms of 3 x 3.
+struct PoseCovariance {
+  double xx, yx, tx, yy, ty, tt;
+
+  explicit PoseCovariance(const Eigen::Matrix3d& P) noexcept
+      : xx(P(0, 0)), yx(P(1, 0)), tx(P(2, 0)), yy(P(1, 1)), ty(P(2, 1)), tt(P(2, 2)) {}
+  [[nodiscard]] Eigen::Matrix3d matrix() const noexcept {
+    Eigen::Matrix3d P;
+    P << xx, yx, tx, yx, yy, ty, tx, ty, tt;
+    return P;
+  }
+  void add(const Eigen::Vector3d& variances) noexcept {
+    xx += variances(0);
+    yy += variances(1);
+    tt += variances(2);
+  }
+  /// P <- M P Mᵀ with M = [a, b, u; -b, a, v; 0, 0, 1], as adjoints and Jacobians are.
+  void pass(double a, double b, double u, double v) noexcept {
+    const PoseCovariance P = *this;
+    const double cross = 2.0 * a * b * P.yx;
+    tx = a * P.tx + b * P.ty;
+    ty = a * P.ty - b * P.tx;
+    xx = a * a * P.xx + cross + b * b * P.yy + u * (2.0 * tx + u * tt);
+    yy = b * b * P.xx - cross + a * a * P.yy + v * (2.0 * ty + v * tt);
+    yx = a * b * (P.yy - P.xx) + (a * a - b * b) * P.yx + u * ty + v * (tx + u * tt);
+    tx += u * tt;
+    ty += v * tt;
+  }
+  /// The correction with z of the whole twist whose entries err independently, entry by entry.
+  /// @param delta  Takes the step. @param nis  Takes zᵀ S⁻¹ z.
+  /// @return  False, and nothing is of use, where a noise is so small that rounding counts.
+  bool correct(const Eigen::Vector3d& z, const Eigen::Vector3d& R, Eigen::Vector3d& delta,
+               double& nis) noexcept {
+    nis = 0.0;
+    delta.setZero();
+    return entry(xx, yx, tx, yy, ty, tt, R(0), z(0), delta(0), delta(1), delta(2), nis) &&
+           entry(yy, yx, ty, xx, tx, tt, R(1), z(1), delta(1), delta(0), delta(2), nis) &&
+           entry(tt, tx, ty, xx, yx, yy, R(2), z(2), delta(2), delta(0), delta(1), nis);
+  }
+
+ private:
+  /// Entry j with the noise r: K = P_j/(P_jj + r), and P <- P - K P_jᵀ, whose row j is r K.
+  static bool entry(double& jj, double& ja, double& jb, double& aa, double& ba, double& bb,
+                    double r, double z, double& dj, double& da, double& db, double& nis) noexcept {
+    constexpr double least = 1e-3;  // Below, Joseph's form is needed: JosephCovariance::correct.
+    const double variance = jj + r;
+    if (!(variance > 0.0 && r >= least * variance)) {
+      return false;
+    }
+    const double inverse = 1.0 / variance;
+    const double innovation = z - dj;
+    const double step = innovation * inverse;
+    nis += innovation * step;
+    dj += jj * step;
+    da += ja * step;
+    db += jb * step;
+    aa -= ja * ja * inverse;
+    ba -= ja * jb * inverse;
+    bb -= jb * jb * inverse;
+    const double left = r * inverse;
+    jj *= left;
+    ja *= left;
+    jb *= left;
+    return true;
+  }
+};
+
 /// A filter of the pose as a DelayedFilter takes it, whose inputs are twists per second.
 class PoseFilter {
  public:
@@ -124,24 +191,9 @@ class PoseFilter {
     const Eigen::Vector3d half =
         0.5 * (per_metre_ * way + per_radian_ * std::abs(twist(2)) + per_second_ * dt);
     const Pose2d step = Pose2d::exp(twist);
-    const Pose2d back = step.inverse();
-    const Eigen::Matrix3d F = back.adjoint();
-    // F = [R, (y, -x)ᵀ; 0, 1]
-    const double c = back.rotation().cos();
-    const double s = back.rotation().sin();
-    const double y = back.y() * half(2);
-    const double x = -back.x() * half(2);
-    Eigen::Matrix3d Q;
-    Q(0, 0) = half(0) + c * c * half(0) + s * s * half(1) + back.y() * y;
-    Q(1, 1) = half(1) + s * s * half(0) + c * c * half(1) - back.x() * x;
-    Q(1, 0) = Q(0, 1) = c * s * (half(0) - half(1)) + back.y() * x;
-    Q(2, 0) = Q(0, 2) = y;
-    Q(2, 1) = Q(1, 2) = x;
-    Q(2, 2) = 2.0 * half(2);
-    const PlainNoise<3> noise(Q);
-    belief_.estimate.predict(belief_.estimate.x_hat() * step, F, noise);
+    move(belief_.estimate, step, half);
     if (belief_.agreed > 0) {
-      belief_.rival.predict(belief_.rival.x_hat() * step, F, noise);
+      move(belief_.rival, step, half);
       belief_.rival_age += dt;
     }
   }
@@ -150,7 +202,7 @@ class PoseFilter {
     const Choice choice = choose(belief_.estimate, seen);
     PoseOutcome outcome;
     if (choice.clear) {
-      outcome = outcome_of(correct(belief_.estimate, choice.residual, seen));
+      outcome = correct(belief_.estimate, choice.residual, seen);
     } else {
       outcome.status = PoseStatus::ambiguous;
     }
@@ -200,6 +252,22 @@ class PoseFilter {
     bool clear = true;
   };
 
+  /// x <- x step, P <- F (P + half) Fᵀ + half with F = Ad(step⁻¹) = [R, (y, -x)ᵀ; 0, 1].
+  static void move(Estimate<Pose2d>& estimate, const Pose2d& step,
+                   const Eigen::Vector3d& half) noexcept {
+    const Pose2d back = step.inverse();
+    PoseCovariance P(estimate.P());
+    P.add(half);
+    P.pass(back.rotation().cos(), -back.rotation().sin(), back.y(), -back.x());
+    P.add(half);
+    set(estimate, estimate.x_hat() * step, P);
+  }
+  static void set(Estimate<Pose2d>& estimate, const Pose2d& pose,
+                  const PoseCovariance& P) noexcept {
+    const Eigen::Matrix<double, 3, 0> nothing;
+    estimate.assign(pose, nothing, PlainNoise<3>(P.matrix()));
+  }
+
   template <int M>
   static PoseOutcome outcome_of(const Correction<M>& correction) noexcept {
     PoseOutcome outcome;
@@ -224,11 +292,25 @@ class PoseFilter {
     return outcome;
   }
 
-  [[gnu::flatten]] Correction<3> correct(Estimate<Pose2d>& estimate,
-                                         const Eigen::Vector3d& residual,
-                                         const SeenPose& seen) noexcept {
-    return estimate.correct<3>(residual, Eigen::Matrix3d::Identity(), seen.noise,
-                               {.guard = &guard_});
+  [[gnu::flatten]] PoseOutcome correct(Estimate<Pose2d>& estimate, const Eigen::Vector3d& residual,
+                                       const SeenPose& seen) noexcept {
+    if (seen.noise.is_diagonal() && is_signal(residual)) {
+      // What fits, with errors that are independent and not tiny, as nearly every pose does: what
+      // `Estimate::correct` does, without the zeros of H = I and of the Jacobian.
+      PoseCovariance P(estimate.P());
+      Eigen::Vector3d delta;
+      PoseOutcome outcome{.status = PoseStatus::taken, .weight = 1.0};
+      if (P.correct(residual, seen.noise.D(), delta, outcome.nis) &&
+          guard_.weight(outcome.nis, 3) == 1.0) {
+        const Eigen::Matrix3d J = Pose2d::right_jacobian(delta);
+        P.pass(J(0, 0), J(0, 1), J(0, 2), J(1, 2));
+        set(estimate, estimate.x_hat().plus(delta), P);
+        guard_.judged(1.0);
+        return outcome;
+      }
+    }
+    return outcome_of(
+        estimate.correct<3>(residual, Eigen::Matrix3d::Identity(), seen.noise, {.guard = &guard_}));
   }
 
   /// eᵀ S⁻¹ e
