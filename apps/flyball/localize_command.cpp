@@ -1,4 +1,5 @@
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <flyball/study/localize.hpp>
@@ -15,8 +16,10 @@ struct Options {
   CommonOptions common;
   study::LocalizeJob job{};
   std::vector<double> start{};
+  std::string filter = "extended";
   double range_std = 0.0;
   double bearing_std = 0.0;
+  double track_width = 0.0;
   bool no_calibration = false;
   bool no_smoother = false;
 };
@@ -38,7 +41,9 @@ void add_localize_command(CLI::App& program, Invocation& invocation) {
       "localize", "Find where a robot was, from its odometry and the landmarks that it saw");
   command->footer(
       "FILES are tables of numbers, told by words in their names: \"odometry\" (time, speed, turn\n"
-      "rate), \"measurement\" or \"sighting\" (time, landmark or barcode, range, bearing), "
+      "rate), or \"wheel\" (time, left, right: how far they have come) and maybe \"gyro\" (time, "
+      "turn\n"
+      "rate); \"measurement\" or \"sighting\" (time, landmark or barcode, range, bearing), "
       "\"landmark\"\n"
       "(number, x, y), and where there are any \"barcode\" (number, barcode) and \"truth\" (time, "
       "x,\n"
@@ -53,10 +58,17 @@ void add_localize_command(CLI::App& program, Invocation& invocation) {
                                         "Where it begins: x,y,heading (m, rad); else found")
                            ->delimiter(',')
                            ->expected(3);
+  command
+      ->add_option("--filter", options->filter,
+                   "Which Kalman filter: extended (the default), unscented or invariant")
+      ->check(CLI::IsMember({"extended", "unscented", "invariant"}));
   CLI::Option* range = command->add_option("--range-std", options->range_std,
                                            "Standard deviation of a range, m (0.1)");
   CLI::Option* bearing = command->add_option("--bearing-std", options->bearing_std,
                                              "Standard deviation of a bearing, rad (0.03)");
+  CLI::Option* track =
+      command->add_option("--track-width", options->track_width,
+                          "About how far apart left and right wheels are, m; the path tells more");
   command->add_flag("--no-calibration", options->no_calibration,
                     "Take the sensors as they are: no scales, offsets and delay are found");
   command->add_flag("--no-smoother", options->no_smoother, "Only the filter");
@@ -73,7 +85,14 @@ void add_localize_command(CLI::App& program, Invocation& invocation) {
     if (bearing->count() > 0) {
       options->job.bearing_std = options->bearing_std;
     }
+    for (const auto method : {LandmarkFilterMethod::unscented, LandmarkFilterMethod::invariant}) {
+      options->job.filter =
+          study::name_of(method) == options->filter ? method : options->job.filter;
+    }
     options->job.calibrate = !options->no_calibration;
+    if (track->count() > 0) {
+      options->job.track_width = options->track_width;
+    }
     options->job.smooth = !options->no_smoother;
     options->common.typed = invocation.typed;
     invocation.status =

@@ -87,18 +87,35 @@ WpilogWriter::Id WpilogWriter::start(std::string_view name, std::string_view typ
   return next_++;
 }
 
+void WpilogWriter::write_schemas(std::span<const Schema> schemas, double time) {
+  for (const auto& [type, members] : schemas) {
+    append(start(type, "structschema", {}, time), time, members);
+  }
+}
+
 WpilogWriter::Id WpilogWriter::start_pose(std::string_view name, double time) {
+  static constexpr Schema schemas[] = {
+      {"/.schema/struct:Rotation2d", "double value"},
+      {"/.schema/struct:Translation2d", "double x;double y"},
+      {"/.schema/struct:Pose2d", "Translation2d translation;Rotation2d rotation"}};
   if (!has_pose_schema_) {
     has_pose_schema_ = true;
-    constexpr std::pair<std::string_view, std::string_view> schemas[] = {
-        {"/.schema/struct:Rotation2d", "double value"},
-        {"/.schema/struct:Translation2d", "double x;double y"},
-        {"/.schema/struct:Pose2d", "Translation2d translation;Rotation2d rotation"}};
-    for (const auto& [type, members] : schemas) {
-      append(start(type, "structschema", {}, time), time, members);
-    }
+    write_schemas(schemas, time);
   }
   return start(name, "struct:Pose2d", {}, time);
+}
+
+WpilogWriter::Id WpilogWriter::start_pose3(std::string_view name, double time) {
+  static constexpr Schema schemas[] = {
+      {"/.schema/struct:Quaternion", "double w;double x;double y;double z"},
+      {"/.schema/struct:Rotation3d", "Quaternion q"},
+      {"/.schema/struct:Translation3d", "double x;double y;double z"},
+      {"/.schema/struct:Pose3d", "Translation3d translation;Rotation3d rotation"}};
+  if (!has_pose3_schema_) {
+    has_pose3_schema_ = true;
+    write_schemas(schemas, time);
+  }
+  return start(name, "struct:Pose3d", {}, time);
 }
 
 void WpilogWriter::finish(Id id, double time) {
@@ -152,7 +169,7 @@ void WpilogWriter::append_raw(Id id, double time, std::string_view payload) {
   record(id, time, payload);
 }
 
-Expected<std::string> to_wpilog(const Log& log) {
+Expected<void> append_log(WpilogWriter& writer, const Log& log) {
   struct Sample {
     double time;
     bool text;
@@ -178,8 +195,6 @@ Expected<std::string> to_wpilog(const Log& log) {
   std::stable_sort(samples.begin(), samples.end(),
                    [](const Sample& a, const Sample& b) { return a.time < b.time; });
 
-  const auto extra = log.metadata.find("extra");
-  WpilogWriter writer(extra == log.metadata.end() ? "Flyball" : extra->second);
   std::vector<WpilogWriter::Id> signals;
   std::vector<WpilogWriter::Id> texts;
   for (const Signal& signal : log.signals) {
@@ -197,7 +212,13 @@ Expected<std::string> to_wpilog(const Log& log) {
                     log.signals[sample.channel].value[sample.row]);
     }
   }
-  return writer.bytes();
+  return {};
+}
+
+Expected<std::string> to_wpilog(const Log& log) {
+  const auto extra = log.metadata.find("extra");
+  WpilogWriter writer(extra == log.metadata.end() ? "Flyball" : extra->second);
+  return append_log(writer, log).map([&] { return writer.bytes(); });
 }
 
 Expected<void> write_wpilog(const std::string& path, const Log& log) {

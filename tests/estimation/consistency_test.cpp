@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <flyball/core/random.hpp>
+#include <flyball/estimation/invariant.hpp>
 #include <flyball/estimation/unscented_kalman_filter.hpp>
+#include <flyball/geometry/se2.hpp>
+#include <flyball/math/derivatives/differentiation.hpp>
 #include <flyball/math/probability/distributions.hpp>
 
 #include "field_drive.hpp"
@@ -119,6 +122,60 @@ TEST(FilterConsistency, OfTheExtendedFilter) {
 }
 TEST(FilterConsistency, OfTheUnscentedFilter) {
   drive_is_consistent<UnscentedKalmanFilter<test::FieldDrive>>();
+}
+/// A reading of range and bearing as a place in the robot's frame.
+struct SeenAt {
+  template <class Reading>
+  auto operator()(const Reading& r) const {
+    using Scalar = typename Reading::Scalar;
+    using std::cos, std::sin;
+    return Eigen::Matrix<Scalar, 2, 1>(r(0) * cos(r(1)), r(0) * sin(r(1)));
+  }
+};
+
+// The drivetrain by the distances of its wheels, the beacons by their place on the field: an error
+// in the fixed frame, x seen = beacon, with the reading's noise brought there.
+TEST(FilterConsistency, OfTheInvariantFilter) {
+  Random random(63);
+  Consistency consistency;
+  const Eigen::Matrix3d P0 = Eigen::Vector3d(0.1, 0.1, 0.05).cwiseAbs2().asDiagonal();
+  const Eigen::Matrix3d W = Eigen::Vector3d(4e-3, 2e-3, 6e-3).cwiseAbs2().asDiagonal();
+  const MeasurementNoise<2> noise = test::sighting_noise();
+  using State = RightInvariant<Pose2d>;
+  for (int run = 0; run < runs; ++run) {
+    const Pose2d start(random.normal(), random.normal(), random.uniform(-3.0, 3.0));
+    auto filter = Estimate<State>::create({start}, Eigen::MatrixXd(P0)).value();
+    Pose2d x = Pose2d::exp(drawn(random, P0)) * start;
+    for (int k = 0; k < 20 * times; ++k) {
+      const double left = 0.02 * (1.5 + 0.8 * std::sin(0.05 * k));
+      const double right = 0.02 * (1.5 + 0.8 * std::cos(0.08 * k));
+      const Eigen::Vector3d twist(0.5 * (left + right), 0.0,
+                                  (right - left) / test::FieldDrive::trackwidth);
+      x = x * Pose2d::exp(twist + drawn(random, W));
+      predict_by_odometry(filter, twist, W);
+      if (k % 10 == 9) {
+        const Eigen::Vector2d beacon = test::beacons[static_cast<std::size_t>(k / 10) % 4];
+        const Eigen::Vector2d seen = x.inverse() * beacon;
+        const Eigen::Vector2d reading =
+            Eigen::Vector2d(seen.norm(), std::atan2(seen(1), seen(0))) + drawn(random, noise.R());
+        const Pose2d& at = filter.x_hat().value;
+        const Eigen::Matrix2d slope = at.rotation().matrix() * jacobian(SeenAt{}, reading);
+        const MeasurementNoise<2> there(Eigen::Matrix2d(slope * noise.R() * slope.transpose()));
+        const auto place = [&](const auto& state) {
+          using Scalar = typename std::decay_t<decltype(state)>::Scalar;
+          return Eigen::Matrix<Scalar, 2, 1>(state.value *
+                                             SeenAt{}(reading).template cast<Scalar>());
+        };
+        const auto correction = Extended{}.correct(filter, beacon, place, there);
+        if (k % 20 == 19) {
+          const Eigen::Vector3d e = minus(State{x}, filter.x_hat());
+          consistency.add(k / 20, e.dot(Eigen::Matrix3d(filter.P()).llt().solve(e)),
+                          correction.nis);
+        }
+      }
+    }
+  }
+  consistency.expect(3, 2);
 }
 TEST(FilterConsistency, OfTheSquareRootUnscentedFilter) {
   drive_is_consistent<SquareRootUnscentedKalmanFilter<test::FieldDrive, SimplexPoints>>();

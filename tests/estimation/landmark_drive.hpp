@@ -84,8 +84,8 @@ inline SimulatedDrive landmark_drive(std::uint64_t seed, const DriveSettings& se
     // What the odometry said a delay ago is what the robot does now.
     const auto [vd, wd] = commanded(t);
     const double speed = k.velocity_scale * vd + settings.speed_std * random.normal();
-    const double turn =
-        k.turn_scale * wd + k.turn_per_velocity * vd + settings.turn_std * random.normal();
+    const double turn = k.turn_scale * (wd - k.gyro_bias) + k.turn_per_velocity * vd +
+                        settings.turn_std * random.normal();
     pose = pose * Pose2d::exp(Eigen::Vector3d(speed * dt, 0.0, turn * dt));
     if (settings.carried_at > t - 0.5 * dt && settings.carried_at < t + 0.5 * dt) {
       pose = Pose2d(-pose.x(), -pose.y(), pose.angle() + 2.0);

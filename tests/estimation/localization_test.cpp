@@ -122,6 +122,63 @@ TEST(LandmarkFilter, FindsItselfAndItsSensors) {
   EXPECT_NEAR(result->calibration.velocity_scale, 0.95, 0.03);
 }
 
+// The steps differ, the model does not: each finds the path and the sensors, and where everything
+// is known well enough for a straight line all say the same.
+TEST(LandmarkFilter, EveryMethodFindsThePathAndTheSensors) {
+  const SimulatedDrive drive = landmark_drive(1, {.duration = 120.0});
+  std::vector<Pose2d> ends;
+  for (const auto method : {LandmarkFilterMethod::extended, LandmarkFilterMethod::unscented,
+                            LandmarkFilterMethod::invariant}) {
+    SCOPED_TRACE(static_cast<int>(method));
+    const auto result = filter_landmarks(drive.log, {.method = method}, drive.time);
+    ASSERT_TRUE(result) << to_string(result.error());
+    const Score all = score(result->path, drive, 20.0);
+    EXPECT_LE(all.rms, 0.06);
+    EXPECT_LE(all.nees, 1.5);
+    EXPECT_NEAR(result->calibration.delay, 0.2, 0.05);
+    EXPECT_NEAR(result->calibration.depth_exponent, 1.0, 0.15);
+    ends.push_back(result->path.pose.back());
+  }
+  for (std::size_t i = 1; i < ends.size(); ++i) {
+    const double apart = ends[i].minus(ends[0]).norm();
+    EXPECT_LT(apart, 0.01);
+    EXPECT_GT(apart, 1e-6) << "the same steps";
+  }
+}
+
+TEST(LandmarkFilter, AGyrosBiasIsFound) {
+  DriveSettings settings{.duration = 120.0};
+  settings.calibration.gyro_bias = 0.03;
+  const SimulatedDrive drive = landmark_drive(4, settings);
+  LandmarkOptions options;
+  options.calibration_std.gyro_bias = 0.05;
+  for (const auto method : {LandmarkFilterMethod::extended, LandmarkFilterMethod::unscented,
+                            LandmarkFilterMethod::invariant}) {
+    options.method = method;
+    const auto filtered = filter_landmarks(drive.log, options, drive.time);
+    ASSERT_TRUE(filtered) << to_string(filtered.error());
+    EXPECT_NEAR(filtered->calibration.gyro_bias, 0.03, 0.01);
+  }
+  const auto smoothed = smooth_landmarks(drive.log, options, drive.time);
+  ASSERT_TRUE(smoothed) << to_string(smoothed.error());
+  EXPECT_NEAR(smoothed->calibration.gyro_bias, 0.03, 3.0 * smoothed->calibration_std.gyro_bias);
+  EXPECT_LT(smoothed->calibration_std.gyro_bias, 0.025);
+}
+
+// What is seen is the inverse of what is measured.
+TEST(LandmarkFilter, SeenIsTheInverseOfASighting) {
+  const SensorCalibration k{.range_scale = 0.1,
+                            .range_offset = 0.05,
+                            .depth_exponent = 0.7,
+                            .bearing_scale = -0.03,
+                            .bearing_offset = 0.02};
+  for (const double angle : {-1.2, -0.3, 0.0, 0.8}) {
+    const Vector2d there(3.0 * std::cos(angle), 3.0 * std::sin(angle));
+    const Eigen::Vector2d reading = localization::sighting(Pose2d(), k.vector(), there);
+    EXPECT_LE((localization::seen(k.vector(), reading(0), reading(1)) - there).norm(), 1e-14);
+  }
+}
+
 TEST(LandmarkFilter, ACalibrationThatIsKnownIsKept) {
   const SimulatedDrive drive = landmark_drive(2);
   LandmarkOptions options;
@@ -220,9 +277,9 @@ TEST(LandmarkFilter, WhatIsNoNumberChangesNothing) {
   EXPECT_TRUE(filter.pose_covariance().allFinite());
 }
 
-TEST(LandmarkFilter, DoesNotAllocate) {
+void expect_no_allocations(LandmarkFilterMethod method) {
   const SimulatedDrive drive = landmark_drive(7, {.duration = 10.0});
-  auto filter = LandmarkFilter::create().value();
+  auto filter = LandmarkFilter::create({.method = method}).value();
   const test::AllocationCounter count;
   std::size_t next = 0;
   for (const OdometrySample& sample : drive.log.odometry) {
@@ -235,6 +292,12 @@ TEST(LandmarkFilter, DoesNotAllocate) {
   }
   EXPECT_EQ(count.count(), 0U);
   EXPECT_TRUE(filter.located());
+}
+TEST(LandmarkFilter, DoesNotAllocate) {
+  for (const auto method : {LandmarkFilterMethod::extended, LandmarkFilterMethod::unscented,
+                            LandmarkFilterMethod::invariant}) {
+    expect_no_allocations(method);
+  }
 }
 
 TEST(SmoothLandmarks, IsNearerThanTheFilterAndKnowsItsSensors) {

@@ -196,6 +196,29 @@ TEST(ManifoldFilter, RightInvariantSlopeDoesNotKnowTheEstimate) {
   }
 }
 
+// With P transported to the corrected pose, Exp(ξ) x and x Exp(δ) are one filter, ξ = Ad(x) δ.
+TEST(ManifoldFilter, BothFramesOfTheErrorAreOneFilter) {
+  Random random(105);
+  const Pose start(1.0, -0.5, 2.0);
+  const Matrix3d P0 = spread(0.3, 0.2, 0.3);
+  auto body = pose_filter<Pose>(start, P0);
+  auto fixed =
+      pose_filter<RightInvariant<Pose>>(start, start.adjoint() * P0 * start.adjoint().transpose());
+  const MeasurementNoise<2> R = MeasurementNoise<2>::independent(Vector2d(0.02, 0.05));
+  for (int k = 0; k < 30; ++k) {
+    const Vector3d twist(0.2, 0.02, 0.3);
+    predict_by_odometry(body, twist, spread(0.02, 0.01, 0.03));
+    predict_by_odometry(fixed, twist, spread(0.02, 0.01, 0.03));
+    const Seen seen{marks[static_cast<std::size_t>(k) % 3]};
+    const Vector2d y = seen(body.x_hat()) + 0.2 * Vector2d(random.normal(), random.normal());
+    ASSERT_TRUE(Extended{}.correct(body, y, seen, R).accepted());
+    ASSERT_TRUE(Extended{}.correct(fixed, y, seen, R).accepted());
+    ASSERT_LT(minus(body.x_hat(), value(fixed.x_hat())).norm(), 1e-12);
+    const Matrix3d Ad = body.x_hat().adjoint();
+    ASSERT_LT((Ad * body.P() * Ad.transpose() - fixed.P()).norm(), 1e-12);
+  }
+}
+
 /// Heading error after `steps` sightings from a start that is off by 2 m and 90°.
 template <class X>
 double error_from_far_off(Random& random) {

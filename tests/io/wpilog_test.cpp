@@ -329,5 +329,29 @@ TEST(Wpilog, WritesPosesWithTheirSchemas) {
   EXPECT_FALSE(log && !log->signals.empty());  // No plain number is in it.
 }
 
+// WPILib's structs of a pose in space: translation, then the quaternion from w, 56 bytes.
+TEST(Wpilog, WritesPosesInSpaceWithTheirSchemas) {
+  WpilogWriter writer;
+  writer.start_pose("/flat");
+  const std::size_t before = writer.bytes().size();
+  const auto first = writer.start_pose3("/a");
+  writer.start_pose3("/b");
+  const std::array<double, 7> pose{1.0, 2.0, 3.0, 0.5, -0.5, 0.5, -0.5};
+  writer.append(first, 0.25, std::span<const double>(pose));
+  const std::string bytes = writer.bytes().substr(before);
+  std::size_t at = 0;
+  for (const char* words :
+       {"/.schema/struct:Quaternion", "structschema", "double w;double x;double y;double z",
+        "/.schema/struct:Rotation3d", "Quaternion q", "/.schema/struct:Translation3d",
+        "double x;double y;double z", "/.schema/struct:Pose3d",
+        "Translation3d translation;Rotation3d rotation", "/a", "struct:Pose3d", "/b"}) {
+    at = bytes.find(words, at);
+    ASSERT_NE(at, std::string::npos) << words;
+  }
+  EXPECT_EQ(bytes.find("/.schema", at), std::string::npos);  // Once.
+  EXPECT_EQ(bytes.substr(bytes.size() - 56),
+            std::string(reinterpret_cast<const char*>(pose.data()), 56));
+}
+
 }  // namespace
 }  // namespace flyball

@@ -1,11 +1,16 @@
 #include <flyball/study/localize.hpp>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
+#include <iomanip>
 #include <limits>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -62,6 +67,90 @@ TEST_F(Localize, FindsTheExamplesPathAndSensors) {
   EXPECT_EQ(answer.figures.size(), 3U);
   EXPECT_EQ(answer.files.size(), 4U);
   EXPECT_FALSE(answer.refusal);
+  EXPECT_EQ(json.at("filter"), "extended");
+  EXPECT_FALSE(json.contains("track_width"));
+  // Poses of the plane and of space, which AdvantageScope draws; the last is the truth's.
+  const std::string& poses = answer.files.back().contents;
+  for (const char* channel : {"/Flyball/smoother", "struct:Pose2d", "/Flyball/smoother_3d",
+                              "struct:Pose3d", "/Flyball/truth_3d"}) {
+    EXPECT_NE(poses.find(channel), std::string::npos) << channel;
+  }
+  std::array<double, 7> last{};
+  std::memcpy(last.data(), poses.data() + poses.size() - sizeof(last), sizeof(last));
+  const Pose2d& end = result->truth.pose.back();
+  EXPECT_EQ(last[0], end.x());
+  EXPECT_EQ(last[2], 0.0);
+  EXPECT_NEAR(last[3], std::cos(0.5 * end.angle()), 1e-15);
+  EXPECT_NEAR(last[6], std::sin(0.5 * end.angle()), 1e-15);
+}
+
+TEST_F(Localize, TakesEveryFilter) {
+  std::vector<double> errors;
+  for (const auto method : {LandmarkFilterMethod::extended, LandmarkFilterMethod::unscented,
+                            LandmarkFilterMethod::invariant}) {
+    const auto result = localize({.paths = {drive}, .filter = method, .smooth = false});
+    ASSERT_TRUE(result) << to_string(result.error());
+    EXPECT_LT(result->filter_error->rms, 0.15);
+    EXPECT_EQ(Json::parse(answer_of(*result).json).at("filter"), name_of(method));
+    errors.push_back(result->filter_error->rms);
+  }
+  EXPECT_NE(errors[0], errors[1]);
+  EXPECT_NE(errors[0], errors[2]);
+}
+
+/// The example's drive by the distances of its wheels, `width` apart.
+std::string wheels_csv(const LocalizedPath& truth, double width) {
+  std::ostringstream text;
+  text << "time,left (m),right (m)\n" << std::setprecision(12);
+  double left = 0.0;
+  double right = 0.0;
+  for (std::size_t i = 0; i < truth.time.size(); ++i) {
+    if (i > 0) {
+      const Eigen::Vector3d moved = truth.pose[i - 1].between(truth.pose[i]).log();
+      left += moved(0) - 0.5 * width * moved(2);
+      right += moved(0) + 0.5 * width * moved(2);
+    }
+    text << truth.time[i] << "," << left << "," << right << "\n";
+  }
+  return text.str();
+}
+
+TEST_F(Localize, WheelsTellTheTrackWidth) {
+  const auto known = localize(job());
+  ASSERT_TRUE(known);
+  remove("odometry.csv");
+  write("wheels.csv", wheels_csv(known->truth, 0.45));
+  LocalizeJob of = job();
+  expect_refused(ArgumentError::empty, "--track-width", of);
+  of.track_width = 0.5;
+  const auto result = localize(of);
+  ASSERT_TRUE(result) << to_string(result.error());
+  ASSERT_TRUE(result->track_width);
+  EXPECT_NEAR(result->track_width->value, 0.45, 3.0 * result->track_width->std);
+  EXPECT_LT(result->track_width->std, 0.03);
+  const Json json = Json::parse(answer_of(*result).json);
+  EXPECT_EQ(json.at("track_width").at("value").get<double>(), result->track_width->value);
+  EXPECT_LT(result->smoother_error->rms, 0.03);
+
+  std::ostringstream gyro;
+  for (std::size_t i = 0; i + 1 < known->truth.time.size(); ++i) {
+    const double dt = known->truth.time[i + 1] - known->truth.time[i];
+    gyro << known->truth.time[i] << ","
+         << known->truth.pose[i].between(known->truth.pose[i + 1]).angle() / dt - 0.03 << "\n";
+  }
+  write("gyro.csv", gyro.str());
+  of.track_width.reset();
+  const auto turned = localize(of);
+  ASSERT_TRUE(turned) << to_string(turned.error());
+  EXPECT_NEAR(turned->smoother->calibration.gyro_bias, -0.03, 0.01);
+  ASSERT_TRUE(turned->track_width);
+  EXPECT_NEAR(turned->track_width->value, 0.45, 3.0 * turned->track_width->std);
+
+  remove("wheels.csv");
+  expect_refused(ArgumentError::empty, "gyro.csv", of);
+  write("odometry.csv", "0,0,0\n");
+  write("wheels.csv", "0,0,0\n1,1,1\n");
+  expect_refused(ArgumentError::ambiguous_name, "wheels.csv", of);
 }
 
 TEST_F(Localize, WithoutTruthCalibrationOrSmootherItAnswersToo) {

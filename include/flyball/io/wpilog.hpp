@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <flyball/core/expected.hpp>
@@ -42,6 +43,9 @@ class WpilogWriter {
   /// Opens a channel of poses of the plane (struct:Pose2d), which AdvantageScope shows on its
   /// field; what is appended is {x, y, angle}, m and rad.
   Id start_pose(std::string_view name, double time = 0.0);
+  /// The same of poses in space (struct:Pose3d); what is appended is {x, y, z, qw, qx, qy, qz}, m
+  /// and a unit quaternion.
+  Id start_pose3(std::string_view name, double time = 0.0);
   void finish(Id id, double time);
   void set_metadata(Id id, std::string_view metadata, double time);
 
@@ -60,11 +64,17 @@ class WpilogWriter {
 
  private:
   void record(Id id, double time, std::string_view payload);
+  using Schema = std::pair<std::string_view, std::string_view>;  ///< A struct and its members.
+  void write_schemas(std::span<const Schema> schemas, double time);
 
   std::string bytes_;
   Id next_ = 1;
   bool has_pose_schema_ = false;
+  bool has_pose3_schema_ = false;
 };
+
+/// Appends what `write_wpilog` writes. @errors Those of `to_wpilog`.
+[[nodiscard]] Expected<void> append_log(WpilogWriter& writer, const Log& log);
 
 /// Writes the signals (as double, their unit as metadata) and texts (as string) of a log in time
 /// order, atomically. Times are rounded to microseconds, which is what the format holds.

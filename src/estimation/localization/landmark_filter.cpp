@@ -4,6 +4,7 @@
 #include <cmath>
 #include <type_traits>
 
+#include <flyball/estimation/unscented_kalman_filter.hpp>
 #include <flyball/math/derivatives/differentiation.hpp>
 
 #include "core/try.hpp"
@@ -151,14 +152,6 @@ void LandmarkFilter::step(double from, double to) noexcept {
     after.template get<1>() *= stays;
     return after;
   };
-  const State next = moved(x);
-  const Matrix F = jacobian(
-      [&](const auto& error) {
-        using Scalar = typename std::remove_cvref_t<decltype(error)>::Scalar;
-        return moved(x.cast<Scalar>().plus(error)).minus(next.cast<Scalar>());
-      },
-      State::Tangent(State::Tangent::Zero()));
-
   const auto square = [](double value) { return value * value; };
   const double speed = way / dt;
   const double rate = turned / dt;
@@ -180,8 +173,13 @@ void LandmarkFilter::step(double from, double to) noexcept {
   for (int i = 0; i < SensorCalibration::size; ++i) {
     Q(velocity_scale + i, velocity_scale + i) = dt * square(0.002 * std(i));
   }
-  dead_reckoned_ = dead_reckoned_ * x.get<0>().between(next.get<0>());
-  estimate_.predict(next, F, PlainNoise<size>(Q));
+  dead_reckoned_ = dead_reckoned_ * x.get<0>().between(moved(x).get<0>());
+  const PlainNoise<size> noise(Q);
+  if (options_.method == LandmarkFilterMethod::unscented) {
+    Unscented<>().predict(estimate_, moved, noise);
+  } else {
+    Extended().predict(estimate_, moved, noise);
+  }
 }
 
 bool LandmarkFilter::predict(double time) noexcept {
@@ -208,6 +206,37 @@ bool LandmarkFilter::predict(double time) noexcept {
   return true;
 }
 
+Correction<2> LandmarkFilter::take(Estimate<State>& estimate, const Vector2d& landmark,
+                                   const Vector2d& reading) noexcept {
+  const CorrectionOptions how{.guard = &guard_, .iterations = 5};
+  if (options_.method == LandmarkFilterMethod::invariant) {
+    // x seen = landmark. The noise is that of the reading, brought into the fixed frame; there the
+    // slope by an error Exp(ξ) x, ξ = Ad(x) δ, is [I, J (x seen)], and a step in ξ is the same step
+    // in δ, since Exp(ξ) x = x Exp(δ).
+    const State& x = estimate.x_hat();
+    const Eigen::Matrix2d slope =
+        x.get<0>().rotation().matrix() *
+        jacobian([&](const auto& r) { return localization::seen(x.get<2>(), r(0), r(1)); },
+                 reading);
+    const MeasurementNoise<2> noise(
+        Eigen::Matrix2d(slope * noise_.D().asDiagonal() * slope.transpose()));
+    const auto there = [&](const auto& at) {
+      using Scalar = typename std::remove_cvref_t<decltype(at)>::Scalar;
+      return Eigen::Matrix<Scalar, 2, 1>(
+          at.template get<0>() *
+          localization::seen(at.template get<2>(), Scalar(reading(0)), Scalar(reading(1))));
+    };
+    return Extended().correct(estimate, landmark, there, noise, how);
+  }
+  const auto expected = [&](const auto& at) {
+    return localization::sighting(at.template get<0>(), at.template get<2>(), landmark);
+  };
+  if (options_.method == LandmarkFilterMethod::unscented) {
+    return Unscented<>().correct(estimate, reading, expected, noise_, how, AngleDifference<1>());
+  }
+  return Extended().correct(estimate, reading, expected, noise_, how, AngleDifference<1>());
+}
+
 Correction<2> LandmarkFilter::sighting(double time, const Vector2d& landmark, double range,
                                        double bearing) noexcept {
   Correction<2> result;
@@ -216,35 +245,19 @@ Correction<2> LandmarkFilter::sighting(double time, const Vector2d& landmark, do
     return result;
   }
   predict(time);
-  const Calibration known = estimate_.x_hat().get<2>();
-  const double direction = (bearing - known(8)) / (1.0 + known(7));
-  const double depth =
-      std::pow(std::max(std::cos(direction), localization::least_cosine), known(6));
-  const double distance = std::max(0.0, (range - known(5)) / ((1.0 + known(4)) * depth));
   relocalizer_.add(time_, dead_reckoned_,
-                   distance * Vector2d(std::cos(direction), std::sin(direction)), landmark);
+                   localization::seen(estimate_.x_hat().get<2>(), range, bearing), landmark);
   if (!located_) {
     relocalize();
     result.status = located_ ? UpdateStatus::updated : UpdateStatus::rejected;
     return result;
   }
-  const State x = estimate_.x_hat();
-  const auto expected = [&](const auto& delta) {
-    using Scalar = typename std::remove_cvref_t<decltype(delta)>::Scalar;
-    const auto at = x.cast<Scalar>().plus(delta);
-    return localization::sighting(at.template get<0>(), at.template get<2>(), landmark);
-  };
-  const auto linearize = [&](const State::Tangent& delta, Estimate<State>::Linearization<2>& at) {
-    const Vector2d h = expected(delta);
-    at.residual = {range - h(0), angle_difference(bearing, h(1))};
-    at.H = jacobian(expected, delta);
-  };
   // Student's noise still lets what is far off pull a little, and a landmark that is taken for
   // another pulls at every sighting: below this weight it does not count at all.
   constexpr double least_weight = 0.05;
   constexpr double doubtful = 0.5;
   Estimate<State> trial = estimate_;
-  result = trial.correct_by<2>(linearize, noise_, {.guard = &guard_, .iterations = 5});
+  result = take(trial, landmark, {range, bearing});
   if (result.accepted() && result.weight >= least_weight) {
     estimate_ = trial;
   } else if (result.accepted()) {

@@ -15,12 +15,12 @@ namespace flyball {
 Eigen::Matrix<double, SensorCalibration::size, 1> SensorCalibration::vector() const {
   Eigen::Matrix<double, size, 1> v;
   v << velocity_scale, turn_scale, turn_per_velocity, delay, range_scale, range_offset,
-      depth_exponent, bearing_scale, bearing_offset;
+      depth_exponent, bearing_scale, bearing_offset, gyro_bias;
   return v;
 }
 
 SensorCalibration SensorCalibration::from(const Eigen::Matrix<double, size, 1>& v) {
-  return {v(0), v(1), v(2), v(3), v(4), v(5), v(6), v(7), v(8)};
+  return {v(0), v(1), v(2), v(3), v(4), v(5), v(6), v(7), v(8), v(9)};
 }
 
 const SensorCalibration::Name& SensorCalibration::name(int index) {
@@ -32,7 +32,8 @@ const SensorCalibration::Name& SensorCalibration::name(int index) {
                                                  {"range offset", "m"},
                                                  {"depth exponent", ""},
                                                  {"bearing scale", ""},
-                                                 {"bearing offset", "rad"}}};
+                                                 {"bearing offset", "rad"},
+                                                 {"gyro bias", "rad/s"}}};
   return names[static_cast<std::size_t>(index)];
 }
 

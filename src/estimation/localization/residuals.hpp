@@ -30,7 +30,7 @@ template <class Errors, class Calibration>
   const Scalar way = d.way - d.velocity_gain * late;
   const Scalar turned = d.turned - d.turn_gain * late;
   return Eigen::Matrix<Scalar, 3, 1>{k(0) * way + e(0) * d.dt, Scalar(0.0),
-                                     k(1) * turned + k(2) * way + e(1) * d.dt};
+                                     k(1) * (turned - k(9) * d.dt) + k(2) * way + e(1) * d.dt};
 }
 
 /// The range and the bearing at which a landmark is seen.
@@ -54,6 +54,28 @@ template <class Pose, class Calibration>
   }
   return Eigen::Matrix<Scalar, 2, 1>{(1.0 + k(4)) * d * exp(k(6) * log(cosine)) + k(5),
                                      (1.0 + k(7)) * beta + k(8)};
+}
+
+/// Where the robot sees what it measured by range and bearing, in its frame: the inverse of
+/// `sighting`.
+template <class Calibration, class Reading>
+[[nodiscard]] auto seen(const Calibration& k, const Reading& range, const Reading& bearing) {
+  using Scalar = ScalarOf<Calibration, Eigen::Matrix<Reading, 1, 1>>;
+  using std::cos;
+  using std::exp;
+  using std::log;
+  using std::sin;
+  constexpr double least_distance = 0.01;  // m
+  const Scalar direction = (bearing - k(8)) / (1.0 + k(7));
+  Scalar cosine = cos(direction);
+  if (cosine < least_cosine) {
+    cosine = Scalar(least_cosine);
+  }
+  Scalar distance = (range - k(5)) / ((1.0 + k(4)) * exp(k(6) * log(cosine)));
+  if (distance < least_distance) {
+    distance = Scalar(least_distance);
+  }
+  return Eigen::Matrix<Scalar, 2, 1>{distance * cos(direction), distance * sin(direction)};
 }
 
 /// From one pose to the next by the odometry between them.

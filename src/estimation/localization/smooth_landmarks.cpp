@@ -227,6 +227,7 @@ class Drive {
   Expected<void> finish(SmoothedLandmarks& result) {
     FLYBALL_TRY(const auto covariances, graph_.covariances());
     result.calibration = SensorCalibration::from(calibration_);
+    result.calibration_covariance = covariances[0];
     result.calibration_std = SensorCalibration::from(covariances[0].diagonal().cwiseSqrt());
     for (const double time : times_) {
       if (time < node_times_.front() || time > node_times_.back()) {

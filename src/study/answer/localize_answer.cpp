@@ -1,19 +1,16 @@
 // Where a robot was, beside what its odometry says.
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include <flyball/core/time_series.hpp>
-#include <flyball/io/csv.hpp>
 #include <flyball/io/json_writer.hpp>
-#include <flyball/io/wpilog.hpp>
 #include <flyball/study/localize.hpp>
 
 #include "core/wording.hpp"
 #include "study/answer/parts.hpp"
+#include "study/answer/pose_log.hpp"
 
 namespace flyball::study {
 
@@ -61,6 +58,7 @@ std::string to_json(const LocalizeResult& result) {
   json.object([&] {
     json.add("schema", schema);
     json.list("files", result.files, [&](const std::string& file) { json.write(file); });
+    json.add("filter", name_of(result.method));
     json.object("sightings", [&] {
       json.add("used_by_filter", used_by_filter(result));
       json.add("of_landmarks", result.log.sightings.size());
@@ -81,6 +79,12 @@ std::string to_json(const LocalizeResult& result) {
         });
       }
     });
+    if (result.track_width) {
+      json.object("track_width", [&] {
+        json.add({{"value", result.track_width->value}, {"std", result.track_width->std}});
+        json.add("unit", "m");
+      });
+    }
     json.list("paths", paths_of(result), [&](const NamedPath& named) {
       json.object([&] {
         json.add("name", named.name);
@@ -120,6 +124,7 @@ Section path_section(const LocalizeResult& result) {
                         result.other_sightings > 0
                             ? fmt::format(", {} of other marks left aside", result.other_sightings)
                             : std::string())));
+  facts.add("filter", Value(fmt::format("{} Kalman filter", name_of(result.method))));
   facts.add("taken by the filter", Value(fmt::format("{}", used_by_filter(result))));
   const LocalizedPath& best = result.smoother ? result.smoother->path : result.filter.path;
   double worst = 0.0;
@@ -168,11 +173,15 @@ Section calibration_section(const LocalizeResult& result) {
                          : Value(""),
          std::string(name.unit)});
   }
+  if (result.track_width) {
+    table.rows.push_back({"track width", quantity(result.track_width->value, "m", 4, false),
+                          Value("± " + number(result.track_width->std, 2)), "m"});
+  }
   Section section{"calibration", "The sensors", {std::move(table)}};
   section.blocks.push_back(Paragraph{
-      "Speed = velocity scale × odometry's; turn rate = turn scale × odometry's + turn per "
-      "velocity "
-      "× speed; both `delay` later. Range = (1 + range scale) d cosᵖ β + range offset of a "
+      "Speed = velocity scale × odometry's; turn rate = turn scale × (odometry's - gyro bias) + "
+      "turn per velocity × speed; both `delay` later. Range = (1 + range scale) d cosᵖ β + range "
+      "offset of a "
       "landmark "
       "at the distance d and the direction β, p the depth exponent: 0 for a sensor of distance, 1 "
       "for a camera, which tells a depth along its axis.",
@@ -314,57 +323,6 @@ Figure sightings_figure(const LocalizeResult& result) {
   return figure;
 }
 
-std::string csv_of(const LocalizedPath& path) {
-  TimeSeries series(path.time);
-  std::array<std::vector<double>, 6> columns;
-  for (std::size_t i = 0; i < path.time.size(); ++i) {
-    const Pose2d& pose = path.pose[i];
-    const Eigen::Matrix3d& P = path.covariance[i];
-    // The position's deviations along the map's axes: the covariance is in the robot's frame.
-    const Eigen::Matrix2d R = pose.rotation().matrix();
-    const Eigen::Matrix2d map = R * P.topLeftCorner<2, 2>() * R.transpose();
-    const std::array<double, 6> row{
-        pose.x(),          pose.y(), pose.angle(), std::sqrt(map(0, 0)), std::sqrt(map(1, 1)),
-        std::sqrt(P(2, 2))};
-    for (std::size_t c = 0; c < row.size(); ++c) {
-      columns[c].push_back(row[c]);
-    }
-  }
-  constexpr std::array<std::pair<const char*, const char*>, 6> names{{{"x", "m"},
-                                                                      {"y", "m"},
-                                                                      {"heading", "rad"},
-                                                                      {"x std", "m"},
-                                                                      {"y std", "m"},
-                                                                      {"heading std", "rad"}}};
-  for (std::size_t c = 0; c < names.size(); ++c) {
-    // One value a row by construction.
-    static_cast<void>(series.add(names[c].first, names[c].second, std::move(columns[c])));
-  }
-  return to_csv(series);
-}
-
-std::string wpilog_of(const LocalizeResult& result) {
-  WpilogWriter writer("Flyball localize");
-  const double begin = result.log.odometry.front().time;
-  for (const NamedPath& named : paths_of(result)) {
-    const auto id = writer.start_pose(fmt::format("/Flyball/{}", named.name));
-    for (std::size_t i = 0; i < named.path->time.size(); ++i) {
-      const Pose2d& pose = named.path->pose[i];
-      const std::array<double, 3> values{pose.x(), pose.y(), pose.angle()};
-      writer.append(id, named.path->time[i] - begin, std::span<const double>(values));
-    }
-  }
-  if (!result.truth.pose.empty()) {
-    const auto id = writer.start_pose("/Flyball/truth");
-    for (std::size_t i = 0; i < result.truth.time.size(); ++i) {
-      const Pose2d& pose = result.truth.pose[i];
-      const std::array<double, 3> values{pose.x(), pose.y(), pose.angle()};
-      writer.append(id, result.truth.time[i] - begin, std::span<const double>(values));
-    }
-  }
-  return writer.bytes();
-}
-
 Verdict verdict_of(const LocalizeResult& result) {
   Verdict verdict;
   const LocalizedPath& best = result.smoother ? result.smoother->path : result.filter.path;
@@ -415,7 +373,7 @@ Answer answer_of(const LocalizeResult& result) {
   for (const NamedPath& named : paths_of(result)) {
     answer.files.push_back({fmt::format("data/{}.csv", named.name), csv_of(*named.path)});
   }
-  answer.files.push_back({"data/poses.wpilog", wpilog_of(result)});
+  answer.files.push_back(localize_log_file(result));
   return answer;
 }
 

@@ -13,12 +13,14 @@ namespace flyball {
 /// Odometry and sightings of landmarks, as they come: the pose, with what the sensors' calibration
 /// is and what the odometry errs by at the moment. An extended Kalman filter on SE(2) x (velocity
 /// and turn error) x calibration; sightings are taken by iterated corrections with Student's noise
-/// in place of gates, and a pose that the newest sightings contradict is found anew.
+/// in place of gates, and a pose that the newest sightings contradict is found anew. By the
+/// options' method the unscented or the invariant filter's steps take their place.
 ///
 /// It begins when it has been given a pose (`reset`) or has seen enough landmarks.
 /// Run-time object: noexcept, bounded, allocation-free, finite whatever comes.
 /// Source: book, sections 9.8 and 10.3; Roth, Ozkan, Gustafsson, "A Student's t filter for heavy
-/// tailed process and measurement noise", ICASSP (2013).
+/// tailed process and measurement noise", ICASSP (2013); Barrau, Bonnabel, "The invariant extended
+/// Kalman filter as a stable observer", IEEE Trans. Automatic Control 62 (2017).
 class LandmarkFilter {
  public:
   using Errors = Eigen::Vector2d;
@@ -70,6 +72,8 @@ class LandmarkFilter {
   };
   [[nodiscard]] Driven driven(double time) const noexcept;
   void step(double from, double to) noexcept;
+  Correction<2> take(Estimate<State>& estimate, const Eigen::Vector2d& landmark,
+                     const Eigen::Vector2d& reading) noexcept;
   void relocalize() noexcept;
 
   static constexpr int memory = 512;  ///< Of samples: 2 s at 250 Hz.

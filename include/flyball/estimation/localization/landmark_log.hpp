@@ -43,7 +43,7 @@ struct LandmarkLog {
 /// rate V, W, the odometry's v, w and the landmark's true distance d and direction β,
 ///
 ///     V(t) = velocity_scale v(t - delay)
-///     W(t) = turn_scale w(t - delay) + turn_per_velocity v(t - delay)
+///     W(t) = turn_scale (w(t - delay) - gyro_bias) + turn_per_velocity v(t - delay)
 ///     range = (1 + range_scale) d cosᵖ β + range_offset,  p = depth_exponent
 ///     bearing = (1 + bearing_scale) β + bearing_offset.
 ///
@@ -51,7 +51,7 @@ struct LandmarkLog {
 /// size in the image measures the depth along its axis (p = 1), which is 12 % less at half a
 /// radian.
 struct SensorCalibration {
-  static constexpr int size = 9;
+  static constexpr int size = 10;
 
   double velocity_scale = 1.0;
   double turn_scale = 1.0;
@@ -62,6 +62,7 @@ struct SensorCalibration {
   double depth_exponent = 0.0;
   double bearing_scale = 0.0;
   double bearing_offset = 0.0;  ///< rad
+  double gyro_bias = 0.0;       ///< rad/s; what the turn rate reads at rest.
 
   /// All of them, in this order.
   [[nodiscard]] Eigen::Matrix<double, size, 1> vector() const;
@@ -74,8 +75,18 @@ struct SensorCalibration {
   [[nodiscard]] static const Name& name(int index);
 };
 
+/// How a LandmarkFilter takes its steps; the model and what becomes of outliers are the same.
+enum class LandmarkFilterMethod {
+  extended,   ///< Exact Jacobians of range and bearing, iterated.
+  unscented,  ///< The unscented transform of the motion and of range and bearing.
+  /// The landmark where the robot sees it, against where it is: of a pose whose error is in the
+  /// fixed frame the slope of that does not depend on the estimate.
+  invariant,
+};
+
 /// What is assumed of a robot: one set of numbers serves drives of small wheeled robots of a kind.
 struct LandmarkOptions {
+  LandmarkFilterMethod method = LandmarkFilterMethod::extended;
   SensorCalibration calibration{.delay = 0.15, .depth_exponent = 0.5};  ///< Expected beforehand.
   /// Standard deviations of that; a zero keeps a value as it is.
   SensorCalibration calibration_std{.velocity_scale = 0.05,
@@ -86,7 +97,8 @@ struct LandmarkOptions {
                                     .range_offset = 0.03,
                                     .depth_exponent = 0.5,
                                     .bearing_scale = 0.03,
-                                    .bearing_offset = 0.02};
+                                    .bearing_offset = 0.02,
+                                    .gyro_bias = 0.005};
   /// Of a sighting, per sighting. Errors of neighbouring sightings are alike, so that they tell
   /// less than they would if they were independent: larger than the scatter.
   double range_std = 0.1;     ///< m

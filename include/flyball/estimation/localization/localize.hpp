@@ -39,6 +39,7 @@ struct SmoothedLandmarks {
       distance{};  ///< √(rᵀ R⁻¹ r) of each sighting, as multiple of what is assumed.
   SensorCalibration calibration{};
   SensorCalibration calibration_std{};
+  Eigen::Matrix<double, SensorCalibration::size, SensorCalibration::size> calibration_covariance{};
   double optimality = 0.0;  ///< As FactorGraphResult's.
   bool converged = false;
   int iterations = 0;
