@@ -1,4 +1,5 @@
 #include <flyball/control/observer_placement.hpp>
+#include <flyball/estimation/autocovariance.hpp>
 #include <flyball/estimation/kalman_gain.hpp>
 #include <flyball/estimation/smoother.hpp>
 #include <flyball/math/probability/gaussian_vector.hpp>
@@ -68,6 +69,29 @@ Outcome solve_smooth(const Problem& problem, JsonWriter& answer) {
   return {};
 }
 
+Outcome solve_noise_covariances(const Problem& problem, JsonWriter& answer) {
+  const bool diagonal = problem.choice("structure") == "diagonal";
+  const Eigen::MatrixXd no_gain;
+  FLYBALL_TRY(const auto fit, fit_noise_by_autocovariances(
+                                  problem.matrix("A"), problem.matrix("C"), problem.matrix("G"),
+                                  Eigen::MatrixXd(problem.matrix("y").transpose()),
+                                  Eigen::MatrixXd(problem.matrix("added").transpose()),
+                                  problem.has("L") ? problem.matrix("L") : no_gain,
+                                  {.lags = problem.integer("lags"),
+                                   .diagonal_process = diagonal,
+                                   .diagonal_measurement = diagonal}));
+  answer.add("Q", fit.Q);
+  answer.add("R", fit.R);
+  answer.add("Q_std", fit.Q_std);
+  answer.add("R_std", fit.R_std);
+  answer.add("lags", static_cast<double>(fit.lags));
+  answer.add("misfit", fit.misfit);
+  answer.add("at_boundary", fit.at_boundary);
+  answer.add("optimality", fit.optimality);
+  answer.add("condition", fit.condition);
+  return {};
+}
+
 Outcome solve_bayes(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const auto prior,
               GaussianVector::create(problem.matrix("mean"), problem.matrix("covariance")));
@@ -127,6 +151,29 @@ std::vector<Kind> estimator_kinds() {
         list("nis", "k", "", "normalised innovations squared")},
        R"({"A": [[1, 0.1], [0, 1]], "C": [[1, 0]], "Q": [[0, 0], [0, 0.01]], "R": [[0.1]], "P0": [[1, 0], [0, 1]], "y": [0.1, 0.3, 0.2]})",
        &solve_smooth},
+      {"noise_covariances",
+       "the covariances of a system's noises from its outputs: autocovariance least squares",
+       {matrix("A", "n", "n", "how the states move by themselves, sampled"),
+        matrix("C", "p", "n", "how the outputs see the states"),
+        matrix("G", "n", "g", "how the process noise moves the states"),
+        samples("y", "k", "p", "the outputs, a row a sample, without Du"),
+        or_zero(samples("added", "k", "n", "what the inputs add to the states after each, Bu")),
+        optional(matrix("L", "n", "p", "the gain of a first, stable predictor")),
+        or_first(
+            choice("structure", "diagonal full", "whether the noises' entries are independent")),
+        or_number(integer("lags", "the last of the autocovariances; 0: as the filter remembers"),
+                  0.0)},
+       {matrix("Q", "g", "g", "of the process noise, a sample; positive semidefinite"),
+        matrix("R", "p", "p", "of the measurement noise, a sample; positive semidefinite"),
+        matrix("Q_std", "g", "g", "standard errors of its entries"),
+        matrix("R_std", "p", "p", "standard errors of its entries"),
+        number("lags", "", "the last of the autocovariances"),
+        number("misfit", "",
+               "of the autocovariances, in standard errors; about 1 where all is right"),
+        flag("at_boundary", "whether only the constraint keeps a covariance semidefinite"),
+        number("optimality", "", "by how much a projected step still moves, relative"), condition},
+       R"({"A": [[0.9]], "C": [[1]], "G": [[1]], "lags": 2, "y": [0.3, 1.1, 0.2, -0.9, -1.4, -0.6, -1.2, 0.4, 0.1, 0.8, 1.9, 0.7, 1.3, 0.2, -0.4, -1.1, -0.3, -0.8, 0.5, -0.2, 0.6, 1.4, 0.9, 0.3, -0.5, 0.1, -1.0, -0.7, 0.2, 0.8, 0.4, -0.1, -0.9, -0.3, 0.5, 1.2, 0.6, -0.4, 0.3, 0.9]})",
+       &solve_noise_covariances},
       {"bayes",
        "a Gaussian vector after the measurement y = Cx + v: fusion and conditionals (9.3, 9.5)",
        {list("mean", "n", "", "E[x] before"),
