@@ -67,7 +67,10 @@ Expected<void> check(const Plot& plot) {
 class Script {
  public:
   explicit Script(const Plot& plot)
-      : plot_(plot), x_(plot.log_x), box_width_(plot.width - left_margin - right_margin) {}
+      : plot_(plot),
+        x_(plot.log_x),
+        left_(left_of(plot)),
+        box_width_(plot.width - left_ - right_margin) {}
 
   std::string build(PictureFormat format) {
     lay_out();
@@ -114,6 +117,18 @@ class Script {
     Range y;
   };
 
+  /// Words on an axis take the room that they need, beside the axis' name.
+  static int left_of(const Plot& plot) {
+    constexpr double name = 48.0;
+    double left = left_margin;
+    for (const PlotPanel& panel : plot.panels) {
+      for (const PlotTick& tick : panel.y_ticks) {
+        left = std::max(left, name + text_width(tick.label, font_size));
+      }
+    }
+    return static_cast<int>(std::min(left, 0.5 * plot.width));
+  }
+
   std::back_insert_iterator<std::string> out() { return std::back_inserter(script_); }
 
   void lay_out() {
@@ -157,6 +172,7 @@ class Script {
         x_.include(span.from);
         x_.include(span.to);
       }
+      scatter = scatter || !panel.y_ticks.empty();
     }
     if (plot_.unit_circle) {
       x_.include(-1.0);
@@ -277,7 +293,7 @@ class Script {
                    "set lmargin at screen {}\nset rmargin at screen {}\nset tmargin at screen {}\n"
                    "set bmargin at screen {}\nset yrange [{}:{}]\n{}set label {} at screen {}, "
                    "screen {} center rotate by 90 textcolor rgb '#333333'\n",
-                   static_cast<double>(left_margin) / plot_.width,
+                   static_cast<double>(left_) / plot_.width,
                    1.0 - static_cast<double>(right_margin) / plot_.width,
                    1.0 - static_cast<double>(box.top) / height_,
                    1.0 - static_cast<double>(box.bottom) / height_, box.y.low(), box.y.high(),
@@ -289,13 +305,13 @@ class Script {
     script_ += panel.log_y ? "set logscale y\n" : "unset logscale y\n";
     if (last) {
       fmt::format_to(out(), "set label {} at screen {}, screen {} center textcolor rgb '#333333'\n",
-                     literal(plot_.x_label), (left_margin + 0.5 * box_width_) / plot_.width,
+                     literal(plot_.x_label), (left_ + 0.5 * box_width_) / plot_.width,
                      18.0 / height_);
       script_ += "set format x '%g'\n";
     } else {
       script_ += "set format x ''\n";
     }
-    script_ += box.legend.commands(left_margin + 10, box.top, plot_.width, height_);
+    script_ += box.legend.commands(left_ + 10, box.top, plot_.width, height_);
     draw_marks(panel);
     draw_curves(panel);
     // The title belongs to the first panel only: a label drawn again and again grows bold.
@@ -402,6 +418,7 @@ class Script {
   const Plot& plot_;
   std::string script_;
   Range x_;
+  int left_;  ///< Of the boxes.
   int box_width_;
   int height_ = 0;
   std::vector<Box> boxes_;
