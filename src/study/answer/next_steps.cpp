@@ -72,7 +72,7 @@ void add_design_steps(std::vector<std::string>& steps, const DesignResult& resul
   steps.push_back(fmt::format(
       "Bring the loop into the robot's program: {0}.hpp in this report's folder is the whole loop "
       "in C++, {0}.java in Java, the .py file in Python, to be called every {1}; or paste the "
-      "constants below into the library that you use.",
+      "constants above into the library that you use.",
       exports::loop_class_name(plant.kind), period));
   steps.push_back(fmt::format(
       "Before it may move, check by hand that a positive voltage moves the mechanism in its "
