@@ -81,6 +81,21 @@ std::string xml_escaped(std::string text) {
   return text;
 }
 
+/// Removes groups that draw nothing: gnuplot begins and ends with some, in colours that the picture
+/// before has left.
+void remove_empty_groups(std::string& text) {
+  constexpr std::string_view close = ">\n</g>\n";
+  std::string result;
+  std::size_t at = 0;
+  for (std::size_t end = text.find(close); end != std::string::npos; end = text.find(close, at)) {
+    const std::size_t line = text.rfind('\n', end) + 1;
+    const bool empty = line >= at && text.compare(line, 3, "<g ") == 0;
+    result.append(text, at, (empty ? line : end + close.size()) - at);
+    at = end + close.size();
+  }
+  text = result.append(text, at);
+}
+
 /// The element alone, with the picture's title for readers of screens, fonts that browsers without
 /// DejaVu fall back to, and without ids and tooltips ("gnuplot_plot_1a") that would clash when
 /// several pictures stand in one page.
@@ -92,7 +107,8 @@ std::string tidy_svg(std::string svg, const std::string& title) {
   replace_all(svg, "<title>Gnuplot</title>",
               "<title>" + xml_escaped(io::printable(title, 400)) + "</title>");
   replace_all(svg, "\"DejaVu Sans\"", "\"DejaVu Sans, Verdana, sans-serif\"");
-  return svg;
+  remove_empty_groups(svg);
+  return std::string(io::trim(svg)) + "\n";
 }
 
 constexpr std::string_view png_signature = "\x89PNG\r\n\x1A\n";

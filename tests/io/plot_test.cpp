@@ -246,7 +246,7 @@ TEST(Plot, PolesInTheUnitCircle) {
       pole_plot("Poles", {{"controller", {{0.5, 0.5}, {0.5, -0.5}}, {{0.0, 0.0}}}}, true);
   EXPECT_TRUE(plot.unit_circle);
   EXPECT_TRUE(plot.equal_axes);
-  EXPECT_EQ(plot.panels[0].lines.size(), 2U);
+  EXPECT_EQ(plot.panels[0].lines.size(), 3U);  // The grid of damping, poles, zeros.
   EXPECT_TRUE(render_svg(plot));
   EXPECT_TRUE(render_svg(pole_plot("Poles", {{"plant", {{-3.0, 0.0}}, {}}}, false)));
   EXPECT_TRUE(render_svg(pole_plot("None", {}, false)));
