@@ -140,6 +140,15 @@ void drop_outliers(TestRun& run, RowDefects& defects) {
       bad[i] = bad[i] || beyond > 2.0 * spread;
     }
   }
+  // A hundredth of a very long test may be its start: what lasts is no outlier.
+  constexpr std::ptrdiff_t longest = 20;
+  for (auto first = std::find(bad.begin(), bad.end(), true); first != bad.end();) {
+    const auto last = std::find(first, bad.end(), false);
+    if (last - first > longest) {
+      std::fill(first, last, false);
+    }
+    first = std::find(last, bad.end(), true);
+  }
   std::vector<std::size_t> rows;
   for (std::size_t i = 0; i < bad.size(); ++i) {
     if (!bad[i]) {
