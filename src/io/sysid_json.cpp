@@ -27,7 +27,6 @@ namespace {
 using io::run_names;
 using io::SysIdRows;
 using io::SysIdTable;
-using Row = io::SysIdRow;
 
 Refusal not_sysid(const std::string& source, std::string got) {
   return refusal(LogError::not_a_log, source, "the JSON")
@@ -71,36 +70,48 @@ struct Dropped {
 /// A table's good rows in time order, spread over the columns of a run.
 SysIdJson::Run to_run(std::string name, SysIdTable& table, SysIdJson::Layout layout,
                       std::size_t columns, Dropped& dropped) {
-  std::vector<Row> rows;
-  rows.reserve(table.rows.size());
-  for (std::size_t i = 0; i < table.rows.size(); ++i) {
-    const Row& row = table.rows[i];
-    if (table.widths[i] != columns) {
+  // The good rows move to the front, so that a long log is not held twice.
+  std::vector<double>& values = table.values;
+  std::size_t from = 0;
+  std::size_t rows = 0;
+  bool sorted = true;
+  for (const unsigned char width : table.widths) {
+    const auto row = values.begin() + static_cast<std::ptrdiff_t>(from);
+    from += width;
+    if (width != columns) {
       ++dropped.other_width;
-    } else if (!std::all_of(row.begin(), row.begin() + static_cast<std::ptrdiff_t>(columns),
-                            [](double value) { return std::isfinite(value); })) {
+    } else if (!std::all_of(row, row + width, [](double value) { return std::isfinite(value); })) {
       ++dropped.non_finite;
     } else {
-      dropped.backward += !rows.empty() && row[0] < rows.back()[0] ? 1 : 0;
-      rows.push_back(row);
+      const auto to = values.begin() + static_cast<std::ptrdiff_t>(rows * columns);
+      std::copy(row, row + width, to);
+      const bool backward = rows > 0 && to[0] < values[(rows - 1) * columns];
+      dropped.backward += backward ? 1 : 0;
+      sorted = sorted && !backward;
+      ++rows;
     }
   }
-  table.rows = {};
-  table.widths = {};
-  std::stable_sort(rows.begin(), rows.end(),
-                   [](const Row& a, const Row& b) { return a[0] < b[0]; });
+  std::vector<std::size_t> order(rows);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (!sorted) {
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return values[a * columns] < values[b * columns];
+    });
+  }
   SysIdJson::Run run;
   run.name = std::move(name);
   const auto members = io::columns_of(layout);
   for (std::size_t c = 0; c < members.size(); ++c) {
     if (members[c] != nullptr) {
       std::vector<double>& column = run.*members[c];
-      column.reserve(rows.size());
-      for (const Row& row : rows) {
-        column.push_back(row[c]);
+      column.reserve(rows);
+      for (const std::size_t row : order) {
+        column.push_back(values[row * columns + c]);
       }
     }
   }
+  std::vector<double>().swap(table.values);  // Frees it, as the next table needs the memory.
+  std::vector<unsigned char>().swap(table.widths);
   return run;
 }
 

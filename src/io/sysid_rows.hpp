@@ -19,13 +19,11 @@ namespace flyball::io {
 
 inline constexpr std::size_t max_columns = columns_2020.size();
 
-using SysIdRow = std::array<double, max_columns>;
-
-/// A test's rows as they stand in the file.
+/// A test's rows as they stand in the file, one after the other.
 struct SysIdTable {
   bool present = false;
-  std::vector<SysIdRow> rows;
-  std::vector<unsigned char> widths;
+  std::vector<double> values;
+  std::vector<unsigned char> widths;  ///< Of each row.
 };
 
 /// Collects complete rows while the parser walks through the text, so that whatever precedes a cut
@@ -108,7 +106,9 @@ class SysIdRows : public nlohmann::json_sax<nlohmann::json> {
     if (in_row()) {
       const bool known = width_ == 4 || width_ == 9 || width_ == 10;
       if (known && !row_is_odd_) {
-        tables[run_].rows.push_back(row_);
+        std::vector<double>& values = tables[run_].values;
+        values.insert(values.end(), row_.begin(),
+                      row_.begin() + static_cast<std::ptrdiff_t>(width_));
         tables[run_].widths.push_back(static_cast<unsigned char>(width_));
       } else {
         ++odd_rows;
@@ -147,7 +147,7 @@ class SysIdRows : public nlohmann::json_sax<nlohmann::json> {
   std::size_t depth_ = 0;
   std::string key_;
   std::size_t run_ = run_names.size();
-  SysIdRow row_{};
+  std::array<double, max_columns> row_{};
   std::size_t width_ = 0;
   bool row_is_odd_ = false;
 };
