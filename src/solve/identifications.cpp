@@ -108,6 +108,7 @@ Outcome solve_subspace(const Problem& problem, JsonWriter& answer) {
     answer.add("simulation_fit", free);
   }
   answer.add("noise_determined", found.noise_determined);
+  answer.add("stabilized", found.stabilized);
   return {};
 }
 
@@ -186,7 +187,10 @@ std::vector<Kind> identification_kinds() {
                unbounded(
                    list("prediction_fit", "p", "", "1 - ‖y - ŷ‖/‖y - mean‖ one sample ahead")),
                optional(unbounded(list("simulation_fit", "p", "", "the same in free run"))),
-               flag("noise_determined", "whether the residuals are large enough to tell K")},
+               flag("noise_determined", "whether the residuals are large enough to tell K"),
+               flag("stabilized",
+                    "whether poles outside the unit circle, which u and y do not ask for, were "
+                    "reflected into it")},
        R"({"u": [1, -1, 2, 0, 1, -2, 0, 1, 1, -1, 2, -2, 1, 0, -1, 1, 2, -2, 0, 1, -1, 2, 1, -1, 0, 2, -2, 1, 1, 0], "y": [0, 1, -0.5, 1.75, 0.9, 1.4, -1.3, -0.6, 0.7, 1.3, -0.3, 1.8, -1.1, 0.5, 0.2, -0.9, 0.6, 2.3, -0.9, -0.4, 0.8, -0.6, 1.7, 1.8, -0.1, -0.1, 2, -1, 0.5, 1.2], "T": 0.1, "order": 1, "block_rows": 3})",
        &solve_subspace},
   };
