@@ -351,7 +351,7 @@ TEST(LandmarkFilter, SilentOdometryIsNoOdometryOfRest) {
     return std::sqrt(filter.pose_covariance()(2, 2));
   };
   EXPECT_GE(heading_std(true), 0.3);
-  EXPECT_LE(heading_std(false), 0.11);
+  EXPECT_LE(heading_std(false), 0.115);
 }
 
 // v = t and w = 2t: the way from 1 to 2 with a delay d is ((2 - d)² - (1 - d)²)/2 = 3/2 - d, the
