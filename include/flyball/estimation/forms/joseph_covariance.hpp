@@ -220,8 +220,8 @@ class JosephCovariance {
     }
     return bounded;
   }
-  /// P_ii > 0 and |P_ij| <= √(P_ii P_jj): where numbers are as far apart as doubles can be, rounding
-  /// and underflow leave less than that.
+  /// P_ii > 0 and |P_ij| <= √(P_ii P_jj): where numbers are as far apart as doubles can be,
+  /// rounding and underflow leave less than that.
   void bound_by_variances() noexcept {
     const Eigen::Index n = P_.rows();
     for (Eigen::Index j = 0; j < n; ++j) {
