@@ -272,9 +272,37 @@ TEST(LandmarkFilter, WhatIsNoNumberChangesNothing) {
   EXPECT_FALSE(filter.sighting(0.5, {3.0, nan}, 2.0, 0.1).accepted());
   EXPECT_FALSE(filter.sighting(0.5, {3.0, 3.0}, 2.0, nan).accepted());
   EXPECT_EQ(filter.pose().minus(before).norm(), 0.0);
-  EXPECT_TRUE(filter.predict(1e6));  // A bounded number of steps.
+  EXPECT_TRUE(filter.predict(3600.0));  // A bounded number of steps.
   EXPECT_TRUE(filter.pose().matrix().allFinite());
   EXPECT_TRUE(filter.pose_covariance().allFinite());
+}
+
+TEST(LandmarkFilter, AnotherClocksTimeChangesNothing) {
+  auto filter = LandmarkFilter::create({}).value();
+  ASSERT_TRUE(filter.reset(Pose2d(1.0, 2.0, 0.5)));
+  ASSERT_TRUE(filter.odometry(10.0, 1.0, 0.0));
+  ASSERT_TRUE(filter.predict(11.0));
+  const Pose2d pose = filter.pose();
+  const auto P = filter.estimate().P();
+  for (const double time : {1e99, 1.7e9, 11.0 + 3601.0}) {
+    EXPECT_FALSE(filter.odometry(time, 1.0, 0.0));
+    EXPECT_FALSE(filter.predict(time));
+    EXPECT_FALSE(filter.sighting(time, {5.0, 5.0}, 3.0, 0.1).accepted());
+  }
+  EXPECT_EQ(filter.time(), 11.0);
+  EXPECT_EQ(filter.pose().matrix(), pose.matrix());
+  EXPECT_EQ(filter.estimate().P(), P);
+  EXPECT_TRUE(filter.odometry(12.0, 1.0, 0.0));
+  EXPECT_TRUE(filter.predict(12.0));
+
+  EXPECT_FALSE(filter.reset(Pose2d(), nan));
+  ASSERT_TRUE(filter.reset(Pose2d(3.0, 0.0, 0.0), 1.7e9));
+  EXPECT_EQ(filter.time(), 1.7e9);
+  ASSERT_TRUE(filter.reset(Pose2d(3.0, 0.0, 0.0), 1.0));  // Back, and with odometry of then.
+  ASSERT_TRUE(filter.odometry(1.0, 1.0, 0.0));
+  ASSERT_TRUE(filter.predict(2.0));
+  EXPECT_EQ(filter.time(), 2.0);
+  EXPECT_GT(filter.pose().x(), 3.5);
 }
 
 void expect_no_allocations(LandmarkFilterMethod method) {
@@ -419,6 +447,12 @@ TEST(LandmarkLog, WhatDoesNotFitIsRefusedWithItsRow) {
           "degrees");
   refused([](auto& log, auto&) { log.landmarks[1].position(0) = nan; }, ArgumentError::not_finite,
           "landmark 2");
+  for (const double beyond : {1e-300, 1e300}) {
+    refused([&](auto&, auto& options) { options.range_std = beyond; }, ArgumentError::out_of_range,
+            "range_std");
+    refused([&](auto&, auto& options) { options.bearing_std = beyond; },
+            ArgumentError::out_of_range, "bearing_std");
+  }
   refused([](auto&, auto& options) { options.range_std = 0.0; }, ArgumentError::not_positive,
           "range_std");
   refused([](auto&, auto& options) { options.calibration_std.delay = -1.0; },

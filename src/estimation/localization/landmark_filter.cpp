@@ -80,9 +80,29 @@ bool LandmarkFilter::reset(const Pose2d& pose) noexcept {
   return located_;
 }
 
+bool LandmarkFilter::reset(const Pose2d& pose, double time) noexcept {
+  if (!is_signal(time) || !reset(pose)) {
+    return false;
+  }
+  time_ = time;
+  started_ = true;
+  sample_count_ = next_sample_ = 0;
+  return true;
+}
+
+/// Whether a time is one of this clock: finite, and not far ahead of what has come.
+bool LandmarkFilter::is_near(double time) const noexcept {
+  double newest = time_;
+  if (sample_count_ > 0) {
+    newest = std::max(
+        newest, samples_[static_cast<std::size_t>((next_sample_ - 1 + memory) % memory)].time);
+  }
+  return is_signal(time) && (!started_ || time - newest <= longest_pause);
+}
+
 bool LandmarkFilter::odometry(double time, double velocity, double turn_rate) noexcept {
   constexpr double shortest = 0.004;  // s
-  if (!is_signal(time) || !is_signal(velocity) || !is_signal(turn_rate)) {
+  if (!is_near(time) || !is_signal(velocity) || !is_signal(turn_rate)) {
     return false;
   }
   if (sample_count_ == 0) {
@@ -185,7 +205,7 @@ void LandmarkFilter::step(double from, double to) noexcept {
 bool LandmarkFilter::predict(double time) noexcept {
   constexpr double longest_step = 0.05;  // s
   constexpr double most_steps = 400.0;
-  if (!is_signal(time) || (started_ && time < time_)) {
+  if (!is_near(time) || (started_ && time < time_)) {
     return false;
   }
   if (!started_) {
@@ -240,7 +260,7 @@ Correction<2> LandmarkFilter::take(Estimate<State>& estimate, const Vector2d& la
 Correction<2> LandmarkFilter::sighting(double time, const Vector2d& landmark, double range,
                                        double bearing) noexcept {
   Correction<2> result;
-  if (!is_signal(time) || !is_signal(landmark) || !is_signal(range) || !is_signal(bearing) ||
+  if (!is_near(time) || !is_signal(landmark) || !is_signal(range) || !is_signal(bearing) ||
       !(range > 0.0)) {
     return result;
   }

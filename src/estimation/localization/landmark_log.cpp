@@ -82,6 +82,8 @@ Expected<void> check_options(const LandmarkOptions& options) {
   return checks.within(options.calibration.delay, 0.0, 1.5, "delay")
       .positive(options.range_std, "range_std")
       .positive(options.bearing_std, "bearing_std")
+      .within(options.range_std, 1e-6, 1e3, "range_std", "m")
+      .within(options.bearing_std, 1e-6, std::numbers::pi, "bearing_std", "rad")
       .within(options.freedom, 1.0, 1e6, "freedom")
       .not_negative(options.velocity_density, "velocity_density")
       .not_negative(options.slip_density, "slip_density")

@@ -97,8 +97,7 @@ Expected<FilteredLandmarks> filter_landmarks(const LandmarkLog& log, const Landm
       continue;
     }
     take_until(time);
-    filter.predict(time);
-    if (filter.located()) {
+    if (filter.predict(time) && filter.located()) {
       result.path.time.push_back(time);
       result.path.pose.push_back(filter.pose());
       result.path.covariance.push_back(filter.pose_covariance());

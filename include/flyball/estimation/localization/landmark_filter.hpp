@@ -31,19 +31,27 @@ class LandmarkFilter {
   /// @errors As `check_landmark_log` for the options.
   [[nodiscard]] static Expected<LandmarkFilter> create(const LandmarkOptions& options = {});
 
+  /// s; what is farther ahead of the filter and of its odometry is another clock's time.
+  static constexpr double longest_pause = 3600.0;
+
   /// A pose to begin, or to go on, with: its standard deviations are the options'.
+  /// @return  Whether it was taken: not what is not finite.
   bool reset(const Pose2d& pose) noexcept;
+  /// The same at a time, earlier or later: by a clock that was set, or after a long pause. The
+  /// odometry so far is forgotten.
+  bool reset(const Pose2d& pose, double time) noexcept;
   /// Whether there is a pose.
   [[nodiscard]] bool located() const noexcept { return located_; }
 
-  /// The odometry from now on. @return  Whether it was taken: not what is not finite or older than
-  /// the last. Of samples that come faster than 4 ms the newest counts.
+  /// The odometry from now on. @return  Whether it was taken: not what is not finite, older than
+  /// the last or `longest_pause` ahead. Of samples that come faster than 4 ms the newest counts.
   bool odometry(double time, double velocity, double turn_rate) noexcept;
-  /// Goes on to a time. @return  Whether it did: times before that of now are left out.
+  /// Goes on to a time. @return  Whether it did: times before that of now are left out, and those
+  /// more than `longest_pause` after it and after the odometry.
   bool predict(double time) noexcept;
   /// What a sighting did. @param landmark  Where the landmark is, m. @param time  s; a sighting
-  /// before the filter's time counts as one of now, one after it predicts. What is not finite
-  /// changes nothing.
+  /// before the filter's time counts as one of now, one after it predicts. What is not finite, or
+  /// farther ahead than `longest_pause`, changes nothing.
   Correction<2> sighting(double time, const Eigen::Vector2d& landmark, double range,
                          double bearing) noexcept;
 
@@ -71,6 +79,7 @@ class LandmarkFilter {
     bool missing = false;  ///< No odometry for longer than a gap.
   };
   [[nodiscard]] Driven driven(double time) const noexcept;
+  [[nodiscard]] bool is_near(double time) const noexcept;
   void step(double from, double to) noexcept;
   Correction<2> take(Estimate<State>& estimate, const Eigen::Vector2d& landmark,
                      const Eigen::Vector2d& reading) noexcept;
