@@ -10,6 +10,7 @@
 
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
+#include "study/localize_doubts.hpp"
 #include "study/localize_files.hpp"
 
 namespace flyball::study {
@@ -31,8 +32,7 @@ void notice_calibration(const SensorCalibration& found, const LandmarkOptions& o
     if (std(i) > 0.0 && std::abs(value(i) - mean(i)) > far * std(i)) {
       warn(diagnostics, "implausible_calibration",
            "{} was found to be {:.3g}{}{}, where {:.3g} ± {:.2g} is expected: look for a unit (a "
-           "foot "
-           "is 0.305 m, a degree 0.0175 rad), a sense of turning or two clocks",
+           "foot is 0.305 m, a degree 0.0175 rad), a sense of turning or two clocks",
            SensorCalibration::name(i).name, value(i), unit.empty() ? "" : " ", unit, mean(i),
            std(i));
     }
@@ -181,6 +181,7 @@ Expected<LocalizeResult> localize(const LocalizeJob& job) {
       result.smoother_error = error_of(result.smoother->path, result.truth);
     }
   }
+  notice_doubts(options, start, result);
   return result;
 }
 

@@ -10,6 +10,7 @@
 #include <limits>
 #include <sstream>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -297,7 +298,7 @@ TEST_F(Localize, TheUtiasRobotIsFound) {
   if (!std::filesystem::exists(data + "mrclam6_robot1_Odometry.dat.gz")) {
     GTEST_SKIP() << "without the recordings";
   }
-  const TemporaryFolder unpacked;
+  TemporaryFolder unpacked;
   const std::string to = unpacked.file("");
   for (const std::string name : {"Odometry", "Measurement", "Groundtruth_every5th"}) {
     const std::string command = "gzip -cd '" + data + "mrclam6_robot1_" + name + ".dat.gz' > '" +
@@ -315,6 +316,45 @@ TEST_F(Localize, TheUtiasRobotIsFound) {
   EXPECT_NEAR(result->smoother->calibration.depth_exponent, 1.0, 0.15);
   EXPECT_NEAR(result->smoother->calibration.delay, 0.2, 0.06);
   EXPECT_LT(result->smoother_error->nees, 1.2);
+  EXPECT_EQ(answer_of(*result).document.verdict.tone, Tone::caution);  // One unknown barcode.
+
+  // The sign of a column, or its unit: never "known", and the mend is told.
+  const auto changed = [&](const char* name, std::size_t column, double factor) {
+    std::istringstream in(read_file(to + "robot1_" + name + ".dat").value());
+    std::string out;
+    for (std::string line; std::getline(in, line);) {
+      if (line.empty() || line.front() == '#') {
+        continue;
+      }
+      std::istringstream cells(line);
+      double cell = 0.0;
+      for (std::size_t k = 0; cells >> cell; ++k) {
+        out += std::to_string(k == column ? factor * cell : cell) + " ";
+      }
+      out += "\n";
+    }
+    return out;
+  };
+  for (const auto& [name, column, factor, expected] :
+       {std::tuple("Measurement", 3, -1.0, "bearings are measured counter-clockwise"),
+        std::tuple("Odometry", 2, -1.0, "turn rates are positive counter-clockwise"),
+        std::tuple("Odometry", 2, 57.29578, "turn rates are in rad/s")}) {
+    const std::string file = std::string("robot1_") + name + ".dat";
+    const std::string right = read_file(to + file).value();
+    unpacked.put(file, changed(name, static_cast<std::size_t>(column), factor));
+    const auto wrong = localize({.paths = {to}, .smooth = false});
+    ASSERT_TRUE(wrong) << to_string(wrong.error());
+    const auto verdict = answer_of(*wrong).document.verdict;
+    EXPECT_EQ(verdict.tone, Tone::bad);
+    EXPECT_NE(verdict.line.find("cannot be trusted"), std::string::npos);
+    std::string all;
+    for (const Diagnostic& diagnostic : wrong->diagnostics) {
+      all += diagnostic.code + ": " + diagnostic.message + "\n";
+    }
+    EXPECT_NE(all.find(expected), std::string::npos) << all;
+    EXPECT_NE(all.find("inconsistent"), std::string::npos) << all;
+    unpacked.put(file, right);
+  }
 }
 #endif
 

@@ -1,4 +1,5 @@
 // Where a robot was, beside what its odometry says.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -332,7 +333,10 @@ Verdict verdict_of(const LocalizeResult& result) {
   }
   const auto left_out = static_cast<double>(result.log.sightings.size() - used_by_filter(result));
   constexpr double too_many = 0.3;
-  const bool believed = left_out <= too_many * static_cast<double>(result.log.sightings.size());
+  const bool believed =
+      left_out <= too_many * static_cast<double>(result.log.sightings.size()) &&
+      std::none_of(result.diagnostics.begin(), result.diagnostics.end(),
+                   [](const Diagnostic& d) { return d.severity == Severity::error; });
   const std::string spread_text = number(sum / static_cast<double>(best.time.size()), 2);
   verdict.line =
       believed
