@@ -67,8 +67,7 @@ bool is_of(const MechanismRow& row, const Section& section, const Field& field) 
   if (section.name == "mechanism") {
     return needs(row) || std::none_of(mechanism_rows().begin(), mechanism_rows().end(), needs);
   }
-  return field.subject != Subject::model &&
-         (field.key != "kG" || has_gravity(row.kind)) &&
+  return field.subject != Subject::model && (field.key != "kG" || has_gravity(row.kind)) &&
          (field.key != "angle_offset" || row.kind == mechanisms::MechanismKind::arm);
 }
 

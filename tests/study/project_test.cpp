@@ -190,7 +190,8 @@ TEST(Project, AJobWithoutAFileTakesItsOptions) {
   EXPECT_EQ(to_string(unknown.error()),
             "--state-tolerance is in a unit that the mechanism decides, which is not known; say "
             "which with --mechanism");
-  const auto unheard = identify_job("a.json", "", std::vector<Override>{{"--mechanism", "catapult"}});
+  const auto unheard =
+      identify_job("a.json", "", std::vector<Override>{{"--mechanism", "catapult"}});
   ASSERT_FALSE(unheard);
   EXPECT_EQ(unheard.error().where(), "--mechanism");
   const auto ten = tune_job("arm.json", "", std::vector<Override>{{"--gearing", "ten"}});
