@@ -41,12 +41,16 @@ inline MechanismControllerDesign design_of(MechanismKind kind, bool kA_determine
   }
   switch (kind) {
     case MechanismKind::flywheel:
+    case MechanismKind::roller:
+    case MechanismKind::swerve_drive:
       design.plant = sampled<1>(mechanisms::flywheel(design.gains).value());
       break;
     case MechanismKind::elevator:
       design.plant = sampled<2>(mechanisms::elevator(design.gains).value());
       break;
     case MechanismKind::arm:
+    case MechanismKind::turret:
+    case MechanismKind::swerve_steer:
       design.plant = sampled<2>(mechanisms::arm(design.gains).value());
       break;
   }

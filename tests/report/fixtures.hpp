@@ -19,6 +19,8 @@ inline study::DesignJob design_job(MechanismKind kind, bool kA_determined = true
   job.plant.kA_determined = kA_determined;
   switch (kind) {
     case MechanismKind::flywheel:
+    case MechanismKind::roller:
+    case MechanismKind::swerve_drive:
       job.plant.gains = {.kS = 0.2, .kV = 0.02, .kA = 0.004};
       break;
     case MechanismKind::elevator:
@@ -28,6 +30,10 @@ inline study::DesignJob design_job(MechanismKind kind, bool kA_determined = true
       break;
     case MechanismKind::arm:
       job.plant.gains = {.kS = 0.1, .kV = 1.2, .kA = 0.15, .kG = 0.65, .angle_offset = 0.2};
+      break;
+    case MechanismKind::turret:
+    case MechanismKind::swerve_steer:
+      job.plant.gains = {.kS = 0.1, .kV = 1.2, .kA = 0.15};
       break;
   }
   if (!kA_determined) {
