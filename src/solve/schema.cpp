@@ -100,11 +100,16 @@ Json object_of(const std::vector<Field>& fields, bool problem) {
 
 std::string json_schema() {
   const Json matrix = any_of(reference("matrix"), reference("number"));
-  Json system = {{"type", "object"},
-                 {"properties", {{"A", matrix}, {"B", matrix}, {"C", matrix}, {"D", matrix}}},
-                 {"anyOf", Json::array({{{"required", Json::array({"A", "B"})}},
-                                        {{"required", Json::array({"D"})}}})},
-                 {"additionalProperties", false}};
+  const auto object_with = [&](Json properties, Json required) {
+    return Json{{"type", "object"},
+                {"properties", std::move(properties)},
+                {"required", std::move(required)},
+                {"additionalProperties", false}};
+  };
+  // With states, or a static gain.
+  Json system = any_of(object_with({{"A", matrix}, {"B", matrix}, {"C", matrix}, {"D", matrix}},
+                                   Json::array({"A", "B"})),
+                       object_with({{"D", matrix}}, Json::array({"D"})));
   Json definitions = {
       {"number", any_of({{"type", "number"}}, {{"enum", Json::array({"inf", "-inf", nullptr})}})},
       {"complex",

@@ -203,7 +203,7 @@ TEST(Identify, AsksForTheMechanismThatTheDataLeaveOpen) {
   EXPECT_TRUE(open.error().is(identification::IdentificationError::unknown_mechanism));
   EXPECT_EQ(open.error().kind(), ErrorKind::misuse);
   const std::string text = to_string(open.error());
-  EXPECT_NE(text.find("--mechanism arm or --mechanism flywheel"), std::string::npos) << text;
+  EXPECT_NE(text.find("--mechanism arm or --mechanism turret"), std::string::npos) << text;
 }
 
 // Two facts are missing, and both are asked for.
@@ -230,10 +230,13 @@ TEST(Identify, ShowsWhatAPersonTrimmed) {
   EXPECT_EQ(json.at("log").at("runs").at(0).at("used_to"), 4.0);
   EXPECT_EQ(json.at("log").at("runs").at(3).at("left_out"), true);
   EXPECT_FALSE(json.at("log").at("runs").at(1).contains("used_to"));
-  ASSERT_EQ(answer.figures.size(), 4U);
-  EXPECT_NE(answer.figures[0].title.find("to 4 s by hand"), std::string::npos)
-      << answer.figures[0].title;
-  EXPECT_NE(answer.figures[3].title.find("left out by hand"), std::string::npos);
+  const auto titled = [&](const char* words) {
+    return std::count_if(answer.figures.begin(), answer.figures.end(), [&](const Figure& figure) {
+      return figure.title.find(words) != std::string::npos;
+    });
+  };
+  EXPECT_EQ(titled("to 4 s by hand"), 1);
+  EXPECT_EQ(titled("left out by hand"), 1);
 }
 
 }  // namespace
