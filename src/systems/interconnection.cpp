@@ -172,6 +172,9 @@ Expected<Continuous> unity_feedback(const Continuous& forward, FeedbackSign sign
 Expected<Eigen::MatrixXcd> evaluate(const Continuous& system, std::complex<double> point) {
   constexpr std::string_view where = "transfer_at";
   FLYBALL_CHECK(Checks(where).finite(point.real(), "the point").finite(point.imag(), "the point"));
+  if (system.A.size() == 0) {
+    return Eigen::MatrixXcd(system.D.cast<std::complex<double>>());
+  }
   const auto [A, B, C, D] =
       detail::scaled_system(system, detail::scaling_of(system.A, system.B, system.C));
   Eigen::MatrixXcd shifted = -A.cast<std::complex<double>>();

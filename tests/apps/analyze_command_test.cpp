@@ -104,7 +104,10 @@ TEST_F(AnalyzeCommand, WritesAReport) {
   const std::string page = contents(work() / "report/index.html");
   EXPECT_TRUE(holds(page, "Poles in the s plane"));
   EXPECT_TRUE(holds(page, "Unit step of voltage (V)"));
-  EXPECT_EQ(page.find("http"), page.find("http://www.w3.org")) << "nothing from a network";
+  for (const char* load : {"src=\"http", "href=\"http", "url(http", "@import"}) {
+    EXPECT_EQ(page.find(load), std::string::npos) << "nothing from a network: " << load;
+  }
+  EXPECT_TRUE(holds(page, "Content-Security-Policy"));
   for (const char* file : {"result.json", "data/step_response.csv", "pictures/poles.svg",
                            "pictures/poles.png", "pictures/step_response.svg"}) {
     EXPECT_GT(contents(work() / "report" / file).size(), 100U) << file;

@@ -166,7 +166,6 @@ TEST_F(BadInput, TimeThatGoesBackIsSorted) {
 
 TEST_F(BadInput, MotorsThatAreNone) {
   expect("motors warpdrive", 2, "known motors are");
-  expect("motors kraken", 2, "one of Kraken X60, Kraken X60 FOC");
   project(with(good_elevator, "\"NEO\"", "\"NEP\""));
   expect("design project.toml", 2, "project.toml:3:9: motor is \"NEP\"");
   expect("design project.toml", 2, "did you mean \"NEO\"?");

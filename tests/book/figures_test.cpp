@@ -78,7 +78,6 @@ TEST(Figures, AnUnknownOneIsAnsweredWithTheNearest) {
            {"8.10", "this one of section 8.8.2 is not computed yet; the nearest: 7.10;"},
            {"table e.3", "series of the discretisation methods of scalars"},
            {"table 5.1", "the nearest: table 7.1;"},
-           {"12.2", "datasheet curves of a 775pro"},
            {"theorem 6.9.1", "a figure or table of the book"},
            {"figure 2.4", "the nearest: 2.3, 2.5, 2.6, 2.7, 2.9, 7.4, 9.4, B.4;"},
            {"", "the nearest: 2.3, 2.5,"}}) {

@@ -146,13 +146,15 @@ TEST(Figures, ASmallStepEndsAtOneAndSettlesWhereItSays) {
       EXPECT_NEAR(design.loop.step[i], 1.0, 0.02 + 1e-9);
     }
   }
-  const PlotLine& drawn = named(study::answer_of(design), "small_step").plot.panels.at(0).lines[0];
+  const Answer answer = study::answer_of(design);
+  const PlotLine& drawn = named(answer, "small_step").plot.panels.at(0).lines[0];
   EXPECT_EQ(drawn.y.front(), design.loop.step.front());
 }
 
 TEST(Figures, IntervalsStandAsSharesOfTheirValues) {
   const study::IdentifyResult result = identify_result(MechanismKind::elevator);
-  const Plot& plot = named(study::answer_of(result), "intervals").plot;
+  const Answer answer = study::answer_of(result);
+  const Plot& plot = named(answer, "intervals").plot;
   const identification::GainEstimate& kV = result.report.fit->kV;
   const PlotPanel& panel = plot.panels.at(0);
   ASSERT_GE(panel.y_ticks.size(), 4U);

@@ -1,4 +1,4 @@
-// error: (use of deleted function|call to deleted member function)[^\n]*step
+// error: use of deleted function|call to deleted|is ambiguous
 #include <flyball/control/lqg.hpp>
 
 double step(flyball::Lqg<2, 1, 1>& loop, double y) {
