@@ -65,6 +65,15 @@ Expected<LinearResponse> respond(const DiscreteSystem<>& system, const MatrixRef
   return response;
 }
 
+/// The system with its input held; a static gain needs no exponential.
+Expected<DiscreteSystem<>> held(const ContinuousSystem<>& system, Time step) {
+  if (system.A.size() == 0) {
+    FLYBALL_CHECK(check_positive(step.si(), "discretize", "step", "s"));
+    return DiscreteSystem<>{system.A, system.B, system.C, system.D, step};
+  }
+  return discretize(system, step);
+}
+
 /// The instants that were asked for, or those that the poles ask for.
 Expected<ResponseTimes> chosen(const ContinuousSystem<>& system,
                                const std::optional<ResponseTimes>& times, std::string_view where) {
@@ -143,8 +152,8 @@ Expected<LinearResponse> forced_response(const DiscreteSystem<>& system, const M
 Expected<LinearResponse> forced_response(const ContinuousSystem<>& system, const MatrixRef& u,
                                          const MatrixRef& x0, Time step) {
   FLYBALL_CHECK(check_system_or_gain(system, "forced_response"));
-  FLYBALL_TRY(const auto held, discretize(system, step));
-  return respond(held, u, x0, "forced_response");
+  FLYBALL_TRY(const auto sampled, held(system, step));
+  return respond(sampled, u, x0, "forced_response");
 }
 
 Expected<LinearResponse> initial_response(const DiscreteSystem<>& system, const MatrixRef& x0,
@@ -157,8 +166,8 @@ Expected<LinearResponse> initial_response(const DiscreteSystem<>& system, const 
 Expected<LinearResponse> initial_response(const ContinuousSystem<>& system, const MatrixRef& x0,
                                           const std::optional<ResponseTimes>& times) {
   FLYBALL_TRY(const auto at, chosen(system, times, "initial_response"));
-  FLYBALL_TRY(const auto held, discretize(system, at.step));
-  return initial_response(held, x0, at);
+  FLYBALL_TRY(const auto sampled, held(system, at.step));
+  return initial_response(sampled, x0, at);
 }
 
 Expected<LinearResponse> step_response(const DiscreteSystem<>& system, Index input,
@@ -173,8 +182,8 @@ Expected<LinearResponse> step_response(const DiscreteSystem<>& system, Index inp
 Expected<LinearResponse> step_response(const ContinuousSystem<>& system, Index input,
                                        const std::optional<ResponseTimes>& times) {
   FLYBALL_TRY(const auto at, chosen(system, times, "step_response"));
-  FLYBALL_TRY(const auto held, discretize(system, at.step));
-  return step_response(held, input, at);
+  FLYBALL_TRY(const auto sampled, held(system, at.step));
+  return step_response(sampled, input, at);
 }
 
 Expected<LinearResponse> impulse_response(const DiscreteSystem<>& system, Index input,
@@ -191,8 +200,8 @@ Expected<LinearResponse> impulse_response(const ContinuousSystem<>& system, Inde
   constexpr std::string_view where = "impulse_response";
   FLYBALL_TRY(const auto at, chosen(system, times, where));
   FLYBALL_CHECK(check_input(input, system.B.cols(), where));
-  FLYBALL_TRY(const auto held, discretize(system, at.step));
-  return respond(held, MatrixXd::Zero(at.samples, system.B.cols()), system.B.col(input), where);
+  FLYBALL_TRY(const auto sampled, held(system, at.step));
+  return respond(sampled, MatrixXd::Zero(at.samples, system.B.cols()), system.B.col(input), where);
 }
 
 }  // namespace flyball
