@@ -27,9 +27,11 @@ class GuardedFilter {
     std::array<OutlierGuard::Memory, Guards> guards;
   };
 
+  /// @param guards  One a kind of measurement.
   GuardedFilter(const Filter& filter, const std::array<OutlierGuard, Guards>& guards) noexcept
       : filter_(filter), guards_(guards) {}
 
+  /// The filter that the guards stand before.
   [[nodiscard]] Filter& filter() noexcept { return filter_; }
   [[nodiscard]] const Filter& filter() const noexcept { return filter_; }
   /// @param i  Below `Guards`.

@@ -57,7 +57,7 @@ bool truncate(Estimate<X, Form>& estimate, double value, const TangentOf<X>& row
 
 /// The nearest estimate within lower ≤ c ≤ upper, as P measures distances: of all x it is the
 /// likeliest. x_hat <- x_hat ⊕ P a (bound - c)/σ²; P stays, which is cautious.
-/// @param value, row, lower, upper, return  As `truncate`.
+/// @param value, row, lower, upper  As `truncate`. @return As there.
 /// Source: Simon, "Kalman filtering with state constraints", IET Control Theory 4 (2010), 2.3.
 template <class X, class Form>
 bool project(Estimate<X, Form>& estimate, double value, const TangentOf<X>& row, double lower,
