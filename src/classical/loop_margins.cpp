@@ -9,6 +9,7 @@
 #include <flyball/systems/system_error.hpp>
 
 #include "classical/polynomial.hpp"
+#include "core/format.hpp"
 #include "core/try.hpp"
 
 namespace flyball::classical {
@@ -256,6 +257,15 @@ Expected<std::vector<double>> phase_places(const Border& border) {
 
 Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
   LoopMargins margins;
+  constexpr Index most_states = 60;
+  if (const double states = static_cast<double>(loop.order()) +
+                            (loop.period() ? loop.delay() / loop.period()->si() : 0.0);
+      states > static_cast<double>(most_states)) {
+    return refusal(ArgumentError::out_of_range, "margins", "the loop's order")
+        .got(flyball::detail::format("{}, its delay counted", states))
+        .expected(flyball::detail::format("at most {}", most_states))
+        .hint("sample it more slowly, or leave out what is fast");
+  }
   const Border border(loop);
   const Polynomial above = border.gain_above();
   const Polynomial below = border.gain_below();

@@ -1,6 +1,7 @@
 #include <flyball/classical/step_metrics.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -36,7 +37,7 @@ class Part {
         fastest_(fastest),
         slowest_(slowest) {}
 
-  [[nodiscard]] double value() const { return (system_.C * x_)(0); }
+  [[nodiscard]] double value() const { return system_.C.row(0).dot(x_); }
   [[nodiscard]] const VectorXd& state() const { return x_; }
   [[nodiscard]] double fastest() const { return fastest_; }
   /// Whether it is rounding of what it began with.
@@ -47,27 +48,36 @@ class Part {
     FLYBALL_TRY(propagator_, expm(system_.A * step));
     return {};
   }
-  void advance() { x_ = propagator_ * x_; }
+  void advance() {
+    next_.noalias() = propagator_ * x_;
+    x_.swap(next_);
+  }
   void end() { x_.setZero(); }
 
   /// y and dy/dt a little after a state, by the exponential's series.
   [[nodiscard]] std::pair<double, double> after(const VectorXd& x, double h) const {
-    VectorXd term = x;
-    VectorXd sum = x;
+    term_ = x;
+    sum_ = x;
     for (int k = 1; k <= 60; ++k) {
-      term = (system_.A * term * (h / k)).eval();
-      sum += term;
-      if (term.cwiseAbs().maxCoeff() <= 1e-18 * sum.cwiseAbs().maxCoeff()) {
+      next_.noalias() = system_.A * term_;
+      next_ *= h / k;
+      term_.swap(next_);
+      sum_ += term_;
+      if (term_.cwiseAbs().maxCoeff() <= 1e-18 * sum_.cwiseAbs().maxCoeff()) {
         break;
       }
     }
-    return {(system_.C * sum)(0), (system_.C * (system_.A * sum))(0)};
+    next_.noalias() = system_.A * sum_;
+    return {system_.C.row(0).dot(sum_), system_.C.row(0).dot(next_)};
   }
 
  private:
   ContinuousSystem<> system_;
   VectorXd x_;
   MatrixXd propagator_{};
+  mutable VectorXd term_{};  ///< Scratch, as the two below.
+  mutable VectorXd sum_{};
+  mutable VectorXd next_{};
   double fastest_;
   double slowest_;
 };
@@ -226,7 +236,7 @@ StepMetrics sampled(const TransferFunction& transfer, double final_value, double
   const auto steps =
       static_cast<long>(std::min(2e6, 10.0 + 1.2 * periods + 2.0 * static_cast<double>(x.size())));
   for (long k = 0; k <= steps; ++k) {
-    const double y = ((s.C * x)(0) + s.D(0, 0)) / final_value;
+    const double y = (s.C.row(0).dot(x) + s.D(0, 0)) / final_value;
     const double t = static_cast<double>(k) * T;
     judge.point(t, y);
     for (const double level : {0.1, 0.9}) {
@@ -348,15 +358,16 @@ Expected<StepMetrics> step_metrics(const TransferFunction& transfer, double band
     const double after = now();
     const double slope_after = at(step).second;
     // Pieces between a top or bottom, in which y is monotone.
-    std::vector<std::pair<double, double>> pieces{{0.0, before}};
+    std::array<std::pair<double, double>, 3> pieces{{{0.0, before}}};
+    std::size_t last = 0;
     if ((slope_before > 0.0) != (slope_after > 0.0)) {
       const double top = crossing([&](double h) { return at(h).second; }, step);
-      pieces.emplace_back(top, at(top).first);
-      judge.point(time + top, pieces.back().second);
+      pieces[++last] = {top, at(top).first};
+      judge.point(time + top, pieces[last].second);
     }
-    pieces.emplace_back(step, after);
+    pieces[++last] = {step, after};
     judge.point(time + step, after);
-    for (std::size_t i = 0; i + 1 < pieces.size(); ++i) {
+    for (std::size_t i = 0; i < last; ++i) {
       const auto [h0, y0] = pieces[i];
       const auto [h1, y1] = pieces[i + 1];
       const auto place = [&](double level) {

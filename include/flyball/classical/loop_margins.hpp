@@ -49,7 +49,8 @@ struct LoopMargins {
 /// stationary points of the phase, stability by counting the crossings of the imaginary axis as the
 /// delay grows.
 /// @param loop  L, opened anywhere; negative feedback.
-/// @errors SystemError::no_convergence. Cost: O(n³) in 31 digits, some milliseconds for order 20.
+/// @errors ArgumentError::out_of_range for an order, periods of delay counted, above 60;
+/// SystemError::no_convergence. Cost: O(n³) in 31 digits, some milliseconds for order 20.
 /// Source: book, sections E.3.6 and 7.7.2; Walton and Marshall, "Direct method for TDS stability
 /// analysis", IEE Proceedings D 134 (1987); Seiler, Packard and Gahinet, "An introduction to disk
 /// margins", IEEE Control Systems Magazine 40 (2020).
