@@ -60,6 +60,15 @@ class Border {
   explicit Border(const TransferFunction& loop) : loop_(loop) {
     num_ = detail::polynomial(loop.num());
     den_ = detail::polynomial(loop.den());
+    if (!loop.period()) {
+      unit_ = detail::unit_of(loop.den());
+      detail::change_unit(num_, unit_);
+      detail::change_unit(den_, unit_);
+    }
+    // Squares of the coefficients are formed, of which none may leave the doubles' range.
+    const int size = std::ilogb(den_.hi.cwiseAbs().maxCoeff());
+    num_ = flyball::detail::scaled(std::move(num_), std::ldexp(1.0, -size));
+    den_ = flyball::detail::scaled(std::move(den_), std::ldexp(1.0, -size));
     if (loop.period()) {
       // Its delay is poles at z = 0.
       const auto periods = static_cast<Index>(std::lround(loop.delay() / loop.period()->si()));
@@ -83,7 +92,8 @@ class Border {
 
   /// rad/s
   [[nodiscard]] double frequency(double x) const {
-    return loop_.period() ? 2.0 * std::atan(std::sqrt(x)) / loop_.period()->si() : std::sqrt(x);
+    return loop_.period() ? 2.0 * std::atan(std::sqrt(x)) / loop_.period()->si()
+                          : std::ldexp(std::sqrt(x), unit_);
   }
   /// Of the rational part.
   [[nodiscard]] double phase(double x) const {
@@ -98,11 +108,14 @@ class Border {
   }
   /// s, of a continuous one: what is not in the polynomials.
   [[nodiscard]] double delay() const { return loop_.period() ? 0.0 : loop_.delay(); }
+  /// The same in the unit of time in which x is told.
+  [[nodiscard]] double own_delay() const { return std::ldexp(delay(), unit_); }
 
  private:
   const TransferFunction& loop_;
   Polynomial num_;
   Polynomial den_;
+  int unit_ = 0;  ///< s = 2^unit s'.
   detail::OnTheAxis n_;
   detail::OnTheAxis d_;
 };
@@ -178,7 +191,7 @@ Expected<int> unstable_roots(const TransferFunction& loop) {
 Expected<std::vector<double>> phase_places(const Border& border) {
   const auto& n = border.n();
   const auto& d = border.d();
-  if (border.delay() == 0.0) {
+  if (border.own_delay() == 0.0) {
     // Im(N D*) = ω (No De - Ne Do).
     const auto places =
         detail::positive_roots(plus(times(n.odd, d.even), -1.0, times(n.even, d.odd)));
@@ -191,12 +204,12 @@ Expected<std::vector<double>> phase_places(const Border& border) {
   const Polynomial above = border.gain_above();
   const Polynomial below = border.gain_below();
   Polynomial slope = plus(times(turning(n), below), -1.0, times(turning(d), above));
-  slope = plus(slope, -border.delay(), times(above, below));
+  slope = plus(slope, -border.own_delay(), times(above, below));
   const auto stationary = detail::positive_roots(slope);
   if (!stationary) {
     return no_convergence();
   }
-  double fastest = 1.0 / border.delay();
+  double fastest = 1.0 / border.own_delay();
   for (const Polynomial* p : {&border.num(), &border.den()}) {
     const auto roots = detail::roots(*p);
     if (!roots) {
@@ -222,12 +235,12 @@ Expected<std::vector<double>> phase_places(const Border& border) {
   for (std::size_t i = 0; i + 1 < bounds.size(); ++i) {
     constexpr int parts = 400;
     double a = bounds[i];
-    double before = rational(a) - a * border.delay();
+    double before = rational(a) - a * border.own_delay();
     const double ratio = std::pow(bounds[i + 1] / a, 1.0 / parts);
     for (int part = 0; part < parts; ++part) {
       const double b = part + 1 == parts ? bounds[i + 1] : a * ratio;
       const double turned =
-          std::remainder(rational(b) - rational(a), 2.0 * pi) - (b - a) * border.delay();
+          std::remainder(rational(b) - rational(a), 2.0 * pi) - (b - a) * border.own_delay();
       const double after = before + turned;
       const double low = std::min(before, after);
       const double high = std::max(before, after);
@@ -238,7 +251,7 @@ Expected<std::vector<double>> phase_places(const Border& border) {
         const auto root = find_root(
             [&](double w) {
               return start + std::remainder(rational(w) - from, 2.0 * pi) -
-                     (w - a) * border.delay() - level;
+                     (w - a) * border.own_delay() - level;
             },
             a, b);
         if (root) {
@@ -377,8 +390,12 @@ Expected<std::optional<double>> bandwidth(const TransferFunction& transfer, doub
   if (!(dc > 0.0) || !std::isfinite(dc)) {
     return std::nullopt;
   }
-  const Border border(transfer);
-  const double level = factor * dc;
+  // Of a gain of about one, so that its square is a number.
+  int power = 0;
+  const double level = factor * std::frexp(dc, &power);
+  FLYBALL_TRY(const auto unit, TransferFunction::create(std::ldexp(1.0, -power) * transfer.num(),
+                                                        transfer.den(), transfer.period()));
+  const Border border(unit);
   const Polynomial bound =
       times(border.gain_below(), detail::polynomial(VectorXd::Constant(1, level * level)));
   const auto places = detail::positive_roots(plus(border.gain_above(), -1.0, bound));

@@ -86,8 +86,7 @@ std::optional<Eigen::VectorXcd> roots(const Polynomial& given) {
     return all;
   }
   // Divided in 31 digits, in a unit in which the roots' geometric mean is about one.
-  const double mean = std::log2(std::abs(p.hi(n, 0) / p.hi(0, 0))) / static_cast<double>(n);
-  const int unit = std::isfinite(mean) ? static_cast<int>(std::lround(mean)) : 0;
+  const int unit = unit_of(p.hi.col(0));
   Polynomial companion = Polynomial::zero(n, n);
   for (Index i = 1; i <= n; ++i) {
     auto share = solve(entry(p, 0), entry(p, i));
@@ -112,6 +111,27 @@ std::optional<Eigen::VectorXcd> roots(const Polynomial& given) {
     all(i) = {std::ldexp((*found)(i).real(), unit), std::ldexp((*found)(i).imag(), unit)};
   }
   return all;
+}
+
+int unit_of(const VectorXd& p) {
+  const Index n = p.size() - 1;
+  for (Index i = n; i > 0; --i) {
+    if (p(i) != 0.0) {
+      const double mean =
+          (std::log2(std::abs(p(i))) - std::log2(std::abs(p(0)))) / static_cast<double>(i);
+      return static_cast<int>(std::lround(mean));
+    }
+  }
+  return 0;
+}
+
+void change_unit(Polynomial& p, int unit) {
+  const Index n = p.rows() - 1;
+  for (Index i = 0; i <= n; ++i) {
+    const int power = unit * static_cast<int>(n - i);
+    p.hi(i, 0) = std::ldexp(p.hi(i, 0), power);
+    p.lo(i, 0) = std::ldexp(p.lo(i, 0), power);
+  }
 }
 
 OnTheAxis on_the_axis(const Polynomial& p) {

@@ -24,6 +24,11 @@ using Polynomial = flyball::detail::DoubleDoubleMatrix;
 /// Nothing where the iteration does not end. Zeros at the end are roots at zero.
 [[nodiscard]] std::optional<Eigen::VectorXcd> roots(const Polynomial& p);
 
+/// The power of two nearest to the geometric mean of a polynomial's roots that are not zero.
+[[nodiscard]] int unit_of(const Eigen::VectorXd& p);
+/// p(2^unit s) as a polynomial in s.
+void change_unit(Polynomial& p, int unit);
+
 /// p(jω) = even(x) + jω odd(x) with x = ω².
 struct OnTheAxis {
   Polynomial even;

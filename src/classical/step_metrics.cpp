@@ -234,7 +234,7 @@ StepMetrics sampled(const TransferFunction& transfer, double final_value, double
   Judge judge(band);
   const double periods = std::log(1e-14) / std::log(std::clamp(slowest, 1e-16, 1.0 - 1e-7));
   const auto steps =
-      static_cast<long>(std::min(2e6, 10.0 + 1.2 * periods + 2.0 * static_cast<double>(x.size())));
+      static_cast<long>(std::min(5e5, 10.0 + 1.2 * periods + 2.0 * static_cast<double>(x.size())));
   for (long k = 0; k <= steps; ++k) {
     const double y = (s.C.row(0).dot(x) + s.D(0, 0)) / final_value;
     const double t = static_cast<double>(k) * T;
@@ -311,12 +311,12 @@ Expected<StepMetrics> step_metrics(const TransferFunction& transfer, double band
   double time = 0.0;
   std::vector<bool> over(parts.size(), false);
   std::vector<VectorXd> from(parts.size());
-  constexpr long most_points = 2'000'000;
+  constexpr long most_points = 500'000;
   for (long point = 0; time < end; ++point) {
     if (point == most_points) {
-      return refusal(SystemError::no_convergence, where, "the step response")
-          .got(flyball::detail::format("not settled after {} points", most_points))
-          .hint("a mode that turns a million times before it decays has no settling to speak of");
+      StepMetrics metrics = judge.metrics(dc, delay);
+      metrics.settling_time.reset();
+      return metrics;
     }
     double rate = slowest;
     for (std::size_t i = 0; i < parts.size(); ++i) {

@@ -258,13 +258,7 @@ ContinuousSystem<> TransferFunction::to_state_space() const {
   }
   // States in units of 2^{unit k}: the companion's entries are then those of polynomials with roots
   // about one.
-  double mean = 0.0;
-  for (Index i = n; i > 0 && mean == 0.0; --i) {
-    if (den_(i) != 0.0) {
-      mean = std::log2(std::abs(den_(i) / den_(0))) / static_cast<double>(i);
-    }
-  }
-  const int unit = std::isfinite(mean) ? static_cast<int>(std::lround(mean)) : 0;
+  const int unit = detail::unit_of(den_);
   for (Index k = 0; k < n; ++k) {
     const int power = -unit * static_cast<int>(k);
     s.A(0, k) = -std::ldexp(den_(k + 1) / den_(0), power);

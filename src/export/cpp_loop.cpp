@@ -19,11 +19,8 @@ std::string matrix_literal(const MatrixXd& M) {
   return text + "}}";
 }
 
-class Cpp final : public LoopLanguage {
+class Cpp final : public BracesLanguage {
  public:
-  [[nodiscard]] std::string comment(std::string_view text) const override {
-    return fmt::format("    // {}\n", text);
-  }
   [[nodiscard]] std::string constant(std::string_view name,
                                      const std::string& value) const override {
     return fmt::format("    const double {} = {};\n", name, value);
@@ -52,16 +49,6 @@ class Cpp final : public LoopLanguage {
                                                 const std::string& lines) const override {
     return fmt::format("    for (std::size_t {0} = 1; {0} < on_the_way; ++{0}) {{\n{1}    }}\n",
                        index, indented(lines));
-  }
-  [[nodiscard]] std::string answer(std::string_view name) const override {
-    return fmt::format("    return {};\n", name);
-  }
-  [[nodiscard]] std::string choose(const std::string& condition, const std::string& yes,
-                                   const std::string& no) const override {
-    return fmt::format("{} ? {} : {}", condition, yes, no);
-  }
-  [[nodiscard]] std::string both(const std::string& a, const std::string& b) const override {
-    return a + " && " + b;
   }
   [[nodiscard]] std::string call(std::string_view function,
                                  const std::string& arguments) const override {

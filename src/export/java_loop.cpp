@@ -51,11 +51,8 @@ std::string java(std::string_view expression) {
   return text;
 }
 
-class Java final : public LoopLanguage {
+class Java final : public BracesLanguage {
  public:
-  [[nodiscard]] std::string comment(std::string_view text) const override {
-    return fmt::format("    // {}\n", text);
-  }
   [[nodiscard]] std::string constant(std::string_view name,
                                      const std::string& value) const override {
     return fmt::format("    final double {} = {};\n", java(name), java(value));
@@ -85,16 +82,6 @@ class Java final : public LoopLanguage {
                                                 const std::string& lines) const override {
     return fmt::format("    for (int {0} = 1; {0} < onTheWay; ++{0}) {{\n{1}    }}\n", index,
                        indented(lines));
-  }
-  [[nodiscard]] std::string answer(std::string_view name) const override {
-    return fmt::format("    return {};\n", name);
-  }
-  [[nodiscard]] std::string choose(const std::string& condition, const std::string& yes,
-                                   const std::string& no) const override {
-    return fmt::format("{} ? {} : {}", condition, yes, no);
-  }
-  [[nodiscard]] std::string both(const std::string& a, const std::string& b) const override {
-    return a + " && " + b;
   }
   [[nodiscard]] std::string call(std::string_view function,
                                  const std::string& arguments) const override {

@@ -64,6 +64,20 @@ std::string extra_lines(const LoopProgram& program, const LoopLanguage& in) {
 
 }  // namespace
 
+std::string BracesLanguage::comment(std::string_view text) const {
+  return fmt::format("    // {}\n", text);
+}
+std::string BracesLanguage::answer(std::string_view name) const {
+  return fmt::format("    return {};\n", name);
+}
+std::string BracesLanguage::choose(const std::string& condition, const std::string& yes,
+                                   const std::string& no) const {
+  return fmt::format("{} ? {} : {}", condition, yes, no);
+}
+std::string BracesLanguage::both(const std::string& a, const std::string& b) const {
+  return a + " && " + b;
+}
+
 std::string update_lines(const LoopProgram& program, const LoopLanguage& in) {
   std::string text;
   if (program.moves_measurement) {

@@ -49,6 +49,16 @@ class LoopLanguage {
                                          const std::string& arguments) const = 0;
 };
 
+/// What C++ and Java write alike.
+class BracesLanguage : public LoopLanguage {
+ public:
+  [[nodiscard]] std::string comment(std::string_view text) const override;
+  [[nodiscard]] std::string answer(std::string_view name) const override;
+  [[nodiscard]] std::string choose(const std::string& condition, const std::string& yes,
+                                   const std::string& no) const override;
+  [[nodiscard]] std::string both(const std::string& a, const std::string& b) const override;
+};
+
 /// The lines of `update`: from measurement, r, r_next and battery_voltage to the answer.
 [[nodiscard]] std::string update_lines(const LoopProgram& program, const LoopLanguage& language);
 

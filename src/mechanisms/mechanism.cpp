@@ -55,27 +55,28 @@ FeedforwardGains rotational_gains(const DcMotor& motor, double G, double J) {
   return {.kS = 0.0, .kV = G / motor.Kv, .kA = motor.R * J / (G * motor.Kt)};
 }
 
-Expected<Flywheel> flywheel_like(MechanismKind kind, const FlywheelParameters& parameters,
-                                 std::string_view where) {
+/// The gains of what turns with a motor, motor turns an output turn and an inertia.
+template <class Parameters>
+Expected<FeedforwardGains> turning_gains(const Parameters& parameters, std::string_view where) {
   const auto& [motor, G, J] = parameters;
   FLYBALL_CHECK(Checks(where)
                     .also([&] { return check_drive(motor, G, where); })
                     .positive(J.si(), "moment_of_inertia", "kg m^2"));
   const FeedforwardGains gains = rotational_gains(motor, G, J.si());
-  return check_gains(gains, where).map([&] {
-    return velocity_model(kind, gains, motor.nominal_voltage);
+  return check_gains(gains, where).map([&] { return gains; });
+}
+
+Expected<Flywheel> flywheel_like(MechanismKind kind, const FlywheelParameters& parameters,
+                                 std::string_view where) {
+  return turning_gains(parameters, where).map([&](const FeedforwardGains& gains) {
+    return velocity_model(kind, gains, parameters.motor.nominal_voltage);
   });
 }
 
 Expected<Turret> turret_like(MechanismKind kind, const TurretParameters& parameters,
                              std::string_view where) {
-  const auto& [motor, G, J] = parameters;
-  FLYBALL_CHECK(Checks(where)
-                    .also([&] { return check_drive(motor, G, where); })
-                    .positive(J.si(), "moment_of_inertia", "kg m^2"));
-  const FeedforwardGains gains = rotational_gains(motor, G, J.si());
-  return check_gains(gains, where).map([&] {
-    return position_model(kind, gains, motor.nominal_voltage);
+  return turning_gains(parameters, where).map([&](const FeedforwardGains& gains) {
+    return position_model(kind, gains, parameters.motor.nominal_voltage);
   });
 }
 

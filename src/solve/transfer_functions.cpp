@@ -25,6 +25,7 @@ double or_nan(const std::optional<double>& value) {
 
 Expected<TransferFunction> transfer_of(const Problem& problem) {
   const double dt = problem.number("dt");
+  FLYBALL_CHECK(Checks("transfer function").not_negative(dt, "dt", "s"));
   return TransferFunction::create(problem.matrix("num"), problem.matrix("den"),
                                   dt > 0.0 ? std::optional(Time(dt)) : std::nullopt,
                                   Time(problem.number("delay")));

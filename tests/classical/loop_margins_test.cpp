@@ -157,6 +157,112 @@ TEST(LoopMargins, DeadTime) {
   }
 }
 
+/// Closed-loop poles in the right half-plane, with the delay by a Padé approximation that is exact
+/// to rounding where |L| matters; -1 where one is too near to the axis to tell.
+int unstable_by_pade(const TransferFunction& L, double delay) {
+  const TransferFunction rational = TransferFunction::create(L.num(), L.den()).value();
+  const auto closed =
+      unity_feedback(series(rational, pade(Time(delay), 14).value()).value()).value();
+  const Eigen::VectorXcd poles = closed.poles().value();
+  int count = 0;
+  for (const Complex& pole : poles) {
+    if (std::abs(pole.real()) < 1e-4 * std::abs(pole)) {
+      return -1;
+    }
+    count += pole.real() > 0.0 ? 1 : 0;
+  }
+  return count;
+}
+
+// A delay destabilises where |L| falls through one and gives stability back where it rises: the
+// count is that of the loop with a rational delay, and the delay margin is where it first changes.
+TEST(LoopMargins, StabilityWithDeadTimeIsCounted) {
+  Random random(29);
+  int compared = 0;
+  int regained = 0;
+  int turned_the_long_way = 0;
+  for (int i = 0; i < 600; ++i) {
+    const TransferFunction L = random_loop(random, false);
+    const LoopMargins now = loop_margins(L).value();
+    if (L.relative_degree() < 1 || now.gain_crossings.empty()) {
+      continue;
+    }
+    const double fastest = now.gain_crossings.back().frequency;
+    int before = now.unstable_poles;
+    for (const double share : {0.1, 0.7, 2.0, 4.0}) {
+      const double delay = share / fastest;
+      const int expected = unstable_by_pade(L, delay);
+      if (expected < 0) {
+        continue;
+      }
+      const auto late =
+          TransferFunction::create(L.num(), L.den(), std::nullopt, Time(delay)).value();
+      EXPECT_EQ(loop_margins(late).value().unstable_poles, expected) << i << " " << share;
+      regained += expected < before ? 1 : 0;
+      before = expected;
+      ++compared;
+    }
+    if (!now.stable) {
+      EXPECT_EQ(now.delay_margin, 0.0);
+      continue;
+    }
+    for (const GainCrossing& crossing : now.gain_crossings) {
+      turned_the_long_way += crossing.phase_margin < 0.0 ? 1 : 0;
+    }
+    const auto unstable_at = [&](double delay) {
+      return loop_margins(
+                 TransferFunction::create(L.num(), L.den(), std::nullopt, Time(delay)).value())
+          .value()
+          .unstable_poles;
+    };
+    EXPECT_EQ(unstable_at(0.999 * now.delay_margin), 0) << i;
+    EXPECT_GT(unstable_at(1.001 * now.delay_margin), 0) << i;
+  }
+  EXPECT_GE(compared, 300);
+  EXPECT_GE(regained, 5);
+  EXPECT_GE(turned_the_long_way, 5);
+}
+
+// Another unit of time, and num and den times one number, change frequencies and delays by the unit
+// and nothing else; another unit of the output changes no bandwidth.
+TEST(LoopMargins, UnitsChangeNothing) {
+  for (const double delay : {0.0, 0.4}) {
+    const auto margins_in = [&](double second, double factor) {
+      // (2 s + 3)/(s³ + s² + 2 s) with s = second s'.
+      const double f = factor;
+      return loop_margins(transfer({2.0 * f * second, 3.0 * f},
+                                   {f * second * second * second, f * second * second,
+                                    2.0 * f * second, 0.0},
+                                   delay * second))
+          .value();
+    };
+    const LoopMargins one = margins_in(1.0, 1.0);
+    for (const double second : {1e-60, 1e-9, 1e3, 1e60}) {
+      for (const double factor : {1e-100, 1.0, 1e100}) {
+        const LoopMargins m = margins_in(second, factor);
+        ASSERT_EQ(m.gain_crossings.size(), one.gain_crossings.size()) << second << " " << factor;
+        ASSERT_EQ(m.phase_crossings.size(), one.phase_crossings.size()) << second << " " << factor;
+        EXPECT_EQ(m.stable, one.stable);
+        EXPECT_NEAR(*m.phase_margin, *one.phase_margin, 1e-9);
+        EXPECT_NEAR(m.delay_margin / second, one.delay_margin, 1e-9);
+        EXPECT_NEAR(m.disk_margin, one.disk_margin, 1e-8);
+        EXPECT_NEAR(m.sensitivity.value, one.sensitivity.value, 1e-8);
+        EXPECT_NEAR(m.gain_crossings[0].frequency * second, one.gain_crossings[0].frequency, 1e-11);
+      }
+    }
+  }
+  for (const double gain : {1e-200, 1e-100, 1e150, 1e300}) {
+    EXPECT_NEAR(bandwidth(transfer({gain}, {1.0, 1.0})).value().value_or(0.0), 0.9976283451109835,
+                1e-14)
+        << gain;
+  }
+}
+
+// 1 + L(∞) = 0: a pole at infinity is no stable one.
+TEST(LoopMargins, ALoopThatActsInstantly) {
+  EXPECT_FALSE(loop_margins(transfer({-1.0, 1.0}, {1.0, 2.0})).value().stable);
+}
+
 TEST(LoopMargins, PeakAndDisk) {
   // 1/(s² + 2ζs + 1) peaks at 1/(2ζ√(1 - ζ²)).
   for (const double zeta : {0.01, 0.1, 0.5}) {

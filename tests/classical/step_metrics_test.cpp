@@ -83,6 +83,21 @@ TEST(StepMetrics, SecondOrder) {
   }
 }
 
+// (1 - s)/((s + 1)(s + 2)) goes down to -1/6 of 1/2 at ln 3/2.
+TEST(StepMetrics, Undershoot) {
+  const StepMetrics m = step_metrics(transfer({-1.0, 1.0}, {1.0, 3.0, 2.0})).value();
+  EXPECT_NEAR(*m.undershoot, 1.0 / 3.0, 1e-14);
+  EXPECT_EQ(*m.overshoot, 0.0);
+}
+
+// A damping of 1e-6: it overshoots as it does, and when it settles half a million points do not
+// show.
+TEST(StepMetrics, RingsForALongTime) {
+  const StepMetrics m = step_metrics(transfer({1.0}, {1.0, 2e-6, 1.0})).value();
+  EXPECT_NEAR(*m.overshoot, std::exp(-M_PI * 1e-6), 1e-9);
+  EXPECT_FALSE(m.settling_time.has_value());
+}
+
 // Poles eight decades apart: the slow one is what is seen.
 TEST(StepMetrics, StiffSystems) {
   const auto fast = transfer({1.0}, {1e-8, 1.0});

@@ -133,6 +133,20 @@ TEST(TransferFunction, FromZerosToZeros) {
   }
 }
 
+// What vanishes above and below at s = 0, or z = 1, cancels.
+TEST(TransferFunction, DcGainOfWhatCancels) {
+  EXPECT_EQ(transfer({3.0, 0.0}, {1.0, 2.0, 0.0}).dc_gain(), 1.5);
+  EXPECT_EQ(transfer({3.0, 0.0, 0.0}, {1.0, 2.0, 0.0}).dc_gain(), 0.0);
+  EXPECT_EQ(transfer({-3.0, 0.0}, {1.0, 2.0, 0.0, 0.0}).dc_gain(), -HUGE_VAL);
+  const auto sampled = [](const VectorXd& num, const VectorXd& den) {
+    return TransferFunction::create(num, den, Time(0.1)).value().dc_gain();
+  };
+  // (z - 1)/((z - 1)(z - 1/2)), and without the zero.
+  EXPECT_DOUBLE_EQ(sampled(Eigen::Vector2d(1.0, -1.0), Eigen::Vector3d(1.0, -1.5, 0.5)), 2.0);
+  EXPECT_EQ(sampled(VectorXd::Ones(1), Eigen::Vector3d(1.0, -1.5, 0.5)), HUGE_VAL);
+  EXPECT_EQ(sampled(Eigen::Vector2d(1.0, -1.0), Eigen::Vector2d(1.0, -0.5)), 0.0);
+}
+
 TEST(TransferFunction, DeadTimeIsExact) {
   const auto G = transfer({2.0}, {1.0, 1.0}, 0.3);
   EXPECT_LE(std::abs(G.response(5.0) - 2.0 / Complex(1.0, 5.0) * std::polar(1.0, -1.5)), 1e-15);

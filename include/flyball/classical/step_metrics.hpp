@@ -9,20 +9,22 @@ namespace flyball::classical {
 /// infinite or not a number and what hangs on it is absent; rise and overshoot are of the motion
 /// from zero to the final value, whatever its sign.
 struct StepMetrics {
-  double final_value = 0.0;               ///< G(0); ±∞ or NaN where it does not settle.
-  std::optional<double> rise_time{};      ///< s, first at 10 % to first at 90 % of the final value.
-  std::optional<double> settling_time{};  ///< s, from where on it is within the band.
-  std::optional<double> overshoot{};      ///< Share of the final value beyond it.
-  std::optional<double> undershoot{};     ///< Share of the final value on the other side of zero.
-  std::optional<double> peak{};           ///< The value farthest in the final value's direction.
-  std::optional<double> peak_time{};      ///< s; absent where the final value is approached only.
+  double final_value = 0.0;           ///< G(0); ±∞ or NaN where it does not settle.
+  std::optional<double> rise_time{};  ///< s, first at 10 % to first at 90 % of the final value.
+  /// s, from where on it is within the band; absent where half a million points do not show it, of
+  /// which the peak is then.
+  std::optional<double> settling_time{};
+  std::optional<double> overshoot{};   ///< Share of the final value beyond it.
+  std::optional<double> undershoot{};  ///< Share of the final value on the other side of zero.
+  std::optional<double> peak{};        ///< The value farthest in the final value's direction.
+  std::optional<double> peak_time{};   ///< s; absent where the final value is approached only.
 };
 
 /// @param band  Half of it, as a share of the final value.
 /// Of a discrete transfer function the samples are the solution.
 /// @errors ArgumentError::out_of_range (a band not in (0, 1)); SystemError::no_convergence.
-/// Cost: O(n³ + n² points), the points following the fastest and the slowest pole, 2 10⁶ at most.
-/// Source: book, sections 2.5 and E.3.5; conventions of the field: 10-90 %, 2 %.
+/// Cost: O(n³ + n² points), the points following the fastest and the slowest pole, half a million
+/// at most. Source: book, sections 2.5 and E.3.5; conventions of the field: 10-90 %, 2 %.
 [[nodiscard]] Expected<StepMetrics> step_metrics(const TransferFunction& transfer,
                                                  double band = 0.02);
 

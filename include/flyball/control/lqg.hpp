@@ -69,8 +69,7 @@ class Lqg {
   template <class R, class Next, class Y, class... More>
     requires(wrong_size<R, StateVector> || wrong_size<Next, StateVector> ||
              wrong_size<Y, OutputVector>)
-  InputVector step(const Eigen::MatrixBase<R>&, const Eigen::MatrixBase<Next>&,
-                   const Eigen::MatrixBase<Y>&, const More&...) = delete;
+  InputVector step(const R&, const Next&, const Y&, const More&...) = delete;
 
   /// Declares a state to be an angle that wraps, see StateFeedback.
   void set_angle(int state, double turn) noexcept { feedback_.set_angle(state, turn); }

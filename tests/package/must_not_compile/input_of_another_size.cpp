@@ -1,4 +1,4 @@
-// error: use of deleted function|call to deleted|is ambiguous
+// error: use of deleted function|call to deleted
 #include <flyball/estimation/kalman_filter.hpp>
 
 bool step(flyball::KalmanFilter<2, 1, 1>& filter) {

@@ -1,4 +1,4 @@
-// error: use of deleted function|call to deleted|is ambiguous
+// error: use of deleted function|call to deleted
 #include <flyball/control/lqg.hpp>
 
 double step(flyball::Lqg<2, 1, 1>& loop, double y) {

@@ -203,8 +203,8 @@ class JosephCovariance {
     bool bounded = true;
     bool odd = false;
     for (Eigen::Index i = 0; i < P.rows(); ++i) {
-      bounded = bounded & (P(i, i) >= 0.0) & (P(i, i) <= detail::largest_variance);
-      odd = odd | (P(i, i) < underflows);
+      bounded = bounded && P(i, i) >= 0.0 && P(i, i) <= detail::largest_variance;
+      odd = odd || P(i, i) < underflows;
     }
     if (bounded) {
       P_.resize(P.rows(), P.cols());
