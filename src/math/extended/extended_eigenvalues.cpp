@@ -177,7 +177,8 @@ void step(Square<Number>& H, Index first, Index last, Number shift) {
   }
 }
 
-/// Conjugates of each other to the last bit, or real.
+/// Conjugates of each other to the last bit, or real. Each pair's mean: those of a cluster err
+/// far more than their sum does, and what is made of all of them again must not.
 void pair_up(Eigen::VectorXcd& values) {
   const Index n = values.size();
   std::vector<bool> done(static_cast<std::size_t>(n), false);
@@ -198,6 +199,7 @@ void pair_up(Eigen::VectorXcd& values) {
     if (nearest == i) {
       values(i).imag(0.0);
     } else {
+      values(i) = 0.5 * (values(i) + std::conj(values(nearest)));
       values(nearest) = std::conj(values(i));
     }
   }
