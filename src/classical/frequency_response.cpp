@@ -1,0 +1,312 @@
+#include <flyball/classical/frequency_response.hpp>
+
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+#include <flyball/systems/analysis.hpp>
+
+#include "core/format.hpp"
+#include "core/try.hpp"
+#include "math/dense/dense.hpp"
+#include "math/dense/dense_reduction.hpp"
+#include "systems/balance.hpp"
+#include "systems/zero_pole_gain.hpp"
+
+namespace flyball::classical {
+
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+using Eigen::VectorXcd;
+using Eigen::VectorXd;
+using Complex = std::complex<double>;
+
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+class TransferSource final : public FrequencyResponse::Source {
+ public:
+  TransferSource(TransferFunction transfer, Factors factors)
+      : transfer_(std::move(transfer)), factors_(std::move(factors)) {}
+
+  [[nodiscard]] Index outputs() const override { return 1; }
+  [[nodiscard]] Index inputs() const override { return 1; }
+  [[nodiscard]] std::optional<Time> period() const override { return transfer_.period(); }
+  void evaluate(const VectorXd& frequencies, Complex* values) const override {
+    for (Index k = 0; k < frequencies.size(); ++k) {
+      values[k] = transfer_.response(frequencies(k));
+    }
+  }
+  [[nodiscard]] MatrixXcd at_point(Complex s) const override {
+    const auto value =
+        transfer_.at(transfer_.period() ? std::exp(s * transfer_.period()->si()) : s);
+    return MatrixXcd::Constant(1, 1, value.value_or(Complex(nan, nan)));
+  }
+  [[nodiscard]] std::optional<Factors> factors(Index /*output*/, Index /*input*/) const override {
+    return factors_;
+  }
+
+ private:
+  TransferFunction transfer_;
+  Factors factors_;
+};
+
+/// Roots that rounding cannot tell from the axis are on it.
+VectorXcd on_the_axis_if_near(const ModalAnalysis& modes, bool discrete) {
+  VectorXcd poles(static_cast<Index>(modes.modes.size()));
+  Index k = 0;
+  for (const Mode& mode : modes.modes) {
+    Complex pole = mode.pole;
+    if (mode.stability == Stability::marginal) {
+      const Complex origin = discrete ? Complex(1.0) : Complex(0.0);
+      pole = std::abs(pole - origin) <= mode.uncertainty ? origin
+             : discrete                                  ? pole / std::abs(pole)
+                                                         : Complex(0.0, pole.imag());
+    }
+    poles(k++) = pole;
+  }
+  return poles;
+}
+
+class StateSpaceSource final : public FrequencyResponse::Source {
+ public:
+  StateSpaceSource(const ContinuousSystem<>& system, std::optional<Time> period, double delay)
+      : system_(system), period_(period), delay_(delay) {
+    if (system.A.size() == 0) {
+      H_ = system.A;
+      B_ = system.B;
+      C_ = system.C;
+      return;
+    }
+    const ContinuousSystem<> scaled = flyball::detail::scaled_system(
+        system, flyball::detail::scaling_of(system.A, system.B, system.C));
+    const flyball::detail::Hessenberg form = flyball::detail::hessenberg_of(scaled.A);
+    H_ = form.H;
+    B_ = flyball::detail::transposed_product(form.Q, scaled.B);
+    C_ = flyball::detail::product(scaled.C, form.Q);
+  }
+
+  [[nodiscard]] Index outputs() const override { return system_.C.rows(); }
+  [[nodiscard]] Index inputs() const override { return system_.B.cols(); }
+  [[nodiscard]] std::optional<Time> period() const override { return period_; }
+  void evaluate(const VectorXd& frequencies, Complex* values) const override {
+    const Index size = outputs() * inputs();
+    for (Index k = 0; k < frequencies.size(); ++k) {
+      Eigen::Map<MatrixXcd>(values + k * size, outputs(), inputs()) =
+          at_point(Complex(0.0, frequencies(k)));
+    }
+  }
+  [[nodiscard]] MatrixXcd at_point(Complex s) const override {
+    // (zI - H)⁻¹B by elimination of the subdiagonal with row pivoting.
+    const Complex z = period_ ? std::exp(s * period_->si()) : s;
+    const Index n = H_.rows();
+    MatrixXcd U = -H_.cast<Complex>();
+    U.diagonal().array() += z;
+    MatrixXcd X = B_.cast<Complex>();
+    for (Index k = 0; k + 1 < n; ++k) {
+      if (std::abs(U(k + 1, k)) > std::abs(U(k, k))) {
+        U.row(k).tail(n - k).swap(U.row(k + 1).tail(n - k));
+        X.row(k).swap(X.row(k + 1));
+      }
+      if (U(k + 1, k) != 0.0) {
+        const Complex factor = U(k + 1, k) / U(k, k);
+        U.row(k + 1).tail(n - k - 1) -= factor * U.row(k).tail(n - k - 1);
+        X.row(k + 1) -= factor * X.row(k);
+      }
+    }
+    MatrixXcd G = system_.D.cast<Complex>();
+    for (Index j = 0; j < X.cols(); ++j) {
+      for (Index k = n - 1; k >= 0; --k) {
+        X(k, j) /= U(k, k);
+        X.col(j).head(k) -= U.col(k).head(k) * X(k, j);
+        G.col(j) += C_.col(k) * X(k, j);
+      }
+    }
+    return delay_ > 0.0 ? MatrixXcd(G * std::exp(-s * delay_)) : G;
+  }
+  [[nodiscard]] std::optional<Factors> factors(Index output, Index input) const override {
+    Factors factors;
+    factors.delay = delay_;
+    factors.gain = system_.D(output, input);
+    if (system_.A.size() == 0) {
+      return factors;
+    }
+    const ContinuousSystem<> one{system_.A, system_.B.col(input), system_.C.row(output),
+                                 system_.D.block(output, input, 1, 1)};
+    const auto zpk = flyball::detail::zero_pole_gain(one);
+    const auto modes =
+        analyze_modes(system_.A, period_ ? TimeDomain::discrete : TimeDomain::continuous,
+                      period_.value_or(Time(1.0)));
+    if (!modes) {
+      return std::nullopt;
+    }
+    factors.poles = on_the_axis_if_near(*modes, period_.has_value());
+    factors.gain = zpk ? zpk->gain : 0.0;
+    if (zpk) {
+      factors.zeros =
+          Eigen::Map<const VectorXcd>(zpk->zeros.data(), static_cast<Index>(zpk->zeros.size()));
+    }
+    return factors;
+  }
+
+ private:
+  ContinuousSystem<> system_;
+  std::optional<Time> period_;
+  double delay_ = 0.0;
+  MatrixXd H_, B_, C_;
+};
+
+/// One entry of a matrix.
+class EntrySource final : public FrequencyResponse::Source {
+ public:
+  EntrySource(FrequencyResponse whole, Index output, Index input)
+      : whole_(std::move(whole)), output_(output), input_(input) {}
+
+  [[nodiscard]] Index outputs() const override { return 1; }
+  [[nodiscard]] Index inputs() const override { return 1; }
+  [[nodiscard]] std::optional<Time> period() const override { return whole_.period(); }
+  void evaluate(const VectorXd& frequencies, Complex* values) const override {
+    if (const auto all = whole_.sample(frequencies)) {
+      Eigen::Map<VectorXcd>(values, frequencies.size()) =
+          all->row(output_ + input_ * whole_.outputs()).transpose();
+    }
+  }
+  [[nodiscard]] MatrixXcd at_point(Complex s) const override {
+    return whole_.at_point(s).block(output_, input_, 1, 1);
+  }
+  [[nodiscard]] std::optional<Factors> factors(Index /*output*/, Index /*input*/) const override {
+    return whole_.factors(output_, input_);
+  }
+  [[nodiscard]] VectorXd known_frequencies() const override { return whole_.known_frequencies(); }
+
+ private:
+  FrequencyResponse whole_;
+  Index output_;
+  Index input_;
+};
+
+/// How often a polynomial in z vanishes at z = 1, to the rounding of its coefficients.
+Index roots_at_one(VectorXd p) {
+  Index count = 0;
+  while (p.size() > 1 &&
+         std::abs(p.sum()) <= 1e-15 * static_cast<double>(p.size()) * p.cwiseAbs().sum()) {
+    for (Index i = 1; i < p.size(); ++i) {
+      p(i) += p(i - 1);
+    }
+    p = p.head(p.size() - 1).eval();
+    ++count;
+  }
+  return count;
+}
+
+/// Those roots are at one that the coefficients have there.
+VectorXcd settled(VectorXcd roots, const VectorXd& p) {
+  for (Index left = roots_at_one(p); left > 0; --left) {
+    Index nearest = 0;
+    double distance = std::numeric_limits<double>::infinity();
+    for (Index i = 0; i < roots.size(); ++i) {
+      if (roots(i) != 1.0 && std::abs(roots(i) - 1.0) < distance) {
+        distance = std::abs(roots(i) - 1.0);
+        nearest = i;
+      }
+    }
+    if (std::isfinite(distance)) {
+      roots(nearest) = 1.0;
+    }
+  }
+  return roots;
+}
+
+}  // namespace
+
+std::optional<Factors> FrequencyResponse::Source::factors(Index /*output*/, Index /*input*/) const {
+  return std::nullopt;
+}
+
+VectorXd FrequencyResponse::Source::known_frequencies() const {
+  return {};
+}
+
+double FrequencyResponse::highest_frequency() const {
+  const auto T = period();
+  return T ? std::numbers::pi / T->si() : std::numeric_limits<double>::infinity();
+}
+
+MatrixXcd FrequencyResponse::at(double frequency) const {
+  MatrixXcd G(outputs(), inputs());
+  source_->evaluate(VectorXd::Constant(1, frequency), G.data());
+  return G;
+}
+
+Expected<MatrixXcd> FrequencyResponse::sample(const VectorXd& frequencies) const {
+  constexpr std::string_view where = "frequency response";
+  FLYBALL_CHECK(check_finite(MatrixXd(frequencies), where, "the frequencies"));
+  const double most = frequencies.size() == 0 ? 0.0 : frequencies.cwiseAbs().maxCoeff();
+  if (most > highest_frequency() * (1.0 + 1e-12)) {
+    return refusal(ArgumentError::out_of_range, where, "a frequency")
+        .got(flyball::detail::format("{} rad/s", most))
+        .expected(flyball::detail::format("up to pi/T, {} rad/s: a sampled system has none beyond",
+                                          highest_frequency()));
+  }
+  const VectorXd known = known_frequencies();
+  if (known.size() > 0 && frequencies.size() > 0 &&
+      (frequencies.minCoeff() < known(0) || frequencies.maxCoeff() > known(known.size() - 1))) {
+    return refusal(ArgumentError::out_of_range, where, "a frequency")
+        .got(flyball::detail::format("{} rad/s", frequencies.minCoeff() < known(0)
+                                                     ? frequencies.minCoeff()
+                                                     : frequencies.maxCoeff()))
+        .expected(flyball::detail::format("within the data, {} to {} rad/s", known(0),
+                                          known(known.size() - 1)));
+  }
+  MatrixXcd values(outputs() * inputs(), frequencies.size());
+  source_->evaluate(frequencies, values.data());
+  return values;
+}
+
+Expected<FrequencyResponse> FrequencyResponse::entry(Index output, Index input) const {
+  constexpr std::string_view where = "frequency response";
+  for (const auto& [index, count, name] :
+       {std::tuple<Index, Index, const char*>{output, outputs(), "the output"},
+        {input, inputs(), "the input"}}) {
+    if (index < 0 || index >= count) {
+      return refusal(ArgumentError::out_of_range, where, name)
+          .got(flyball::detail::format("{}", index))
+          .expected(flyball::detail::format("from 0 to {}", count - 1));
+    }
+  }
+  return outputs() * inputs() == 1
+             ? *this
+             : FrequencyResponse(std::make_shared<EntrySource>(*this, output, input));
+}
+
+Expected<FrequencyResponse> frequency_response(const TransferFunction& transfer) {
+  Factors factors;
+  FLYBALL_TRY(factors.zeros, transfer.zeros());
+  FLYBALL_TRY(factors.poles, transfer.poles());
+  if (transfer.period()) {
+    factors.zeros = settled(factors.zeros, transfer.num());
+    factors.poles = settled(factors.poles, transfer.den());
+  }
+  factors.gain = transfer.num()(0) / transfer.den()(0);
+  factors.delay = transfer.delay();
+  return FrequencyResponse(std::make_shared<TransferSource>(transfer, std::move(factors)));
+}
+
+Expected<FrequencyResponse> frequency_response(const ContinuousSystem<>& system, Time delay) {
+  constexpr std::string_view where = "frequency response";
+  FLYBALL_CHECK(check_system_or_gain(system, where));
+  FLYBALL_CHECK(check_not_negative(delay.si(), where, "delay", "s"));
+  return FrequencyResponse(std::make_shared<StateSpaceSource>(system, std::nullopt, delay.si()));
+}
+
+Expected<FrequencyResponse> frequency_response(const DiscreteSystem<>& system, Time delay) {
+  constexpr std::string_view where = "frequency response";
+  FLYBALL_CHECK(check_system_or_gain(system, where));
+  FLYBALL_CHECK(check_not_negative(delay.si(), where, "delay", "s"));
+  return FrequencyResponse(std::make_shared<StateSpaceSource>(
+      ContinuousSystem<>{system.A, system.B, system.C, system.D}, system.period, delay.si()));
+}
+
+}  // namespace flyball::classical
