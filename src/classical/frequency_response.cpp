@@ -187,33 +187,41 @@ class EntrySource final : public FrequencyResponse::Source {
   Index input_;
 };
 
-/// How often a polynomial in z vanishes at z = 1, to the rounding of its coefficients.
-Index roots_at_one(VectorXd p) {
-  Index count = 0;
-  while (p.size() > 1 &&
-         std::abs(p.sum()) <= 1e-15 * static_cast<double>(p.size()) * p.cwiseAbs().sum()) {
-    for (Index i = 1; i < p.size(); ++i) {
-      p(i) += p(i - 1);
+/// How far a root moves when the coefficients of its polynomial move by their last digit: the δ of
+/// Σ |p⁽ᵐ⁾(r)|/m! δᵐ = ε Σ |cₖ rᵏ| is at most the smallest of its terms' own.
+double uncertainty(const VectorXd& p, Complex root) {
+  constexpr double epsilon = std::numeric_limits<double>::epsilon();
+  const Index n = p.size() - 1;
+  VectorXcd shifted = p.cast<Complex>();  // p(r + x), by repeated synthetic division
+  for (Index from = 0; from < n; ++from) {
+    for (Index i = 1; i <= n - from; ++i) {
+      shifted(i) += root * shifted(i - 1);
     }
-    p = p.head(p.size() - 1).eval();
-    ++count;
   }
-  return count;
+  double size = 0.0;
+  for (Index i = 0; i <= n; ++i) {
+    size = size * std::abs(root) + std::abs(p(i));
+  }
+  double least = std::numeric_limits<double>::infinity();
+  for (Index m = 1; m <= n; ++m) {
+    const double slope = std::abs(shifted(n - m));
+    if (slope > 0.0) {
+      least = std::min(least, std::pow(epsilon * size / slope, 1.0 / static_cast<double>(m)));
+    }
+  }
+  return least;
 }
 
-/// Those roots are at one that the coefficients have there.
-VectorXcd settled(VectorXcd roots, const VectorXd& p) {
-  for (Index left = roots_at_one(p); left > 0; --left) {
-    Index nearest = 0;
-    double distance = std::numeric_limits<double>::infinity();
-    for (Index i = 0; i < roots.size(); ++i) {
-      if (roots(i) != 1.0 && std::abs(roots(i) - 1.0) < distance) {
-        distance = std::abs(roots(i) - 1.0);
-        nearest = i;
-      }
-    }
-    if (std::isfinite(distance)) {
-      roots(nearest) = 1.0;
+/// Roots that the coefficients cannot tell from the axis are on it, those at z = 1 are there.
+VectorXcd settled(VectorXcd roots, const VectorXd& p, bool discrete) {
+  for (Complex& root : roots) {
+    const double blur = uncertainty(p, root);
+    if (!discrete) {
+      root.real(std::abs(root.real()) <= blur ? 0.0 : root.real());
+    } else if (std::abs(root - 1.0) <= blur) {
+      root = 1.0;
+    } else if (std::abs(std::abs(root) - 1.0) <= blur) {
+      root /= std::abs(root);
     }
   }
   return roots;
@@ -285,10 +293,9 @@ Expected<FrequencyResponse> frequency_response(const TransferFunction& transfer)
   Factors factors;
   FLYBALL_TRY(factors.zeros, transfer.zeros());
   FLYBALL_TRY(factors.poles, transfer.poles());
-  if (transfer.period()) {
-    factors.zeros = settled(factors.zeros, transfer.num());
-    factors.poles = settled(factors.poles, transfer.den());
-  }
+  const bool discrete = transfer.period().has_value();
+  factors.zeros = settled(factors.zeros, transfer.num(), discrete);
+  factors.poles = settled(factors.poles, transfer.den(), discrete);
   factors.gain = transfer.num()(0) / transfer.den()(0);
   factors.delay = transfer.delay();
   return FrequencyResponse(std::make_shared<TransferSource>(transfer, std::move(factors)));
