@@ -1,0 +1,53 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include <flyball/classical/transfer_function.hpp>
+
+namespace flyball::classical {
+
+/// What no transfer function can be made of, beyond errors of grammar
+/// (expression::ExpressionError). All carry the evidence `offset` and `length`: the place in the
+/// text, in bytes.
+enum class TransferTextError {
+  both_variables,      ///< s and z in one expression.
+  period_missing,      ///< z, and nobody said its sample period.
+  period_without_z,    ///< s, and a sample period.
+  negative_delay,      ///< e^{+Ts}: the output would be there before the input.
+  not_a_delay,         ///< e to the power of anything else than -T s.
+  power_not_whole,     ///< s^0.5, s^s.
+  not_a_number,        ///< s where only a number can stand, or a result that is none.
+  ambiguous_division,  ///< 1/2s, which some read as 1/(2s) and others as (1/2)s.
+  degree_too_high,     ///< More than 100 poles or zeros.
+};
+[[nodiscard]] ErrorInfo error_info(TransferTextError code);
+
+/// A transfer function as people write it: "2/(s^2+3*s+2)*exp(-0.1*s)".
+///
+/// Numbers, s or z, + - * / ^ with whole powers, parentheses, products without a sign (2s, 3(s+1)),
+/// dead time as exp(-T*s) or e^(-T*s), powers z^-1, coefficients in descending powers ([1 2]/[1 3
+/// 2]), pi, sqrt(number). −, ·, ×, ², ³ and ** are read, too. Whatever a division 1/2s might mean
+/// is asked, not guessed.
+///
+/// Factors stay factors: nothing is multiplied out but where a sum needs it, and then in 31 digits.
+/// Sums of fractions have the least common denominator of the factors as written, and compound
+/// fractions are cleared of what both sides have below: G/(1 + G) has the poles of the closed loop
+/// alone, (1 + z^-1)/(1 - 0.5z^-1) no pole at 0. Nothing else is cancelled.
+/// @param text  UTF-8, at most 10 000 bytes. @param period  Of z; a constant is taken for discrete
+/// with it.
+/// @errors TransferTextError; expression::ExpressionError for grammar; TransferError::improper,
+/// zero_denominator, delay_in_loop for sums of different dead times and a dead time below a
+/// fraction. `expression::caret_lines` shows the place.
+/// Cost: O(bytes degree²), allocates.
+[[nodiscard]] Expected<TransferFunction> parse_transfer_function(
+    std::string_view text, std::optional<Time> period = std::nullopt);
+
+/// The product of several texts, of which one alone may be improper: a PD controller before its
+/// plant. @errors As above, and `text` as evidence: which of them, from 0.
+[[nodiscard]] Expected<TransferFunction> parse_transfer_product(
+    std::span<const std::string> texts, std::optional<Time> period = std::nullopt);
+
+}  // namespace flyball::classical
