@@ -47,10 +47,16 @@ bool Odometry::step(const Eigen::Vector3d& delta, const Rotation2d& gyro,
   return true;
 }
 
-void Odometry::reset(const Pose2d& pose, const Eigen::Matrix3d& covariance) noexcept {
+bool Odometry::reset(const Pose2d& pose, const Eigen::Matrix3d& covariance) noexcept {
+  const Rotation2d& heading = pose.rotation();
+  if (!is_signal(pose.translation()) || !is_signal(heading.cos()) || !is_signal(heading.sin()) ||
+      !is_signal(covariance)) {
+    return false;
+  }
   pose_ = pose;
   covariance_ = covariance;
   knows_gyro_zero_ = false;
+  return true;
 }
 
 }  // namespace flyball

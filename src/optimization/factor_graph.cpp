@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <flyball/core/argument.hpp>
 
@@ -85,6 +86,9 @@ Refusal not_determined(const NormalEquations& equations, Index entry) {
 }  // namespace
 
 double graph_cost(const GraphFunctions& graph) {
+  if (std::any_of(graph.links.begin(), graph.links.end(), [](int link) { return link < 0; })) {
+    return std::numeric_limits<double>::quiet_NaN();  // a variable of another graph
+  }
   double cost = 0.0;
   std::vector<double> r;
   for (std::size_t f = 0; f < graph.factors.size(); ++f) {

@@ -146,9 +146,11 @@ void notice_passes(const Estimation& result, const std::vector<EstimatePass>& pa
   std::size_t not_moved = 0;
   std::size_t missing = 0;
   std::size_t left_out = 0;
+  std::size_t limited = 0;
   constexpr double hardly = 0.1;
   for (const EstimatePass& pass : passes) {
     not_moved += pass.not_moved;
+    limited += pass.limited;
     missing += static_cast<std::size_t>(pass.run.measured.array().isNaN().colwise().all().count());
     left_out +=
         static_cast<std::size_t>(std::count_if(pass.run.weight.begin(), pass.run.weight.end(),
@@ -158,6 +160,11 @@ void notice_passes(const Estimation& result, const std::vector<EstimatePass>& pa
     warn(all, "left_the_numbers",
          "{} of the model left the numbers that there are, and the estimate stayed",
          text::count(not_moved, "prediction"));
+  }
+  if (limited > 0) {
+    note(all, "at_a_limit",
+         "at {} the estimate had left the limits of the states and was brought back",
+         text::count(limited, "sample"));
   }
   if (std::any_of(passes.begin(), passes.end(), [](const auto& pass) { return pass.is_stiff; })) {
     warn(all, "stiff",

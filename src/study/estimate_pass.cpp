@@ -3,6 +3,7 @@
 #include <limits>
 #include <optional>
 
+#include <flyball/estimation/state_limits.hpp>
 #include <flyball/estimation/unscented_kalman_filter.hpp>
 
 #include "core/try.hpp"
@@ -24,6 +25,24 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double longest_step = 0.25;
 constexpr int most_steps = 1000;
 
+/// A state's estimates given the limits of the states: the Gaussian with the moments of the cut
+/// one. What the filter carries on is not cut: a limit that is told at each sample is the same
+/// knowledge every time.
+void cut_off(Eigen::Ref<VectorXd> x, Eigen::Ref<VectorXd> deviations, const MatrixXd& P,
+             const ModelEstimate& settings) {
+  auto estimate = Estimate<VectorXd>::create(VectorXd(x), Covariance(P));
+  if (!estimate) {
+    return;  // a state that is known without error
+  }
+  for (Index i = 0; i < x.size(); ++i) {
+    if (std::isfinite(settings.lower(i)) || std::isfinite(settings.upper(i))) {
+      limit_state(*estimate, i, settings.lower(i), settings.upper(i));
+    }
+  }
+  x = estimate->x_hat();
+  deviations = estimate->P().diagonal().cwiseMax(0.0).cwiseSqrt();
+}
+
 MatrixXd squares(const VectorXd& deviations) {
   return deviations.cwiseAbs2().asDiagonal();
 }
@@ -37,7 +56,9 @@ class Pass {
         run_(run),
         settings_(settings),
         hold_(hold),
-        density_(squares(settings.process_noise)) {}
+        density_(squares(settings.process_noise)),
+        is_limited_(settings.lower.array().isFinite().any() ||
+                    settings.upper.array().isFinite().any()) {}
 
   Expected<EstimatePass> run(bool smooth) {
     const auto count = static_cast<Index>(run_.time.size());
@@ -73,10 +94,14 @@ class Pass {
           detail::product_transposed(detail::product(step.F, pass.P_end_unmeasured), step.F) +
           step.Q;
       correct(k, guard ? &*guard : nullptr, pass);
+      pass.limited += is_limited_ && bring_inside() ? 1 : 0;
       step.x = filter_.x_hat();
       step.P = filter_.P();
       made.filtered.col(k) = step.x;
       made.filtered_std.col(k) = step.P.diagonal().cwiseMax(0.0).cwiseSqrt();
+      if (is_limited_) {
+        cut_off(made.filtered.col(k), made.filtered_std.col(k), step.P, settings_);
+      }
       steps.push_back(std::move(step));
     }
     pass.P_end = filter_.P();
@@ -87,12 +112,33 @@ class Pass {
       for (Index k = 0; k < count; ++k) {
         made.smoothed_std.col(k) =
             pass.path.P[static_cast<std::size_t>(k + 1)].diagonal().cwiseMax(0.0).cwiseSqrt();
+        if (is_limited_) {
+          cut_off(made.smoothed.col(k), made.smoothed_std.col(k),
+                  pass.path.P[static_cast<std::size_t>(k + 1)], settings_);
+        }
       }
     }
     return pass;
   }
 
  private:
+  /// The likeliest estimate within the limits. @return Whether it was not there already.
+  bool bring_inside() {
+    auto estimate = filter_.estimate();
+    bool moved = false;
+    for (Index i = 0; i < settings_.lower.size(); ++i) {
+      const double x = estimate.x_hat()(i);
+      if (x < settings_.lower(i) || x > settings_.upper(i)) {
+        const VectorXd row = VectorXd::Unit(settings_.lower.size(), i);
+        moved = project(estimate, x, row, settings_.lower(i), settings_.upper(i)) || moved;
+      }
+    }
+    if (moved) {
+      filter_.restore(estimate);
+    }
+    return moved;
+  }
+
   /// To the time of a sample.
   Expected<FilterStep<>> advance(Index k, EstimatePass& pass) {
     const Index n = filter_.x_hat().size();
@@ -146,6 +192,7 @@ class Pass {
   const ModelEstimate& settings_;
   InputHold hold_;
   MatrixXd density_;
+  bool is_limited_;
 };
 
 template <class Filter>

@@ -16,6 +16,7 @@ struct EstimatePass {
   Eigen::MatrixXd P_end_unmeasured{};  ///< and what it were without a measurement.
   double log_likelihood = 0.0;
   std::size_t not_moved = 0;  ///< Predictions that left the numbers that there are.
+  std::size_t limited = 0;    ///< Samples at which a state had left its limits.
   bool is_stiff = false;      ///< The model is faster than the most steps that are made.
 };
 

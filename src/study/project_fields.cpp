@@ -475,6 +475,14 @@ constexpr std::array estimate_fields{
         "How far they may be off: standard deviation")
         .without("1 in the state's SI unit")
         .no_option(),
+    map("lower_limit", at<&EstimateSection::lower_limit>(), "{ height = \"0 m\" }",
+        "Where a state always is at least, as above a stop")
+        .without("none")
+        .no_option(),
+    map("upper_limit", at<&EstimateSection::upper_limit>(), "{ height = \"48 in\" }",
+        "Where it always is at most")
+        .without("none")
+        .no_option(),
     text("outliers", at<&EstimateSection::outliers>(), "\"huber\"",
          "What becomes of a reading that does not fit: it is taken, left out, or counts for less")
         .one_of("none, gate, huber, student")

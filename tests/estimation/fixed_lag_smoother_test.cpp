@@ -107,6 +107,20 @@ TEST(FixedLagSmoother, DynamicSizesAreTheSame) {
   }
 }
 
+TEST(FixedLagSmoother, StartsFromNumbers) {
+  using Smoother = FixedLagSmoother<2, 3>;
+  const Eigen::Vector2d nowhere =
+      Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
+  const Eigen::Matrix2d P = Eigen::Matrix2d::Identity();
+  Smoother smoother(nowhere, P);
+  EXPECT_EQ(smoother.at(0).x, Eigen::Vector2d::Zero());
+  EXPECT_TRUE(smoother.reset(Eigen::Vector2d(1.0, 2.0), P));
+  EXPECT_FALSE(smoother.reset(nowhere, P));
+  EXPECT_FALSE(smoother.reset(Eigen::Vector2d::Zero(),
+                              Eigen::Matrix2d::Constant(std::numeric_limits<double>::quiet_NaN())));
+  EXPECT_EQ(smoother.at(0).x, Eigen::Vector2d(1.0, 2.0));
+}
+
 TEST(FixedLagSmoother, TakesOnlyWhatIsFiniteAndAllocatesNothing) {
   using Step = FilterStep<2>;
   const Step good{Eigen::Matrix2d{{1.0, 0.02}, {0.0, 1.0}}, 0.01 * Eigen::Matrix2d::Identity(),

@@ -147,6 +147,21 @@ TEST(Odometry, LeavesOutWhatIsNoNumber) {
   }
 }
 
+TEST(Odometry, ANewPlaceIsANumber) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  Odometry odometry(OdometryRule::pose_exponential, Pose2d(1.0, 2.0, 0.5));
+  EXPECT_FALSE(odometry.reset(Pose2d(nan, 0.0, 0.0)));
+  EXPECT_FALSE(odometry.reset(Pose2d(), Matrix3d::Constant(nan)));
+  EXPECT_FALSE(odometry.reset(Pose2d(1e300, 0.0, 0.0)));
+  EXPECT_EQ(odometry.pose().x(), 1.0);
+  EXPECT_TRUE(odometry.reset(Pose2d(3.0, 0.0, 0.0)));
+  EXPECT_EQ(odometry.pose().x(), 3.0);
+  Odometry lost(OdometryRule::forward_euler, Pose2d(0.0, nan, 0.0));
+  EXPECT_EQ(lost.pose().y(), 0.0);
+  EXPECT_TRUE(lost.step({1.0, 0.0, 0.0}));
+  EXPECT_EQ(lost.pose().x(), 1.0);
+}
+
 // The covariance against the spread of 20 000 runs whose twists carry the noise.
 TEST(Odometry, CovarianceIsThatOfManyRuns) {
   const Vector3d sigma(0.01, 0.004, 0.008);

@@ -287,6 +287,21 @@ TEST(FactorGraph, WhatCannotBeSolvedIsRefused) {
   EXPECT_TRUE(graph.solve().error().is(ArgumentError::out_of_range));
 }
 
+// A variable that no `add` returned, and one of another kind: no memory of theirs is read.
+TEST(FactorGraph, VariablesOfNoGraphAreRefused) {
+  for (const Variable<One> stranger : {Variable<One>{}, Variable<One>{0}, Variable<One>{7}}) {
+    FactorGraph<One, Vector2d> graph;
+    const auto pair = graph.add(Vector2d(1.0, 2.0));
+    graph.add_factor(at(0.0), stranger);
+    graph.fix(stranger);
+    graph.set(stranger, One(3.0));
+    EXPECT_TRUE(std::isnan(graph.cost()));
+    EXPECT_TRUE(graph.solve().error().is(ArgumentError::out_of_range));
+    EXPECT_TRUE(graph.covariances().error().is(ArgumentError::out_of_range));
+    EXPECT_EQ(graph[pair], Vector2d(1.0, 2.0));
+  }
+}
+
 TEST(FactorGraph, TheCapIsKept) {
   FactorGraph<One> graph;
   const auto x = graph.add(One(2.0));

@@ -11,6 +11,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/io/csv.hpp>
 #include <flyball/io/wpilog.hpp>
+#include <flyball/math/probability/truncated_normal.hpp>
 
 namespace flyball::study {
 namespace {
@@ -319,6 +320,74 @@ TEST(Estimate, RefusalsSayTheMend) {
   EXPECT_NE(refusal(log, swing(noises + std::string("tune = true\n[fit]\nto = \"-1 s\"\n")))
                 .find("0 samples of angle"),
             std::string::npos);
+}
+
+// A lift in free coasting that rests on its stop, read with much noise: with the stop known, no
+// estimate is below it, and the errors are smaller. Where the estimate is inside, the one that is
+// told is its Gaussian cut off, of the same recursion.
+TEST(Estimate, LimitsOfStatesAreKept) {
+  const std::string lift =
+      "[model]\nstates = { height = \"m\" }\ninputs = { v = \"m/s\" }\n"
+      "[model.derivative]\nheight = \"v\"\n[model.outputs]\nread = \"height\"\n"
+      "[estimate]\nprocess_noise = { height = \"0.02 m\" }\n"
+      "measurement_noise = { read = \"0.1 m\" }\ninitial = { height = \"0.1 m\" }\n"
+      "initial_std = { height = \"0.1 m\" }\n";
+  Random random(11);
+  Log log;
+  log.source = "lift.csv";
+  Signal v{"v", "m/s", {}, {}};
+  Signal read{"read", "m", {}, {}};
+  for (int k = 0; k < 400; ++k) {
+    v.time.push_back(0.02 * k);
+    v.value.push_back(0.0);
+    read.time.push_back(0.02 * k);
+    read.value.push_back(0.1 * random.normal());
+  }
+  log.signals = {v, read};
+  for (const std::string filter : {"extended", "unscented"}) {
+    const std::string base = lift + "filter = \"" + filter + "\"\n";
+    const Estimation without = estimated(log, base);
+    const Estimation with = estimated(log, base + "lower_limit = { height = \"0 m\" }\n");
+    ASSERT_EQ(with.runs.size(), 1U);
+    const EstimatedRun& free = without.runs[0];
+    const EstimatedRun& kept = with.runs[0];
+    EXPECT_LT(free.filtered.minCoeff(), 0.0);
+    EXPECT_GE(kept.filtered.minCoeff(), 0.0);
+    EXPECT_GE(kept.smoothed.minCoeff(), 0.0);
+    EXPECT_TRUE(tells(with, "at_a_limit"));
+    EXPECT_FALSE(tells(without, "at_a_limit"));
+    for (const Eigen::Index k : {Eigen::Index(0), Eigen::Index(1)}) {
+      ASSERT_GT(free.filtered(0, k), 0.0);  // until then both recursions are the same
+      const double sigma = free.filtered_std(0, k);
+      const Moments cut = truncated_normal(free.filtered(0, k), sigma * sigma, 0.0, 1e300);
+      EXPECT_NEAR(kept.filtered(0, k), cut.mean, 1e-12);
+      EXPECT_NEAR(kept.filtered_std(0, k), std::sqrt(cut.variance), 1e-12);
+    }
+    // At the stop itself the mean of a Gaussian cut there is above it by 0.8 σ and its rms less.
+    const std::vector<double> truth(400, 0.0);
+    EXPECT_LT(errors_of(truth, kept.smoothed, kept.smoothed_std, 0).normalized, 3.0);
+  }
+  const auto wide = lift + "upper_limit = { height = \"9 m\" }\n";
+  const auto open = estimated(log, lift);
+  EXPECT_LT((estimated(log, wide).runs[0].smoothed - open.runs[0].smoothed).cwiseAbs().maxCoeff(),
+            1e-15);
+}
+
+TEST(Estimate, WrongLimitsAreTold) {
+  const auto told = [](const std::string& limits) {
+    const auto project = parse_project(swing(std::string(noises) + limits), "swing.toml");
+    return project ? std::string("accepted") : to_string(project.error());
+  };
+  EXPECT_NE(told("lower_limit = { theta = \"1 rad\" }\nupper_limit = { theta = \"-1 rad\" }\n")
+                .find("above lower_limit"),
+            std::string::npos);
+  const std::string outside = told("upper_limit = { theta = \"0.4 rad\" }\n");
+  EXPECT_NE(outside.find("a limit that the start keeps"), std::string::npos) << outside;
+  EXPECT_NE(outside.find("swing.toml:"), std::string::npos) << outside;
+  EXPECT_NE(told("upper_limit = { angle = \"1 rad\" }\n").find("\"angle\" is not a state"),
+            std::string::npos);
+  EXPECT_NE(told("upper_limit = { theta = \"1 m\" }\n").find("m"), std::string::npos);
+  EXPECT_EQ(told("lower_limit = { theta = \"-90 deg\" }\n"), "accepted");
 }
 
 TEST(Estimate, WhatTheFileSaysWronglyIsToldWithItsPlace) {

@@ -41,8 +41,14 @@ class FixedLagSmoother {
     StateMatrix P;
   };
 
-  /// @param x0, P0  The filter's estimate before the first step.
-  FixedLagSmoother(const StateVector& x0, const StateMatrix& P0) : newest_{x0, P0} {}
+  /// @param x0, P0  The filter's estimate before the first step; what `reset` would not take counts
+  /// as zero.
+  FixedLagSmoother(const StateVector& x0, const StateMatrix& P0) : newest_{x0, P0} {
+    if (!reset(x0, P0)) {
+      newest_.x.setZero();
+      newest_.P.setZero();
+    }
+  }
 
   /// Takes a step of the filter. @return  Whether it was taken: one with a number that is not
   /// finite, or whose variances are beyond the square of `largest_signal`, is not, and `at` stays
@@ -56,13 +62,22 @@ class FixedLagSmoother {
   /// [0, available] counts as the nearest of these. Cost: O(lag n³).
   [[nodiscard]] Estimate at(int lag) const noexcept;
 
-  /// Starts again.
-  void reset(const StateVector& x0, const StateMatrix& P0) noexcept {
+  /// Starts again. @return  Whether it did: not with a number that is not finite, or beyond what
+  /// `take` takes, and nothing changes.
+  bool reset(const StateVector& x0, const StateMatrix& P0) noexcept {
+    if (!is_signal(x0) || !is_covariance(P0)) {
+      return false;
+    }
     newest_ = {x0, P0};
     available_ = 0;
+    return true;
   }
 
  private:
+  [[nodiscard]] static bool is_covariance(const StateMatrix& P) noexcept {
+    return (P.array().abs() <= largest_signal * largest_signal).all();
+  }
+
   /// The estimate before a step given the one after it: N(x + K(x_after - x_prior), P).
   struct Back {
     StateVector x;
@@ -96,11 +111,9 @@ bool FixedLagSmoother<States, Lag>::take(const FilterStep<States>& step) noexcep
   rest.noalias() = half * left.transpose();
   half.noalias() = solved.transpose() * step.Q;
   rest.noalias() += half * solved;
-  const auto bounded = [](const StateMatrix& M) {
-    return (M.array().abs() <= largest_signal * largest_signal).all();
-  };
   const bool usable = is_signal(step.F) && is_signal(step.x) && is_signal(step.x_prior) &&
-                      is_signal(solved) && bounded(step.Q) && bounded(rest) && bounded(step.P);
+                      is_signal(solved) && is_covariance(step.Q) && is_covariance(rest) &&
+                      is_covariance(step.P);
   if (!usable) {
     return false;
   }

@@ -36,10 +36,13 @@ class Odometry {
  public:
   /// At the origin, and sure of it.
   explicit Odometry(OdometryRule rule = OdometryRule::pose_exponential) noexcept : rule_(rule) {}
+  /// A pose or covariance that `reset` would not take counts as the origin, known for sure.
   /// @param covariance  Of the pose's error in its own frame: m², m rad, rad².
   Odometry(OdometryRule rule, const Pose2d& pose,
            const Eigen::Matrix3d& covariance = Eigen::Matrix3d::Zero()) noexcept
-      : rule_(rule), pose_(pose), covariance_(covariance) {}
+      : rule_(rule) {
+    reset(pose, covariance);
+  }
 
   /// A period without a gyro. @param delta  The twist. @param Q  Its covariance.
   bool step(const Eigen::Vector3d& delta,
@@ -50,8 +53,9 @@ class Odometry {
   /// @param gyro  Its absolute heading, wrapped or not: only differences within a half turn count.
   bool step(const Eigen::Vector3d& delta, const Rotation2d& gyro,
             const Eigen::Matrix3d& Q = Eigen::Matrix3d::Zero()) noexcept;
-  /// Somewhere else; the gyro's zero is found anew.
-  void reset(const Pose2d& pose,
+  /// Somewhere else; the gyro's zero is found anew. @return  Whether it was taken: one with a
+  /// number that is none is not, and nothing changes.
+  bool reset(const Pose2d& pose,
              const Eigen::Matrix3d& covariance = Eigen::Matrix3d::Zero()) noexcept;
 
   [[nodiscard]] const Pose2d& pose() const noexcept { return pose_; }

@@ -159,18 +159,26 @@ class FactorGraph {
     of_kind.variables.push_back(place);
     return {place};
   }
-  /// Keeps it where it is.
+  /// Keeps it where it is. Another graph's is left out, as by `set`.
   template <Manifold Point>
   void fix(Variable<Point> variable) {
-    functions_->sizes[index(variable)] = 0;
+    if (knows(variable)) {
+      functions_->sizes[index(variable)] = 0;
+    }
   }
 
   /// A residual r(x₁, …) of the variables, with a loss of its norm.
   /// @param residual  Over a generic scalar, a vector of fixed size, whitened.
+  /// @param of  What `add` returned; with others `cost` is not a number and `solve` refuses.
   template <class Residual, Manifold... Of>
   void add_factor(Residual residual, RobustLoss loss, Variable<Of>... of) {
     using Made = Factor<Residual, Of...>;
     functions_->factors.push_back({functions_->links.size(), sizeof...(Of), Made::rows, loss});
+    if (!(knows(of) && ...)) {
+      (functions_->links.push_back(knows(of) ? of.place : -1), ...);
+      functions_->residuals.push_back(nullptr);
+      return;
+    }
     (functions_->links.push_back(of.place), ...);
     functions_->residuals.push_back(std::make_unique<Made>(
         std::move(residual), std::array<std::size_t, sizeof...(Of)>{
@@ -181,7 +189,7 @@ class FactorGraph {
     add_factor(std::move(residual), RobustLoss{}, of...);
   }
 
-  /// Its value now.
+  /// Its value now. @param variable  One of this graph's.
   template <Manifold Point>
   [[nodiscard]] const Point& operator[](Variable<Point> variable) const {
     return std::get<Kind<Point>>(functions_->kinds).now[functions_->places[index(variable)]];
@@ -189,6 +197,9 @@ class FactorGraph {
   /// Sets it, as a new start.
   template <Manifold Point>
   void set(Variable<Point> variable, const Point& value) {
+    if (!knows(variable)) {
+      return;
+    }
     std::get<Kind<Point>>(functions_->kinds).now[functions_->places[index(variable)]] = value;
   }
   [[nodiscard]] std::size_t variables() const noexcept { return functions_->sizes.size(); }
@@ -318,6 +329,13 @@ class FactorGraph {
     }
   };
 
+  template <class Point>
+  [[nodiscard]] bool knows(Variable<Point> variable) const noexcept {
+    const std::vector<int>& of_kind = std::get<Kind<Point>>(functions_->kinds).variables;
+    return variable.place >= 0 && index(variable) < functions_->places.size() &&
+           functions_->places[index(variable)] < of_kind.size() &&
+           of_kind[functions_->places[index(variable)]] == variable.place;
+  }
   template <class Point>
   [[nodiscard]] static std::size_t index(Variable<Point> variable) noexcept {
     return static_cast<std::size_t>(variable.place);

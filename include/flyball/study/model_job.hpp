@@ -84,6 +84,7 @@ struct EstimateSection {
   std::optional<bool> smoother{};
   bool tune = false;
   NamedTexts process_noise{}, measurement_noise{}, initial{}, initial_std{};
+  NamedTexts lower_limit{}, upper_limit{};
 };
 
 /// The same, checked, in SI.
@@ -96,6 +97,8 @@ struct ModelEstimate {
   Eigen::VectorXd initial{};            ///< n
   Eigen::VectorXd initial_std{};        ///< n
   std::optional<OutlierTreatment> outliers{};
+  Eigen::VectorXd lower{};  ///< n, where a state is at least; -∞ where nothing is known,
+  Eigen::VectorXd upper{};  ///< and at most, ∞.
 };
 
 /// The inputs of an open loop, over time.
