@@ -318,6 +318,25 @@ TEST_F(Localize, TheUtiasRobotIsFound) {
   EXPECT_LT(result->smoother_error->nees, 1.2);
   EXPECT_EQ(answer_of(*result).document.verdict.tone, Tone::caution);  // One unknown barcode.
 
+  // A part of it, whose sightings go on after the odometry has ended: the smoother settles.
+  const auto first_lines = [&](const char* name, int lines) {
+    std::istringstream in(read_file(to + "robot1_" + name + ".dat").value());
+    std::string out;
+    std::string line;
+    for (int k = 0; k < lines && std::getline(in, line); ++k) {
+      out += line + "\n";
+    }
+    return out;
+  };
+  TemporaryFolder part;
+  part.put("Odometry.dat", first_lines("Odometry", 8000));
+  part.put("Measurement.dat", first_lines("Measurement", 260));
+  part.put("Barcodes.dat", read_file(to + "mrclam6_Barcodes.dat").value());
+  part.put("Landmarks.dat", read_file(to + "mrclam6_Landmark_Groundtruth.dat").value());
+  const auto of_part = localize({.paths = {part.file("")}});
+  ASSERT_TRUE(of_part) << to_string(of_part.error());
+  EXPECT_TRUE(of_part->smoother->converged) << of_part->smoother->optimality;
+
   // The sign of a column, or its unit: never "known", and the mend is told.
   const auto changed = [&](const char* name, std::size_t column, double factor) {
     std::istringstream in(read_file(to + "robot1_" + name + ".dat").value());

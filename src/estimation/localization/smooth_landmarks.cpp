@@ -187,7 +187,7 @@ class Drive {
   Expected<void> solve(SmoothedLandmarks& result) {
     build(result.used);
     // Poses are known to 1e-3 of their deviations long before the optimum is exact.
-    FLYBALL_TRY(const auto solved, graph_.solve({.max_iterations = 50, .tolerance = 1e-5}));
+    FLYBALL_TRY(const auto solved, graph_.solve({.max_iterations = 300, .tolerance = 1e-5}));
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       poses_[i] = graph_[nodes_[i]];
       errors_[i] = graph_[node_errors_[i]];
