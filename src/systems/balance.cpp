@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/dense/pair_scaling.hpp"
 #include "systems/balance.hpp"
 
 namespace flyball::detail {
@@ -31,9 +32,11 @@ SystemScaling scaling_of(const MatrixRef& A, const MatrixRef& B, const MatrixRef
     b.row(i) /= f;
     c.col(i) *= f;
   };
+  // Inputs and outputs in units of their own: only the relation between the states counts. Their
+  // size is what no units change; if it followed the states', all would run away.
+  const double cycle = cycle_mean_of(A);
+  const double size = std::isfinite(cycle) ? static_cast<double>(n) * std::exp2(cycle) : M.sum();
   for (int sweep = 0; sweep < 60; ++sweep) {
-    // Inputs and outputs in units of their own: only the relation between the states counts.
-    const double size = M.sum();
     for (MatrixXd* side : {&b, &c}) {
       const double sum = side->sum();
       if (positive(sum) && positive(size)) {
@@ -76,14 +79,14 @@ SystemScaling scaling_of(const MatrixRef& A, const MatrixRef& B, const MatrixRef
     }
   }
   const MatrixXd scaled = scaled_state_matrix(A, scaling);
-  const double size = scaled.norm();
+  const double size_a = scaled.norm();
   const double size_b = (scaling.states.cwiseInverse().asDiagonal() * B).norm();
   const double size_c = (C * scaling.states.asDiagonal()).norm();
   if (positive(size_b)) {
-    scaling.inputs = power_of_two((positive(size) ? size : 1.0) / size_b);
+    scaling.inputs = power_of_two((positive(size_a) ? size_a : 1.0) / size_b);
   }
   if (positive(size_c)) {
-    scaling.outputs = power_of_two((positive(size) ? size : 1.0) / size_c);
+    scaling.outputs = power_of_two((positive(size_a) ? size_a : 1.0) / size_c);
   }
   return scaling;
 }

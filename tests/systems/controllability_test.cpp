@@ -213,6 +213,29 @@ TEST(Controllability, Edges) {
   EXPECT_FALSE(none->controllable);
 }
 
+// A PI controller before a plant of three lags: the plant's last state acts on nothing and the
+// controller's hangs on the input alone, so that neither has a unit of its own. det [B AB …] is
+// not zero: no zero of (s + 2)/(s + c) is a pole of 8000/((s + 0.1)(s + 20)²).
+TEST(Controllability, EndsOfChainsDoNotRunAway) {
+  for (const double c : {0.0, 1e-3}) {
+    for (const double gain : {8.0, 8000.0}) {
+      MatrixXd A(4, 4);
+      A << -c, 0.0, 0.0, 0.0, 0.0, -0.1, 1.0, 0.0, 0.0, 0.0, -20.0, 1.0, gain * (2.0 - c), 0.0, 0.0,
+          -20.0;
+      const MatrixXd B = Eigen::Vector4d(1.0, 0.0, 0.0, gain);
+      const auto reach = analyze_controllability(A, B, TimeDomain::continuous).value();
+      EXPECT_TRUE(reach.controllable) << describe(reach);
+      double sum = 0.0;
+      for (const ModeReach& mode : reach.modes) {
+        sum += mode.eigenvalue.real();
+      }
+      EXPECT_NEAR(sum, -40.1 - c, 1e-10);
+      const MatrixXd C = B.transpose();
+      EXPECT_TRUE(analyze_observability(A.transpose(), C, TimeDomain::continuous)->observable);
+    }
+  }
+}
+
 TEST(Controllability, Errors) {
   const MatrixXd I = MatrixXd::Identity(2, 2);
   EXPECT_TRUE(analyze_controllability(I, MatrixXd::Ones(3, 1), TimeDomain::continuous)

@@ -222,5 +222,29 @@ TEST(Gramian, OfInputsWhoseSquaresAreNoDoubles) {
   EXPECT_TRUE(continuous(-1.0, 1e200).error().is(MatrixEquationError::overflow));
 }
 
+// A sensitivity 1/(1 + KG) with the controller's integral in the middle: units in which its entries
+// are near one exist, though the input and the output each have but one.
+TEST(Norms, OfALoopWhoseInputMovesOneState) {
+  ContinuousSystem<> S;
+  S.A.setZero(7, 7);
+  S.A.diagonal() << -0.1, -20.0, -316.0, -0.001, -0.1, -20.0, -20.0;
+  S.A(0, 1) = S.A(1, 2) = S.A(4, 5) = S.A(5, 6) = 1.0;
+  S.A(3, 4) = -1.0;
+  S.A.row(2).head(2) << -372103.0, -11278.0;
+  S.A(2, 3) = 2694776.0;
+  S.A.row(6).head(4) << -372103.0, -11278.0, -296.0, 2694776.0;
+  S.B = MatrixXd::Zero(7, 1);
+  S.B(3, 0) = 1.0;
+  S.C = MatrixXd::Zero(1, 7);
+  S.C(0, 4) = -1.0;
+  S.D = scalar(1.0);
+  const HInfinityNorm found = h_infinity_norm(S).value();
+  double largest = 0.0;
+  for (double w = 1e-4; w < 1e5; w *= 1.01) {
+    largest = std::max(largest, std::abs(test::response(S, {0.0, w})(0, 0)));
+  }
+  EXPECT_NEAR(found.norm / largest, 1.0, 1e-3);
+}
+
 }  // namespace
 }  // namespace flyball

@@ -160,6 +160,38 @@ int whole(double exponent) {
 
 }  // namespace
 
+double cycle_mean_of(const MatrixRef& A) {
+  const Index n = A.rows();
+  const MatrixXd a = logarithms(A);
+  // walks(i, k): the most that k steps which end at i can bring together.
+  MatrixXd walks = MatrixXd::Constant(n, n + 1, none);
+  walks.col(0).setZero();
+  for (Index k = 0; k < n; ++k) {
+    for (Index j = 0; j < n; ++j) {
+      if (walks(j, k) == none) {
+        continue;
+      }
+      for (Index i = 0; i < n; ++i) {
+        walks(i, k + 1) = std::max(walks(i, k + 1), walks(j, k) + a(i, j));
+      }
+    }
+  }
+  double most = none;
+  for (Index i = 0; i < n; ++i) {
+    if (walks(i, n) == none) {
+      continue;
+    }
+    double least = std::numeric_limits<double>::infinity();
+    for (Index k = 0; k < n; ++k) {
+      if (walks(i, k) != none) {
+        least = std::min(least, (walks(i, n) - walks(i, k)) / static_cast<double>(n - k));
+      }
+    }
+    most = std::max(most, least);
+  }
+  return most;
+}
+
 PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B) {
   constexpr int sweeps = 200;
   constexpr double ordinary = 100.0;
@@ -173,7 +205,9 @@ PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B) {
     pair.start();
     pair.e = pair.e.array().round();
   }
-  double size = pair.size();
+  // It stays as it is: if it followed the entries that are brought to it, all would run away.
+  const double cycle = cycle_mean_of(A);
+  const double size = cycle == none ? pair.size() : cycle;
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     pair.scale_inputs(size);
     const Eigen::VectorXd before = pair.e;
@@ -185,9 +219,8 @@ PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B) {
     if (!changed || ((pair.e - before).array() == pair.e(0) - before(0)).all()) {
       break;
     }
-    size = pair.size();
   }
-  PairScaling scaling{Eigen::VectorXi(n), Eigen::VectorXi::Zero(B.cols()), whole(size)};
+  PairScaling scaling{Eigen::VectorXi(n), Eigen::VectorXi::Zero(B.cols()), whole(pair.size())};
   for (Index i = 0; i < n; ++i) {
     scaling.states(i) = whole(pair.e(i));
   }

@@ -16,11 +16,18 @@ struct PairScaling {
   int time = 0;
 };
 
+/// The binary logarithm of the largest geometric mean of |A|'s entries along a cycle of states,
+/// which no units of theirs change; -∞ without a cycle. Cost: O(n³).
+/// Source: Karp, "A characterization of the minimum cycle mean in a digraph", Discrete Mathematics
+/// 23 (1978).
+[[nodiscard]] double cycle_mean_of(const MatrixRef& A);
+
 /// The units in which row and column of each state in [A B; 0 0] are of like size, without the
 /// diagonal (Osborne's iteration, on logarithms); each input's and time's own unit make the largest
 /// entry of its column and of A' one. A state that
-/// acts on nothing, or on which nothing acts, takes the unit in which what it has is of A's size.
-/// Cost: O(n (n + m)) a sweep, at most 200.
+/// acts on nothing, or on which nothing acts, takes the unit in which what it has is of the size
+/// that A's cycles have in any units.
+/// Cost: O(n³), and O(n (n + m)) a sweep, at most 200.
 /// Source: Osborne, "On pre-conditioning of matrices", J. ACM 7 (1960).
 [[nodiscard]] PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B);
 
