@@ -184,4 +184,16 @@ std::vector<MatrixXd> spectral_blocks(const MatrixRef& A) {
   return blocks;
 }
 
+std::vector<MatrixXd> spectral_parts(const MatrixRef& A) {
+  std::vector<MatrixXd> blocks = spectral_blocks(A);
+  if (blocks.size() > 1 || !A.allFinite() || (A.array() != 0.0).all()) {
+    return blocks;
+  }
+  blocks.clear();
+  for (const Indices& part : parts_of(A)) {
+    blocks.emplace_back(A(part, part));
+  }
+  return blocks;
+}
+
 }  // namespace flyball::detail
