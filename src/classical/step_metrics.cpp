@@ -11,6 +11,7 @@
 #include <flyball/systems/system_error.hpp>
 
 #include "classical/polynomial.hpp"
+#include "classical/step_judge.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -18,6 +19,8 @@
 namespace flyball::classical {
 
 namespace {
+
+using detail::Judge;
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -179,52 +182,6 @@ double crossing(const F& f, double h) {
   }
   return 0.5 * (low + high);
 }
-
-/// The metrics as points and crossings come in, of y in the final value's direction and unit.
-class Judge {
- public:
-  explicit Judge(double band) : band_(band) {}
-
-  void point(double time, double y) {
-    if (y > peak_) {
-      peak_ = y;
-      peak_time_ = time;
-    }
-    least_ = std::min(least_, y);
-  }
-  void reaches(double level, double time) {
-    std::optional<double>& first = level == 0.1 ? ten_ : ninety_;
-    first = first ? first : std::optional(time);
-  }
-  void outside_until(double time) { settled_ = time; }
-  [[nodiscard]] bool waits_for(double level) const { return !(level == 0.1 ? ten_ : ninety_); }
-  [[nodiscard]] double band() const { return band_; }
-
-  [[nodiscard]] StepMetrics metrics(double final_value, double delay) const {
-    StepMetrics m{.final_value = final_value};
-    if (ten_ && ninety_) {
-      m.rise_time = *ninety_ - *ten_;
-    }
-    m.settling_time = settled_ + (settled_ > 0.0 || delay > 0.0 ? delay : 0.0);
-    const bool beyond = peak_ > 1.0 + 1e-12;
-    m.overshoot = beyond ? peak_ - 1.0 : 0.0;
-    m.undershoot = least_ < -1e-14 ? -least_ : 0.0;
-    m.peak = beyond ? peak_ * final_value : final_value;
-    if (beyond) {
-      m.peak_time = peak_time_ + delay;
-    }
-    return m;
-  }
-
- private:
-  double band_;
-  double peak_ = -std::numeric_limits<double>::infinity();
-  double peak_time_ = 0.0;
-  double least_ = 0.0;
-  std::optional<double> ten_{};
-  std::optional<double> ninety_{};
-  double settled_ = 0.0;
-};
 
 StepMetrics sampled(const TransferFunction& transfer, double final_value, double band,
                     double slowest) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <flyball/classical/delay_system.hpp>
 #include <flyball/classical/transfer_function.hpp>
 
 namespace flyball::classical {
@@ -27,5 +28,15 @@ struct StepMetrics {
 /// at most. Source: book, sections 2.5 and E.3.5; conventions of the field: 10-90 %, 2 %.
 [[nodiscard]] Expected<StepMetrics> step_metrics(const TransferFunction& transfer,
                                                  double band = 0.02);
+
+/// Of one channel of a system with any inputs and outputs and dead time anywhere, in loops too: by
+/// the method of steps (`delay_response.hpp`), whose polynomials are searched for tops, bottoms and
+/// crossings; right to about 1e-10 of the largest value.
+/// @param output, input  Which, from 0. @param band  As above.
+/// @errors ArgumentError::out_of_range (the channel, a band not in (0, 1)); those of
+/// `rightmost_poles` and `step_response`. Cost: as those, over 36 of the slowest pole's time
+/// constants.
+[[nodiscard]] Expected<StepMetrics> step_metrics(const DelaySystem& system, Eigen::Index output,
+                                                 Eigen::Index input, double band = 0.02);
 
 }  // namespace flyball::classical

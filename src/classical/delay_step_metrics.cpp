@@ -1,0 +1,192 @@
+// Step metrics of systems with dead time anywhere.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <flyball/classical/delay_poles.hpp>
+#include <flyball/classical/step_metrics.hpp>
+
+#include "classical/delay_motion.hpp"
+#include "classical/step_judge.hpp"
+#include "core/format.hpp"
+#include "core/try.hpp"
+
+namespace flyball::classical {
+
+namespace {
+
+using detail::Judge;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double rounding = 1e-10;
+constexpr double most_states = 200.0;
+
+/// A polynomial by Legendre's coefficients, and its slope over [-1, 1].
+struct Piece {
+  VectorXd modes;
+  [[nodiscard]] double operator()(double place) const {
+    return detail::legendre(static_cast<int>(modes.size()), place).dot(modes);
+  }
+  [[nodiscard]] double slope(double place) const {
+    // P'_{k+1} = P'_{k-1} + (2k + 1) P_k
+    const VectorXd P = detail::legendre(static_cast<int>(modes.size()), place);
+    double before = 0.0;
+    double now = 1.0;
+    double sum = modes.size() > 1 ? modes(1) : 0.0;
+    for (Index k = 1; k + 1 < modes.size(); ++k) {
+      const double next = before + static_cast<double>(2 * k + 1) * P(k);
+      sum += next * modes(k + 1);
+      before = now;
+      now = next;
+    }
+    return sum;
+  }
+};
+
+/// Where a function changes its sign between two places, by halving.
+template <class F>
+double crossing(const F& f, double low, double high) {
+  const bool rises = f(high) > f(low);
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    ((f(middle) > 0.0) == rises ? high : low) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+/// Judges the outputs as they come.
+class JudgedPieces : public detail::OutputPieces {
+ public:
+  JudgedPieces(Index output, double final_value, double band)
+      : output_(output), final_value_(final_value), judge_(band, rounding) {}
+
+  void add(double begin, double length, const MatrixXd& modes) override {
+    const Piece y{modes.col(output_) / final_value_};
+    // A polynomial that is resolved turns between neighbours of these places once at most.
+    constexpr int parts = 24;
+    double from = -1.0;
+    double slope_from = y.slope(from);
+    for (int i = 1; i <= parts; ++i) {
+      const double to = -1.0 + 2.0 * i / parts;
+      const double slope_to = y.slope(to);
+      if ((slope_from > 0.0) != (slope_to > 0.0)) {
+        const double top = crossing([&](double place) { return y.slope(place); }, from, to);
+        monotone(y, from, top, begin, length);
+        monotone(y, top, to, begin, length);
+      } else {
+        monotone(y, from, to, begin, length);
+      }
+      from = to;
+      slope_from = slope_to;
+    }
+  }
+  [[nodiscard]] const Judge& judge() const { return judge_; }
+
+ private:
+  void monotone(const Piece& y, double from, double to, double begin, double length) {
+    const auto time = [&](double place) { return begin + 0.5 * (place + 1.0) * length; };
+    const double y0 = y(from);
+    const double y1 = y(to);
+    judge_.point(time(from), y0);
+    judge_.point(time(to), y1);
+    const auto place_of = [&](double level) {
+      return time(crossing([&](double place) { return y(place) - level; }, from, to));
+    };
+    for (const double level : {0.1, 0.9}) {
+      if (judge_.waits_for(level) && std::max(y0, y1) >= level) {
+        judge_.reaches(level, y0 >= level ? time(from) : place_of(level));
+      }
+    }
+    const double band = judge_.band();
+    if (std::abs(y0 - 1.0) > band && std::abs(y1 - 1.0) <= band) {
+      judge_.outside_until(place_of(y0 > 1.0 ? 1.0 + band : 1.0 - band));
+    } else if (std::abs(y1 - 1.0) > band) {
+      judge_.outside_until(time(to));
+    }
+  }
+
+  Index output_;
+  double final_value_;
+  Judge judge_;
+};
+
+/// The samples are the solution.
+Expected<StepMetrics> of_samples(const DelaySystem& system, Index output, Index input, double end,
+                                 double final_value, double band) {
+  const double T = system.period()->si();
+  const auto samples = static_cast<Index>(std::min(5e5, std::ceil(end / T) + 2.0));
+  FLYBALL_TRY(const auto response, step_response(system, input, ResponseTimes{Time(T), samples}));
+  Judge judge(band, rounding);
+  for (Index k = 0; k < samples; ++k) {
+    const double y = response.y(k, output) / final_value;
+    judge.point(response.time(k), y);
+    for (const double level : {0.1, 0.9}) {
+      if (y >= level && judge.waits_for(level)) {
+        judge.reaches(level, response.time(k));
+      }
+    }
+    if (std::abs(y - 1.0) > band) {
+      judge.outside_until(response.time(k) + T);
+    }
+  }
+  StepMetrics metrics = judge.metrics(final_value, 0.0);
+  if (static_cast<double>(samples) * T < end) {
+    metrics.settling_time.reset();
+  }
+  return metrics;
+}
+
+}  // namespace
+
+Expected<StepMetrics> step_metrics(const DelaySystem& system, Index output, Index input,
+                                   double band) {
+  constexpr std::string_view where = "step_metrics";
+  FLYBALL_CHECK(
+      Checks(where)
+          .within(static_cast<double>(output), 0.0, static_cast<double>(system.outputs() - 1),
+                  "output")
+          .within(static_cast<double>(input), 0.0, static_cast<double>(system.inputs() - 1),
+                  "input")
+          .within(static_cast<double>(system.states()), 0.0, most_states, "the number of states"));
+  if (!(band > 0.0 && band < 1.0)) {
+    return refusal(ArgumentError::out_of_range, where, "band")
+        .got(format_number(band))
+        .expected("a share between 0 and 1, such as 0.02");
+  }
+  FLYBALL_TRY(const DelayPoles found, rightmost_poles(system));
+  const double final_value = system.dc_gain()(output, input);
+  if (!found.stable) {
+    return StepMetrics{.final_value = std::isfinite(final_value)
+                                          ? std::numeric_limits<double>::quiet_NaN()
+                                          : final_value};
+  }
+  if (final_value == 0.0) {
+    return StepMetrics{};
+  }
+  constexpr double time_constants = 36.0;  // e⁻³⁶ is rounding
+  const double late = system.has_delay() ? system.delays().sum() : 0.0;
+  if (system.period()) {
+    const double slowest = found.poles.size() > 0 ? found.poles.cwiseAbs().maxCoeff() : 0.0;
+    const double periods = time_constants / -std::log(std::clamp(slowest, 1e-16, 1.0 - 1e-7)) +
+                           static_cast<double>(system.states());
+    return of_samples(system, output, input, periods * system.period()->si() + late, final_value,
+                      band);
+  }
+  double rate = -found.high_frequency_abscissa;
+  for (const auto& pole : found.poles) {
+    rate = std::min(rate, -pole.real());
+  }
+  const double moving = std::isfinite(rate) ? time_constants / rate : 0.0;
+  const double end = 1.01 * (moving + late) + (moving + late == 0.0 ? 1.0 : 0.0);
+  MatrixXd u = MatrixXd::Zero(2, system.inputs());
+  u.col(input).setOnes();
+  JudgedPieces pieces(output, final_value, band);
+  FLYBALL_CHECK(detail::Motion(system, detail::Drive{u}, end, 2, &pieces)
+                    .run(VectorXd::Zero(system.states())));
+  return pieces.judge().metrics(final_value, 0.0);
+}
+
+}  // namespace flyball::classical
