@@ -8,6 +8,7 @@
 
 #include "core/format.hpp"
 #include "core/try.hpp"
+#include "systems/linear_recurrence.hpp"
 
 namespace flyball {
 
@@ -39,28 +40,18 @@ Expected<void> check_input(Index input, Index inputs, std::string_view where) {
 Expected<LinearResponse> respond(const DiscreteSystem<>& system, const MatrixRef& u,
                                  const MatrixRef& x0, std::string_view where) {
   FLYBALL_CHECK(check_system_or_gain(system, where));
-  const auto& [A, B, C, D, period] = system;
   const Index samples = u.rows();
   FLYBALL_CHECK(Checks(where)
-                    .shape(u, samples, B.cols(), "u", "samples x inputs")
-                    .shape(x0, A.rows(), 1, "x0", "states x 1")
+                    .shape(u, samples, system.B.cols(), "u", "samples x inputs")
+                    .shape(x0, system.A.rows(), 1, "x0", "states x 1")
                     .finite(u, "u")
                     .finite(x0, "x0"));
   LinearResponse response{
-      VectorXd::LinSpaced(samples, 0.0, period.si() * static_cast<double>(samples - 1)),
-      MatrixXd(samples + 1, A.rows()), MatrixXd(samples, C.rows())};
+      VectorXd::LinSpaced(samples, 0.0, system.period.si() * static_cast<double>(samples - 1)),
+      MatrixXd(samples + 1, system.A.rows()), MatrixXd(samples, system.C.rows())};
   VectorXd x = x0;
-  VectorXd x_next(x.size());
   response.x.row(0) = x.transpose();
-  for (Index k = 0; k < samples; ++k) {
-    const auto u_k = u.row(k).transpose();
-    response.y.row(k).transpose().noalias() = C * x;
-    response.y.row(k).transpose().noalias() += D * u_k;
-    x_next.noalias() = A * x;
-    x_next.noalias() += B * u_k;
-    x.swap(x_next);
-    response.x.row(k + 1) = x.transpose();
-  }
+  detail::run_recurrence(system, u, x, response.x.data(), samples + 1, response.y);
   FLYBALL_CHECK(Checks(where).finite(response.x, "x").finite(response.y, "y"));
   return response;
 }

@@ -97,6 +97,32 @@ TEST(Response, IsLinear) {
 
 // A mode that grows, e^t, is shown for 5 s though another settles in 600 s; an oscillation of
 // 8 rad/s for 40/8 s; a pole of 1e200 for the two samples that a double holds.
+// One input and one output of up to six states have a way of their own: the same as of two.
+TEST(Response, OfOneInputAndOneOutput) {
+  Random random(4);
+  for (Index n = 1; n <= 8; ++n) {
+    MatrixXd A(n, n);
+    MatrixXd B(n, 1);
+    MatrixXd C(1, n);
+    MatrixXd u(200, 1);
+    for (MatrixXd* M : {&A, &B, &C, &u}) {
+      for (double& entry : M->reshaped()) {
+        entry = random.normal();
+      }
+    }
+    A *= 0.9 / A.norm();
+    const MatrixXd x0 = B;
+    MatrixXd two(2, n);
+    two << C, -C;
+    const DiscreteSystem<> one{A, B, C, scalar(0.7), Time(0.1)};
+    const DiscreteSystem<> both{A, B, two, MatrixXd::Constant(2, 1, 0.7), Time(0.1)};
+    const auto single = forced_response(one, u, x0).value();
+    const auto general = forced_response(both, u, x0).value();
+    EXPECT_LE((single.x - general.x).norm(), 1e-14 * general.x.norm());
+    EXPECT_LE((single.y - general.y.col(0)).norm(), 1e-14 * general.y.norm());
+  }
+}
+
 TEST(Response, ChoosesItsTimes) {
   const auto end_of = [](const MatrixXd& A) {
     const ResponseTimes times = response_times(analyze_modes(A, TimeDomain::continuous).value());
