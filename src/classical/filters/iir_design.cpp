@@ -182,6 +182,13 @@ Expected<DigitalFilter> design_filter(const IirDesign& design, Time period) {
                                ? 2.0 * std::atan(std::sqrt(low * high))
                                : 0.0;
   detail::set_gains(filter.sections, std::copysign(at_rest, filter.gain), reference);
+  if (!check_sections(filter.sections, where)) {
+    return refusal(ArgumentError::out_of_range, where, "frequency")
+        .got(format_number(design.frequency) + " rad/s, " +
+             format_number(design.frequency * period.si()) + " rad a sample")
+        .expected("not so far from the sample rate that rounded coefficients are unstable")
+        .hint("take a lower order, or fewer samples (decimate)");
+  }
   return filter;
 }
 

@@ -23,7 +23,7 @@ using flyball::detail::signal_or_zero;
 ///
 ///   y = b0 x + s1,  s1 ← b1 x - a1 y + s2,  s2 ← b2 x - a2 y.
 ///
-/// Run-time object: no allocation, noexcept, about a nanosecond a section. A sample that is not
+/// Run-time object: no allocation, noexcept, some six nanoseconds a section. A sample that is not
 /// finite counts as the last one that was, so that a drop-out holds the input; no state is ever
 /// beyond `largest_signal`.
 /// @tparam N  Of how many sections it has room for.

@@ -68,9 +68,10 @@ struct AnalogFilter {
 /// The filter in z, by the bilinear transform with each edge prewarped, so that the edges are where
 /// they were asked for. Roots are mapped as roots; polynomials are never multiplied out.
 /// @param period  T, s: of the samples.
-/// @errors As `design_analog_filter`; out_of_range for an edge at or above half the sample rate.
-/// Cost: O(order²); allocates. The sections' coefficients are doubles: with an edge far below the
-/// sample rate their rounding moves the response by about 1e-16/(ωT)², the reference gain excepted.
+/// @errors As `design_analog_filter`; out_of_range for an edge at or above half the sample rate,
+/// and for one so far below it (some 1e-8 of it) that sections of doubles are not stable. Cost:
+/// O(order²); allocates. The sections' coefficients are doubles: with an edge far below the sample
+/// rate their rounding moves the response by about 1e-16/(ωT)², the reference gain excepted.
 [[nodiscard]] Expected<DigitalFilter> design_filter(const IirDesign& design, Time period);
 
 /// What a filter must do. Low pass: {pass} < {stop}; high pass: {stop} < {pass}; band pass: the
