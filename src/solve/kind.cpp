@@ -57,6 +57,7 @@ std::span<const Kind> kinds() {
     add("Observers", estimator_kinds());
     add("Regression", regression_kinds());
     add("Spectra and frequency responses", spectrum_kinds());
+    add("Filters and signals", filter_kinds());
     add("Models from records", identification_kinds());
     return table;
   }();

@@ -181,6 +181,7 @@ template <class Function>
 [[nodiscard]] std::vector<Kind> estimator_kinds();
 [[nodiscard]] std::vector<Kind> regression_kinds();
 [[nodiscard]] std::vector<Kind> spectrum_kinds();
+[[nodiscard]] std::vector<Kind> filter_kinds();
 [[nodiscard]] std::vector<Kind> identification_kinds();
 
 }  // namespace flyball::solve
