@@ -132,8 +132,16 @@ std::vector<FigureCheck> check_figures() {
 }
 
 std::vector<FigureCheck> check_figure(std::string_view id) {
-  auto checks = check_figures();
-  std::erase_if(checks, [&](const FigureCheck& check) { return check.figure != id; });
+  std::vector<FigureCheck> checks;
+  for (const std::string_view json : embedded_references()) {
+    if (const auto reference = parse_reference(json); reference && reference->figure == id) {
+      const auto of_one = check_reference(json);
+      checks.insert(checks.end(), of_one.begin(), of_one.end());
+    }
+  }
+  if (checks.empty() && std::ranges::find(figures(), id, &FigureEntry::id) != figures().end()) {
+    checks.push_back(failed(std::string(id), "reference", "", "there is none"));
+  }
   return checks;
 }
 

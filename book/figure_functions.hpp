@@ -50,8 +50,31 @@ namespace flyball::book {
 [[nodiscard]] FigureResult figure_C_1();
 [[nodiscard]] FigureResult figure_C_2();
 [[nodiscard]] FigureResult figure_C_3();
+[[nodiscard]] FigureResult figure_E_1();
+[[nodiscard]] FigureResult figure_E_2();
+[[nodiscard]] FigureResult figure_E_5();
+[[nodiscard]] FigureResult figure_E_6();
+[[nodiscard]] FigureResult figure_E_9();
+[[nodiscard]] FigureResult figure_E_10();
+[[nodiscard]] FigureResult figure_E_11();
+[[nodiscard]] FigureResult figure_E_13();
+[[nodiscard]] FigureResult figure_E_14();
+[[nodiscard]] FigureResult figure_E_15();
+[[nodiscard]] FigureResult figure_E_16();
+[[nodiscard]] FigureResult figure_E_17();
+[[nodiscard]] FigureResult figure_E_18();
+[[nodiscard]] FigureResult figure_E_19();
+[[nodiscard]] FigureResult figure_E_20();
+[[nodiscard]] FigureResult figure_E_21();
+[[nodiscard]] FigureResult figure_E_22();
+[[nodiscard]] FigureResult figure_E_23();
+[[nodiscard]] FigureResult figure_E_24();
+[[nodiscard]] FigureResult figure_E_25();
 [[nodiscard]] FigureResult table_7_1();
 [[nodiscard]] FigureResult table_7_2();
 [[nodiscard]] FigureResult table_7_3();
+[[nodiscard]] FigureResult table_E_1();
+[[nodiscard]] FigureResult table_E_2();
+[[nodiscard]] FigureResult table_E_3();
 
 }  // namespace flyball::book
