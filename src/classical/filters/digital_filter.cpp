@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include <flyball/classical/filters/biquad_cascade.hpp>
+#include <flyball/classical/filters/room.hpp>
 #include <flyball/core/signal.hpp>
 
 #include "classical/filters/root_sections.hpp"

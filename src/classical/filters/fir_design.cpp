@@ -5,7 +5,7 @@
 #include <numbers>
 #include <string>
 
-#include <flyball/classical/filters/biquad_cascade.hpp>
+#include <flyball/classical/filters/room.hpp>
 #include <flyball/core/signal.hpp>
 
 #include "core/try.hpp"

@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <span>
 
-#include <flyball/classical/filters/biquad_cascade.hpp>
+#include <Eigen/Core>
+
+#include <flyball/classical/filters/room.hpp>
 
 namespace flyball::classical {
 

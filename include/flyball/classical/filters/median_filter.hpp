@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-#include <flyball/classical/filters/biquad_cascade.hpp>
+#include <flyball/classical/filters/room.hpp>
 
 namespace flyball::classical {
 
