@@ -16,9 +16,6 @@ namespace {
 
 using mechanisms::MechanismKind;
 
-/// Finer than any gain is known.
-constexpr int digits = 6;
-
 /// Per unit, of those of a robot's loop or of a motor controller's.
 const UnitGains* gains_per(const std::vector<UnitGains>& all, std::string_view per) {
   const auto found = std::find_if(all.begin(), all.end(),
@@ -29,12 +26,6 @@ const UnitGains* gains_per(const std::vector<UnitGains>& all, std::string_view p
 const std::vector<UnitGains>& on_board(const MechanismConstants& of) {
   return of.on_board.empty() ? of.gains : of.on_board;
 }
-
-struct Constant {
-  std::string name;
-  double value = 0.0;
-  std::string comment;  ///< Unit first.
-};
 
 std::string kA_comment(const MechanismConstants& of, const UnitGains& gains,
                        std::string_view unit) {
@@ -68,31 +59,18 @@ std::vector<Constant> constants_of(const MechanismConstants& of, const UnitGains
   return all;
 }
 
-/// "prefix NAME = VALUE;  // comment" in aligned columns.
-std::string assignments(const std::vector<Constant>& constants, std::string_view prefix,
-                        std::string_view assign = " = ", std::string_view end = ";") {
-  std::size_t width = 0;
-  for (const Constant& constant : constants) {
-    width = std::max(width, constant.name.size() + literal(constant.value, digits).size());
-  }
-  std::string text;
-  for (const Constant& constant : constants) {
-    const std::string value = literal(constant.value, digits);
-    text += fmt::format("{}{}{}{}{}{:{}}  // {}\n", prefix, constant.name, assign, value, end, "",
-                        width - constant.name.size() - value.size(), constant.comment);
-  }
-  return text;
-}
-
 /// @param board  Of a loop on the motor controller.
-std::string heading(const MechanismConstants& of, std::string_view library, bool board) {
+std::string heading(const MechanismConstants& of, std::string_view library, bool board,
+                    Language language) {
   const bool own = board && !of.on_board.empty();
   const std::string late = of.delay > 0.0 ? fmt::format(" and a measurement that is {} ms old",
                                                         format_number(1e3 * of.delay, 3))
                                           : "";
-  return fmt::format("// {}, for {}.\n// Loop period {} ms{}{}; volts are at the motor.\n",
-                     capitalized(of.kind), library, own ? "1" : format_number(1e3 * of.period, 4),
-                     own ? ", on the controller," : "", late);
+  return comments(
+      fmt::format("// {}, for {}.\n// Loop period {} ms{}{}; volts are at the motor.\n",
+                  capitalized(of.kind), library, own ? "1" : format_number(1e3 * of.period, 4),
+                  own ? ", on the controller," : "", late),
+      language);
 }
 
 std::string offset_note(const MechanismConstants& of, std::string_view how) {
@@ -101,8 +79,8 @@ std::string offset_note(const MechanismConstants& of, std::string_view how) {
     return "";
   }
   return fmt::format("// The sensor's zero is {} rad ({} rotations) from horizontal: {}\n",
-                     literal(offset, digits), literal(offset / (2.0 * std::numbers::pi), digits),
-                     how);
+                     literal(offset, constant_digits),
+                     literal(offset / (2.0 * std::numbers::pi), constant_digits), how);
 }
 
 /// How a loop is told that it may turn the shorter way.
@@ -122,44 +100,51 @@ std::string wpilib_constants(const MechanismConstants& of, Language language) {
   if (gains == nullptr) {
     return "";
   }
-  const bool cpp = language == Language::cpp;
   const std::string name = capitalized(of.kind) + "Constants";
-  const std::vector<Constant> constants =
-      constants_of(of, *gains, of.unit, "V·s/" + of.unit, "V·s²/" + of.unit);
-  const double period = of.period;
+  const std::string period = literal(of.period, constant_digits);
   const std::string unit_velocity = of.unit == "m" ? "1_mps" : "1_rad_per_s";
   const bool gravity = has_gravity(of.kind);
+  const bool arm = of.kind == MechanismKind::arm;
   const std::string type = of.kind == MechanismKind::elevator ? "ElevatorFeedforward"
-                           : of.kind == MechanismKind::arm    ? "ArmFeedforward"
+                           : arm                              ? "ArmFeedforward"
                                                               : "SimpleMotorFeedforward";
-  std::string text = heading(of, "WPILib 2025", false) +
-                     offset_note(of, "give ArmFeedforward the measured angle plus that.");
-  if (cpp) {
-    text += fmt::format("namespace {} {{\n", name);
-    text += assignments(constants, "inline constexpr double ");
-    text += fmt::format("}}  // namespace {}\n\n// using namespace {};\n", name, name);
-    text += fmt::format(
-        "// frc::{}{} feedforward{{kS * 1_V, {}kV * 1_V / {}, kA * 1_V / {}_sq}};\n", type,
-        gravity          ? ""
-        : of.unit == "m" ? "<units::meters>"
-                         : "<units::radians>",
-        gravity ? "kG * 1_V, " : "", unit_velocity, unit_velocity);
-    text += fmt::format(
-        "// frc::PIDController feedback{{kP, 0.0, kD, {} * 1_s}};  // answers in volts\n",
-        literal(period, digits));
-  } else {
-    text += fmt::format("public final class {} {{\n", name);
-    text += assignments(constants, "  public static final double ");
-    text += fmt::format("\n  private {}() {{}}\n}}\n\n", name);
-    text += fmt::format("// {0} feedforward = new {0}(kS, {1}kV, kA, {2});\n", type,
-                        gravity ? "kG, " : "", literal(period, digits));
-    text += fmt::format(
-        "// PIDController feedback = new PIDController(kP, 0.0, kD, {});  // answers in volts\n",
-        literal(period, digits));
+  std::string text =
+      heading(of, "WPILib 2025", false, language) +
+      comments(offset_note(of, "give ArmFeedforward the measured angle plus that."), language) +
+      scope(name, constants_of(of, *gains, of.unit, "V·s/" + of.unit, "V·s²/" + of.unit),
+            language) +
+      "\n";
+  switch (language) {
+    case Language::cpp:
+      text += fmt::format(
+          "// using namespace {};\n"
+          "// frc::{}{} feedforward{{kS * 1_V, {}kV * 1_V / {}, kA * 1_V / {}_sq}};\n"
+          "// frc::PIDController feedback{{kP, 0.0, kD, {} * 1_s}};  // answers in volts\n",
+          name, type,
+          gravity          ? ""
+          : of.unit == "m" ? "<units::meters>"
+                           : "<units::radians>",
+          gravity ? "kG * 1_V, " : "", unit_velocity, unit_velocity, period);
+      return text +
+             wrap_note(of, "feedback.EnableContinuousInput(-std::numbers::pi, std::numbers::pi);");
+    case Language::java:
+      text += fmt::format(
+          "// {0} feedforward = new {0}(kS, {1}kV, kA, {2});\n"
+          "// PIDController feedback = new PIDController(kP, 0.0, kD, {2});  // answers in volts\n",
+          type, gravity ? "kG, " : "", period);
+      return text + wrap_note(of, "feedback.enableContinuousInput(-Math.PI, Math.PI);");
+    case Language::python:
+      break;
   }
-  text += wrap_note(of, cpp ? "feedback.EnableContinuousInput(-std::numbers::pi, std::numbers::pi);"
-                            : "feedback.enableContinuousInput(-Math.PI, Math.PI);");
-  return text;
+  const std::string python_type = type + (gravity ? "" : of.unit == "m" ? "Meters" : "Radians");
+  text += fmt::format(
+      "# from wpimath.controller import PIDController, {0}\n"
+      "# c = {1}\n"
+      "# feedforward = {0}(c.kS, {2}c.kV, c.kA{3})\n"
+      "# feedback = PIDController(c.kP, 0.0, c.kD, {4})  # answers in volts\n",
+      python_type, name, gravity ? "c.kG, " : "", arm ? "" : ", " + period, period);
+  return text +
+         comments(wrap_note(of, "feedback.enableContinuousInput(-math.pi, math.pi)"), language);
 }
 
 std::string phoenix_constants(const MechanismConstants& of, Language language) {
@@ -168,35 +153,50 @@ std::string phoenix_constants(const MechanismConstants& of, Language language) {
     return "";
   }
   const bool cpp = language == Language::cpp;
-  const bool flywheel = controls_velocity(of.kind);
+  const bool python = language == Language::python;
+  const bool arm = of.kind == MechanismKind::arm;
   std::vector<Constant> constants =
       constants_of(of, *gains, "rotation", "V·s/rotation", "V·s²/rotation");
   for (Constant& constant : constants) {
-    constant.name = (cpp ? ".WithK" : ".withK") + constant.name.substr(1);
+    const char which = constant.name.back();
+    constant.name = python ? fmt::format(".with_k_{}", static_cast<char>(which - 'A' + 'a'))
+                           : fmt::format(".{}ithK{}", cpp ? 'W' : 'w', which);
   }
-  std::string text = heading(of, "CTRE Phoenix 6, per rotation of the mechanism", true);
-  text += fmt::format(
+  std::string notes = fmt::format(
       "// For voltage requests ({}).\n"
-      "// Set Feedback.SensorToMechanismRatio to the gearing{}: one rotation is one of the {}.\n",
-      flywheel ? "VelocityVoltage" : "PositionVoltage, MotionMagicVoltage",
+      "// Set {} to the gearing{}: one rotation is one of the {}.\n",
+      controls_velocity(of.kind) ? "VelocityVoltage" : "PositionVoltage, MotionMagicVoltage",
+      python ? "feedback.sensor_to_mechanism_ratio" : "Feedback.SensorToMechanismRatio",
       of.gearing != 1.0 ? " (" + format_number(of.gearing) + ")" : "",
       of.kind == MechanismKind::elevator       ? "drum"
       : of.kind == MechanismKind::swerve_drive ? "wheel"
                                                : "output");
-  text += wrap_note(of, "config.ClosedLoopGeneral.ContinuousWrap = true;");
-  text += offset_note(of,
-                      "Arm_Cosine\n// needs 0 where the arm is horizontal, so set the sensor's "
-                      "offset accordingly.");
-  text += cpp ? "ctre::phoenix6::configs::Slot0Configs slot0 =\n"
-                "    ctre::phoenix6::configs::Slot0Configs{}\n"
-              : "Slot0Configs slot0 = new Slot0Configs()\n";
+  notes += wrap_note(of, python ? "config.closed_loop_general.continuous_wrap = True"
+                                : "config.ClosedLoopGeneral.ContinuousWrap = true;");
+  notes += offset_note(
+      of, fmt::format("{}\n// needs 0 where the arm is horizontal, so set the sensor's offset "
+                      "accordingly.",
+                      python ? "ARM_COSINE" : "Arm_Cosine"));
+  std::string text = heading(of, "CTRE Phoenix 6, per rotation of the mechanism", true, language) +
+                     comments(std::move(notes), language);
+  text += cpp      ? "ctre::phoenix6::configs::Slot0Configs slot0 =\n"
+                     "    ctre::phoenix6::configs::Slot0Configs{}\n"
+          : python ? "from phoenix6 import configs, signals\n\n"
+                     "slot0 = (\n    configs.Slot0Configs()\n"
+                   : "Slot0Configs slot0 = new Slot0Configs()\n";
+  const std::string_view indent = python ? "    " : "        ";
   if (has_gravity(of.kind)) {
-    const std::string scope =
-        cpp ? "ctre::phoenix6::signals::GravityTypeValue::" : "GravityTypeValue.";
-    text += fmt::format("        .{}ithGravityType({}{})\n", cpp ? "W" : "w", scope,
-                        of.kind == MechanismKind::arm ? "Arm_Cosine" : "Elevator_Static");
+    text += python ? fmt::format("{}.with_gravity_type(signals.GravityTypeValue.{})\n", indent,
+                                 arm ? "ARM_COSINE" : "ELEVATOR_STATIC")
+                   : fmt::format(
+                         "{}.{}ithGravityType({}{})\n", indent, cpp ? "W" : "w",
+                         cpp ? "ctre::phoenix6::signals::GravityTypeValue::" : "GravityTypeValue.",
+                         arm ? "Arm_Cosine" : "Elevator_Static");
   }
-  text += assignments(constants, "        ", "(", ")");
+  text += assignments(constants, language, indent, "(", ")");
+  if (python) {
+    return text + ")\n";
+  }
   // The semicolon belongs to the last call, before its comment.
   const std::size_t last = text.rfind(')', text.rfind("  //"));
   text.insert(last + 1, ";");
@@ -208,56 +208,57 @@ std::string rev_constants(const MechanismConstants& of, Language language) {
   if (gains == nullptr) {
     return "";
   }
-  const bool cpp = language == Language::cpp;
+  const bool java = language == Language::java;
+  const bool python = language == Language::python;
   const bool flywheel = controls_velocity(of.kind);
   const std::string name = capitalized(of.kind) + "SparkConstants";
-  const std::vector<Constant> constants =
-      constants_of(of, *gains, "rotation", "V/RPM", "V/(RPM/s)");
-  const std::string nominal = literal(of.nominal_voltage, digits);
+  const std::string nominal = literal(of.nominal_voltage, constant_digits);
 
-  std::string text = heading(of, "REVLib, per rotation and RPM of the mechanism", true);
-  text +=
+  std::string text = heading(of, "REVLib, per rotation and RPM of the mechanism", true, language);
+  text += comments(
       fmt::format("// Set the encoder's position and velocity conversion factors to 1/gearing{}.\n",
-                  of.gearing != 1.0 ? " = " + literal(1.0 / of.gearing, digits) : "");
-  text += offset_note(of, "add it before the cosine.");
-  if (cpp) {
-    text += fmt::format("namespace {} {{\n", name);
-    text += assignments(constants, "inline constexpr double ");
-    text += fmt::format("}}  // namespace {}\n", name);
-  } else {
-    text += fmt::format("public final class {} {{\n", name);
-    text += assignments(constants, "  public static final double ");
-    text += fmt::format("\n  private {}() {{}}\n}}\n", name);
-  }
-  text +=
-      "\n// kS, kG, kV, kA are volts. ClosedLoopConfig takes P and D as a share of the full "
+                  of.gearing != 1.0 ? " = " + literal(1.0 / of.gearing, constant_digits) : "") +
+          offset_note(of, "add it before the cosine."),
+      language);
+  text += scope(name, constants_of(of, *gains, "rotation", "V/RPM", "V/(RPM/s)"), language);
+  // What is called with them, to be taken out of its comment.
+  const std::string_view end = python ? "" : ";";
+  const std::string own = python ? "c." : "";
+  std::string calls =
+      "// kS, kG, kV, kA are volts. ClosedLoopConfig takes P and D as a share of the full "
       "voltage:\n";
-  const std::string call = cpp ? "config.closedLoop.P" : "config.closedLoop.p";
-  text +=
-      fmt::format("//   {}(kP / {});  // {} of the voltage per {}\n", call, nominal,
-                  literal(gains->kP / of.nominal_voltage, digits), flywheel ? "RPM" : "rotation");
+  calls += python ? fmt::format("//   c = {}\n", name) : "";
+  calls += fmt::format("//   config.closedLoop.{}({}kP / {}){}  {} {} of the voltage per {}\n",
+                       java ? "p" : "P", own, nominal, end, comment_mark(language),
+                       literal(gains->kP / of.nominal_voltage, constant_digits),
+                       flywheel ? "RPM" : "rotation");
   if (!flywheel) {
-    text +=
-        fmt::format("//   {}(kD * 60.0 / 0.001 / {});{}\n",
-                    cpp ? "config.closedLoop.D" : "config.closedLoop.d", nominal,
-                    fmt::format("  // {} per change of rotations in its 1 ms loop",
-                                literal(gains->kD * 60.0 / 0.001 / of.nominal_voltage, digits)));
+    calls += fmt::format(
+        "//   config.closedLoop.{}({}kD * 60.0 / 0.001 / {}){}  {} {} per change of rotations in "
+        "its 1 ms loop\n",
+        java ? "d" : "D", own, nominal, end, comment_mark(language),
+        literal(gains->kD * 60.0 / 0.001 / of.nominal_voltage, constant_digits));
   }
-  text += wrap_note(of, cpp ? "config.closedLoop.PositionWrappingEnabled(true)"
-                              ".PositionWrappingInputRange(0, 1);"
-                            : "config.closedLoop.positionWrappingEnabled(true)"
-                              ".positionWrappingInputRange(0, 1);");
-  const std::string gravity = of.kind == MechanismKind::arm        ? ".kCos(kG)"
-                              : of.kind == MechanismKind::elevator ? ".kG(kG)"
+  calls +=
+      wrap_note(of, language == Language::cpp ? "config.closedLoop.PositionWrappingEnabled(true)"
+                                                ".PositionWrappingInputRange(0, 1);"
+                    : java                    ? "config.closedLoop.positionWrappingEnabled(true)"
+                                                ".positionWrappingInputRange(0, 1);"
+                                              : "config.closedLoop.positionWrappingEnabled(True)"
+                                                ".positionWrappingInputRange(0, 1)");
+  const std::string gravity = of.kind == MechanismKind::arm        ? fmt::format(".kCos({}kG)", own)
+                              : of.kind == MechanismKind::elevator ? fmt::format(".kG({}kG)", own)
                                                                    : "";
-  text += fmt::format(
+  calls += fmt::format(
       "// REVLib 2026 takes the feedforward in volts:\n"
-      "//   config.closedLoop.feedForward.kS(kS).kV(kV).kA(kA){};\n"
+      "//   config.closedLoop.feedForward.kS({0}kS).kV({0}kV).kA({0}kA){1}{2}\n"
       "// REVLib 2025 has only velocityFF, a share per RPM, for velocity control:\n"
-      "//   config.closedLoop.{}(kV / {});{}\n",
-      gravity, cpp ? "VelocityFF" : "velocityFF", nominal,
-      flywheel ? "" : "  // or pass volts as arbitrary feedforward");
-  return text;
+      "//   config.closedLoop.{3}({0}kV / {4}){2}{5}\n",
+      own, gravity, end, language == Language::cpp ? "VelocityFF" : "velocityFF", nominal,
+      flywheel
+          ? ""
+          : fmt::format("  {} or pass volts as arbitrary feedforward", comment_mark(language)));
+  return text + "\n" + comments(std::move(calls), language);
 }
 
 std::vector<PasteText> paste_constants(const MechanismConstants& of) {
@@ -272,13 +273,11 @@ std::vector<PasteText> paste_constants(const MechanismConstants& of) {
       Library{"REVLib (per RPM)", "revlib", &rev_constants}};
   std::vector<PasteText> all;
   for (const Library& library : libraries) {
-    for (const Language language : {Language::cpp, Language::java}) {
-      const bool cpp = language == Language::cpp;
+    for (const Language language : languages) {
       std::string text = library.text(of, language);
       if (!text.empty()) {
-        all.push_back({library.title + (cpp ? ", C++" : ", Java"),
-                       fmt::format("constants/{}_{}.txt", library.file, cpp ? "cpp" : "java"),
-                       std::move(text)});
+        all.push_back({fmt::format("{}, {}", library.title, name_of(language)),
+                       constants_file(library.file, language), std::move(text)});
       }
     }
   }

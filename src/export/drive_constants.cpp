@@ -1,7 +1,5 @@
 #include <flyball/export/drive_constants.hpp>
 
-#include <algorithm>
-
 #include <fmt/format.h>
 
 #include <flyball/core/argument.hpp>
@@ -11,14 +9,6 @@
 namespace flyball::exports {
 
 namespace {
-
-constexpr int digits = 6;
-
-struct Constant {
-  std::string name;
-  double value;
-  std::string comment;
-};
 
 std::vector<Constant> constants_of(const DriveConstants& of) {
   std::vector<Constant> all;
@@ -44,26 +34,13 @@ std::vector<Constant> constants_of(const DriveConstants& of) {
   return all;
 }
 
-std::string assignments(const std::vector<Constant>& constants, std::string_view prefix) {
-  std::size_t width = 0;
-  for (const Constant& constant : constants) {
-    width = std::max(width, constant.name.size() + literal(constant.value, digits).size());
-  }
-  std::string text;
-  for (const Constant& constant : constants) {
-    const std::string value = literal(constant.value, digits);
-    text += fmt::format("{}{} = {};{:{}}  // {}\n", prefix, constant.name, value, "",
-                        width - constant.name.size() - value.size(), constant.comment);
-  }
-  return text;
-}
-
 /// What takes both modes' gains in metres and radians.
-std::string objects(const DriveConstants& of, bool cpp) {
-  const std::string period = literal(of.period, digits);
-  std::string text;
+std::string objects(const DriveConstants& of, Language language) {
+  const bool cpp = language == Language::cpp;
+  const std::string period = literal(of.period, constant_digits);
   const bool whole = of.unit == "m" && of.linear && of.angular && of.linear->kA > 0.0 &&
                      of.angular->kA > 0.0 && of.trackwidth;
+  std::string text;
   if (whole && cpp) {
     text +=
         "// frc::LinearSystem<2, 2, 2> plant = frc::LinearSystemId::IdentifyDrivetrainSystem(\n"
@@ -93,31 +70,60 @@ std::string objects(const DriveConstants& of, bool cpp) {
   return text;
 }
 
+/// The same for RobotPy.
+std::string python_objects(const DriveConstants& of) {
+  const bool whole = of.unit == "m" && of.linear && of.angular && of.linear->kA > 0.0 &&
+                     of.angular->kA > 0.0 && of.trackwidth;
+  std::string text = fmt::format("# from wpimath.controller import PIDController{}\n",
+                                 whole ? ", DifferentialDriveFeedforward" : "");
+  if (of.trackwidth) {
+    text += "# from wpimath.kinematics import DifferentialDriveKinematics\n";
+  }
+  if (whole) {
+    text += "# from wpimath.system.plant import LinearSystemId\n";
+  }
+  text += "# c = DrivetrainConstants\n";
+  if (whole) {
+    text +=
+        "# plant = LinearSystemId.identifyDrivetrainSystem(\n"
+        "#     c.kVLinear, c.kALinear, c.kVAngular, c.kAAngular, c.trackwidth)\n"
+        "# feedforward = DifferentialDriveFeedforward(\n"
+        "#     c.kVLinear, c.kALinear, c.kVAngular, c.kAAngular, c.trackwidth)\n";
+  }
+  if (of.trackwidth) {
+    text += "# kinematics = DifferentialDriveKinematics(c.trackwidth)\n";
+  }
+  for (const char* side : {"left", "right"}) {
+    text += fmt::format("# {} = PIDController(c.kP, 0.0, 0.0, {})  # answers in volts\n", side,
+                        literal(of.period, constant_digits));
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string wpilib_drive_constants(const DriveConstants& of, Language language) {
-  const bool cpp = language == Language::cpp;
-  std::string text = fmt::format(
-      "// Drivetrain, for WPILib 2025.\n// Loop period {} ms; volts are at "
-      "the motor.\n",
-      format_number(1e3 * of.period, 4));
-  const std::vector<Constant> constants = constants_of(of);
-  if (cpp) {
-    text += "namespace DrivetrainConstants {\n" +
-            assignments(constants, "inline constexpr double ") +
-            "}  // namespace DrivetrainConstants\n\n// using namespace DrivetrainConstants;\n";
-  } else {
-    text += "public final class DrivetrainConstants {\n" +
-            assignments(constants, "  public static final double ") +
-            "\n  private DrivetrainConstants() {}\n}\n\n";
+  const std::string name = "DrivetrainConstants";
+  std::string text = comments(
+      fmt::format(
+          "// Drivetrain, for WPILib 2025.\n// Loop period {} ms; volts are at the motor.\n",
+          format_number(1e3 * of.period, 4)),
+      language);
+  text += scope(name, constants_of(of), language) + "\n";
+  if (language == Language::python) {
+    return text + python_objects(of);
   }
-  return text + objects(of, cpp);
+  text += language == Language::cpp ? fmt::format("// using namespace {};\n", name) : "";
+  return text + objects(of, language);
 }
 
 std::vector<PasteText> paste_drive_constants(const DriveConstants& of) {
-  return {
-      {"WPILib, C++", "constants/wpilib_cpp.txt", wpilib_drive_constants(of, Language::cpp)},
-      {"WPILib, Java", "constants/wpilib_java.txt", wpilib_drive_constants(of, Language::java)}};
+  std::vector<PasteText> all;
+  for (const Language language : languages) {
+    all.push_back({fmt::format("WPILib, {}", name_of(language)), constants_file("wpilib", language),
+                   wpilib_drive_constants(of, language)});
+  }
+  return all;
 }
 
 }  // namespace flyball::exports

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "export/text.hpp"
@@ -34,6 +36,68 @@ std::string comment_text(std::string_view text) {
                                           : c;
   }
   return line;
+}
+
+std::string_view name_of(Language language) {
+  return language == Language::cpp ? "C++" : language == Language::java ? "Java" : "Python";
+}
+
+std::string constants_file(std::string_view library, Language language) {
+  const char* word = language == Language::cpp    ? "cpp"
+                     : language == Language::java ? "java"
+                                                  : "python";
+  return fmt::format("constants/{}_{}.txt", library, word);
+}
+
+std::string_view comment_mark(Language language) {
+  return language == Language::python ? "#" : "//";
+}
+
+std::string comments(std::string text, Language language) {
+  if (language != Language::python) {
+    return text;
+  }
+  std::string written;
+  std::string_view rest = text;
+  while (!rest.empty()) {
+    const std::string_view line = rest.substr(0, std::min(rest.find('\n'), rest.size() - 1) + 1);
+    written += "#";
+    written += line.substr(2);
+    rest.remove_prefix(line.size());
+  }
+  return written;
+}
+
+std::string assignments(const std::vector<Constant>& constants, Language language,
+                        std::string_view before, std::string_view assign, std::string_view end) {
+  std::size_t width = 0;
+  for (const Constant& constant : constants) {
+    width = std::max(width, constant.name.size() + literal(constant.value, constant_digits).size());
+  }
+  std::string text;
+  for (const Constant& constant : constants) {
+    const std::string value = literal(constant.value, constant_digits);
+    text += fmt::format("{}{}{}{}{}{:{}}  {} {}\n", before, constant.name, assign, value, end, "",
+                        width - constant.name.size() - value.size(), comment_mark(language),
+                        constant.comment);
+  }
+  return text;
+}
+
+std::string scope(const std::string& name, const std::vector<Constant>& constants,
+                  Language language) {
+  switch (language) {
+    case Language::cpp:
+      return fmt::format("namespace {0} {{\n{1}}}  // namespace {0}\n", name,
+                         assignments(constants, language, "inline constexpr double ", " = ", ";"));
+    case Language::java:
+      return fmt::format(
+          "public final class {0} {{\n{1}\n  private {0}() {{}}\n}}\n", name,
+          assignments(constants, language, "  public static final double ", " = ", ";"));
+    case Language::python:
+      break;
+  }
+  return fmt::format("class {}:\n{}", name, assignments(constants, language, "    ", " = ", ""));
 }
 
 }  // namespace flyball::exports

@@ -2,7 +2,9 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include <flyball/export/language.hpp>
 #include <flyball/mechanisms/mechanism_kind.hpp>
 
 /// Pieces of text that the sources of all languages are made of.
@@ -18,5 +20,36 @@ namespace flyball::exports {
 /// One line that cannot end a comment, whatever a log says: no line break, no control character, no
 /// backslash.
 [[nodiscard]] std::string comment_text(std::string_view text);
+
+/// "C++", "Java", "Python".
+[[nodiscard]] std::string_view name_of(Language language);
+
+/// "constants/wpilib_java.txt": a report's file of constants.
+[[nodiscard]] std::string constants_file(std::string_view library, Language language);
+
+/// What a comment begins with: "//" or "#".
+[[nodiscard]] std::string_view comment_mark(Language language);
+
+/// Whole lines of comments, "// …\n", as the language writes them.
+[[nodiscard]] std::string comments(std::string text, Language language);
+
+/// Significant digits of a constant: finer than any gain is known.
+inline constexpr int constant_digits = 6;
+
+/// A number that is pasted.
+struct Constant {
+  std::string name;
+  double value = 0.0;
+  std::string comment;  ///< Unit first.
+};
+
+/// A line for each, "<before>NAME<assign>VALUE<end>  // comment", the comments below each other.
+[[nodiscard]] std::string assignments(const std::vector<Constant>& constants, Language language,
+                                      std::string_view before, std::string_view assign,
+                                      std::string_view end);
+
+/// A namespace of them, or a class that holds nothing else.
+[[nodiscard]] std::string scope(const std::string& name, const std::vector<Constant>& constants,
+                                Language language);
 
 }  // namespace flyball::exports

@@ -2,10 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <numbers>
 #include <regex>
+#include <sstream>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <flyball/export/drive_constants.hpp>
 
 namespace flyball::exports {
 namespace {
@@ -37,16 +46,17 @@ MechanismConstants constants(MechanismKind kind, double turn = 2.0 * std::number
   return of;
 }
 
-/// The number that a line assigns to `name`: "kV = 4.0" or ".withKV(4.0)".
+/// The number that a line assigns to `name`: "kV = 4.0", ".withKV(4.0)" or ".with_k_v(4.0)".
 double value_of(const std::string& text, const std::string& name) {
   std::smatch match;
-  const std::regex assignment("\\b" + name + " = ([-0-9.e+]+);");
+  const std::regex assignment("\\b" + name + " = ([-0-9.e+]+)[; ]");
   if (std::regex_search(text, match, assignment)) {
     return std::stod(match[1]);
   }
-  const std::regex call("[wW]ithK" + name.substr(1) + "\\(([-0-9.e+]+)\\)");
+  const std::regex call("([wW]ithK" + name.substr(1) + "|with_k_" +
+                        static_cast<char>(name[1] - 'A' + 'a') + ")\\(([-0-9.e+]+)\\)");
   if (std::regex_search(text, match, call)) {
-    return std::stod(match[1]);
+    return std::stod(match[2]);
   }
   ADD_FAILURE() << name << " is not in:\n" << text;
   return std::nan("");
@@ -71,6 +81,7 @@ void expect_gains(const std::string& text, const UnitGains& gains, bool gravity)
   } else {
     EXPECT_EQ(text.find("kG ="), std::string::npos);
     EXPECT_EQ(text.find("ithKG("), std::string::npos);
+    EXPECT_EQ(text.find("with_k_g("), std::string::npos);
   }
 }
 
@@ -80,7 +91,7 @@ TEST(Constants, CarryTheDesignsGainsInEveryUnitAndLanguage) {
         MechanismKind::swerve_steer, MechanismKind::swerve_drive}) {
     const MechanismConstants of = constants(kind);
     const bool gravity = kind == MechanismKind::elevator || kind == MechanismKind::arm;
-    for (const Language language : {Language::cpp, Language::java}) {
+    for (const Language language : languages) {
       expect_gains(wpilib_constants(of, language), gains_per(of, of.unit), gravity);
       expect_gains(phoenix_constants(of, language), gains_per(of, "rotation"), gravity);
       expect_gains(rev_constants(of, language), gains_per(of, "RPM"), gravity);
@@ -141,6 +152,110 @@ TEST(Constants, OfTurretsAndSwerveModules) {
   EXPECT_EQ(rev_constants(drive, Language::java).find("closedLoop.d("), std::string::npos);
 }
 
+/// The lines of Python that a comment offers, taken out of it, below those that stand.
+std::string taken_out(const std::string& text) {
+  std::string program;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    static const std::regex code(
+        "#( {1,3})((from|import) .*|[\\w.]+ = .*|(feedback|config)\\..*|    c\\..*)");
+    std::smatch match;
+    program += std::regex_match(line, match, code) ? match[2].str() + "\n" : line + "\n";
+  }
+  return program;
+}
+
+// What stands for the libraries takes every call and says which; the gains that it is given are
+// those of the constants.
+TEST(Constants, InPythonRunAndAreGivenToTheLibraries) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("flyball_constants_" + std::to_string(getpid()));
+  std::filesystem::create_directories(folder);
+  const auto write = [&](const std::string& name, const std::string& text) {
+    std::ofstream(folder / name) << text;
+  };
+  std::string main =
+      "import math, sys, types\n"
+      "class Any:\n"
+      "    def __init__(self, name='', *given): self.name, self.given = name, given\n"
+      "    def __getattr__(self, name): return Any(self.name + '.' + name)\n"
+      "    def __call__(self, *given):\n"
+      "        calls.append((self.name, given))\n"
+      "        return Any(self.name.split('.')[0])\n"
+      "    __path__ = []\n"
+      "for name in ('wpimath', 'wpimath.controller', 'wpimath.kinematics', 'wpimath.system',\n"
+      "             'wpimath.system.plant', 'phoenix6'):\n"
+      "    sys.modules[name] = Any()\n"
+      "def run(file):\n"
+      "    global calls\n"
+      "    calls = []\n"
+      "    names = {'config': Any('config'), 'math': math}\n"
+      "    exec(compile(open(file, encoding='utf-8').read(), file, 'exec'), names)\n"
+      "    return names, calls\n"
+      "def expect(calls, name, *given):\n"
+      "    found = [g for n, g in calls if n == name]\n"
+      "    assert len(found) == 1, (name, calls)\n"
+      "    assert len(found[0]) == len(given), (name, found, given)\n"
+      "    for a, b in zip(found[0], given):\n"
+      "        assert a == b or abs(a - b) <= 1e-5 * abs(b), (name, found, given)\n";
+  const auto number = [](double value) { return fmt::format("{}", value); };
+  int files = 0;
+  for (const MechanismKind kind :
+       {MechanismKind::flywheel, MechanismKind::elevator, MechanismKind::arm, MechanismKind::turret,
+        MechanismKind::roller, MechanismKind::swerve_steer, MechanismKind::swerve_drive}) {
+    const MechanismConstants of = constants(kind);
+    const bool velocity = controls_velocity(kind);
+    const std::string gravity = has_gravity(kind) ? number(gains_per(of, of.unit).kG) + ", " : "";
+    const auto begin = [&](const std::string& text) {
+      const std::string name = fmt::format("paste_{}.py", files++);
+      write(name, taken_out(text));
+      main += "names, calls = run('" + name + "')\n";
+    };
+    const UnitGains& own = gains_per(of, of.unit);
+    begin(wpilib_constants(of, Language::python));
+    const std::string type = kind == MechanismKind::elevator ? "ElevatorFeedforward"
+                             : kind == MechanismKind::arm    ? "ArmFeedforward"
+                             : of.unit == "m"                ? "SimpleMotorFeedforwardMeters"
+                                                             : "SimpleMotorFeedforwardRadians";
+    main += fmt::format("expect(calls, '.{}', {}, {}{}, {}{})\n", type, own.kS, gravity, own.kV,
+                        own.kA, kind == MechanismKind::arm ? "" : ", 0.02");
+    main += fmt::format("expect(calls, '.PIDController', {}, 0.0, {}, 0.02)\n", own.kP, own.kD);
+    begin(phoenix_constants(of, Language::python));
+    const UnitGains& turn = gains_per(of, "rotation");
+    for (const auto& [name, value] :
+         {std::pair("s", turn.kS), std::pair("v", turn.kV), std::pair("a", turn.kA),
+          std::pair("p", turn.kP), std::pair("d", turn.kD)}) {
+      main += fmt::format("expect(calls, '.with_k_{}', {})\n", name, value);
+    }
+    begin(rev_constants(of, Language::python));
+    const UnitGains& rpm = gains_per(of, "RPM");
+    main += fmt::format("expect(calls, 'config.closedLoop.P', {})\n", rpm.kP / 12.0);
+    main += velocity ? "assert not any(n.endswith('.D') for n, g in calls)\n"
+                     : fmt::format("expect(calls, 'config.closedLoop.D', {})\n",
+                                   60000.0 * rpm.kD / 12.0);
+    main += fmt::format("expect(calls, 'config.closedLoop.velocityFF', {})\n", rpm.kV / 12.0);
+  }
+  DriveConstants drive{.linear = DriveModeGains{0.1, 2.0, 0.3},
+                       .angular = DriveModeGains{0.2, 2.5, 0.4},
+                       .trackwidth = 0.6,
+                       .kP = 3.0};
+  write("drive.py", taken_out(wpilib_drive_constants(drive, Language::python)));
+  main +=
+      "names, calls = run('drive.py')\n"
+      "expect(calls, '.DifferentialDriveFeedforward', 2.0, 0.3, 0.75, 0.12, 0.6)\n"
+      "expect(calls, '.LinearSystemId.identifyDrivetrainSystem', 2.0, 0.3, 0.75, 0.12, 0.6)\n"
+      "expect(calls, '.DifferentialDriveKinematics', 0.6)\n"
+      "assert [g for n, g in calls if n == '.PIDController'] == [(3.0, 0.0, 0.0, 0.02)] * 2\n";
+  write("main.py", main);
+  const std::string command = fmt::format("cd '{}' && '{}' -W error -B main.py 2> said.txt",
+                                          folder.string(), FLYBALL_PYTHON);
+  const int ended = std::system(command.c_str());
+  std::ifstream said(folder / "said.txt");
+  EXPECT_EQ(ended, 0) << std::string(std::istreambuf_iterator<char>(said), {});
+  EXPECT_EQ(files, 21);
+  std::filesystem::remove_all(folder);
+}
+
 // A motor controller's own loop has its own gains; the robot's loop keeps those of its period.
 TEST(Constants, OfLoopsOnMotorControllers) {
   MechanismConstants of = constants(MechanismKind::arm);
@@ -150,7 +265,7 @@ TEST(Constants, OfLoopsOnMotorControllers) {
     gains.kP *= 2.0;
     gains.kD *= 3.0;
   }
-  for (const Language language : {Language::cpp, Language::java}) {
+  for (const Language language : languages) {
     expect_gains(wpilib_constants(of, language), gains_per(of, "rad"), true);
     const auto own = [&](std::string_view per) {
       return *std::find_if(of.on_board.begin(), of.on_board.end(),
@@ -204,8 +319,8 @@ TEST(Constants, LeaveOutWhatThereAreNoGainsFor) {
   const MechanismConstants of = constants(MechanismKind::elevator, 0.0);
   EXPECT_EQ(phoenix_constants(of, Language::cpp), "");
   EXPECT_EQ(rev_constants(of, Language::java), "");
-  EXPECT_EQ(paste_constants(of).size(), 2u);
-  EXPECT_EQ(paste_constants(constants(MechanismKind::arm)).size(), 6u);
+  EXPECT_EQ(paste_constants(of).size(), 3u);
+  EXPECT_EQ(paste_constants(constants(MechanismKind::arm)).size(), 9u);
 }
 
 }  // namespace

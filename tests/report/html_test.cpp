@@ -130,7 +130,7 @@ TEST(Html, ATunesPageHasEverythingAndNeedsNothing) {
                              "poles", "small_step", "bode", "nyquist", "closed_loop", "estimate"}) {
       EXPECT_TRUE(has(page, std::string(" data-name=\"") + name + "\"")) << name;
     }
-    EXPECT_EQ(occurrences(page, "<details>"), 6u);
+    EXPECT_EQ(occurrences(page, "<details>"), 9u);
     EXPECT_TRUE(has(page, "flyball tune lift.wpilog"));
     EXPECT_TRUE(has(page, "prefers-color-scheme:dark"));
     EXPECT_TRUE(has(page, "scope=\"col\""));

@@ -85,6 +85,7 @@ TEST_F(WriteReport, HoldsEverythingThatATuneGives) {
                            "pictures/fit_1_quasistatic-forward.png",
                            "constants/wpilib_cpp.txt",
                            "constants/wpilib_java.txt",
+                           "constants/wpilib_python.txt",
                            "constants/phoenix6_cpp.txt",
                            "constants/phoenix6_java.txt",
                            "constants/revlib_cpp.txt",

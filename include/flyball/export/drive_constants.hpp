@@ -32,7 +32,7 @@ struct DriveConstants {
 [[nodiscard]] std::string wpilib_drive_constants(const DriveConstants& constants,
                                                  Language language);
 
-/// In both languages.
+/// In every language.
 [[nodiscard]] std::vector<PasteText> paste_drive_constants(const DriveConstants& constants);
 
 }  // namespace flyball::exports
