@@ -49,7 +49,8 @@ Expected<void> check_design(const FirDesign& design, Time period) {
   const bool band = is_band(design.band);
   if (band && !(design.upper_frequency > design.frequency)) {
     return refusal(ArgumentError::out_of_range, where, "upper_frequency")
-        .got(format_number(design.upper_frequency) + " rad/s")
+        .got(design.upper_frequency == 0.0 ? "missing"
+                                           : format_number(design.upper_frequency) + " rad/s")
         .expected("above frequency, which is " + format_number(design.frequency) + " rad/s");
   }
   const double top = band ? design.upper_frequency : design.frequency;

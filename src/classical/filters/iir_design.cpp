@@ -26,7 +26,9 @@ Expected<void> check_edges(const IirDesign& design, std::string_view where) {
     return !is_band(design.band) || design.upper_frequency > design.frequency
                ? check_finite(design.upper_frequency, where, "upper_frequency")
                : Expected<void>(refusal(ArgumentError::out_of_range, where, "upper_frequency")
-                                    .got(format_number(design.upper_frequency) + " rad/s")
+                                    .got(design.upper_frequency == 0.0
+                                             ? std::string("missing")
+                                             : format_number(design.upper_frequency) + " rad/s")
                                     .expected("above frequency, which is " +
                                               format_number(design.frequency) + " rad/s"));
   });
@@ -150,7 +152,13 @@ Expected<AnalogFilter> design_analog_filter(const IirDesign& design) {
   FLYBALL_TRY_IN("design_analog_filter", const AnalogFilter prototype,
                  filter_prototype(design.family, design.order, design.ripple, design.attenuation));
   FLYBALL_CHECK(check_edges(design, "design_analog_filter"));
-  return moved(prototype, design.band, design.frequency, design.upper_frequency);
+  AnalogFilter filter = moved(prototype, design.band, design.frequency, design.upper_frequency);
+  if (!filter.poles.allFinite() || !std::isnormal(filter.gain)) {
+    return refusal(ArgumentError::out_of_range, "design_analog_filter", "frequency")
+        .got(format_number(design.frequency) + " rad/s")
+        .expected("one whose power of the order is a number; take another unit of time");
+  }
+  return filter;
 }
 
 Expected<DigitalFilter> design_filter(const IirDesign& design, Time period) {

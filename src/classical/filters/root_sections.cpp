@@ -4,6 +4,7 @@
 #include <numbers>
 #include <optional>
 #include <ranges>
+#include <tuple>
 
 #include "classical/filters/root_sections.hpp"
 #include "core/try.hpp"
@@ -143,8 +144,8 @@ Expected<std::vector<Biquad>> paired_sections(const VectorXcd& zeros, const Vect
     }
     places.push_back({of_real(pole, other), pole});
   }
-  std::ranges::stable_sort(places, {}, [](const Place& place) {
-    return place.factor.degree == 1 ? 2.0 : from_circle(place.near);
+  std::ranges::sort(places, {}, [](const Place& place) {
+    return std::tuple(place.factor.degree == 1, from_circle(place.near), place.near.real());
   });
 
   auto later = static_cast<std::size_t>(

@@ -417,7 +417,14 @@ TEST(IirDesign, Refuses) {
   EXPECT_TRUE(design_filter({.frequency = nan}, 10_ms).error().is(ArgumentError::not_finite));
   EXPECT_TRUE(design_filter({.frequency = -1.0}, 10_ms).error().is(ArgumentError::not_positive));
   EXPECT_TRUE(design_filter({.frequency = 1.0}, Time(0.0)).error().is(ArgumentError::not_positive));
-  EXPECT_TRUE(design_analog_filter({.band = FilterBand::band_stop, .frequency = 1.0})
+  EXPECT_EQ(
+      to_string(design_analog_filter({.band = FilterBand::band_stop, .frequency = 1.0}).error()),
+      "design_analog_filter: upper_frequency is missing; it must be above frequency, which is 1 "
+      "rad/s");
+  EXPECT_TRUE(design_analog_filter({.order = 20, .frequency = 1e20})
+                  .error()
+                  .is(ArgumentError::out_of_range));
+  EXPECT_TRUE(design_analog_filter({.order = 20, .frequency = 1e-20})
                   .error()
                   .is(ArgumentError::out_of_range));
   const auto order = [](FilterFamily family, std::array<double, 2> pass,

@@ -39,7 +39,8 @@ class BiquadCascade {
       const double y = c.b0 * value + s.first;
       s.first = c.b1 * value - c.a1 * y + s.second;
       s.second = c.b2 * value - c.a2 * y;
-      ordinary = ordinary & is_signal(s.first) & is_signal(s.second);
+      ordinary = ordinary & is_signal(s.first);
+      ordinary = ordinary & is_signal(s.second);
       value = y;
     }
     if (!ordinary) {

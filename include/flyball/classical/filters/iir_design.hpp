@@ -62,7 +62,7 @@ struct AnalogFilter {
 
 /// The filter in s: the prototype through s/ω_c, ω_c/s, (s² + ω₁ω₂)/(s(ω₂ - ω₁)) or its inverse.
 /// @errors As `filter_prototype`; not_positive for the frequency, out_of_range for an upper one
-/// that is not above it.
+/// that is not above it, and for a frequency whose power of the order overflows.
 [[nodiscard]] Expected<AnalogFilter> design_analog_filter(const IirDesign& design);
 
 /// The filter in z, by the bilinear transform with each edge prewarped, so that the edges are where
