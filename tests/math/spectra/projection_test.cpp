@@ -95,6 +95,31 @@ TEST(Laplace, TransformsSamples) {
   }
 }
 
+// The chord's transform is the sum of its tones', Σ ω/(s² + ω²), as Figure E.14 has it: right of
+// the axis, where a record of 0.6 s is all of it. Straight lines between samples are off by
+// (ωT)²/12.
+TEST(Laplace, OfAChordIsTheSumOfItsTones) {
+  constexpr double T = 1e-5;
+  constexpr double tones[] = {349.23, 440.0, 261.63};
+  VectorXd x = VectorXd::Zero(60001);
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    for (const double f : tones) {
+      x(k) += std::sin(2.0 * pi * f * static_cast<double>(k) * T);
+    }
+  }
+  VectorXcd s(3);
+  s << Complex(50.0, 2.0 * pi * 349.23), Complex(80.0, 2.0 * pi * 300.0), Complex(60.0, 3000.0);
+  const auto X = laplace_transform(x, Time(T), s).value();
+  for (int i = 0; i < 3; ++i) {
+    Complex sum = 0.0;
+    for (const double f : tones) {
+      const double w = 2.0 * pi * f;
+      sum += w / (s(i) * s(i) + w * w);
+    }
+    EXPECT_NEAR(std::abs(X(i) - sum), 0.0, 1e-4 * std::abs(sum));
+  }
+}
+
 // The chord of Figure E.11 (F4, A4, C4): a record of a whole number of their periods has lines of
 // one, with the phase of a sine, -90°; the flat top reads them of any record.
 TEST(AmplitudeSpectrum, HasTheTonesOfAChord) {
