@@ -54,6 +54,7 @@ std::span<const Kind> kinds() {
     add("Regulators", regulator_kinds());
     add("Feedforward, delay and margins", feedforward_kinds());
     add("PID", pid_kinds());
+    add("Compensators and robust synthesis", compensator_kinds());
     add("Observers", estimator_kinds());
     add("Regression", regression_kinds());
     add("Spectra and frequency responses", spectrum_kinds());

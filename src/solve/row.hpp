@@ -178,6 +178,7 @@ template <class Function>
 [[nodiscard]] std::vector<Kind> regulator_kinds();
 [[nodiscard]] std::vector<Kind> feedforward_kinds();
 [[nodiscard]] std::vector<Kind> pid_kinds();
+[[nodiscard]] std::vector<Kind> compensator_kinds();
 [[nodiscard]] std::vector<Kind> estimator_kinds();
 [[nodiscard]] std::vector<Kind> regression_kinds();
 [[nodiscard]] std::vector<Kind> spectrum_kinds();

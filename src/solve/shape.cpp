@@ -38,6 +38,8 @@ constexpr std::array letters{Letter{'n', "states"},
                              Letter{'o', "coefficients of B, or of a denominator"},
                              Letter{'t', "coefficients of C"},
                              Letter{'x', "coefficients of D"},
+                             Letter{'F', "coefficients of W3"},
+                             Letter{'G', "coefficients of W3's denominator"},
                              Letter{'l', "numbers"},
                              Letter{'w', "frequencies"}};
 
