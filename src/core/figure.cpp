@@ -19,6 +19,9 @@ using Complex = std::complex<double>;
 
 constexpr std::array damping_ratios{0.1, 0.3, 0.5, 0.7, 0.9};
 
+/// Of the groups' poles, in turn.
+constexpr std::array pole_styles{LineStyle::crosses, LineStyle::frames, LineStyle::diamonds};
+
 /// Adds a curve to a line, apart from what it has, and its mirror image below the real axis.
 template <class Curve>
 void add_mirrored(PlotLine& line, double from, double to, const Curve& curve) {
@@ -109,7 +112,7 @@ Plot pole_plot(std::string title, const std::vector<PolePlotGroup>& groups, bool
         added.y.push_back(root.imag());
       }
     };
-    line(groups[g].poles, LineStyle::crosses, "poles");
+    line(groups[g].poles, pole_styles[g % pole_styles.size()], "poles");
     line(groups[g].zeros, LineStyle::circles, "zeros");
   }
   plot.panels.push_back(std::move(panel));

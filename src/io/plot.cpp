@@ -126,14 +126,6 @@ Expected<std::string> picture_of(std::string answer, const std::string& title,
   return answer;
 }
 
-/// Draws, and looks at what came.
-template <class AnyPlot>
-Expected<std::string> drawn(const AnyPlot& plot, PictureFormat format, double seconds) {
-  FLYBALL_TRY(const std::string script, io::gnuplot_script(plot, format));
-  FLYBALL_TRY(std::string answer, run_gnuplot(script, seconds));
-  return picture_of(std::move(answer), plot.title, format);
-}
-
 /// The pictures that stand one after the other: each begins where the last ended.
 std::vector<std::string> parted(std::string_view answer, PictureFormat format) {
   constexpr std::string_view svg_end = "</svg>";  // Nowhere else: texts are escaped.
@@ -153,6 +145,45 @@ std::vector<std::string> parted(std::string_view answer, PictureFormat format) {
   return parts;
 }
 
+/// What one gnuplot answers to programs, in their order; as many as it was asked for.
+///
+/// Before PNGs it draws a small picture with a letter and one without: where there are no fonts, of
+/// which it says nothing, both are the same. An SVG is written with the fonts of who looks at it.
+Expected<std::vector<std::string>> answers(const std::string& scripts, std::size_t count,
+                                           PictureFormat format, double seconds) {
+  const bool raster = format == PictureFormat::png;
+  constexpr std::size_t probes = 2;
+  const std::string letter = "set label 1 'H' at screen 0.5, screen 0.5 center\nplot NaN\n";
+  FLYBALL_TRY(
+      const std::string answer,
+      run_gnuplot(raster ? io::script_head(format, 40, 30) +
+                               "unset border\nunset tics\nunset key\nset margins 0, 0, 0, 0\n"
+                               "set xrange [0:1]\nset yrange [0:1]\n" +
+                               letter + "unset label\nplot NaN\nreset session\n" + scripts
+                         : scripts,
+                  seconds));
+  std::vector<std::string> parts = parted(answer, format);
+  if (raster && parts.size() >= probes) {
+    if (parts[0] == parts[1]) {
+      return refusal(PlotError::no_fonts, "plot")
+          .hint("install some (Debian and Ubuntu: apt install fonts-dejavu-core)");
+    }
+    parts.erase(parts.begin(), parts.begin() + probes);
+  }
+  if (parts.size() != count) {
+    return refusal(PlotError::not_a_picture, "plot");
+  }
+  return parts;
+}
+
+/// Draws, and looks at what came.
+template <class AnyPlot>
+Expected<std::string> drawn(const AnyPlot& plot, PictureFormat format, double seconds) {
+  FLYBALL_TRY(const std::string script, io::gnuplot_script(plot, format));
+  FLYBALL_TRY(auto parts, answers(script, 1, format, seconds));
+  return picture_of(std::move(parts.front()), plot.title, format);
+}
+
 std::vector<Expected<std::string>> drawn_together(std::span<const Plot* const> plots,
                                                   PictureFormat format, double seconds) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
@@ -169,20 +200,16 @@ std::vector<Expected<std::string>> drawn_together(std::span<const Plot* const> p
   if (asked.empty()) {
     return pictures;
   }
-  const Expected<std::string> answer = run_gnuplot(script, seconds);
-  if (!answer && answer.error().is(PlotError::gnuplot_missing)) {
-    for (const std::size_t i : asked) {
-      pictures[i] = tl::unexpected(answer.error());
-    }
-    return pictures;
-  }
-  const std::vector<std::string> parts =
-      answer ? parted(*answer, format) : std::vector<std::string>();
+  auto parts = answers(script, asked.size(), format, seconds);
+  const bool hopeless = !parts && (parts.error().is(PlotError::gnuplot_missing) ||
+                                   parts.error().is(PlotError::no_fonts));
   for (std::size_t k = 0; k < asked.size(); ++k) {
     const Plot& plot = *plots[asked[k]];
     Expected<std::string>& picture = pictures[asked[k]];
-    if (parts.size() == asked.size()) {
-      picture = picture_of(parts[k], plot.title, format);
+    if (parts) {
+      picture = picture_of(std::move((*parts)[k]), plot.title, format);
+    } else if (hopeless) {
+      picture = tl::unexpected(parts.error());
     } else {
       // One of them was refused: which, and with what words, is known of each alone.
       const std::chrono::duration<double> left = end - std::chrono::steady_clock::now();
@@ -215,6 +242,7 @@ ErrorInfo error_info(PlotError code) {
       {"gnuplot_failed", "gnuplot did not draw the picture", ErrorKind::environment},
       {"timed_out", "gnuplot did not finish in time", ErrorKind::environment},
       {"not_a_picture", "what gnuplot answered is no picture", ErrorKind::environment},
+      {"no_fonts", "gnuplot finds no font to write with", ErrorKind::environment},
   };
   return detail::info_of(code, "plot", rows);
 }

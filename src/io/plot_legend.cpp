@@ -38,7 +38,7 @@ double text_width(std::string_view text, double size) {
 
 bool scattered(LineStyle style) {
   return style == LineStyle::points || style == LineStyle::crosses || style == LineStyle::circles ||
-         style == LineStyle::squares;
+         style == LineStyle::squares || style == LineStyle::frames || style == LineStyle::diamonds;
 }
 
 std::vector<std::string_view> panel_colors(const PlotPanel& panel) {
@@ -82,6 +82,10 @@ std::string stroke(LineStyle style, std::size_t points) {
       return "pt 6 ps 1.2 lw 2";
     case LineStyle::squares:
       return "pt 4 ps 1.2 lw 2";
+    case LineStyle::frames:
+      return "pt 4 ps 1.9 lw 1.6";
+    case LineStyle::diamonds:
+      return "pt 12 ps 2.9 lw 1.6";
     case LineStyle::points:
       break;
   }

@@ -8,6 +8,7 @@
 
 #include "core/try.hpp"
 #include "io/plot_data.hpp"
+#include "io/plot_labels.hpp"
 #include "io/plot_legend.hpp"
 #include "io/plot_script.hpp"
 #include "io/text.hpp"
@@ -24,6 +25,8 @@ constexpr int panel_gap = 14;
 
 constexpr int x_tick_pixels = 80;  ///< At least, from one tick to the next.
 constexpr int y_tick_pixels = 34;
+
+constexpr int label_size = 12;  ///< Of what stands beside marks, pixels.
 
 constexpr std::size_t max_scatter = 4000;
 
@@ -312,7 +315,7 @@ class Script {
       script_ += "set format x ''\n";
     }
     script_ += box.legend.commands(left_ + 10, box.top, plot_.width, height_);
-    draw_marks(panel);
+    draw_marks(panel, box);
     draw_curves(panel);
     // The title belongs to the first panel only: a label drawn again and again grows bold.
     script_ += "unset label\nunset arrow\nunset object\n";
@@ -326,7 +329,9 @@ class Script {
     return fmt::format("set ytics ({})\n", words);
   }
 
-  void draw_marks(const PlotPanel& panel) {
+  void draw_marks(const PlotPanel& panel, const Box& box) {
+    Labels labels(panel, {x_, box.y, plot_.log_x, panel.log_y, static_cast<double>(box_width_),
+                          static_cast<double>(box.bottom - box.top)});
     for (const PlotSpan& span : panel.spans) {
       if (std::isfinite(span.from) && std::isfinite(span.to)) {
         fmt::format_to(out(),
@@ -351,15 +356,15 @@ class Script {
       }
       const std::string label = literal(mark.label);
       if (mark.vertical) {
-        const bool at_end = mark.at > end_of_labels();
-        fmt::format_to(out(), "set label {} at first {}, graph 0.96 {} offset character {}, 0",
-                       label, mark.at, at_end ? "right" : "left", at_end ? -0.5 : 0.5);
+        const auto [height, before] = labels.place(mark, label_size);
+        fmt::format_to(out(), "set label {} at first {}, graph {:.3f} {} offset character {}, 0",
+                       label, mark.at, height, before ? "right" : "left", before ? -0.5 : 0.5);
       } else {
         fmt::format_to(out(),
                        "set label {} at graph 0.995, first {} right offset 0, character -0.6",
                        label, mark.at);
       }
-      script_ += " font ',12' textcolor rgb '#555555' front\n";
+      fmt::format_to(out(), " font ',{}' textcolor rgb '#555555' front\n", label_size);
     }
     for (const PlotNote& note : panel.notes) {
       if (std::isfinite(note.x) && std::isfinite(note.y)) {
@@ -369,13 +374,6 @@ class Script {
                        literal(note.text), note.x, note.y);
       }
     }
-  }
-
-  /// Where a label that begins there may leave the box: four fifths of the x axis.
-  double end_of_labels() const {
-    constexpr double share = 0.8;
-    return plot_.log_x ? x_.low() * std::pow(x_.high() / x_.low(), share)
-                       : x_.low() + share * x_.span();
   }
 
   void draw_curves(const PlotPanel& panel) {

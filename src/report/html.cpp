@@ -172,12 +172,29 @@ std::string render(const Picture& picture, std::size_t number) {
                    plot_data(figure), escape_html(figure.description));
 }
 
+/// Hidden where no script can move it.
+std::string render(const Animation& animation) {
+  return fmt::format(
+      "<figure class=\"animation\" data-name=\"{}\">\n"
+      "<script type=\"application/json\">{}</script>\n"
+      "<figcaption>{}</figcaption>\n</figure>\n",
+      escape_html(animation.name), animation_data(animation), escape_html(animation.description));
+}
+
 /// That still pictures are missing, and what there is in their place.
 std::string missing_stills(const std::vector<Picture>& pictures) {
   const auto missing = [](const Picture& picture) { return svg_element(picture.svg).empty(); };
   const auto first = std::find_if(pictures.begin(), pictures.end(), missing);
   if (first == pictures.end()) {
-    return "";
+    const auto problem = [](const Picture& picture) { return !picture.problem.empty(); };
+    const auto found = std::find_if(pictures.begin(), pictures.end(), problem);
+    return found == pictures.end()
+               ? ""
+               : fmt::format(
+                     "<p class=\"caution\">▲ {} of {} pictures beside this page could not be drawn "
+                     "as PNG: {}. Those in the page and their SVG are here.</p>\n",
+                     std::count_if(found, pictures.end(), problem), pictures.size(),
+                     escape_html(found->problem));
   }
   return fmt::format(
       "<p class=\"caution\">▲ {} of {} still pictures could not be drawn: {}. The interactive "
@@ -218,7 +235,7 @@ std::string origin_section(const Facts& origins, const Provenance& provenance) {
 }  // namespace
 
 std::string page_of(const Document& document, const std::vector<Picture>& pictures,
-                    const Provenance& provenance) {
+                    const std::vector<Animation>& animations, const Provenance& provenance) {
   std::string out = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
@@ -249,6 +266,11 @@ std::string page_of(const Document& document, const std::vector<Picture>& pictur
     for (const Block& block : section.blocks) {
       out += std::visit([](const auto& b) { return render(b); }, block);
     }
+    for (const Animation& animation : animations) {
+      if (animation.section == section.id) {
+        out += render(animation);
+      }
+    }
     for (const Picture& picture : pictures) {
       if (picture.figure.section == section.id) {
         out += render(picture, ++number);
@@ -258,11 +280,11 @@ std::string page_of(const Document& document, const std::vector<Picture>& pictur
   }
   out += origin_section(document.origins, provenance);
   out += "</main>\n";
-  return out + (pictures.empty() ? "" : scripts()) + "</body>\n</html>\n";
+  return out + (pictures.empty() && animations.empty() ? "" : scripts()) + "</body>\n</html>\n";
 }
 
 std::string to_html(const Answer& answer, const Provenance& provenance) {
-  return page_of(answer.document, draw(answer.figures, false), provenance);
+  return page_of(answer.document, draw(answer.figures, false), answer.animations, provenance);
 }
 
 }  // namespace flyball::report

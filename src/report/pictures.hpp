@@ -23,7 +23,9 @@ struct Picture {
 
 /// The page of a document whose pictures are drawn already; they stand at the end of the section
 /// that they name.
+/// @param animations  Stand before those, where scripts run.
 [[nodiscard]] std::string page_of(const Document& document, const std::vector<Picture>& pictures,
+                                  const std::vector<Animation>& animations,
                                   const Provenance& provenance);
 
 }  // namespace flyball::report

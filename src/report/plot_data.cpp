@@ -29,6 +29,10 @@ std::string_view name_of(LineStyle style) {
       return "circles";
     case LineStyle::squares:
       return "squares";
+    case LineStyle::frames:
+      return "frames";
+    case LineStyle::diamonds:
+      return "diamonds";
     case LineStyle::dash_dot:
       return "dash_dot";
     case LineStyle::dotted:
@@ -170,6 +174,31 @@ class PanelWriter {
   Columns& columns_;
 };
 
+std::string_view name_of(PartStyle style) {
+  switch (style) {
+    case PartStyle::filled:
+      return "filled";
+    case PartStyle::outlined:
+      return "outlined";
+    case PartStyle::ground:
+      break;
+  }
+  return "ground";
+}
+
+/// '<' stands in texts alone, and must not end the element.
+std::string in_an_element(std::string_view json) {
+  std::string text;
+  for (const char c : json) {
+    if (c == '<') {
+      text += "\\u003c";
+    } else {
+      text += c;
+    }
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string plot_data(const Figure& figure) {
@@ -188,16 +217,43 @@ std::string plot_data(const Figure& figure) {
     });
     columns.write(json);
   });
-  // '<' stands in texts alone, and must not end the element.
-  std::string text;
-  for (const char c : json.text()) {
-    if (c == '<') {
-      text += "\\u003c";
-    } else {
-      text += c;
+  return in_an_element(json.text());
+}
+
+std::string animation_data(const Animation& animation) {
+  Columns columns;
+  JsonWriter json;
+  const auto frame = [&](std::string_view key, const std::vector<double>& values) {
+    if (!values.empty()) {
+      json.add(key, columns.add(values));
     }
-  }
-  return text;
+  };
+  json.object([&] {
+    json.add("title", animation.title);
+    json.add("clock", animation.clock);
+    json.add("time", columns.add(animation.time));
+    json.list("parts", animation.parts, [&](const MovingPart& part) {
+      json.object([&] {
+        json.add("label", part.label);
+        json.add("style", name_of(part.style));
+        json.add("color", part.color % 7);
+        json.add("x", columns.add(part.x));
+        json.add("y", columns.add(part.y));
+        frame("toX", part.to_x);
+        frame("toY", part.to_y);
+        frame("angle", part.angle);
+      });
+    });
+    json.list("values", animation.values, [&](const TellingValue& value) {
+      json.object([&] {
+        json.add("label", value.label);
+        json.add("unit", value.unit);
+        json.add("values", columns.add(value.values));
+      });
+    });
+    columns.write(json);
+  });
+  return in_an_element(json.text());
 }
 
 }  // namespace flyball::report

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include <flyball/core/animation.hpp>
 #include <flyball/core/figure.hpp>
 
 namespace flyball::report {
@@ -10,5 +11,8 @@ namespace flyball::report {
 /// Columns that several curves share are in it once; each is a base in double and differences from
 /// it in single precision, little-endian in base64, a third of the size of text.
 [[nodiscard]] std::string plot_data(const Figure& figure);
+
+/// An animation for page/animation.js, in the same form.
+[[nodiscard]] std::string animation_data(const Animation& animation);
 
 }  // namespace flyball::report

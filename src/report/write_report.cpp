@@ -36,7 +36,8 @@ Expected<WrittenReport> write_report(const Answer& answer, const std::string& fo
       FLYBALL_CHECK(write(stem + ".png", picture.png));
     }
   }
-  FLYBALL_CHECK(output.write("index.html", page_of(answer.document, pictures, made)));
+  FLYBALL_CHECK(
+      output.write("index.html", page_of(answer.document, pictures, answer.animations, made)));
   FLYBALL_CHECK(output.commit());
   return report;
 }

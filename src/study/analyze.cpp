@@ -1,6 +1,8 @@
 #include <flyball/study/analyze.hpp>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -63,6 +65,72 @@ Expected<SampledAnalysis> sampled_analysis(const ContinuousSystem<>& system, Tim
   });
 }
 
+/// From a tenth of the slowest mode's frequency to ten times the fastest's, with each mode's own:
+/// where little is damped, a peak is narrow.
+std::vector<double> shown_frequencies(const ModelFile& model, const ModalAnalysis& modes) {
+  constexpr int count = 300;
+  constexpr double beyond = 10.0;
+  std::vector<double> own;
+  for (const Mode& mode : modes.modes) {
+    if (mode.natural_frequency > 0.0 && std::isfinite(mode.natural_frequency)) {
+      own.push_back(mode.natural_frequency);
+      own.push_back(std::abs(mode.s.imag()));
+    }
+  }
+  std::erase(own, 0.0);
+  const auto [slowest, fastest] = std::minmax_element(own.begin(), own.end());
+  const bool continuous = model.domain == TimeDomain::continuous;
+  const double last = !continuous   ? std::numbers::pi / model.period->si()
+                      : own.empty() ? beyond
+                                    : beyond * *fastest;
+  const double first = own.empty() ? last / (beyond * beyond) : *slowest / beyond;
+  std::vector<double> frequencies = frequencies_between(std::min(first, 1e-3 * last), last, count);
+  for (const double frequency : own) {
+    if (frequency > frequencies.front() && frequency < last) {
+      frequencies.push_back(frequency);
+    }
+  }
+  std::sort(frequencies.begin(), frequencies.end());
+  frequencies.erase(std::unique(frequencies.begin(), frequencies.end()), frequencies.end());
+  return frequencies;
+}
+
+/// What can be looked at: six channels of a system that is not large.
+std::vector<ChannelResponse> frequency_responses(const ModelFile& model,
+                                                 const ModalAnalysis& modes) {
+  constexpr Eigen::Index most_states = 40;
+  constexpr std::size_t most_channels = 6;
+  const auto& [A, B, C, D] = model.system;
+  if (A.rows() > most_states || B.cols() == 0 || C.rows() == 0) {
+    return {};
+  }
+  std::vector<ChannelResponse> channels;
+  for (Eigen::Index output = 0; output < C.rows(); ++output) {
+    for (Eigen::Index input = 0; input < B.cols(); ++input) {
+      channels.push_back({.input = input, .output = output});
+    }
+  }
+  const bool continuous = model.domain == TimeDomain::continuous;
+  const double T = model.period.value_or(Time(1.0)).si();
+  const DiscreteSystem<> discrete{A, B, C, D, Time(T)};
+  for (const double frequency : shown_frequencies(model, modes)) {
+    const auto at = continuous ? transfer_at(model.system, {0.0, frequency})
+                               : transfer_at(discrete, std::polar(1.0, frequency * T));
+    if (!at) {
+      continue;  // a pole
+    }
+    for (ChannelResponse& channel : channels) {
+      append(channel.response, frequency, (*at)(channel.output, channel.input));
+    }
+  }
+  std::erase_if(channels, [](const ChannelResponse& channel) {
+    return std::all_of(channel.response.begin(), channel.response.end(),
+                       [](const FrequencyPoint& point) { return point.gain == 0.0; });
+  });
+  channels.resize(std::min(channels.size(), most_channels));
+  return channels;
+}
+
 void add_gains(ModelAnalysis& analysis) {
   const ContinuousSystem<>& system = analysis.model.system;
   const bool continuous = analysis.model.domain == TimeDomain::continuous;
@@ -91,7 +159,7 @@ Expected<ModelAnalysis> analysis_of(const ModelFile& model) {
   }
   FLYBALL_TRY(auto structure,
               analyze_structure(model.system, model.domain, model.period.value_or(Time(1.0))));
-  ModelAnalysis analysis{std::move(structure), model, {}, {}, {}, {}, {}};
+  ModelAnalysis analysis{std::move(structure), model, {}, {}, {}, {}, {}, {}};
   complete_names(analysis.model);
   if (continuous && model.period) {
     auto sampled = sampled_analysis(model.system, *model.period);
@@ -109,6 +177,7 @@ Expected<ModelAnalysis> analysis_of(const ModelFile& model) {
     warn(analysis.model.notes, "no_responses", "without step responses: {}",
          to_string(steps.error()));
   }
+  analysis.frequency_responses = frequency_responses(model, analysis.modes);
   add_gains(analysis);
   return analysis;
 }

@@ -101,25 +101,18 @@ Expected<LoopBehavior> behavior_of(const LoopDesign& loop, const LinearModel& mo
   return behavior;
 }
 
-Expected<std::vector<LoopPoint>> frequency_response(const LoopDesign& loop,
-                                                    const LinearModel& model,
-                                                    const DesignJob& job) {
+Expected<std::vector<FrequencyPoint>> frequency_response(const LoopDesign& loop,
+                                                         const LinearModel& model,
+                                                         const DesignJob& job) {
   const auto& [believed, K, K_e] = loop.regulator;
   FLYBALL_TRY(const auto opened,
               observer_regulator_loop(model.A, model.B, model.C, believed, K, K_e, delay_of(job)));
   constexpr int points = 300;
-  constexpr double decades = 3.0;
   const double nyquist = std::numbers::pi / job.controller.period;
-  std::vector<LoopPoint> response;
-  for (int i = 0; i < points; ++i) {
-    const double frequency = nyquist * std::pow(10.0, decades * (i / (points - 1.0) - 1.0));
-    FLYBALL_TRY(const auto gain, loop_response(opened, std::min(frequency, nyquist)));
-    LoopPoint point{frequency, std::abs(gain), std::arg(gain)};
-    if (!response.empty()) {
-      const double turn = 2.0 * std::numbers::pi;
-      point.phase += turn * std::round((response.back().phase - point.phase) / turn);
-    }
-    response.push_back(point);
+  std::vector<FrequencyPoint> response;
+  for (const double frequency : frequencies_between(1e-3 * nyquist, nyquist, points)) {
+    FLYBALL_TRY(const auto gain, loop_response(opened, frequency));
+    append(response, frequency, gain);
   }
   return response;
 }

@@ -81,9 +81,9 @@ struct LoopDesign {
 
 /// The loop opened at the plant input, on the model, from a thousandth of Nyquist's frequency to
 /// it.
-[[nodiscard]] Expected<std::vector<LoopPoint>> frequency_response(const LoopDesign& loop,
-                                                                  const LinearModel& model,
-                                                                  const DesignJob& job);
+[[nodiscard]] Expected<std::vector<FrequencyPoint>> frequency_response(const LoopDesign& loop,
+                                                                       const LinearModel& model,
+                                                                       const DesignJob& job);
 
 /// Warns where the delay costs more than half of the loop's speed, and tells what would be faster.
 [[nodiscard]] Expected<void> tell_cost_of_delay(const LoopDesign& loop, const LoopBehavior& runs,

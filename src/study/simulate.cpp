@@ -17,6 +17,7 @@
 
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
+#include "study/model_loop_response.hpp"
 #include "study/simulation_record.hpp"
 #include "study/told.hpp"
 
@@ -186,7 +187,11 @@ Expected<Simulation> mechanism_open_loop(const Project& project) {
       state = truth.step(state, voltage(0), step / parts);
     }
   }
-  return recorded(described(names, project.path, run, true), std::move(rows));
+  return recorded(described(names, project.path, run, true), std::move(rows))
+      .map([&](Simulation result) {
+        result.plant = plant;
+        return result;
+      });
 }
 
 ExpectedAll<Simulation> mechanism_closed_loop(const Project& project) {
@@ -219,6 +224,7 @@ ExpectedAll<Simulation> mechanism_closed_loop(const Project& project) {
   }
   result.inputs = {{{"voltage", "V"}, "motor_voltage", "voltage", ""}};
   result.limits = {designed.job.controller.max_voltage};
+  result.plant = plant;
   result.diagnostics = std::move(designed.diagnostics);
   summarize(result);
   return result;
@@ -377,6 +383,7 @@ ExpectedAll<ModelDesign> design_model(const ModelJob& job) {
     const double constant = std::isfinite(made.time_constant) ? made.time_constant : job.period;
     run.duration = std::clamp(time_constants * constant, 10.0 * job.period, 60.0);
   }
+  result.regulator.frequency_responses = loop_responses(made, Time(job.delay));
   FLYBALL_TRY(result.simulation, simulate_closed_loop(result.job, made));
   return result;
 }

@@ -61,13 +61,14 @@ class Page(unittest.TestCase):
     def js(self, script, *arguments):
         return self.driver.execute_script(script, *arguments)
 
-    def emulate(self, width=1100, height=1000, mobile=False, scheme="light", media=""):
+    def emulate(self, width=1100, height=1000, mobile=False, scheme="light", media="", motion=""):
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
                                     {"width": width, "height": height, "deviceScaleFactor": 1,
                                      "mobile": mobile})
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia",
                                     {"media": media, "features": [
-                                        {"name": "prefers-color-scheme", "value": scheme}]})
+                                        {"name": "prefers-color-scheme", "value": scheme},
+                                        {"name": "prefers-reduced-motion", "value": motion}]})
 
     def open(self, url=None, plots=True, **emulation):
         """The page with all of its plots, also those that are not in view."""
@@ -202,6 +203,93 @@ class Page(unittest.TestCase):
                           return near && [near.x, near.y];""")
         self.assertEqual(near, pole)
 
+    def moment(self):
+        """Where the drawing is, and where the plots of its clock are."""
+        return self.js("""
+            const drawing = document.querySelector('figure.animation').plot;
+            const plot = document.querySelector('[data-name=closed_loop]').plot;
+            const {hair, graph} = plot.panels[0];
+            return {now: drawing.now, playing: drawing.playing, cursor: plot.clock.cursor,
+                    hair: hair.hidden ? null : graph.toDataXCoord(parseFloat(hair.style.left)),
+                    first: drawing.time[0], last: drawing.time[drawing.time.length - 1],
+                    look: drawing.canvas.toDataURL()};""")
+
+    def test_the_drawing_moves_with_the_plots(self):
+        self.open()
+        live = self.find("figure.animation .live")
+        self.assertEqual(self.js("return document.querySelectorAll('figure.animation').length"), 1)
+        self.assertEqual(live.get_attribute("aria-label"), "Motion of the elevator")
+        slider = live.find_element("css selector", "input[type=range]")
+        self.assertEqual(slider.accessible_name, "Time")
+        begin = self.moment()
+        self.assertFalse(begin["playing"], "nothing moves before it is asked to")
+        # The cursor of a plot is the drawing's moment, and stays it when it has left the plot.
+        panel = self.find("[data-name=closed_loop] .panel")
+        ActionChains(self.driver).move_to_element_with_offset(panel, -60, 0).perform()
+        self.frames()
+        pointed = self.moment()
+        self.assertAlmostEqual(pointed["now"], pointed["cursor"], places=12)
+        self.assertGreater(pointed["now"], begin["first"])
+        self.assertNotEqual(pointed["look"], begin["look"])
+        # By keys, and then all plots show that moment.
+        slider = self.find("figure.animation input[type=range]")
+        slider.send_keys(Keys.HOME)
+        self.frames()
+        self.assertAlmostEqual(self.moment()["hair"], begin["first"], places=2)
+        self.assertTrue(slider.get_attribute("aria-valuetext").startswith("0 s, position 0 m"),
+                        slider.get_attribute("aria-valuetext"))
+        slider.send_keys(Keys.END)
+        self.frames()
+        ended = self.moment()
+        self.assertAlmostEqual(ended["now"], ended["last"], places=9)
+        self.assertAlmostEqual(ended["hair"], ended["last"], places=2)
+        told = self.driver.find_element("css selector", "figure.animation output").text
+        position = self.js("""const line = document.querySelector('[data-name=closed_loop]').plot.panels[0]
+                                  .panel.lines[0]; return line.y[line.y.length - 1];""")
+        self.assertAlmostEqual(float(told.split("position ")[1].split(" ")[0].replace("−", "-")), position,
+                               delta=1e-3 * abs(position))
+        # Played from the start, by the button's key; a pointer over the plots does not disturb it.
+        button = self.driver.find_element("css selector", "figure.animation button")
+        self.assertEqual(button.text, "Play")
+        button.send_keys(Keys.SPACE)
+        self.frames()
+        played = self.moment()
+        self.assertEqual(button.text, "Pause")
+        self.assertLess(played["now"], ended["last"])
+        self.assertGreater(played["now"], begin["first"])
+        self.frames()
+        later = self.moment()
+        self.assertGreater(later["now"], played["now"])
+        self.assertAlmostEqual(later["hair"], later["now"], delta=0.25)
+        button.send_keys(Keys.SPACE)
+        self.frames()
+        stopped = self.moment()
+        self.frames()
+        self.assertEqual(self.moment()["now"], stopped["now"])
+        self.assertEqual(button.text, "Play")
+        # A zoomed clock plays what it shows.
+        self.js("document.querySelector('[data-name=closed_loop]').plot.show([0.5, 0.6])")
+        self.frames()
+        self.js("document.querySelector('figure.animation').plot.press()")
+        WebDriverWait(self.driver, 20).until(lambda _: not self.moment()["playing"])
+        self.assertAlmostEqual(self.moment()["now"], 0.6, places=9)
+        self.assert_no_complaint()
+
+    def test_reduced_motion_moves_by_presses_alone(self):
+        self.open(motion="reduce")
+        button = self.find("figure.animation button")
+        self.assertEqual(button.text, "Next moment")
+        begin = self.moment()
+        button.click()
+        self.frames()
+        after = self.moment()
+        self.assertAlmostEqual(after["now"] - begin["now"], (begin["last"] - begin["first"]) / 20, places=9)
+        self.frames()
+        self.assertEqual(self.moment()["now"], after["now"])
+        self.emulate(motion="no-preference")  # while the page is open
+        self.frames()
+        self.assertEqual(button.text, "Play")
+
     def test_a_curve_can_be_hidden_and_shown(self):
         self.open()
         name = self.find("[data-name=closed_loop] .legend button")
@@ -282,16 +370,20 @@ class Page(unittest.TestCase):
         shown = """const seen = element => element && getComputedStyle(element).display !== 'none';
                    return [...document.querySelectorAll('figure.plot')].map(figure =>
                        [seen(figure.querySelector('.still')), !!seen(figure.querySelector('.live'))]);"""
+        drawing = "return getComputedStyle(document.querySelector('figure.animation')).display"
         self.open()
         self.assertEqual({tuple(pair) for pair in self.js(shown)}, {(False, True)})
+        self.assertEqual(self.js(drawing), "block")
         self.emulate(media="print", scheme="dark")
         self.assertEqual({tuple(pair) for pair in self.js(shown)}, {(True, False)})
+        self.assertEqual(self.js(drawing), "none")
         self.assertEqual(self.js("return getComputedStyle(document.body).backgroundColor"),
                          "rgb(255, 255, 255)")
         self.driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
         try:
             self.open(plots=False)
             self.assertEqual({tuple(pair) for pair in self.js(shown)}, {(True, False)})
+            self.assertEqual(self.js(drawing), "none")
         finally:
             self.driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
 
@@ -331,6 +423,19 @@ class Page(unittest.TestCase):
         self.assertEqual(everything, 101, "a window of few rows has every one of them")
         self.frames()
         self.assert_no_complaint()
+
+    def test_without_fonts_the_page_is_whole_and_says_what_lacks(self):
+        with tempfile.TemporaryDirectory() as folder:
+            none = pathlib.Path(folder) / "fonts.conf"
+            none.write_text('<?xml version="1.0"?><!DOCTYPE fontconfig SYSTEM "fonts.dtd"><fontconfig></fontconfig>')
+            url = tune(folder + "/report", FONTCONFIG_FILE=str(none))
+            self.open(url)
+            self.assertIn("could not be drawn as PNG",
+                          self.driver.find_element("css selector", "header p.caution").text)
+            self.assertEqual(self.js("return document.querySelectorAll('figure.plot.on').length"),
+                             self.js("return document.querySelectorAll('.still svg').length"))
+            self.assertEqual(list((pathlib.Path(folder) / "report" / "pictures").glob("*.png")), [])
+            self.assert_no_complaint()
 
     def test_without_gnuplot_the_plots_are_there_and_the_page_says_so(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -14,6 +14,7 @@
 
 #include "io/examples.hpp"
 #include "io/plot_data.hpp"
+#include "io/plot_labels.hpp"
 #include "io/temporary_folder.hpp"
 
 namespace flyball {
@@ -32,9 +33,10 @@ Plot example(std::size_t points) {
   }
   PlotBand band{"interval", line.x, line.y, line.y};
   PlotPanel panel{"Velocity (m/s)", {line}, {band}, {{0.5, "step", true}, {1.2, "limit"}}};
-  for (const LineStyle style : {LineStyle::dashed, LineStyle::points, LineStyle::steps,
-                                LineStyle::crosses, LineStyle::circles, LineStyle::squares,
-                                LineStyle::dash_dot, LineStyle::dotted, LineStyle::samples}) {
+  for (const LineStyle style :
+       {LineStyle::dashed, LineStyle::points, LineStyle::steps, LineStyle::crosses,
+        LineStyle::circles, LineStyle::squares, LineStyle::frames, LineStyle::diamonds,
+        LineStyle::dash_dot, LineStyle::dotted, LineStyle::samples}) {
     panel.lines.push_back({"", {0.1, 0.2}, {0.1, 0.2}, style});
   }
   plot.panels = {panel, {"Voltage (V)", {line}}};
@@ -43,6 +45,40 @@ Plot example(std::size_t points) {
 
 SurfacePlot example_surface() {
   return {"Cost-to-go", "x (m)", "v (m/s)", "cost", {0, 1, 2}, {0, 1}, {0, 1, 4, 1, nan, 5}};
+}
+
+// A curve that runs along the top, then along the bottom, of a panel of 500 by 200 pixels.
+TEST(Plot, LabelsOfMarksStandWhereNoCurveIs) {
+  PlotPanel panel;
+  panel.lines = {{.x = {0.0, 0.49, 0.51, 1.0}, .y = {0.96, 0.96, 0.04, 0.04}}};
+  panel.marks = {{0.1, "settled", true}, {0.7, "settled", true}, {0.72, "late", true}};
+  io::PanelView view{io::Range(), io::Range(), false, false, 500.0, 200.0};
+  for (io::Range* range : {&view.x, &view.y}) {
+    range->include(0.0);
+    range->include(1.0);
+  }
+  io::Labels labels(panel, view);
+  EXPECT_LT(labels.place(panel.marks[0], 12.0).height, 0.3);
+  const auto second = labels.place(panel.marks[1], 12.0);
+  EXPECT_GT(second.height, 0.9);
+  // It stands on the side of its mark where the other mark is not; that one's does not meet it.
+  EXPECT_TRUE(second.before);
+  const auto third = labels.place(panel.marks[2], 12.0);
+  EXPECT_FALSE(third.before);
+  EXPECT_GT(third.height, 0.9);
+  // Where there is no room on one side it stands on the other, and two that must meet do not.
+  panel.marks = {{0.98, "settled", true}, {0.985, "settled", true}};
+  io::Labels at_the_end(panel, view);
+  const auto last = at_the_end.place(panel.marks[0], 12.0);
+  const auto beside = at_the_end.place(panel.marks[1], 12.0);
+  EXPECT_TRUE(last.before && beside.before);
+  EXPECT_GT(std::abs(last.height - beside.height) * 200.0, 15.0);
+  // Where there is nothing a label is at the top, after its mark.
+  PlotPanel empty;
+  empty.marks = {{0.1, "settled", true}};
+  const auto free = io::Labels(empty, view).place(empty.marks[0], 12.0);
+  EXPECT_EQ(free.height, 0.96);
+  EXPECT_FALSE(free.before);
 }
 
 TEST(Plot, SvgIsOneElementWithTheTexts) {
@@ -330,6 +366,33 @@ TEST(Plot, AMissingGnuplotIsToldWithWhatToDo) {
   EXPECT_TRUE(svg.error().is(PlotError::gnuplot_missing));
   EXPECT_EQ(svg.error().kind(), ErrorKind::environment);
   EXPECT_TRUE(contains(to_string(svg.error()), "apt install gnuplot-nox"));
+}
+
+// A PNG whose words are missing is none; an SVG is written with the fonts of who looks at it.
+TEST(Plot, MissingFontsAreToldWithWhatToDo) {
+  const TemporaryFolder folder;
+  const std::string none =
+      folder.put("fonts.conf",
+                 "<?xml version=\"1.0\"?><!DOCTYPE fontconfig SYSTEM \"fonts.dtd\">"
+                 "<fontconfig></fontconfig>\n");
+  ::setenv("FONTCONFIG_FILE", none.c_str(), 1);
+  const Plot plot = example(3);
+  const std::vector<const Plot*> plots{&plot, &plot};
+  const Expected<std::string> png = render_png(plot);
+  const auto pngs = render_pngs(plots);
+  const Expected<std::string> surface = render_png(example_surface());
+  const Expected<std::string> svg = render_svg(plot);
+  ::unsetenv("FONTCONFIG_FILE");
+  ASSERT_FALSE(png);
+  EXPECT_TRUE(png.error().is(PlotError::no_fonts));
+  EXPECT_EQ(png.error().kind(), ErrorKind::environment);
+  EXPECT_TRUE(contains(to_string(png.error()), "apt install fonts-dejavu-core"));
+  for (const auto& each : pngs) {
+    EXPECT_TRUE(!each && each.error().is(PlotError::no_fonts));
+  }
+  EXPECT_TRUE(!surface && surface.error().is(PlotError::no_fonts));
+  EXPECT_TRUE(svg) << to_string(svg.error());
+  EXPECT_TRUE(render_png(plot)) << "with fonts it is one";
 }
 
 TEST(Plot, WhatGnuplotComplainsAboutIsTold) {

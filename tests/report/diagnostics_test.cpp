@@ -159,7 +159,17 @@ TEST(Diagnostics, OfADrivetrain) {
   ASSERT_EQ(answer.figures.size(), 13u);
   EXPECT_EQ(answer.figures[0].name, "intervals");
   EXPECT_EQ(answer.figures[1].plot.panels.size(), 4u);
-  EXPECT_EQ(answer.figures[1].plot.panels[2].lines.size(), 2u);
+  // Of a ramp from rest the fit leaves out what is before the motion: it is marked, and shown from
+  // where the voltage begins.
+  const std::vector<PlotPanel>& panels = answer.figures[1].plot.panels;
+  ASSERT_EQ(panels[2].lines.size(), 3u);
+  EXPECT_EQ(panels[2].lines[0].label, "not used by the fit");
+  EXPECT_EQ(panels[2].lines[0].x, panels[3].lines[0].x);
+  for (const PlotPanel& panel : panels) {
+    ASSERT_FALSE(panel.spans.empty());
+    EXPECT_EQ(panel.spans[0].from, panels[3].lines[0].x.front());
+    EXPECT_EQ(panel.spans[0].to, panels[2].lines[1].x.front());
+  }
   EXPECT_EQ(answer.files.size(), 8u);
 }
 

@@ -194,9 +194,12 @@ TEST(Html, ThePageForbidsItselfTheNetworkAndHoldsItsScripts) {
   EXPECT_EQ(occurrences(page, std::string(dygraphs_script)), 1u);
   EXPECT_EQ(dygraphs_script.find("</script"), std::string_view::npos);
   EXPECT_EQ(page_script.find("</script"), std::string_view::npos);
-  EXPECT_EQ(occurrences(page, "type=\"application/json\""), answer.figures.size());
+  EXPECT_EQ(occurrences(page, "type=\"application/json\""),
+            answer.figures.size() + answer.animations.size());
   Answer words = answer;
   words.figures.clear();
+  EXPECT_TRUE(has(to_html(words), "<script")) << "what moves needs them, too";
+  words.animations.clear();
   EXPECT_FALSE(has(to_html(words), "<script"));
 }
 

@@ -114,5 +114,33 @@ TEST(PlotData, WhatAxesMarksAndStretchesSayIsThereAndEndsNoElement) {
   EXPECT_EQ(panel.at("ticks")[0], Json({{"at", 1.0}, {"label", "kS"}}));
 }
 
+TEST(PlotData, AnAnimationsPartsNameTheirColumns) {
+  const double up = std::nan("");
+  Animation animation{.title = "<b>", .clock = "c", .time = {0.0, 0.5, 1.0}};
+  animation.parts = {{.label = "carriage",
+                      .x = {0.0, up, 1.0},
+                      .y = {2.0, up, 3.0},
+                      .color = 9,
+                      .to_y = {4.0, 5.0, 6.0}},
+                     {.x = {1.0}, .y = {1.0}, .style = PartStyle::ground}};
+  animation.values = {{"position", "m", {4.0, 5.0, 6.0}}};
+  const std::string text = animation_data(animation);
+  EXPECT_EQ(text.find('<'), std::string::npos);
+  const Json json = Json::parse(text);
+  const auto columns = columns_of(json);
+  const auto column = [&](const Json& index) { return columns.at(index.get<std::size_t>()); };
+  EXPECT_EQ(json.at("title"), "<b>");
+  EXPECT_EQ(json.at("clock"), "c");
+  EXPECT_EQ(column(json.at("time")), animation.time);
+  const Json& part = json.at("parts")[0];
+  EXPECT_EQ(part.at("style"), "filled");
+  EXPECT_EQ(part.at("color"), 2);
+  EXPECT_EQ(column(part.at("toY")), animation.parts[0].to_y);
+  EXPECT_TRUE(std::isnan(column(part.at("x"))[1]));
+  EXPECT_FALSE(part.contains("toX") || part.contains("angle")) << "what rests needs no column";
+  EXPECT_EQ(json.at("parts")[1].at("style"), "ground");
+  EXPECT_EQ(json.at("values")[0].at("values"), part.at("toY"));
+}
+
 }  // namespace
 }  // namespace flyball::report

@@ -18,6 +18,8 @@ enum class LineStyle {
   crosses,
   circles,
   squares,
+  frames,    ///< Large squares: around other points.
+  diamonds,  ///< Larger still: around those.
   dash_dot,
   dotted,
   samples,  ///< Points joined by a thin line: few values at whole steps.
@@ -133,8 +135,9 @@ struct PolePlotGroup {
   std::vector<std::complex<double>> zeros = {};
 };
 /// A pole map over a grid of equal damping ratios and natural frequencies.
-/// @param groups  Each with a colour and a legend of its own. @param discrete  Draws the unit
-/// circle.
+/// @param groups  Each with a colour and a legend of its own; the second's poles are squares that
+/// leave room for a cross, the third's diamonds around both, so that equal poles are all seen.
+/// @param discrete  Draws the unit circle.
 [[nodiscard]] Plot pole_plot(std::string title, const std::vector<PolePlotGroup>& groups,
                              bool discrete);
 

@@ -19,6 +19,7 @@ enum class PlotError {
   gnuplot_failed,   ///< It refused the picture; its own words are the evidence.
   timed_out,        ///< It did not finish in time.
   not_a_picture,    ///< It answered something else, or without end.
+  no_fonts,         ///< It has no font, and a PNG would lack every word.
 };
 [[nodiscard]] ErrorInfo error_info(PlotError code);
 

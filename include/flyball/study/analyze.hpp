@@ -64,6 +64,13 @@ struct SampledAnalysis : StructureAnalysis {
 /// The outputs after a unit step of one input, from rest.
 using StepResponse = LinearResponse;
 
+/// From one input to one output, over frequency.
+struct ChannelResponse {
+  Eigen::Index input = 0;
+  Eigen::Index output = 0;
+  std::vector<FrequencyPoint> response{};
+};
+
 /// What a linear system is like.
 struct ModelAnalysis : StructureAnalysis {
   ModelFile model;                         ///< With a name for every state, input and output.
@@ -74,6 +81,9 @@ struct ModelAnalysis : StructureAnalysis {
   std::optional<HInfinityNorm> h_infinity_norm;  ///< Of a stable system.
   std::vector<StepResponse> steps;  ///< One an input, of the first 16; a growing one is shown for
                                     ///< a few of its time constants.
+  /// Of the first channels that are not zero, about the modes' frequencies, of a discrete system up
+  /// to Nyquist's; none of more than 40 states.
+  std::vector<ChannelResponse> frequency_responses{};
 };
 
 /// Poles, controllability and observability, gains and step responses of a model.

@@ -13,6 +13,7 @@
 #include <flyball/export/constants.hpp>
 #include <flyball/mechanisms/mechanism.hpp>
 #include <flyball/mechanisms/motor.hpp>
+#include <flyball/study/frequency_points.hpp>
 #include <flyball/study/model_job.hpp>
 
 namespace flyball::study {
@@ -103,13 +104,6 @@ struct LoopMargins {
   double crossover = 0.0;       ///< rad/s, gain crossover that limits the phase; 0 if none.
 };
 
-/// The loop opened at the plant input, with the delay in it, at one frequency.
-struct LoopPoint {
-  double frequency = 0.0;  ///< rad/s, below Nyquist's.
-  double gain = 0.0;       ///< |L|
-  double phase = 0.0;      ///< rad, of L, continuous along the frequencies.
-};
-
 /// One point of the grid over inertia and gain errors.
 struct RobustnessPoint {
   double inertia_factor = 1.0;  ///< True inertia over the model's; NaN where kA is not determined.
@@ -166,7 +160,9 @@ struct DesignResult {
   bool feedback = true;       ///< Whether the gain makes a difference anywhere below Nyquist.
   std::string no_feedback{};  ///< Why there is none.
   LoopMargins margins;
-  std::vector<LoopPoint> frequency_response{};  ///< On the model; empty without feedback.
+  /// Of the loop opened at the plant input, with the delay in it, on the model, up to Nyquist's
+  /// frequency; empty without feedback.
+  std::vector<FrequencyPoint> frequency_response{};
   std::vector<RobustnessPoint> robustness{};
   bool robust = false;  ///< Whether every point of the grid is stable.
   double worst_overshoot = 0.0;

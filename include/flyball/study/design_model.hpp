@@ -2,6 +2,7 @@
 
 #include <flyball/control/margins.hpp>
 #include <flyball/core/errors.hpp>
+#include <flyball/study/frequency_points.hpp>
 #include <flyball/study/model_job.hpp>
 #include <flyball/systems/equilibrium.hpp>
 
@@ -38,6 +39,9 @@ struct ModelRegulator {
   Eigen::MatrixXd kalman_gain{};  ///< Filter form (9.22), if there is an observer.
   Eigen::VectorXcd estimator_poles{};
   std::optional<StabilityMargins> margins{};  ///< Of a single input.
+  /// Of the loop opened at each input in turn, with observer and delay, up to Nyquist's frequency;
+  /// empty where there is no picture of it.
+  std::vector<std::vector<FrequencyPoint>> frequency_responses{};
   std::vector<Diagnostic> diagnostics{};
 };
 

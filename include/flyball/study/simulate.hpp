@@ -40,7 +40,8 @@ struct Simulation {
   std::vector<ShownSignal> states{}, inputs{}, outputs{};
   std::vector<SignalSummary> state_summary{}, output_summary{};
   std::vector<InputSummary> input_summary{};
-  std::vector<double> limits{};  ///< Of each input, infinite for none.
+  std::vector<double> limits{};             ///< Of each input, infinite for none.
+  std::optional<PlantDescription> plant{};  ///< Of a mechanism.
   std::vector<Diagnostic> diagnostics{};
 };
 

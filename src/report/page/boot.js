@@ -28,11 +28,22 @@
     element.plot = plot;
   }
 
+  function animate(element) {
+    const data = flyball.drawing(JSON.parse(element.querySelector('script').textContent));
+    const live = make('div', {className: 'live'});
+    live.setAttribute('role', 'group');
+    live.setAttribute('aria-label', data.title);
+    element.prepend(live);
+    element.classList.add('on');
+    element.plot = new flyball.Animation(data, live);
+    flyball.animations.push(element.plot);
+  }
+
   function open(element) {
     if (element.plot !== undefined) return;
     element.plot = null;
     try {
-      build(element);
+      element.matches('.animation') ? animate(element) : build(element);
     } catch (problem) {
       // The still picture stays.
       element.classList.remove('on');
@@ -41,7 +52,7 @@
     }
   }
 
-  const figures = [...document.querySelectorAll('figure.plot')];
+  const figures = [...document.querySelectorAll('figure.plot, figure.animation')];
   flyball.open_all = () => figures.forEach(open);
   const near = new IntersectionObserver(entries => {
     for (const {isIntersecting, target} of entries) {
@@ -52,7 +63,8 @@
     if (!performance.getEntriesByName('interactive').length) performance.mark('interactive');
   }, {rootMargin: '300px'});
   figures.forEach(figure => near.observe(figure));
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => flyball.all.forEach(plot => plot.restyle()));
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', 
+      () => [...flyball.all, ...flyball.animations].forEach(plot => plot.restyle()));
 
   if (figures.length) {
     const fingers = matchMedia('(pointer: coarse)').matches;

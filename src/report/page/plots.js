@@ -3,6 +3,7 @@
 'use strict';
 const flyball = (() => {
   const all = [];  // The plots that were made, in the page's order of appearance.
+  const animations = [];
 
   /** A colour of the page's style sheet, as it is now in this scheme. */
   const color = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
@@ -10,7 +11,7 @@ const flyball = (() => {
       color(line.style === 'guide' ? 'guide' : 'c' + line.color);
 
   const dashes = {dashed: [9, 4], dash_dot: [10, 3, 2, 3], dotted: [2, 3]};
-  const scattered = style => ['points', 'crosses', 'circles', 'squares'].includes(style);
+  const scattered = style => ['points', 'crosses', 'circles', 'squares', 'frames', 'diamonds'].includes(style);
 
   function make(name, properties = {}, ...children) {
     const element = Object.assign(document.createElement(name), properties);
@@ -92,9 +93,32 @@ const flyball = (() => {
     return figure;
   }
 
+  /** The columns of an animation, put where its parts and values name them. */
+  function drawing(data) {
+    const raw = columns(data);
+    const column = index => index === undefined ? null : raw[index];
+    data.time = column(data.time);
+    for (const part of data.parts)
+      for (const name of ['x', 'y', 'toX', 'toY', 'angle']) part[name] = column(part[name]);
+    for (const value of data.values) value.values = column(value.values);
+    return data;
+  }
+
+  /** The first index whose value is not below. */
+  function lower(x, value) {
+    let low = 0;
+    let high = x.length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (x[middle] < value) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+
   function sample(line, kind) {
     const paths = {points: 'M13 5m-3 0a3 3 0 1 0 6 0a3 3 0 1 0 -6 0', crosses: 'M9 1l8 8M17 1l-8 8',
-                   circles: 'M13 5m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0', squares: 'M9 1h8v8h-8z'};
+                   circles: 'M13 5m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0', squares: 'M9 1h8v8h-8z', frames: 'M8.5 .5h9v9h-9z', diamonds: 'M13 0l5 5l-5 5l-5 -5z'};
     const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
     const path = document.createElementNS('http://www.w3.org/2000/svg', 'path');
     for (const [name, value] of Object.entries({width: 26, height: 10, 'aria-hidden': true}))
@@ -147,10 +171,38 @@ const flyball = (() => {
     return {element, at: text => { at.textContent = text; }, zoomed: yes => { back.hidden = !yes; }};
   }
 
-  /** A label to the right of a line, or to its left where there is no room. */
-  function beside(context, label, x, y, end) {
+  function diamond(c, x, y, r) {
+    c.moveTo(x + r, y);
+    c.lineTo(x, y + r);
+    c.lineTo(x - r, y);
+    c.lineTo(x, y - r);
+    c.closePath();
+  }
+
+  /**
+   * A label beside an upright line, where it hides the fewest curves and other lines: to the right
+   * and at the top if that is nowhere. `heights(x)` are those of the curves at a pixel, `lines` the
+   * pixels of all upright lines, `taken` the places of the labels so far.
+   */
+  function beside(context, label, x, area, heights, lines, taken) {
+    if (!label) return;
     const wide = context.measureText(label).width + 4;
-    context.fillText(label, x + 4 + wide < end ? x + 4 : x - wide, y);
+    const after = x + 4 + wide < area.x + area.w;
+    let best = null;
+    for (const left of [...(after ? [x + 4] : []), ...(x - wide > area.x || !after ? [x - wide] : [])]) {
+      const there = [];
+      for (let k = 0; k <= 12; ++k) there.push(...heights(left + k / 12 * wide));
+      const crossed = lines.filter(line => line > left && line < left + wide).length;
+      for (const share of [0, 1, 0.13, 0.87, 0.28, 0.72, 0.5]) {
+        const middle = area.y + 8 + share * (area.h - 16);
+        const hidden = crossed + there.filter(y => Math.abs(y - middle) < 10).length +
+            1000 * taken.filter(other => other.left < left + wide && left < other.right &&
+                                         Math.abs(other.middle - middle) < 14).length;
+        if (!best || hidden < best.hidden) best = {hidden, left, middle};
+      }
+    }
+    taken.push({left: best.left, right: best.left + wide, middle: best.middle});
+    context.fillText(label, best.left, best.middle + 4);
   }
 
   /** Once a frame, however often it is asked for. */
@@ -203,5 +255,5 @@ const flyball = (() => {
     };
   }
 
-  return {all, color, lineColor, dashes, scattered, make, number, ticks, unpack, legend, bar, beside, each_frame, touches};
+  return {all, animations, color, lineColor, dashes, scattered, make, number, ticks, unpack, legend, bar, beside, each_frame, touches, diamond, lower, drawing};
 })();

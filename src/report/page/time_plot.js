@@ -1,6 +1,6 @@
 // Plots over time or frequency, by dygraphs. Of long series it is given what the pixels can show.
 flyball.TimePlot = (() => {
-  const {make, number} = flyball;
+  const {make, number, lower} = flyball;
 
   /** The plots that share an x axis: what one shows and where its cursor is, all show. */
   class Clock {
@@ -21,7 +21,9 @@ flyball.TimePlot = (() => {
         this.redraw();
       }, 150);
     }
-    at(x) {
+    /** While something plays, the cursor is its. */
+    at(x, by) {
+      if (this.player && this.player !== by) return;
       this.cursor = x;
       this.point();
     }
@@ -32,18 +34,7 @@ flyball.TimePlot = (() => {
     if (!clocks.has(name)) clocks.set(name, new Clock());
     return clocks.get(name);
   }
-
-  /** The first index whose value is not below. */
-  function lower(x, value) {
-    let low = 0;
-    let high = x.length;
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (x[middle] < value) low = middle + 1;
-      else high = middle;
-    }
-    return low;
-  }
+  flyball.clock_of = clock_of;
 
   /**
    * The rows that look as all of them do: of each of `count` columns of pixels the first, the last,
@@ -93,6 +84,8 @@ flyball.TimePlot = (() => {
     crosses(c, x, y, r) { c.moveTo(x - r, y - r); c.lineTo(x + r, y + r); c.moveTo(x + r, y - r); c.lineTo(x - r, y + r); },
     circles(c, x, y, r) { c.arc(x, y, r, 0, 2 * Math.PI); },
     squares(c, x, y, r) { c.rect(x - r, y - r, 2 * r, 2 * r); },
+    frames(c, x, y, r) { c.rect(x - 1.7 * r, y - 1.7 * r, 3.4 * r, 3.4 * r); },
+    diamonds(c, x, y, r) { flyball.diamond(c, x, y, 2.7 * r); },
   };
   function shape(style) {
     return (g, name, context, x, y, color, size) => {
@@ -254,6 +247,14 @@ flyball.TimePlot = (() => {
       context.strokeStyle = flyball.color('mark');
       context.fillStyle = flyball.color('quiet');
       context.setLineDash([6, 4]);
+      const taken = [];
+      const curves = panel.lines.filter(line => line.visible && line.style !== 'guide' && line.x.length);
+      const heights = x => {
+        const at = graph.toDataXCoord(x);
+        return curves.filter(line => at >= line.x[0] && at <= line.x[line.x.length - 1])
+            .map(line => graph.toDomYCoord(line.y[Math.min(lower(line.x, at), line.x.length - 1)]));
+      };
+      const lines = panel.marks.filter(mark => mark.vertical).map(mark => graph.toDomXCoord(mark.at));
       for (const mark of panel.marks.filter(mark => Number.isFinite(mark.at))) {
         if (mark.vertical) {
           const x = graph.toDomXCoord(mark.at);
@@ -261,7 +262,7 @@ flyball.TimePlot = (() => {
           context.moveTo(x, area.y);
           context.lineTo(x, area.y + area.h);
           context.stroke();
-          flyball.beside(context, mark.label, x, area.y + 12, area.x + area.w);
+          flyball.beside(context, mark.label, x, area, heights, lines, taken);
         } else {
           context.textAlign = 'right';
           const y = graph.toDomYCoord(mark.at);

@@ -149,13 +149,15 @@ flyball.XyPlot = (() => {
       c.setLineDash([6, 4]);
       c.strokeStyle = flyball.color('mark');
       c.fillStyle = flyball.color('quiet');
+      const taken = [];
+      const lines = this.panel.marks.filter(mark => mark.vertical).map(mark => this.px(mark.at));
       for (const mark of this.panel.marks) {
         const p = mark.vertical ? this.px(mark.at) : this.py(mark.at);
         c.beginPath();
         c.moveTo(mark.vertical ? p : area.x, mark.vertical ? area.y : p);
         c.lineTo(mark.vertical ? p : area.x + area.w, mark.vertical ? area.y + area.h : p);
         c.stroke();
-        if (mark.vertical) flyball.beside(c, mark.label, p, area.y + 12, area.x + area.w);
+        if (mark.vertical) flyball.beside(c, mark.label, p, area, () => [], lines, taken);
         else c.fillText(mark.label, area.x + 6, p - 4);
       }
       c.setLineDash([]);
@@ -199,8 +201,11 @@ flyball.XyPlot = (() => {
       if (style === 'crosses') {
         c.moveTo(x - r, y - r); c.lineTo(x + r, y + r);
         c.moveTo(x + r, y - r); c.lineTo(x - r, y + r);
-      } else if (style === 'squares') {
-        c.rect(x - r, y - r, 2 * r, 2 * r);
+      } else if (style === 'squares' || style === 'frames') {
+        const half = style === 'squares' ? r : 1.5 * r;
+        c.rect(x - half, y - half, 2 * half, 2 * half);
+      } else if (style === 'diamonds') {
+        flyball.diamond(c, x, y, 2.5 * r);
       } else {
         c.moveTo(x + r, y);
         c.arc(x, y, r, 0, 2 * Math.PI);

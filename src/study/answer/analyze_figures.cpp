@@ -7,6 +7,7 @@
 
 #include "core/wording.hpp"
 #include "study/answer/drawing.hpp"
+#include "study/answer/frequency_figures.hpp"
 #include "study/answer/parts.hpp"
 
 namespace flyball::study {
@@ -66,6 +67,44 @@ Figure step_figure(const ModelAnalysis& result) {
   return figure;
 }
 
+/// Gain and phase of the channels; of a single one its curve in the plane, too.
+std::vector<Figure> frequency_figures(const ModelAnalysis& result) {
+  const std::vector<ChannelResponse>& channels = result.frequency_responses;
+  if (channels.empty()) {
+    return {};
+  }
+  const std::vector<Coordinate>& inputs = result.model.inputs;
+  const std::vector<Coordinate>& outputs = result.model.outputs;
+  const std::size_t all = inputs.size() * outputs.size();
+  Figure bode{
+      "response", "bode", "Bode plot",
+      fmt::format(
+          "Gain and phase from {} to {}{}. The gain is of the units that the system "
+          "is written in.",
+          inputs.size() == 1 ? inputs.front().name : "each input",
+          outputs.size() == 1 ? outputs.front().name : "each output",
+          channels.size() < all ? fmt::format("; {} of {} channels", channels.size(), all) : ""),
+      bode_plot("Bode plot")};
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    const ChannelResponse& channel = channels[i];
+    add_response(bode.plot, channel.response,
+                 all == 1 ? ""
+                          : fmt::format("{} after {}",
+                                        outputs[static_cast<std::size_t>(channel.output)].name,
+                                        inputs[static_cast<std::size_t>(channel.input)].name),
+                 static_cast<int>(i));
+  }
+  std::vector<Figure> figures{std::move(bode)};
+  if (all == 1) {
+    figures.push_back(
+        {"response", "nyquist", "Nyquist curve",
+         "The same in the complex plane, cut off far from the origin. Fed back with a gain of one, "
+         "the loop is as far from its limit of stability as the curve is from −1.",
+         nyquist_plot("Nyquist curve", "G", channels.front().response)});
+  }
+  return figures;
+}
+
 }  // namespace
 
 std::vector<Figure> figures_of(const ModelAnalysis& result) {
@@ -77,6 +116,7 @@ std::vector<Figure> figures_of(const ModelAnalysis& result) {
   if (!result.steps.empty()) {
     figures.push_back(step_figure(result));
   }
+  append(figures, frequency_figures(result));
   return figures;
 }
 

@@ -206,6 +206,7 @@ Answer answer_of(const DesignResult& result) {
   document.sections = design_sections(result);
   document.origins.add("seed", fmt::to_string(result.job.seed));
   answer.figures = figures_of(result);
+  answer.animations = animations_of(result);
   add_design_files(answer, result, nullptr);
   document.sections.push_back(next_steps(result));
   document.sections.push_back(diagnostics_section(result.diagnostics));

@@ -9,6 +9,7 @@
 
 #include "core/wording.hpp"
 #include "study/answer/drawing.hpp"
+#include "study/answer/mechanism_animation.hpp"
 #include "study/answer/parts.hpp"
 
 namespace flyball::study {
@@ -137,6 +138,10 @@ std::vector<Figure> figures_of(const DesignResult& result) {
   return figures;
 }
 
+std::vector<Animation> animations_of(const DesignResult& result) {
+  return mechanism_animation(drawn(result.job.plant, "motion", motion_clock), result.response);
+}
+
 std::vector<AnswerFile> data_files(const DesignResult& result) {
   std::vector<AnswerFile> files;
   if (!result.loop.step.empty()) {
@@ -146,7 +151,7 @@ std::vector<AnswerFile> data_files(const DesignResult& result) {
   }
   if (!result.frequency_response.empty()) {
     std::string loop = "frequency_rad_per_s,gain,phase_rad\n";
-    for (const LoopPoint& point : result.frequency_response) {
+    for (const FrequencyPoint& point : result.frequency_response) {
       loop += fmt::format("{},{},{}\n", text::exact(point.frequency), text::exact(point.gain),
                           text::exact(point.phase));
     }

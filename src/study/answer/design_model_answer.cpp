@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "study/answer/frequency_figures.hpp"
 #include "study/answer/model_parts.hpp"
 
 namespace flyball::study {
@@ -158,6 +159,41 @@ Figure pole_figure(const ModelDesign& result) {
       pole_plot(title, groups, true)};
 }
 
+/// The loop opened at each input; of a single one with its margins.
+std::vector<Figure> frequency_figures(const ModelDesign& result) {
+  const ModelRegulator& regulator = result.regulator;
+  const std::vector<Coordinate>& inputs = result.job.model.names().inputs;
+  std::vector<Figure> figures;
+  for (std::size_t i = 0; i < regulator.frequency_responses.size(); ++i) {
+    OpenedLoop loop{.section = "controller", .response = regulator.frequency_responses[i]};
+    if (inputs.size() > 1) {
+      loop.name = "_" + inputs[i].name;
+      loop.where = fmt::format(" at {}, the others closed", inputs[i].name);
+    }
+    if (const auto& margins = regulator.margins; margins && margins->stable) {
+      const auto nearest =
+          std::min_element(margins->gain_crossovers.begin(), margins->gain_crossovers.end(),
+                           [](const Crossover& a, const Crossover& b) {
+                             return 180.0 - std::abs(a.phase) < 180.0 - std::abs(b.phase);
+                           });
+      if (nearest != margins->gain_crossovers.end()) {
+        loop.crossover = nearest->frequency;
+        loop.phase_margin = margins->phase_margin * std::numbers::pi / 180.0;
+      }
+      loop.gain_margin = margins->gain_margin_up;
+      for (const Crossover& crossing : margins->phase_crossovers) {
+        const double factor = crossing.gain * margins->gain_margin_up;
+        if (std::abs(factor - 1.0) < 1e-6) {
+          loop.turned = crossing.frequency;
+        }
+      }
+    }
+    figures.push_back(bode_figure(loop));
+    figures.push_back(nyquist_figure(loop));
+  }
+  return figures;
+}
+
 void write_margins(JsonWriter& json, const StabilityMargins& margins) {
   json.add("margins", {{"gain_margin", margins.gain_margin_up},
                        {"gain_reduction", margins.gain_margin_down},
@@ -251,6 +287,7 @@ Answer answer_of(const ModelDesign& result) {
   document.origins.add("model", result.job.path);
   document.origins.add("seed", fmt::to_string(result.job.run.seed));
   answer.figures = {pole_figure(result)};
+  append(answer.figures, frequency_figures(result));
   append(answer.figures, figures_of(result.simulation));
   answer.files = {data_file(result.simulation)};
   return answer;

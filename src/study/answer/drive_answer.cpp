@@ -1,5 +1,6 @@
 // Verdict, JSON, pictures and tables of a drivetrain's identification.
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -36,6 +37,43 @@ PlotPanel compared(const Coordinate& shown, const FittedDriveRun& run,
   return panel(shown, std::move(lines));
 }
 
+constexpr const char* not_used = "not used by the fit";
+
+/// Marks the rows of a run before and after those that the fit used, and shows what is recorded of
+/// them, as far as the axis of the others reaches.
+void mark_unused(PlotPanel& shown, const DriveRun& run, const FittedDriveRun& fitted,
+                 const std::vector<double>& recorded, bool said) {
+  if (fitted.time.empty() || run.time.empty()) {
+    return;
+  }
+  const double begin = run.time.front();
+  const double first = fitted.time.front();
+  const double last = fitted.time.back();
+  const auto mark = [&](double from, double to) {
+    if (to > from) {
+      shown.spans.push_back({from - begin, to - begin, said ? not_used : ""});
+    }
+  };
+  mark(begin, first);
+  mark(last, run.time.back());
+  if (shown.spans.empty() || recorded.size() != run.time.size() || shown.lines.empty()) {
+    return;
+  }
+  const std::vector<double>& used = shown.lines.front().y;
+  const auto [least, greatest] = std::minmax_element(used.begin(), used.end());
+  const double room = 0.5 * (*greatest - *least);
+  PlotLine rows{.label = not_used, .style = LineStyle::dotted, .color = unused_color};
+  for (std::size_t i = 0; i < recorded.size(); ++i) {
+    // Joined to the used ones, where there are some beyond.
+    const bool outside =
+        (run.time[i] <= first && first > begin) || (run.time[i] >= last && last < run.time.back());
+    const bool near = recorded[i] >= *least - room && recorded[i] <= *greatest + room;
+    rows.x.push_back(run.time[i] - begin);
+    rows.y.push_back(outside && near ? recorded[i] : NAN);
+  }
+  shown.lines.insert(shown.lines.begin(), std::move(rows));
+}
+
 Figure drive_figure(const DriveReport& report, const FittedDriveRun& fitted, std::size_t index) {
   const DriveRun& run = report.recording.runs[index];
   const std::string rate = report.recording.unit + "/s";
@@ -60,6 +98,15 @@ Figure drive_figure(const DriveReport& report, const FittedDriveRun& fitted, std
             {line("left", time, run.left.voltage, voltage_color),
              line("right", time, run.right.voltage, quiet_color, LineStyle::dashed)},
             true));
+  if (fitted.used) {
+    std::vector<PlotPanel>& panels = figure.plot.panels;
+    mark_unused(panels[0], run, fitted, run.left.velocity, false);
+    mark_unused(panels[1], run, fitted, run.right.velocity, false);
+    if (panels.size() > 3) {
+      mark_unused(panels[2], run, fitted, run.heading, false);
+    }
+    mark_unused(panels.back(), run, fitted, {}, true);
+  }
   return figure;
 }
 

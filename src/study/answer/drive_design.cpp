@@ -163,7 +163,18 @@ void add_drive_design(Answer& answer, const TuneResult& result) {
       figure.section = fmt::format("{}_{}", mode.key, figure.section);
       figure.name = fmt::format("{}_{}", mode.key, figure.name);
       figure.title = fmt::format("{}: {}", mode.title, figure.title);
+      if (!figure.plot.clock.empty()) {
+        figure.plot.clock = fmt::format("{}_{}", mode.key, figure.plot.clock);  // not the other's
+      }
       answer.figures.push_back(std::move(figure));
+    }
+    // Only of what moves straight on: a mode of the turning has no wheel.
+    if (std::string_view(mode.key) == "linear") {
+      for (Animation& animation : animations_of(*design)) {
+        animation.section = fmt::format("{}_{}", mode.key, animation.section);
+        animation.clock = fmt::format("{}_{}", mode.key, animation.clock);
+        answer.animations.push_back(std::move(animation));
+      }
     }
     for (AnswerFile& file : data_files(*design)) {
       constexpr std::string_view folder = "data/";

@@ -71,7 +71,11 @@ PlotLine unused_rows(const PreparedRun& prepared, const FittedRun& run, double b
   PlotLine rows{.label = not_used, .style = LineStyle::dotted, .color = unused_color};
   for (std::size_t i = 0; i < std::min(velocity.size(), prepared.run.time.size()); ++i) {
     const double time = prepared.run.time[i];
-    const bool used = time > run.time.front() && time < run.time.back();
+    // Joined to the used ones, where there are some beyond.
+    const double first = run.time.front();
+    const double last = run.time.back();
+    const bool used = (time > first || first <= prepared.run.time.front()) &&
+                      (time < last || last >= prepared.run.time.back());
     const bool shown = velocity[i] >= *least - room && velocity[i] <= *greatest + room;
     rows.x.push_back(time - begin);
     rows.y.push_back(!used && shown ? velocity[i] : NAN);

@@ -10,6 +10,7 @@
 #include <flyball/study/localize.hpp>
 
 #include "core/wording.hpp"
+#include "study/answer/localize_animation.hpp"
 #include "study/answer/parts.hpp"
 #include "study/answer/pose_log.hpp"
 
@@ -21,6 +22,7 @@ using text::number;
 using text::percent;
 
 constexpr const char* schema = "flyball.localize/1";
+constexpr const char* drive_clock = "drive";  ///< Of its pictures over time.
 
 /// The paths that there are, the best last.
 struct NamedPath {
@@ -254,7 +256,7 @@ Figure error_figure(const LocalizeResult& result) {
   Figure figure{.section = "path",
                 .name = known ? "errors" : "uncertainty",
                 .title = known ? "Distance from the truth" : "Standard deviation of the position"};
-  figure.plot = {.title = figure.title, .x_label = "Time (s)"};
+  figure.plot = {.title = figure.title, .x_label = "Time (s)", .clock = drive_clock};
   const double begin = result.log.odometry.front().time;
   const auto add = [&](const LocalizedPath& path, const char* name, int color) {
     PlotPanel panel{.y_label = fmt::format("{} (m)", name)};
@@ -294,7 +296,7 @@ Figure error_figure(const LocalizeResult& result) {
 
 Figure sightings_figure(const LocalizeResult& result) {
   Figure figure{.section = "sightings", .name = "sightings", .title = "Sightings"};
-  figure.plot = {.title = "Sightings", .x_label = "Time (s)"};
+  figure.plot = {.title = "Sightings", .x_label = "Time (s)", .clock = drive_clock};
   const double begin = result.log.odometry.front().time;
   PlotPanel panel{.y_label = "off, in assumed σ"};
   PlotLine taken{.label = "taken", .style = LineStyle::points, .color = 0};
@@ -374,6 +376,7 @@ Answer answer_of(const LocalizeResult& result) {
     answer.document.origins.add("file", Value(file));
   }
   answer.figures = {map_figure(result), error_figure(result), sightings_figure(result)};
+  answer.animations = localize_animation(result, "path", drive_clock);
   for (const NamedPath& named : paths_of(result)) {
     answer.files.push_back({fmt::format("data/{}.csv", named.name), csv_of(*named.path)});
   }

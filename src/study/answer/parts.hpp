@@ -82,6 +82,8 @@ void add_warnings(Verdict& verdict, const std::vector<Diagnostic>& diagnostics,
 [[nodiscard]] std::vector<Figure> figures_of(const IdentifyResult& result);
 /// Pole map, Bode plot, Nyquist curve, small step, closed-loop response, estimate against truth.
 [[nodiscard]] std::vector<Figure> figures_of(const DesignResult& result);
+/// The mechanism in that closed loop, moving.
+[[nodiscard]] std::vector<Animation> animations_of(const DesignResult& result);
 /// Pole map and step responses.
 [[nodiscard]] std::vector<Figure> figures_of(const ModelAnalysis& result);
 

@@ -5,6 +5,7 @@
 
 #include <flyball/io/csv.hpp>
 
+#include "study/answer/mechanism_animation.hpp"
 #include "study/answer/model_parts.hpp"
 
 namespace flyball::study {
@@ -12,6 +13,9 @@ namespace flyball::study {
 namespace {
 
 constexpr std::size_t most_panels = 8;  ///< Of a picture that is looked at.
+
+/// Of all of its pictures over time.
+constexpr const char* simulation_clock = "simulation";
 
 std::vector<Value> row_of(const Coordinate& signal, const SignalSummary& summary) {
   return {label(signal), text::number(summary.min), text::number(summary.max),
@@ -45,6 +49,7 @@ Figure figure(const Simulation& result, const std::vector<ShownSignal>& signals,
               const std::string& reference, bool steps) {
   Figure made = over_time("simulation", name, title,
                           fmt::format("{} of the simulated {}.", title, result.name));
+  made.plot.clock = simulation_clock;
   for (std::size_t i = 0; i < std::min(signals.size(), most_panels); ++i) {
     made.plot.panels.push_back(signal_panel(result, signals[i], estimate, reference, steps));
     if (steps && std::isfinite(result.limits[i])) {
@@ -52,6 +57,48 @@ Figure figure(const Simulation& result, const std::vector<ShownSignal>& signals,
       made.plot.panels.back().marks.push_back({-result.limits[i], "", false});
     }
   }
+  return made;
+}
+
+/// Of two states one over the other, where it begins, and where it should go.
+Figure phase_plane(const Simulation& result) {
+  constexpr std::size_t most_points = 5000;
+  const ShownSignal& x = result.states[0];
+  const ShownSignal& y = result.states[1];
+  Figure made{"simulation",
+              "phase_plane",
+              "Phase plane",
+              fmt::format("{} over {}: the way of the simulated {} from where it begins.",
+                          text::capitalized(y.signal.name), x.signal.name, result.name),
+              {}};
+  made.plot.title = made.title;
+  made.plot.x_label = label({text::capitalized(x.signal.name), x.signal.unit});
+  made.plot.width = 640;
+  PlotPanel panel{.y_label = label({text::capitalized(y.signal.name), y.signal.unit})};
+  const std::size_t stride = (result.series.rows() + most_points - 1) / most_points;
+  const auto add = [&](const std::string& across, const std::string& up, PlotLine line) {
+    const std::vector<double>* const xs = across.empty() ? nullptr : result.series.find(across);
+    const std::vector<double>* const ys = up.empty() ? nullptr : result.series.find(up);
+    if (xs != nullptr && ys != nullptr && !xs->empty()) {
+      for (std::size_t i = 0; i < xs->size(); i += stride) {
+        line.x.push_back((*xs)[i]);
+        line.y.push_back((*ys)[i]);
+      }
+      panel.lines.push_back(std::move(line));
+    }
+  };
+  add(x.truth, y.truth, {.label = result.closed_loop ? "truth" : "", .color = measured_color});
+  add(x.reference, y.reference,
+      {.label = "reference", .style = LineStyle::dashed, .color = simulated_color});
+  if (!panel.lines.empty()) {
+    const PlotLine& truth = panel.lines.front();
+    panel.lines.push_back({.label = "begin",
+                           .x = {truth.x.front()},
+                           .y = {truth.y.front()},
+                           .style = LineStyle::circles,
+                           .color = measured_color});
+  }
+  made.plot.panels = {std::move(panel)};
   return made;
 }
 
@@ -138,6 +185,9 @@ std::vector<Figure> figures_of(const Simulation& result) {
   if (!result.inputs.empty()) {
     figures.push_back(figure(result, result.inputs, "inputs", "Inputs", "asked for", "", true));
   }
+  if (result.states.size() == 2) {
+    figures.push_back(phase_plane(result));
+  }
   return figures;
 }
 
@@ -197,6 +247,10 @@ Answer answer_of(const Simulation& result) {
   document.origins.add("model", result.path);
   document.origins.add("seed", fmt::to_string(result.seed));
   answer.figures = figures_of(result);
+  if (result.plant) {
+    answer.animations =
+        mechanism_animation(drawn(*result.plant, "simulation", simulation_clock), result.series);
+  }
   answer.files = {data_file(result)};
   return answer;
 }

@@ -92,6 +92,7 @@ Answer answer_of(const TuneResult& result) {
     append(document.sections, design_sections(*design));
     document.origins.add("seed", fmt::to_string(design->job.seed));
     append(answer.figures, figures_of(*design));
+    answer.animations = animations_of(*design);
     const auto& fit = result.identification.report.fit;
     answer.files.clear();
     add_design_files(answer, *design, fit ? &*fit : nullptr);
