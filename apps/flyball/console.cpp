@@ -76,7 +76,12 @@ void add_common_options(CLI::App& command, CommonOptions& options, const std::st
 }
 
 void add_field_options(CLI::App& command, study::JobKind job, std::vector<study::Override>& given) {
-  for (const study::FieldInfo& field : study::fields_of(job)) {
+  add_field_options(command, study::fields_of(job), given);
+}
+
+void add_field_options(CLI::App& command, const std::vector<study::FieldInfo>& fields,
+                       std::vector<study::Override>& given) {
+  for (const study::FieldInfo& field : fields) {
     std::string help = field.help;
     if (field.value.empty()) {
       // --flag, or --flag=false against a file that says true.

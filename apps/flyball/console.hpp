@@ -38,6 +38,10 @@ void add_common_options(CLI::App& command, CommonOptions& options, const std::st
 /// Adds the options of a job's fields, by its table. @param given  What is typed goes there.
 void add_field_options(CLI::App& command, study::JobKind job, std::vector<study::Override>& given);
 
+/// The same by the table of another kind of job.
+void add_field_options(CLI::App& command, const std::vector<study::FieldInfo>& fields,
+                       std::vector<study::Override>& given);
+
 /// Colours when standard output is a terminal and NO_COLOR is not set; its width (else COLUMNS,
 /// else 100); ASCII where the locale is not of UTF-8. Without a word of a locale only a terminal is
 /// taken for one that knows no more.

@@ -13,6 +13,7 @@
 
 #include <flyball/core/text.hpp>
 #include <flyball/core/version.hpp>
+#include <flyball/study/loop_study.hpp>
 
 #include "commands.hpp"
 #include "console.hpp"
@@ -63,6 +64,8 @@ int run(int argc, char** argv) {
       "  flyball units velocity                     the units that quantities are read in\n"
       "  flyball localize Robot1/                   a drive among landmarks, to path and map\n"
       "  flyball analyze elevator.toml              poles, what can be moved and seen, gains\n"
+      "  flyball bode \"2/(s^2+3*s+2)*exp(-0.1*s)\"   margins and curves of a loop; sisotool: all "
+      "of it\n"
       "  flyball solve dare < problems.jsonl        any kernel, from any language\n"
       "  flyball book 6.3                           a figure of the book, from this library\n"
       "\n"
@@ -86,6 +89,7 @@ int run(int argc, char** argv) {
   flyball::app::add_localize_command(program, invocation);
   flyball::app::add_book_command(program, invocation);
   flyball::app::add_analyze_command(program, invocation);
+  flyball::app::add_loop_commands(program, invocation);
   flyball::app::add_solve_command(program, invocation);
   flyball::app::add_units_command(program, invocation);
   flyball::app::add_help_commands(program, invocation);
@@ -144,10 +148,30 @@ std::vector<char*> with_help_last(int argc, char** argv) {
   return arguments;
 }
 
+/// CLI11 takes "[1]/[1 2]" for a list of its own; behind a blank it is the text that it was.
+void keep_coefficients(std::vector<char*>& arguments, std::vector<std::string>& texts) {
+  const std::string_view command = arguments.size() > 2 ? arguments[1] : "";
+  const auto& views = flyball::study::loop_views;
+  if (std::none_of(views.begin(), views.end(),
+                   [&](auto view) { return to_string(view) == command; })) {
+    return;
+  }
+  texts.reserve(arguments.size());
+  for (char*& argument : arguments) {
+    const std::string_view text = argument == nullptr ? "" : argument;
+    if (text.starts_with('[') && text.ends_with(']')) {
+      texts.push_back(" " + std::string(text));
+      argument = texts.back().data();
+    }
+  }
+}
+
 int guarded_run(int argc, char** argv) {
   try {
     flyball::app::begin_session();
     std::vector<char*> arguments = with_help_last(argc, argv);
+    std::vector<std::string> texts;
+    keep_coefficients(arguments, texts);
     return run(static_cast<int>(arguments.size()) - 1, arguments.data());
   } catch (const std::bad_alloc&) {
     return give_up_for_memory();

@@ -6,8 +6,11 @@
 #include <vector>
 
 #include <flyball/math/expression/formula.hpp>
+#include <flyball/systems/system_error.hpp>
 
+#include "classical/locus_loop.hpp"
 #include "classical/polynomial.hpp"
+#include "classical/quotient.hpp"
 #include "classical/transfer_syntax.hpp"
 #include "core/error_rows.hpp"
 #include "core/format.hpp"
@@ -18,10 +21,23 @@ namespace flyball::classical {
 namespace {
 
 using detail::at_place;
+using detail::clear_shifts;
+using detail::common;
+using detail::constant;
+using detail::degree;
+using detail::expanded;
+using detail::Factor;
+using detail::Factors;
+using detail::multiply;
+using detail::number;
+using detail::of_polynomial;
 using detail::Polynomial;
 using detail::quote;
+using detail::Quotient;
 using detail::TextPlace;
+using detail::together;
 using detail::TransferNode;
+using detail::without;
 using Eigen::Index;
 using Eigen::VectorXd;
 using expression::ExpressionError;
@@ -29,139 +45,6 @@ using flyball::detail::format;
 
 constexpr std::string_view where = "transfer function";
 constexpr Index highest_degree = 100;
-
-/// A polynomial that is not a constant, and how often it stands there.
-struct Factor {
-  Polynomial p;
-  Index times = 1;
-};
-using Factors = std::vector<Factor>;
-
-Polynomial constant(double value) {
-  return detail::polynomial(VectorXd::Constant(1, value));
-}
-
-bool is_zero(const Polynomial& p) {
-  return p.hi.isZero(0.0) && p.lo.isZero(0.0);
-}
-
-bool same(const Polynomial& a, const Polynomial& b) {
-  return a.rows() == b.rows() && a.hi == b.hi && a.lo == b.lo;
-}
-
-/// s or z itself.
-bool is_variable(const Polynomial& p) {
-  return p.rows() == 2 && p.hi(0, 0) == 1.0 && p.lo(0, 0) == 0.0 && p.hi(1, 0) == 0.0 &&
-         p.lo(1, 0) == 0.0;
-}
-
-Index degree(const Factors& factors) {
-  Index sum = 0;
-  for (const Factor& factor : factors) {
-    sum += (factor.p.rows() - 1) * factor.times;
-  }
-  return sum;
-}
-
-Index count_of(const Factors& factors, const Polynomial& p) {
-  for (const Factor& factor : factors) {
-    if (same(factor.p, p)) {
-      return factor.times;
-    }
-  }
-  return 0;
-}
-
-void multiply(Factors& factors, const Polynomial& p, Index times) {
-  for (Factor& factor : factors) {
-    if (same(factor.p, p)) {
-      factor.times += times;
-      return;
-    }
-  }
-  factors.push_back({p, times});
-}
-
-void remove(Factors& factors, const Polynomial& p, Index times) {
-  for (Factor& factor : factors) {
-    if (same(factor.p, p)) {
-      factor.times -= times;
-    }
-  }
-  std::erase_if(factors, [](const Factor& factor) { return factor.times == 0; });
-}
-
-/// What two have in common.
-Factors common(const Factors& a, const Factors& b) {
-  Factors both;
-  for (const Factor& factor : a) {
-    if (const Index times = std::min(factor.times, count_of(b, factor.p)); times > 0) {
-      both.push_back({factor.p, times});
-    }
-  }
-  return both;
-}
-
-Factors without(Factors factors, const Factors& less) {
-  for (const Factor& factor : less) {
-    remove(factors, factor.p, factor.times);
-  }
-  return factors;
-}
-
-Factors together(Factors factors, const Factors& more) {
-  for (const Factor& factor : more) {
-    multiply(factors, factor.p, factor.times);
-  }
-  return factors;
-}
-
-Polynomial expanded(const Factors& factors, Polynomial p) {
-  for (const Factor& factor : factors) {
-    for (Index i = 0; i < factor.times; ++i) {
-      p = detail::times(p, factor.p);
-    }
-  }
-  return p;
-}
-
-/// gain Π num / Π den e^{-delay s}, factored as it was written.
-struct Quotient {
-  Polynomial gain = constant(1.0);  ///< A number.
-  Factors num{};
-  Factors den{};
-  double delay = 0.0;
-
-  [[nodiscard]] bool is_zero() const { return classical::is_zero(gain); }
-  [[nodiscard]] bool is_constant() const { return num.empty() && den.empty() && delay == 0.0; }
-  [[nodiscard]] double value() const { return gain.rounded()(0, 0); }
-};
-
-Quotient number(double value) {
-  return {.gain = constant(value)};
-}
-
-/// The quotient of a polynomial; nothing but a gain if it is of degree 0.
-Quotient of_polynomial(const Polynomial& p) {
-  const Polynomial q = detail::trimmed(p);
-  if (q.rows() == 1) {
-    return {.gain = q};
-  }
-  return {.num = {{q, 1}}};
-}
-
-/// z/z is one: its pole is no dynamics of the plant, but of how it is written.
-void clear_shifts(Quotient& q, char variable) {
-  if (variable != 'z') {
-    return;
-  }
-  for (const Factor& factor : common(q.num, q.den)) {
-    if (is_variable(factor.p)) {
-      remove(q.num, factor.p, factor.times);
-      remove(q.den, factor.p, factor.times);
-    }
-  }
-}
 
 class Evaluator {
  public:
@@ -229,7 +112,7 @@ class Evaluator {
       case Kind::subtract:
         return sum(node, values[node.a], node.kind == Kind::add ? 1.0 : -1.0, values[node.b]);
       case Kind::multiply:
-        return product(values[node.a], values[node.b]);
+        return detail::product(values[node.a], values[node.b]);
       case Kind::divide:
         return divided(syntax_.nodes[node.b], values[node.a], values[node.b]);
       case Kind::power:
@@ -252,26 +135,7 @@ class Evaluator {
     if (a.delay != b.delay) {
       return tl::unexpected(delays_differ(node, a.delay, b.delay));
     }
-    // a/c + b/d = (a d' + b c')/lcm(c, d), factors that both have kept in front.
-    Quotient whole{.delay = a.delay};
-    const Factors in_front = common(a.num, b.num);
-    const Factors below = common(a.den, b.den);
-    const Factors only_a = without(a.den, below);
-    const Factors only_b = without(b.den, below);
-    const Polynomial left = expanded(together(without(a.num, in_front), only_b), a.gain);
-    const Polynomial right = expanded(together(without(b.num, in_front), only_a), b.gain);
-    const Polynomial above = detail::trimmed(detail::plus(left, sign, right));
-    if (is_zero(above)) {
-      return number(0.0);
-    }
-    whole.num = in_front;
-    whole.den = together(together(below, only_a), only_b);
-    if (above.rows() == 1) {
-      whole.gain = above;
-    } else {
-      multiply(whole.num, above, 1);
-    }
-    return whole;
+    return detail::sum(a, sign, b);
   }
 
   [[nodiscard]] Error delays_differ(const TransferNode& node, double a, double b) const {
@@ -280,16 +144,6 @@ class Evaluator {
         .got(format("a sum of parts with {} s and {} s of dead time", a, b))
         .expected("of one dead time: the sum of others is no rational function")
         .hint("approximate one of them by (1 - T*s/2)/(1 + T*s/2)");
-  }
-
-  static Quotient product(const Quotient& a, const Quotient& b) {
-    if (a.is_zero() || b.is_zero()) {
-      return number(0.0);
-    }
-    return {.gain = detail::times(a.gain, b.gain),
-            .num = together(a.num, b.num),
-            .den = together(a.den, b.den),
-            .delay = a.delay + b.delay};
   }
 
   /// @param below  The divisor, for messages.
@@ -500,8 +354,11 @@ Expected<TransferFunction> parse_transfer_function(std::string_view text,
   return finished(parsed.value, period, text);
 }
 
-Expected<TransferFunction> parse_transfer_product(std::span<const std::string> texts,
-                                                  std::optional<Time> period) {
+namespace {
+
+/// The product of several texts, whose errors say which of them they are about.
+Expected<Quotient> product_of(std::span<const std::string> texts,
+                              const std::optional<Time>& period) {
   if (texts.empty()) {
     return refusal(ArgumentError::empty, where, "the factors");
   }
@@ -528,14 +385,7 @@ Expected<TransferFunction> parse_transfer_product(std::span<const std::string> t
                            parsed->syntax.first_use));
     }
     variable = own != 0 ? own : variable;
-    if (whole.is_zero() || parsed->value.is_zero()) {
-      whole = number(0.0);
-    } else {
-      whole.gain = detail::times(whole.gain, parsed->value.gain);
-      whole.num = together(whole.num, parsed->value.num);
-      whole.den = together(whole.den, parsed->value.den);
-      whole.delay += parsed->value.delay;
-    }
+    whole = detail::product(whole, parsed->value);
     clear_shifts(whole, variable);
   }
   if (std::max(degree(whole.num), degree(whole.den)) > highest_degree) {
@@ -543,11 +393,50 @@ Expected<TransferFunction> parse_transfer_product(std::span<const std::string> t
         .got(format("of degree {}", std::max(degree(whole.num), degree(whole.den))))
         .expected(format("of degree {} at most", highest_degree));
   }
+  return whole;
+}
+
+/// The roots of factors, each on its own.
+Expected<Eigen::VectorXcd> roots_of(const Factors& factors, std::string_view name) {
+  std::vector<std::complex<double>> all;
+  for (const Factor& factor : factors) {
+    const auto found = detail::roots(factor.p);
+    if (!found) {
+      return refusal(SystemError::no_convergence, where, name).got("not found");
+    }
+    for (const detail::MultipleRoot& root : detail::grouped(*found, factor.p)) {
+      all.insert(all.end(), static_cast<std::size_t>(root.times * factor.times), root.at);
+    }
+  }
+  return Eigen::VectorXcd(
+      Eigen::Map<const Eigen::VectorXcd>(all.data(), static_cast<Index>(all.size())));
+}
+
+}  // namespace
+
+Expected<TransferFunction> parse_transfer_product(std::span<const std::string> texts,
+                                                  std::optional<Time> period) {
+  FLYBALL_TRY(const Quotient whole, product_of(texts, period));
   std::string product;
   for (const std::string& text : texts) {
     product += (product.empty() ? "(" : "*(") + text + ")";
   }
   return finished(whole, period, texts.size() == 1 ? texts.front() : product);
+}
+
+Expected<ZeroPoleGain> parse_zero_pole_gain(std::span<const std::string> texts,
+                                            std::optional<Time> period) {
+  FLYBALL_TRY(const Quotient whole, product_of(texts, period));
+  FLYBALL_TRY(const auto zeros, roots_of(whole.num, "the zeros"));
+  FLYBALL_TRY(const auto poles, roots_of(whole.den, "the poles"));
+  double gain = whole.value();
+  for (const Factor& factor : whole.num) {
+    gain *= std::pow(factor.p.hi(0, 0), static_cast<double>(factor.times));
+  }
+  for (const Factor& factor : whole.den) {
+    gain /= std::pow(factor.p.hi(0, 0), static_cast<double>(factor.times));
+  }
+  return ZeroPoleGain::create(zeros, poles, gain, period, Time(whole.delay));
 }
 
 }  // namespace flyball::classical

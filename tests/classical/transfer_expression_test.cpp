@@ -287,6 +287,26 @@ TEST(TransferExpression, AnyBytesAreAnswered) {
   EXPECT_GT(parsed, 100);
 }
 
+TEST(TransferExpression, RootsAsWritten) {
+  const std::vector<std::string> texts{"3(2s+1)", "1/((s+1)^20*(s^2+2s+5)^2)*exp(-s)"};
+  const auto G = parse_zero_pole_gain(texts).value();
+  ASSERT_EQ(G.poles().size(), 24);
+  int at_one = 0;
+  int complex = 0;
+  for (const Complex& pole : G.poles()) {
+    at_one += pole == -1.0 ? 1 : 0;
+    complex += std::abs(pole - Complex(-1.0, 2.0)) < 1e-15 ? 1 : 0;
+  }
+  EXPECT_EQ(at_one, 20);
+  EXPECT_EQ(complex, 2);
+  EXPECT_EQ(G.zeros()(0), -0.5);
+  EXPECT_EQ(G.gain(), 6.0);
+  EXPECT_EQ(G.delay(), 1.0);
+  EXPECT_TRUE(parse_zero_pole_gain(std::vector<std::string>{"1/("})
+                  .error()
+                  .is(ExpressionError::missing_operand));
+}
+
 TEST(TransferExpression, Products) {
   // A PD controller is improper alone.
   const std::vector<std::string> texts{"2*(1+0.1s)", "1/(s^2+s)"};

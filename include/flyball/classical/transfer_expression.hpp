@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include <flyball/classical/transfer_function.hpp>
+#include <flyball/classical/zero_pole_gain.hpp>
 
 namespace flyball::classical {
 
@@ -48,6 +49,11 @@ enum class TransferTextError {
 /// The product of several texts, of which one alone may be improper: a PD controller before its
 /// plant. @errors As above, and `text` as evidence: which of them, from 0.
 [[nodiscard]] Expected<TransferFunction> parse_transfer_product(
+    std::span<const std::string> texts, std::optional<Time> period = std::nullopt);
+
+/// The same by its roots: those of each factor as it is written, so that (s+1)^20 has twenty poles
+/// at -1. It may be improper. @errors As above, and SystemError::no_convergence.
+[[nodiscard]] Expected<ZeroPoleGain> parse_zero_pole_gain(
     std::span<const std::string> texts, std::optional<Time> period = std::nullopt);
 
 }  // namespace flyball::classical

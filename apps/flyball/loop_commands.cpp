@@ -1,0 +1,98 @@
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <flyball/io/output_folder.hpp>
+#include <flyball/study/loop_study.hpp>
+
+#include "answer.hpp"
+#include "commands.hpp"
+#include "console.hpp"
+
+namespace flyball::app {
+
+namespace {
+
+constexpr const char* schema = "flyball.loop/1";
+
+/// A view's command.
+struct LoopCommand {
+  study::LoopView view;
+  const char* help;
+  const char* report;
+};
+
+constexpr LoopCommand loop_commands[] = {
+    {study::LoopView::bode, "Bode plot and margins of transfer functions",
+     "Write the report into this folder: Bode plot, its data"},
+    {study::LoopView::nyquist, "Nyquist curves, the count of encirclements, margins",
+     "Write the report into this folder: Nyquist curve, its data"},
+    {study::LoopView::nichols, "Nichols plot and margins of transfer functions",
+     "Write the report into this folder: Nichols plot, its data"},
+    {study::LoopView::rlocus, "Root locus: stable gains, where branches meet and cross",
+     "Write the report into this folder: root locus, its data"},
+    {study::LoopView::step, "Step responses and what they are judged by",
+     "Write the report into this folder: step response, its data"},
+    {study::LoopView::impulse, "Impulse responses",
+     "Write the report into this folder: impulse response, its data"},
+    {study::LoopView::margins, "Every gain and phase crossing of a loop, and its margins",
+     "Write the report into this folder: margins, Bode plot"},
+    {study::LoopView::sisotool, "One page of a loop: root locus, Bode, Nyquist, closed-loop step",
+     "Write the page into this folder"},
+};
+
+struct Options {
+  CommonOptions common;
+  std::vector<std::string> expressions;
+  std::vector<study::Override> given;
+  study::LoopView view = study::LoopView::bode;
+};
+
+int run(const Options& options) {
+  if (const std::string& out = options.common.out; !out.empty()) {
+    if (const auto folder = OutputFolder::create(out); !folder) {
+      return fail(folder.error(), options.common, schema);
+    }
+  }
+  const auto answer = study::loop_job(options.view, options.expressions, options.given)
+                          .and_then(&study::study_loops)
+                          .map([](const auto& result) { return study::answer_of(result); });
+  if (!answer) {
+    return fail(answer.error(), options.common, schema);
+  }
+  const int status = tell(*answer, options.common, false);
+  if (status == success && options.common.out.empty() && !options.common.json) {
+    print("\n--out DIR draws it: pictures, their data, and a page whose plots answer\n");
+  }
+  return status;
+}
+
+}  // namespace
+
+void add_loop_commands(CLI::App& program, Invocation& invocation) {
+  for (const LoopCommand& of : loop_commands) {
+    CLI::App* command = program.add_subcommand(std::string(to_string(of.view)), of.help);
+    command->footer(
+        "EXPR is a transfer function in s, or in z with --period: numbers, + - * / ^, parentheses, "
+        "exp(-T*s)\n"
+        "for dead time, z^-1, coefficients such as [1 2]/[1 3 2]; or a JSON file with expr, or num "
+        "and den,\n"
+        "and dt, delay. Several are shown in one picture. The loop is 1/(1 + k C EXPR), negative "
+        "feedback.\n"
+        "\n  flyball " +
+        std::string(to_string(of.view)) + " \"2/(s^2+3*s+2)" +
+        (of.view == study::LoopView::rlocus ? "\"" : "*exp(-0.1*s)\"") + " --out report");
+    auto options = std::make_shared<Options>();
+    options->view = of.view;
+    options->common.typed = invocation.typed;
+    command->add_option("EXPR", options->expressions, "Transfer functions, or JSON files of them");
+    add_field_options(*command, study::loop_fields(of.view), options->given);
+    add_common_options(*command, options->common, of.report);
+    command->callback([options, &invocation] {
+      invocation.status =
+          guarded([&] { return run(*options); }, options->common, schema, "the transfer functions");
+    });
+  }
+}
+
+}  // namespace flyball::app

@@ -1,0 +1,575 @@
+// Loops in tables and as JSON.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <flyball/io/json_writer.hpp>
+
+#include "core/wording.hpp"
+#include "study/answer/loop_study_parts.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+using classical::LoopMargins;
+using text::number;
+using enum LoopView;
+
+constexpr const char* schema = "flyball.loop/1";
+
+double decibels(double gain) {
+  return 20.0 * std::log10(gain);
+}
+
+/// A number and its unit, or words where there is none.
+Value or_none(const std::optional<double>& value, const std::string& unit, double scale = 1.0) {
+  return value ? quantity(scale * *value, unit) : Value("none", Tone::quiet);
+}
+
+/// "62.7°"
+Value degrees(double angle) {
+  Value value = quantity(angle, "°");
+  value.text = number(angle) + "°";
+  return value;
+}
+
+Value gain_margin(const LoopMargins& margins) {
+  if (!margins.gain_margin) {
+    return margins.stable ? Value("∞") : Value("none", Tone::quiet);
+  }
+  return quantity(decibels(*margins.gain_margin), "dB");
+}
+
+Value phase_margin(const LoopMargins& margins) {
+  if (!margins.phase_margin) {
+    return margins.stable ? Value("∞") : Value("none", Tone::quiet);
+  }
+  return degrees(*margins.phase_margin);
+}
+
+/// What becomes of the closed loop.
+Value stability_of(const LoopFindings& loop) {
+  if (loop.margins->stable) {
+    return {"stable", Tone::good};
+  }
+  return {
+      fmt::format("unstable, {} {}",
+                  text::count(static_cast<std::size_t>(loop.margins->unstable_poles), "pole"),
+                  loop.transfer.period() ? "not inside the unit circle" : "not left of the axis"),
+      Tone::bad};
+}
+
+Section margins_section(const LoopResult& result) {
+  Section section{"margins", "Margins of the opened loop", {}};
+  if (result.loops.size() > 1) {
+    Table table{.header = {"loop", "closed loop", "gain margin", "phase margin", "delay margin",
+                           "disk margin", "max |S|"},
+                .words = {0, 1}};
+    for (const LoopFindings& loop : result.loops) {
+      const LoopMargins& m = *loop.margins;
+      table.rows.push_back({short_name(loop),
+                            m.stable ? Value("stable", Tone::good) : Value("unstable", Tone::bad),
+                            gain_margin(m), phase_margin(m), quantity(m.delay_margin, "s"),
+                            quantity(m.disk_margin, ""), quantity(m.sensitivity.value, "")});
+    }
+    section.blocks.push_back(std::move(table));
+    return section;
+  }
+  const LoopFindings& loop = result.loops.front();
+  const LoopMargins& m = *loop.margins;
+  Facts facts;
+  facts.add("closed loop", stability_of(loop));
+  facts.add("gain margin", gain_margin(m));
+  facts.add("phase margin", phase_margin(m));
+  facts.add("delay margin", quantity(m.delay_margin, "s"));
+  facts.add("disk margin", quantity(m.disk_margin, ""));
+  Value peak = quantity(m.sensitivity.value, "");
+  peak.text += fmt::format(" at {} rad/s", number(m.sensitivity.frequency));
+  facts.add("largest |1/(1 + L)|", std::move(peak));
+  facts.add("L(0)", quantity(loop.transfer.dc_gain(), ""));
+  if (loop.bandwidth) {
+    facts.add("bandwidth of L", quantity(*loop.bandwidth, "rad/s"));
+  }
+  section.blocks.push_back(std::move(facts));
+  if (!m.gain_crossings.empty() || !m.phase_crossings.empty()) {
+    Table table{.caption = "Every crossing",
+                .header = {"frequency (rad/s)", "what", "margin"},
+                .words = {1}};
+    for (const auto& at : m.gain_crossings) {
+      table.rows.push_back(
+          {quantity(at.frequency, "rad/s", 5, false), "|L| = 1", degrees(at.phase_margin)});
+    }
+    for (const auto& at : m.phase_crossings) {
+      table.rows.push_back({quantity(at.frequency, "rad/s", 5, false), "L < 0",
+                            quantity(decibels(at.gain_margin), "dB")});
+    }
+    std::stable_sort(table.rows.begin(), table.rows.end(), [](const auto& a, const auto& b) {
+      return a.front().number.value_or(0.0) < b.front().number.value_or(0.0);
+    });
+    section.blocks.push_back(std::move(table));
+  }
+  return section;
+}
+
+/// What is told of each loop: below each other of one, a row each of several.
+struct Column {
+  std::string name;
+  std::vector<Value> values{};
+};
+Block told(const LoopResult& result, std::vector<Column> columns) {
+  if (result.loops.size() == 1) {
+    Facts facts;
+    for (Column& column : columns) {
+      facts.add(std::move(column.name), std::move(column.values.front()));
+    }
+    return facts;
+  }
+  Table table{.header = {""}, .words = {0}};
+  for (std::size_t i = 0; i < result.loops.size(); ++i) {
+    table.rows.push_back({short_name(result.loops[i])});
+    for (Column& column : columns) {
+      if (i == 0) {
+        table.header.push_back(column.name);
+      }
+      table.rows.back().push_back(std::move(column.values[i]));
+    }
+  }
+  return table;
+}
+
+Section nyquist_section(const LoopResult& result) {
+  std::vector<Column> columns{{"unstable poles of L"},
+                              {"encirclements of −1"},
+                              {"unstable poles of the closed loop"},
+                              {"distance from −1"}};
+  for (const LoopFindings& loop : result.loops) {
+    const classical::NyquistData& n = *loop.nyquist;
+    const auto counted = [](const std::optional<int>& count) {
+      return count ? Value(fmt::format("{}", *count)) : Value("none: the curve meets −1");
+    };
+    columns[0].values.emplace_back(fmt::format("{}", n.open_loop_unstable));
+    columns[1].values.push_back(counted(n.encirclements));
+    columns[2].values.push_back(counted(n.closed_loop_unstable));
+    columns[3].values.push_back(quantity(n.distance, ""));
+  }
+  return {"nyquist", "Nyquist's count", {told(result, std::move(columns))}};
+}
+
+std::string ranges_of(const std::vector<classical::GainRange>& ranges) {
+  if (ranges.empty()) {
+    return "none";
+  }
+  std::vector<std::string> texts;
+  for (const classical::GainRange& range : ranges) {
+    texts.push_back(fmt::format("{} to {}", number(range.low, 6), number(range.high, 6)));
+  }
+  return text::enumerate(texts);
+}
+
+std::string angles_of(const std::vector<double>& angles) {
+  std::vector<std::string> texts;
+  for (const double angle : angles) {
+    texts.push_back(number(angle, 4) + "°");
+  }
+  return fmt::format("{}", fmt::join(texts, ", "));
+}
+
+void add_locus(Section& section, const LoopResult& result, const LoopFindings& loop) {
+  const classical::RootLocus& locus = *loop.locus;
+  if (result.loops.size() > 1) {
+    section.blocks.push_back(Paragraph{loop.name});
+  }
+  Facts facts;
+  facts.add("stable for k", ranges_of(locus.stable_gains),
+            locus.stable_gains.empty() ? Tone::bad : Tone::good);
+  if (!locus.asymptotes.angles.empty()) {
+    facts.add("asymptotes", fmt::format("from {}, at {}", number(locus.asymptotes.center),
+                                        angles_of(locus.asymptotes.angles)));
+  }
+  section.blocks.push_back(std::move(facts));
+  Table table{.header = {"on the locus", "k", "s", "frequency (rad/s)", "damping ratio"},
+              .words = {0, 2}};
+  if (loop.transfer.period()) {
+    table.header[2] = "z";
+  }
+  const auto row = [&](std::string what, std::optional<double> gain, std::complex<double> point) {
+    const std::complex<double> s =
+        loop.transfer.period() ? std::log(point) / loop.transfer.period()->si() : point;
+    const double frequency = std::abs(s);
+    table.rows.push_back(
+        {std::move(what), gain ? quantity(*gain, "", 6) : Value("", Tone::quiet),
+         text::complex_number(point, 6),
+         std::isfinite(frequency) ? quantity(frequency, "rad/s", 5, false) : Value("∞"),
+         std::isfinite(frequency) && frequency > 0.0 ? quantity(-s.real() / frequency, "", 4)
+                                                     : Value("")});
+  };
+  for (const classical::BranchPoint& at : locus.branch_points) {
+    if (at.point.imag() >= 0.0) {
+      row(at.branches == 2 ? "two branches meet" : fmt::format("{} branches meet", at.branches),
+          at.gain, at.point);
+    }
+  }
+  for (const classical::BorderCrossing& at : locus.crossings) {
+    row("border of stability", at.gain, at.point);
+  }
+  for (const classical::LocusPoint& at : loop.at_damping) {
+    row(fmt::format("damping ratio {}", number(*result.job.damping)), at.gain, at.point);
+  }
+  if (loop.closed_poles) {
+    for (const std::complex<double>& pole : *loop.closed_poles) {
+      if (pole.imag() >= 0.0) {
+        row("closed loop", result.job.gain, pole);
+      }
+    }
+  }
+  section.blocks.push_back(std::move(table));
+  Table roots{.header = {"of L", "at", "branches leave or arrive at"}, .words = {0, 1, 2}};
+  for (const auto& [angles, what] :
+       {std::pair(&locus.departures, "pole"), std::pair(&locus.arrivals, "zero")}) {
+    for (const classical::LocusAngles& root : *angles) {
+      if (root.root.imag() >= 0.0) {
+        roots.rows.push_back({what, text::complex_number(root.root, 6), angles_of(root.angles)});
+      }
+    }
+  }
+  section.blocks.push_back(std::move(roots));
+}
+
+Section locus_section(const LoopResult& result) {
+  Section section{"rlocus", "Root locus", {}};
+  for (const LoopFindings& loop : result.loops) {
+    if (loop.locus) {
+      add_locus(section, result, loop);
+    }
+  }
+  return section;
+}
+
+Section response_section(const LoopResult& result) {
+  const bool closed = result.job.closed || result.job.view == sisotool;
+  Section section{"response",
+                  result.job.view == LoopView::impulse ? "Impulse response"
+                  : closed                             ? "Step response of the closed loop"
+                                                       : "Step response",
+                  {}};
+  if (result.job.view == LoopView::impulse) {
+    std::vector<Column> columns{{"largest"}, {"after"}};
+    for (const LoopFindings& loop : result.loops) {
+      const auto& y = loop.response->value;
+      const auto largest = std::max_element(
+          y.begin(), y.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
+      columns[0].values.push_back(quantity(*largest, "", 5));
+      columns[1].values.push_back(
+          quantity(loop.response->time[static_cast<std::size_t>(largest - y.begin())], "s"));
+    }
+    section.blocks.push_back(told(result, std::move(columns)));
+    return section;
+  }
+  std::vector<Column> columns{{"final value"}, {"rise 10–90 %"}, {"settled in 2 %"}, {"overshoot"},
+                              {"undershoot"},  {"peak"},         {"peak at"}};
+  bool off = false;
+  bool restless = false;
+  for (const LoopFindings& loop : result.loops) {
+    const classical::StepMetrics m = loop.response->metrics.value_or(
+        classical::StepMetrics{.final_value = std::numeric_limits<double>::quiet_NaN()});
+    off = off || loop.response->read_off;
+    restless = restless || !m.settling_time;
+    columns[0].values.push_back(std::isnan(m.final_value) ? Value("none", Tone::quiet)
+                                                          : quantity(m.final_value, "", 5));
+    columns[1].values.push_back(or_none(m.rise_time, "s"));
+    columns[2].values.push_back(or_none(m.settling_time, "s"));
+    columns[3].values.push_back(or_none(m.overshoot, "%", 100.0));
+    columns[4].values.push_back(or_none(m.undershoot, "%", 100.0));
+    columns[5].values.push_back(or_none(m.peak, ""));
+    columns[6].values.push_back(or_none(m.peak_time, "s"));
+  }
+  section.blocks.push_back(told(result, std::move(columns)));
+  if (off) {
+    section.blocks.push_back(Paragraph{
+        "Of a closed loop with dead time the numbers are read off the response, to about a "
+        "thousandth of its time; the response itself takes the dead time as it is.",
+        Tone::quiet});
+  }
+  if (restless) {
+    section.blocks.push_back(
+        Paragraph{"What does not settle (unstable, or with an integrator) has no final value, and "
+                  "nothing that hangs on it.",
+                  Tone::quiet});
+  }
+  return section;
+}
+
+Section system_section(const LoopResult& result) {
+  Section section{"system", "What was asked about", {}};
+  Table table{.header = {"transfer function", "zeros", "poles", "dead time"},
+              .words = {0, 1, 2},
+              .wide_column = 2};
+  for (const LoopFindings& loop : result.loops) {
+    const auto roots = [](const Eigen::VectorXcd& all) {
+      std::vector<std::string> texts;
+      for (const std::complex<double>& root : all) {
+        if (root.imag() >= 0.0) {
+          texts.push_back(text::complex_number(root, 5));
+        }
+      }
+      constexpr std::size_t most = 12;
+      if (texts.size() > most) {
+        texts.resize(most);
+        texts.push_back("…");
+      }
+      return texts.empty() ? std::string("none") : fmt::format("{}", fmt::join(texts, ", "));
+    };
+    table.rows.push_back({short_name(loop), roots(loop.zeros), roots(loop.poles),
+                          quantity(loop.transfer.delay(), "s")});
+  }
+  section.blocks.push_back(std::move(table));
+  Facts facts;
+  if (!result.job.compensator.empty()) {
+    facts.add("compensator", result.job.compensator, Tone::plain);
+  }
+  if (result.job.gain != 1.0) {
+    facts.add("gain k", quantity(result.job.gain, "", 6));
+  }
+  if (const auto& period = result.loops.front().transfer.period()) {
+    facts.add("sample period", text::seconds(period->si()), Tone::plain);
+  }
+  if (!facts.facts.empty()) {
+    section.blocks.push_back(std::move(facts));
+  }
+  return section;
+}
+
+/// Whether the loop will do, in a line.
+Verdict verdict_of(const LoopResult& result) {
+  const LoopFindings& first = result.loops.front();
+  Verdict verdict;
+  if (result.loops.size() > 1) {
+    if (first.margins) {
+      const auto stable =
+          static_cast<std::size_t>(std::count_if(result.loops.begin(), result.loops.end(),
+                                                 [](const auto& l) { return l.margins->stable; }));
+      verdict.line = fmt::format("{} of {} closed loops are stable", stable, result.loops.size());
+      verdict.tone = stable == result.loops.size() ? Tone::good : Tone::caution;
+    }
+    return verdict;
+  }
+  if (first.margins) {
+    const LoopMargins& m = *first.margins;
+    verdict.tone = m.stable ? Tone::good : Tone::bad;
+    verdict.line = m.stable
+                       ? fmt::format("The closed loop is stable: phase margin {}, gain margin {}",
+                                     phase_margin(m).text, gain_margin(m).text)
+                       : fmt::format("The closed loop is {}", stability_of(first).text);
+    if (m.stable && m.sensitivity.value > 2.0) {
+      verdict.add(Tone::caution,
+                  fmt::format("the curve passes −1 at {} (1/max |S|), where 0.5 is usual",
+                              number(1.0 / m.sensitivity.value, 3)));
+    }
+  } else if (first.locus) {
+    verdict.line = fmt::format("Stable for k: {}", ranges_of(first.locus->stable_gains));
+    verdict.tone = first.locus->stable_gains.empty() ? Tone::bad : Tone::good;
+  } else if (first.response && first.response->metrics) {
+    const classical::StepMetrics& m = *first.response->metrics;
+    verdict.tone = m.settling_time ? Tone::good : Tone::caution;
+    verdict.line =
+        m.settling_time
+            ? fmt::format("Ends at {}, settled after {}, overshoot {}", number(m.final_value),
+                          text::seconds(*m.settling_time), text::percent(m.overshoot.value_or(0.0)))
+            : std::string("Does not settle");
+  }
+  return verdict;
+}
+
+std::string title_of(const LoopResult& result) {
+  static constexpr std::array<std::string_view, 8> titles{
+      "Bode plot",     "Nyquist curve",    "Nichols plot", "Root locus",
+      "Step response", "Impulse response", "Margins",      "Loop"};
+  const auto view = static_cast<std::size_t>(result.job.view);
+  return result.loops.size() == 1
+             ? fmt::format("{} of {}", titles[view], short_name(result.loops.front()))
+             : fmt::format("{}: {} transfer functions", titles[view], result.loops.size());
+}
+
+Document document_of(const LoopResult& result) {
+  Document document{.title = title_of(result), .verdict = verdict_of(result)};
+  const LoopFindings& first = result.loops.front();
+  document.sections.push_back(system_section(result));
+  if (first.locus) {
+    document.sections.push_back(locus_section(result));
+  }
+  if (first.margins) {
+    document.sections.push_back(margins_section(result));
+  }
+  if (first.nyquist) {
+    document.sections.push_back(nyquist_section(result));
+  }
+  if (first.response) {
+    document.sections.push_back(response_section(result));
+  }
+  if (!result.diagnostics.empty()) {
+    document.sections.push_back(diagnostics_section(result.diagnostics));
+  }
+  return document;
+}
+
+void write_margins(JsonWriter& json, const LoopFindings& loop) {
+  const LoopMargins& m = *loop.margins;
+  json.object("margins", [&] {
+    json.add("stable", m.stable);
+    json.add("unstable_poles", m.unstable_poles);
+    json.add("gain_margin", m.gain_margin);
+    json.add("phase_margin_deg", m.phase_margin);
+    json.add({{"delay_margin", m.delay_margin}, {"disk_margin", m.disk_margin}});
+    json.add("sensitivity_peak", {{"Ms", m.sensitivity.value}, {"w", m.sensitivity.frequency}});
+    json.add("bandwidth", loop.bandwidth);
+    json.list("phase_margins", m.gain_crossings, [&](const classical::GainCrossing& at) {
+      json.object([&] { json.add({{"w", at.frequency}, {"pm_deg", at.phase_margin}}); });
+    });
+    json.list("gain_margins", m.phase_crossings, [&](const classical::PhaseCrossing& at) {
+      json.object([&] { json.add({{"w", at.frequency}, {"gm", at.gain_margin}}); });
+    });
+  });
+}
+
+void write_locus(JsonWriter& json, const LoopFindings& loop) {
+  const classical::RootLocus& locus = *loop.locus;
+  json.object("root_locus", [&] {
+    json.add("gains", locus.gains);
+    json.key("branches");
+    json.open('[');
+    for (Eigen::Index branch = 0; branch < locus.branches.cols(); ++branch) {
+      json.write(Eigen::VectorXcd(locus.branches.col(branch)));
+    }
+    json.close(']');
+    json.list("branch_points", locus.branch_points, [&](const classical::BranchPoint& at) {
+      json.object([&] {
+        json.add("point", std::vector{at.point.real(), at.point.imag()});
+        json.add("gain", at.gain);
+        json.add("branches", at.branches);
+      });
+    });
+    json.list("crossings", locus.crossings, [&](const classical::BorderCrossing& at) {
+      json.object([&] {
+        json.add("point", std::vector{at.point.real(), at.point.imag()});
+        json.add({{"w", at.frequency}, {"gain", at.gain}});
+      });
+    });
+    json.object("asymptotes", [&] {
+      json.add("center", locus.asymptotes.center);
+      json.add("angles_deg", locus.asymptotes.angles);
+    });
+    for (const auto& [name, angles] :
+         {std::pair("departures", &locus.departures), std::pair("arrivals", &locus.arrivals)}) {
+      json.list(name, *angles, [&](const classical::LocusAngles& root) {
+        json.object([&] {
+          json.add("root", std::vector{root.root.real(), root.root.imag()});
+          json.add("angles_deg", root.angles);
+        });
+      });
+    }
+    json.list("stable_gains", locus.stable_gains, [&](const classical::GainRange& range) {
+      json.object([&] { json.add({{"low", range.low}, {"high", range.high}}); });
+    });
+    json.list("at_damping", loop.at_damping, [&](const classical::LocusPoint& at) {
+      json.object([&] {
+        json.add("point", std::vector{at.point.real(), at.point.imag()});
+        json.add("gain", at.gain);
+      });
+    });
+  });
+}
+
+void write_response(JsonWriter& json, const LoopResponse& response) {
+  json.object("response", [&] {
+    json.add("time", response.time);
+    json.add("value", response.value);
+    if (response.metrics) {
+      const classical::StepMetrics& m = *response.metrics;
+      json.object("step", [&] {
+        json.add("final_value", m.final_value);
+        json.add("rise_time", m.rise_time);
+        json.add("settling_time", m.settling_time);
+        json.add("overshoot", m.overshoot ? std::optional(100.0 * *m.overshoot) : m.overshoot);
+        json.add("undershoot", m.undershoot ? std::optional(100.0 * *m.undershoot) : m.undershoot);
+        json.add("peak", m.peak);
+        json.add("peak_time", m.peak_time);
+        json.add("exact", !response.read_off);
+      });
+    }
+  });
+}
+
+std::string to_json(const LoopResult& result) {
+  JsonWriter json;
+  json.object([&] {
+    json.add("schema", schema);
+    json.add("view", to_string(result.job.view));
+    if (result.frequency.size() > 0) {
+      json.add("w", result.frequency);
+    }
+    json.list("loops", result.loops, [&](const LoopFindings& loop) {
+      json.object([&] {
+        json.add("expression", loop.name);
+        json.add("num", loop.transfer.num());
+        json.add("den", loop.transfer.den());
+        json.add("delay", loop.transfer.delay());
+        if (loop.transfer.period()) {
+          json.add("dt", loop.transfer.period()->si());
+        }
+        json.add("zeros", loop.zeros);
+        json.add("poles", loop.poles);
+        json.add("dcgain", loop.transfer.dc_gain());
+        if (loop.margins) {
+          write_margins(json, loop);
+        }
+        if (loop.bode) {
+          std::vector<double> gains;
+          for (const double gain : loop.bode->gain) {
+            gains.push_back(decibels(gain));
+          }
+          json.add("gain_db", gains);
+          json.add("phase_deg", loop.bode->phase);
+        }
+        if (loop.nyquist) {
+          json.object("nyquist", [&] {
+            json.add("w", loop.nyquist->frequency);
+            json.add("value", loop.nyquist->value);
+            json.add("encirclements", loop.nyquist->encirclements);
+            json.add("open_loop_unstable", loop.nyquist->open_loop_unstable);
+            json.add("closed_loop_unstable", loop.nyquist->closed_loop_unstable);
+            json.add("distance", loop.nyquist->distance);
+          });
+        }
+        if (loop.locus) {
+          write_locus(json, loop);
+        }
+        if (loop.closed_poles) {
+          json.add("closed_loop_poles", *loop.closed_poles);
+        }
+        if (loop.response) {
+          write_response(json, *loop.response);
+        }
+      });
+    });
+    json.add("diagnostics", result.diagnostics);
+  });
+  return std::move(json).text();
+}
+
+}  // namespace
+
+Answer answer_of(const LoopResult& result) {
+  return {.schema = schema,
+          .json = to_json(result),
+          .document = document_of(result),
+          .figures = figures_of(result),
+          .files = data_files(result)};
+}
+
+}  // namespace flyball::study

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <flyball/study/loop_study.hpp>
+
+/// Pieces of the answer about loops.
+namespace flyball::study {
+
+/// The pictures of a view, in the order in which they are looked at.
+[[nodiscard]] std::vector<Figure> figures_of(const LoopResult& result);
+/// The same as CSV.
+[[nodiscard]] std::vector<AnswerFile> data_files(const LoopResult& result);
+
+/// An expression for a legend: its beginning, where it is long.
+[[nodiscard]] std::string short_name(const LoopFindings& loop);
+
+}  // namespace flyball::study

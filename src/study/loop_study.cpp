@@ -1,0 +1,393 @@
+#include <flyball/study/loop_study.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <flyball/classical/delay_response.hpp>
+#include <flyball/classical/transfer_expression.hpp>
+#include <flyball/math/expression/formula.hpp>
+#include <flyball/systems/response.hpp>
+
+#include "core/diagnose.hpp"
+#include "core/try.hpp"
+#include "core/wording.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+using classical::TransferFunction;
+using Eigen::Index;
+using Eigen::VectorXd;
+using enum LoopView;
+
+/// An error of an expression with the line at fault, a caret under the place.
+Errors quoted(Error error, std::span<const std::string> texts) {
+  std::size_t which = 0;
+  bool placed = false;
+  for (const Evidence& evidence : error.evidence()) {
+    if (evidence.name == "text" && !evidence.values.empty()) {
+      which = static_cast<std::size_t>(evidence.values.front());
+    }
+    placed = placed || evidence.name == "offset";
+  }
+  if (!placed || which >= texts.size()) {
+    return error;
+  }
+  QuotedError shown{std::move(error)};
+  shown.excerpt = expression::caret_lines(texts[which], shown);
+  return Errors(std::vector{std::move(shown)});
+}
+
+/// C and G.
+std::vector<std::string> texts_of(const LoopJob& job, const std::string& expression) {
+  return job.compensator.empty() ? std::vector{expression}
+                                 : std::vector{job.compensator, expression};
+}
+
+/// k C G, with the dead time of the job.
+ExpectedAll<TransferFunction> transfer_of(const LoopJob& job, const std::string& expression) {
+  const std::vector<std::string> texts = texts_of(job, expression);
+  auto parsed = classical::parse_transfer_product(texts, job.period);
+  if (!parsed) {
+    return tl::unexpected(quoted(std::move(parsed).error(), texts));
+  }
+  return TransferFunction::create(job.gain * parsed->num(), parsed->den(), parsed->period(),
+                                  Time(parsed->delay() + job.delay.si()))
+      .map_error([](Error error) { return Errors(std::move(error)); });
+}
+
+/// What a step response is judged by where there is nothing exact: read off its samples.
+classical::StepMetrics read_off(const std::vector<double>& time, const std::vector<double>& value,
+                                double final_value) {
+  classical::StepMetrics metrics{.final_value = final_value};
+  const auto share = [&](std::size_t i) { return value[i] / final_value; };
+  const auto crossing = [&](std::size_t i, double level) {
+    const double before = share(i - 1);
+    return time[i - 1] + (time[i] - time[i - 1]) * (level - before) / (share(i) - before);
+  };
+  std::optional<double> ten;
+  std::optional<double> ninety;
+  double settled = 0.0;
+  std::size_t top = 0;
+  double least = 0.0;
+  constexpr double band = 0.02;
+  for (std::size_t i = 1; i < time.size(); ++i) {
+    for (auto& [first, level] : {std::pair(&ten, 0.1), std::pair(&ninety, 0.9)}) {
+      if (!*first && share(i - 1) < level && share(i) >= level) {
+        *first = crossing(i, level);
+      }
+    }
+    if (std::abs(share(i - 1) - 1.0) > band) {
+      const double edge = share(i - 1) > 1.0 ? 1.0 + band : 1.0 - band;
+      settled = std::abs(share(i) - 1.0) <= band ? crossing(i, edge) : time[i];
+    }
+    top = share(i) > share(top) ? i : top;
+    least = std::min(least, share(i));
+  }
+  if (ten && ninety) {
+    metrics.rise_time = *ninety - *ten;
+  }
+  if (std::abs(share(time.size() - 1) - 1.0) <= band) {
+    metrics.settling_time = settled;
+  }
+  const bool beyond = share(top) > 1.0 + 1e-9;
+  metrics.overshoot = beyond ? share(top) - 1.0 : 0.0;
+  metrics.undershoot = -least;
+  metrics.peak = beyond ? value[top] : final_value;
+  if (beyond) {
+    metrics.peak_time = time[top];
+  }
+  return metrics;
+}
+
+std::vector<double> list(const auto& values) {
+  return {values.begin(), values.end()};
+}
+
+/// The response of a rational function behind its dead time.
+Expected<LoopResponse> rational_response(const TransferFunction& transfer, bool impulse,
+                                         const std::optional<ResponseTimes>& times) {
+  const ContinuousSystem<> system = transfer.to_state_space();
+  LinearResponse found;
+  if (transfer.period()) {
+    const DiscreteSystem<> sampled{system.A, system.B, system.C, system.D, *transfer.period()};
+    FLYBALL_TRY(found,
+                impulse ? impulse_response(sampled, 0, times) : step_response(sampled, 0, times));
+  } else {
+    FLYBALL_TRY(found,
+                impulse ? impulse_response(system, 0, times) : step_response(system, 0, times));
+  }
+  LoopResponse response{.time = list(found.time), .value = list(found.y.col(0)), .metrics = {}};
+  if (const double delay = transfer.delay(); delay > 0.0) {
+    for (double& time : response.time) {
+      time += delay;
+    }
+    response.time.insert(response.time.begin(), {0.0, delay});
+    response.value.insert(response.value.begin(), {0.0, 0.0});
+  }
+  return response;
+}
+
+/// A gain: nothing moves.
+LoopResponse static_response(const TransferFunction& transfer, double end) {
+  const double gain = transfer.dc_gain();
+  const double delay = transfer.delay();
+  LoopResponse response;
+  response.time = delay > 0.0 ? std::vector{0.0, delay, delay, delay + end} : std::vector{0.0, end};
+  response.value = delay > 0.0 ? std::vector{0.0, 0.0, gain, gain} : std::vector{gain, gain};
+  return response;
+}
+
+class Study {
+ public:
+  explicit Study(const LoopJob& job) : result_{.job = job} {}
+
+  ExpectedAll<LoopResult> run() {
+    for (const std::string& expression : job().expressions) {
+      FLYBALL_TRY(auto transfer, transfer_of(job(), expression));
+      result_.loops.push_back({.name = expression, .transfer = std::move(transfer)});
+    }
+    for (LoopFindings& loop : result_.loops) {
+      if (auto found = look(loop); !found) {
+        return tl::unexpected(named(loop, std::move(found).error()));
+      }
+    }
+    if (in({bode, nichols, sisotool, margins})) {
+      FLYBALL_CHECK(bode_curves().map_error([](Error error) { return Errors(std::move(error)); }));
+    }
+    if (in({step, impulse, sisotool})) {
+      FLYBALL_CHECK(responses().map_error([](Error error) { return Errors(std::move(error)); }));
+    }
+    return std::move(result_);
+  }
+
+ private:
+  [[nodiscard]] const LoopJob& job() const { return result_.job; }
+  [[nodiscard]] bool in(std::initializer_list<LoopView> views) const {
+    return std::find(views.begin(), views.end(), job().view) != views.end();
+  }
+  /// Which of several it is.
+  [[nodiscard]] Error named(const LoopFindings& loop, Error error) const {
+    return result_.loops.size() == 1 ? std::move(error)
+                                     : Error(std::move(error).with("expression", loop.name));
+  }
+
+  [[nodiscard]] classical::FrequencyGridOptions grid_options() const {
+    classical::FrequencyGridOptions options;
+    if (job().from) {
+      options.low = job().from->si();
+    }
+    if (job().to) {
+      options.high = job().to->si();
+    }
+    return options;
+  }
+
+  /// What needs no common axis.
+  Expected<void> look(LoopFindings& loop) {
+    FLYBALL_TRY(const auto roots,
+                classical::parse_zero_pole_gain(texts_of(job(), loop.name), job().period));
+    loop.zeros = roots.zeros();
+    loop.poles = roots.poles();
+    FLYBALL_TRY(const auto left, classical::without_cancellations(roots));
+    for (const classical::Cancellation& pair : left.cancelled) {
+      if (pair.pole.imag() < 0.0) {
+        continue;
+      }
+      const std::string pole = text::complex_number(pair.pole);
+      if (pair.unstable) {
+        warn(result_.diagnostics, "unstable_cancellation",
+             "{}: a zero hides the pole at {}, which grows unseen: whatever the margins say, the "
+             "loop is not stable",
+             loop.name, pole);
+      } else {
+        note(result_.diagnostics, "cancellation",
+             "{}: a zero hides the pole at {}; it stays where it is, whatever the gain", loop.name,
+             pole);
+      }
+    }
+    if (in({bode, nyquist, nichols, margins, sisotool})) {
+      FLYBALL_TRY(loop.margins, classical::loop_margins(loop.transfer));
+      FLYBALL_TRY(loop.bandwidth, classical::bandwidth(loop.transfer));
+    }
+    if (in({nyquist, sisotool})) {
+      FLYBALL_TRY(const auto response, classical::frequency_response(loop.transfer));
+      FLYBALL_TRY(loop.nyquist, classical::nyquist(response, grid_options()));
+    }
+    if (in({rlocus, sisotool})) {
+      FLYBALL_CHECK(locus(loop));
+    }
+    return {};
+  }
+
+  Expected<void> locus(LoopFindings& loop) {
+    const bool late = !loop.transfer.period() && loop.transfer.delay() > 0.0;
+    if (job().view == sisotool && (late || loop.transfer.order() == 0)) {
+      if (late) {
+        note(result_.diagnostics, "no_locus",
+             "there is no root locus of a loop with dead time: it has infinitely many branches; "
+             "all else takes the dead time as it is");
+      }
+      return {};
+    }
+    // Of C G: k is what the locus is about.
+    FLYBALL_TRY(const auto without_gain,
+                TransferFunction::create(loop.transfer.num() / job().gain, loop.transfer.den(),
+                                         loop.transfer.period(), Time(loop.transfer.delay())));
+    FLYBALL_TRY(loop.locus, classical::root_locus(
+                                without_gain, {.negative = job().negative, .largest_gain = {}}));
+    if (job().damping) {
+      FLYBALL_TRY(loop.at_damping, classical::locus_at_damping(without_gain, *job().damping));
+    }
+    if (auto closed = classical::unity_feedback(
+            loop.transfer.delay() > 0.0 ? with_late_poles(loop.transfer) : loop.transfer)) {
+      FLYBALL_TRY(loop.closed_poles, closed->poles());
+    }
+    return {};
+  }
+
+  /// The delay of a discrete one as poles at z = 0.
+  static TransferFunction with_late_poles(const TransferFunction& transfer) {
+    const auto late = static_cast<Index>(std::lround(transfer.delay() / transfer.period()->si()));
+    VectorXd den = VectorXd::Zero(transfer.den().size() + late);
+    den.head(transfer.den().size()) = transfer.den();
+    return TransferFunction::create(transfer.num(), den, transfer.period()).value();
+  }
+
+  /// All on the frequencies of each.
+  Expected<void> bode_curves() {
+    std::vector<classical::FrequencyResponse> all;
+    std::vector<double> frequencies;
+    for (const LoopFindings& loop : result_.loops) {
+      FLYBALL_TRY(auto response, classical::frequency_response(loop.transfer));
+      FLYBALL_TRY(const auto grid, classical::frequency_grid(response, grid_options()));
+      frequencies.insert(frequencies.end(), grid.frequency.begin(), grid.frequency.end());
+      all.push_back(std::move(response));
+    }
+    std::sort(frequencies.begin(), frequencies.end());
+    frequencies.erase(
+        std::unique(frequencies.begin(), frequencies.end(),
+                    [](double a, double b) { return std::abs(a - b) <= 1e-12 * std::abs(b); }),
+        frequencies.end());
+    if (const double highest =
+            result_.loops.front().transfer.period() ? all.front().highest_frequency() : HUGE_VAL;
+        !frequencies.empty()) {
+      frequencies.back() = std::min(frequencies.back(), highest);
+    }
+    result_.frequency =
+        Eigen::Map<const VectorXd>(frequencies.data(), static_cast<Index>(frequencies.size()));
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      FLYBALL_TRY(auto data, classical::bode(all[i], result_.frequency));
+      result_.loops[i].bode = std::move(data.curves.front());
+    }
+    return {};
+  }
+
+  /// The closed loop where it has dead time.
+  Expected<LoopResponse> late_response(const TransferFunction& loop, bool impulse,
+                                       const std::optional<ResponseTimes>& times) const {
+    FLYBALL_TRY(const auto open, classical::DelaySystem::create(loop));
+    FLYBALL_TRY(const auto closed, classical::feedback(open));
+    FLYBALL_TRY(const auto found, impulse ? classical::impulse_response(closed, 0, times)
+                                          : classical::step_response(closed, 0, times));
+    return LoopResponse{.time = list(found.time), .value = list(found.y.col(0)), .metrics = {}};
+  }
+
+  Expected<LoopResponse> response_of(const LoopFindings& loop,
+                                     const std::optional<ResponseTimes>& times) const {
+    const bool impulse = job().view == LoopView::impulse;
+    const bool closed = job().closed || job().view == sisotool;
+    TransferFunction shown = loop.transfer;
+    if (closed) {
+      if (!shown.period() && shown.delay() > 0.0) {
+        FLYBALL_TRY(auto response, late_response(shown, impulse, times));
+        if (!impulse) {
+          const double at_rest = shown.dc_gain();
+          const double final_value = std::isinf(at_rest) ? 1.0 : at_rest / (1.0 + at_rest);
+          const auto margins = classical::loop_margins(shown);
+          if (margins && margins->stable && final_value != 0.0) {
+            response.metrics = read_off(response.time, response.value, final_value);
+            response.read_off = true;
+          }
+        }
+        return response;
+      }
+      FLYBALL_TRY(shown,
+                  classical::unity_feedback(shown.delay() > 0.0 ? with_late_poles(shown) : shown));
+    }
+    if (shown.order() == 0) {
+      LoopResponse response = static_response(
+          shown, times ? times->step.si() * static_cast<double>(times->samples) : 1.0);
+      if (impulse) {
+        return refusal(ArgumentError::out_of_range, to_string(job().view), "the transfer function")
+            .got("a gain")
+            .expected("one with poles: the impulse response of a gain is an impulse");
+      }
+      FLYBALL_TRY(response.metrics, classical::step_metrics(shown));
+      return response;
+    }
+    FLYBALL_TRY(auto response, rational_response(shown, impulse, times));
+    if (!impulse) {
+      FLYBALL_TRY(response.metrics, classical::step_metrics(shown));
+    }
+    return response;
+  }
+
+  Expected<void> responses() {
+    std::vector<LoopResponse> found;
+    double end = 0.0;
+    const auto& period = result_.loops.front().transfer.period();
+    for (const LoopFindings& loop : result_.loops) {
+      std::optional<ResponseTimes> times;
+      if (job().duration) {
+        times = times_until(job().duration->si(), period);
+      }
+      auto response = response_of(loop, times);
+      if (!response) {
+        return tl::unexpected(named(loop, std::move(response).error()));
+      }
+      end = std::max(end, response->time.back());
+      found.push_back(*std::move(response));
+    }
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      // What settles sooner is followed as long as the others.
+      if (!job().duration && found[i].time.back() < 0.999 * end) {
+        if (auto longer = response_of(result_.loops[i], times_until(end, period))) {
+          longer->metrics = found[i].metrics;
+          found[i] = *std::move(longer);
+        }
+      }
+      result_.loops[i].response = std::move(found[i]);
+    }
+    return {};
+  }
+
+  static ResponseTimes times_until(double end, const std::optional<Time>& period) {
+    constexpr Index most = 100'000;
+    if (period) {
+      const double samples = std::floor(end / period->si() * (1.0 + 1e-12)) + 1.0;
+      return {*period, static_cast<Index>(std::min(samples, static_cast<double>(most)))};
+    }
+    constexpr Index steps = 1000;
+    return {Time(end / static_cast<double>(steps)), steps + 1};
+  }
+
+  LoopResult result_;
+};
+
+}  // namespace
+
+ExpectedAll<LoopResult> study_loops(const LoopJob& job) {
+  if (job.expressions.empty()) {
+    return tl::unexpected(Errors(Error(ArgumentError::empty)
+                                     .in(std::string(to_string(job.view)))
+                                     .about("the transfer functions")));
+  }
+  return Study(job).run();
+}
+
+}  // namespace flyball::study
