@@ -173,6 +173,8 @@ template <class Function>
 [[nodiscard]] std::vector<Kind> system_kinds();
 [[nodiscard]] std::vector<Kind> response_kinds();
 [[nodiscard]] std::vector<Kind> transfer_function_kinds();
+[[nodiscard]] std::vector<Kind> root_locus_kinds();
+[[nodiscard]] std::vector<Kind> step_kinds();
 [[nodiscard]] std::vector<Kind> realization_kinds();
 [[nodiscard]] std::vector<Kind> interconnection_kinds();
 [[nodiscard]] std::vector<Kind> regulator_kinds();
