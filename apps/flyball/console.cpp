@@ -139,13 +139,13 @@ std::size_t columns() {
   constexpr std::size_t narrowest = 40;
   constexpr std::size_t widest = 160;
   constexpr std::size_t ordinary = 100;
-  winsize size{};
   std::size_t found = 0;
-  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0) {
-    found = size.ws_col;
-  }
-  if (const char* given = environment("COLUMNS"); found == 0 && given != nullptr) {
+  if (const char* given = environment("COLUMNS")) {  // what is asked for goes before what is there
     found = std::strtoul(given, nullptr, 10);
+  }
+  winsize size{};
+  if (found == 0 && ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0) {
+    found = size.ws_col;
   }
   return found == 0 ? ordinary : std::clamp(found, narrowest, widest);
 }

@@ -3,6 +3,7 @@
 #include <exception>
 #include <filesystem>
 #include <new>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,6 +18,7 @@
 
 #include "commands.hpp"
 #include "console.hpp"
+#include "help_text.hpp"
 #include "progress_line.hpp"
 #include "session.hpp"
 
@@ -44,6 +46,12 @@ std::string unknown_command(const CLI::App& program, int argc, char** argv) {
   return fmt::format("\"{}\" is not a command; {}", wanted,
                      nearest.empty() ? fmt::format("commands are {}", fmt::join(names, ", "))
                                      : fmt::format("did you mean \"{}\"?", nearest));
+}
+
+/// Help as wide as what shows it, and in the signs that it shows.
+std::string for_terminal(const std::string& help) {
+  const auto style = flyball::app::terminal_style();
+  return flyball::app::folded_help(style.ascii ? flyball::ascii(help) : help, style.width);
 }
 
 int run(int argc, char** argv) {
@@ -111,10 +119,13 @@ int run(int argc, char** argv) {
   try {
     program.parse(argc, argv);
   } catch (const CLI::Success& answer) {
-    return program.exit(answer);
+    std::ostringstream words;
+    const int status = program.exit(answer, words, words);
+    flyball::app::print(for_terminal(words.str()));
+    return status;
   } catch (const CLI::ParseError& problem) {
     if (argc < 2) {  // as git does: who does not know a command is told them all
-      std::fputs(program.help().c_str(), stderr);
+      std::fputs(for_terminal(program.help()).c_str(), stderr);
       return flyball::app::bad_input;
     }
     const auto commands = program.get_subcommands();

@@ -218,10 +218,49 @@ std::string render(const Table& table, const TerminalStyle& style) {
   return group.empty() ? out : out + render_columns(table, group, width, style);
 }
 
+void change(std::string& text) {
+  text = ascii(text);
+}
+void change(Value& value) {
+  change(value.text);
+}
+void change(Facts& facts) {
+  for (Facts::Fact& fact : facts.facts) {
+    change(fact.name);
+    change(fact.value);
+  }
+}
+void change(Table& table) {
+  change(table.caption);
+  for (std::string& name : table.header) {
+    change(name);
+  }
+  for (std::vector<Value>& row : table.rows) {
+    for (Value& value : row) {
+      change(value);
+    }
+  }
+}
+void change(Paragraph& paragraph) {
+  change(paragraph.text);
+}
+void change(Findings& findings) {
+  for (Diagnostic& diagnostic : findings.diagnostics) {
+    change(diagnostic.message);
+  }
+}
+void change(Code& code) {
+  change(code.title);
+  change(code.text);
+}
+void change(Steps& steps) {
+  for (std::string& step : steps.steps) {
+    change(step);
+  }
+}
+
 /// Every text of a document in ASCII.
 Document in_ascii(Document document) {
-  const auto change = [](std::string& text) { text = ascii(text); };
-  const auto change_value = [&](Value& value) { change(value.text); };
   change(document.title);
   change(document.verdict.line);
   for (std::string& reason : document.verdict.reasons) {
@@ -230,27 +269,7 @@ Document in_ascii(Document document) {
   for (Section& section : document.sections) {
     change(section.title);
     for (Block& block : section.blocks) {
-      if (auto* facts = std::get_if<Facts>(&block)) {
-        for (Facts::Fact& fact : facts->facts) {
-          change(fact.name);
-          change_value(fact.value);
-        }
-      } else if (auto* table = std::get_if<Table>(&block)) {
-        change(table->caption);
-        std::for_each(table->header.begin(), table->header.end(), change);
-        for (auto& row : table->rows) {
-          std::for_each(row.begin(), row.end(), change_value);
-        }
-      } else if (auto* paragraph = std::get_if<Paragraph>(&block)) {
-        change(paragraph->text);
-      } else if (auto* findings = std::get_if<Findings>(&block)) {
-        for (Diagnostic& diagnostic : findings->diagnostics) {
-          change(diagnostic.message);
-        }
-      } else if (auto* code = std::get_if<Code>(&block)) {
-        change(code->title);
-        change(code->text);
-      }
+      std::visit([](auto& b) { change(b); }, block);
     }
   }
   return document;

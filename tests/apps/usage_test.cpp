@@ -1,4 +1,7 @@
 // What a newcomer types first, and what a shell, a pager and a program get of it.
+#include <iterator>
+#include <sstream>
+
 #include <nlohmann/json.hpp>
 
 #include "run.hpp"
@@ -87,6 +90,61 @@ TEST_F(Usage, TablesAreFoldedToTheTerminal) {
     const Answer units = run(set + "units");
     EXPECT_LE(widest(units.out), static_cast<std::size_t>(columns)) << units.out;
   }
+}
+
+// What an option means is folded behind its name, or under it; nothing of it is lost.
+TEST_F(Usage, HelpIsFoldedToTheTerminal) {
+  const std::string command = std::string("'") + FLYBALL_COMMAND + "' ";
+  const auto words = [](const std::string& text) {
+    std::istringstream in(text);
+    return std::vector<std::string>(std::istream_iterator<std::string>(in), {});
+  };
+  const auto help = [&](const std::string& of, int columns) {
+    return run("motors >/dev/null; LC_ALL=C.UTF-8 COLUMNS=" + std::to_string(columns) + ' ' +
+               command + of + " --help")
+        .out;
+  };
+  for (const char* of : {"tune", "design", "estimate", "localize"}) {
+    const std::string whole = help(of, 160);
+    for (const int columns : {40, 60, 80, 120}) {
+      const std::string folded = help(of, columns);
+      EXPECT_EQ(words(folded), words(whole)) << of << columns;
+      // Names and examples keep their lines.
+      std::istringstream lines(folded);
+      for (std::string line; std::getline(lines, line);) {
+        const bool meaning = line.starts_with("      ");
+        const bool entry = columns >= 60 && line.starts_with("  -");
+        const bool prose = !line.starts_with(" ");
+        EXPECT_TRUE(!(meaning || entry || prose) ||
+                    widest(line) <= static_cast<std::size_t>(columns))
+            << line;
+      }
+    }
+  }
+  EXPECT_TRUE(holds(help("tune", 100), "\n  --run N:FROM..TO,…          What to use of single"));
+  EXPECT_TRUE(is_ascii(run("motors >/dev/null; LC_ALL=C " + command + "help tune").out));
+}
+
+// What is asked for goes before what the terminal has.
+TEST_F(Usage, ColumnsGoBeforeTheTerminalsWidth) {
+  write("narrow.py",
+        "import fcntl, os, pty, struct, subprocess, sys, termios\n"
+        "master, slave = pty.openpty()\n"
+        "fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack('HHHH', 50, int(sys.argv[1]), 0, 0))\n"
+        "subprocess.run([sys.argv[2], 'motors'], stdout=slave, check=True)\n"
+        "os.close(slave)\n"
+        "text = b''\n"
+        "try:\n"
+        "    while True: text += os.read(master, 65536)\n"
+        "except OSError: pass\n"
+        "print(text.decode().count('Kv rad/s/V'), text.decode().count('Falcon 500 FOC'))\n");
+  const std::string command = std::string(" '") + FLYBALL_COMMAND + "'";
+  const std::string set = "motors >/dev/null; TERM=xterm NO_COLOR=1 LC_ALL=C.UTF-8 ";
+  // Where the table does not fit it is two below each other, each with the motors' names.
+  EXPECT_EQ(run(set + "python3 narrow.py 120" + command).out, "1 1\n");
+  EXPECT_EQ(run(set + "python3 narrow.py 60" + command).out, "1 2\n");
+  EXPECT_EQ(run(set + "COLUMNS=60 python3 narrow.py 120" + command).out, "1 2\n");
+  EXPECT_EQ(run(set + "COLUMNS=none python3 narrow.py 60" + command).out, "1 2\n");
 }
 
 TEST_F(Usage, PlainAsciiWhereTheLocaleHasNoMore) {

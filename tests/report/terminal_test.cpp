@@ -106,8 +106,7 @@ TEST(Terminal, IsWithinItsWidthAndAligned) {
        {MechanismKind::flywheel, MechanismKind::elevator, MechanismKind::arm}) {
     for (const std::string& line : lines_of(text_of(tune_result(kind)))) {
       // Code to paste keeps its lines.
-      EXPECT_TRUE(display_width(line) <= 100 || has(line, "//") || has(line, "# "))
-          << line;
+      EXPECT_TRUE(display_width(line) <= 100 || has(line, "//") || has(line, "# ")) << line;
     }
   }
 }
@@ -140,7 +139,11 @@ TEST(Terminal, AsciiWhereThereIsNoUtf8) {
   const Document document{
       .title = "10 rad/s²",
       .verdict = {.line = "±2σ"},
-      .sections = {{"t", "", {Table{.header = {"Ω"}, .rows = {{"15 mΩ"}}}, Paragraph{"kg·m²"}}}}};
+      .sections = {{"t",
+                    "",
+                    {Table{.header = {"Ω"}, .rows = {{"15 mΩ"}}}, Paragraph{"kg·m²"},
+                     Facts{{{"σ", "1 °"}}}, Findings{{{"c", Severity::info, "− 3"}}},
+                     Code{"Größe", "// V·s"}, Steps{{"at most 18 m/s²"}}}}}};
   const std::string text = to_terminal(document, {.ascii = true});
   for (const char c : text) {
     EXPECT_LT(static_cast<unsigned char>(c), 0x80) << text;
@@ -149,6 +152,7 @@ TEST(Terminal, AsciiWhereThereIsNoUtf8) {
   EXPECT_TRUE(has(text, "+-2sigma"));
   EXPECT_TRUE(has(text, "15 mOhm"));
   EXPECT_TRUE(has(text, "kg*m^2"));
+  EXPECT_TRUE(has(text, "at most 18 m/s^2"));
   EXPECT_TRUE(has(text, "-------"));
 }
 
