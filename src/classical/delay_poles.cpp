@@ -12,6 +12,7 @@
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/spectral_blocks.hpp"
 #include "systems/balance.hpp"
 
 namespace flyball::classical {
@@ -53,7 +54,7 @@ class Characteristic {
     A_ = inverse.asDiagonal() * form.A * scaling.asDiagonal();
     B_ = inverse.asDiagonal() * form.B2;
     C_ = form.C2 * scaling.asDiagonal();
-    open_ = A_.size() > 0 ? eigenvalues_of(A_) : VectorXcd(0);
+    open_ = flyball::detail::eigenvalues_by_parts_of(A_);
   }
 
   [[nodiscard]] Index states() const { return A_.rows(); }
@@ -497,7 +498,7 @@ Expected<DelayPoles> judged(const Characteristic& f, double jumps) {
 DelayPoles of_matrix(const MatrixXd& A, bool discrete) {
   DelayPoles found;
   found.high_frequency_abscissa = -infinity;
-  const VectorXcd values = A.size() > 0 ? eigenvalues_of(A) : VectorXcd(0);
+  const VectorXcd values = flyball::detail::eigenvalues_by_parts_of(A);
   std::vector<Complex> all(values.begin(), values.end());
   sort_by_real_part(all);
   if (discrete) {

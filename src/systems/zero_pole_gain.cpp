@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "math/dense/dense.hpp"
+#include "math/dense/spectral_blocks.hpp"
 #include "systems/balance.hpp"
 #include "systems/zero_pole_gain.hpp"
 
@@ -111,7 +112,7 @@ std::optional<ZeroPoleGain> zero_pole_gain(const ContinuousSystem<>& system) {
   const auto [A, b0, c0, d0] = scaled_system(system, scaling_of(system.A, system.B, system.C));
 
   ZeroPoleGain zpk;
-  const Eigen::VectorXcd poles = eigenvalues_of(A);
+  const Eigen::VectorXcd poles = eigenvalues_by_parts_of(A);
   if (!poles.allFinite()) {
     return std::nullopt;
   }

@@ -65,8 +65,7 @@ Eigensystem eigensystem_of(const MatrixRef& A) {
 Eigen::VectorXcd eigenvalues_of(const MatrixRef& A) {
   Eigen::VectorXcd values(A.rows());
   Eigen::Index done = 0;
-  const std::vector<MatrixXd> blocks = spectral_parts(A);
-  for (const MatrixXd& block : blocks) {
+  for (const MatrixXd& block : spectral_blocks(A)) {
     const Eigen::Index n = block.rows();
     if (n == 0) {
       continue;

@@ -184,16 +184,24 @@ std::vector<MatrixXd> spectral_blocks(const MatrixRef& A) {
   return blocks;
 }
 
-std::vector<MatrixXd> spectral_parts(const MatrixRef& A) {
-  std::vector<MatrixXd> blocks = spectral_blocks(A);
-  if (blocks.size() > 1 || !A.allFinite() || (A.array() != 0.0).all()) {
-    return blocks;
+Eigen::VectorXcd eigenvalues_by_parts_of(const MatrixRef& A) {
+  if (A.size() == 0) {
+    return Eigen::VectorXcd(0);
   }
-  blocks.clear();
+  if (!A.allFinite() || (A.array() != 0.0).all()) {
+    return eigenvalues_of(A);
+  }
+  Eigen::VectorXcd values(A.rows());
+  Index done = 0;
   for (const Indices& part : parts_of(A)) {
-    blocks.emplace_back(A(part, part));
+    const auto size = static_cast<Index>(part.size());
+    values.segment(done, size) = eigenvalues_of(A(part, part));
+    done += size;
   }
-  return blocks;
+  if (!values.allFinite()) {
+    values.setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+  return values;
 }
 
 }  // namespace flyball::detail

@@ -18,8 +18,8 @@ namespace flyball::detail {
 /// methods in control" (1986), section 2.2; Golub and Van Loan, "Matrix Computations", section 7.6.
 [[nodiscard]] std::vector<Eigen::MatrixXd> spectral_blocks(const MatrixRef& A);
 
-/// The same, and the parts of A where they are not far apart, too: its eigenvalues are theirs,
-/// whatever couples them.
-[[nodiscard]] std::vector<Eigen::MatrixXd> spectral_parts(const MatrixRef& A);
+/// The eigenvalues of A, part by part also where the parts are not far apart: its eigenvalues are
+/// theirs, whatever couples them. All NaN where the QR iteration did not converge.
+[[nodiscard]] Eigen::VectorXcd eigenvalues_by_parts_of(const MatrixRef& A);
 
 }  // namespace flyball::detail
