@@ -273,6 +273,9 @@ class Maker {
                 {"C", rows_of(matrix(p, n))},
                 {"D", rows_of(matrix(p, m))}};
       }
+      case FieldType::transfer:
+        return {{"num", rows_of(matrix(1, size_of(field.rows)))[0]},
+                {"den", rows_of(matrix(1, size_of(field.columns)))[0]}};
       case FieldType::texts:
         return json(std::vector<std::string>(static_cast<std::size_t>(size_of(field.rows)), "x"));
       default:

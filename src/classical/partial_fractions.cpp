@@ -375,9 +375,7 @@ std::string TimeFunction::text(int digits) const {
   return delay > 0.0 ? written + " from t = " + text::number(delay, digits) + " on" : written;
 }
 
-namespace {
-
-TimeFunction function_of(const PartialFractions& fractions, double delay) {
+TimeFunction function_of_time(const PartialFractions& fractions, double delay) {
   TimeFunction f;
   f.impulses = fractions.polynomial.reverse();
   f.delay = delay;
@@ -400,6 +398,8 @@ TimeFunction function_of(const PartialFractions& fractions, double delay) {
   return f;
 }
 
+namespace {
+
 Expected<void> check_continuous(const std::optional<Time>& period) {
   if (!period) {
     return {};
@@ -414,13 +414,13 @@ Expected<void> check_continuous(const std::optional<Time>& period) {
 Expected<TimeFunction> inverse_laplace(const TransferFunction& transform) {
   FLYBALL_CHECK(check_continuous(transform.period()));
   FLYBALL_TRY(const auto fractions, partial_fractions(transform.num(), transform.den()));
-  return function_of(fractions, transform.delay());
+  return function_of_time(fractions, transform.delay());
 }
 
 Expected<TimeFunction> inverse_laplace(const ZeroPoleGain& transform) {
   FLYBALL_CHECK(check_continuous(transform.period()));
   FLYBALL_TRY(const auto fractions, partial_fractions(transform));
-  return function_of(fractions, transform.delay());
+  return function_of_time(fractions, transform.delay());
 }
 
 Expected<TimeFunction> step_in_closed_form(const TransferFunction& transfer) {
@@ -428,7 +428,7 @@ Expected<TimeFunction> step_in_closed_form(const TransferFunction& transfer) {
   VectorXd den = VectorXd::Zero(transfer.den().size() + 1);
   den.head(transfer.den().size()) = transfer.den();
   FLYBALL_TRY(const auto fractions, partial_fractions(transfer.num(), den));
-  return function_of(fractions, transfer.delay());
+  return function_of_time(fractions, transfer.delay());
 }
 
 }  // namespace flyball::classical

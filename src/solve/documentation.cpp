@@ -48,6 +48,8 @@ std::string type_of(const Field& field) {
                          fmt::join(text::split(field.choices, " "), ", "));
     case FieldType::system:
       return fmt::format("system of {}", shape);
+    case FieldType::transfer:
+      return "transfer function, num and den";
   }
   return {};
 }

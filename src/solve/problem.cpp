@@ -38,6 +38,17 @@ constexpr std::array<Field, 4> fields_of_system(const Field& system) {
           matrix("D", system.outputs, system.columns, Absent::zero)};
 }
 
+constexpr std::array<Field, 4> fields_of_transfer(const Field& transfer) {
+  const auto list = [](std::string_view name, std::string_view length) {
+    return Field{.name = name, .type = FieldType::list, .rows = length, .columns = "1"};
+  };
+  const auto or_zero = [](std::string_view name) {
+    return Field{.name = name, .type = FieldType::number, .absent = Absent::number};
+  };
+  return {list("num", transfer.rows), list("den", transfer.columns), or_zero("dt"),
+          or_zero("delay")};
+}
+
 std::string in_quotes(std::string_view text) {
   return fmt::format("\"{}\"", text);
 }
@@ -75,6 +86,7 @@ class ProblemReader {
   [[nodiscard]] Expected<std::string_view> choice(const Field& field, const Json& json) const;
   [[nodiscard]] Expected<void> matrix(const Field& field, const Json& json, MatrixXd& M);
   [[nodiscard]] Expected<ContinuousSystem<>> system(const Field& field, const Json& json);
+  [[nodiscard]] Expected<TransferCoefficients> transfer(const Field& field, const Json& json);
   [[nodiscard]] Expected<void> refused_if(const Verdict& verdict, const Field& field) const {
     if (verdict) {
       return tl::unexpected(malformed(field, verdict->got, verdict->expected));
@@ -158,6 +170,10 @@ Expected<void> ProblemReader::read_value(const Field& field, const Json& json, V
       return refused_if(read_texts(json, value.emplace<std::vector<std::string>>()), field);
     case FieldType::system: {
       FLYBALL_TRY(value, system(field, json));
+      return {};
+    }
+    case FieldType::transfer: {
+      FLYBALL_TRY(value, transfer(field, json));
       return {};
     }
     case FieldType::flag:
@@ -269,6 +285,19 @@ Expected<ContinuousSystem<>> ProblemReader::system(const Field& field, const Jso
   }
   FLYBALL_CHECK(ProblemReader(json, where_, prefix, sizes_).read(fields, inner));
   return inner.system();
+}
+
+Expected<TransferCoefficients> ProblemReader::transfer(const Field& field, const Json& json) {
+  if (!json.is_object()) {
+    return tl::unexpected(malformed(
+        field, kind_of(json), "a transfer function, such as {\"num\": [1], \"den\": [1, 2]}"));
+  }
+  const std::array<Field, 4> fields = fields_of_transfer(field);
+  const std::string prefix = full(field.name) + '.';
+  Problem inner;
+  FLYBALL_CHECK(ProblemReader(json, where_, prefix, sizes_).read(fields, inner));
+  return TransferCoefficients{inner.matrix("num"), inner.matrix("den"), inner.number("dt"),
+                              inner.number("delay")};
 }
 
 Expected<Problem> Problem::read(const Json& object, std::span<const Field> fields,

@@ -16,6 +16,14 @@
 
 namespace flyball::solve {
 
+/// A transfer function as it is written: nothing of it is checked but that its lists are numbers.
+struct TransferCoefficients {
+  Eigen::VectorXd num;  ///< Descending powers.
+  Eigen::VectorXd den;
+  double dt = 0.0;     ///< s; 0 of a continuous one.
+  double delay = 0.0;  ///< s
+};
+
 /// The fields of one object, read and checked against their rows.
 class Problem {
  public:
@@ -49,6 +57,9 @@ class Problem {
   [[nodiscard]] const ContinuousSystem<>& system(std::string_view name) const {
     return get<ContinuousSystem<>>(name);
   }
+  [[nodiscard]] const TransferCoefficients& transfer(std::string_view name) const {
+    return get<TransferCoefficients>(name);
+  }
   [[nodiscard]] const std::vector<std::string>& texts(std::string_view name) const {
     return get<std::vector<std::string>>(name);
   }
@@ -63,8 +74,9 @@ class Problem {
   }
 
  private:
-  using Value = std::variant<std::monostate, double, std::string_view, Eigen::MatrixXd,
-                             Eigen::VectorXcd, ContinuousSystem<>, std::vector<std::string>>;
+  using Value =
+      std::variant<std::monostate, double, std::string_view, Eigen::MatrixXd, Eigen::VectorXcd,
+                   ContinuousSystem<>, std::vector<std::string>, TransferCoefficients>;
   friend class ProblemReader;
 
   [[nodiscard]] std::size_t index_of(std::string_view name) const;

@@ -83,6 +83,12 @@ constexpr Field system(std::string_view name, std::string_view states, std::stri
           .help = help};
 }
 
+/// A transfer function. @param num, den  The sizes of its lists of coefficients.
+constexpr Field transfer(std::string_view name, std::string_view num, std::string_view den,
+                         std::string_view help) {
+  return {.name = name, .type = FieldType::transfer, .rows = num, .columns = den, .help = help};
+}
+
 // What holds for a field that is left out.
 
 constexpr Field optional(Field field, Absent absent = Absent::nothing, double otherwise = 0.0) {
@@ -175,6 +181,7 @@ template <class Function>
 [[nodiscard]] std::vector<Kind> transfer_function_kinds();
 [[nodiscard]] std::vector<Kind> root_locus_kinds();
 [[nodiscard]] std::vector<Kind> step_kinds();
+[[nodiscard]] std::vector<Kind> transfer_algebra_kinds();
 [[nodiscard]] std::vector<Kind> realization_kinds();
 [[nodiscard]] std::vector<Kind> interconnection_kinds();
 [[nodiscard]] std::vector<Kind> regulator_kinds();

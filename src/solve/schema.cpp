@@ -64,6 +64,8 @@ Json type_of(const Field& field, bool problem) {
     }
     case FieldType::system:
       return reference("system");
+    case FieldType::transfer:
+      return reference("transfer");
   }
   return {};
 }
@@ -110,12 +112,19 @@ std::string json_schema() {
   Json system = any_of(object_with({{"A", matrix}, {"B", matrix}, {"C", matrix}, {"D", matrix}},
                                    Json::array({"A", "B"})),
                        object_with({{"D", matrix}}, Json::array({"D"})));
+  const Json coefficients = list_of(reference("number"));
+  Json transfer = object_with({{"num", coefficients},
+                               {"den", coefficients},
+                               {"dt", reference("number")},
+                               {"delay", reference("number")}},
+                              Json::array({"num", "den"}));
   Json definitions = {
       {"number", any_of({{"type", "number"}}, {{"enum", Json::array({"inf", "-inf", nullptr})}})},
       {"complex",
        {{"type", "array"}, {"items", reference("number")}, {"minItems", 2}, {"maxItems", 2}}},
       {"matrix", list_of(list_of(reference("number")))},
       {"system", std::move(system)},
+      {"transfer", std::move(transfer)},
       {"refusal",
        {{"type", "object"},
         {"properties",

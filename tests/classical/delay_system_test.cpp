@@ -135,6 +135,33 @@ TEST(DelaySystem, OfTransferFunctions) {
   EXPECT_LE(std::abs(system.at({0.5, 0.2}).value()(0, 0) - late.at({0.5, 0.2}).value()), 1e-15);
 }
 
+// Numbers of mpmath with 50 digits.
+TEST(DelaySystem, Gold) {
+  int seen = 0;
+  for (const auto& c : test::cases_of("interconnection.json")) {
+    const auto system = [&](const char* name) {
+      return DelaySystem::create(test::transfer_of(c[name])).value();
+    };
+    const DelaySystem G = system("G");
+    const DelaySystem H = system("H");
+    const std::pair<const char*, DelaySystem> made[] = {
+        {"jw_series", series(G, H).value()},
+        {"jw_parallel", parallel(G, H).value()},
+        {"jw_feedback_neg", feedback(G, H).value()},
+        {"jw_feedback_pos", feedback(G, H, FeedbackSign::positive).value()}};
+    for (const auto& [name, connected] : made) {
+      for (std::size_t i = 0; i < c["w"].size(); ++i) {
+        ++seen;
+        const Complex expected(c[name][i][0].get<double>(), c[name][i][1].get<double>());
+        EXPECT_LE(std::abs(connected.response(c["w"][i].get<double>())(0, 0) - expected),
+                  1e-12 * std::abs(expected))
+            << c["name"] << ' ' << name << " at " << c["w"][i];
+      }
+    }
+  }
+  EXPECT_GE(seen, 60);
+}
+
 // A loop of dead time alone, y = u - k y(t - τ): 1/(1 + k e^{-jωτ}); without the dead time u/(1 +
 // k).
 TEST(DelaySystem, StaticLoopWithDeadTime) {

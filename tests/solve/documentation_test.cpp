@@ -86,6 +86,8 @@ bool is_as_told(const Json& value, const Field& field, Letters& letters) {
     case FieldType::complex_list:
       return value.is_array() && letters.fits(std::string(field.rows), value.size()) &&
              std::all_of(value.begin(), value.end(), is_complex);
+    case FieldType::transfer:
+      return value.is_object() && value.at("num").is_array() && value.at("den").is_array();
     case FieldType::matrices:
       return value.is_array() && std::all_of(value.begin(), value.end(), [&](const Json& M) {
                return is_matrix(M, field, letters);

@@ -59,6 +59,9 @@ struct TimeFunction {
   [[nodiscard]] std::string text(int digits = 6) const;
 };
 
+/// The function of time of which fractions are the transform. @param delay  s
+[[nodiscard]] TimeFunction function_of_time(const PartialFractions& fractions, double delay = 0.0);
+
 /// The inverse Laplace transform in closed form; of a transfer function the impulse response.
 /// @errors As `partial_fractions`; TransferError::period_mismatch for a discrete one.
 /// Source: book, Table E.1.

@@ -30,6 +30,7 @@ enum class FieldType {
   record,        ///< Of an answer: numbers by name, {"w": 1.5, "gm": 3}; `choices` are the names.
   records,       ///< A list of such.
   system,        ///< {"A": …, "B": …, "C": …, "D": …}; C left out is the identity, D zero.
+  transfer,      ///< {"num": …, "den": …}, of a problem with "dt" and "delay", zero if left out.
 };
 
 /// What stands for a field that a problem leaves out. In an answer, everything but `refused` says
