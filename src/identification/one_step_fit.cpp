@@ -10,8 +10,31 @@
 #include <flyball/identification/identification_error.hpp>
 
 #include "core/try.hpp"
+#include "identification/one_step_gains.hpp"
 
 namespace flyball::identification {
+
+OneStepFit one_step_gains(const Eigen::VectorXd& solution, double period, bool elevator, bool arm) {
+  OneStepFit fit;
+  fit.period = period;
+  fit.alpha = solution[0];
+  fit.beta = solution[1];
+  fit.gamma = solution[2];
+  fit.kS = -fit.gamma / fit.beta;         // (14.7)
+  fit.kV = (1.0 - fit.alpha) / fit.beta;  // (14.8)
+  fit.kA = fit.alpha > 0.0 ? (fit.alpha - 1.0) * fit.period / (fit.beta * std::log(fit.alpha))
+                           : std::numeric_limits<double>::quiet_NaN();  // (14.9)
+  if (elevator) {
+    fit.kG = -solution[3] / fit.beta;
+  } else if (arm) {
+    // kG cos(θ + offset) = kG cos(offset) cos θ − kG sin(offset) sin θ
+    const double cosine = -solution[3] / fit.beta;
+    const double sine = -solution[4] / fit.beta;
+    fit.kG = std::hypot(cosine, sine);
+    fit.angle_offset = std::atan2(-sine, cosine);
+  }
+  return fit;
+}
 
 Expected<OneStepFit> fit_one_step(const PreparedRecording& recording) {
   using mechanisms::MechanismKind;
@@ -60,24 +83,7 @@ Expected<OneStepFit> fit_one_step(const PreparedRecording& recording) {
   }
   const Eigen::VectorXd solution = qr.solve(x_next);
 
-  OneStepFit fit;
-  fit.period = recording.row_period;
-  fit.alpha = solution[0];
-  fit.beta = solution[1];
-  fit.gamma = solution[2];
-  fit.kS = -fit.gamma / fit.beta;         // (14.7)
-  fit.kV = (1.0 - fit.alpha) / fit.beta;  // (14.8)
-  fit.kA = fit.alpha > 0.0 ? (fit.alpha - 1.0) * fit.period / (fit.beta * std::log(fit.alpha))
-                           : std::numeric_limits<double>::quiet_NaN();  // (14.9)
-  if (elevator) {
-    fit.kG = -solution[3] / fit.beta;
-  } else if (arm) {
-    // kG cos(θ + offset) = kG cos(offset) cos θ − kG sin(offset) sin θ
-    const double cosine = -solution[3] / fit.beta;
-    const double sine = -solution[4] / fit.beta;
-    fit.kG = std::hypot(cosine, sine);
-    fit.angle_offset = std::atan2(-sine, cosine);
-  }
+  OneStepFit fit = one_step_gains(solution, recording.row_period, elevator, arm);
   const double residual = (x_next - regressors * solution).squaredNorm();
   const double total = (x_next.array() - x_next.mean()).matrix().squaredNorm();
   fit.r_squared = total > 0.0 ? 1.0 - residual / total : 0.0;

@@ -18,12 +18,40 @@
 
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
+#include "io/csv_layout.hpp"
 #include "io/csv_table.hpp"
 #include "io/csv_time.hpp"
 #include "io/signals.hpp"
 #include "io/text.hpp"
 
 namespace flyball {
+
+namespace io {
+
+bool is_blank_cell(std::string_view cell) {
+  if (cell.empty()) {
+    return true;
+  }
+  constexpr std::array<std::string_view, 5> words{"null", "undefined", "n/a", "#n/a", "nil"};
+  return cell.size() <= 9 && std::find(words.begin(), words.end(), lower(cell)) != words.end();
+}
+
+std::optional<double> cell_number(std::string_view cell) {
+  const std::string word = lower(trim(cell));
+  if (word == "true" || word == "false") {
+    return word == "true" ? 1.0 : 0.0;
+  }
+  // A comma in a cell of a table that commas separate was quoted: it is a decimal one too.
+  if (std::count(word.begin(), word.end(), ',') == 1 && word.find('.') == std::string::npos) {
+    std::string with_point = word;
+    std::replace(with_point.begin(), with_point.end(), ',', '.');
+    return parse_number(with_point);
+  }
+  return parse_number(word);
+}
+
+}  // namespace io
+
 namespace {
 
 using io::CsvTable;
@@ -53,30 +81,6 @@ Header split_header(std::string_view text) {
 
 bool is_time_name(std::string_view name) {
   return io::time_name(name).is_time;
-}
-
-/// Cells in which loggers write that there is no value.
-bool is_blank(std::string_view cell) {
-  if (cell.empty()) {
-    return true;
-  }
-  constexpr std::array<std::string_view, 5> words{"null", "undefined", "n/a", "#n/a", "nil"};
-  return cell.size() <= 9 && std::find(words.begin(), words.end(), io::lower(cell)) != words.end();
-}
-
-/// A cell's value: a number, or true and false as 1 and 0.
-std::optional<double> cell_number(std::string_view cell) {
-  const std::string word = io::lower(io::trim(cell));
-  if (word == "true" || word == "false") {
-    return word == "true" ? 1.0 : 0.0;
-  }
-  // A comma in a cell of a table that commas separate was quoted: it is a decimal one too.
-  if (std::count(word.begin(), word.end(), ',') == 1 && word.find('.') == std::string::npos) {
-    std::string with_point = word;
-    std::replace(with_point.begin(), with_point.end(), ',', '.');
-    return io::parse_number(with_point);
-  }
-  return io::parse_number(word);
 }
 
 class Reader {
@@ -114,8 +118,39 @@ class Reader {
     return std::move(log_);
   }
 
+  /// Of a table whose first lines these are.
+  Expected<std::optional<io::CsvLayout>> layout() {
+    FLYBALL_CHECK(read_header());
+    if (is_list() || table_.rows.size() <= first_row_) {
+      return std::optional<io::CsvLayout>();
+    }
+    FLYBALL_TRY(const std::size_t clock, time_column());
+    const double scale = time_scale(clock);
+    std::vector<std::optional<double>> time(table_.rows.size());
+    std::optional<double> last;
+    for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
+      const std::optional<double> value = number(cell(row, clock));
+      // Dates, and rows that are out of order or of another clock, are for who sees them all.
+      if (!value || !std::isfinite(*value) || (last && *value < *last)) {
+        return std::optional<io::CsvLayout>();
+      }
+      last = value;
+      time[row] = *value * scale;
+    }
+    io::CsvLayout layout{table_.delimiter, clock, scale, {}, {}};
+    for (std::size_t c = 0; c < headers_.size(); ++c) {
+      const std::size_t texts = log_.texts.size();
+      if (c != clock) {
+        read_column(c, time);
+      }
+      layout.columns.push_back({headers_[c].name, headers_[c].unit, log_.texts.size() > texts});
+    }
+    layout.diagnostics = log_.diagnostics;
+    return std::optional(std::move(layout));
+  }
+
  private:
-  static std::optional<double> number(std::string_view cell) { return cell_number(cell); }
+  static std::optional<double> number(std::string_view cell) { return io::cell_number(cell); }
 
   /// Lines before the header: a program's name, a date, a line without two cells.
   void skip_titles() {
@@ -153,7 +188,7 @@ class Reader {
     }
     const std::vector<std::string>& first = table_.rows.front();
     const bool headless = std::all_of(first.begin(), first.end(), [&](const std::string& cell) {
-      return is_blank(io::trim(cell)) || number(cell).has_value();
+      return io::is_blank_cell(io::trim(cell)) || number(cell).has_value();
     });
     for (std::size_t c = 0; c < first.size(); ++c) {
       headers_.push_back(headless ? Header{fmt::format("column {}", c + 1), {}}
@@ -319,7 +354,7 @@ class Reader {
     TextSignal text{headers_[column].name, {}, {}};
     for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
       const std::string_view value = cell(row, column);
-      if (is_blank(value) || !time[row]) {
+      if (io::is_blank_cell(value) || !time[row]) {
         continue;
       }
       text.time.push_back(*time[row]);
@@ -353,7 +388,7 @@ class Reader {
         ++bad_times_;
         continue;
       }
-      if (is_blank(cell(row, 2))) {
+      if (io::is_blank_cell(cell(row, 2))) {
         continue;
       }
       const std::string_view key = cell(row, 1);
@@ -412,6 +447,13 @@ std::string header_cell(const std::string& name, const std::string& unit) {
 }
 
 }  // namespace
+
+Expected<std::optional<io::CsvLayout>> io::csv_layout(std::string_view head,
+                                                      const std::string& source) {
+  return split_csv(head, source).and_then([&](CsvTable table) {
+    return Reader(std::move(table), source).layout();
+  });
+}
 
 Expected<Log> parse_csv(std::string_view text, const std::string& source) {
   return io::split_csv(text, source).and_then([&](CsvTable table) {

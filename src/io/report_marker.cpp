@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <flyball/io/checksum.hpp>
 #include <flyball/io/file.hpp>
 
 #include "core/wording.hpp"
@@ -18,15 +19,6 @@ constexpr std::string_view sentence =
     "Flyball wrote these files and replaces them with the next report as long as nobody changes "
     "them.";
 
-/// FNV-1a, of 64 bits: against changes, not against forgers.
-std::uint64_t checksum_of(std::string_view bytes) {
-  std::uint64_t sum = 14695981039346656037U;
-  for (const char c : bytes) {
-    sum = (sum ^ static_cast<unsigned char>(c)) * 1099511628211U;
-  }
-  return sum;
-}
-
 template <class Number>
 bool take_number(std::string_view& line, Number& number, int base) {
   const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), number, base);
@@ -40,7 +32,7 @@ bool take_number(std::string_view& line, Number& number, int base) {
 }  // namespace
 
 WrittenFile written_file(std::string name, std::string_view contents) {
-  return {std::move(name), contents.size(), checksum_of(contents)};
+  return {std::move(name), contents.size(), checksum(contents)};
 }
 
 std::string marker_text(const std::vector<WrittenFile>& files) {

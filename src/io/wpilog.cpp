@@ -17,99 +17,12 @@
 #include "io/signals.hpp"
 #include "io/text.hpp"
 #include "io/urcl.hpp"
+#include "io/wpilog_format.hpp"
 
 namespace flyball {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "payloads are copied as they are");
-
-constexpr std::string_view magic = "WPILOG";
-constexpr std::size_t header_bytes = 12;
-/// Beyond these a hostile file could turn each of its bytes into a channel of its own.
-constexpr std::size_t max_array_width = 64;
-constexpr std::size_t max_channels = 50'000;
-
-template <class T>
-T read_le(std::string_view bytes) {
-  T value;
-  std::memcpy(&value, bytes.data(), sizeof value);
-  return value;
-}
-
-std::uint64_t read_le(std::string_view bytes, std::size_t width) {
-  std::uint64_t value = 0;
-  std::memcpy(&value, bytes.data(), width);
-  return value;
-}
-
-/// Takes a string (u32 length, bytes) from the front of `bytes`, if it fits.
-std::optional<std::string_view> take_string(std::string_view& bytes) {
-  if (bytes.size() < 4) {
-    return std::nullopt;
-  }
-  const std::size_t length = read_le<std::uint32_t>(bytes);
-  if (length > bytes.size() - 4) {
-    return std::nullopt;
-  }
-  const std::string_view text = bytes.substr(4, length);
-  bytes.remove_prefix(4 + length);
-  return text;
-}
-
-enum class Scalar { none, float64, float32, int64, boolean };
-
-struct Type {
-  Scalar scalar = Scalar::none;
-  bool array = false;
-  bool text = false;
-  bool frames = false;  ///< Of URCL.
-};
-
-Type parse_type(std::string_view name) {
-  Type type;
-  type.text = name == "string" || name == "json";
-  type.frames = io::UrclDecoder::knows(name);
-  if (name.ends_with("[]")) {
-    type.array = true;
-    name.remove_suffix(2);
-  }
-  type.scalar = name == "double"    ? Scalar::float64
-                : name == "float"   ? Scalar::float32
-                : name == "int64"   ? Scalar::int64
-                : name == "boolean" ? Scalar::boolean
-                                    : Scalar::none;
-  return type;
-}
-
-constexpr std::size_t width(Scalar scalar) {
-  return scalar == Scalar::boolean ? 1 : scalar == Scalar::float32 ? 4 : 8;
-}
-
-double decode(Scalar scalar, std::string_view bytes) {
-  switch (scalar) {
-    case Scalar::float64:
-      return read_le<double>(bytes);
-    case Scalar::float32:
-      return static_cast<double>(read_le<float>(bytes));
-    case Scalar::int64:
-      return static_cast<double>(read_le<std::int64_t>(bytes));
-    case Scalar::boolean:
-    case Scalar::none:
-      break;
-  }
-  return bytes.front() == 0 ? 0.0 : 1.0;
-}
-
-/// "Volt" is itself a unit; of JSON metadata only the member "unit" is one.
-std::string unit_of(std::string_view metadata) {
-  metadata = io::trim(metadata);
-  if (!metadata.starts_with('{')) {
-    return io::is_utf8(metadata) ? std::string(metadata) : std::string();
-  }
-  const auto json = nlohmann::json::parse(metadata, nullptr, /*allow_exceptions=*/false);
-  const auto unit = json.is_object() ? json.find("unit") : json.end();
-  return unit != json.end() && unit->is_string() ? unit->get<std::string>() : std::string();
-}
+using namespace io::wpilog;
 
 /// Everything that one name and type has in the log, over all its entries.
 struct Channel {
@@ -177,12 +90,9 @@ class Reader {
   /// Reads one record; false where the log ends early.
   bool read_record() {
     const std::string_view rest = bytes_.substr(at_);
-    const auto bits = static_cast<unsigned char>(rest.front());
-    const std::size_t id_width = (bits & 3U) + 1;
-    const std::size_t size_width = ((bits >> 2) & 3U) + 1;
-    const std::size_t time_width = ((bits >> 4) & 7U) + 1;
-    const std::size_t head = 1 + id_width + size_width + time_width;
-    if (bits >> 7 != 0) {
+    const auto [id_width, size_width, time_width] = record_head(rest.front());
+    const std::size_t head = record_head(rest.front()).bytes();
+    if (static_cast<unsigned char>(rest.front()) >> 7 != 0) {
       return stop("damaged_log", "is not the beginning of a record");
     }
     if (rest.size() < head) {

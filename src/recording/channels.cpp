@@ -27,27 +27,6 @@ constexpr std::array<std::string_view, 4> velocity_words{"velocity", "speed", "r
 constexpr std::array<std::string_view, 9> other_words{
     "battery", "bus", "inputvolt", "target", "setpoint", "goal", "reference", "desired", "error"};
 
-bool fits(const Signal& signal, Channel quantity) {
-  const std::string name = lower(signal.name);
-  if (contains_any(name, other_words)) {
-    return false;
-  }
-  const auto unit = signal.unit.empty() ? Expected<Unit>(Unit{}) : parse_unit(signal.unit);
-  const bool known = !signal.unit.empty() && unit.has_value();
-  const Dimension dimension = known ? unit->dimension : Dimension::dimensionless;
-  switch (quantity) {
-    case Channel::voltage:
-      return contains_any(name, voltage_words) && (!known || dimension == Dimension::voltage);
-    case Channel::position:
-      return contains_any(name, position_words) && !contains_any(name, velocity_words) &&
-             (!known || dimension == Dimension::length || dimension == Dimension::angle);
-    case Channel::velocity:
-      return contains_any(name, velocity_words) && (!known || dimension == Dimension::velocity ||
-                                                    dimension == Dimension::angular_velocity);
-  }
-  return false;
-}
-
 // Linear interpolation in a sorted signal; `cursor` only moves forward.
 double interpolate(const Signal& signal, double t, std::size_t& cursor) {
   while (cursor + 1 < signal.time.size() && signal.time[cursor + 1] <= t) {
@@ -202,6 +181,27 @@ double median_step(const std::vector<double>& time) {
 constexpr std::array every_channel{Channel::voltage, Channel::position, Channel::velocity};
 
 }  // namespace
+
+bool fits(const Signal& signal, Channel quantity) {
+  const std::string name = lower(signal.name);
+  if (contains_any(name, other_words)) {
+    return false;
+  }
+  const auto unit = signal.unit.empty() ? Expected<Unit>(Unit{}) : parse_unit(signal.unit);
+  const bool known = !signal.unit.empty() && unit.has_value();
+  const Dimension dimension = known ? unit->dimension : Dimension::dimensionless;
+  switch (quantity) {
+    case Channel::voltage:
+      return contains_any(name, voltage_words) && (!known || dimension == Dimension::voltage);
+    case Channel::position:
+      return contains_any(name, position_words) && !contains_any(name, velocity_words) &&
+             (!known || dimension == Dimension::length || dimension == Dimension::angle);
+    case Channel::velocity:
+      return contains_any(name, velocity_words) && (!known || dimension == Dimension::velocity ||
+                                                    dimension == Dimension::angular_velocity);
+  }
+  return false;
+}
 
 std::vector<const Signal*> candidates_for(const Log& log, const FoundTests& tests,
                                           Channel quantity) {

@@ -32,6 +32,9 @@ enum class Channel { voltage, position, velocity };
 /// "voltage", …, as its option is called.
 [[nodiscard]] std::string channel_name(Channel quantity);
 
+/// Whether a channel's name and unit are those of such a quantity.
+[[nodiscard]] bool fits(const Signal& signal, Channel quantity);
+
 /// Channels whose name and unit fit, those of the tests' subject if there are any.
 [[nodiscard]] std::vector<const Signal*> candidates_for(const Log& log, const FoundTests& tests,
                                                         Channel quantity);

@@ -1,9 +1,15 @@
 #include <flyball/study/identify.hpp>
 
 #include <algorithm>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
+#include <flyball/recording/stream_recording.hpp>
+#include <flyball/study/identify_streamed.hpp>
+
 #include "core/try.hpp"
+#include "study/identify_with.hpp"
 
 namespace flyball::study {
 
@@ -61,8 +67,9 @@ IdentifyResult identify_drivetrain(recording::LoadedRecording source) {
                         .drive = std::move(drive)};
 }
 
-ExpectedAll<IdentifyResult> identify(const IdentifyJob& job) {
-  FLYBALL_TRY(auto source, load_recording(job.log, job.selection));
+ExpectedAll<IdentifyResult> identify_with(const recording::LogSelection& selection,
+                                          const LoadFunction& load) {
+  FLYBALL_TRY(auto source, load(selection));
   if (source.drive) {
     return identify_drivetrain(std::move(source));
   }
@@ -73,9 +80,9 @@ ExpectedAll<IdentifyResult> identify(const IdentifyJob& job) {
   }
   if (const auto& chosen = report.prepared.mechanism; chosen && !source.recording.mechanism) {
     // Units may have been assumed for any kind: for this one they may be others.
-    recording::LogSelection closer = job.selection;
+    recording::LogSelection closer = selection;
     closer.mechanism = chosen;
-    FLYBALL_TRY(auto again, load_recording(job.log, closer));
+    FLYBALL_TRY(auto again, load(closer));
     if (!same_motion(source.recording, again.recording)) {
       const Diagnostic assumed = report.diagnostics.front();
       report = identification::identify_feedforward(again.recording);
@@ -90,6 +97,26 @@ ExpectedAll<IdentifyResult> identify(const IdentifyJob& job) {
                         .mechanism = mechanism,
                         .unit = unit,
                         .drive = {}};
+}
+
+ExpectedAll<IdentifyResult> identify(const IdentifyJob& job) {
+  std::error_code ignored;
+  const auto size = std::filesystem::file_size(job.log, ignored);
+  if (!ignored && size >= recording::streamed_from) {
+    FLYBALL_TRY(auto streamed, identify_streamed(job));
+    if (streamed) {
+      return *std::move(streamed);
+    }
+  }
+  return identify_with(job.selection, [&](const recording::LogSelection& selection) {
+    return recording::load_recording(job.log, selection);
+  });
+}
+
+ExpectedAll<IdentifyResult> identify(const Log& log, const recording::LogSelection& selection) {
+  return identify_with(selection, [&](const recording::LogSelection& closer) {
+    return recording::recording_from_log(log, closer);
+  });
 }
 
 }  // namespace flyball::study

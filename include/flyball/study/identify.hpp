@@ -39,6 +39,10 @@ struct IdentifyResult {
 ///         several kinds, together with RecordingError::unit_unknown where the unit is open too.
 [[nodiscard]] ExpectedAll<IdentifyResult> identify(const IdentifyJob& job);
 
+/// The same of a log in memory. @param selection  Without `also`: another log is not read.
+[[nodiscard]] ExpectedAll<IdentifyResult> identify(const Log& log,
+                                                   const recording::LogSelection& selection = {});
+
 /// The same of a drivetrain's recording in memory. @param source  With its `drive`.
 [[nodiscard]] IdentifyResult identify_drivetrain(recording::LoadedRecording source);
 

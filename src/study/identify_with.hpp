@@ -1,0 +1,16 @@
+#pragma once
+
+#include <flyball/core/function_ref.hpp>
+#include <flyball/study/identify.hpp>
+
+namespace flyball::study {
+
+/// Reads a recording by a selection, which may be asked for a second time.
+using LoadFunction =
+    FunctionRef<ExpectedAll<recording::LoadedRecording>(const recording::LogSelection&)>;
+
+/// `identify` of whatever `load` reads.
+[[nodiscard]] ExpectedAll<IdentifyResult> identify_with(const recording::LogSelection& selection,
+                                                        const LoadFunction& load);
+
+}  // namespace flyball::study
