@@ -14,6 +14,7 @@ struct Invocation {
 
 /// Adds a command to the program. When it was called it leaves its exit status.
 void add_identify_command(CLI::App& program, Invocation& invocation);
+void add_merge_command(CLI::App& program, Invocation& invocation);
 void add_estimate_command(CLI::App& program, Invocation& invocation);
 void add_experiment_command(CLI::App& program, Invocation& invocation);
 void add_design_command(CLI::App& program, Invocation& invocation);

@@ -1,8 +1,11 @@
+#include <memory>
+
 #include <flyball/core/argument.hpp>
 #include <flyball/study/answer.hpp>
 #include <flyball/study/identify_logs.hpp>
 #include <flyball/study/identify_model.hpp>
 
+#include "identify_each.hpp"
 #include "job_command.hpp"
 
 namespace flyball::app {
@@ -53,7 +56,8 @@ ExpectedAll<Answer> run(JobInput& input) {
 }  // namespace
 
 void add_identify_command(CLI::App& program, Invocation& invocation) {
-  add_job_command(
+  const auto each = std::make_shared<EachOptions>();
+  CLI::App* command = add_job_command(
       program, invocation,
       {.name = "identify",
        .schema = "flyball.identify/1",
@@ -68,16 +72,26 @@ void add_identify_command(CLI::App& program, Invocation& invocation) {
            "Several logs of one mechanism are compared, and fitted together. A drivetrain's log "
            "has\n"
            "both sides; --also adds the log of its rotation tests.\n"
+           "Of a FOLDER, and with --each, every log is identified by itself, a row a log: a table, "
+           "a line\n"
+           "of JSON each with --json, logs.csv and logs.jsonl with --out, where what is done stays "
+           "done.\n"
+           "Parts of --shard go together with flyball merge.\n"
            "With a [model] and a [fit] in PROJECT.toml, LOG is any recording of its inputs and "
            "outputs.",
        .job = study::JobKind::identify,
        .file = "LOG",
-       .file_help = "The log",
+       .file_help = "The log, or a folder of logs",
        .report = "Write the report into this folder",
        .reports_unasked = false,
        .run = &run,
-       .several = true},
+       .several = true,
+       .instead = [each](JobInput& input, const CommonOptions& common) -> std::optional<int> {
+         return means_each(input, *each) ? std::optional(identify_each(input, *each, common))
+                                         : std::nullopt;
+       }},
       true);
+  add_each_options(*command, each);
 }
 
 }  // namespace flyball::app

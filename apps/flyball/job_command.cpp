@@ -52,6 +52,11 @@ CLI::App* add_job_command(CLI::App& program, Invocation& invocation, const JobCo
           return fail(folder.error(), options->common, input.schema);
         }
       }
+      if (command.instead) {
+        if (const auto status = command.instead(input, options->common)) {
+          return *status;
+        }
+      }
       const auto answer = command.run(input);
       return answer ? tell(*answer, options->common, command.reports_unasked)
                     : fail(answer.error(), options->common, input.schema);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,6 +36,8 @@ struct JobCommand {
   bool reports_unasked;  ///< Into flyball-report.
   ExpectedAll<Answer> (*run)(JobInput& input);
   bool several = false;  ///< Whether further files of the kind may follow.
+  /// Does all in place of `run` where it returns an exit status.
+  std::function<std::optional<int>(JobInput&, const CommonOptions&)> instead{};
 };
 
 /// Adds it with the options of its job, --json and --out.

@@ -63,6 +63,8 @@ int run(int argc, char** argv) {
       "  flyball tune arm.json                      a log of an arm, to gains, report and C++\n"
       "  flyball tune lift.wpilog --mechanism elevator --period 20ms --out report/\n"
       "  flyball identify shooter.json --json       only the gains, for other programs\n"
+      "  flyball identify season/ --out season-gains    each log of a folder, by itself\n"
+      "  flyball merge part1 part2 --out whole      the parts of several machines\n"
       "  flyball design elevator.toml               no robot yet: mass, gearing and motors\n"
       "  flyball estimate swing.csv pendulum.toml   states from a log, by filter and smoother\n"
       "  flyball simulate pendulum.toml             a mechanism, or a model by formula\n"
@@ -87,6 +89,7 @@ int run(int argc, char** argv) {
   flyball::app::Invocation invocation{
       .typed = flyball::app::typed_command({argv, static_cast<std::size_t>(argc)})};
   flyball::app::add_identify_command(program, invocation);
+  flyball::app::add_merge_command(program, invocation);
   flyball::app::add_design_command(program, invocation);
   flyball::app::add_simulate_command(program, invocation);
   flyball::app::add_tune_command(program, invocation);

@@ -144,6 +144,31 @@ def check_answers(folder):
     check("loop", answer(["bode", "1/(s+1"], 2, folder), "bode of what is no expression")
 
 
+def check_each(folder):
+    """A line a log, of a mechanism, a drivetrain and two without gains, and their summary."""
+    logs = folder / "each"
+    logs.mkdir()
+    for name in ("straight.json", "still.json", "again.json"):
+        (logs / name).write_text((folder / name).read_text())
+    (logs / "none.csv").write_text("nothing")
+    arguments = [command, "identify", "each", "--out", "each-gains", "--json"]
+    lines = subprocess.run(arguments, cwd=folder, capture_output=True, text=True).stdout.splitlines()
+    if len(lines) != 4 or "\n".join(lines) + "\n" != (folder / "each-gains/logs.jsonl").read_text():
+        failures.append(f"identify each: {lines}")
+    for line in lines:
+        row = json.loads(line)
+        check("log_row", row, f"identify each: {row['path']}")
+        for key in row:
+            wrong = copy.deepcopy(row)
+            wrong[key] = {"not": "this"} if not isinstance(wrong[key], dict) else "text"
+            check_says_no("log_row", wrong, f"a row with a wrong {key}")
+    summary = json.loads((folder / "each-gains/result.json").read_text())
+    check("identify_each", summary, "identify each")
+    for key in summary:
+        check_says_no("identify_each", {**summary, key: {"not": "this"}}, f"a summary with a wrong {key}")
+    check_answer(["merge", "again.json"], 2, folder, "identify_each")
+
+
 def check_model_fit(folder):
     """A lag of 0.5 s behind a square wave, its output in mm."""
     rows, x = ["time (s),command,x (mm)"], 0.0
@@ -298,6 +323,7 @@ with tempfile.TemporaryDirectory() as name:
     check_answers(pathlib.Path(name))
     check_drivetrain(pathlib.Path(name))
     check_refusals(pathlib.Path(name))
+    check_each(pathlib.Path(name))
     check_localize(pathlib.Path(name))
     check_estimate(pathlib.Path(name))
     check_motors(pathlib.Path(name))
