@@ -49,9 +49,9 @@ std::span<const Kind> kinds() {
     add("Systems", system_kinds());
     add("Responses", response_kinds());
     add("Transfer functions", transfer_function_kinds());
+    add("Transfer functions", transfer_algebra_kinds());
     add("Root loci", root_locus_kinds());
     add("Step responses", step_kinds());
-    add("Transfer functions", transfer_algebra_kinds());
     add("Realizations", realization_kinds());
     add("Interconnections", interconnection_kinds());
     add("Regulators", regulator_kinds());
