@@ -201,7 +201,13 @@ class Tracer {
       }
       const double at = meetings[next].gain;
       // Those that begin where it begins to be followed are as good as poles.
-      if (at > gain_ * (1.0 + 1e-6)) {
+      if (at > gain_) {
+        // At infinity the first power of 1/s may count but very far out.
+        close_ = std::any_of(meetings.begin() + static_cast<std::ptrdiff_t>(next),
+                             meetings.begin() + static_cast<std::ptrdiff_t>(end),
+                             [](const Meeting& meeting) { return meeting.infinite; })
+                     ? 1e-10
+                     : 1e-7;
         FLYBALL_CHECK(follow(at, true));
         const double after = end < meetings.size() ? std::min(meetings[end].gain, last) : last;
         FLYBALL_CHECK(
@@ -305,8 +311,7 @@ class Tracer {
   Expected<void> follow(double until, bool meeting) {
     constexpr double shortest = 1e-13;
     constexpr std::size_t most_rows = 6000;
-    // So near to a meeting a branch is at the square root of it.
-    const double close = meeting ? 1e-7 : 0.0;
+    const double close = meeting ? close_ : 0.0;
     double step = 0.1;
     while (true) {
       const double left = std::log(until / gain_);
@@ -376,7 +381,7 @@ class Tracer {
 
   /// Over the gain at which some branches meet. @param room  To the next such gain, as a share.
   Expected<void> meet(std::span<const Meeting> meetings, double at, double room) {
-    const double late = std::clamp(1e-2 * room, 1e-12, 1e-7);
+    const double late = std::clamp(1e-2 * room, 1e-12, close_);
     struct Slots {
       Fan fan;
       std::vector<std::pair<double, std::pair<Index, Index>>> arriving;  // angle, branch, mirror
@@ -503,6 +508,7 @@ class Tracer {
   double size_;
   Index count_;
   double gain_ = 0.0;
+  double close_ = 1e-7;  ///< To a meeting, in ln k: a branch is at the square root of it.
   Points points_;
   Trace trace_;
 };

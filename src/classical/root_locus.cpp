@@ -212,7 +212,7 @@ std::vector<GainRange> stable_gains(const LocusLoop& loop, const RootLocus& locu
       if (!ranges.empty() && ranges.back().high == sign * low) {
         ranges.back().high = sign * high;  // a branch that only touches the border
       } else {
-        ranges.push_back({sign * low, sign * high});
+        ranges.push_back({sign * low + 0.0, sign * high});
       }
     }
   }
@@ -284,7 +284,7 @@ Expected<RootLocus> locus_of(LocusLoop loop, const RootLocusOptions& options) {
   locus.gains.resize(rows);
   locus.branches.resize(rows, fixed + loop.pole_count());
   for (Index row = 0; row < rows; ++row) {
-    locus.gains(row) = sign * trace.gains[static_cast<std::size_t>(row)];
+    locus.gains(row) = sign * trace.gains[static_cast<std::size_t>(row)] + 0.0;  // no -0
     for (Index i = 0; i < fixed; ++i) {
       locus.branches(row, i) = loop.fixed[static_cast<std::size_t>(i)];
     }

@@ -131,11 +131,18 @@ TEST(RootLocus, ThroughInfinity) {
       continue;
     }
     const double s = -(2.0 + k) / (1.0 - k);
-    EXPECT_NEAR(locus.branches(i, 0).real() / s, 1.0, 1e-8);
+    EXPECT_NEAR(locus.branches(i, 0).real() / s, 1.0, 4e-15 / std::abs(1.0 - k) + 1e-14);
   }
   EXPECT_TRUE(infinite);
   ASSERT_EQ(locus.stable_gains.size(), 1U);
   EXPECT_DOUBLE_EQ(locus.stable_gains[0].high, 1.0);
+}
+
+TEST(RootLocus, ThroughInfinityBesideAnother) {
+  // Zeros at ±3e4: near k = 1/0.12 both branches are far out before one is at infinity.
+  const auto locus = root_locus(transfer({-0.12, -0.9, 1e8}, {1, -0.5, -1.2}));
+  ASSERT_TRUE(locus) << to_string(locus.error());
+  EXPECT_EQ(locus->branches.cols(), 2);
 }
 
 TEST(RootLocus, ConditionallyStable) {
