@@ -69,7 +69,7 @@ std::string heading(const MechanismConstants& of, std::string_view library, bool
   return comments(
       fmt::format("// {}, for {}.\n// Loop period {} ms{}{}; volts are at the motor.\n",
                   capitalized(of.kind), library, own ? "1" : format_number(1e3 * of.period, 4),
-                  own ? ", on the controller," : "", late),
+                  own ? ", on the controller" : "", late.empty() || !own ? late : "," + late),
       language);
 }
 

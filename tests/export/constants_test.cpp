@@ -281,6 +281,9 @@ TEST(Constants, OfLoopsOnMotorControllers) {
       "Loop period 1 ms, on the controller, and a measurement that is 42.5 ms old");
   has(wpilib_constants(of, Language::java),
       "Loop period 20 ms and a measurement that is 42.5 ms old");
+  of.delay = 0.0;
+  has(rev_constants(of, Language::java), "Loop period 1 ms, on the controller; volts are");
+  has(wpilib_constants(of, Language::java), "Loop period 20 ms; volts are");
   // 2 · 61.2345678 · 2π V a rotation of 12 V; 60 · 3 · 3.21 · 2π/60 V s a rotation over 1 ms and 12
   // V.
   has(rev_constants(of, Language::java), "closedLoop.p(kP / 12.0);  // 64.1247 of the voltage per");
