@@ -60,50 +60,6 @@ ExpectedAll<TransferFunction> transfer_of(const LoopJob& job, const std::string&
       .map_error([](Error error) { return Errors(std::move(error)); });
 }
 
-/// What a step response is judged by where there is nothing exact: read off its samples.
-classical::StepMetrics read_off(const std::vector<double>& time, const std::vector<double>& value,
-                                double final_value) {
-  classical::StepMetrics metrics{.final_value = final_value};
-  const auto share = [&](std::size_t i) { return value[i] / final_value; };
-  const auto crossing = [&](std::size_t i, double level) {
-    const double before = share(i - 1);
-    return time[i - 1] + (time[i] - time[i - 1]) * (level - before) / (share(i) - before);
-  };
-  std::optional<double> ten;
-  std::optional<double> ninety;
-  double settled = 0.0;
-  std::size_t top = 0;
-  double least = 0.0;
-  constexpr double band = 0.02;
-  for (std::size_t i = 1; i < time.size(); ++i) {
-    for (auto& [first, level] : {std::pair(&ten, 0.1), std::pair(&ninety, 0.9)}) {
-      if (!*first && share(i - 1) < level && share(i) >= level) {
-        *first = crossing(i, level);
-      }
-    }
-    if (std::abs(share(i - 1) - 1.0) > band) {
-      const double edge = share(i - 1) > 1.0 ? 1.0 + band : 1.0 - band;
-      settled = std::abs(share(i) - 1.0) <= band ? crossing(i, edge) : time[i];
-    }
-    top = share(i) > share(top) ? i : top;
-    least = std::min(least, share(i));
-  }
-  if (ten && ninety) {
-    metrics.rise_time = *ninety - *ten;
-  }
-  if (std::abs(share(time.size() - 1) - 1.0) <= band) {
-    metrics.settling_time = settled;
-  }
-  const bool beyond = share(top) > 1.0 + 1e-9;
-  metrics.overshoot = beyond ? share(top) - 1.0 : 0.0;
-  metrics.undershoot = -least;
-  metrics.peak = beyond ? value[top] : final_value;
-  if (beyond) {
-    metrics.peak_time = time[top];
-  }
-  return metrics;
-}
-
 std::vector<double> list(const auto& values) {
   return {values.begin(), values.end()};
 }
@@ -294,7 +250,11 @@ class Study {
     FLYBALL_TRY(const auto closed, classical::feedback(open));
     FLYBALL_TRY(const auto found, impulse ? classical::impulse_response(closed, 0, times)
                                           : classical::step_response(closed, 0, times));
-    return LoopResponse{.time = list(found.time), .value = list(found.y.col(0)), .metrics = {}};
+    LoopResponse response{.time = list(found.time), .value = list(found.y.col(0)), .metrics = {}};
+    if (!impulse) {
+      FLYBALL_TRY(response.metrics, classical::step_metrics(closed, 0, 0));
+    }
+    return response;
   }
 
   Expected<LoopResponse> response_of(const LoopFindings& loop,
@@ -304,17 +264,7 @@ class Study {
     TransferFunction shown = loop.transfer;
     if (closed) {
       if (!shown.period() && shown.delay() > 0.0) {
-        FLYBALL_TRY(auto response, late_response(shown, impulse, times));
-        if (!impulse) {
-          const double at_rest = shown.dc_gain();
-          const double final_value = std::isinf(at_rest) ? 1.0 : at_rest / (1.0 + at_rest);
-          const auto margins = classical::loop_margins(shown);
-          if (margins && margins->stable && final_value != 0.0) {
-            response.metrics = read_off(response.time, response.value, final_value);
-            response.read_off = true;
-          }
-        }
-        return response;
+        return late_response(shown, impulse, times);
       }
       FLYBALL_TRY(shown,
                   classical::unity_feedback(shown.delay() > 0.0 ? with_late_poles(shown) : shown));

@@ -59,9 +59,7 @@ struct LoopJob {
 struct LoopResponse {
   std::vector<double> time{};
   std::vector<double> value{};
-  /// Of a step. Exact, but of a closed loop with dead time, whose metrics are read off.
-  std::optional<classical::StepMetrics> metrics{};
-  bool read_off = false;
+  std::optional<classical::StepMetrics> metrics{};  ///< Of a step.
 };
 
 /// One of the transfer functions, as far as its view needs it.

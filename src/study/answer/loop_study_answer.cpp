@@ -273,12 +273,10 @@ Section response_section(const LoopResult& result) {
   }
   std::vector<Column> columns{{"final value"}, {"rise 10–90 %"}, {"settled in 2 %"}, {"overshoot"},
                               {"undershoot"},  {"peak"},         {"peak at"}};
-  bool off = false;
   bool restless = false;
   for (const LoopFindings& loop : result.loops) {
     const classical::StepMetrics m = loop.response->metrics.value_or(
         classical::StepMetrics{.final_value = std::numeric_limits<double>::quiet_NaN()});
-    off = off || loop.response->read_off;
     restless = restless || !m.settling_time;
     columns[0].values.push_back(std::isnan(m.final_value) ? Value("none", Tone::quiet)
                                                           : quantity(m.final_value, "", 5));
@@ -290,12 +288,6 @@ Section response_section(const LoopResult& result) {
     columns[6].values.push_back(or_none(m.peak_time, "s"));
   }
   section.blocks.push_back(told(result, std::move(columns)));
-  if (off) {
-    section.blocks.push_back(Paragraph{
-        "Of a closed loop with dead time the numbers are read off the response, to about a "
-        "thousandth of its time; the response itself takes the dead time as it is.",
-        Tone::quiet});
-  }
   if (restless) {
     section.blocks.push_back(
         Paragraph{"What does not settle (unstable, or with an integrator) has no final value, and "
@@ -499,7 +491,6 @@ void write_response(JsonWriter& json, const LoopResponse& response) {
         json.add("undershoot", m.undershoot ? std::optional(100.0 * *m.undershoot) : m.undershoot);
         json.add("peak", m.peak);
         json.add("peak_time", m.peak_time);
-        json.add("exact", !response.read_off);
       });
     }
   });
