@@ -4,14 +4,9 @@
 #include <tuple>
 #include <utility>
 
-#include <flyball/systems/analysis.hpp>
-
+#include "classical/state_space_response.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
-#include "math/dense/dense.hpp"
-#include "math/dense/dense_reduction.hpp"
-#include "systems/balance.hpp"
-#include "systems/zero_pole_gain.hpp"
 
 namespace flyball::classical {
 
@@ -51,111 +46,6 @@ class TransferSource final : public FrequencyResponse::Source {
  private:
   TransferFunction transfer_;
   Factors factors_;
-};
-
-/// Roots that rounding cannot tell from the axis are on it.
-VectorXcd on_the_axis_if_near(const ModalAnalysis& modes, bool discrete) {
-  VectorXcd poles(static_cast<Index>(modes.modes.size()));
-  Index k = 0;
-  for (const Mode& mode : modes.modes) {
-    Complex pole = mode.pole;
-    if (mode.stability == Stability::marginal) {
-      const Complex origin = discrete ? Complex(1.0) : Complex(0.0);
-      pole = std::abs(pole - origin) <= mode.uncertainty ? origin
-             : discrete                                  ? pole / std::abs(pole)
-                                                         : Complex(0.0, pole.imag());
-    }
-    poles(k++) = pole;
-  }
-  return poles;
-}
-
-class StateSpaceSource final : public FrequencyResponse::Source {
- public:
-  StateSpaceSource(const ContinuousSystem<>& system, std::optional<Time> period, double delay)
-      : system_(system), period_(period), delay_(delay) {
-    if (system.A.size() == 0) {
-      H_ = system.A;
-      B_ = system.B;
-      C_ = system.C;
-      return;
-    }
-    const ContinuousSystem<> scaled = flyball::detail::scaled_system(
-        system, flyball::detail::scaling_of(system.A, system.B, system.C));
-    const flyball::detail::Hessenberg form = flyball::detail::hessenberg_of(scaled.A);
-    H_ = form.H;
-    B_ = flyball::detail::transposed_product(form.Q, scaled.B);
-    C_ = flyball::detail::product(scaled.C, form.Q);
-  }
-
-  [[nodiscard]] Index outputs() const override { return system_.C.rows(); }
-  [[nodiscard]] Index inputs() const override { return system_.B.cols(); }
-  [[nodiscard]] std::optional<Time> period() const override { return period_; }
-  void evaluate(const VectorXd& frequencies, Complex* values) const override {
-    const Index size = outputs() * inputs();
-    for (Index k = 0; k < frequencies.size(); ++k) {
-      Eigen::Map<MatrixXcd>(values + k * size, outputs(), inputs()) =
-          at_point(Complex(0.0, frequencies(k)));
-    }
-  }
-  [[nodiscard]] MatrixXcd at_point(Complex s) const override {
-    // (zI - H)⁻¹B by elimination of the subdiagonal with row pivoting.
-    const Complex z = period_ ? std::exp(s * period_->si()) : s;
-    const Index n = H_.rows();
-    MatrixXcd U = -H_.cast<Complex>();
-    U.diagonal().array() += z;
-    MatrixXcd X = B_.cast<Complex>();
-    for (Index k = 0; k + 1 < n; ++k) {
-      if (std::abs(U(k + 1, k)) > std::abs(U(k, k))) {
-        U.row(k).tail(n - k).swap(U.row(k + 1).tail(n - k));
-        X.row(k).swap(X.row(k + 1));
-      }
-      if (U(k + 1, k) != 0.0) {
-        const Complex factor = U(k + 1, k) / U(k, k);
-        U.row(k + 1).tail(n - k - 1) -= factor * U.row(k).tail(n - k - 1);
-        X.row(k + 1) -= factor * X.row(k);
-      }
-    }
-    MatrixXcd G = system_.D.cast<Complex>();
-    for (Index j = 0; j < X.cols(); ++j) {
-      for (Index k = n - 1; k >= 0; --k) {
-        X(k, j) /= U(k, k);
-        X.col(j).head(k) -= U.col(k).head(k) * X(k, j);
-        G.col(j) += C_.col(k) * X(k, j);
-      }
-    }
-    return delay_ > 0.0 ? MatrixXcd(G * std::exp(-s * delay_)) : G;
-  }
-  [[nodiscard]] std::optional<Factors> factors(Index output, Index input) const override {
-    Factors factors;
-    factors.delay = delay_;
-    factors.gain = system_.D(output, input);
-    if (system_.A.size() == 0) {
-      return factors;
-    }
-    const ContinuousSystem<> one{system_.A, system_.B.col(input), system_.C.row(output),
-                                 system_.D.block(output, input, 1, 1)};
-    const auto zpk = flyball::detail::zero_pole_gain(one);
-    const auto modes =
-        analyze_modes(system_.A, period_ ? TimeDomain::discrete : TimeDomain::continuous,
-                      period_.value_or(Time(1.0)));
-    if (!modes) {
-      return std::nullopt;
-    }
-    factors.poles = on_the_axis_if_near(*modes, period_.has_value());
-    factors.gain = zpk ? zpk->gain : 0.0;
-    if (zpk) {
-      factors.zeros =
-          Eigen::Map<const VectorXcd>(zpk->zeros.data(), static_cast<Index>(zpk->zeros.size()));
-    }
-    return factors;
-  }
-
- private:
-  ContinuousSystem<> system_;
-  std::optional<Time> period_;
-  double delay_ = 0.0;
-  MatrixXd H_, B_, C_;
 };
 
 /// One entry of a matrix.
@@ -305,15 +195,15 @@ Expected<FrequencyResponse> frequency_response(const ContinuousSystem<>& system,
   constexpr std::string_view where = "frequency response";
   FLYBALL_CHECK(check_system_or_gain(system, where));
   FLYBALL_CHECK(check_not_negative(delay.si(), where, "delay", "s"));
-  return FrequencyResponse(std::make_shared<StateSpaceSource>(system, std::nullopt, delay.si()));
+  return FrequencyResponse(detail::state_space_source(system, std::nullopt, delay.si()));
 }
 
 Expected<FrequencyResponse> frequency_response(const DiscreteSystem<>& system, Time delay) {
   constexpr std::string_view where = "frequency response";
   FLYBALL_CHECK(check_system_or_gain(system, where));
   FLYBALL_CHECK(check_not_negative(delay.si(), where, "delay", "s"));
-  return FrequencyResponse(std::make_shared<StateSpaceSource>(
-      ContinuousSystem<>{system.A, system.B, system.C, system.D}, system.period, delay.si()));
+  return FrequencyResponse(detail::state_space_source({system.A, system.B, system.C, system.D},
+                                                      system.period, delay.si()));
 }
 
 }  // namespace flyball::classical

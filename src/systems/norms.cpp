@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <flyball/math/search/minimum.hpp>
+#include <flyball/systems/analysis.hpp>
 #include <flyball/systems/conversion.hpp>
 
 #include "core/try.hpp"
@@ -151,7 +152,8 @@ std::vector<double> crossings(const ContinuousSystem<>& s, double gamma) {
   return found;
 }
 
-/// G(1/s): what lies at infinity comes to the origin. A is stable, so it has an inverse.
+/// G(1/s): what lies at infinity comes to the origin. A has no pole on the axis, so it has an
+/// inverse.
 ContinuousSystem<> inverted(const ContinuousSystem<>& s) {
   const Index n = s.A.rows();
   MatrixXd right(n, n + s.B.cols());
@@ -161,7 +163,7 @@ ContinuousSystem<> inverted(const ContinuousSystem<>& s) {
   return {solved.leftCols(n), -A_B, product(s.C, solved.leftCols(n)), s.D - product(s.C, A_B)};
 }
 
-/// @param system  Stable, scaled.
+/// @param system  Without a pole on the axis, scaled.
 Expected<HInfinityNorm> largest_gain(const ContinuousSystem<>& system, std::string_view where) {
   const Gain gains(system);
   HInfinityNorm best{gains.at(infinity), infinity, 0.0, 0};
@@ -281,25 +283,33 @@ Expected<double> h2_norm(const DiscreteSystem<>& system) {
   return root_of_power({system.A, system.B, system.C, system.D}, TimeDomain::discrete);
 }
 
-Expected<HInfinityNorm> h_infinity_norm(const ContinuousSystem<>& system) {
-  constexpr std::string_view where = "h_infinity_norm";
-  FLYBALL_CHECK(check_system_or_gain(system, where));
-  if (system.A.size() == 0) {
-    return HInfinityNorm{.norm = largest_singular_value(system.D),
-                         .upper_bound = largest_singular_value(system.D)};
+namespace {
+
+/// No pole on the imaginary axis, or the unit circle, as far as rounding can tell.
+Expected<void> check_off_axis(const MatrixRef& A, TimeDomain domain, std::string_view where) {
+  FLYBALL_TRY(const auto analysis, analyze_modes(A, domain));
+  for (const Mode& mode : analysis.modes) {
+    if (mode.stability == Stability::marginal) {
+      return refusal(SystemError::not_stable, where, "A")
+          .got("marginally stable")
+          .expected(domain == TimeDomain::continuous
+                        ? "without a pole on the imaginary axis: the gain there is infinite"
+                        : "without a pole on the unit circle: the gain there is infinite")
+          .with("pole", std::vector<double>{mode.pole.real(), mode.pole.imag()});
+    }
   }
-  FLYBALL_CHECK(detail::check_stable(system.A, TimeDomain::continuous, where));
+  return {};
+}
+
+Expected<HInfinityNorm> gain_of_static(const MatrixXd& D) {
+  return HInfinityNorm{.norm = largest_singular_value(D), .upper_bound = largest_singular_value(D)};
+}
+
+Expected<HInfinityNorm> norm_of(const ContinuousSystem<>& system, std::string_view where) {
   return largest_gain(scaled(system), where);
 }
 
-Expected<HInfinityNorm> h_infinity_norm(const DiscreteSystem<>& system) {
-  constexpr std::string_view where = "h_infinity_norm";
-  FLYBALL_CHECK(check_system_or_gain(system, where));
-  if (system.A.size() == 0) {
-    return HInfinityNorm{.norm = largest_singular_value(system.D),
-                         .upper_bound = largest_singular_value(system.D)};
-  }
-  FLYBALL_CHECK(detail::check_stable(system.A, TimeDomain::discrete, where));
+Expected<HInfinityNorm> norm_of(const DiscreteSystem<>& system, std::string_view where) {
   // With T = 2, s = (z - 1)/(z + 1) = j tan(ωT/2).
   FLYBALL_TRY(auto mapped,
               convert_to_continuous({system.A, system.B, system.C, system.D, Time(2.0)},
@@ -309,6 +319,46 @@ Expected<HInfinityNorm> h_infinity_norm(const DiscreteSystem<>& system) {
     norm->frequency = 2.0 * std::atan(norm->frequency) / system.period.si();
   }
   return norm;
+}
+
+template <class System>
+Expected<HInfinityNorm> h_infinity(const System& system, TimeDomain domain) {
+  constexpr std::string_view where = "h_infinity_norm";
+  FLYBALL_CHECK(check_system_or_gain(system, where));
+  if (system.A.size() == 0) {
+    return gain_of_static(system.D);
+  }
+  FLYBALL_CHECK(detail::check_stable(system.A, domain, where));
+  return norm_of(system, where);
+}
+
+template <class System>
+Expected<HInfinityNorm> l_infinity(const System& system, TimeDomain domain) {
+  constexpr std::string_view where = "l_infinity_norm";
+  FLYBALL_CHECK(check_system_or_gain(system, where));
+  if (system.A.size() == 0) {
+    return gain_of_static(system.D);
+  }
+  FLYBALL_CHECK(check_off_axis(system.A, domain, where));
+  return norm_of(system, where);
+}
+
+}  // namespace
+
+Expected<HInfinityNorm> h_infinity_norm(const ContinuousSystem<>& system) {
+  return h_infinity(system, TimeDomain::continuous);
+}
+
+Expected<HInfinityNorm> h_infinity_norm(const DiscreteSystem<>& system) {
+  return h_infinity(system, TimeDomain::discrete);
+}
+
+Expected<HInfinityNorm> l_infinity_norm(const ContinuousSystem<>& system) {
+  return l_infinity(system, TimeDomain::continuous);
+}
+
+Expected<HInfinityNorm> l_infinity_norm(const DiscreteSystem<>& system) {
+  return l_infinity(system, TimeDomain::discrete);
 }
 
 }  // namespace flyball

@@ -62,6 +62,8 @@ class FrequencyResponse {
   [[nodiscard]] Eigen::MatrixXcd at(double frequency) const;
   /// The same at many, much faster than one by one: a column a frequency, of the entries of G
   /// column by column.
+  /// A state space answers within 1e-12 of its largest entry at each frequency (of a discrete one
+  /// at e^{jωT} to 19 digits).
   /// @param frequencies  rad/s, of either sign.
   /// @errors ArgumentError::not_finite; out_of_range beyond π/T, or beyond what is known.
   [[nodiscard]] Expected<Eigen::MatrixXcd> sample(const Eigen::VectorXd& frequencies) const;

@@ -37,4 +37,10 @@ struct HInfinityNorm {
 [[nodiscard]] Expected<HInfinityNorm> h_infinity_norm(const ContinuousSystem<>& system);
 [[nodiscard]] Expected<HInfinityNorm> h_infinity_norm(const DiscreteSystem<>& system);
 
+/// The same of any system without a pole on the imaginary axis, or the unit circle: the largest
+/// gain over the frequencies, which is no norm of what an unstable system does from rest.
+/// @errors As above; SystemError::not_stable with the pole on the axis.
+[[nodiscard]] Expected<HInfinityNorm> l_infinity_norm(const ContinuousSystem<>& system);
+[[nodiscard]] Expected<HInfinityNorm> l_infinity_norm(const DiscreteSystem<>& system);
+
 }  // namespace flyball

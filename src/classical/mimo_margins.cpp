@@ -1,0 +1,255 @@
+#include <flyball/classical/mimo_margins.hpp>
+
+#include <cmath>
+#include <type_traits>
+#include <utility>
+
+#include <flyball/classical/response_margins.hpp>
+#include <flyball/math/search/minimum.hpp>
+#include <flyball/systems/interconnection.hpp>
+
+#include "core/format.hpp"
+#include "core/try.hpp"
+#include "math/dense/dense.hpp"
+
+namespace flyball::classical {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+namespace {
+
+/// The same system with other matrices.
+template <class System>
+System with(System system, MatrixXd A, MatrixXd B, MatrixXd C, MatrixXd D) {
+  system.A = std::move(A);
+  system.B = std::move(B);
+  system.C = std::move(C);
+  system.D = std::move(D);
+  return system;
+}
+
+Peak peak_of(const HInfinityNorm& norm) {
+  return {norm.norm, norm.frequency};
+}
+
+/// x' = A x + B e, y = C x + D e with e = r - y: from r to a e + b y.
+template <class System>
+Expected<System> closed(const System& loop, double of_error, double of_output,
+                        std::string_view where) {
+  const Index m = loop.B.cols();
+  double rcond = 0.0;
+  const MatrixXd one = MatrixXd::Identity(m, m);
+  // e = (I + D)⁻¹(r - C x)
+  MatrixXd right(m, m + loop.A.rows());
+  right << one, loop.C;
+  const MatrixXd solved = flyball::detail::solve_linear(one + loop.D, right, &rcond);
+  if (!(rcond > 1e-15) || !solved.allFinite()) {
+    return refusal(SystemError::algebraic_loop, where, "I + D")
+        .got("singular")
+        .expected("invertible: no output satisfies the loop at infinite frequency")
+        .with("reciprocal condition", rcond);
+  }
+  const MatrixXd M = solved.leftCols(m);
+  const MatrixXd MC = solved.rightCols(loop.A.rows());
+  using flyball::detail::product;
+  // y = r - e
+  const MatrixXd C = -(of_error - of_output) * MC;
+  const MatrixXd D = of_output * one + (of_error - of_output) * M;
+  return with(loop, loop.A - product(loop.B, MC), product(loop.B, M), C, D);
+}
+
+template <class System>
+Expected<bool> stable(const System& system) {
+  if (system.A.size() == 0) {
+    return true;
+  }
+  return is_stable(system);
+}
+
+/// All channels but one closed.
+template <class System>
+Expected<System> opened_at(const System& loop, Index channel, std::string_view where) {
+  const Index m = loop.B.cols();
+  if (m == 1) {
+    return loop;
+  }
+  // The channel first, the others after it.
+  Eigen::VectorXi order(m);
+  order(0) = static_cast<int>(channel);
+  for (int k = 1, from = 0; k < static_cast<int>(m); ++k, ++from) {
+    from += from == static_cast<int>(channel) ? 1 : 0;
+    order(k) = from;
+  }
+  MatrixXd B(loop.B.rows(), m);
+  MatrixXd C(m, loop.C.cols());
+  MatrixXd D(m, m);
+  for (Index j = 0; j < m; ++j) {
+    B.col(j) = loop.B.col(order(j));
+    C.row(j) = loop.C.row(order(j));
+    for (Index i = 0; i < m; ++i) {
+      D(i, j) = loop.D(order(i), order(j));
+    }
+  }
+  const Index rest = m - 1;
+  const Index n = loop.A.rows();
+  double rcond = 0.0;
+  // e₂ = -(I + D₂₂)⁻¹(C₂ x + D₂₁ e₁)
+  MatrixXd right(rest, n + 1);
+  right << C.bottomRows(rest), D.bottomLeftCorner(rest, 1);
+  const MatrixXd solved = flyball::detail::solve_linear(
+      MatrixXd::Identity(rest, rest) + D.bottomRightCorner(rest, rest), right, &rcond);
+  if (!(rcond > 1e-15) || !solved.allFinite()) {
+    return refusal(SystemError::algebraic_loop, where, "I + D without one channel")
+        .got("singular")
+        .expected("invertible")
+        .with("channel", static_cast<double>(channel));
+  }
+  using flyball::detail::product;
+  const MatrixXd by_x = solved.leftCols(n);
+  const MatrixXd by_e = solved.rightCols(1);
+  return with(loop, loop.A - product(B.rightCols(rest), by_x),
+              B.leftCols(1) - product(B.rightCols(rest), by_e),
+              C.topRows(1) - product(D.topRightCorner(1, rest), by_x),
+              D.topLeftCorner(1, 1) - product(D.topRightCorner(1, rest), by_e));
+}
+
+/// min over diagonal D of σ(D M D⁻¹): convex in ln D, one entry after the other.
+double scaled_gain(const Eigen::MatrixXcd& M) {
+  const Index m = M.rows();
+  Eigen::VectorXd log_d = Eigen::VectorXd::Zero(m);
+  const auto gain = [&] {
+    Eigen::MatrixXcd scaled = M;
+    for (Index i = 0; i < m; ++i) {
+      for (Index j = 0; j < m; ++j) {
+        scaled(i, j) *= std::exp(log_d(i) - log_d(j));
+      }
+    }
+    return flyball::detail::singular_values_of_complex(scaled)(0);
+  };
+  double best = gain();
+  if (m == 1 || best == 0.0) {
+    return best;
+  }
+  double reach = 4.0;
+  constexpr int most_rounds = 60;
+  for (int round = 0; round < most_rounds && reach > 1e-9; ++round) {
+    const double before = best;
+    for (Index i = 1; i < m; ++i) {
+      const double middle = log_d(i);
+      const auto lowest = find_minimum(
+          [&](double x) {
+            log_d(i) = x;
+            return gain();
+          },
+          middle - reach, middle + reach, {.absolute_tolerance = 1e-9});
+      log_d(i) = lowest && lowest->value <= best ? lowest->x : middle;
+      best = lowest ? std::min(best, lowest->value) : best;
+    }
+    // Ridges slow it down: the search narrows where a round gains nothing.
+    reach = best < before * (1.0 - 1e-6) ? reach : 0.25 * reach;
+  }
+  return best;
+}
+
+/// The largest of it over the frequencies.
+Expected<Peak> largest_scaled_gain(const FrequencyResponse& difference, double full_frequency) {
+  FLYBALL_TRY(const auto grid, frequency_grid(difference));
+  const auto at = [&](double w) { return scaled_gain(difference.at(w)); };
+  std::vector<double> places(grid.frequency.begin(), grid.frequency.end());
+  places.push_back(std::isfinite(full_frequency) ? full_frequency : 0.0);
+  places.push_back(0.0);
+  Peak best;
+  for (const double w : places) {
+    const double value = at(w);
+    if (value > best.value) {
+      best = {value, w};
+    }
+  }
+  if (best.frequency > 0.0) {
+    const double high = std::min(1.05 * best.frequency, difference.highest_frequency());
+    const auto top = find_minimum([&](double w) { return -at(w); }, 0.95 * best.frequency, high);
+    if (top && -top->value > best.value) {
+      best = {-top->value, top->x};
+    }
+  }
+  return best;
+}
+
+template <class System>
+Expected<MimoMargins> margins_of(const System& loop) {
+  constexpr std::string_view where = "mimo_margins";
+  FLYBALL_CHECK(check_system_or_gain(loop, where));
+  if (loop.B.cols() != loop.C.rows()) {
+    return refusal(ArgumentError::wrong_shape, where, "the loop")
+        .got(flyball::detail::format("{} x {}", loop.C.rows(), loop.B.cols()))
+        .expected("square: as many outputs as inputs");
+  }
+  MimoMargins margins;
+  FLYBALL_TRY(const System S, closed(loop, 1.0, 0.0, where));
+  FLYBALL_TRY(const System T, closed(loop, 0.0, 1.0, where));
+  FLYBALL_TRY(const System difference, closed(loop, 1.0, -1.0, where));
+  FLYBALL_TRY(margins.stable, stable(S));
+  FLYBALL_TRY_IN(where, const auto of_S, l_infinity_norm(S));
+  FLYBALL_TRY_IN(where, const auto of_T, l_infinity_norm(T));
+  FLYBALL_TRY_IN(where, const auto of_difference, l_infinity_norm(difference));
+  margins.sensitivity = peak_of(of_S);
+  margins.complementary = peak_of(of_T);
+  margins.full_disk_margin = margins.stable ? 2.0 / of_difference.norm : 0.0;
+  margins.disk_margin = margins.full_disk_margin;
+  margins.disk_frequency = of_difference.frequency;
+  if (loop.B.cols() > 1) {
+    FLYBALL_TRY(const auto response, frequency_response(difference));
+    FLYBALL_TRY_IN(where, const Peak scaled,
+                   largest_scaled_gain(response, of_difference.frequency));
+    margins.disk_margin = margins.stable ? 2.0 / scaled.value : 0.0;
+    margins.disk_frequency = scaled.frequency;
+  }
+  for (Index channel = 0; channel < loop.B.cols(); ++channel) {
+    FLYBALL_TRY(const System one, opened_at(loop, channel, where));
+    FLYBALL_TRY(const auto response, frequency_response(one));
+    FLYBALL_TRY(auto alone, loop_margins(response));
+    margins.loop_at_a_time.push_back(std::move(alone));
+  }
+  return margins;
+}
+
+template <class System>
+Expected<GangOfFour> gang_of(const System& P, const System& C) {
+  constexpr std::string_view where = "gang_of_four";
+  FLYBALL_TRY_IN(where, const System loop, series(C, P));  // P C
+  FLYBALL_TRY(const System S, closed(loop, 1.0, 0.0, where));
+  FLYBALL_TRY(const System T, closed(loop, 0.0, 1.0, where));
+  FLYBALL_TRY_IN(where, const System PS, feedback(P, C));
+  FLYBALL_TRY_IN(where, const System CS, feedback(C, P));
+  GangOfFour gang;
+  FLYBALL_TRY(gang.stable, stable(S));
+  FLYBALL_TRY_IN(where, const auto of_S, l_infinity_norm(S));
+  FLYBALL_TRY_IN(where, const auto of_T, l_infinity_norm(T));
+  FLYBALL_TRY_IN(where, const auto of_PS, l_infinity_norm(PS));
+  FLYBALL_TRY_IN(where, const auto of_CS, l_infinity_norm(CS));
+  gang.sensitivity = peak_of(of_S);
+  gang.complementary = peak_of(of_T);
+  gang.disturbance_sensitivity = peak_of(of_PS);
+  gang.noise_sensitivity = peak_of(of_CS);
+  return gang;
+}
+
+}  // namespace
+
+Expected<MimoMargins> mimo_margins(const ContinuousSystem<>& loop) {
+  return margins_of(loop);
+}
+Expected<MimoMargins> mimo_margins(const DiscreteSystem<>& loop) {
+  return margins_of(loop);
+}
+Expected<GangOfFour> gang_of_four(const ContinuousSystem<>& plant,
+                                  const ContinuousSystem<>& controller) {
+  return gang_of(plant, controller);
+}
+Expected<GangOfFour> gang_of_four(const DiscreteSystem<>& plant,
+                                  const DiscreteSystem<>& controller) {
+  return gang_of(plant, controller);
+}
+
+}  // namespace flyball::classical
