@@ -5,7 +5,6 @@
 #include <flyball/control/delay_compensation.hpp>
 #include <flyball/control/feedforward.hpp>
 #include <flyball/control/latency.hpp>
-#include <flyball/control/margins.hpp>
 #include <flyball/control/steady_state_feedforward.hpp>
 #include <flyball/systems/discretize.hpp>
 
@@ -83,57 +82,6 @@ Outcome solve_delay_compensation(const Problem& problem, JsonWriter& answer) {
   return {};
 }
 
-Outcome solve_margins(const Problem& problem, JsonWriter& answer) {
-  const MatrixXd& A = problem.matrix("A");
-  const MatrixXd& B = problem.matrix("B");
-  const MatrixXd& K = problem.matrix("K");
-  const Time period(problem.number("T"));
-  const Time delay(problem.number("delay"));
-  constexpr double most_periods = 500.0;  // each adds a state to the loop
-  if (period.si() > 0.0) {
-    FLYBALL_CHECK(
-        check_within(delay.si(), 0.0, most_periods * period.si(), "margins", "delay", "s"));
-  }
-  const bool observer = problem.has("K_e");
-  if (observer != problem.has("C")) {
-    return refusal(ArgumentError::malformed, "margins", observer ? "C" : "K_e")
-        .got("left out")
-        .expected("there: an observer has both C and K_e");
-  }
-  FLYBALL_TRY(const auto loop,
-              observer
-                  ? discretize(ContinuousSystem<>{A, B, problem.matrix("C"),
-                                                  MatrixXd::Zero(problem.matrix("C").rows(), 1)},
-                               period)
-                        .and_then([&](const DiscreteSystem<>& model) {
-                          return observer_regulator_loop(A, B, model.C, model, K,
-                                                         problem.matrix("K_e"), delay);
-                        })
-                  : state_feedback_loop(A, B, K, period, delay));
-  FLYBALL_TRY(const auto margins, stability_margins(loop));
-  answer.add("stable", margins.stable);
-  answer.add("spectral_radius", margins.spectral_radius);
-  answer.add("gain_margin_up", margins.gain_margin_up);
-  answer.add("gain_margin_down", margins.gain_margin_down);
-  answer.add("phase_margin", margins.phase_margin);
-  answer.add("delay_margin", margins.delay_margin);
-  answer.add("disk_margin", margins.disk_margin);
-  answer.add("disk_gain_up", margins.disk_gain_up);
-  answer.add("disk_gain_down", margins.disk_gain_down);
-  answer.add("disk_phase", margins.disk_phase);
-  answer.add("disk_frequency", margins.disk_frequency);
-  const auto frequencies = [](const std::vector<Crossover>& crossovers) {
-    Eigen::VectorXd list(static_cast<Eigen::Index>(crossovers.size()));
-    for (Eigen::Index k = 0; k < list.size(); ++k) {
-      list(k) = crossovers[static_cast<std::size_t>(k)].frequency;
-    }
-    return list;
-  };
-  answer.add("gain_crossovers", frequencies(margins.gain_crossovers));
-  answer.add("phase_crossovers", frequencies(margins.phase_crossovers));
-  return {};
-}
-
 }  // namespace
 
 std::vector<Kind> feedforward_kinds() {
@@ -166,29 +114,6 @@ std::vector<Kind> feedforward_kinds() {
                           "has arrived yet; the last is K"))},
        R"({"K": [[20, 3]], "A": [[1, 0.02], [0, 0.9]], "B": [[0.0006], [0.059]], "delay": 0.03, "domain": "discrete", "T": 0.02})",
        &solve_delay_compensation},
-      {"margins",
-       "how much the input of a continuous plant under sampled feedback may be wrong",
-       {A, matrix("B", "n", "1", "how the input moves the states"),
-        matrix("K", "1", "n", "gain of u = K(r - x)", "input/state"),
-        number("T", "s", "sample period of the controller"),
-        or_number(number("delay", "s", "pure delay in the loop"), 0.0),
-        optional(matrix("C", "p", "n", "what an observer sees")),
-        optional(matrix("K_e", "n", "p", "the observer's gain, filter form"))},
-       {flag("stable", "whether the loop is; if not there is no margin"),
-        number("spectral_radius", "", "the largest magnitude of its poles"),
-        unbounded(number("gain_margin_up", "", "stable for every gain up to this one")),
-        unbounded(number("gain_margin_down", "", "and down to this one")),
-        unbounded(number("phase_margin", "deg", "the smallest rotation that destabilizes")),
-        unbounded(number("delay_margin", "s", "the shortest further delay that destabilizes")),
-        unbounded(number("disk_margin", "", "2/‖S - T‖∞")),
-        unbounded(number("disk_gain_up", "", "the disk's largest real factor")),
-        unbounded(number("disk_gain_down", "", "its smallest")),
-        unbounded(number("disk_phase", "deg", "its rotation")),
-        unbounded(number("disk_frequency", "rad/s", "where ‖S - T‖ is largest")),
-        list("gain_crossovers", "g", "rad/s", "where the loop gain is 1"),
-        list("phase_crossovers", "f", "rad/s", "where it is real and negative")},
-       R"({"A": [[0, 1], [0, -2]], "B": [[0], [3]], "K": [[20, 3]], "T": 0.02})",
-       &solve_margins},
   };
 }
 

@@ -52,10 +52,11 @@ std::span<const Kind> kinds() {
     add("Transfer functions", transfer_algebra_kinds());
     add("Root loci", root_locus_kinds());
     add("Step responses", step_kinds());
+    add("Frequency responses and margins", frequency_response_kinds());
     add("Realizations", realization_kinds());
     add("Interconnections", interconnection_kinds());
     add("Regulators", regulator_kinds());
-    add("Feedforward, delay and margins", feedforward_kinds());
+    add("Feedforward and delay", feedforward_kinds());
     add("PID", pid_kinds());
     add("Compensators and robust synthesis", compensator_kinds());
     add("Observers", estimator_kinds());

@@ -182,6 +182,7 @@ template <class Function>
 [[nodiscard]] std::vector<Kind> root_locus_kinds();
 [[nodiscard]] std::vector<Kind> step_kinds();
 [[nodiscard]] std::vector<Kind> transfer_algebra_kinds();
+[[nodiscard]] std::vector<Kind> frequency_response_kinds();
 [[nodiscard]] std::vector<Kind> realization_kinds();
 [[nodiscard]] std::vector<Kind> interconnection_kinds();
 [[nodiscard]] std::vector<Kind> regulator_kinds();

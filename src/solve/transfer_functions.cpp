@@ -68,25 +68,6 @@ Outcome solve_transfer_function(const Problem& problem, JsonWriter& answer) {
   return {};
 }
 
-Outcome solve_response(const Problem& problem, JsonWriter& answer) {
-  FLYBALL_TRY(const auto transfer, transfer_of(problem));
-  const Eigen::VectorXd w = problem.matrix("w");
-  FLYBALL_CHECK(check_size(3.0 * static_cast<double>(w.size()), "freqresp", "w"));
-  Eigen::VectorXd real(w.size());
-  Eigen::VectorXd imaginary(w.size());
-  Eigen::VectorXd decibels(w.size());
-  for (Eigen::Index i = 0; i < w.size(); ++i) {
-    const std::complex<double> G = transfer.response(w(i));
-    real(i) = G.real();
-    imaginary(i) = G.imag();
-    decibels(i) = 20.0 * std::log10(std::abs(G));
-  }
-  answer.add("real", real);
-  answer.add("imag", imaginary);
-  answer.add("gain_db", decibels);
-  return {};
-}
-
 Outcome solve_pade(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const auto transfer,
               classical::pade(Time(problem.number("T")), static_cast<int>(problem.integer("n"))));
@@ -123,13 +104,6 @@ std::vector<Kind> transfer_function_kinds() {
                "null where there is none")},
        R"({"num": [100], "den": [1, 2, 100]})",
        &solve_transfer_function},
-      {"freqresp",
-       "a transfer function on the imaginary axis, or the unit circle",
-       transfer + std::vector{list("w", "w", "rad/s", "frequencies")},
-       {unbounded(list("real", "w", "", "Re G")), unbounded(list("imag", "w", "", "Im G")),
-        unbounded(list("gain_db", "w", "dB", "20 log |G|"))},
-       R"({"num": [1], "den": [1, 1], "w": [0.1, 1, 10]})",
-       &solve_response},
       {"pade",
        "the rational function nearest to a delay e^(-Ts) at low frequencies",
        {number("T", "s", "the delay"), integer("n", "the order, 0 to 20")},
