@@ -312,6 +312,7 @@ double disk_margin_of(const Eigen::MatrixXd& M) {
     }
   }
   std::sort(grid.begin(), grid.end());
+  grid.erase(std::unique(grid.begin(), grid.end()), grid.end());
   std::vector<double> values;
   for (const double theta : grid) {
     values.push_back(gain(theta));

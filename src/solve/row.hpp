@@ -185,6 +185,7 @@ template <class Function>
 [[nodiscard]] std::vector<Kind> frequency_response_kinds();
 [[nodiscard]] std::vector<Kind> realization_kinds();
 [[nodiscard]] std::vector<Kind> interconnection_kinds();
+[[nodiscard]] std::vector<Kind> certificate_kinds();
 [[nodiscard]] std::vector<Kind> regulator_kinds();
 [[nodiscard]] std::vector<Kind> feedforward_kinds();
 [[nodiscard]] std::vector<Kind> pid_kinds();

@@ -56,6 +56,29 @@ TEST(SolveSystems, HInfinityNorm) {
   EXPECT_EQ(refusal("hinf-norm", R"({"A":[[0]],"B":[[1]]})"), "not_stable");
 }
 
+// dx/dt = g u, u = -8 x each half second: stable for 0 < g < 1/2. α = 2 (2 - 4 g)/(2 + 4 g). A
+// plant p x + u with p in [-1, 1] and the gain 8: |e^{pT} - 8 (e^{pT} - 1)/p| < 1 fails at p = 1.
+TEST(SolveSystems, Certify) {
+  const std::string loop = R"({"A":[[0]],"B":[[1]],"T":0.5,"K":[[8]],"low":[0.1,0],"high":[)";
+  const Json proven = answer("certify", loop + "0.3,0]}");
+  EXPECT_EQ(proven.at("verdict"), "stable");
+  EXPECT_NEAR(number(proven, "worst_disk_margin"), 2.0 * 0.8 / 3.2, 1e-9);
+  EXPECT_LE(number(proven, "disk_margin"), 0.5);
+  EXPECT_GE(number(proven, "disk_margin"), 0.47);
+  const Json broken = answer("certify", loop + "0.6,0]}");
+  EXPECT_EQ(broken.at("verdict"), "unstable");
+  EXPECT_GT(broken.at("worst").at(0).get<double>(), 0.5);
+  EXPECT_EQ(
+      refusal("certify", R"({"A":[[0]],"B":[[1]],"T":0.5,"K":[[8]],"low":[0.4,0],"high":[0.3,0]})"),
+      "out_of_range");
+  EXPECT_EQ(refusal("certify", R"({"A":[[0]],"B":[[1]],"T":0.5,"K":[[3]],"low":[-1,1,0],)"
+                               R"("high":[1,1,0],"A_p":[[1],[1]]})"),
+            "wrong_shape");
+  const Json plant = answer("certify", R"({"A":[[0]],"B":[[1]],"T":0.5,"K":[[3]],"low":[-1,1,0],)"
+                                       R"("high":[1,1,0],"A_p":[[1]],"K_e":[[0.5]]})");
+  EXPECT_NE(plant.at("verdict"), "undecided");
+}
+
 // dx/dt = u, x(t) = x + tu: ∫x² + r u² = T x² + T² x u + (T³/3 + rT) u².
 TEST(SolveSystems, SampledCost) {
   const Json cost = answer("sampled-cost", R"({"A":[[0]],"B":[[1]],"Q":[[1]],"R":[[2]],"T":0.1})");
