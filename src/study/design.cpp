@@ -193,6 +193,7 @@ Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
     add_margin_warnings(loop, job, result.diagnostics);
   }
   if (result.feedback) {
+    FLYBALL_TRY(result.proofs, proofs_of(loop, job));
     FLYBALL_TRY(result.frequency_response, frequency_response(loop, model, job));
     FLYBALL_CHECK(tell_cost_of_delay(loop, result.loop, model, job, chosen, result.diagnostics));
   }

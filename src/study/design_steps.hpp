@@ -90,6 +90,11 @@ struct LoopDesign {
                                                 const LinearModel& model, const DesignJob& job,
                                                 bool chosen, std::vector<Diagnostic>& diagnostics);
 
+/// Proofs for all mechanisms that the grid is a sample of and, of identified gains, for their 95 %
+/// set.
+[[nodiscard]] Expected<std::vector<PlantProof>> proofs_of(const LoopDesign& loop,
+                                                          const DesignJob& job);
+
 /// Why the gain makes no difference anywhere below Nyquist; empty where it does.
 [[nodiscard]] Expected<std::string> why_no_feedback(const LoopDesign& loop,
                                                     const LinearModel& model, const DesignJob& job);

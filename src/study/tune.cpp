@@ -23,6 +23,9 @@ PlantDescription plant_from_fit(const identification::FeedforwardFit& fit) {
   plant.kA_determined = fit.kA.determined;
   plant.kA_upper_bound = fit.kA.determined ? 0.0 : fit.kA.upper_bound;
   plant.kA_reason = fit.kA.determined ? "" : fit.kA.reason;
+  if (fit.kA.determined) {
+    plant.spread = PlantSpread{fit.kV.standard_error, fit.kA.standard_error / fit.kA.value};
+  }
   plant.gains.kG = fit.kG ? known(*fit.kG) : 0.0;
   if (fit.gravity_with_friction) {
     plant.gains.kS = fit.kS.value;

@@ -50,6 +50,11 @@ TEST(Tune, GoesFromALogToAProvenController) {
   ASSERT_TRUE(*result->design) << to_string(result->design->error());
   const DesignResult& design = **result->design;
   EXPECT_TRUE(design.robust);
+  // Of the errors that the grid samples, and of what the log leaves open.
+  ASSERT_EQ(design.proofs.size(), 2u);
+  for (const PlantProof& proof : design.proofs) {
+    EXPECT_EQ(proof.certificate.verdict, LoopVerdict::stable) << proof.set;
+  }
   // The delay that the log shows is the one that the loop is designed for.
   EXPECT_NEAR(*design.job.controller.delay, std::max(0.0, fit.position_delay), 1e-12);
 

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include <flyball/control/certificate.hpp>
 #include <flyball/core/coordinate.hpp>
 #include <flyball/core/diagnostic.hpp>
 #include <flyball/core/errors.hpp>
@@ -18,6 +19,12 @@
 
 namespace flyball::study {
 
+/// What an identification leaves open of the loop's plant: standard errors.
+struct PlantSpread {
+  double kV = 0.0;      ///< V·s/unit
+  double log_kA = 0.0;  ///< Of ln kA.
+};
+
 /// The mechanism to be controlled: gains (identified, or computed from mass, gearing and motors).
 struct PlantDescription {
   mechanisms::MechanismKind kind{};
@@ -27,6 +34,7 @@ struct PlantDescription {
   bool kA_determined = true;                   ///< If not, Theorem 14.3.2 is the plant.
   double kA_upper_bound = 0.0;                 ///< V·s²/unit, if not determined.
   std::string kA_reason{};                     ///< Why it is not determined, if a log says so.
+  std::optional<PlantSpread> spread{};         ///< Of identified gains.
   std::optional<mechanisms::DcMotor> motor{};  ///< If known: current and battery sag are simulated.
   double gearing = 1.0;                        ///< Motor turns per output turn.
   double drum_radius = 0.0;       ///< m, of a known drum (of a swerve drive: wheel), else 0.
@@ -115,6 +123,16 @@ struct RobustnessPoint {
   double overshoot = 0.0;        ///< Of a small step, as a share of it; infinity if unstable.
 };
 
+/// What is proven of the loop for every mechanism of a set.
+struct PlantProof {
+  std::string of{};   ///< "errors", "delays", "identified": which set.
+  std::string set{};  ///< The same in words: "an inertia and a gain within ±20 % of the model's".
+  bool tried = true;  ///< False where the loop has too many states for a proof.
+  int states = 0;     ///< Of the loop, the inputs on their way among them.
+  LoopCertificate certificate{};
+  /// Of the worst member found, the parameters are [kV; kA; gain; delay].
+};
+
 /// The fastest trapezoid that the motor can follow with its voltage.
 struct FastestMotion {
   double max_velocity = 0.0;      ///< unit/s
@@ -166,6 +184,9 @@ struct DesignResult {
   std::vector<RobustnessPoint> robustness{};
   bool robust = false;  ///< Whether every point of the grid is stable.
   double worst_overshoot = 0.0;
+  /// For every mechanism of a set, not of a grid: the errors of the grid, and what a log leaves
+  /// open.
+  std::vector<PlantProof> proofs{};
 
   FastestMotion motion;
   TimeSeries response{};  ///< The simulated closed loop: columns as `MechanismResponse`.

@@ -47,6 +47,7 @@ void write_robustness(JsonWriter& json, const DesignResult& result) {
   json.object("robustness", [&] {
     json.add("stable", result.robust);
     json.add("worst_overshoot", result.worst_overshoot);
+    write_proofs(json, result);
     json.list("grid", result.robustness, [&](const RobustnessPoint& point) {
       json.object([&] {
         json.add({{"inertia_factor", point.inertia_factor},
@@ -152,6 +153,7 @@ Verdict verdict_of(const DesignResult& result) {
                       "the loop unstable"
                     : "a mechanism that differs by 20 % from its model makes the loop unstable");
   }
+  add_proofs(verdict, result);
   if (!result.feedback) {
     verdict.add(Tone::caution, "there is no feedback: " + result.no_feedback);
   }
@@ -170,11 +172,12 @@ Verdict verdict_of(const DesignResult& result) {
   }
   add_warnings(verdict, result.diagnostics, "of the design");
   verdict.line =
-      verdict.tone == Tone::good  ? "The loop is stable and robust."
+      verdict.tone == Tone::good  ? proof_line(result)
       : verdict.tone == Tone::bad ? "Do not run this controller as it is."
       : !result.feedback
           ? "Feedforward alone drives the mechanism; mind what follows before you run it."
-          : "The loop is stable; mind what follows before you run it.";
+      : all_proven(result) ? proof_line(result) + " Mind what follows before you run it."
+                           : "The loop is stable; mind what follows before you run it.";
   return verdict;
 }
 

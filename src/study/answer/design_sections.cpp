@@ -298,6 +298,7 @@ Section robustness_section(const DesignResult& result) {
   section.blocks.emplace_back(Paragraph{fmt::format(
       "Of the loop opened at the plant input, with the delay in it{}:", checked_kA(result))});
   section.blocks.emplace_back(std::move(facts));
+  append(section.blocks, proof_blocks(result));
   if (!result.robustness.empty()) {
     section.blocks.emplace_back(robustness_table(result));
     if (result.predicts) {
@@ -306,10 +307,11 @@ Section robustness_section(const DesignResult& result) {
       section.blocks.emplace_back(delay_error_facts(result));
     }
     section.blocks.emplace_back(
-        result.robust ? Paragraph{fmt::format("Stable in the whole grid, worst overshoot {}.",
-                                              percent(result.worst_overshoot, 3)),
-                                  Tone::good}
-                      : Paragraph{"Not stable in the whole grid.", Tone::bad});
+        result.robust
+            ? Paragraph{fmt::format("Stable at every point of this grid, worst overshoot {}.",
+                                    percent(result.worst_overshoot, 3)),
+                        Tone::good}
+            : Paragraph{"Not stable at every point of this grid.", Tone::bad});
   }
   return section;
 }

@@ -55,6 +55,15 @@ void write_drive_gains(JsonWriter& json, const identification::DriveFit& fit);
 [[nodiscard]] Section data_section(const IdentifyResult& result);
 /// Gains and the quality of the fit; for a refused fit, its reason.
 [[nodiscard]] Section gains_section(const IdentifyResult& result);
+/// What is proven, in a sentence: of all sets, or the first of which it is not.
+[[nodiscard]] std::string proof_line(const DesignResult& result);
+/// Whether every mechanism of every set is proven stable.
+[[nodiscard]] bool all_proven(const DesignResult& result);
+/// A row a set, with the worst member that was found.
+[[nodiscard]] std::vector<Block> proof_blocks(const DesignResult& result);
+void write_proofs(JsonWriter& json, const DesignResult& result);
+/// What speaks against the loop in its proofs.
+void add_proofs(Verdict& verdict, const DesignResult& result);
 /// Plant, controller, robustness, motion, constants.
 [[nodiscard]] std::vector<Section> design_sections(const DesignResult& result);
 

@@ -1,0 +1,120 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "core/try.hpp"
+#include "study/design_steps.hpp"
+
+// What holds of the loop for every mechanism of a set, with a proof.
+namespace flyball::study {
+
+namespace {
+
+using Eigen::Index;
+
+constexpr double error_share = 0.2;   ///< Of inertia and gain, as in the grid.
+constexpr double delay_share = 0.25;  ///< Of a delay that is predicted over.
+/// A proof's work grows with the sixth power of the states.
+constexpr Index most_states = 14;
+constexpr double most_work = 2e8;  ///< A tenth of a second, for each claim.
+
+UncertainLoop uncertain_loop(const LoopDesign& loop, const DesignJob& job) {
+  const auto& [model, K, K_e] = loop.regulator;
+  const Index n = model.A.rows();
+  // As `observer_regulator_loop`, whose plant is of the set.
+  const Eigen::MatrixXd I_KC = Eigen::MatrixXd::Identity(n, n) - K_e * model.C;
+  const Eigen::MatrixXd A_BK = model.A - model.B * K;
+  const bool position = !controls_velocity(job.plant.kind);
+  UncertainLoop uncertain{.plant = MechanismFamily{.position = position},
+                          .C = Eigen::MatrixXd::Zero(1, position ? 2 : 1),
+                          .period = model.period,
+                          .A_c = A_BK * I_KC,
+                          .B_c = A_BK * K_e,
+                          .C_c = K * I_KC,
+                          .D_c = K * K_e,
+                          .set = {}};
+  uncertain.C(0, 0) = 1.0;
+  return uncertain;
+}
+
+Expected<PlantProof> proof_of(std::string of, std::string set, const UncertainLoop& loop) {
+  PlantProof proof{.of = std::move(of), .set = std::move(set)};
+  const Index last = loop.set.centre.size() - 1;
+  const double delay = loop.set.centre(last) + loop.set.axes.row(last).cwiseAbs().sum();
+  proof.states = static_cast<int>(loop.C.cols() + loop.A_c.rows()) +
+                 static_cast<int>(std::ceil(delay / loop.period.si() - 1e-9));
+  proof.tried = proof.states <= most_states;
+  if (!proof.tried) {
+    return proof;
+  }
+  FLYBALL_TRY(proof.certificate, certify_loop(loop, {.most_pieces = 2000, .most_work = most_work}));
+  if (std::get<MechanismFamily>(loop.plant).logarithmic) {
+    for (LoopMember* member : {&proof.certificate.worst, &proof.certificate.slowest}) {
+      if (member->parameters.size() > 1) {
+        member->parameters(1) = std::exp(member->parameters(1));
+      }
+    }
+  }
+  return proof;
+}
+
+/// The box about the joint 95 % ellipsoid of kV and ln kA, however the two are correlated: each
+/// within √χ²(2) of its standard errors.
+Expected<ParameterSet> confidence_set(const PlantSpread& spread, const PlantDescription& plant,
+                                      double delay) {
+  const double joint = 2.447746830680816;  // √5.99146
+  const double log_kA = std::log(plant.gains.kA);
+  return parameter_box(
+      {plant.gains.kV - joint * spread.kV, log_kA - joint * spread.log_kA, 1.0, delay},
+      {plant.gains.kV + joint * spread.kV, log_kA + joint * spread.log_kA, 1.0, delay});
+}
+
+}  // namespace
+
+Expected<std::vector<PlantProof>> proofs_of(const LoopDesign& loop, const DesignJob& job) {
+  const PlantDescription& plant = job.plant;
+  const double kV = plant.gains.kV;
+  const double delay = job.controller.delay.value_or(0.0);
+  UncertainLoop uncertain = uncertain_loop(loop, job);
+  std::vector<PlantProof> proofs;
+
+  const double kA_low = plant.kA_determined ? (1.0 - error_share) * plant.gains.kA : 0.0;
+  const double kA_high =
+      plant.kA_determined ? (1.0 + error_share) * plant.gains.kA : plant.kA_upper_bound;
+  FLYBALL_TRY(uncertain.set, parameter_box({kV, kA_low, 1.0 - error_share, delay},
+                                           {kV, kA_high, 1.0 + error_share, delay}));
+  FLYBALL_TRY(
+      auto errors,
+      proof_of("errors",
+               plant.kA_determined ? std::string("an inertia and a gain within ±20 % of the "
+                                                 "model's")
+               : kA_high > 0.0
+                   ? fmt::format("a kA from 0 to {} V·s²/{} and a gain within ±20 % of the "
+                                 "model's",
+                                 format_number(kA_high, 3), plant.unit)
+                   : std::string("no inertia and a gain within ±20 % of the model's"),
+               uncertain));
+  proofs.push_back(std::move(errors));
+
+  if (loop.predicts && plant.kA_determined) {
+    FLYBALL_TRY(uncertain.set,
+                parameter_box({kV, plant.gains.kA, 1.0, (1.0 - delay_share) * delay},
+                              {kV, plant.gains.kA, 1.0, (1.0 + delay_share) * delay}));
+    FLYBALL_TRY(
+        auto delays,
+        proof_of("delays", "a delay within ±25 % of what it was predicted over", uncertain));
+    proofs.push_back(std::move(delays));
+  }
+  if (plant.spread && plant.kA_determined) {
+    std::get<MechanismFamily>(uncertain.plant).logarithmic = true;
+    FLYBALL_TRY(uncertain.set, confidence_set(*plant.spread, plant, delay));
+    FLYBALL_TRY(auto identified,
+                proof_of("identified", "a kV and a kA of the log's joint 95 % set", uncertain));
+    proofs.push_back(std::move(identified));
+  }
+  return proofs;
+}
+
+}  // namespace flyball::study
