@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include <flyball/math/equations/matrix_equation.hpp>
 #include <flyball/math/riccati/riccati.hpp>
@@ -204,8 +205,15 @@ Expected<Smaller> smaller(const Continuous& stable, Index order, Index added, Ti
   negative.D = -negative.D;
   if (n > 0) {
     FLYBALL_TRY_IN(where, const auto difference, parallel(stable, negative));
-    FLYBALL_TRY_IN(where, const auto norm, norm_of(difference, domain));
-    found.error = norm.norm;
+    const auto norm = norm_of(difference, domain);
+    if (!norm && !norm.error().is(SystemError::no_convergence)) {
+      return tl::unexpected(norm.error());
+    }
+    // Of differences near rounding the search may not end: what it reached is told.
+    found.error = norm ? norm->norm : 0.0;
+    for (const Evidence& evidence : norm ? std::vector<Evidence>{} : norm.error().evidence()) {
+      found.error = evidence.name == "gain reached" ? evidence.values.front() : found.error;
+    }
   }
   return found;
 }

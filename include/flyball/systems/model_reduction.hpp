@@ -43,7 +43,8 @@ struct ReducedModel {
   Eigen::VectorXd hankel;     ///< σ of what was reduced: the stable part, or the coprime factors.
   Eigen::Index unstable = 0;  ///< States of the unstable part, kept as they are; 0 of coprime.
   double error_bound = 0.0;   ///< 2 Σ of the σ left out.
-  /// ‖G - G_r‖∞, or that of the factors [M; N], computed: at most `error_bound`.
+  /// ‖G - G_r‖∞, or that of the factors [M; N], computed: at most `error_bound`. The largest gain
+  /// found, where the search for the norm did not end.
   double error = 0.0;
 };
 
