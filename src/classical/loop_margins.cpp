@@ -39,8 +39,20 @@ Polynomial shifted(const Polynomial& p) {
   return more;
 }
 
+/// Horner's rule in 31 digits, since beside a weakly damped root nearly all of the terms cancel.
 double at(const Polynomial& p, double x) {
-  return detail::value(p.rounded(), x).real();
+  double high = 0.0;
+  double low = 0.0;
+  for (Index i = 0; i < p.rows(); ++i) {
+    const double product = high * x;
+    const double lost = std::fma(high, x, -product) + low * x;
+    const double sum = product + p.hi(i, 0);
+    const double back = sum - product;
+    const double rest = (product - (sum - back)) + (p.hi(i, 0) - back) + lost + p.lo(i, 0);
+    high = sum + rest;
+    low = rest - (high - sum);
+  }
+  return high + low;
 }
 
 /// |p(jω)|² as a polynomial in x = ω².
@@ -157,6 +169,31 @@ Expected<std::pair<double, double>> largest_ratio(const Polynomial& a, const Pol
     if (above > 1e-12 * detail::value(sizes, x).real()) {
       take(x, infinity);
     }
+  }
+  // A narrow peak stands beside a root of b: searched there, as its slope's root may be too inexact.
+  const auto beside = detail::roots(b);
+  if (!beside) {
+    return no_convergence();
+  }
+  const auto ratio = [&](double x) {
+    const double below = at(b, x);
+    return below > 0.0 ? at(a, x) / below : 0.0;
+  };
+  for (const Complex& root : *beside) {
+    const double width = 4.0 * std::abs(root.imag());
+    if (!(root.real() > 0.0) || !(width < root.real())) {
+      continue;
+    }
+    double low = root.real() - width;
+    double high = root.real() + width;
+    constexpr double golden = 0.3819660112501051;
+    for (int i = 0; i < 100 && high - low > 1e-16 * high; ++i) {
+      const double left = low + golden * (high - low);
+      const double right = high - golden * (high - low);
+      (ratio(left) > ratio(right) ? high : low) = ratio(left) > ratio(right) ? right : left;
+    }
+    const double x = 0.5 * (low + high);
+    take(x, ratio(x));
   }
   const Polynomial p = detail::trimmed(a);
   const Polynomial q = detail::trimmed(b);
