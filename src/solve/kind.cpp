@@ -57,7 +57,6 @@ std::span<const Kind> kinds() {
     add("Interconnections", interconnection_kinds());
     add("Regulators", regulator_kinds());
     add("Feedforward and delay", feedforward_kinds());
-    add("Feedforward, delay and margins", feedforward_kinds());
     add("Certificates", certificate_kinds());
     add("PID", pid_kinds());
     add("Compensators and robust synthesis", compensator_kinds());
