@@ -271,9 +271,9 @@ Expected<double> gain_for_error_constant(const TransferFunction& plant, double c
       for (Index i = 1; i < p.size(); ++i) {
         p(i) += p(i - 1);
       }
-      p = (p.head(p.size() - 1) * period->si()).eval();
+      p = VectorXd(p.head(p.size() - 1) * period->si());
     } else {
-      p = p.head(p.size() - 1).eval();
+      p = VectorXd(p.head(p.size() - 1));
     }
   };
   while (den.size() > 1 && vanishes(den)) {

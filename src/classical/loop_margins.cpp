@@ -170,7 +170,8 @@ Expected<std::pair<double, double>> largest_ratio(const Polynomial& a, const Pol
       take(x, infinity);
     }
   }
-  // A narrow peak stands beside a root of b: searched there, as its slope's root may be too inexact.
+  // A narrow peak stands beside a root of b: searched there, as its slope's root may be too
+  // inexact.
   const auto beside = detail::roots(b);
   if (!beside) {
     return no_convergence();
@@ -247,6 +248,7 @@ Expected<std::vector<double>> phase_places(const Border& border) {
     return no_convergence();
   }
   double fastest = 1.0 / border.own_delay();
+  double slowest = fastest;
   for (const Polynomial* p : {&border.num(), &border.den()}) {
     const auto roots = detail::roots(*p);
     if (!roots) {
@@ -254,10 +256,11 @@ Expected<std::vector<double>> phase_places(const Border& border) {
     }
     for (const Complex& root : *roots) {
       fastest = std::max(fastest, std::abs(root));
+      slowest = root == 0.0 ? slowest : std::min(slowest, std::abs(root));
     }
   }
   const double end = 10.0 * fastest;
-  std::vector<double> bounds{1e-9 * end / 10.0};
+  std::vector<double> bounds{std::max(1e-6 * slowest, 1e-300)};
   for (const double x : *stationary) {
     const double w = std::sqrt(x);
     if (w > bounds.front() && w < end) {
@@ -266,6 +269,7 @@ Expected<std::vector<double>> phase_places(const Border& border) {
   }
   bounds.push_back(end);
   std::sort(bounds.begin(), bounds.end());
+  constexpr std::size_t most_crossings = 1'000;
   // The phase without jumps: between neighbours it turns by less than half a turn at a time.
   const auto rational = [&](double w) { return border.phase(w * w); };
   std::vector<double> places;
@@ -283,6 +287,9 @@ Expected<std::vector<double>> phase_places(const Border& border) {
       const double high = std::max(before, after);
       for (double level = pi + 2.0 * pi * std::ceil((low - pi) / (2.0 * pi)); level <= high;
            level += 2.0 * pi) {
+        if (places.size() == most_crossings) {
+          return places;  // by frequency: parts and levels ascend
+        }
         const double from = rational(a);
         const double start = before;
         const auto root = find_root(
@@ -326,6 +333,7 @@ Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
   }
   const Polynomial steepness = detail::derivative(difference);
   FLYBALL_TRY(margins.unstable_poles, unstable_roots(loop));
+  double unstable = margins.unstable_poles;  // may be many more than an int holds
   double further = infinity;
   for (const double x : *unit_gain) {
     const double w = border.frequency(x);
@@ -337,11 +345,12 @@ Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
     const int direction = at(steepness, x) < 0.0 ? 2 : -2;
     if (border.delay() > 0.0 && border.delay() * w > turn) {
       const double crossings = std::floor((border.delay() * w - turn) / (2.0 * pi)) + 1.0;
-      margins.unstable_poles += direction * static_cast<int>(crossings);
+      unstable += direction * crossings;
     }
     const double ahead = margin > 0.0 ? margin : margin + 360.0;
     further = std::min(further, ahead * pi / 180.0 / w);
   }
+  margins.unstable_poles = static_cast<int>(std::clamp(unstable, 0.0, 2147483647.0));
   margins.stable = margins.unstable_poles == 0;
   margins.delay_margin = margins.stable ? further : 0.0;
 

@@ -43,7 +43,7 @@ std::pair<int, double> at_rest(VectorXd p, bool discrete) {
         p(i) += p(i - 1);
       }
     }
-    p = p.head(p.size() - 1).eval();
+    p = VectorXd(p.head(p.size() - 1));
   }
   return {times, discrete ? p.sum() : p(p.size() - 1)};
 }

@@ -161,7 +161,7 @@ bool LoopProver::show_on(const SetPiece& piece, const DelayBranch& branch,
                      }).has_value();
   work_ += work_of(vertices.size(), size, fixed) * (search.steps + 1);
   if (search.last.rows() == size) {
-    T = search.last.lazyProduct(*T_0);
+    T = MatrixXd(search.last.lazyProduct(*T_0));
   }
   if (found && options_.keep_proof) {
     proof_.push_back(

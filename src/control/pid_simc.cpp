@@ -44,9 +44,9 @@ double rest_at_origin(const Eigen::VectorXd& p, int roots, const std::optional<T
       for (Eigen::Index i = 1; i < q.size(); ++i) {
         q(i) += q(i - 1);
       }
-      q = (q.head(q.size() - 1) * period->si()).eval();
+      q = Eigen::VectorXd(q.head(q.size() - 1) * period->si());
     } else {
-      q = q.head(q.size() - 1).eval();
+      q = Eigen::VectorXd(q.head(q.size() - 1));
     }
   }
   return period ? q.sum() : q(q.size() - 1);
@@ -59,7 +59,7 @@ double residence(const Eigen::VectorXd& p, int roots, const std::optional<Time>&
     for (Eigen::Index i = 1; i < q.size(); ++i) {
       q(i) += q(i - 1);
     }
-    q = q.head(q.size() - 1).eval();
+    q = Eigen::VectorXd(q.head(q.size() - 1));
   }
   double slope = 0.0;
   for (Eigen::Index i = 0; i < q.size(); ++i) {

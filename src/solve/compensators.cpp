@@ -431,7 +431,8 @@ std::vector<Kind> compensator_kinds() {
                       "of the output to the reference, as in tf"),
                record("load", "peak peak_time recovery_time integral absolute_integral final_value",
                       "of the output to a step of load at the plant's input")},
-       R"({"num": [1], "den": [1, 3, 3, 1], "delay": 0.2, "form": "pi"})", &solve_pidtune},
+       R"({"num": [1], "den": [1, 3, 3, 1], "delay": 0.2, "form": "pi", "method": "simc"})",
+       &solve_pidtune},
       {"compensator", "a lead, lag or lead-lag compensator in front of a plant",
        plant_fields() +
            std::vector{

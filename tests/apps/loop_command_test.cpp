@@ -149,7 +149,7 @@ TEST_F(LoopCommand, PolesAsWritten) {
 TEST_F(LoopCommand, AReportOfTheLoop) {
   const Answer told = run("sisotool '2/(s^2+3*s+2)*exp(-0.1*s)' --gain 3 --out report");
   ASSERT_EQ(told.status, 0) << told.err;
-  EXPECT_TRUE(holds(told.out, "closed loop with dead time"));
+  EXPECT_TRUE(holds(told.out, "overshoot"));
   for (const char* file : {"index.html", "result.json", "data/bode.csv", "data/nyquist.csv",
                            "data/response.csv", "pictures/bode.svg", "pictures/nyquist.svg"}) {
     EXPECT_TRUE(std::filesystem::exists(work() / "report" / file)) << file;

@@ -37,7 +37,8 @@ void try_every_allocation(const std::string& what, FunctionRef<std::string()> wo
        {AllocationFault::Memory::comes_back, AllocationFault::Memory::stays_short}) {
     std::size_t k = 0;
     for (bool struck = true; struck;) {
-      k += 1 + (sparsely ? k / 100 : 0);
+      // Each of the first thousand; of much work then one in a hundred of those before it.
+      k += 1 + (sparsely || k > 1000 ? k / 100 : 0);
       const long before = blocks_held();
       {
         AllocationFault fault(k, memory);

@@ -249,7 +249,7 @@ TEST(Design, ExportsItsLoopAndItsConstants) {
   EXPECT_EQ(constants.gains[1].kP, result->paste[1].kP);
   EXPECT_EQ(constants.angle_offset, 0.2);
   EXPECT_EQ(constants.kA_reason, "no reason");
-  EXPECT_EQ(exports::paste_constants(constants).size(), 6u);
+  EXPECT_EQ(exports::paste_constants(constants).size(), 9u);  // of three tools in three languages
 }
 
 // The sensor of the simulation is as late as the design says, and the controller makes up for it:

@@ -28,9 +28,10 @@ struct Peak {
 
 /// How far a loop 1/(1 + L) is from instability, whole.
 struct LoopMargins {
-  std::vector<GainCrossing> gain_crossings{};    ///< By frequency.
-  std::vector<PhaseCrossing> phase_crossings{};  ///< By frequency; of a loop with a delay those
-                                                 ///< up to ten times its fastest pole or zero.
+  std::vector<GainCrossing> gain_crossings{};  ///< By frequency.
+  /// By frequency; of a loop with a delay those up to ten times its fastest pole or zero, the first
+  /// thousand at most.
+  std::vector<PhaseCrossing> phase_crossings{};
   /// The gain margin nearest to one, as a ratio; none without a phase crossing.
   std::optional<double> gain_margin{};
   /// deg, that nearest to zero; none without a gain crossing.

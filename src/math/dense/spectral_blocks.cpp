@@ -179,7 +179,8 @@ std::vector<MatrixXd> spectral_blocks(const MatrixRef& A) {
     }
   }
   if (blocks.size() == 1 || !(most / far_apart > least)) {
-    blocks.assign(1, MatrixXd(A));
+    blocks.clear();
+    blocks.emplace_back(A);
   }
   return blocks;
 }

@@ -249,7 +249,7 @@ std::optional<MatrixXd> common_lyapunov(const std::vector<MatrixXd>& M, Index fi
   const auto last = [&] {
     MatrixXd L = barrier.widened(P);
     if (factor_in_place(L)) {
-      search.last = L.transpose();
+      search.last = MatrixXd(L.transpose());
       search.last.triangularView<Eigen::StrictlyLower>().setZero();
     }
   };

@@ -1,6 +1,7 @@
 // What is proven for every mechanism of a set, in words, as a table and as JSON.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -95,8 +96,9 @@ std::vector<Block> proof_blocks(const DesignResult& result) {
   }
   Table table;
   table.caption = "What holds for every mechanism of a set, with its observer and delay:";
-  table.header = {"every mechanism with", "its loop is", "gain",
-                  "phase margin",         "disk margin", "the worst found"};
+  table.header = {"every mechanism with", "its loop is", "gain", "phase margin", "disk margin"};
+  table.words = {0, 1, 2, 3, 4};
+  std::vector<Block> worst;
   for (const PlantProof& proof : result.proofs) {
     const LoopCertificate& certificate = proof.certificate;
     const bool margins = proven(proof) && certificate.disk_margin > 0.0;
@@ -106,13 +108,16 @@ std::vector<Block> proof_blocks(const DesignResult& result) {
                                number(certificate.gain_down, 3), number(certificate.gain_up, 3))
                  : "",
          margins ? fmt::format("at least {}°", number(certificate.phase_margin, 3)) : "",
-         margins ? fmt::format("at least {}", number(certificate.disk_margin, 3)) : "",
-         proof.tried && certificate.worst.parameters.size() == 4
-             ? fmt::format("disk margin {} with {}", number(certificate.worst.disk_margin, 3),
-                           member_text(result, certificate.worst))
-             : ""});
+         margins ? fmt::format("at least {}", number(certificate.disk_margin, 3)) : ""});
+    if (proof.tried && certificate.worst.parameters.size() == 4) {
+      worst.emplace_back(Paragraph{fmt::format("The worst found with {}: disk margin {} with {}.",
+                                               proof.set, number(certificate.worst.disk_margin, 3),
+                                               member_text(result, certificate.worst)),
+                                   Tone::quiet});
+    }
   }
   blocks.emplace_back(std::move(table));
+  std::move(worst.begin(), worst.end(), std::back_inserter(blocks));
   blocks.emplace_back(Paragraph{
       fmt::format(
           "A set is proven by a Lyapunov function for each of the pieces that it is cut into, "
