@@ -124,7 +124,9 @@ int run(int argc, char** argv) {
   } catch (const CLI::Success& answer) {
     std::ostringstream words;
     const int status = program.exit(answer, words, words);
-    flyball::app::print(for_terminal(words.str()));
+    if (!words.str().empty()) {  // what `--schema` prints is printed
+      flyball::app::print(for_terminal(words.str()));
+    }
     return status;
   } catch (const CLI::ParseError& problem) {
     if (argc < 2) {  // as git does: who does not know a command is told them all
