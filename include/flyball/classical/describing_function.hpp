@@ -21,6 +21,7 @@ enum class NonlinearityKind {
 /// @errors ArgumentError::unknown_name with the nearest name as hint.
 [[nodiscard]] Expected<NonlinearityKind> parse_nonlinearity(std::string_view name);
 
+/// A nonlinearity without memory, or with one of one side, and its measures.
 struct Nonlinearity {
   NonlinearityKind kind = NonlinearityKind::saturation;
   double width = 1.0;   ///< In the unit of its input; of a relay not asked for.

@@ -51,6 +51,7 @@ class FrequencyResponse {
     [[nodiscard]] virtual Eigen::VectorXd known_frequencies() const;
   };
 
+  /// Of anything that has one. @param source  Not null.
   explicit FrequencyResponse(std::shared_ptr<const Source> source) : source_(std::move(source)) {}
 
   [[nodiscard]] Eigen::Index outputs() const { return source_->outputs(); }

@@ -19,6 +19,7 @@ struct PartialFractions {
   Eigen::VectorXd polynomial;  ///< q, descending powers; empty of a strictly proper one.
   std::vector<PartialFraction> fractions{};  ///< By falling real part, conjugates after each other.
 
+  /// Their sum at a point of the plane; not finite at a pole.
   [[nodiscard]] std::complex<double> at(std::complex<double> s) const;
 };
 

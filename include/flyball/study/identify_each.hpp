@@ -94,8 +94,9 @@ struct LogRows {
 
 /// "2/8": the second of eight parts; the logs whose number leaves 1 when divided by 8.
 struct Shard {
-  std::size_t part = 1;
-  std::size_t of = 1;
+  std::size_t part = 1;  ///< From 1.
+  std::size_t of = 1;    ///< How many there are.
+  /// Whether a log, by its number among all, is of this part.
   [[nodiscard]] bool holds(std::size_t number) const { return number % of == part - 1; }
 };
 /// @errors ArgumentError::malformed, out_of_range.
