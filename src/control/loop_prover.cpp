@@ -73,6 +73,12 @@ double work_of(std::size_t vertices, Index size, Index fixed) {
          unknowns * unknowns * unknowns / 3.0 + 1000.0;
 }
 
+/// Of a loop's enclosure over a piece, as measured beside `work_of`.
+double work_of_enclosure(Index states) {
+  const auto n = static_cast<double>(states);
+  return 2400.0 * n * n * n + 50'000.0;
+}
+
 }  // namespace
 
 bool LoopProver::outside(const SetPiece& piece) const {
@@ -118,6 +124,7 @@ void LoopProver::choose_split(const SetPiece& piece, const MatrixFamily& family,
 bool LoopProver::show_on(const SetPiece& piece, const DelayBranch& branch,
                          const std::vector<TaylorForm>& parameters, const LoopClaim& claim,
                          MatrixXd& T) {
+  work_ += work_of_enclosure(loop_.C.cols() + loop_.A_c.rows() + 1);
   const auto forms = closed_loop_over(loop_, parameters, branch, claim.disk, claim.decay);
   if (!forms) {
     choose_split(piece, {}, nullptr);

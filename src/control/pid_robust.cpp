@@ -77,10 +77,14 @@ Expected<Span> span_of(const TransferFunction& plant, std::string_view where) {
   }
   const double first = 1e-3 * span.slow;
   const double last = period ? end : 100.0 * span.fast;
+  // A plant of more than twenty decades is looked at more coarsely, so that the work has a bound.
   constexpr double steps = 60.0;  // a decade
-  const int count = static_cast<int>(steps * std::log10(last / first)) + 1;
+  constexpr double most_steps = 1200.0;
+  const int count =
+      static_cast<int>(std::min(steps * (std::log10(last) - std::log10(first)), most_steps)) + 1;
   for (int i = 0; i <= count; ++i) {
-    span.grid.push_back(first * std::pow(last / first, static_cast<double>(i) / count));
+    const double share = static_cast<double>(i) / count;
+    span.grid.push_back(std::pow(first, 1.0 - share) * std::pow(last, share));
   }
   for (const Complex& place : places) {
     // Sharp turns near the axis.

@@ -111,7 +111,7 @@ struct LoopCertificate {
 /// How much work, and what to show.
 struct CertificateOptions {
   int most_pieces = 20000;  ///< Of each claim.
-  /// Floating-point operations of each claim's search for Lyapunov functions, about.
+  /// Floating-point operations of each claim, about.
   double most_work = 3e9;
   bool margins = true;      ///< Disk margin and decay beside stability.
   double closeness = 0.95;  ///< Of the margin that is shown to the smallest that was found.

@@ -48,7 +48,7 @@ bool invert(const MatrixXd& S, MatrixXd& inverse, double& log_det) {
       R(i, j) = -L.row(i).segment(j, i - j).dot(R.col(j).segment(j, i - j)) / L(i, i);
     }
   }
-  inverse = R.transpose().lazyProduct(R);
+  inverse = MatrixXd(R.transpose().lazyProduct(R));  // of another size it may have been
   return true;
 }
 
