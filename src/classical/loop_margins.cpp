@@ -139,10 +139,19 @@ double wrapped(double degrees) {
 }
 
 /// The largest of a(x)/b(x) over x >= 0 and at infinity.
-Expected<std::pair<double, double>> largest_ratio(const Polynomial& a, const Polynomial& b) {
-  const Polynomial slope =
-      plus(times(detail::derivative(a), b), -1.0, times(a, detail::derivative(b)));
-  auto places = detail::positive_roots(slope);
+Expected<std::pair<double, double>> largest_ratio(const Polynomial& above,
+                                                  const Polynomial& below) {
+  const Polynomial a = detail::trimmed(above);
+  const Polynomial b = detail::trimmed(below);
+  // The slope's numerator is a'b - ab' = a'd - ad' with d = b - a, in which what is equal above and
+  // below has gone: what rounding leaves of it would be a root near infinity, beside which the
+  // others are lost. So would the leading terms of an a and a d of one degree.
+  const Polynomial d = detail::trimmed(plus(b, -1.0, a));
+  Polynomial slope = plus(times(detail::derivative(a), d), -1.0, times(a, detail::derivative(d)));
+  if (a.rows() == d.rows()) {
+    slope.hi(0, 0) = slope.lo(0, 0) = 0.0;
+  }
+  const auto places = detail::positive_roots(slope);
   const auto poles = detail::positive_roots(b);
   if (!places || !poles) {
     return no_convergence();
@@ -155,18 +164,22 @@ Expected<std::pair<double, double>> largest_ratio(const Polynomial& a, const Pol
       where = x;
     }
   };
+  const auto ratio = [&](double x) {
+    const double under = at(b, x);
+    return under > 0.0 ? at(a, x) / under : 0.0;
+  };
   const double zero = at(b, 0.0);
   take(0.0, zero != 0.0 ? at(a, 0.0) / zero : at(a, 0.0) != 0.0 ? infinity : 0.0);
   for (const double x : *places) {
-    const double below = at(b, x);
-    const double above = at(a, x);
     // Where both vanish the slope does, too, and says nothing.
-    take(x, below > 0.0 ? above / below : 0.0);
+    take(x, ratio(x));
   }
   for (const double x : *poles) {
-    const double above = at(a, x);
+    // b is a square: of a root that is rounded, nothing is left in 31 digits.
     const VectorXd sizes = a.rounded().cwiseAbs();
-    if (above > 1e-12 * detail::value(sizes, x).real()) {
+    const VectorXd sizes_below = b.rounded().cwiseAbs();
+    if (at(a, x) > 1e-12 * detail::value(sizes, x).real() &&
+        at(b, x) <= 1e-27 * detail::value(sizes_below, x).real()) {
       take(x, infinity);
     }
   }
@@ -176,10 +189,6 @@ Expected<std::pair<double, double>> largest_ratio(const Polynomial& a, const Pol
   if (!beside) {
     return no_convergence();
   }
-  const auto ratio = [&](double x) {
-    const double below = at(b, x);
-    return below > 0.0 ? at(a, x) / below : 0.0;
-  };
   for (const Complex& root : *beside) {
     const double width = 4.0 * std::abs(root.imag());
     if (!(root.real() > 0.0) || !(width < root.real())) {
@@ -196,11 +205,9 @@ Expected<std::pair<double, double>> largest_ratio(const Polynomial& a, const Pol
     const double x = 0.5 * (low + high);
     take(x, ratio(x));
   }
-  const Polynomial p = detail::trimmed(a);
-  const Polynomial q = detail::trimmed(b);
-  take(infinity, p.rows() < q.rows()   ? 0.0
-                 : p.rows() > q.rows() ? infinity
-                                       : p.hi(0, 0) / q.hi(0, 0));
+  take(infinity, a.rows() < b.rows()   ? 0.0
+                 : a.rows() > b.rows() ? infinity
+                                       : a.hi(0, 0) / b.hi(0, 0));
   return std::pair(best, where);
 }
 

@@ -286,6 +286,67 @@ TEST(LoopMargins, PeakAndDisk) {
   EXPECT_NEAR(exact.delay_margin, near.delay_margin, 1e-10);
 }
 
+// 1 + L = (s² + 2ζs + 1)/(s + 1)²: |S| = 1/ζ at 1 rad/s, a peak that is ζ wide. What is left of ζ
+// in the numerator's 2ζ - 2 is known exactly.
+TEST(LoopMargins, ANarrowPeakIsFound) {
+  for (const double damping : {1e-2, 1e-5, 1e-8, 1e-11}) {
+    const double num = 2.0 * damping - 2.0;
+    const double kept = 0.5 * (num + 2.0);
+    const LoopMargins m = loop_margins(transfer({num, 0.0}, {1.0, 2.0, 1.0})).value();
+    EXPECT_TRUE(m.stable) << damping;
+    EXPECT_NEAR(m.sensitivity.value * kept, 1.0, 1e-6) << damping;
+    EXPECT_NEAR(m.sensitivity.frequency, 1.0, 1e-6) << damping;
+  }
+}
+
+// |1 + L|² is |D + N|²/|D|² in which the highest terms are equal: what rounding left of them was a
+// root near infinity, beside which the true peak was lost. No point of the curve is above the peak.
+TEST(LoopMargins, NoPointIsAboveThePeak) {
+  const TransferFunction continuous =
+      transfer({9.659805037516815, 1.9332859322781475},
+               {1.0, 0.75805784536454368, 0.3377335147432704, 0.088164947527266641,
+                0.016968091124931608, 0.0022587682955374925, 0.00022813618693196908,
+                1.3234389454421982e-05, 3.8573198475469116e-07});
+  const TransferFunction discrete =
+      TransferFunction::create(
+          Eigen::Vector3d(-22.241364951097655, 12.600756874317035, -1.7874876631839218),
+          Eigen::VectorXd{{1.0, 1.1061474934571429, -1.8830750423228972, -2.2096582299047083,
+                           0.78428666210568621, 1.1141025066724861, -0.049097591898913759,
+                           -0.17585668954517586}},
+          Time(0.1))
+          .value();
+  for (const auto& [L, fastest] : {std::pair(&continuous, 100.0), std::pair(&discrete, 31.4)}) {
+    const Peak peak = loop_margins(*L)->sensitivity;
+    double largest = 0.0;
+    for (double w = 1e-3; w < fastest; w *= 1.0005) {
+      largest = std::max(largest, 1.0 / std::abs(1.0 + L->response(w)));
+    }
+    EXPECT_GE(peak.value, largest * (1.0 - 1e-12));
+    EXPECT_LE(peak.value, largest * (1.0 + 1e-5));
+    EXPECT_NEAR(1.0 / std::abs(1.0 + L->response(peak.frequency)), peak.value, 1e-9 * peak.value);
+  }
+}
+
+// A zero at 1e19 rad/s behind a second of dead time crosses the axis 1e19 times; those that matter
+// are there, the first thousand, and nothing takes long. Without it they are the same.
+TEST(LoopMargins, AFarZeroHidesNoCrossing) {
+  const LoopMargins far = loop_margins(transfer({1e-19, 2.0}, {1.0, 2.0, 1.0}, 1.0)).value();
+  const LoopMargins without = loop_margins(transfer({2.0}, {1.0, 2.0, 1.0}, 1.0)).value();
+  EXPECT_EQ(far.phase_crossings.size(), 1000U);
+  ASSERT_GE(without.phase_crossings.size(), 1U);
+  for (std::size_t k = 0; k < without.phase_crossings.size(); ++k) {
+    EXPECT_NEAR(far.phase_crossings[k].frequency / without.phase_crossings[k].frequency, 1.0, 1e-9);
+  }
+  EXPECT_EQ(far.stable, without.stable);
+  EXPECT_NEAR(*far.gain_margin / *without.gain_margin, 1.0, 1e-9);
+  // Nor does a slow pole beside fast ones: 2e-6/(s + 1e-6) is 2 at rest and 1 at 1.7e-6 rad/s.
+  const LoopMargins slow = loop_margins(transfer({2e-6}, {1e-9, 1.0 + 1e-15, 1e-6}, 1e-3)).value();
+  EXPECT_TRUE(slow.stable);
+  ASSERT_GE(slow.phase_crossings.size(), 1U);
+  // -90° of the pole and ωT = 90°: at π/2 / 1 ms, and hardly less for the pole at 1e9.
+  EXPECT_NEAR(slow.phase_crossings[0].frequency, 1570.7, 0.2);
+}
+
 TEST(LoopMargins, NothingToCross) {
   const LoopMargins none = loop_margins(transfer({0.0}, {1.0, 1.0})).value();
   EXPECT_TRUE(none.stable);

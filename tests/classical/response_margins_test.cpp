@@ -78,7 +78,7 @@ void expect_same(const LoopMargins& a, const LoopMargins& b, int i) {
 TEST(ResponseMargins, AreThoseOfThePolynomials) {
   Random random(41);
   const char* many = std::getenv("FLYBALL_TEST_RUNS");
-  const int runs = many != nullptr ? std::atoi(many) : 300;
+  const int runs = many != nullptr ? std::atoi(many) : 600;
   int crossings = 0;
   for (int i = 0; i < runs; ++i) {
     const TransferFunction L = random_loop(random, i % 3 == 2);
