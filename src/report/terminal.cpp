@@ -172,24 +172,38 @@ std::string render_columns(const Table& table, const std::vector<std::size_t>& c
   return out;
 }
 
+/// How wide a text is at least when it is folded: a word, such as a path, is not cut.
+std::size_t longest_word(std::string_view words) {
+  std::size_t longest = 0;
+  for (const std::string_view word : text::split(words, " ")) {
+    longest = std::max(longest, display_width(word));
+  }
+  return longest;
+}
+
 std::string render(const Table& table, const TerminalStyle& style) {
   const std::size_t columns = table.header.size();
+  const std::size_t room = std::max<std::size_t>(20, style.width) - indent.size();
+  constexpr std::size_t narrow = 12;
   std::vector<std::size_t> width(columns, 0);
+  std::vector<std::size_t> narrowest(columns, narrow);
   for (std::size_t c = 0; c < columns; ++c) {
-    width[c] = display_width(table.header[c]);
+    const auto hold = [&](std::string_view text) {
+      width[c] = std::max(width[c], display_width(text));
+      narrowest[c] = std::max(narrowest[c], std::min(longest_word(text), room));
+    };
+    hold(table.header[c]);
     for (const auto& row : table.rows) {
-      width[c] = std::max(width[c], c < row.size() ? display_width(row[c].text) : 0);
+      hold(c < row.size() ? std::string_view(row[c].text) : std::string_view());
     }
   }
-  const std::size_t room = std::max<std::size_t>(20, style.width) - indent.size();
   std::size_t total = gap * (columns - std::min<std::size_t>(columns, 1));
   for (const std::size_t w : width) {
     total += w;
   }
-  constexpr std::size_t narrow = 12;
   if (table.wide_column < columns && total > room) {
     std::size_t& wide = width[table.wide_column];
-    const std::size_t least = std::min(wide, narrow);
+    const std::size_t least = std::min(wide, narrowest[table.wide_column]);
     const std::size_t cut = std::min(wide - least, total - room);
     wide -= cut;
     total -= cut;
@@ -201,7 +215,8 @@ std::string render(const Table& table, const TerminalStyle& style) {
   if (total > room) {
     // Words that fill half of the line are folded; what is still too wide follows below.
     for (std::size_t c = 0; c < columns; ++c) {
-      width[c] = table.is_words(c) ? std::min(width[c], std::max(narrow, room / 2)) : width[c];
+      width[c] =
+          table.is_words(c) ? std::min(width[c], std::max(narrowest[c], room / 2)) : width[c];
     }
   }
   std::vector<std::size_t> group;

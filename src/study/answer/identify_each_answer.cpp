@@ -147,20 +147,18 @@ class Codes {
 
   [[nodiscard]] bool empty() const { return all_.empty(); }
 
-  /// The most frequent first.
-  [[nodiscard]] Table table(std::string caption) const {
+  /// The most frequent first. @param folder  Of all logs, which is left out.
+  [[nodiscard]] Facts facts(const std::string& folder) const {
     std::vector<Code> sorted = all_;
     std::stable_sort(sorted.begin(), sorted.end(),
                      [](const Code& a, const Code& b) { return a.logs > b.logs; });
-    Table table;
-    table.caption = std::move(caption);
-    table.header = {"code", "logs", "first in", "which says"};
-    table.words = {0, 2, 3};
-    table.wide_column = 3;
+    Facts facts;
     for (const Code& code : sorted) {
-      table.rows.push_back({code.code, fmt::to_string(code.logs), code.path, code.message});
+      facts.add(fmt::format("{}, {}", code.code, text::count(code.logs, "log")),
+                fmt::format("{} ({}{})", code.message, code.logs > 1 ? "first in " : "",
+                            code.path.substr(folder.size())));
     }
-    return table;
+    return facts;
   }
 
   void write(JsonWriter& json, std::string_view name) const {
@@ -322,6 +320,7 @@ std::string to_csv(const LogRows& rows) {
 
 Answer answer_of(const LogRows& rows, std::size_t passed_over) {
   Summary summary = summary_of(rows);
+  const std::string folder = common_folder(rows);
   JsonWriter json;
   json.object([&] {
     json.add("schema", schema);
@@ -347,15 +346,10 @@ Answer answer_of(const LogRows& rows, std::size_t passed_over) {
   }
   document.sections.push_back(std::move(logs));
   if (!summary.errors.empty()) {
-    document.sections.push_back({"errors",
-                                 "Logs without gains",
-                                 {summary.errors.table("Why, the most frequent reason first")}});
+    document.sections.push_back({"errors", "Logs without gains", {summary.errors.facts(folder)}});
   }
   if (!summary.warnings.empty()) {
-    document.sections.push_back(
-        {"warnings",
-         "Warnings",
-         {summary.warnings.table("Each once a log, the most frequent first")}});
+    document.sections.push_back({"warnings", "Warnings", {summary.warnings.facts(folder)}});
   }
   std::string lines;
   for (const NumberedRow& row : rows.rows) {
