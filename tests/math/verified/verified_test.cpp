@@ -152,6 +152,43 @@ TEST(Contraction, IsDecidedAtTheVertices) {
   EXPECT_FALSE(contracts(scalar_family(0.5, 0.1), Eigen::MatrixXd::Zero(1, 1)));
 }
 
+// What is not at a vertex counts whole: 0.5 ± 0.4 ± rest is below one for a rest below 0.1, be it
+// in a square, in the radius or in both, in any coordinates.
+TEST(Contraction, SquaresAndRemaindersCount) {
+  const auto with = [](double square, double radius) {
+    MatrixFamily family = scalar_family(0.5, 0.4);
+    family.squares.push_back(Eigen::MatrixXd::Constant(1, 1, square));
+    family.pairs.push_back({0, 0});
+    family.radius.setConstant(radius);
+    return family;
+  };
+  for (const double scale : {1.0, 1e-3, 1e3}) {
+    const Eigen::MatrixXd T = Eigen::MatrixXd::Constant(1, 1, scale);
+    EXPECT_TRUE(contracts(with(0.0999, 0.0), T));
+    EXPECT_FALSE(contracts(with(0.1001, 0.0), T));
+    EXPECT_FALSE(contracts(with(-0.1001, 0.0), T));
+    EXPECT_TRUE(contracts(with(0.0, 0.0999), T));
+    EXPECT_FALSE(contracts(with(0.0, 0.1001), T));
+    EXPECT_TRUE(contracts(with(0.05, 0.0499), T));
+    EXPECT_FALSE(contracts(with(0.05, 0.0501), T));
+  }
+  // In two states the radius is any matrix within it: of [0 r; r 0] added to 0.9 I the norm is
+  // 0.9 + r; in coordinates diag(1, 10) it is ten times as large.
+  MatrixFamily plane = family_of(FormMatrix(Eigen::MatrixXd(0.9 * Eigen::Matrix2d::Identity())));
+  plane.radius = Eigen::MatrixXd{{0.0, 0.0}, {0.09, 0.0}};
+  EXPECT_TRUE(contracts(plane, Eigen::MatrixXd::Identity(2, 2)));
+  EXPECT_FALSE(contracts(plane, Eigen::MatrixXd{{1.0, 0.0}, {0.0, 10.0}}));
+  // Nor is an instability sure that a square or the radius may take back.
+  MatrixFamily away = scalar_family(1.5, 0.2);
+  EXPECT_TRUE(surely_unstable(away));
+  away.radius.setConstant(0.4);
+  EXPECT_FALSE(surely_unstable(away));
+  away.radius.setZero();
+  away.squares.push_back(Eigen::MatrixXd::Constant(1, 1, 0.4));
+  away.pairs.push_back({0, 0});
+  EXPECT_FALSE(surely_unstable(away));
+}
+
 TEST(Contraction, InstabilityIsProvenBeyondRounding) {
   EXPECT_TRUE(surely_unstable(scalar_family(1.0 + 1e-9, 0.0)));
   EXPECT_TRUE(surely_unstable(scalar_family(-1.5, 0.1)));
