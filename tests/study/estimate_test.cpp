@@ -373,6 +373,31 @@ TEST(Estimate, LimitsOfStatesAreKept) {
             1e-15);
 }
 
+// Down against the stop for two seconds, up for one, and readings that tell nothing: a height that
+// had gone on below the stop would come back to it at the end, where the lift is 1 m above.
+TEST(Estimate, AStopStopsWhatTheFilterCarriesOn) {
+  Log log;
+  log.source = "lift.csv";
+  Signal v{"v", "m/s", {}, {}};
+  Signal read{"read", "m", {}, {}};
+  for (int k = 0; k <= 300; ++k) {
+    v.time.push_back(0.01 * k);
+    v.value.push_back(k < 200 ? -1.0 : 1.0);
+    read.time.push_back(0.01 * k);
+    read.value.push_back(0.0);
+  }
+  log.signals = {v, read};
+  const std::string lift =
+      "[model]\nstates = { height = \"m\" }\ninputs = { v = \"m/s\" }\n"
+      "[model.derivative]\nheight = \"v\"\n[model.outputs]\nread = \"height\"\n"
+      "[estimate]\nsmoother = false\nmeasurement_noise = { read = \"1000 m\" }\n"
+      "initial = { height = \"0.1 m\" }\ninitial_std = { height = \"0.01 m\" }\n";
+  const Estimation kept = estimated(log, lift + "lower_limit = { height = \"0 m\" }\n");
+  const Estimation lost = estimated(log, lift);
+  EXPECT_NEAR(kept.runs[0].filtered(0, 300), 1.0, 0.05);
+  EXPECT_NEAR(lost.runs[0].filtered(0, 300), -0.9, 0.05);
+}
+
 TEST(Estimate, WrongLimitsAreTold) {
   const auto told = [](const std::string& limits) {
     const auto project = parse_project(swing(std::string(noises) + limits), "swing.toml");
