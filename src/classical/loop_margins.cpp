@@ -5,9 +5,11 @@
 #include <numbers>
 #include <utility>
 
+#include <flyball/math/search/minimum.hpp>
 #include <flyball/math/search/roots.hpp>
 #include <flyball/systems/system_error.hpp>
 
+#include "classical/loop_peaks.hpp"
 #include "classical/polynomial.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
@@ -194,16 +196,11 @@ Expected<std::pair<double, double>> largest_ratio(const Polynomial& above,
     if (!(root.real() > 0.0) || !(width < root.real())) {
       continue;
     }
-    double low = root.real() - width;
-    double high = root.real() + width;
-    constexpr double golden = 0.3819660112501051;
-    for (int i = 0; i < 100 && high - low > 1e-16 * high; ++i) {
-      const double left = low + golden * (high - low);
-      const double right = high - golden * (high - low);
-      (ratio(left) > ratio(right) ? high : low) = ratio(left) > ratio(right) ? right : left;
+    const auto top =
+        find_minimum([&](double part) { return -ratio(root.real() + part * width); }, -1.0, 1.0);
+    if (top) {
+      take(root.real() + top->x * width, -top->value);
     }
-    const double x = 0.5 * (low + high);
-    take(x, ratio(x));
   }
   take(infinity, a.rows() < b.rows()   ? 0.0
                  : a.rows() > b.rows() ? infinity
@@ -394,47 +391,19 @@ Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
     const auto opposite = detail::on_the_axis(plus(border.den(), -1.0, border.num()));
     FLYBALL_TRY(const auto sensitivity, largest_ratio(below, square(closed)));
     margins.sensitivity = {std::sqrt(sensitivity.first), border.frequency(sensitivity.second)};
+    FLYBALL_TRY(const auto complementary, largest_ratio(above, square(closed)));
+    margins.complementary = {std::sqrt(complementary.first),
+                             border.frequency(complementary.second)};
     FLYBALL_TRY(const auto spread, largest_ratio(square(opposite), square(closed)));
     margins.disk_margin = margins.stable ? 2.0 / std::sqrt(spread.first) : 0.0;
     return margins;
   }
-  // With a delay on a grid that follows its turns, refined at the tops.
-  const auto refined = [&](auto&& gain) {
-    Peak peak;
-    double end = 10.0 / border.delay();
-    for (const GainCrossing& crossing : margins.gain_crossings) {
-      end = std::max(end, 10.0 * crossing.frequency);
-    }
-    const double begin = 1e-6 * end;
-    std::vector<double> grid;
-    const double turns = 0.02 / border.delay();
-    for (double w = begin; w < end && grid.size() < 200'000; w += std::min(0.002 * w, turns)) {
-      grid.push_back(w);
-    }
-    for (std::size_t i = 0; i < grid.size(); ++i) {
-      const double value = gain(grid[i]);
-      if (value > peak.value) {
-        peak = {value, grid[i]};
-      }
-    }
-    const double step = std::min(0.002 * peak.frequency, turns);
-    double low = std::max(begin, peak.frequency - step);
-    double high = peak.frequency + step;
-    constexpr double golden = 0.3819660112501051;
-    for (int i = 0; i < 80; ++i) {
-      const double a = low + golden * (high - low);
-      const double b = high - golden * (high - low);
-      (gain(a) > gain(b) ? high : low) = gain(a) > gain(b) ? b : a;
-    }
-    const double w = 0.5 * (low + high);
-    return gain(w) > peak.value ? Peak{gain(w), w} : peak;
-  };
-  margins.sensitivity = refined([&](double w) { return 1.0 / std::abs(1.0 + loop.response(w)); });
-  const Peak spread = refined([&](double w) {
-    const Complex L = loop.response(w);
-    return std::abs((1.0 - L) / (1.0 + L));
-  });
-  margins.disk_margin = margins.stable ? 2.0 / spread.value : 0.0;
+  // With a delay no polynomial has the peaks, and no grid of its turns alone: they are bounded.
+  FLYBALL_TRY(const FrequencyResponse response, frequency_response(loop));
+  FLYBALL_TRY(const detail::LoopPeaks peaks, detail::loop_peaks(response));
+  margins.sensitivity = peaks.sensitivity;
+  margins.complementary = peaks.complementary;
+  margins.disk_margin = margins.stable ? 2.0 / peaks.spread : 0.0;
   return margins;
 }
 

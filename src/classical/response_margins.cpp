@@ -10,6 +10,7 @@
 #include <flyball/systems/system_error.hpp>
 
 #include "classical/factors.hpp"
+#include "classical/loop_peaks.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -253,11 +254,13 @@ std::optional<std::vector<double>> zeros(const BoundedLoop& loop, const Step& ra
 }
 
 /// What a loop is looked at for: its largest over the frequencies.
-enum class Measure { sensitivity, spread };
+enum class Measure { sensitivity, complementary, spread };
 
-/// |1/(1 + L)|, or |(1 - L)/(1 + L)|.
+/// |1/(1 + L)|, |L/(1 + L)| or |(1 - L)/(1 + L)|.
 double size_of(Measure measure, Complex L) {
-  const double top = measure == Measure::sensitivity ? 1.0 : std::abs(1.0 - L);
+  const double top = measure == Measure::sensitivity     ? 1.0
+                     : measure == Measure::complementary ? std::abs(L)
+                                                         : std::abs(1.0 - L);
   return top / std::abs(1.0 + L);
 }
 
@@ -270,19 +273,23 @@ double bound_of(Measure measure, Complex L, double v) {
   const double way_of_L = std::abs(L) * moved;
   const double way_of_M = std::abs(M) * moved;
   if (const double left = std::abs(1.0 + L) - way_of_L; left > 0.0) {
-    const double top = measure == Measure::sensitivity ? 1.0 : std::abs(1.0 - L) + way_of_L;
+    const double top = measure == Measure::sensitivity     ? 1.0
+                       : measure == Measure::complementary ? std::abs(L) + way_of_L
+                                                           : std::abs(1.0 - L) + way_of_L;
     bound = std::min(bound, top / left);
   }
   if (const double left = std::abs(1.0 + M) - way_of_M; left > 0.0) {
-    const double top =
-        (measure == Measure::sensitivity ? std::abs(M) : std::abs(1.0 - M)) + way_of_M;
+    const double top = measure == Measure::sensitivity     ? std::abs(M) + way_of_M
+                       : measure == Measure::complementary ? 1.0
+                                                           : std::abs(1.0 - M) + way_of_M;
     bound = std::min(bound, top / left);
   }
   return bound;
 }
 
 /// Whether it only rises or only falls on a step, so that no more is there than at the ends: its
-/// logarithm's slope, -Re L'/(1 + L) or -Re 2L'/(1 - L²), against how far that can change.
+/// logarithm's slope, -Re L'/(1 + L), Re (L'/L)/(1 + L) or -Re 2L'/(1 - L²), against how far that
+/// can change.
 bool is_monotone(const BoundedLoop& loop, const Step& step, double v, Measure measure) {
   const double h = step.to - step.from;
   const Complex L = loop.at(step.from);
@@ -300,6 +307,13 @@ bool is_monotone(const BoundedLoop& loop, const Step& step, double v, Measure me
     }
     const double change = h * (second / least + (first / least) * (first / least));
     return std::abs((by_log * L / (1.0 + L)).real()) > change;
+  }
+  if (measure == Measure::complementary) {
+    if (!(least > 0.0)) {
+      return false;
+    }
+    const double change = h * (curvature / least + steepest * first / (least * least));
+    return std::abs((by_log / (1.0 + L)).real()) > change;
   }
   const double other = std::abs(1.0 - L) - way;
   if (!(least > 0.0) || !(other > 0.0)) {
@@ -367,7 +381,43 @@ double wrapped(double degrees) {
   return turned == -180.0 ? 180.0 : turned;
 }
 
+/// Of a loop that is not zero.
+detail::LoopPeaks peaks_of(const BoundedLoop& loop, const Step& range, const Eigen::VectorXd& grid,
+                           bool discrete) {
+  detail::LoopPeaks peaks{largest(loop, range, grid, Measure::sensitivity),
+                          largest(loop, range, grid, Measure::complementary),
+                          largest(loop, range, grid, Measure::spread).value};
+  const Index excess = loop.factors().poles.size() - loop.factors().zeros.size();
+  const double direct = excess == 0 ? loop.factors().gain : 0.0;
+  if (discrete || (loop.factors().delay > 0.0 && direct != 0.0)) {
+    return peaks;
+  }
+  // At infinity, where it is only approached.
+  const double last = 1.0 / std::abs(1.0 + direct);
+  const auto consider = [](double value, Peak& peak) {
+    if (value > peak.value * (1.0 - 1e-12)) {
+      peak = {value, infinity};
+    }
+  };
+  consider(last, peaks.sensitivity);
+  if (direct != 0.0) {
+    consider(std::abs(direct) * last, peaks.complementary);
+  }
+  peaks.spread = std::max(peaks.spread, std::abs(1.0 - direct) * last);
+  return peaks;
+}
+
 }  // namespace
+
+Expected<detail::LoopPeaks> detail::loop_peaks(const FrequencyResponse& response) {
+  auto factors = response.factors();
+  if (factors->gain == 0.0) {
+    return LoopPeaks{{1.0, 0.0}, {0.0, 0.0}, 1.0};
+  }
+  FLYBALL_TRY(const FrequencyGrid grid, frequency_grid(response));
+  const BoundedLoop loop(response, *std::move(factors));
+  return peaks_of(loop, loop.range(), grid.frequency, response.period().has_value());
+}
 
 Expected<LoopMargins> loop_margins(const FrequencyResponse& response) {
   constexpr std::string_view where = "margins";
@@ -427,18 +477,10 @@ Expected<LoopMargins> loop_margins(const FrequencyResponse& response) {
       margins.phase_margin = crossing.phase_margin;
     }
   }
-  const Index excess = loop.factors().poles.size() - loop.factors().zeros.size();
-  const double direct = excess == 0 ? loop.factors().gain : 0.0;
-  const bool has_end = !response.period() && (loop.factors().delay == 0.0 || direct == 0.0);
-  margins.sensitivity = largest(loop, range, curve.frequency, Measure::sensitivity);
-  Peak spread = largest(loop, range, curve.frequency, Measure::spread);
-  // At infinity, where it is only approached.
-  const double last = 1.0 / std::abs(1.0 + direct);
-  if (has_end && last > margins.sensitivity.value * (1.0 - 1e-12)) {
-    margins.sensitivity = {last, infinity};
-  }
-  spread.value = has_end ? std::max(spread.value, std::abs(1.0 - direct) * last) : spread.value;
-  margins.disk_margin = margins.stable ? 2.0 / spread.value : 0.0;
+  const auto peaks = peaks_of(loop, range, curve.frequency, response.period().has_value());
+  margins.sensitivity = peaks.sensitivity;
+  margins.complementary = peaks.complementary;
+  margins.disk_margin = margins.stable ? 2.0 / peaks.spread : 0.0;
   return margins;
 }
 

@@ -11,41 +11,7 @@ namespace flyball {
 
 namespace {
 
-using classical::Peak;
 using classical::TransferFunction;
-using Complex = std::complex<double>;
-
-/// max |L/(1 + L)| of a loop with dead time: on a grid that follows its turns, refined at the top.
-Peak largest_complementary(const TransferFunction& loop, const classical::LoopMargins& margins) {
-  const auto gain = [&](double w) {
-    const Complex L = loop.response(w);
-    return std::abs(L / (1.0 + L));
-  };
-  double end = 10.0 / loop.delay();
-  for (const auto& crossing : margins.gain_crossings) {
-    end = std::max(end, 10.0 * crossing.frequency);
-  }
-  Peak peak;
-  const double turns = 0.02 / loop.delay();
-  double w = 1e-6 * end;
-  for (int points = 0; w < end && points < 200'000; ++points, w += std::min(0.002 * w, turns)) {
-    const double value = gain(w);
-    if (value > peak.value) {
-      peak = {value, w};
-    }
-  }
-  const double step = std::min(0.002 * peak.frequency, turns);
-  double low = peak.frequency - step;
-  double high = peak.frequency + step;
-  for (int i = 0; i < 80; ++i) {
-    constexpr double golden = 0.3819660112501051;
-    const double a = low + golden * (high - low);
-    const double b = high - golden * (high - low);
-    (gain(a) > gain(b) ? high : low) = gain(a) > gain(b) ? b : a;
-  }
-  const double top = 0.5 * (low + high);
-  return gain(top) > peak.value ? Peak{gain(top), top} : peak;
-}
 
 }  // namespace
 
@@ -126,9 +92,6 @@ Expected<PidLoop> assess_pid(const TransferFunction& plant, const PidGains& gain
       FLYBALL_TRY_IN(where, whole, TransferFunction::create(loop.num(), den, plant.period()));
     }
     FLYBALL_TRY_IN(where, closed, classical::unity_feedback(whole));
-    FLYBALL_TRY_IN(where, found.complementary, classical::peak_gain(*closed));
-  } else {
-    found.complementary = largest_complementary(loop, found.margins);
   }
   if (!found.margins.stable) {
     found.reference.final_value = std::numeric_limits<double>::quiet_NaN();

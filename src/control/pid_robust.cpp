@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <flyball/control/pid_design.hpp>
+#include <flyball/math/search/minimum.hpp>
 
 #include "control/pid_basis.hpp"
 #include "core/format.hpp"
@@ -176,31 +177,11 @@ class Search {
       return least;
     }
     // Refined between its neighbours.
-    double low = span_.grid[at > 0 ? at - 1 : 0];
-    double high = span_.grid[std::min(at + 1, responses_.size() - 1)];
-    constexpr double golden = 0.3819660112501051;
-    const auto value = [&](double w) { return limit(w, plant_.response(w), point, sign); };
-    double a = low + golden * (high - low);
-    double b = high - golden * (high - low);
-    double at_a = value(a);
-    double at_b = value(b);
-    for (int i = 0; i < 36; ++i) {
-      if (at_a < at_b) {
-        high = b;
-        b = a;
-        at_b = at_a;
-        a = low + golden * (high - low);
-        at_a = value(a);
-      } else {
-        low = a;
-        a = b;
-        at_a = at_b;
-        b = high - golden * (high - low);
-        at_b = value(b);
-      }
-      least = std::min({least, at_a, at_b});
-    }
-    return least;
+    const double low = span_.grid[at > 0 ? at - 1 : 0];
+    const double high = span_.grid[std::min(at + 1, responses_.size() - 1)];
+    const auto refined = find_minimum(
+        [&](double w) { return limit(w, plant_.response(w), point, sign); }, low, high);
+    return refined ? std::min(least, refined->value) : least;
   }
 
   /// Whether 1 + L turns as often as a stable loop's does along the grid: what keeps its distance

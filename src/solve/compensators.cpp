@@ -91,7 +91,7 @@ Outcome solve_pidtune(const Problem& problem, JsonWriter& answer) {
   answer.add("num", loop.controller.num());
   answer.add("den", loop.controller.den());
   write_margins(loop.margins, answer);
-  answer.add("Mt", loop.complementary.value);
+  answer.add("Mt", loop.margins.complementary.value);
   answer.add("crossover", loop.margins.gain_crossings.empty()
                               ? std::numeric_limits<double>::quiet_NaN()
                               : loop.margins.gain_crossings.back().frequency);

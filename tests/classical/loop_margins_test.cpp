@@ -324,7 +324,31 @@ TEST(LoopMargins, NoPointIsAboveThePeak) {
     EXPECT_GE(peak.value, largest * (1.0 - 1e-12));
     EXPECT_LE(peak.value, largest * (1.0 + 1e-5));
     EXPECT_NEAR(1.0 / std::abs(1.0 + L->response(peak.frequency)), peak.value, 1e-9 * peak.value);
+    const Peak other = loop_margins(*L)->complementary;
+    const std::complex<double> there = L->response(other.frequency);
+    EXPECT_NEAR(std::abs(there / (1.0 + there)), other.value, 1e-9 * other.value);
   }
+}
+
+// A resonance far above the dead time and the crossings, where |L| is 0.9 and turns many times: no
+// crossing tells of it. The peaks are those of a grid of a thousandth of its width.
+TEST(LoopMargins, AResonanceBehindDeadTimeIsSeen) {
+  const auto L = transfer({180.0, 0.0}, {1.0, 200.0, 1e8}, 0.01);
+  const LoopMargins m = loop_margins(L).value();
+  EXPECT_TRUE(m.gain_crossings.empty());
+  double sensitivity = 0.0;
+  double complementary = 0.0;
+  double spread = 0.0;
+  for (double w = 9000.0; w < 11000.0; w += 0.1) {
+    const std::complex<double> value = L.response(w);
+    sensitivity = std::max(sensitivity, 1.0 / std::abs(1.0 + value));
+    complementary = std::max(complementary, std::abs(value / (1.0 + value)));
+    spread = std::max(spread, std::abs((1.0 - value) / (1.0 + value)));
+  }
+  EXPECT_GT(sensitivity, 1.9);
+  EXPECT_NEAR(m.sensitivity.value, sensitivity, 1e-6);
+  EXPECT_NEAR(m.complementary.value, complementary, 1e-6);
+  EXPECT_NEAR(m.disk_margin, 2.0 / spread, 1e-6);
 }
 
 // A zero at 1e19 rad/s behind a second of dead time crosses the axis 1e19 times; those that matter

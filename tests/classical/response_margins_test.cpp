@@ -65,6 +65,7 @@ void expect_same(const LoopMargins& a, const LoopMargins& b, int i) {
         << i;
   }
   EXPECT_NEAR(a.sensitivity.value / b.sensitivity.value, 1.0, 1e-6) << i;
+  EXPECT_NEAR(a.complementary.value / b.complementary.value, 1.0, 1e-6) << i;
   EXPECT_NEAR(a.disk_margin, b.disk_margin, 1e-6 * b.disk_margin) << i;
   if (std::isfinite(b.delay_margin)) {
     EXPECT_NEAR(a.delay_margin, b.delay_margin, 1e-9 * (1.0 + b.delay_margin)) << i;

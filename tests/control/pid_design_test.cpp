@@ -172,7 +172,7 @@ TEST(PidDesign, DeadTimeByTheMethodOfSteps) {
   ASSERT_TRUE(small.load && none.load);
   EXPECT_NEAR(*small.reference.overshoot, *none.reference.overshoot, 2e-3);
   EXPECT_NEAR(small.load->peak, none.load->peak, 1e-3);
-  EXPECT_NEAR(small.complementary.value, none.complementary.value, 3e-3);
+  EXPECT_NEAR(small.margins.complementary.value, none.margins.complementary.value, 3e-3);
 }
 
 TransferFunction random_plant(Random& random, int kind) {
@@ -330,7 +330,7 @@ TEST(PidDesign, RobustPidOfManyLags) {
   const PidLoop three = tune_by_robustness(P, PidForm::pid, goal).value();
   EXPECT_GT(three.gains.ki, 1.5 * two.gains.ki);
   EXPECT_LE(three.margins.sensitivity.value, 1.4 * (1.0 + 1e-9));
-  EXPECT_LE(three.complementary.value, 1.4 * (1.0 + 1e-9));
+  EXPECT_LE(three.margins.complementary.value, 1.4 * (1.0 + 1e-9));
   EXPECT_LE(three.load->absolute_integral, two.load->absolute_integral);
   // The load's integral is not much less than its absolute one: nothing oscillates.
   EXPECT_LE(three.load->absolute_integral, 1.15 * three.load->integral);

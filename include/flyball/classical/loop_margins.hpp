@@ -42,6 +42,7 @@ struct LoopMargins {
   double delay_margin = 0.0;
   double disk_margin = 0.0;  ///< α = 2/‖S - T‖∞ of a stable loop; 0 of an unstable one.
   Peak sensitivity{};        ///< max |1/(1 + L)| over the frequencies, stable or not.
+  Peak complementary{};      ///< max |L/(1 + L)|.
 };
 
 /// Margins by polynomial equations in ω² in 31 digits, so that none is missed and each is a

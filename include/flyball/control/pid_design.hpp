@@ -39,7 +39,6 @@ struct PidLoop {
   double derivative_time_constant = 0.0;  ///< s, τ of kd s/(τ s + 1).
   classical::TransferFunction controller;
   classical::LoopMargins margins;      ///< Of L = P C; `sensitivity` is M_s.
-  classical::Peak complementary{};     ///< M_t = max |L/(1 + L)|.
   classical::StepMetrics reference{};  ///< Of the output to a step of the reference.
   std::optional<LoadResponse> load{};  ///< Of a stable loop.
 };

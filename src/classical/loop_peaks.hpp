@@ -1,0 +1,19 @@
+#pragma once
+
+#include <flyball/classical/frequency_response.hpp>
+#include <flyball/classical/loop_margins.hpp>
+
+namespace flyball::classical::detail {
+
+/// How large a loop's functions get over all frequencies.
+struct LoopPeaks {
+  Peak sensitivity;    ///< max |1/(1 + L)|
+  Peak complementary;  ///< max |L/(1 + L)|
+  double spread;       ///< max |(1 - L)/(1 + L)|
+};
+
+/// To 1e-5 by bounds on what ln L moves between two frequencies, and refined.
+/// @param response  L, whose factors are known. @errors As `frequency_grid`.
+[[nodiscard]] Expected<LoopPeaks> loop_peaks(const FrequencyResponse& response);
+
+}  // namespace flyball::classical::detail
