@@ -195,6 +195,68 @@ TEST(SquareRootUnscentedKalmanFilter, SeesADowndateThatFails) {
   EXPECT_TRUE(filter.correct(Vector2d(1.0, 1.0), Eigen::Matrix<double, 1, 1>(0.0)).accepted());
 }
 
+// A precise measurement far from the prediction, y = x² of x ~ N(1, 1): the posterior's mean and
+// deviation, by a sum over a grid, are hit only where the points stand around what is known after
+// the measurement. A straight h needs no second look.
+TEST(UnscentedKalmanFilter, IteratesToTheLineOfThePosterior) {
+  using State = Eigen::Vector2d;
+  const auto created = [] {
+    return Estimate<State>::create({1.0, 0.0}, Covariance(Eigen::Matrix2d::Identity())).value();
+  };
+  using Vector1 = Eigen::Matrix<double, 1, 1>;
+  const double y = 6.0;
+  const double R = 0.04;
+  const MeasurementNoise<1> noise{Vector1(R)};
+  const auto square = [](const State& x) { return Vector1(x(0) * x(0)); };
+  double total = 0.0;
+  double mean = 0.0;
+  double second = 0.0;
+  for (double x = 0.0; x < 6.0; x += 1e-4) {
+    const double off = y - x * x;
+    const double weight = std::exp(-0.5 * (x - 1.0) * (x - 1.0) - 0.5 * off * off / R);
+    total += weight;
+    mean += weight * x;
+    second += weight * x * x;
+  }
+  mean /= total;
+  const double deviation = std::sqrt(second / total - mean * mean);
+  auto once = created();
+  auto iterated = created();
+  EXPECT_TRUE(Unscented<>().correct(once, Vector1(y), square, noise).accepted());
+  EXPECT_TRUE(
+      Unscented<>().correct(iterated, Vector1(y), square, noise, {.iterations = 30}).accepted());
+  EXPECT_GT(std::abs(once.x_hat()(0) - mean), 0.1);
+  EXPECT_NEAR(iterated.x_hat()(0), mean, 1e-3);
+  EXPECT_NEAR(std::sqrt(iterated.P()(0, 0)), deviation, 1e-2 * deviation);
+
+  const auto straight = [](const State& x) { return Vector1(2.0 * x(0) - x(1)); };
+  auto plain = created();
+  auto again = created();
+  Unscented<>().correct(plain, Vector1(y), straight, noise);
+  Unscented<>().correct(again, Vector1(y), straight, noise, {.iterations = 5});
+  EXPECT_LT((plain.x_hat() - again.x_hat()).norm(), 1e-13);
+  EXPECT_LT((plain.P() - again.P()).norm(), 1e-13);
+}
+
+// Every look of an iterated correction asks the guard, and one measurement is judged once.
+TEST(UnscentedKalmanFilter, AnIteratedMeasurementIsJudgedOnce) {
+  using Vector1 = Eigen::Matrix<double, 1, 1>;
+  auto estimate =
+      Estimate<Vector2d>::create({1.0, 0.0}, Covariance(Eigen::Matrix2d::Identity())).value();
+  auto guard = OutlierGuard::create({.treatment = OutlierTreatment::gate}).value();
+  auto other = guard;
+  const MeasurementNoise<1> noise{Vector1(1e-4)};
+  const auto square = [](const Vector2d& x) { return Vector1(x(0) * x(0)); };
+  auto same = estimate;
+  for (int k = 0; k < 3; ++k) {
+    Unscented<>().correct(estimate, Vector1(900.0), square, noise,
+                          {.guard = &guard, .iterations = 5});
+    Unscented<>().correct(same, Vector1(900.0), square, noise, {.guard = &other});
+  }
+  EXPECT_EQ(estimate.x_hat(), same.x_hat());
+  EXPECT_EQ(estimate.P(), same.P());
+}
+
 TEST(UnscentedKalmanFilter, AllocatesNothing) {
   if (!test::counts_allocations()) {
     GTEST_SKIP() << "a sanitizer has its own allocator";

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include <flyball/estimation/forms/square_root_covariance.hpp>
 #include <flyball/estimation/model_filter.hpp>
@@ -70,22 +71,63 @@ class Unscented {
     }
   }
 
-  /// As Extended::correct, with h as it is called for X. The options' iterations do not count: the
-  /// points have seen how h bends.
+  /// As Extended::correct, with h as it is called for X. Iterated, the points stand around what is
+  /// known after the measurement, and the prediction is corrected anew with the line found there.
+  /// Source: García-Fernández, Svensson, Morelande, Särkkä, "Posterior linearization filter:
+  /// principles and implementation using sigma points", IEEE Trans. Signal Processing 63 (2015).
   template <class X, class Form, Manifold Y, class H, class Subtract = Difference>
   Correction<tangent_size<Y>> correct(Estimate<X, Form>& estimate, const Y& y, const H& h,
                                       const MeasurementNoise<tangent_size<Y>>& R,
                                       const CorrectionOptions& options = {},
                                       const Subtract& subtract = {}) noexcept {
-    constexpr int N = tangent_size<X>;
     constexpr int M = tangent_size<Y>;
     const X& x = estimate.x_hat();
-    const TangentMatrix<X> S = estimate.form().factor();
+    TangentOf<X> point = minus(x, x);
+    auto line = line_of<M>(x, point, estimate.form().factor(), y, h, R, subtract);
+    for (int k = 1; k < options.iterations; ++k) {
+      Estimate<X, Form> trial = estimate;
+      CorrectionOptions once = options;
+      std::optional<OutlierGuard> guard;
+      if (options.guard != nullptr) {
+        once.guard = &guard.emplace(*options.guard);
+      }
+      if (!trial.template correct<M>(line.residual, line.slope, line.noise, once).accepted()) {
+        break;
+      }
+      const TangentOf<X> moved = minus(trial.x_hat(), x);
+      const bool settled = (moved - point).cwiseAbs().sum() <= 1e-6 * moved.cwiseAbs().sum();
+      point = moved;
+      line = line_of<M>(x, point, trial.form().factor(), y, h, R, subtract);
+      if (settled) {
+        break;
+      }
+    }
+    return estimate.template correct<M>(line.residual, line.slope, line.noise, options);
+  }
+
+ private:
+  template <int N>
+  static constexpr int outer = N == Eigen::Dynamic ? N : Points::outer(N);
+  template <int N>
+  static constexpr int columns = N == Eigen::Dynamic ? N : N + Points::rest(N);
+
+  /// The straight line that fits h best around x ⊕ δ, as a measurement of an error of x.
+  template <int M, int N>
+  struct Line {
+    Eigen::Matrix<double, M, 1> residual;
+    Eigen::Matrix<double, M, N> slope;
+    MeasurementNoise<M> noise;
+  };
+  template <int M, class X, class Y, class H, class Subtract>
+  Line<M, tangent_size<X>> line_of(const X& x, const TangentOf<X>& delta, const TangentMatrix<X>& S,
+                                   const Y& y, const H& h, const MeasurementNoise<M>& R,
+                                   const Subtract& subtract) noexcept {
+    constexpr int N = tangent_size<X>;
     const Eigen::Index n = S.rows();
-    const Y centre = h(x);
+    const Y centre = h(plus(x, delta));
     Eigen::Matrix<double, M, outer<N>> E(R.size(), Points::outer(static_cast<int>(n)));
     for (Eigen::Index i = 0; i < E.cols(); ++i) {
-      E.col(i) = subtract(Y(h(plus(x, TangentOf<X>(points_.place(S, i))))), centre);
+      E.col(i) = subtract(Y(h(plus(x, TangentOf<X>(delta + points_.place(S, i))))), centre);
     }
     Eigen::Matrix<double, M, 1> m(R.size());
     Eigen::Matrix<double, M, columns<N>> Z(R.size(), n + Points::rest(static_cast<int>(n)));
@@ -102,16 +144,10 @@ class Unscented {
       ++left_out_;
       noise = MeasurementNoise<M>(total);
     }
-    const Y expected = plus(centre, m);
-    const Eigen::Matrix<double, M, 1> residual = subtract(y, expected);
-    return estimate.template correct<M>(residual, slope, noise, options);
+    const Eigen::Matrix<double, M, 1> residual =
+        subtract(y, plus(centre, m)) + slope.lazyProduct(delta);
+    return {residual, slope, noise};
   }
-
- private:
-  template <int N>
-  static constexpr int outer = N == Eigen::Dynamic ? N : Points::outer(N);
-  template <int N>
-  static constexpr int columns = N == Eigen::Dynamic ? N : N + Points::rest(N);
 
   /// H of H S = B; zero along what S does not span.
   template <class Slope, class Matrix>

@@ -252,7 +252,13 @@ Correction<2> LandmarkFilter::take(Estimate<State>& estimate, const Vector2d& la
     return localization::sighting(at.template get<0>(), at.template get<2>(), landmark);
   };
   if (options_.method == LandmarkFilterMethod::unscented) {
-    return Unscented<>().correct(estimate, reading, expected, noise_, how, AngleDifference<1>());
+    auto taken =
+        Unscented<>().correct(estimate, reading, expected, noise_, how, AngleDifference<1>());
+    // Where h bends much, what its line leaves is noise beside which everything fits: what counts
+    // is how far off the reading still is.
+    const Vector2d off = AngleDifference<1>()(reading, expected(estimate.x_hat()));
+    taken.weight = std::min(taken.weight, guard_.weight(off.dot(off.cwiseQuotient(noise_.D())), 2));
+    return taken;
   }
   return Extended().correct(estimate, reading, expected, noise_, how, AngleDifference<1>());
 }
