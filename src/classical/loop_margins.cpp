@@ -13,6 +13,7 @@
 #include "classical/polynomial.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
+#include "core/wording.hpp"
 
 namespace flyball::classical {
 
@@ -277,6 +278,7 @@ Expected<std::vector<double>> phase_places(const Border& border) {
   // The phase without jumps: between neighbours it turns by less than half a turn at a time.
   const auto rational = [&](double w) { return border.phase(w * w); };
   std::vector<double> places;
+  std::size_t asked = 0;
   for (std::size_t i = 0; i + 1 < bounds.size(); ++i) {
     constexpr int parts = 400;
     double a = bounds[i];
@@ -291,8 +293,9 @@ Expected<std::vector<double>> phase_places(const Border& border) {
       const double high = std::max(before, after);
       for (double level = pi + 2.0 * pi * std::ceil((low - pi) / (2.0 * pi)); level <= high;
            level += 2.0 * pi) {
-        if (places.size() == most_crossings) {
-          return places;  // by frequency: parts and levels ascend
+        // By frequency: parts and levels ascend. Beyond 2^53 turns no crossing has digits.
+        if (++asked > most_crossings || level + pi == level) {
+          return places;
         }
         const double from = rational(a);
         const double start = before;
@@ -341,6 +344,14 @@ Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
   double further = infinity;
   for (const double x : *unit_gain) {
     const double w = border.frequency(x);
+    constexpr double most_turned = 1e9;  // rad, of which a double has 1e-7 left
+    if (!(w * border.delay() <= most_turned)) {
+      return refusal(ArgumentError::out_of_range, "margins", "the delay")
+          .got(flyball::detail::format("{} s, where the loop's gain is 1 at {} rad/s", loop.delay(),
+                                       w))
+          .expected(flyball::detail::format("at most {} s there", text::number(most_turned / w)))
+          .hint("the phase turns so often by then that no digit of a margin is left");
+    }
     const double rational = border.phase(x) * 180.0 / pi;
     const double margin = wrapped(180.0 + rational - w * border.delay() * 180.0 / pi);
     margins.gain_crossings.push_back({w, margin});

@@ -157,7 +157,7 @@ class Contour {
   }
 
  private:
-  static constexpr std::size_t most_points = 2'000'000;
+  static constexpr std::size_t most_points = 300'000;
 
   [[nodiscard]] Complex value(double frequency) const { return loop_.at(frequency)(0, 0); }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <flyball/classical/nyquist.hpp>
@@ -210,7 +211,7 @@ std::optional<std::vector<double>> zeros(const BoundedLoop& loop, const Step& ra
   std::vector<Step> pending{range};
   const auto value = [&](double w) { return crossing.value(loop.at(w)); };
   constexpr double closest = 1e-13;
-  constexpr int most_steps = 2'000'000;
+  constexpr int most_steps = 600'000;
   for (int count = 0; !pending.empty(); ++count) {
     if (count == most_steps) {
       return std::nullopt;
@@ -287,10 +288,30 @@ double bound_of(Measure measure, Complex L, double v) {
   return bound;
 }
 
-/// Whether it only rises or only falls on a step, so that no more is there than at the ends: its
-/// logarithm's slope, -Re L'/(1 + L), Re (L'/L)/(1 + L) or -Re 2L'/(1 - L²), against how far that
-/// can change.
-bool is_monotone(const BoundedLoop& loop, const Step& step, double v, Measure measure) {
+/// At most on a step on which ln |L| moves by `swing`, whatever the phase does.
+double bound_by_size(Measure measure, double size, double swing) {
+  const double most = size * std::exp(swing);
+  const double least = size * std::exp(-swing);
+  const auto top = [&](double L) {
+    return measure == Measure::sensitivity ? 1.0 : measure == Measure::complementary ? L : 1.0 + L;
+  };
+  return most < 1.0    ? top(most) / (1.0 - most)
+         : least > 1.0 ? top(least) / (least - 1.0)
+                       : infinity;
+}
+
+/// The slope of the logarithm where a step begins, -Re L'/(1 + L), Re (L'/L)/(1 + L) or
+/// -Re 2L'/(1 - L²), and how far it can be from that on the step.
+struct LogSlope {
+  double value;
+  double change;
+
+  /// Whether it only rises or only falls, so that no more is there than at the ends.
+  [[nodiscard]] bool is_monotone() const { return std::abs(value) > change; }
+};
+
+std::optional<LogSlope> log_slope(const BoundedLoop& loop, const Step& step, double v,
+                                  Measure measure) {
   const double h = step.to - step.from;
   const Complex L = loop.at(step.from);
   const Complex by_log = loop.slope(step.from);
@@ -300,28 +321,24 @@ bool is_monotone(const BoundedLoop& loop, const Step& step, double v, Measure me
   const double first = size * steepest;
   const double second = size * (steepest * steepest + curvature);
   const double way = std::abs(L) * std::expm1(v);
-  double least = std::abs(1.0 + L) - way;
-  if (measure == Measure::sensitivity) {
-    if (!(least > 0.0)) {
-      return false;
-    }
-    const double change = h * (second / least + (first / least) * (first / least));
-    return std::abs((by_log * L / (1.0 + L)).real()) > change;
-  }
-  if (measure == Measure::complementary) {
-    if (!(least > 0.0)) {
-      return false;
-    }
-    const double change = h * (curvature / least + steepest * first / (least * least));
-    return std::abs((by_log / (1.0 + L)).real()) > change;
-  }
+  const double least = std::abs(1.0 + L) - way;
   const double other = std::abs(1.0 - L) - way;
-  if (!(least > 0.0) || !(other > 0.0)) {
-    return false;
+  if (!(least > 0.0) || (measure == Measure::spread && !(other > 0.0))) {
+    return std::nullopt;
   }
-  least *= other;
-  const double change = 2.0 * h * (second / least + 2.0 * size * (first / least) * (first / least));
-  return std::abs((2.0 * by_log * L / (1.0 - L * L)).real()) > change;
+  switch (measure) {
+    case Measure::sensitivity:
+      return LogSlope{-(by_log * L / (1.0 + L)).real(),
+                      h * (second / least + (first / least) * (first / least))};
+    case Measure::complementary:
+      return LogSlope{(by_log / (1.0 + L)).real(),
+                      h * (curvature / least + steepest * first / (least * least))};
+    case Measure::spread:
+      break;
+  }
+  const double both = least * other;
+  return LogSlope{-(2.0 * by_log * L / (1.0 - L * L)).real(),
+                  2.0 * h * (second / both + 2.0 * size * (first / both) * (first / both))};
 }
 
 Peak largest(const BoundedLoop& loop, const Step& range, const Eigen::VectorXd& grid,
@@ -346,20 +363,43 @@ Peak largest(const BoundedLoop& loop, const Step& range, const Eigen::VectorXd& 
     }
   }
   pending.push_back({last, range.to});
+  // The low ones first: where the work ends before the steps do, what was not looked at is high up.
+  std::reverse(pending.begin(), pending.end());
   constexpr double tolerance = 1e-5;
-  constexpr int most = 200'000;
+  constexpr int most = 60'000;
   for (int count = 0; !pending.empty() && count < most; ++count) {
     const Step step = pending.back();
     pending.pop_back();
-    const double v = loop.variation(step);
     const Complex L = loop.at(step.from);
-    consider(size(step.from), step.from);
+    const double here = size(step.from);
+    consider(here, step.from);
     consider(size(step.to), step.to);
-    if (bound_of(measure, L, v) > best.value * (1.0 + tolerance) &&
-        step.to - step.from > 1e-13 * step.to &&
-        !(v < 1.0 && is_monotone(loop, step, v, measure))) {
-      pending.push_back(halves(step, false));
-      pending.push_back(halves(step, true));
+    const double beyond = best.value * (1.0 + tolerance);
+    const double v = loop.variation(step);
+    if (bound_of(measure, L, v) <= beyond ||
+        bound_by_size(measure, std::abs(L), loop.swing(step)) <= beyond ||
+        !(step.to - step.from > 1e-13 * step.to)) {
+      continue;
+    }
+    if (v < 1.0) {
+      const auto slope = log_slope(loop, step, v, measure);
+      if (slope &&
+          (slope->is_monotone() ||
+           here * std::exp((step.to - step.from) * (slope->value + slope->change)) <= beyond)) {
+        continue;
+      }
+    }
+    pending.push_back(halves(step, true));
+    pending.push_back(halves(step, false));
+  }
+  // What is left once the work is done may be larger: then nothing is told.
+  constexpr double doubtful = 1.01;
+  for (const Step& step : pending) {
+    const Complex L = loop.at(step.from);
+    if (bound_of(measure, L, loop.variation(step)) > doubtful * best.value &&
+        bound_by_size(measure, std::abs(L), loop.swing(step)) > doubtful * best.value) {
+      constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+      return {unknown, unknown};
     }
   }
   for (const double width : {1e-2, 1e-4}) {

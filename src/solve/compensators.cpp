@@ -313,7 +313,7 @@ const std::vector<Field>& margin_fields() {
       unbounded(number("gain_margin", "", "the nearest, a ratio; null without one")),
       unbounded(number("phase_margin", "deg", "the nearest; null without one")),
       unbounded(number("delay_margin", "s", "the further delay that the loop bears")),
-      number("disk_margin", "", "2/‖S - T‖∞"),
+      unbounded(number("disk_margin", "", "2/‖S - T‖∞")),
       unbounded(number("Ms", "", "max |S|"))};
   return fields;
 }

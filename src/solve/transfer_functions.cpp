@@ -96,9 +96,10 @@ std::vector<Kind> transfer_function_kinds() {
         records("phase_margins", "w pm_deg", "where |L| = 1: rad/s and 180 + arg L in degrees"),
         flag("closed_loop_stable", "whether 1/(1 + L) is stable"),
         unbounded(number("delay_margin", "s", "the further delay that the loop bears")),
-        number("disk_margin", "", "2/‖S - T‖∞ of a stable loop"),
+        unbounded(number("disk_margin", "",
+                         "2/‖S - T‖∞ of a stable loop; null where dead time turns too often")),
         unbounded(number("bandwidth", "rad/s", "where |G| is 3 dB below G(0) first")),
-        record("sensitivity_peak", "Ms w", "the largest |1/(1 + L)| and where, rad/s"),
+        unbounded(record("sensitivity_peak", "Ms w", "the largest |1/(1 + L)| and where, rad/s")),
         record("step", "rise_time settling_time overshoot undershoot peak peak_time final_value",
                "G's step response: 10 to 90 %, 2 %, percent of the final value; exact in time, "
                "null where there is none")},

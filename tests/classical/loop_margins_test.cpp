@@ -351,6 +351,19 @@ TEST(LoopMargins, AResonanceBehindDeadTimeIsSeen) {
   EXPECT_NEAR(m.disk_margin, 2.0 / spread, 1e-6);
 }
 
+// Where the phase has turned beyond its digits nothing is told, at once; a delay that is as long
+// where the gain is never 1 harms nothing but the peaks, which it does not bound.
+TEST(LoopMargins, DeadTimeBeyondTheDigits) {
+  const auto refused = loop_margins(transfer({1.0}, {1.0, 1.0, 0.0}, 1e300));
+  ASSERT_FALSE(refused);
+  EXPECT_TRUE(refused.error().is(ArgumentError::out_of_range));
+  EXPECT_NE(to_string(refused.error()).find("the delay"), std::string::npos);
+  const auto quiet = loop_margins(transfer({0.5}, {1.0, 1.0}, 1e300));
+  ASSERT_TRUE(quiet) << to_string(quiet.error());
+  EXPECT_TRUE(quiet->stable);
+  EXPECT_EQ(quiet->delay_margin, std::numeric_limits<double>::infinity());
+}
+
 // A zero at 1e19 rad/s behind a second of dead time crosses the axis 1e19 times; those that matter
 // are there, the first thousand, and nothing takes long. Without it they are the same.
 TEST(LoopMargins, AFarZeroHidesNoCrossing) {

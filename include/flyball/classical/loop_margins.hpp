@@ -40,9 +40,11 @@ struct LoopMargins {
   int unstable_poles = 0;
   /// s, further delay that a stable loop bears; ∞ if any, 0 of an unstable one.
   double delay_margin = 0.0;
-  double disk_margin = 0.0;  ///< α = 2/‖S - T‖∞ of a stable loop; 0 of an unstable one.
-  Peak sensitivity{};        ///< max |1/(1 + L)| over the frequencies, stable or not.
-  Peak complementary{};      ///< max |L/(1 + L)|.
+  /// α = 2/‖S - T‖∞ of a stable loop; 0 of an unstable one. This and the peaks are NaN where the
+  /// work that is allowed does not bound them: dead time that turns very many times.
+  double disk_margin = 0.0;
+  Peak sensitivity{};    ///< max |1/(1 + L)| over the frequencies, stable or not.
+  Peak complementary{};  ///< max |L/(1 + L)|.
 };
 
 /// Margins by polynomial equations in ω² in 31 digits, so that none is missed and each is a
