@@ -9,6 +9,7 @@
 
 #include <flyball/math/search/roots.hpp>
 
+#include "classical/whole_periods.hpp"
 #include "core/error_rows.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
@@ -128,7 +129,7 @@ Expected<Compensation> judged(const TransferFunction& plant, double gain,
   }
   Compensation found{.compensator = C, .margins = std::move(margins), .poles = {}};
   if (period && plant.delay() > 0.0) {
-    const auto late = static_cast<Index>(std::lround(plant.delay() / period->si()));
+    const auto late = detail::periods_in(plant.delay(), period);
     VectorXd den = VectorXd::Zero(L.den().size() + late);
     den.head(L.den().size()) = L.den();
     FLYBALL_TRY_IN(where, const auto whole, TransferFunction::create(L.num(), den, period));

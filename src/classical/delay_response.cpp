@@ -8,6 +8,7 @@
 #include <flyball/systems/system_error.hpp>
 
 #include "classical/delay_motion.hpp"
+#include "classical/whole_periods.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -34,8 +35,7 @@ Expected<DelayResponse> stepped(const DelaySystem& system, const Drive& drive, c
   const Index k = f.delays.size();
   std::vector<Index> lengths;
   for (Index i = 0; i < k; ++i) {
-    lengths.push_back(static_cast<Index>(
-        std::min(std::round(f.delays(i) / period), static_cast<double>(samples))));
+    lengths.push_back(std::min(detail::periods_in(f.delays(i), system.period()), samples));
   }
   DelayResponse response;
   response.time = VectorXd::LinSpaced(samples, 0.0, period * static_cast<double>(samples - 1));

@@ -9,6 +9,7 @@
 #include <flyball/systems/system_error.hpp>
 
 #include "classical/polynomial.hpp"
+#include "classical/whole_periods.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -205,12 +206,7 @@ Expected<DelaySystem> DelaySystem::create(const DelayForm& form, std::optional<T
   for (Index i = 0; i < form.delays.size(); ++i) {
     const double delay = form.delays(i);
     FLYBALL_CHECK(check_not_negative(delay, noun, "delay", "s"));
-    const double periods = period ? delay / period->si() : 0.0;
-    if (std::abs(periods - std::round(periods)) > 1e-9 * periods) {
-      return refusal(ArgumentError::out_of_range, noun, "delay")
-          .got(flyball::detail::format("{} periods", periods))
-          .expected("whole periods, in a discrete system");
-    }
+    FLYBALL_CHECK(detail::check_whole_periods(delay, period, noun, "a discrete system"));
   }
   FLYBALL_TRY(DelayForm closed, without_zero_delays(form));
   if (period) {
@@ -378,7 +374,7 @@ Expected<MatrixXcd> DelaySystem::at(Complex s) const {
   FLYBALL_CHECK(Checks(noun).finite(s.real(), "the point").finite(s.imag(), "the point"));
   Eigen::VectorXcd late(delays().size());
   for (Index i = 0; i < late.size(); ++i) {
-    late(i) = period_ ? std::pow(s, -std::round(delays()(i) / period_->si()))
+    late(i) = period_ ? std::pow(s, -static_cast<double>(detail::periods_in(delays()(i), period_)))
                       : std::exp(-s * delays()(i));
   }
   double rcond = 0.0;
@@ -430,8 +426,8 @@ Expected<DiscreteSystem<>> DelaySystem::to_discrete() const {
   std::vector<Index> lengths;
   double total = static_cast<double>(n);
   for (Index i = 0; i < k; ++i) {
-    total += std::round(delays()(i) / period_->si());
-    lengths.push_back(static_cast<Index>(std::min(total, 1e9)));
+    total += static_cast<double>(detail::periods_in(delays()(i), period_));
+    lengths.push_back(static_cast<Index>(total));
   }
   if (total > static_cast<double>(most_states)) {
     return refusal(ArgumentError::out_of_range, noun, "the number of states with the delays'")

@@ -6,6 +6,7 @@
 #include <flyball/systems/system_error.hpp>
 
 #include "classical/locus_loop.hpp"
+#include "classical/whole_periods.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -375,7 +376,7 @@ Expected<LocusLoop> locus_loop(const TransferFunction& given) {
   auto z = grouped(zeros, polynomial(given.num()));
   auto p = grouped(poles, polynomial(given.den()));
   if (given.period()) {
-    const int late = static_cast<int>(std::lround(given.delay() / given.period()->si()));
+    const auto late = static_cast<int>(detail::periods_in(given.delay(), given.period()));
     if (late > 0) {
       const auto at_zero =
           std::find_if(p.begin(), p.end(), [](const MultipleRoot& r) { return r.at == 0.0; });

@@ -11,6 +11,7 @@
 
 #include "classical/loop_peaks.hpp"
 #include "classical/polynomial.hpp"
+#include "classical/whole_periods.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "core/wording.hpp"
@@ -86,7 +87,7 @@ class Border {
     den_ = flyball::detail::scaled(std::move(den_), std::ldexp(1.0, -size));
     if (loop.period()) {
       // Its delay is poles at z = 0.
-      const auto periods = static_cast<Index>(std::lround(loop.delay() / loop.period()->si()));
+      const auto periods = detail::periods_in(loop.delay(), loop.period());
       for (Index i = 0; i < periods; ++i) {
         den_ = shifted(den_);
       }
@@ -213,7 +214,7 @@ Expected<std::pair<double, double>> largest_ratio(const Polynomial& above,
 Expected<int> unstable_roots(const TransferFunction& loop) {
   Polynomial den = detail::polynomial(loop.den());
   if (loop.period()) {
-    const auto periods = static_cast<Index>(std::lround(loop.delay() / loop.period()->si()));
+    const auto periods = detail::periods_in(loop.delay(), loop.period());
     for (Index i = 0; i < periods; ++i) {
       den = shifted(den);
     }

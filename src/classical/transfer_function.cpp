@@ -10,6 +10,7 @@
 #include <flyball/systems/system_error.hpp>
 
 #include "classical/polynomial.hpp"
+#include "classical/whole_periods.hpp"
 #include "core/error_rows.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
@@ -148,14 +149,8 @@ Expected<TransferFunction> TransferFunction::create(const VectorXd& num, const V
         .expected(flyball::detail::format("of degree {} at most, as den is", d.size() - 1))
         .hint("a differentiator needs a pole that ends it, such as s/(0.001 s + 1)");
   }
-  if (period && delay.si() > 0.0) {
-    const double periods = delay.si() / period->si();
-    if (std::abs(periods - std::round(periods)) > 1e-9 * periods) {
-      return refusal(ArgumentError::out_of_range, where, "delay")
-          .got(flyball::detail::format("{} periods", periods))
-          .expected("whole periods, for a discrete transfer function");
-    }
-  }
+  FLYBALL_CHECK(
+      detail::check_whole_periods(delay.si(), period, where, "a discrete transfer function"));
   return TransferFunction(std::move(n), std::move(d), period, delay.si());
 }
 
@@ -223,8 +218,9 @@ Expected<Complex> TransferFunction::at(Complex s) const {
         .got("a pole")
         .with("point", std::vector<double>{s.real(), s.imag()});
   }
-  const Complex late =
-      period_ ? std::pow(s, -std::round(delay_ / period_->si())) : std::exp(-s * delay_);
+  const Complex late = period_
+                           ? std::pow(s, -static_cast<double>(detail::periods_in(delay_, period_)))
+                           : std::exp(-s * delay_);
   return detail::value(num_, s) / d * (delay_ > 0.0 ? late : Complex(1.0));
 }
 

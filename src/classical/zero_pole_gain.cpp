@@ -8,6 +8,7 @@
 
 #include <flyball/systems/system_error.hpp>
 
+#include "classical/whole_periods.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "systems/balance.hpp"
@@ -115,12 +116,8 @@ Expected<ZeroPoleGain> ZeroPoleGain::create(const VectorXcd& zeros, const Vector
   FLYBALL_CHECK(Checks(noun).finite(gain, "gain").not_negative(delay.si(), "delay", "s"));
   if (period) {
     FLYBALL_CHECK(check_positive(period->si(), noun, "period", "s"));
-    const double periods = delay.si() / period->si();
-    if (std::abs(periods - std::round(periods)) > 1e-9 * periods) {
-      return refusal(ArgumentError::out_of_range, noun, "delay")
-          .got(flyball::detail::format("{} periods", periods))
-          .expected("whole periods, for a discrete transfer function");
-    }
+    FLYBALL_CHECK(
+        detail::check_whole_periods(delay.si(), period, noun, "a discrete transfer function"));
   }
   return ZeroPoleGain(std::move(z), std::move(p), gain, period, delay.si());
 }
@@ -167,8 +164,9 @@ Expected<Complex> ZeroPoleGain::at(Complex s) const {
         .got("a pole")
         .with("point", std::vector<double>{s.real(), s.imag()});
   }
-  const Complex late =
-      period_ ? std::pow(s, -std::round(delay_ / period_->si())) : std::exp(-s * delay_);
+  const Complex late = period_
+                           ? std::pow(s, -static_cast<double>(detail::periods_in(delay_, period_)))
+                           : std::exp(-s * delay_);
   return gain_ * quotient_of_factors(zeros_, poles_, s) * (delay_ > 0.0 ? late : Complex(1.0));
 }
 

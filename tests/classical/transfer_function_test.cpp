@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <flyball/classical/delay_system.hpp>
+#include <flyball/classical/zero_pole_gain.hpp>
 #include <flyball/core/random.hpp>
 
 #include "classical/transfer_cases.hpp"
@@ -186,6 +188,49 @@ TEST(TransferFunction, Refusals) {
   EXPECT_TRUE(TransferFunction::from_zeros(Eigen::VectorXcd(0), lonely, 1.0)
                   .error()
                   .is(ArgumentError::malformed));
+}
+
+// A delay between nothing and one period, of periods that cannot be counted, and next to whole
+// ones.
+TEST(TransferFunction, DelayOfADiscreteOneIsWholePeriods) {
+  const VectorXd one = VectorXd::Ones(1);
+  const VectorXd den = Eigen::Vector2d(1.0, -0.5);
+  const Eigen::VectorXcd poles = Eigen::VectorXcd::Constant(1, 0.5);
+  for (const auto& [delay, period] : {std::pair{5e-324, 100.0},
+                                      {1e-320, 0.02},
+                                      {1e-12, 1.0},
+                                      {0.5, 1.0},
+                                      {1.0 + 1e-6, 1.0},
+                                      {1e300, 1e-300},
+                                      {1e308, 0.01},
+                                      {2e9, 1.0}}) {
+    const auto refused = [](const auto& made) {
+      return !made && made.error().is(ArgumentError::out_of_range);
+    };
+    EXPECT_TRUE(refused(TransferFunction::create(one, den, Time(period), Time(delay)))) << delay;
+    EXPECT_TRUE(
+        refused(ZeroPoleGain::create(Eigen::VectorXcd(0), poles, 1.0, Time(period), Time(delay))))
+        << delay;
+    const auto rational =
+        DelaySystem::create(TransferFunction::create(one, den, Time(period)).value()).value();
+    EXPECT_TRUE(refused(rational.with_input_delays(VectorXd::Constant(1, delay)))) << delay;
+    EXPECT_TRUE(refused(rational.with_output_delays(VectorXd::Constant(1, delay)))) << delay;
+  }
+  const auto near = TransferFunction::create(one, den, Time(0.1), Time(0.3 + 1e-12)).value();
+  const auto states = DelaySystem::create(near).value().to_discrete().value();
+  EXPECT_EQ(states.A.rows(), 4);
+  for (const double w : {0.1, 3.0, 30.0}) {
+    const Complex z = std::polar(1.0, 0.1 * w);
+    const Complex expected = 1.0 / ((z - 0.5) * z * z * z);
+    EXPECT_LE(std::abs(test::response(states.A, states.B, states.C, states.D, z)(0, 0) - expected),
+              1e-14 * std::abs(expected));
+  }
+  EXPECT_EQ(to_string(TransferFunction::create(one, den, Time(1.0), Time(1.5)).error()),
+            "transfer function: delay is 1.5 periods; it must be whole periods, for a discrete "
+            "transfer function");
+  EXPECT_EQ(to_string(TransferFunction::create(one, den, Time(1.0), Time(2e9)).error()),
+            "transfer function: delay is 2000000000 periods; it must be at most 1000000000 "
+            "periods");
 }
 
 }  // namespace
