@@ -1,5 +1,6 @@
 #include <flyball/classical/mimo_margins.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <type_traits>
 #include <utility>
@@ -115,9 +116,10 @@ Expected<System> opened_at(const System& loop, Index channel, std::string_view w
 }
 
 /// min over diagonal D of σ(D M D⁻¹): convex in ln D, one entry after the other.
-double scaled_gain(const Eigen::MatrixXcd& M) {
+/// @param log_d  Where it begins, and what it found. @param floor  An answer below is of no use:
+/// what the beginning gives is enough then.
+double scaled_gain(const Eigen::MatrixXcd& M, Eigen::VectorXd& log_d, double floor = 0.0) {
   const Index m = M.rows();
-  Eigen::VectorXd log_d = Eigen::VectorXd::Zero(m);
   const auto gain = [&] {
     Eigen::MatrixXcd scaled = M;
     for (Index i = 0; i < m; ++i) {
@@ -128,7 +130,7 @@ double scaled_gain(const Eigen::MatrixXcd& M) {
     return flyball::detail::singular_values_of_complex(scaled)(0);
   };
   double best = gain();
-  if (m == 1 || best == 0.0) {
+  if (m == 1 || best <= floor) {
     return best;
   }
   double reach = 4.0;
@@ -155,20 +157,40 @@ double scaled_gain(const Eigen::MatrixXcd& M) {
 /// The largest of it over the frequencies.
 Expected<Peak> largest_scaled_gain(const FrequencyResponse& difference, double full_frequency) {
   FLYBALL_TRY(const auto grid, frequency_grid(difference));
-  const auto at = [&](double w) { return scaled_gain(difference.at(w)); };
-  std::vector<double> places(grid.frequency.begin(), grid.frequency.end());
-  places.push_back(std::isfinite(full_frequency) ? full_frequency : 0.0);
-  places.push_back(0.0);
+  Eigen::VectorXd log_d = Eigen::VectorXd::Zero(difference.outputs());
+  // The unscaled gain bounds it: from the largest on, until no other can exceed the best.
+  std::vector<Peak> places;
+  const auto consider = [&](double w) {
+    const Eigen::MatrixXcd M = difference.at(w);
+    places.push_back({M.allFinite() ? flyball::detail::singular_values_of_complex(M)(0) : 0.0, w});
+  };
+  for (const double w : grid.frequency) {
+    consider(w);
+  }
+  consider(std::isfinite(full_frequency) ? full_frequency : 0.0);
+  consider(0.0);
+  std::stable_sort(places.begin(), places.end(),
+                   [](const Peak& a, const Peak& b) { return a.value > b.value; });
   Peak best;
-  for (const double w : places) {
-    const double value = at(w);
+  for (const Peak& place : places) {
+    if (place.value <= best.value) {
+      break;
+    }
+    Eigen::VectorXd own = log_d;
+    const double value = scaled_gain(difference.at(place.frequency), own, best.value);
     if (value > best.value) {
-      best = {value, w};
+      log_d = own;
+      best = {value, place.frequency};
     }
   }
   if (best.frequency > 0.0) {
     const double high = std::min(1.05 * best.frequency, difference.highest_frequency());
-    const auto top = find_minimum([&](double w) { return -at(w); }, 0.95 * best.frequency, high);
+    const auto top = find_minimum(
+        [&](double w) {
+          Eigen::VectorXd own = log_d;
+          return -scaled_gain(difference.at(w), own);
+        },
+        0.95 * best.frequency, high);
     if (top && -top->value > best.value) {
       best = {-top->value, top->x};
     }
