@@ -234,7 +234,9 @@ TEST(PoseDrive, AllocatesNothing) {
     wide = rk4(observed, wide, Vector2d(3.0, 2.0), 0.005);
     observed.jacobians(wide, Vector2d(3.0, 2.0), A_wide, B_wide);
   }
-  EXPECT_EQ(counter.count(), 0U);
+  if (test::counts_allocations()) {
+    EXPECT_EQ(counter.count(), 0U);
+  }
   EXPECT_TRUE(x.allFinite() && wide.allFinite());
 }
 

@@ -114,8 +114,13 @@ TEST(SwerveKinematics, StandingModulesHoldTheirAngles) {
 TEST(SwerveKinematics, RefusesModulesInOnePlace) {
   const Eigen::Vector2d place(0.3, 0.2);
   EXPECT_EQ(to_string(swerve_kinematics(std::array{place, place, place}).error()),
-            "swerve_kinematics: positions is all within 0 m; it must be modules in different "
-            "places, to tell turning from moving");
+            "swerve_kinematics: positions is (0.3 m, 0.2 m) of modules 1 and 2 both; it must be "
+            "modules in different places; give each module its own place in the robot's frame, x "
+            "forward and y left");
+  // Two of three: a motion could be told, but no robot is built so.
+  EXPECT_TRUE(swerve_kinematics(std::array{place, Eigen::Vector2d(0.0, 0.1), place})
+                  .error()
+                  .is(ArgumentError::out_of_range));
   EXPECT_TRUE(swerve_kinematics(std::array{place, Eigen::Vector2d(0.0, NAN)})
                   .error()
                   .is(ArgumentError::not_finite));

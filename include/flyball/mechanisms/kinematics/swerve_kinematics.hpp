@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 #include <span>
+#include <string_view>
+#include <utility>
 
 #include <Eigen/Core>
 
@@ -110,14 +112,15 @@ class SwerveKinematics {
 
 namespace detail {
 
-/// @errors ArgumentError::not_finite; out_of_range for modules that are all in one place.
-[[nodiscard]] Expected<void> check_module_positions(std::span<const Eigen::Vector2d> positions);
+/// @errors ArgumentError::not_finite; out_of_range for two modules in one place.
+[[nodiscard]] Expected<void> check_module_positions(std::span<const Eigen::Vector2d> positions,
+                                                    std::string_view where = "swerve_kinematics");
 
 }  // namespace detail
 
 /// @param positions  m, in the robot's frame; two modules or more.
-/// @errors ArgumentError::not_finite; out_of_range for modules that are all in one place, which say
-///         nothing of a rotation. Source: book, section 11.7.
+/// @errors ArgumentError::not_finite; out_of_range for two modules in one place, which no robot has
+///         (all in one place say nothing of a rotation). Source: book, section 11.7.
 template <std::size_t N>
 [[nodiscard]] Expected<SwerveKinematics<N>> swerve_kinematics(
     const std::array<Eigen::Vector2d, N>& positions) {
