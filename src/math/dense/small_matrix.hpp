@@ -20,17 +20,21 @@ struct Size {
 using Vector2 = double __attribute__((vector_size(16), aligned(8), may_alias));
 using Vector4 = double __attribute__((vector_size(32), aligned(8), may_alias));
 
-/// Doubles in memory that are aligned as doubles are, no more: a reference to a vector of four
-/// would promise 32 bytes, and template arguments lose the attributes of the types above.
+/// A vector in memory that is aligned as doubles are, no more; it may be part of any array.
+template <class Vector>
+struct __attribute__((packed, may_alias)) InMemory {
+  Vector value;
+};
+
+/// A memcpy of 32 bytes becomes two stores of 16 and a load of both, for which the processor waits;
+/// a member of a packed struct is one move.
 template <class Vector>
 inline __attribute__((always_inline)) Vector load(const double* from) {
-  Vector value;
-  __builtin_memcpy(&value, from, sizeof(Vector));
-  return value;
+  return reinterpret_cast<const InMemory<Vector>*>(from)->value;
 }
 template <class Vector>
 inline __attribute__((always_inline)) void store(double* to, Vector value) {
-  __builtin_memcpy(to, &value, sizeof(Vector));
+  reinterpret_cast<InMemory<Vector>*>(to)->value = value;
 }
 
 inline __attribute__((always_inline)) Vector4 load4(const double* from) {
