@@ -1,0 +1,306 @@
+#include <algorithm>
+#include <cmath>
+
+#include "control/lyapunov/loop_enclosure.hpp"
+
+namespace flyball::detail {
+
+namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+Interval clamped(const Interval& u, double low, double high) noexcept {
+  return {std::clamp(u.low, low, high), std::clamp(u.high, low, high)};
+}
+
+/// The slopes of a clamp over an interval.
+Interval clamp_slope(const Interval& u, double low, double high) noexcept {
+  if (u.low >= low && u.high <= high) {
+    return 1.0;
+  }
+  return u.high < low || u.low > high ? Interval(0.0) : Interval(0.0, 1.0);
+}
+
+double low_limit(const SaturatedLoop& loop, int input) noexcept {
+  return loop.u_min.size() > 0 ? loop.u_min(input) : -infinite;
+}
+double high_limit(const SaturatedLoop& loop, int input) noexcept {
+  return loop.u_max.size() > 0 ? loop.u_max(input) : infinite;
+}
+
+std::size_t at(int i) noexcept {
+  return static_cast<std::size_t>(i);
+}
+
+/// [-1, 1] r.
+Interval within(double r) noexcept {
+  return {-r, r};
+}
+
+}  // namespace
+
+LoopEnclosure::LoopEnclosure(const SaturatedLoop& loop, const Eigen::MatrixXd& P,
+                             const Eigen::MatrixXd& T)
+    : loop_(loop),
+      P_(P),
+      T_(T),
+      n_(static_cast<int>(loop.model.states)),
+      m_(static_cast<int>(loop.model.inputs)),
+      derivatives_(expression::differentiate(loop.model.f)),
+      f_(loop.model.f, loop.model.parameters),
+      jacobian_(derivatives_.tape, loop.model.parameters),
+      KT_(at(n_ * m_)),
+      in_(at(n_ + m_)),
+      box_(at(n_ + m_)),
+      u_raw_(at(m_)),
+      values_(loop.model.f.size()),
+      point_(at(n_ + m_)),
+      slope_(at(n_)) {
+  for (int i = 0; i < n_; ++i) {
+    for (int j = 0; j < n_; ++j) {
+      Interval sum;
+      for (int k = 0; k < n_; ++k) {
+        sum = sum + Interval(T(k, i)) * Interval(P(k, j));
+      }
+      W_[at(i)][at(j)] = sum;
+    }
+  }
+  for (int i = 0; i < m_; ++i) {
+    for (int j = 0; j < n_; ++j) {
+      Interval sum;
+      for (int k = 0; k < n_; ++k) {
+        sum = sum + Interval(loop.K(i, k)) * Interval(T(k, j));
+      }
+      KT_[at(i * n_ + j)] = sum;
+    }
+  }
+  for (int i = 0; i < n_; ++i) {  // ‖TᵀPT - I‖ in the largest row sum
+    double row = 0.0;
+    for (int j = 0; j < n_; ++j) {
+      Interval sum(i == j ? -1.0 : 0.0);
+      for (int k = 0; k < n_; ++k) {
+        sum = sum + W_[at(i)][at(k)] * Interval(T(k, j));
+      }
+      row += sum.magnitude();
+    }
+    slack_ = std::max(slack_, 1.001 * row + 1e-12);
+  }
+  loop.model.f.prepare<double>(loop.model.parameters, values_);
+}
+
+double LoopEnclosure::least(const RegionCell& cell) const noexcept {
+  double sum = 0.0;
+  for (int i = 0; i < n_; ++i) {
+    const double near = std::max(0.0, std::abs(cell.centre[at(i)]) - cell.half[at(i)]);
+    sum += near * near;
+  }
+  return sum * (1.0 - slack_);
+}
+
+double LoopEnclosure::most(const RegionCell& cell) const noexcept {
+  double sum = 0.0;
+  for (int i = 0; i < n_; ++i) {
+    const double far = std::abs(cell.centre[at(i)]) + cell.half[at(i)];
+    sum += far * far;
+  }
+  return sum * (1.0 + slack_);
+}
+
+void LoopEnclosure::evaluate_centre(const Coordinates& centre) noexcept {
+  for (int i = 0; i < n_; ++i) {
+    Interval x(loop_.x(i));
+    for (int j = 0; j < n_; ++j) {
+      x = x + Interval(T_(i, j)) * Interval(centre[at(j)]);
+    }
+    in_[at(i)] = x;
+  }
+  for (int i = 0; i < m_; ++i) {
+    Interval u(loop_.u(i));
+    for (int j = 0; j < n_; ++j) {
+      u = u - KT_[at(i * n_ + j)] * Interval(centre[at(j)]);
+    }
+    u_raw_[at(i)] = u;
+    in_[at(n_ + i)] = clamped(u, low_limit(loop_, i), high_limit(loop_, i));
+  }
+  const std::span<const Interval> f = f_.evaluate(in_);
+  for (int i = 0; i < n_; ++i) {
+    Interval sum;
+    for (int j = 0; j < n_; ++j) {
+      sum = is_bounded(f[at(j)]) ? sum + W_[at(i)][at(j)] * f[at(j)] : anything;
+      if (!is_bounded(sum)) {
+        break;
+      }
+    }
+    f_z_[at(i)] = sum;
+  }
+}
+
+void LoopEnclosure::evaluate_jacobian(const Coordinates& half) noexcept {
+  for (int i = 0; i < n_; ++i) {
+    double reach = 0.0;
+    for (int j = 0; j < n_; ++j) {
+      reach += std::abs(T_(i, j)) * half[at(j)];
+    }
+    box_[at(i)] = in_[at(i)] + within(reach * inflation);
+  }
+  std::array<Interval, most_region_states> slope{};
+  for (int i = 0; i < m_; ++i) {
+    double reach = 0.0;
+    for (int j = 0; j < n_; ++j) {
+      reach += KT_[at(i * n_ + j)].magnitude() * half[at(j)];
+    }
+    const Interval u = u_raw_[at(i)] + within(reach * inflation);
+    slope[at(i)] = clamp_slope(u, low_limit(loop_, i), high_limit(loop_, i));
+    box_[at(n_ + i)] = clamped(u, low_limit(loop_, i), high_limit(loop_, i));
+  }
+  const std::span<const Interval> all = jacobian_.evaluate(box_);
+  // W [J, B]
+  Square WJ{};
+  Square WB{};
+  for (std::size_t e = 0; e < derivatives_.entries.size(); ++e) {
+    const auto [row, column] = derivatives_.entries[e];
+    const Interval& entry = all[derivatives_.rows + e];
+    const bool by_input = static_cast<int>(column) >= n_;
+    Square& target = by_input ? WB : WJ;
+    const std::size_t k = by_input ? column - at(n_) : column;
+    for (int i = 0; i < n_; ++i) {
+      Interval& sum = target[at(i)][k];
+      const Interval term = product(W_[at(i)][row], entry);
+      sum = is_bounded(term) && is_bounded(sum) ? sum + term : anything;
+    }
+  }
+  // F = W J T - W B Σ K T
+  for (int i = 0; i < n_; ++i) {
+    for (int j = 0; j < n_; ++j) {
+      Interval sum;
+      for (int k = 0; k < n_; ++k) {
+        const Interval term = product(WJ[at(i)][at(k)], T_(k, j));
+        sum = is_bounded(term) && is_bounded(sum) ? sum + term : anything;
+      }
+      for (int k = 0; k < m_; ++k) {
+        const Interval gain = product(WB[at(i)][at(k)], slope[at(k)]);
+        const Interval term = product(gain, KT_[at(k * n_ + j)]);
+        sum = is_bounded(term) && is_bounded(sum) ? sum - term : anything;
+      }
+      F_[at(i)][at(j)] = sum;
+    }
+  }
+}
+
+CellBound LoopEnclosure::bound(const RegionCell& cell) noexcept {
+  evaluate_centre(cell.centre);
+  evaluate_jacobian(cell.half);
+  CellBound result;
+  Interval centre;
+  for (int i = 0; i < n_; ++i) {
+    if (!is_bounded(f_z_[at(i)])) {
+      result.high = std::numeric_limits<double>::quiet_NaN();
+      result.share = cell.half;
+      result.centre_low = -infinite;
+      result.centre_high = infinite;
+      return result;
+    }
+    centre = centre + Interval(2.0 * cell.centre[at(i)]) * f_z_[at(i)];
+  }
+  result.centre_low = centre.low;
+  result.centre_high = centre.high;
+  double growth = 0.0;
+  for (int i = 0; i < n_; ++i) {
+    const double h = cell.half[at(i)];
+    Interval g = f_z_[at(i)];
+    for (int k = 0; k < n_; ++k) {
+      const Interval& entry = F_[at(k)][at(i)];
+      g = is_bounded(entry) && is_bounded(g) ? g + entry * Interval(cell.centre[at(k)]) : anything;
+    }
+    const double slope = g.magnitude();
+    // max over |δ| <= h of 2 slope δ + G_ii δ²
+    const double bend = rounded_up(2.0 * F_[at(i)][at(i)].high);
+    double own = 2.0 * slope * h + bend * h * h;
+    if (bend < 0.0 && slope < -bend * h) {
+      own = slope * slope / -bend;
+    }
+    if (bend < 0.0) {
+      // The difference of two terms: its rounding is of the size of the larger.
+      own += 1e-14 * slope * h;
+    }
+    double share = std::max(own, 0.0);
+    growth += own;
+    for (int j = 0; j < n_; ++j) {
+      if (j != i) {
+        const Interval mixed = is_bounded(F_[at(i)][at(j)]) && is_bounded(F_[at(j)][at(i)])
+                                   ? F_[at(i)][at(j)] + F_[at(j)][at(i)]
+                                   : anything;
+        const double both = mixed.magnitude() * h * cell.half[at(j)];
+        share += both;
+        growth += j > i ? 2.0 * both : 0.0;
+      }
+    }
+    result.share[at(i)] = share;
+  }
+  result.high = rounded_up(centre.high + growth + 1e-13 * std::abs(growth));
+  return result;
+}
+
+double LoopEnclosure::core_rate(double half) noexcept {
+  Coordinates box{};
+  std::fill_n(box.begin(), n_, half);
+  evaluate_centre({});
+  evaluate_jacobian(box);
+  double worst = -infinite;
+  for (int i = 0; i < n_; ++i) {  // Gershgorin
+    double row = 2.0 * F_[at(i)][at(i)].high;
+    double beside = 0.0;
+    for (int j = 0; j < n_; ++j) {
+      if (j != i) {
+        if (!is_bounded(F_[at(i)][at(j)]) || !is_bounded(F_[at(j)][at(i)])) {
+          return infinite;
+        }
+        beside += (F_[at(i)][at(j)] + F_[at(j)][at(i)]).magnitude();
+      }
+    }
+    row = rounded_up(row + beside * inflation);
+    if (!(row < infinite)) {
+      return infinite;
+    }
+    worst = std::max(worst, row);
+  }
+  return worst;
+}
+
+double LoopEnclosure::rest() noexcept {
+  evaluate_centre({});
+  double sum = 0.0;
+  for (int i = 0; i < n_; ++i) {
+    sum += f_z_[at(i)].magnitude();
+  }
+  return sum * inflation;
+}
+
+double LoopEnclosure::rate(const Eigen::VectorXd& z) {
+  double sum = 0.0;
+  for (int i = 0; i < n_; ++i) {
+    double x = loop_.x(i);
+    for (int j = 0; j < n_; ++j) {
+      x += T_(i, j) * z(j);
+    }
+    point_[at(i)] = x;
+  }
+  for (int i = 0; i < m_; ++i) {
+    double u = loop_.u(i);
+    for (int k = 0; k < n_; ++k) {
+      u -= loop_.K(i, k) * (point_[at(k)] - loop_.x(k));
+    }
+    point_[at(n_ + i)] = std::clamp(u, low_limit(loop_, i), high_limit(loop_, i));
+  }
+  loop_.model.f.evaluate<double>(point_, slope_, values_);
+  for (int i = 0; i < n_; ++i) {
+    double weight = 0.0;
+    for (int j = 0; j < n_; ++j) {
+      weight += P_(i, j) * (point_[at(j)] - loop_.x(j));
+    }
+    sum += 2.0 * weight * slope_[at(i)];
+  }
+  return sum;
+}
+
+}  // namespace flyball::detail
