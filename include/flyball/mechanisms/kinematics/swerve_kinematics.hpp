@@ -56,18 +56,27 @@ class SwerveKinematics {
     Modules result;
     for (std::size_t i = 0; i < N; ++i) {
       const ChassisSpeeds there = speeds.at(positions_[i] - centre);
-      const double speed = std::hypot(there.vx, there.vy);
-      result[i] = {speed,
-                   speed > 0.0 ? Rotation2d::from_direction(there.vx, there.vy) : held[i].angle};
+      const double square = there.vx * there.vx + there.vy * there.vy;
+      // The square of what is tiny or huge has lost digits, or all.
+      const double speed =
+          square > 1e-280 && square < 1e300 ? std::sqrt(square) : std::hypot(there.vx, there.vy);
+      result[i] = {speed, speed > 0.0 ? Rotation2d::from_unit(there.vx / speed, there.vy / speed)
+                                      : held[i].angle};
     }
     return result;
   }
   /// Forward kinematics. Source: book, equation (11.17).
   [[nodiscard]] ChassisSpeeds chassis(const Modules& modules) const noexcept {
     std::array<Eigen::Vector2d, N> v;
-    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
     for (std::size_t i = 0; i < N; ++i) {
       v[i] = {modules[i].speed * modules[i].angle.cos(), modules[i].speed * modules[i].angle.sin()};
+    }
+    return chassis(v);
+  }
+  /// The same of the modules' velocities. @param v  m/s, in the robot's frame.
+  [[nodiscard]] ChassisSpeeds chassis(const std::array<Eigen::Vector2d, N>& v) const noexcept {
+    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+    for (std::size_t i = 0; i < N; ++i) {
       mean += v[i] / static_cast<double>(N);
     }
     double moment = 0.0;
