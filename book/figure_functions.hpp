@@ -27,6 +27,17 @@ namespace flyball::book {
 [[nodiscard]] FigureResult figure_7_7();
 [[nodiscard]] FigureResult figure_7_8();
 [[nodiscard]] FigureResult figure_7_10();
+[[nodiscard]] FigureResult figure_8_3();
+[[nodiscard]] FigureResult figure_8_4();
+[[nodiscard]] FigureResult figure_8_5();
+[[nodiscard]] FigureResult figure_8_6();
+[[nodiscard]] FigureResult figure_8_7();
+[[nodiscard]] FigureResult figure_8_8();
+[[nodiscard]] FigureResult figure_8_9();
+[[nodiscard]] FigureResult figure_8_10();
+[[nodiscard]] FigureResult figure_8_11();
+[[nodiscard]] FigureResult figure_8_12();
+[[nodiscard]] FigureResult figure_8_13();
 [[nodiscard]] FigureResult figure_9_1();
 [[nodiscard]] FigureResult figure_9_2();
 [[nodiscard]] FigureResult figure_9_3();

@@ -51,12 +51,14 @@ TEST(FigureChecks, EveryFigureAgreesWithItsReference) {
   EXPECT_GT(values, 1000u);
 }
 
-// Gains and series within 1e-9, as the references say; only what the book prints, to three
-// decimals, is compared more loosely.
+// Gains and series within 1e-9, as the references say; more loosely only what the book prints, to
+// three decimals, and the drives that its scripts integrate and differentiate to 1e-6.
 TEST(FigureChecks, ToleranceIsNineDigits) {
   for (const FigureCheck& check : check_figures()) {
+    const bool integrated = check.figure.starts_with("8.") &&
+                            check.source.find("the book's own script") != std::string::npos;
     if (check.source.find("printed") == std::string::npos) {
-      EXPECT_LE(check.tolerance, 1e-9) << describe(check);
+      EXPECT_LE(check.tolerance, integrated ? 1e-6 : 1e-9) << describe(check);
     }
   }
 }
@@ -129,7 +131,8 @@ TEST(FigureChecks, EveryAlteredSeriesIsFound) {
           continue;
         }
         Json& entry = part == std::string("values") ? series["values"].back() : series[part];
-        entry = entry.get<double>() + 3e-9 * scale_of(original["series"][i]);
+        entry = entry.get<double>() +
+                3.0 * original.value("tolerance", 1e-9) * scale_of(original["series"][i]);
         const auto failures = failures_against(altered);
         ASSERT_EQ(failures.size(), 1u)
             << original["figure"] << " " << series["name"] << " " << part;
