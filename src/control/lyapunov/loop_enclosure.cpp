@@ -32,6 +32,19 @@ std::size_t at(int i) noexcept {
   return static_cast<std::size_t>(i);
 }
 
+/// Whether ∂f/∂u does not depend on u.
+bool is_affine(const expression::Derivatives& derivatives, std::size_t states, std::size_t inputs) {
+  std::vector<expression::Slot> by;
+  for (std::size_t k = 0; k < inputs; ++k) {
+    by.push_back(derivatives.tape.input_slot(states + k));
+  }
+  const expression::Derivatives second = expression::differentiate(derivatives.tape, by);
+  return std::none_of(second.entries.begin(), second.entries.end(), [&](const auto& entry) {
+    return entry.row >= derivatives.rows &&
+           derivatives.entries[entry.row - derivatives.rows].column >= states;
+  });
+}
+
 /// [-1, 1] r.
 Interval within(double r) noexcept {
   return {-r, r};
@@ -86,6 +99,7 @@ LoopEnclosure::LoopEnclosure(const SaturatedLoop& loop, const Eigen::MatrixXd& P
     slack_ = std::max(slack_, 1.001 * row + 1e-12);
   }
   loop.model.f.prepare<double>(loop.model.parameters, values_);
+  affine_ = is_affine(derivatives_, at(n_), at(m_));
 }
 
 double LoopEnclosure::least(const RegionCell& cell) const noexcept {
@@ -106,7 +120,7 @@ double LoopEnclosure::most(const RegionCell& cell) const noexcept {
   return sum * (1.0 + slack_);
 }
 
-void LoopEnclosure::evaluate_centre(const Coordinates& centre) noexcept {
+void LoopEnclosure::evaluate_centre(const Coordinates& centre, const Regimes& regimes) noexcept {
   for (int i = 0; i < n_; ++i) {
     Interval x(loop_.x(i));
     for (int j = 0; j < n_; ++j) {
@@ -120,7 +134,19 @@ void LoopEnclosure::evaluate_centre(const Coordinates& centre) noexcept {
       u = u - KT_[at(i * n_ + j)] * Interval(centre[at(j)]);
     }
     u_raw_[at(i)] = u;
-    in_[at(n_ + i)] = clamped(u, low_limit(loop_, i), high_limit(loop_, i));
+    switch (regimes[at(i)]) {
+      case Regime::linear:
+        in_[at(n_ + i)] = u;
+        break;
+      case Regime::low:
+        in_[at(n_ + i)] = low_limit(loop_, i);
+        break;
+      case Regime::high:
+        in_[at(n_ + i)] = high_limit(loop_, i);
+        break;
+      case Regime::mixed:
+        in_[at(n_ + i)] = clamped(u, low_limit(loop_, i), high_limit(loop_, i));
+    }
   }
   const std::span<const Interval> f = f_.evaluate(in_);
   for (int i = 0; i < n_; ++i) {
@@ -135,7 +161,7 @@ void LoopEnclosure::evaluate_centre(const Coordinates& centre) noexcept {
   }
 }
 
-void LoopEnclosure::evaluate_jacobian(const Coordinates& half) noexcept {
+void LoopEnclosure::evaluate_jacobian(const Coordinates& half, const Regimes& regimes) noexcept {
   for (int i = 0; i < n_; ++i) {
     double reach = 0.0;
     for (int j = 0; j < n_; ++j) {
@@ -150,8 +176,14 @@ void LoopEnclosure::evaluate_jacobian(const Coordinates& half) noexcept {
       reach += KT_[at(i * n_ + j)].magnitude() * half[at(j)];
     }
     const Interval u = u_raw_[at(i)] + within(reach * inflation);
-    slope[at(i)] = clamp_slope(u, low_limit(loop_, i), high_limit(loop_, i));
-    box_[at(n_ + i)] = clamped(u, low_limit(loop_, i), high_limit(loop_, i));
+    const Regime regime = regimes[at(i)];
+    if (regime == Regime::mixed) {
+      slope[at(i)] = clamp_slope(u, low_limit(loop_, i), high_limit(loop_, i));
+      box_[at(n_ + i)] = clamped(u, low_limit(loop_, i), high_limit(loop_, i));
+    } else {
+      slope[at(i)] = regime == Regime::linear ? 1.0 : 0.0;
+      box_[at(n_ + i)] = regime == Regime::linear ? u : in_[at(n_ + i)];
+    }
   }
   const std::span<const Interval> all = jacobian_.evaluate(box_);
   // W [J, B]
@@ -187,23 +219,76 @@ void LoopEnclosure::evaluate_jacobian(const Coordinates& half) noexcept {
   }
 }
 
+std::array<unsigned, most_region_states> LoopEnclosure::regimes_of(
+    const RegionCell& cell) noexcept {
+  std::array<unsigned, most_region_states> met{};
+  for (int i = 0; i < m_; ++i) {
+    Interval u(loop_.u(i));
+    for (int j = 0; j < n_; ++j) {
+      const Interval& gain = KT_[at(i * n_ + j)];
+      const double c = cell.centre[at(j)];
+      const double h = cell.half[at(j)];
+      u = u - gain * (Interval(c) + within(h));
+    }
+    const double low = low_limit(loop_, i);
+    const double high = high_limit(loop_, i);
+    met[at(i)] = (u.high >= low && u.low <= high ? 1U : 0U) | (u.low < low ? 2U : 0U) |
+                 (u.high > high ? 4U : 0U);
+  }
+  return met;
+}
+
 CellBound LoopEnclosure::bound(const RegionCell& cell) noexcept {
-  evaluate_centre(cell.centre);
-  evaluate_jacobian(cell.half);
+  Regimes regimes;
+  regimes.fill(Regime::mixed);
+  if (!affine_) {
+    return bound_in(cell, regimes);
+  }
+  // V̇ is affine in each input, which lies between its line and its limit: it is at most the larger of
+  // what it is with the one and with the other.
+  constexpr std::array all{Regime::linear, Regime::low, Regime::high};
+  const auto met = regimes_of(cell);
+  CellBound result;
+  result.high = -infinite;
+  std::array<std::size_t, most_region_states> choice{};
+  for (bool more = true; more;) {
+    bool possible = true;
+    for (int i = 0; i < m_; ++i) {
+      possible = possible && (met[at(i)] >> choice[at(i)] & 1U) != 0;
+      regimes[at(i)] = all[choice[at(i)]];
+    }
+    if (possible) {
+      const CellBound part = bound_in(cell, regimes);
+      if (!(part.high <= result.high)) {
+        result.high = part.high;
+        result.share = part.share;
+      }
+      if (std::isnan(part.high)) {
+        return part;
+      }
+    }
+    more = false;
+    for (int i = 0; i < m_ && !more; ++i) {
+      more = ++choice[at(i)] < all.size();
+      choice[at(i)] = more ? choice[at(i)] : 0;
+    }
+  }
+  return result;
+}
+
+CellBound LoopEnclosure::bound_in(const RegionCell& cell, const Regimes& regimes) noexcept {
+  evaluate_centre(cell.centre, regimes);
+  evaluate_jacobian(cell.half, regimes);
   CellBound result;
   Interval centre;
   for (int i = 0; i < n_; ++i) {
     if (!is_bounded(f_z_[at(i)])) {
       result.high = std::numeric_limits<double>::quiet_NaN();
       result.share = cell.half;
-      result.centre_low = -infinite;
-      result.centre_high = infinite;
       return result;
     }
     centre = centre + Interval(2.0 * cell.centre[at(i)]) * f_z_[at(i)];
   }
-  result.centre_low = centre.low;
-  result.centre_high = centre.high;
   double growth = 0.0;
   for (int i = 0; i < n_; ++i) {
     const double h = cell.half[at(i)];
@@ -244,8 +329,10 @@ CellBound LoopEnclosure::bound(const RegionCell& cell) noexcept {
 double LoopEnclosure::core_rate(double half) noexcept {
   Coordinates box{};
   std::fill_n(box.begin(), n_, half);
-  evaluate_centre({});
-  evaluate_jacobian(box);
+  Regimes mixed;
+  mixed.fill(Regime::mixed);
+  evaluate_centre({}, mixed);
+  evaluate_jacobian(box, mixed);
   double worst = -infinite;
   for (int i = 0; i < n_; ++i) {  // Gershgorin
     double row = 2.0 * F_[at(i)][at(i)].high;
@@ -268,7 +355,9 @@ double LoopEnclosure::core_rate(double half) noexcept {
 }
 
 double LoopEnclosure::rest() noexcept {
-  evaluate_centre({});
+  Regimes mixed;
+  mixed.fill(Regime::mixed);
+  evaluate_centre({}, mixed);
   double sum = 0.0;
   for (int i = 0; i < n_; ++i) {
     sum += f_z_[at(i)].magnitude();

@@ -24,8 +24,6 @@ struct RegionCell {
 /// What is known of V̇ over a cell.
 struct CellBound {
   double high = 0.0;         ///< No less than V̇ anywhere in it; NaN where nothing is known.
-  double centre_low = 0.0;   ///< No more than V̇ at its centre,
-  double centre_high = 0.0;  ///< and no less.
   Coordinates share{};       ///< What each coordinate's width adds.
 };
 
@@ -56,10 +54,18 @@ class LoopEnclosure {
   using Row = std::array<Interval, most_region_states>;
   using Square = std::array<Row, most_region_states>;
 
+  /// What an input does over a cell: K's, one of its limits, or now one and now the other.
+  enum class Regime { linear, low, high, mixed };
+  using Regimes = std::array<Regime, most_region_states>;
+
+  /// The regimes of each input that a cell meets: bits of linear, low and high.
+  [[nodiscard]] std::array<unsigned, most_region_states> regimes_of(
+      const RegionCell& cell) noexcept;
+  [[nodiscard]] CellBound bound_in(const RegionCell& cell, const Regimes& regimes) noexcept;
   /// f_z at the centre; leaves x and u there.
-  void evaluate_centre(const Coordinates& centre) noexcept;
+  void evaluate_centre(const Coordinates& centre, const Regimes& regimes) noexcept;
   /// F over the cell about the centre that was evaluated last.
-  void evaluate_jacobian(const Coordinates& half) noexcept;
+  void evaluate_jacobian(const Coordinates& half, const Regimes& regimes) noexcept;
 
   const SaturatedLoop& loop_;
   Eigen::MatrixXd P_, T_;
@@ -70,6 +76,8 @@ class LoopEnclosure {
   Square W_{};                  ///< TᵀP
   std::vector<Interval> KT_{};  ///< m x n, row by row.
   double slack_ = 0.0;
+  /// f is affine in u: V̇ is then least and largest where each input is at an end of its range.
+  bool affine_ = false;
   std::vector<Interval> in_{}, box_{};
   std::vector<Interval> u_raw_{};
   Row f_z_{};
