@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "control/lyapunov/loop_enclosure.hpp"
@@ -61,11 +62,13 @@ LoopEnclosure::LoopEnclosure(const SaturatedLoop& loop, const Eigen::MatrixXd& P
       m_(static_cast<int>(loop.model.inputs)),
       derivatives_(expression::differentiate(loop.model.f)),
       f_(loop.model.f, loop.model.parameters),
+      forms_(loop.model.f, loop.model.parameters),
       jacobian_(derivatives_.tape, loop.model.parameters),
       KT_(at(n_ * m_)),
       in_(at(n_ + m_)),
       box_(at(n_ + m_)),
       u_raw_(at(m_)),
+      form_in_(at(n_ + m_)),
       values_(loop.model.f.size()),
       point_(at(n_ + m_)),
       slope_(at(n_)) {
@@ -120,7 +123,7 @@ double LoopEnclosure::most(const RegionCell& cell) const noexcept {
   return sum * (1.0 + slack_);
 }
 
-void LoopEnclosure::evaluate_centre(const Coordinates& centre, const Regimes& regimes) noexcept {
+void LoopEnclosure::evaluate_centre(const Coordinates& centre) noexcept {
   for (int i = 0; i < n_; ++i) {
     Interval x(loop_.x(i));
     for (int j = 0; j < n_; ++j) {
@@ -134,34 +137,11 @@ void LoopEnclosure::evaluate_centre(const Coordinates& centre, const Regimes& re
       u = u - KT_[at(i * n_ + j)] * Interval(centre[at(j)]);
     }
     u_raw_[at(i)] = u;
-    switch (regimes[at(i)]) {
-      case Regime::linear:
-        in_[at(n_ + i)] = u;
-        break;
-      case Regime::low:
-        in_[at(n_ + i)] = low_limit(loop_, i);
-        break;
-      case Regime::high:
-        in_[at(n_ + i)] = high_limit(loop_, i);
-        break;
-      case Regime::mixed:
-        in_[at(n_ + i)] = clamped(u, low_limit(loop_, i), high_limit(loop_, i));
-    }
-  }
-  const std::span<const Interval> f = f_.evaluate(in_);
-  for (int i = 0; i < n_; ++i) {
-    Interval sum;
-    for (int j = 0; j < n_; ++j) {
-      sum = is_bounded(f[at(j)]) ? sum + W_[at(i)][at(j)] * f[at(j)] : anything;
-      if (!is_bounded(sum)) {
-        break;
-      }
-    }
-    f_z_[at(i)] = sum;
+    in_[at(n_ + i)] = clamped(u, low_limit(loop_, i), high_limit(loop_, i));
   }
 }
 
-void LoopEnclosure::evaluate_jacobian(const Coordinates& half, const Regimes& regimes) noexcept {
+void LoopEnclosure::evaluate_jacobian(const Coordinates& half) noexcept {
   for (int i = 0; i < n_; ++i) {
     double reach = 0.0;
     for (int j = 0; j < n_; ++j) {
@@ -176,14 +156,8 @@ void LoopEnclosure::evaluate_jacobian(const Coordinates& half, const Regimes& re
       reach += KT_[at(i * n_ + j)].magnitude() * half[at(j)];
     }
     const Interval u = u_raw_[at(i)] + within(reach * inflation);
-    const Regime regime = regimes[at(i)];
-    if (regime == Regime::mixed) {
-      slope[at(i)] = clamp_slope(u, low_limit(loop_, i), high_limit(loop_, i));
-      box_[at(n_ + i)] = clamped(u, low_limit(loop_, i), high_limit(loop_, i));
-    } else {
-      slope[at(i)] = regime == Regime::linear ? 1.0 : 0.0;
-      box_[at(n_ + i)] = regime == Regime::linear ? u : in_[at(n_ + i)];
-    }
+    slope[at(i)] = clamp_slope(u, low_limit(loop_, i), high_limit(loop_, i));
+    box_[at(n_ + i)] = clamped(u, low_limit(loop_, i), high_limit(loop_, i));
   }
   const std::span<const Interval> all = jacobian_.evaluate(box_);
   // W [J, B]
@@ -239,32 +213,40 @@ std::array<unsigned, most_region_states> LoopEnclosure::regimes_of(
 }
 
 CellBound LoopEnclosure::bound(const RegionCell& cell) noexcept {
-  Regimes regimes;
-  regimes.fill(Regime::mixed);
-  if (!affine_) {
-    return bound_in(cell, regimes);
-  }
-  // V̇ is affine in each input, which lies between its line and its limit: it is at most the larger of
-  // what it is with the one and with the other.
-  constexpr std::array all{Regime::linear, Regime::low, Regime::high};
+  evaluate_centre(cell.centre);
   const auto met = regimes_of(cell);
+  // V̇ is affine in each input, which lies between its line and its limit: it is at most the larger
+  // of what it is with the one and with the other.
+  constexpr std::array all{Regime::linear, Regime::low, Regime::high};
   CellBound result;
   result.high = -infinite;
+  Regimes regimes{};
   std::array<std::size_t, most_region_states> choice{};
   for (bool more = true; more;) {
     bool possible = true;
     for (int i = 0; i < m_; ++i) {
-      possible = possible && (met[at(i)] >> choice[at(i)] & 1U) != 0;
-      regimes[at(i)] = all[choice[at(i)]];
+      const bool one = std::has_single_bit(met[at(i)]);
+      possible = possible &&
+                 (affine_ || one ? (met[at(i)] >> choice[at(i)] & 1U) != 0 : choice[at(i)] == 0);
+      regimes[at(i)] = affine_ || one ? all[choice[at(i)]] : Regime::mixed;
     }
     if (possible) {
-      const CellBound part = bound_in(cell, regimes);
-      if (!(part.high <= result.high)) {
-        result.high = part.high;
-        result.share = part.share;
+      const TaylorForm rate = rate_in(cell, regimes);
+      const double high = upper_bound(rate);
+      if (!(high <= result.high)) {
+        result.high = high;
+        for (int i = 0; i < n_; ++i) {
+          double share = std::abs(rate.slope[at(i)]);
+          for (int j = 0; j < n_; ++j) {
+            share += std::abs(rate.square[square_index(at(std::min(i, j)), at(std::max(i, j)))]);
+          }
+          result.share[at(i)] = share;
+        }
       }
-      if (std::isnan(part.high)) {
-        return part;
+      if (!std::isfinite(high)) {
+        result.share = cell.half;
+        result.high = std::numeric_limits<double>::quiet_NaN();
+        return result;
       }
     }
     more = false;
@@ -276,63 +258,61 @@ CellBound LoopEnclosure::bound(const RegionCell& cell) noexcept {
   return result;
 }
 
-CellBound LoopEnclosure::bound_in(const RegionCell& cell, const Regimes& regimes) noexcept {
-  evaluate_centre(cell.centre, regimes);
-  evaluate_jacobian(cell.half, regimes);
-  CellBound result;
-  Interval centre;
+TaylorForm LoopEnclosure::rate_in(const RegionCell& cell, const Regimes& regimes) noexcept {
+  // A number times h ε_j, and what its product was rounded by.
+  const auto add_slope = [&](TaylorForm& form, int j, const Interval& factor) {
+    const double h = cell.half[at(j)];
+    const double middle = 0.5 * factor.low + 0.5 * factor.high;
+    form.slope[at(j)] = middle * h;
+    form.widen((std::max(factor.high - middle, middle - factor.low) +
+                4.0 * unit_roundoff * factor.magnitude()) *
+                   h * inflation +
+               underflow);
+  };
   for (int i = 0; i < n_; ++i) {
-    if (!is_bounded(f_z_[at(i)])) {
-      result.high = std::numeric_limits<double>::quiet_NaN();
-      result.share = cell.half;
-      return result;
-    }
-    centre = centre + Interval(2.0 * cell.centre[at(i)]) * f_z_[at(i)];
-  }
-  double growth = 0.0;
-  for (int i = 0; i < n_; ++i) {
-    const double h = cell.half[at(i)];
-    Interval g = f_z_[at(i)];
-    for (int k = 0; k < n_; ++k) {
-      const Interval& entry = F_[at(k)][at(i)];
-      g = is_bounded(entry) && is_bounded(g) ? g + entry * Interval(cell.centre[at(k)]) : anything;
-    }
-    const double slope = g.magnitude();
-    // max over |δ| <= h of 2 slope δ + G_ii δ²
-    const double bend = rounded_up(2.0 * F_[at(i)][at(i)].high);
-    double own = 2.0 * slope * h + bend * h * h;
-    if (bend < 0.0 && slope < -bend * h) {
-      own = slope * slope / -bend;
-    }
-    if (bend < 0.0) {
-      // The difference of two terms: its rounding is of the size of the larger.
-      own += 1e-14 * slope * h;
-    }
-    double share = std::max(own, 0.0);
-    growth += own;
+    TaylorForm& x = form_in_[at(i)];
+    x = TaylorForm::between(in_[at(i)]);
     for (int j = 0; j < n_; ++j) {
-      if (j != i) {
-        const Interval mixed = is_bounded(F_[at(i)][at(j)]) && is_bounded(F_[at(j)][at(i)])
-                                   ? F_[at(i)][at(j)] + F_[at(j)][at(i)]
-                                   : anything;
-        const double both = mixed.magnitude() * h * cell.half[at(j)];
-        share += both;
-        growth += j > i ? 2.0 * both : 0.0;
-      }
+      add_slope(x, j, T_(i, j));
     }
-    result.share[at(i)] = share;
   }
-  result.high = rounded_up(centre.high + growth + 1e-13 * std::abs(growth));
-  return result;
+  for (int i = 0; i < m_; ++i) {
+    TaylorForm& u = form_in_[at(n_ + i)];
+    const double low = low_limit(loop_, i);
+    const double high = high_limit(loop_, i);
+    if (regimes[at(i)] == Regime::low || regimes[at(i)] == Regime::high) {
+      u = regimes[at(i)] == Regime::low ? low : high;
+      continue;
+    }
+    u = TaylorForm::between(u_raw_[at(i)]);
+    for (int j = 0; j < n_; ++j) {
+      add_slope(u, j, -KT_[at(i * n_ + j)]);
+    }
+    if (regimes[at(i)] == Regime::mixed) {
+      u = TaylorForm::between(clamped(u.range(), low, high));
+    }
+  }
+  const std::span<const TaylorForm> f = forms_.evaluate(form_in_);
+  TaylorForm sum;
+  for (int j = 0; j < n_; ++j) {
+    Interval centre;
+    for (int i = 0; i < n_; ++i) {
+      centre = centre + Interval(2.0 * cell.centre[at(i)]) * W_[at(i)][at(j)];
+    }
+    TaylorForm weight = TaylorForm::between(centre);
+    for (int i = 0; i < n_; ++i) {
+      add_slope(weight, i, Interval(2.0) * W_[at(i)][at(j)]);
+    }
+    sum = sum + weight * f[at(j)];
+  }
+  return sum;
 }
 
 double LoopEnclosure::core_rate(double half) noexcept {
   Coordinates box{};
   std::fill_n(box.begin(), n_, half);
-  Regimes mixed;
-  mixed.fill(Regime::mixed);
-  evaluate_centre({}, mixed);
-  evaluate_jacobian(box, mixed);
+  evaluate_centre({});
+  evaluate_jacobian(box);
   double worst = -infinite;
   for (int i = 0; i < n_; ++i) {  // Gershgorin
     double row = 2.0 * F_[at(i)][at(i)].high;
@@ -355,12 +335,18 @@ double LoopEnclosure::core_rate(double half) noexcept {
 }
 
 double LoopEnclosure::rest() noexcept {
-  Regimes mixed;
-  mixed.fill(Regime::mixed);
-  evaluate_centre({}, mixed);
+  evaluate_centre({});
+  const std::span<const Interval> f = f_.evaluate(in_);
   double sum = 0.0;
   for (int i = 0; i < n_; ++i) {
-    sum += f_z_[at(i)].magnitude();
+    Interval f_z;
+    for (int j = 0; j < n_; ++j) {
+      if (!is_bounded(f[at(j)])) {
+        return infinite;
+      }
+      f_z = f_z + W_[at(i)][at(j)] * f[at(j)];
+    }
+    sum += f_z.magnitude();
   }
   return sum * inflation;
 }

@@ -9,10 +9,11 @@
 #include <flyball/math/expression/differentiate.hpp>
 
 #include "math/verified/interval_tape.hpp"
+#include "math/verified/taylor_tape.hpp"
 
 namespace flyball::detail {
 
-inline constexpr int most_region_states = 8;
+inline constexpr int most_region_states = most_parameters;
 using Coordinates = std::array<double, most_region_states>;
 
 /// A box of the coordinates z, x = x* + T z: |z_i - centre_i| <= half_i. Both exact.
@@ -23,8 +24,8 @@ struct RegionCell {
 
 /// What is known of V̇ over a cell.
 struct CellBound {
-  double high = 0.0;         ///< No less than V̇ anywhere in it; NaN where nothing is known.
-  Coordinates share{};       ///< What each coordinate's width adds.
+  double high = 0.0;    ///< No less than V̇ anywhere in it; NaN where nothing is known.
+  Coordinates share{};  ///< What each coordinate's width adds.
 };
 
 /// A loop in the coordinates z in which V = |z|², nearly: T = x by z, TᵀPT = I within rounding.
@@ -61,17 +62,19 @@ class LoopEnclosure {
   /// The regimes of each input that a cell meets: bits of linear, low and high.
   [[nodiscard]] std::array<unsigned, most_region_states> regimes_of(
       const RegionCell& cell) noexcept;
-  [[nodiscard]] CellBound bound_in(const RegionCell& cell, const Regimes& regimes) noexcept;
-  /// f_z at the centre; leaves x and u there.
-  void evaluate_centre(const Coordinates& centre, const Regimes& regimes) noexcept;
+  /// V̇ over the cell whose centre was evaluated last.
+  [[nodiscard]] TaylorForm rate_in(const RegionCell& cell, const Regimes& regimes) noexcept;
+  /// x and u at a centre.
+  void evaluate_centre(const Coordinates& centre) noexcept;
   /// F over the cell about the centre that was evaluated last.
-  void evaluate_jacobian(const Coordinates& half, const Regimes& regimes) noexcept;
+  void evaluate_jacobian(const Coordinates& half) noexcept;
 
   const SaturatedLoop& loop_;
   Eigen::MatrixXd P_, T_;
   int n_, m_;
   expression::Derivatives derivatives_;
   IntervalTape f_;
+  TaylorTape forms_;
   IntervalTape jacobian_;
   Square W_{};                  ///< TᵀP
   std::vector<Interval> KT_{};  ///< m x n, row by row.
@@ -80,7 +83,7 @@ class LoopEnclosure {
   bool affine_ = false;
   std::vector<Interval> in_{}, box_{};
   std::vector<Interval> u_raw_{};
-  Row f_z_{};
+  std::vector<TaylorForm> form_in_{};
   Square F_{};
   std::vector<double> values_{}, point_{}, slope_{};
 };

@@ -76,14 +76,14 @@ struct CertifiedRegion {
 /// The largest level set of a quadratic Lyapunov function that is proven to be a region of
 /// attraction of a loop whose inputs are limited; this is a proof.
 ///
-/// In coordinates z with V = |z|², a cell c + δ, |δ_i| <= h_i, has
-///   V̇ = 2 zᵀf_z(z) ∈ 2 cᵀf_z(c) + 2 Σ g_i δ_i + δᵀ(F + Fᵀ)δ,  g = f_z(c) + Fᵀc,
-/// with F an interval matrix that holds the generalised Jacobian of the loop over the cell: of f by
-/// outward rounded interval arithmetic on its tape of derivatives, of a clamp 1, 0 or all between.
-/// Cells are taken in the order of V, those with V̇ < 0 are done, others halved where that helps
-/// most: when the nearest that is left has V = ρ, everything below ρ is proven. About x* itself,
-/// where V̇ has a zero, F + Fᵀ < 0 shows the loop to contract. So whatever starts in V <= level
-/// stays there and ends in the core, and there in one equilibrium, within rounding of x*.
+/// Over a cell of the coordinates z in which V = |z|², V̇ = 2 zᵀf_z(z) is enclosed by a Taylor model
+/// of second order with outward rounding, from the model's tape. Where f is affine in the inputs V̇
+/// is at most the larger of its values with an input's line and with its limit, each smooth; else a
+/// clamp in doubt is an interval. Cells are taken in the order of V, those with V̇ < 0 are done,
+/// others halved where that helps most: when the nearest that is left has V = ρ, everything below ρ
+/// is proven. About x* itself, where V̇ has a zero, an interval enclosure of the loop's generalised
+/// Jacobian F, F + Fᵀ < 0, shows the loop to contract. So whatever starts in V <= level stays there
+/// and ends in the core, and there in one equilibrium, within rounding of x*.
 ///
 /// What is proven is true of the loop as the model says and the input acts at all times; a sampled
 /// controller needs a period that is short beside the loop's time constants. Functions other than
