@@ -7,7 +7,7 @@
 #include <flyball/control/feedforward.hpp>
 #include <flyball/control/lqr.hpp>
 #include <flyball/mechanisms/elevator.hpp>
-#include <flyball/planning/trapezoid_profile.hpp>
+#include <flyball/planning/profiles/trapezoid_profile.hpp>
 #include <flyball/systems/discretize.hpp>
 
 int main() {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include <flyball/planning/trapezoid_profile.hpp>
+#include <flyball/planning/profiles/trapezoid_profile.hpp>
 
 int main() {
   using namespace flyball;

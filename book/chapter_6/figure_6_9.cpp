@@ -1,5 +1,5 @@
 #include <flyball/mechanisms/arm.hpp>
-#include <flyball/planning/generate_trapezoid_profile.hpp>
+#include <flyball/planning/profiles/generate_trapezoid_profile.hpp>
 
 #include "book/figure_functions.hpp"
 #include "book/mechanism_case_study.hpp"

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <flyball/core/argument.hpp>
+#include <flyball/planning/profiles/trapezoid_profile.hpp>
 
 #include "core/try.hpp"
 

@@ -7,7 +7,7 @@
 #include <flyball/control/mechanism_controller.hpp>
 #include <flyball/control/pid.hpp>
 #include <flyball/estimation/kalman_filter.hpp>
-#include <flyball/planning/trapezoid_profile.hpp>
+#include <flyball/planning/profiles/trapezoid_profile.hpp>
 
 #include "elevator_loop.hpp"
 #include "mechanism_designs.hpp"

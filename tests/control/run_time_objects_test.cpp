@@ -20,7 +20,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/estimation/kalman_filter.hpp>
 #include <flyball/mechanisms/elevator.hpp>
-#include <flyball/planning/trapezoid_profile.hpp>
+#include <flyball/planning/profiles/trapezoid_profile.hpp>
 #include <flyball/systems/discretize.hpp>
 
 #include "elevator_loop.hpp"

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include <flyball/core/random.hpp>
+#include <flyball/planning/profiles/trapezoid_profile.hpp>
 #include <flyball/simulation/mechanism_loop.hpp>
 
 #include "control/mechanism_designs.hpp"

@@ -9,7 +9,7 @@
 #include <flyball/control/lqg.hpp>
 #include <flyball/control/lqr.hpp>
 #include <flyball/mechanisms/elevator.hpp>
-#include <flyball/planning/generate_trapezoid_profile.hpp>
+#include <flyball/planning/profiles/generate_trapezoid_profile.hpp>
 #include <flyball/systems/discretize.hpp>
 
 namespace flyball {

@@ -10,6 +10,7 @@
 #include <flyball/mechanisms/arm.hpp>
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/mechanisms/flywheel.hpp>
+#include <flyball/planning/profiles/trapezoid_profile.hpp>
 #include <flyball/systems/discretize.hpp>
 
 namespace flyball {

@@ -5,7 +5,7 @@
 
 #include <flyball/control/lqg.hpp>
 #include <flyball/control/predicting_lqg.hpp>
-#include <flyball/planning/trapezoid_profile.hpp>
+#include <flyball/planning/profiles/motion.hpp>
 
 namespace flyball {
 

@@ -2,7 +2,7 @@
 #include <cstdio>
 
 #include <flyball/core/version.hpp>
-#include <flyball/planning/generate_trapezoid_profile.hpp>
+#include <flyball/planning/profiles/generate_trapezoid_profile.hpp>
 
 using namespace flyball;
 using namespace flyball::literals;

@@ -1,4 +1,4 @@
-#include <flyball/planning/trapezoid_profile.hpp>
+#include <flyball/planning/profiles/trapezoid_profile.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +8,7 @@
 
 #include <flyball/core/random.hpp>
 
+#include "planning/profiles/profile_laws.hpp"
 #include "support/allocation_count.hpp"
 
 namespace flyball {
@@ -66,41 +67,32 @@ TEST(TrapezoidProfile, NothingToDo) {
   EXPECT_EQ(profile.sample(0.0).acceleration, 0.0);
 }
 
-// Any states: it starts and ends where it should, position is the integral of velocity, velocity
-// the integral of acceleration, and both limits hold (but for a start that breaks them).
-TEST(TrapezoidProfile, KeepsItsLaws) {
+TEST(TrapezoidProfile, KeepsTheLaws) {
   Random random(11);
-  for (int trial = 0; trial < 2000; ++trial) {
-    const MotionLimits limits{std::exp(random.uniform(-3.0, 3.0)),
-                              std::exp(random.uniform(-3.0, 3.0))};
-    const MotionState start{random.uniform(-10.0, 10.0), random.normal() * limits.velocity};
-    const MotionState goal{random.uniform(-10.0, 10.0),
-                           trial % 2 == 0 ? 0.0 : random.uniform(-1.0, 1.0) * limits.velocity};
-    const TrapezoidProfile profile(limits, start, goal);
-    const double end = profile.total_time();
-    ASSERT_TRUE(std::isfinite(end));
-    const double size = 1e-10 * (20.0 + end * (std::abs(start.velocity) + limits.velocity));
-    const MotionState last = profile.sample(end * (1.0 - 1e-15));
-    ASSERT_NEAR(last.position, goal.position, size);
-    ASSERT_NEAR(last.velocity, goal.velocity, 1e-9 * (limits.velocity + std::abs(start.velocity)));
-    const double speed_limit = std::max(limits.velocity, std::abs(start.velocity));
-    MotionState before = profile.sample(0.0);
-    ASSERT_EQ(before.position, start.position);
-    ASSERT_EQ(before.velocity, start.velocity);
-    constexpr int samples = 40;
-    for (int i = 1; i <= samples; ++i) {
-      const double h = end / samples;
-      const MotionState now = profile.sample(i * h);
-      ASSERT_LE(std::abs(now.velocity), speed_limit * (1.0 + 1e-12));
-      ASSERT_LE(std::abs(now.acceleration), limits.acceleration);
-      ASSERT_LE(std::abs(now.velocity - before.velocity),
-                limits.acceleration * h * (1.0 + 1e-9) + 1e-12);
-      // The mean of the end velocities is off by less than a h²/4 where a phase ends inside.
-      ASSERT_NEAR(now.position - before.position, 0.5 * h * (now.velocity + before.velocity),
-                  0.2501 * limits.acceleration * h * h + size);
-      before = now;
+  for (const bool outside : {false, true}) {
+    for (int trial = 0; trial < 20000; ++trial) {
+      const test::ProfileDemand demand = test::random_demand(random, 2, outside);
+      const TrapezoidProfile profile(demand.limits, demand.start, demand.goal);
+      ASSERT_EQ(test::broken_law(profile, demand), "") << "trial " << trial;
     }
   }
+}
+
+// Up with 4, down with 1, over 10 from rest: the peak is √(2·10·4·1/5) = 4, 1 s up, 4 s down. The
+// other way it is 4 s up and 1 s down; `along` makes it 1 s and 4 s both ways.
+TEST(TrapezoidProfile, OtherLimitsUpThanDown) {
+  const MotionLimits limits{.velocity = 9.0, .acceleration = 4.0, .deceleration = 1.0};
+  const TrapezoidProfile up(limits, {}, {10.0});
+  EXPECT_NEAR(up.total_time(), 5.0, 1e-14);
+  EXPECT_NEAR(up.sample(1.0).velocity, 4.0, 1e-14);
+  const TrapezoidProfile down(limits, {10.0}, {});
+  EXPECT_NEAR(down.sample(4.0).velocity, -4.0, 1e-14);
+  const TrapezoidProfile mirrored(limits.along(-10.0), {10.0}, {});
+  EXPECT_NEAR(mirrored.sample(1.0).velocity, -4.0, 1e-14);
+  // 9 forwards, 2 backwards: only what is no faster than 2 can be gone back.
+  const MotionLimits slow_back{.velocity = 9.0, .acceleration = 4.0, .reverse_velocity = 2.0};
+  EXPECT_FALSE(TrapezoidProfile(slow_back, {}, {10.0}).reversible());
+  EXPECT_TRUE(TrapezoidProfile(slow_back, {}, {0.5}).reversible());
 }
 
 // A brute-force check of time optimality: no bang-bang-with-cruise motion of the other sign, and no

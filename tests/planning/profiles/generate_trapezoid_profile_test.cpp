@@ -1,4 +1,4 @@
-#include <flyball/planning/generate_trapezoid_profile.hpp>
+#include <flyball/planning/profiles/generate_trapezoid_profile.hpp>
 
 #include <limits>
 

@@ -1,0 +1,162 @@
+#pragma once
+
+#include <flyball/planning/profiles/motion.hpp>
+
+namespace flyball {
+
+/// The fastest motion between two states under limits of velocity and acceleration: accelerate,
+/// cruise, brake. Any velocities at the ends, other limits up than down.
+///
+/// A start above the velocity limit is braked down to it at the acceleration limit; a goal velocity
+/// above it is cut to it. Run-time object: noexcept, allocation-free, and finite for whatever it is
+/// given: limits outside of 1e-100 to 1e100, or states that are not finite or beyond
+/// `largest_signal` (all together), give a profile that is at the goal from the start. The jerk
+/// limit has no part in it. Planning and one sample take some ten nanoseconds, so that it may be
+/// planned anew each period. Source: book, section 15.1.3.
+class TrapezoidProfile {
+ public:
+  /// @param start  Where it is (its acceleration is ignored). @param goal  Where it is to be.
+  TrapezoidProfile(const MotionLimits& limits, const MotionState& start,
+                   const MotionState& goal) noexcept;
+
+  /// How long it takes, s.
+  [[nodiscard]] double total_time() const noexcept { return time_[2]; }
+  /// What is left of it t s after the start; all of it before.
+  [[nodiscard]] double remaining_time(double t) const noexcept {
+    return t > 0.0 ? (t < time_[2] ? time_[2] - t : 0.0) : time_[2];
+  }
+  /// The velocity of the cruise, signed.
+  [[nodiscard]] double cruise_velocity() const noexcept { return cruise_; }
+  /// Ends of the acceleration, the cruise and the braking, s since the start.
+  [[nodiscard]] const double (&phase_ends() const noexcept)[3] { return time_; }
+  [[nodiscard]] MotionLimits limits() const noexcept { return limits_.both_ways(); }
+  /// Backwards the same accelerations go with opposite velocities.
+  [[nodiscard]] bool reversible() const noexcept;
+  [[nodiscard]] TrapezoidProfile replanned(const MotionState& state,
+                                           const MotionState& goal) const noexcept {
+    return {limits_, state, goal};
+  }
+
+  /// @param t  s since the start; before it the start, after the end the goal, moving on with its
+  ///           velocity. The acceleration is that of the interval which begins at t.
+  [[nodiscard]] MotionState sample(double t) const noexcept;
+
+ private:
+  MotionLimits limits_;
+  MotionState start_;
+  MotionState goal_;
+  double cruise_ = 0.0;
+  double first_acceleration_ = 0.0;
+  double last_acceleration_ = 0.0;
+  double time_[3] = {0.0, 0.0, 0.0};  ///< Ends of the three phases, s since the start.
+};
+
+inline bool TrapezoidProfile::reversible() const noexcept {
+  const MotionLimits all = limits();
+  const double low = __builtin_fmin(start_.velocity, __builtin_fmin(goal_.velocity, cruise_));
+  const double high = __builtin_fmax(start_.velocity, __builtin_fmax(goal_.velocity, cruise_));
+  return -low <= all.velocity && high <= all.reverse_velocity;
+}
+
+[[gnu::always_inline]] inline TrapezoidProfile::TrapezoidProfile(const MotionLimits& limits,
+                                                                 const MotionState& start,
+                                                                 const MotionState& goal) noexcept
+    : limits_(limits),
+      start_{start.position, start.velocity, 0.0},
+      goal_{goal.position, goal.velocity, 0.0} {
+  const double up = limits.acceleration;
+  const double down = limits.deceleration == 0.0 ? up : limits.deceleration;
+  const double v_high = limits.velocity;
+  const double v_low = limits.reverse_velocity == 0.0 ? v_high : limits.reverse_velocity;
+  // Within these nothing below overflows, nor does any place on the way.
+  constexpr double largest = 1e100;  // core/signal.hpp
+  constexpr double least = 1e-100;
+  const double size = __builtin_fabs(start.position) + __builtin_fabs(start.velocity) +
+                      __builtin_fabs(goal.position) + __builtin_fabs(goal.velocity);
+  const double most_velocity = v_high > v_low ? v_high : v_low;
+  const double most_acceleration = up > down ? up : down;
+  const bool usable = v_high >= least && v_low >= least && up >= least && down >= least &&
+                      size + most_velocity + most_acceleration <= largest;
+  if (!usable) [[unlikely]] {
+    goal_.position = __builtin_isfinite(goal.position) ? goal.position : 0.0;
+    goal_.velocity = 0.0;
+    start_ = goal_;
+    return;
+  }
+  const double end = goal.velocity > v_high   ? v_high
+                     : goal.velocity < -v_low ? -v_low
+                                              : goal.velocity;
+  goal_.velocity = end;
+
+  // Going straight from one velocity to the other covers (v_g² - v_0²)/2a with the acceleration a
+  // of that sign. What lies beyond it needs acceleration first, what falls short of it braking
+  // first: the same motion mirrored.
+  const double distance = goal.position - start.position;
+  const double squares = end * end - start.velocity * start.velocity;
+  const double straight = end >= start.velocity ? up : -down;
+  const double beyond = 2.0 * straight * distance - squares;  // times 2a
+  const bool forward = (beyond >= 0.0) == (straight > 0.0) || beyond == 0.0;
+  const double sign = forward ? 1.0 : -1.0;
+  const double a = forward ? up : down;
+  const double b = forward ? down : up;
+  const double v_max = forward ? v_high : v_low;
+  const double d = sign * distance;
+  const double v_0 = sign * start.velocity;
+  const double v_g = sign * end;
+
+  // Divisions cost most here: with equal limits one is enough.
+  const double per_a = 1.0 / a;
+  const double per_b = a == b ? per_a : 1.0 / b;
+  const double to_peak = a == b ? 0.5 * a : 1.0 / (per_a + per_b);
+
+  // The peak c of a motion without cruise: (c² - v_0²)/2a + (c² - v_g²)/2b = d.
+  const double peak_square = (2.0 * d + v_0 * v_0 * per_a + v_g * v_g * per_b) * to_peak;
+  double peak = __builtin_sqrt(peak_square > 0.0 ? peak_square : 0.0);
+  // Of what is straight only rounding is left (of states that were sampled on the way, too). Its
+  // root must not become a phase, nor a goal that moves be missed by it.
+  const double scale = 2.0 * a * size + v_0 * v_0 + v_g * v_g;
+  if (__builtin_fabs(beyond) <= 2e-15 * scale) [[unlikely]] {
+    peak = v_0 > v_g ? v_0 : v_g;
+  }
+  const double c = peak < v_max ? peak : v_max;
+  const double t_1 = __builtin_fabs(c - v_0) * (a == b || c >= v_0 ? per_a : per_b);
+  const double t_3 = __builtin_fabs(v_g - c) * (a == b || v_g > c ? per_a : per_b);
+  const double slack = d - 0.5 * ((v_0 + c) * t_1 + (c + v_g) * t_3);
+  const double cruised = (c < v_max ? 0.0 : slack) / v_max;
+  const double t_2 = cruised > 0.0 ? cruised : 0.0;
+  cruise_ = sign * c;
+  first_acceleration_ = t_1 > 0.0 ? sign * (c >= v_0 ? a : -b) : 0.0;
+  last_acceleration_ = t_3 > 0.0 ? sign * (v_g > c ? a : -b) : 0.0;
+  start_.acceleration = t_1 > 0.0 ? first_acceleration_ : t_2 > 0.0 ? 0.0 : last_acceleration_;
+  time_[0] = t_1;
+  time_[1] = t_1 + t_2;
+  time_[2] = t_1 + t_2 + t_3;
+}
+
+[[gnu::always_inline]] inline MotionState TrapezoidProfile::sample(double t) const noexcept {
+  if (!(t > 0.0)) {
+    return {start_.position, start_.velocity, t == 0.0 ? start_.acceleration : 0.0};
+  }
+  if (t < time_[0]) {
+    return {start_.position + (start_.velocity + 0.5 * first_acceleration_ * t) * t,
+            start_.velocity + first_acceleration_ * t, first_acceleration_};
+  }
+  if (t >= time_[2]) {
+    const double past = __builtin_isfinite(t) ? t - time_[2] : 0.0;
+    const double position = goal_.position + goal_.velocity * past;
+    return {__builtin_isfinite(position) ? position : goal_.position, goal_.velocity, 0.0};
+  }
+  if (t < time_[1]) {
+    const double t_1 = time_[0];
+    const double x_1 = start_.position + (start_.velocity + 0.5 * first_acceleration_ * t_1) * t_1;
+    return {x_1 + cruise_ * (t - t_1), cruise_, 0.0};
+  }
+  // Backwards from the goal, so that the end is met exactly.
+  const double left = time_[2] - t;
+  return {goal_.position - (goal_.velocity - 0.5 * last_acceleration_ * left) * left,
+          goal_.velocity - last_acceleration_ * left, last_acceleration_};
+}
+
+static_assert(MotionProfile<TrapezoidProfile>);
+
+}  // namespace flyball
