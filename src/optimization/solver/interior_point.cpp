@@ -1,0 +1,544 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "optimization/solver/interior_point.hpp"
+#include "optimization/solver/restoration.hpp"
+
+namespace flyball::optimization::detail {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+struct InteriorPoint::Restoration {
+  explicit Restoration(Program& program) : restoring(program), solver(restoring) {
+    solver.is_restoration_ = true;
+  }
+  RestorationProgram restoring;
+  InteriorPoint solver;
+};
+
+double InteriorPoint::Errors::largest() const noexcept {
+  const double most = std::max(dual, std::max(primal, complementarity));
+  return std::isfinite(dual) && std::isfinite(primal) && std::isfinite(complementarity) ? most
+                                                                                        : infinity;
+}
+
+InteriorPoint::InteriorPoint(Program& program) : program_(program) {
+  const Index n = program.variables();
+  const Index m = program.constraints();
+  for (VectorXd* v :
+       {&w_, &zl_, &zu_, &sl_, &su_, &gradient_, &rd_, &rw_, &dw_, &dzl_, &dzu_, &diagonal_,
+        &residual_w_, &fix_w_, &fix_zl_, &fix_zu_, &trial_, &step_w_, &free_}) {
+    v->setZero(n);
+  }
+  for (VectorXd* v :
+       {&lambda_, &c_, &dl_, &D_, &residual_c_, &fix_c_, &trial_c_, &corrected_c_, &step_l_}) {
+    v->setZero(m);
+  }
+}
+
+InteriorPoint::~InteriorPoint() = default;
+
+void InteriorPoint::start(const VectorXd& w) {
+  const VectorXd& lower = program_.lower;
+  const VectorXd& upper = program_.upper;
+  for (Index i = 0; i < w.size(); ++i) {
+    double x = w(i);
+    if (lower(i) == upper(i)) {
+      w_(i) = lower(i);
+      free_(i) = 0.0;
+      continue;
+    }
+    free_(i) = 1.0;
+    const double range = upper(i) - lower(i);
+    if (lower(i) > -infinity) {
+      x = std::max(x, lower(i) + std::min(1e-2 * std::max(1.0, std::abs(lower(i))), 1e-2 * range));
+    }
+    if (upper(i) < infinity) {
+      x = std::min(x, upper(i) - std::min(1e-2 * std::max(1.0, std::abs(upper(i))), 1e-2 * range));
+    }
+    w_(i) = x;
+  }
+  lambda_.setZero();
+  mu_ = 0.0;
+}
+
+void InteriorPoint::warm_start(double mu) {
+  mu_ = mu;
+  // The larger of a distance and its multiplier stays, the other makes their product μ again.
+  const auto center = [&](double& distance, double& multiplier, double range) {
+    if (multiplier > distance) {
+      distance = std::min(std::max(distance, mu / multiplier), 0.5 * range);
+    }
+    multiplier = std::max(multiplier, mu / distance);
+  };
+  for (Index i = 0; i < w_.size(); ++i) {
+    const double lower = program_.lower(i);
+    const double upper = program_.upper(i);
+    if (lower == upper) {
+      w_(i) = lower;
+      continue;
+    }
+    const double range = upper - lower;
+    double low = std::max(w_(i) - lower, 1e-12);
+    if (low < infinity) {
+      center(low, zl_(i), range);
+      w_(i) = lower + low;
+    }
+    double high = std::max(upper - w_(i), 1e-12);
+    if (high < infinity) {
+      center(high, zu_(i), range);
+      w_(i) = upper - high;
+    }
+  }
+}
+
+void InteriorPoint::distances() {
+  sl_ = (free_.array() > 0.0).select((w_ - program_.lower).array(), infinity).matrix();
+  su_ = (free_.array() > 0.0).select((program_.upper - w_).array(), infinity).matrix();
+}
+
+double InteriorPoint::barrier(const VectorXd& w, double f) const {
+  double sum = 0.0;
+  double product = 1.0;
+  const VectorXd& lower = program_.lower;
+  const VectorXd& upper = program_.upper;
+  for (Index i = 0; i < w.size(); ++i) {
+    if (free_(i) == 0.0) {
+      continue;
+    }
+    const double low = w(i) - lower(i);
+    const double high = upper(i) - w(i);
+    if (low < infinity) {
+      product *= low;
+    }
+    if (high < infinity) {
+      product *= high;
+    }
+    if (!(product > 1e-120 && product < 1e120)) {
+      sum += std::log(product);
+      product = 1.0;
+    }
+  }
+  return f - mu_ * (sum + std::log(product));
+}
+
+void InteriorPoint::dual_residual() {
+  program_.transpose_multiply(lambda_, rd_);
+  rd_ = ((rd_ + gradient_ - zl_ + zu_).array() * free_.array()).matrix();
+}
+
+InteriorPoint::Errors InteriorPoint::errors(double mu) const {
+  Errors e;
+  const auto n = static_cast<double>(w_.size() + 1);
+  const auto m = static_cast<double>(lambda_.size() + 1);
+  const double bound_sum = zl_.lpNorm<1>() + zu_.lpNorm<1>();
+  const double dual_scale = std::max(100.0, (lambda_.lpNorm<1>() + bound_sum) / (m + n)) / 100.0;
+  const double bound_scale = std::max(100.0, bound_sum / n) / 100.0;
+  e.dual = rd_.lpNorm<Eigen::Infinity>() / dual_scale;
+  e.primal = c_.size() > 0 ? c_.lpNorm<Eigen::Infinity>() : 0.0;
+  double gap = 0.0;
+  for (Index i = 0; i < w_.size(); ++i) {
+    const double low = zl_(i) > 0.0 ? std::abs(sl_(i) * zl_(i) - mu) : 0.0;
+    const double high = zu_(i) > 0.0 ? std::abs(su_(i) * zu_(i) - mu) : 0.0;
+    gap = std::max(gap, std::max(low, high));
+  }
+  e.complementarity = gap / bound_scale;
+  if (!std::isfinite(rd_.sum()) || !std::isfinite(c_.sum())) {
+    e.dual = infinity;
+  }
+  return e;
+}
+
+/// Solves the factorised system for (-rw, -rc), and again for what is left.
+void InteriorPoint::refine(VectorXd& dw, VectorXd& dl, const VectorXd& rw, const VectorXd& rc) {
+  program_.solve(rw, rc, dw, dl);
+  const double size =
+      std::max(rw.lpNorm<Eigen::Infinity>(), rc.size() > 0 ? rc.lpNorm<Eigen::Infinity>() : 0.0);
+  double before = infinity;
+  for (int round = 0; round < 4; ++round) {
+    program_.multiply(dw, dl, residual_w_, residual_c_);
+    residual_w_ += (diagonal_.array() * dw.array()).matrix() + rw;
+    residual_w_.array() *= free_.array();
+    residual_c_ += rc - (D_.array() * dl.array()).matrix();
+    const double left =
+        std::max(residual_w_.lpNorm<Eigen::Infinity>(),
+                 residual_c_.size() > 0 ? residual_c_.lpNorm<Eigen::Infinity>() : 0.0);
+    if (!(left > 1e-10 * size) || !(left < 0.5 * before)) {
+      break;
+    }
+    before = left;
+    program_.solve(residual_w_, residual_c_, fix_w_, fix_c_);
+    dw += fix_w_;
+    dl += fix_c_;
+  }
+}
+
+/// The Newton step, with as much added to the Hessian as it takes for a descent direction.
+bool InteriorPoint::direction() {
+  const auto sigma = (zl_.array() / sl_.array() + zu_.array() / su_.array()) * free_.array();
+  diagonal_ = sigma.matrix();
+  rw_ = ((rd_ + zl_ - zu_).array() - mu_ / sl_.array() + mu_ / su_.array()).matrix();
+  rw_.array() *= free_.array();
+  D_.setZero();
+  regularization_ = 0.0;
+  ++counts_.factorizations;
+  bool good = program_.factor(diagonal_, D_, true);
+  if (!good) {
+    double added = last_regularization_ > 0.0 ? std::max(1e-20, last_regularization_ / 3.0) : 1e-4;
+    while (!good) {
+      if (added > 1e40) {
+        return false;
+      }
+      diagonal_.array() += added - regularization_;
+      regularization_ = added;
+      ++counts_.factorizations;
+      good = program_.factor(diagonal_, D_, true);
+      if (!good) {
+        added *= last_regularization_ > 0.0 ? 8.0 : 100.0;
+      }
+    }
+    last_regularization_ = regularization_;
+  }
+  refine(dw_, dl_, rw_, c_);
+  dzl_ = ((mu_ - zl_.array() * dw_.array()) / sl_.array() - zl_.array()).matrix();
+  dzu_ = ((mu_ + zu_.array() * dw_.array()) / su_.array() - zu_.array()).matrix();
+  return std::isfinite(dw_.sum()) && std::isfinite(dl_.sum());
+}
+
+double InteriorPoint::primal_step(const VectorXd& dw, double tau) const {
+  double alpha = 1.0;
+  for (Index i = 0; i < dw.size(); ++i) {
+    if (dw(i) < 0.0) {
+      if (-dw(i) * alpha > tau * sl_(i)) {
+        alpha = -tau * sl_(i) / dw(i);
+      }
+    } else if (dw(i) * alpha > tau * su_(i)) {
+      alpha = tau * su_(i) / dw(i);
+    }
+  }
+  return alpha;
+}
+
+double InteriorPoint::dual_step(double tau) const {
+  double alpha = 1.0;
+  for (Index i = 0; i < w_.size(); ++i) {
+    if (-dzl_(i) * alpha > tau * zl_(i) && zl_(i) > 0.0) {
+      alpha = -tau * zl_(i) / dzl_(i);
+    }
+    if (-dzu_(i) * alpha > tau * zu_(i) && zu_(i) > 0.0) {
+      alpha = -tau * zu_(i) / dzu_(i);
+    }
+  }
+  return alpha;
+}
+
+void InteriorPoint::reset_filter() {
+  filter_.clear();
+  filter_.add(theta_max_, -infinity);
+}
+
+void InteriorPoint::bound_multipliers() {
+  for (Index i = 0; i < w_.size(); ++i) {
+    if (zl_(i) > 0.0) {
+      zl_(i) = std::clamp(zl_(i), mu_ / sl_(i) / 1e10, mu_ / sl_(i) * 1e10);
+    }
+    if (zu_(i) > 0.0) {
+      zu_(i) = std::clamp(zu_(i), mu_ / su_(i) / 1e10, mu_ / su_(i) * 1e10);
+    }
+  }
+}
+
+/// Takes trial_ as the next point.
+void InteriorPoint::accept(double alpha, double alpha_dual) {
+  w_.swap(trial_);
+  c_.swap(trial_c_);
+  f_ = trial_f_;
+  lambda_ += alpha * dl_;
+  zl_ += alpha_dual * dzl_;
+  zu_ += alpha_dual * dzu_;
+  zl_ = (program_.lower.array() > -infinity).select(zl_, 0.0);
+  zu_ = (program_.upper.array() < infinity).select(zu_, 0.0);
+  distances();
+  bound_multipliers();
+  last_.step = alpha;
+  last_.dual_step = alpha_dual;
+}
+
+bool InteriorPoint::search() {
+  const double theta = c_.lpNorm<1>();
+  const double phi = barrier(w_, f_);
+  const double slope = rw_.dot(dw_) - [&] {
+    // ∇φ = rw - Aᵀλ
+    program_.transpose_multiply(lambda_, residual_w_);
+    return (residual_w_.array() * free_.array()).matrix().dot(dw_);
+  }();
+  const double alpha_max = primal_step(dw_, tau_);
+  const double alpha_dual = dual_step(tau_);
+  double alpha_min = 1e-5;
+  if (slope < 0.0) {
+    alpha_min = std::min(alpha_min, 1e-5 * theta / -slope);
+    if (theta <= theta_min_) {
+      alpha_min = std::min(alpha_min, std::pow(theta, 1.1) / std::pow(-slope, 2.3));
+    }
+  }
+  alpha_min = std::max(0.05 * alpha_min, 1e-12);
+  last_.trials = 0;
+  const auto try_point = [&](const VectorXd& dw, double alpha, double& t, double& p) {
+    trial_ = w_ + alpha * dw;
+    ++counts_.evaluations;
+    ++last_.trials;
+    if (!program_.values(trial_, trial_f_, trial_c_)) {
+      return false;
+    }
+    t = trial_c_.lpNorm<1>();
+    p = barrier(trial_, trial_f_);
+    return std::isfinite(t) && std::isfinite(p);
+  };
+  const auto acceptable = [&](double t, double p, double alpha) {
+    if (!filter_.accepts(t, p)) {
+      return false;
+    }
+    const bool switching = slope < 0.0 && alpha * std::pow(-slope, 2.3) > std::pow(theta, 1.1);
+    const double rounding = 10.0 * std::numeric_limits<double>::epsilon() * std::abs(phi);
+    if (theta <= theta_min_ && switching) {
+      if (p - phi - rounding <= 1e-8 * alpha * slope) {
+        return true;
+      }
+      return false;
+    }
+    return t <= (1.0 - 1e-5) * theta || p - rounding <= phi - 1e-5 * theta;
+  };
+  const auto keep_out = [&](double p, double alpha) {
+    const bool switching = slope < 0.0 && alpha * std::pow(-slope, 2.3) > std::pow(theta, 1.1);
+    if (!switching || !(p - phi <= 1e-8 * alpha * slope)) {
+      filter_.add((1.0 - 1e-5) * theta, phi - 1e-5 * theta);
+    }
+  };
+  double alpha = alpha_max;
+  for (int round = 0; alpha > alpha_min; ++round, alpha *= 0.5) {
+    double t = 0.0;
+    double p = 0.0;
+    const bool defined = try_point(dw_, alpha, t, p);
+    if (defined && acceptable(t, p, alpha)) {
+      keep_out(p, alpha);
+      accept(alpha, alpha_dual);
+      return true;
+    }
+    if (round > 0) {
+      continue;
+    }
+    // A full step that lowers the error of the first-order conditions is as good.
+    if (defined && t < theta_max_) {
+      const double before = errors(mu_).largest();
+      step_l_ = lambda_;
+      fix_w_ = w_;
+      fix_zl_ = zl_;
+      fix_zu_ = zu_;
+      const double old_f = f_;
+      fix_c_ = c_;
+      accept(alpha, alpha_dual);
+      if (program_.derivatives(w_, lambda_, 1.0, gradient_)) {
+        dual_residual();
+        if (errors(mu_).largest() <= 0.9999 * before) {
+          derivatives_fresh_ = true;
+          reset_filter();
+          return true;
+        }
+      }
+      w_ = fix_w_;
+      c_ = fix_c_;
+      f_ = old_f;
+      lambda_ = step_l_;
+      zl_ = fix_zl_;
+      zu_ = fix_zu_;
+      distances();
+      (void)program_.derivatives(w_, lambda_, 1.0, gradient_);
+      dual_residual();
+      // The factorisation's matrix stands; its blocks are those of the point again.
+    }
+    if (!(t >= theta) || !defined) {
+      continue;
+    }
+    // Second-order corrections.
+    corrected_c_ = c_;
+    double before = theta;
+    double t_soc = t;
+    double alpha_soc = alpha;
+    for (int correction = 0; correction < 4; ++correction) {
+      corrected_c_ = alpha_soc * corrected_c_ + trial_c_;
+      refine(step_w_, step_l_, rw_, corrected_c_);
+      alpha_soc = primal_step(step_w_, tau_);
+      double p_soc = 0.0;
+      if (!try_point(step_w_, alpha_soc, t_soc, p_soc)) {
+        break;
+      }
+      if (acceptable(t_soc, p_soc, alpha)) {
+        keep_out(p_soc, alpha);
+        ++counts_.corrections;
+        dw_ = step_w_;
+        dl_ = step_l_;
+        dzl_ = ((mu_ - zl_.array() * dw_.array()) / sl_.array() - zl_.array()).matrix();
+        dzu_ = ((mu_ + zu_.array() * dw_.array()) / su_.array() - zu_.array()).matrix();
+        accept(alpha_soc, dual_step(tau_));
+        return true;
+      }
+      if (t_soc > 0.99 * before) {
+        break;
+      }
+      before = t_soc;
+    }
+  }
+  return false;
+}
+
+bool InteriorPoint::restore(const SolverOptions& options, Watch watch) {
+  if (is_restoration_) {
+    return false;
+  }
+  if (!restoration_) {
+    restoration_ = std::make_unique<Restoration>(program_);
+  }
+  const double theta = c_.lpNorm<1>();
+  if (!(theta > 0.1 * options.tolerance)) {
+    return false;
+  }
+  ++counts_.restorations;
+  filter_.add((1.0 - 1e-5) * theta, barrier(w_, f_) - 1e-5 * theta);
+  RestorationProgram& restoring = restoration_->restoring;
+  InteriorPoint& solver = restoration_->solver;
+  const double mu = std::max(mu_, c_.lpNorm<Eigen::Infinity>());
+  restoring.set_reference(w_, mu);
+  restoring.begin(w_, c_, mu, zl_, zu_, solver);
+  bool enough = false;
+  const int before = last_.number;
+  const auto check = [&](const Iteration& iteration) {
+    last_.number = before + iteration.number;
+    Iteration shown = iteration;
+    shown.number = last_.number;
+    shown.restoration = true;
+    if (watch(shown)) {
+      return true;
+    }
+    trial_ = solver.w().head(w_.size());
+    if (!program_.values(trial_, trial_f_, trial_c_)) {
+      return false;
+    }
+    const double t = trial_c_.lpNorm<1>();
+    enough = t <= 0.9 * theta && filter_.accepts(t, barrier(trial_, trial_f_));
+    return enough;
+  };
+  SolverOptions inner = options;
+  inner.first_barrier = mu;
+  inner.max_iterations = std::max(0, options.max_iterations - before);
+  const SolveStatus status = solver.run(inner, check);
+  if (!enough) {
+    trial_ = solver.w().head(w_.size());
+    if (program_.values(trial_, trial_f_, trial_c_) && trial_c_.lpNorm<1>() <= 0.5 * theta &&
+        status == SolveStatus::solved) {
+      enough = true;
+      reset_filter();
+    }
+  }
+  w_ = trial_;
+  c_ = trial_c_;
+  f_ = trial_f_;
+  distances();
+  zl_ = (zl_.array() > 0.0).select((mu_ / sl_.array()).matrix(), 0.0);
+  zu_ = (zu_.array() > 0.0).select((mu_ / su_.array()).matrix(), 0.0);
+  lambda_.setZero();
+  return enough;
+}
+
+SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
+  using Clock = std::chrono::steady_clock;
+  const auto begin = Clock::now();
+  const VectorXd& lower = program_.lower;
+  const VectorXd& upper = program_.upper;
+  counts_ = {};
+  last_ = {};
+  last_regularization_ = 0.0;
+  distances();
+  if (mu_ == 0.0) {
+    mu_ = options.first_barrier > 0.0 ? options.first_barrier : 0.1;
+    for (Index i = 0; i < w_.size(); ++i) {
+      zl_(i) = free_(i) > 0.0 && lower(i) > -infinity ? mu_ / sl_(i) : 0.0;
+      zu_(i) = free_(i) > 0.0 && upper(i) < infinity ? mu_ / su_(i) : 0.0;
+    }
+  }
+  if (!program_.values(w_, f_, c_)) {
+    return SolveStatus::not_finite;
+  }
+  const double first_theta = c_.lpNorm<1>();
+  theta_max_ = 1e4 * std::max(1.0, first_theta);
+  theta_min_ = 1e-4 * std::max(1.0, first_theta);
+  first_primal_ = c_.size() > 0 ? c_.lpNorm<Eigen::Infinity>() : 0.0;
+  first_mu_ = mu_;
+  reset_filter();
+  derivatives_fresh_ = false;
+  const double mu_min = options.tolerance / 11.0;
+  for (int k = 0;; ++k) {
+    if (!derivatives_fresh_ && !program_.derivatives(w_, lambda_, 1.0, gradient_)) {
+      return SolveStatus::not_finite;
+    }
+    derivatives_fresh_ = false;
+    dual_residual();
+    const Errors error = errors(0.0);
+    last_.cost = f_;
+    last_.infeasibility = error.primal;
+    last_.optimality = error.dual;
+    last_.complementarity = error.complementarity;
+    last_.barrier = mu_;
+    last_.regularization = regularization_;
+    counts_.iterations = last_.number;
+    if (error.largest() <= options.tolerance) {
+      return SolveStatus::solved;
+    }
+    if (k > 0 && watch(last_)) {
+      return SolveStatus::stopped;
+    }
+    if (last_.number >= options.max_iterations) {
+      return SolveStatus::iteration_limit;
+    }
+    if (std::chrono::duration<double>(Clock::now() - begin).count() > options.time_limit) {
+      return SolveStatus::time_limit;
+    }
+    // The barrier falls when its problem is solved well enough.
+    for (bool lowered = true; lowered && mu_ > mu_min;) {
+      const Errors now = errors(mu_);
+      const bool small = now.largest() <= 10 * mu_;
+      const bool feasible = now.primal <= std::max(0.3 * first_primal_ * std::sqrt(mu_ / first_mu_),
+                                                   0.1 * options.tolerance);
+      lowered = small && feasible;
+      if (lowered) {
+        mu_ = std::max(mu_min, std::min(0.2 * mu_, std::pow(mu_, 1.4)));
+        reset_filter();
+      }
+    }
+    tau_ = std::max(0.99, 1.0 - mu_);
+    ++last_.number;
+    const bool has_direction = direction();
+    if (has_direction && search()) {
+      continue;
+    }
+    if (!std::isfinite(gradient_.sum())) {
+      return SolveStatus::not_finite;
+    }
+    if (!restore(options, watch)) {
+      const double left = error.largest();
+      if (left <= 1e3 * options.tolerance) {
+        return SolveStatus::acceptable;
+      }
+      return error.primal > 1e-6 ? SolveStatus::infeasible : SolveStatus::no_progress;
+    }
+  }
+}
+
+}  // namespace flyball::optimization::detail

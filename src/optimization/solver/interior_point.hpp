@@ -1,0 +1,91 @@
+#pragma once
+
+#include <limits>
+#include <memory>
+
+#include <Eigen/Core>
+
+#include <flyball/core/function_ref.hpp>
+#include <flyball/optimization/solver/solution.hpp>
+
+#include "optimization/solver/filter.hpp"
+#include "optimization/solver/program.hpp"
+
+namespace flyball::optimization::detail {
+
+/// A primal-dual interior-point method with a filter line search.
+///
+/// min f(w) - μ Σ ln(w - lower) - μ Σ ln(upper - w) subject to c(w) = 0 for μ → 0, by Newton's
+/// method; second-order corrections, and a phase that restores feasibility where the line search
+/// fails. All memory is allocated by the constructor (that of the restoration phase when it is
+/// first needed).
+/// Source: Wächter, Biegler (2006); Nocedal, Wright, "Numerical optimization" (2006), chapter 19.
+class InteriorPoint {
+ public:
+  /// @param program  Must outlive this.
+  explicit InteriorPoint(Program& program);
+  ~InteriorPoint();
+  InteriorPoint(const InteriorPoint&) = delete;
+  InteriorPoint& operator=(const InteriorPoint&) = delete;
+
+  /// Where to start: w is moved into the bounds' interior. Multipliers become zero.
+  void start(const Eigen::VectorXd& w);
+  /// Keeps what the last run left, as a warm start: μ at first.
+  void warm_start(double mu);
+
+  /// After each accepted step; true: stop with `stopped`.
+  using Watch = FunctionRef<bool(const Iteration&)>;
+  [[nodiscard]] SolveStatus run(const SolverOptions& options, Watch watch);
+
+  [[nodiscard]] const Eigen::VectorXd& w() const noexcept { return w_; }
+  [[nodiscard]] const Eigen::VectorXd& lambda() const noexcept { return lambda_; }
+  [[nodiscard]] const Eigen::VectorXd& lower_multipliers() const noexcept { return zl_; }
+  [[nodiscard]] const Eigen::VectorXd& upper_multipliers() const noexcept { return zu_; }
+  [[nodiscard]] const Eigen::VectorXd& constraint_values() const noexcept { return c_; }
+  [[nodiscard]] const Iteration& last() const noexcept { return last_; }
+  [[nodiscard]] double objective() const noexcept { return f_; }
+  [[nodiscard]] const SolverCounts& counts() const noexcept { return counts_; }
+  [[nodiscard]] double mu() const noexcept { return mu_; }
+
+ private:
+  friend class RestorationProgram;
+  struct Errors {
+    double dual = 0.0;
+    double primal = 0.0;
+    double complementarity = 0.0;
+    [[nodiscard]] double largest() const noexcept;
+  };
+
+  [[nodiscard]] Errors errors(double mu) const;
+  [[nodiscard]] double barrier(const Eigen::VectorXd& w, double f) const;
+  void distances();
+  void dual_residual();
+  [[nodiscard]] bool direction();
+  void refine(Eigen::VectorXd& dw, Eigen::VectorXd& dl, const Eigen::VectorXd& rw,
+              const Eigen::VectorXd& rc);
+  [[nodiscard]] double primal_step(const Eigen::VectorXd& dw, double tau) const;
+  [[nodiscard]] double dual_step(double tau) const;
+  [[nodiscard]] bool search();
+  void accept(double alpha, double alpha_dual);
+  [[nodiscard]] bool restore(const SolverOptions& options, Watch watch);
+  void reset_filter();
+  void bound_multipliers();
+
+  Program& program_;
+  Eigen::VectorXd w_, lambda_, zl_, zu_, sl_, su_, c_, gradient_, rd_, rw_;
+  Eigen::VectorXd dw_, dl_, dzl_, dzu_, diagonal_, D_, residual_w_, residual_c_, fix_w_, fix_c_,
+      fix_zl_, fix_zu_;
+  Eigen::VectorXd trial_, trial_c_, corrected_c_, step_w_, step_l_, free_;
+  double f_ = 0.0, trial_f_ = 0.0, mu_ = 0.1, theta_max_ = 0.0, theta_min_ = 0.0;
+  double regularization_ = 0.0, last_regularization_ = 0.0, tau_ = 0.99;
+  double first_primal_ = 0.0, first_mu_ = 0.0;
+  bool derivatives_fresh_ = false;
+  bool is_restoration_ = false;
+  Filter filter_;
+  Iteration last_;
+  SolverCounts counts_;
+  struct Restoration;
+  std::unique_ptr<Restoration> restoration_;
+};
+
+}  // namespace flyball::optimization::detail
