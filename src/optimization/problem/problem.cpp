@@ -1,0 +1,354 @@
+#include <flyball/optimization/problem/problem.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "core/error_rows.hpp"
+#include "core/format.hpp"
+#include "optimization/problem/flat_problem.hpp"
+#include "optimization/problem/sparse_program.hpp"
+#include "optimization/solver/interior_point.hpp"
+#include "optimization/solver/quadratic_method.hpp"
+
+namespace flyball::optimization {
+
+using detail::ExpressionGraph;
+using detail::FlatProblem;
+using detail::InteriorPoint;
+using detail::QuadraticMethod;
+using detail::SparseProgram;
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr std::size_t most_violations = 10;
+
+}  // namespace
+
+ErrorInfo error_info(ProblemError code) {
+  static constexpr flyball::detail::ErrorRow rows[] = {
+      {"no_variables", "there is nothing to decide", ErrorKind::misuse},
+      {"wrong_shape", "shapes do not fit", ErrorKind::misuse},
+      {"other_problem", "it belongs to another problem", ErrorKind::misuse},
+      {"not_finite", "a number is NaN or infinite", ErrorKind::misuse},
+  };
+  return flyball::detail::info_of(code, "problem", rows);
+}
+
+struct Problem::Parts {
+  ExpressionGraph graph{};
+  Expression cost{};
+  double sign = 1.0;
+  Constraints constraints{};
+  struct Named {
+    std::size_t first;
+    std::string name;
+  };
+  std::vector<Named> names{};
+  std::optional<Error> error{};
+
+  std::unique_ptr<SparseProgram> program{};
+  std::unique_ptr<InteriorPoint> general{};
+  std::unique_ptr<QuadraticMethod> quadratic{};
+  bool is_warm = false;
+
+  void refuse(Error problem_error) {
+    if (!error) {
+      error = std::move(problem_error).in("problem");
+    }
+  }
+  [[nodiscard]] std::string name_of(std::size_t constraint) const;
+  void report(ProblemSolution& solution, const FlatProblem& flat) const;
+  [[nodiscard]] ProblemSolution run(FlatProblem flat, const SolverOptions& options,
+                                    FunctionRef<bool(const Iteration&)> watch);
+};
+
+Problem::Problem() : parts_(std::make_unique<Parts>()) {}
+Problem::Problem(Problem&&) noexcept = default;
+Problem& Problem::operator=(Problem&&) noexcept = default;
+Problem::~Problem() = default;
+
+Expression Problem::decision_variable() {
+  parts_->is_warm = false;
+  return {&parts_->graph, parts_->graph.input()};
+}
+
+ExpressionMatrix Problem::decision_variable(Index rows, Index columns) {
+  if (rows <= 0 || columns <= 0) {
+    return {};
+  }
+  ExpressionMatrix X(rows, columns);
+  for (Index i = 0; i < X.size(); ++i) {
+    X(i) = decision_variable();
+  }
+  return X;
+}
+
+Expression Problem::parameter(double value) {
+  return {&parts_->graph, parts_->graph.parameter(value)};
+}
+
+ExpressionMatrix Problem::parameter(const Eigen::Ref<const Eigen::MatrixXd>& values) {
+  ExpressionMatrix P(values.rows(), values.cols());
+  for (Index j = 0; j < values.cols(); ++j) {
+    for (Index i = 0; i < values.rows(); ++i) {
+      P(i, j) = parameter(values(i, j));
+    }
+  }
+  return P;
+}
+
+void Problem::minimize(const Expression& cost) {
+  if (!cost.is_constant() && cost.graph() != &parts_->graph) {
+    parts_->refuse(Error(ProblemError::other_problem).about("the cost"));
+    return;
+  }
+  parts_->cost = cost;
+  parts_->sign = 1.0;
+  parts_->program.reset();
+}
+
+void Problem::maximize(const Expression& gain) {
+  minimize(gain);
+  parts_->sign = -1.0;
+}
+
+void Problem::subject_to(const Constraints& constraints, std::string_view name) {
+  Parts& parts = *parts_;
+  if (!name.empty()) {
+    parts.names.push_back({parts.constraints.size(), std::string(name)});
+  } else if (!parts.names.empty() && !parts.names.back().name.empty()) {
+    parts.names.push_back({parts.constraints.size(), {}});
+  }
+  for (const Constraint& constraint : constraints) {
+    if (!constraint.value.is_constant() && constraint.value.graph() != &parts.graph) {
+      parts.refuse(
+          Error(ProblemError::other_problem).about(parts.name_of(parts.constraints.size())));
+    }
+    if (constraint.value.is_constant() && std::isnan(constraint.value.constant())) {
+      parts.refuse(Error(ProblemError::wrong_shape)
+                       .about(parts.name_of(parts.constraints.size()))
+                       .hint("compare matrices of one shape, and keep slices within theirs"));
+    }
+    parts.constraints.push_back(constraint);
+  }
+  parts.program.reset();
+}
+
+std::string Problem::Parts::name_of(std::size_t constraint) const {
+  const auto after =
+      std::upper_bound(names.begin(), names.end(), constraint,
+                       [](std::size_t c, const Named& named) { return c < named.first; });
+  if (after == names.begin() || std::prev(after)->name.empty()) {
+    return fmt::format("constraint {}", constraint);
+  }
+  const Named& named = *std::prev(after);
+  const std::size_t end = after == names.end() ? constraints.size() : after->first;
+  return end - named.first > 1 ? fmt::format("{}, entry {}", named.name, constraint - named.first)
+                               : named.name;
+}
+
+/// The constraints that the variables' values do not satisfy.
+void Problem::Parts::report(ProblemSolution& solution, const FlatProblem& flat) const {
+  std::vector<std::uint32_t> nodes;
+  std::vector<std::size_t> numbers;
+  for (std::size_t i = 0; i < constraints.size(); ++i) {
+    if (!constraints[i].value.is_constant()) {
+      nodes.push_back(constraints[i].value.node());
+      numbers.push_back(i);
+    }
+  }
+  const expression::Tape tape = graph.tape(nodes);
+  std::vector<double> work(tape.size());
+  std::vector<double> values(nodes.size());
+  tape.prepare<double>(graph.parameter_values, work);
+  tape.evaluate<double>(graph.values, values, work);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double amount = constraints[numbers[i]].equality ? std::abs(values[i]) : -values[i];
+    if (amount > 1e-6 || std::isnan(amount)) {
+      solution.violations.push_back({numbers[i], name_of(numbers[i]), amount});
+    }
+  }
+  if (flat.impossible >= 0 && solution.violations.empty()) {
+    const auto constraint = static_cast<std::size_t>(flat.impossible);
+    solution.violations.push_back({constraint, name_of(constraint), flat.impossible_by});
+  }
+  std::stable_sort(solution.violations.begin(), solution.violations.end(),
+                   [](const ConstraintViolation& a, const ConstraintViolation& b) {
+                     return a.amount > b.amount;
+                   });
+  if (solution.violations.size() > most_violations) {
+    solution.violations.resize(most_violations);
+  }
+  solution.message = std::string(to_string(solution.status));
+  if (!solution.violations.empty()) {
+    solution.message += fmt::format(": {} is violated by {:.3g}", solution.violations.front().name,
+                                    solution.violations.front().amount);
+  }
+}
+
+ProblemSolution Problem::Parts::run(FlatProblem flat, const SolverOptions& options,
+                                    FunctionRef<bool(const Iteration&)> watch) {
+  ProblemSolution solution;
+  const double direction = flat.sign;
+  if (!program || !program->update(flat)) {
+    program = std::make_unique<SparseProgram>(std::move(flat));
+    general.reset();
+    quadratic.reset();
+    is_warm = false;
+  }
+  SparseProgram& p = *program;
+  const FlatProblem& stated = p.flat();
+  solution.cost_degree = stated.cost_degree;
+  solution.equality_degree = stated.equality_degree;
+  solution.inequality_degree = stated.inequality_degree;
+  SolveStatus status = SolveStatus::no_progress;
+  const VectorXd* w = nullptr;
+  const VectorXd* lambda = nullptr;
+  const VectorXd* zl = nullptr;
+  const VectorXd* zu = nullptr;
+  const auto take = [&](const auto& method) {
+    w = &method.w();
+    lambda = &method.lambda();
+    zl = &method.lower_multipliers();
+    zu = &method.upper_multipliers();
+    solution.counts = method.counts();
+    solution.infeasibility = method.last().infeasibility;
+    solution.optimality = method.last().optimality;
+    solution.complementarity = method.last().complementarity;
+    solution.cost = direction * method.objective() / p.objective_scale();
+  };
+  const VectorXd begin = is_warm ? VectorXd() : p.start(graph.values);
+  if (p.is_quadratic()) {
+    if (!quadratic) {
+      quadratic = std::make_unique<QuadraticMethod>(p);
+    }
+    status = quadratic->run(options, watch, is_warm);
+    if (is_warm && status != SolveStatus::solved && status != SolveStatus::stopped &&
+        status != SolveStatus::time_limit) {
+      status = quadratic->run(options, watch, false);
+    }
+    solution.method = stated.cost_degree == Degree::quadratic
+                          ? "quadratic program, Mehrotra's predictor-corrector method"
+                          : "linear program, Mehrotra's predictor-corrector method";
+    take(*quadratic);
+    if (status == SolveStatus::infeasible) {
+      solution.certificate.setZero(static_cast<Index>(constraints.size()));
+      for (int r = 0; r < p.constraints(); ++r) {
+        solution.certificate(stated.constraint[static_cast<std::size_t>(r)]) =
+            quadratic->certificate()(r) * p.row_scale(r);
+      }
+    } else if (status == SolveStatus::unbounded) {
+      solution.certificate = quadratic->certificate().head(static_cast<Index>(graph.inputs()));
+    }
+  }
+  if (status == SolveStatus::no_progress) {  // not quadratic, or not convex
+    if (!general) {
+      general = std::make_unique<InteriorPoint>(p);
+      is_warm = false;
+    }
+    if (is_warm) {
+      general->warm_start(1e-4);
+    } else {
+      general->start(begin.size() > 0 ? begin : p.start(graph.values));
+    }
+    status = general->run(options, watch);
+    if (is_warm && status != SolveStatus::solved && status != SolveStatus::stopped &&
+        status != SolveStatus::time_limit) {
+      general->start(p.start(graph.values));
+      status = general->run(options, watch);
+    }
+    solution.method = "filter interior-point method";
+    take(*general);
+  }
+  solution.status = status;
+  if (status == SolveStatus::not_finite) {
+    const int row = p.find_fault(*w);
+    solution.message =
+        row == -1 ? std::string("the cost is not finite")
+        : row == -2
+            ? std::string("a derivative is not finite")
+            : name_of(static_cast<std::size_t>(stated.constraint[static_cast<std::size_t>(row)])) +
+                  " is not finite";
+  }
+  std::copy_n(w->data(), graph.inputs(), graph.values.begin());
+  is_warm = status == SolveStatus::solved;
+  // Multipliers: L = f - Σ λᵢ cᵢ, those of inequalities not negative.
+  solution.multipliers.setZero(static_cast<Index>(constraints.size()));
+  for (int r = 0; r < p.constraints(); ++r) {
+    solution.multipliers(stated.constraint[static_cast<std::size_t>(r)]) =
+        -(*lambda)(r)*p.row_scale(r) / p.objective_scale();
+  }
+  for (std::size_t i = 0; i < graph.inputs(); ++i) {
+    const auto k = static_cast<Index>(i);
+    if (stated.lower[i] == stated.upper[i]) {
+      continue;
+    }
+    if (stated.lower_from[i] >= 0) {
+      solution.multipliers(stated.lower_from[i]) =
+          (*zl)(k) / stated.lower_slope[i] / p.objective_scale();
+    }
+    if (stated.upper_from[i] >= 0) {
+      solution.multipliers(stated.upper_from[i]) =
+          -(*zu)(k) / stated.upper_slope[i] / p.objective_scale();
+    }
+  }
+  return solution;
+}
+
+Expected<ProblemSolution> Problem::solve(const SolverOptions& options) {
+  return solve(options, [](const Iteration&) { return false; });
+}
+
+Expected<ProblemSolution> Problem::solve(const SolverOptions& options,
+                                         FunctionRef<bool(const Iteration&)> watch) {
+  const auto begin = std::chrono::steady_clock::now();
+  Parts& parts = *parts_;
+  if (parts.error) {
+    return tl::unexpected(*parts.error);
+  }
+  if (parts.graph.inputs() == 0) {
+    return tl::unexpected(
+        Error(ProblemError::no_variables).in("problem").hint("make some with decision_variable"));
+  }
+  for (const double value : parts.graph.values) {
+    if (!std::isfinite(value)) {
+      return tl::unexpected(
+          Error(ProblemError::not_finite).in("problem").about("a variable's start"));
+    }
+  }
+  FlatProblem flat = detail::flatten(parts.graph, parts.cost, parts.sign, parts.constraints);
+  if (flat.not_finite != -1) {
+    return tl::unexpected(Error(ProblemError::not_finite)
+                              .in("problem")
+                              .about(flat.not_finite == -2 ? std::string("the cost")
+                                                           : parts.name_of(static_cast<std::size_t>(
+                                                                 flat.not_finite))));
+  }
+  ProblemSolution solution;
+  std::vector<Iteration> rows;
+  if (flat.impossible >= 0) {
+    solution.status = SolveStatus::infeasible;
+    solution.method = "presolve";
+    parts.report(solution, flat);
+    return solution;
+  }
+  const auto look = [&](const Iteration& row) {
+    rows.push_back(row);
+    return watch(row);
+  };
+  solution = parts.run(std::move(flat), options, look);
+  solution.iterations = std::move(rows);
+  if (!solution.solved() && solution.status != SolveStatus::not_finite) {
+    parts.report(solution, parts.program->flat());
+  }
+  solution.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return solution;
+}
+
+}  // namespace flyball::optimization

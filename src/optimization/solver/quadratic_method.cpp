@@ -1,0 +1,346 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "optimization/solver/quadratic_method.hpp"
+
+namespace flyball::optimization::detail {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+double largest(const VectorXd& v) {
+  return v.size() > 0 ? v.lpNorm<Eigen::Infinity>() : 0.0;
+}
+
+}  // namespace
+
+QuadraticMethod::QuadraticMethod(Program& program) : program_(program) {
+  const Index n = program.variables();
+  const Index m = program.constraints();
+  for (VectorXd* v :
+       {&w_, &zl_, &zu_, &sl_, &su_, &free_, &g_, &rd_, &diagonal_, &rw_, &dw_, &dzl_, &dzu_,
+        &affine_w_, &residual_w_, &fix_w_, &hw_, &low_target_, &high_target_}) {
+    v->setZero(n);
+  }
+  for (VectorXd* v : {&lambda_, &c0_, &c_, &D_, &dl_, &affine_l_, &residual_c_, &fix_c_, &hc_}) {
+    v->setZero(m);
+  }
+  certificate_.setZero(std::max(n, m));
+}
+
+void QuadraticMethod::distances() {
+  for (Index i = 0; i < w_.size(); ++i) {
+    sl_(i) = free_(i) > 0.0 ? w_(i) - program_.lower(i) : infinity;
+    su_(i) = free_(i) > 0.0 ? program_.upper(i) - w_(i) : infinity;
+  }
+}
+
+void QuadraticMethod::residuals() {
+  program_.multiply(w_, lambda_, hw_, hc_);  // H w + Aᵀ λ, A w
+  rd_ = ((hw_ + g_ - zl_ + zu_).array() * free_.array()).matrix();
+  c_ = hc_ + c0_;
+}
+
+void QuadraticMethod::solve(VectorXd& dw, VectorXd& dl) {
+  program_.solve(rw_, c_, dw, dl);
+  const double size = std::max(largest(rw_), largest(c_));
+  double before = infinity;
+  for (int round = 0; round < 3; ++round) {
+    program_.multiply(dw, dl, residual_w_, residual_c_);
+    residual_w_ = ((residual_w_ + rw_).array() + diagonal_.array() * dw.array()) * free_.array();
+    residual_c_ += c_;
+    const double left = std::max(largest(residual_w_), largest(residual_c_));
+    if (!(left > 1e-10 * size) || !(left < 0.5 * before)) {
+      return;
+    }
+    before = left;
+    program_.solve(residual_w_, residual_c_, fix_w_, fix_c_);
+    dw += fix_w_;
+    dl += fix_c_;
+  }
+}
+
+/// Mehrotra's start: the point of least norm on the equalities, moved into the bounds.
+bool QuadraticMethod::begin(bool warm) {
+  const VectorXd& lower = program_.lower;
+  const VectorXd& upper = program_.upper;
+  pairs_ = 0;
+  VectorXd& w = rw_;
+  for (Index i = 0; i < w_.size(); ++i) {
+    free_(i) = lower(i) == upper(i) ? 0.0 : 1.0;
+    w(i) = free_(i) == 0.0 ? lower(i) : 0.0;
+    pairs_ += free_(i) > 0.0 && lower(i) > -infinity ? 1 : 0;
+    pairs_ += free_(i) > 0.0 && upper(i) < infinity ? 1 : 0;
+  }
+  // The constant parts, where all variables are zero but for those that are fixed.
+  fix_w_.setZero();
+  if (!program_.values(fix_w_, f0_, c0_) ||
+      !program_.derivatives(fix_w_, fix_c_.setZero(), 1.0, g_)) {
+    return false;
+  }
+  size_ = std::max(1.0, largest(g_));
+  fix_w_.setOnes();
+  program_.multiply(fix_w_, fix_c_, residual_w_, residual_c_);
+  has_curvature_ = largest(residual_w_) > 0.0;
+  if (warm) {
+    for (Index i = 0; i < w_.size(); ++i) {
+      w_(i) = free_(i) == 0.0 ? lower(i) : w_(i);
+    }
+  } else {
+    w_ = w;
+    lambda_.setZero();
+    zl_.setZero();
+    zu_.setZero();
+    // A point inside the bounds to begin with, then the nearest to it on the equalities.
+    for (Index i = 0; i < w_.size(); ++i) {
+      const bool low = lower(i) > -infinity;
+      const bool high = upper(i) < infinity;
+      diagonal_(i) = free_(i) > 0.0 ? (low || high ? 1.0 : 1e-8) : 1.0;
+      if (free_(i) > 0.0) {
+        w_(i) = low && high ? 0.5 * (lower(i) + upper(i))
+                : low       ? std::max(0.0, lower(i))
+                : high      ? std::min(0.0, upper(i))
+                            : 0.0;
+      }
+    }
+    residuals();
+    D_.setZero();
+    ++counts_.factorizations;
+    if (!program_.factor(diagonal_, D_, true)) {
+      return false;
+    }
+    rw_ = ((hw_ + g_).array() * free_.array()).matrix();
+    solve(dw_, dl_);
+    w_ += dw_;
+    lambda_ += dl_;
+  }
+  residuals();
+  const double least = warm ? 1e-4 : 1.0;
+  double largest_multiplier = 0.0;
+  for (Index i = 0; i < w_.size(); ++i) {
+    largest_multiplier = std::max(largest_multiplier, std::abs(rd_(i)));
+  }
+  const double multiplier =
+      warm ? 1e-4 * size_ : std::max(1.0, std::min(largest_multiplier, 1e3 * size_));
+  for (Index i = 0; i < w_.size(); ++i) {
+    if (free_(i) == 0.0) {
+      continue;
+    }
+    const bool low = lower(i) > -infinity;
+    const bool high = upper(i) < infinity;
+    const double margin = std::min(least, 0.25 * (upper(i) - lower(i)));
+    if (low) {
+      w_(i) = std::max(w_(i), lower(i) + margin);
+      zl_(i) = std::max(zl_(i), multiplier);
+    }
+    if (high) {
+      w_(i) = std::min(w_(i), upper(i) - margin);
+      zu_(i) = std::max(zu_(i), multiplier);
+    }
+  }
+  distances();
+  return true;
+}
+
+bool QuadraticMethod::converged(double tolerance) {
+  residuals();
+  double gap = 0.0;
+  double most = 0.0;
+  for (Index i = 0; i < w_.size(); ++i) {
+    const double low = zl_(i) > 0.0 ? sl_(i) * zl_(i) : 0.0;
+    const double high = zu_(i) > 0.0 ? su_(i) * zu_(i) : 0.0;
+    gap += low + high;
+    most = std::max(most, std::max(low, high));
+  }
+  mu_ = pairs_ > 0 ? gap / pairs_ : 0.0;
+  const auto n = static_cast<double>(w_.size() + 1);
+  const auto m = static_cast<double>(lambda_.size() + 1);
+  const double bounds = zl_.lpNorm<1>() + zu_.lpNorm<1>();
+  const double dual_scale = std::max(100.0, (lambda_.lpNorm<1>() + bounds) / (m + n)) / 100.0;
+  last_.infeasibility = largest(c_);
+  last_.optimality = largest(rd_) / dual_scale;
+  last_.complementarity = most / (std::max(100.0, bounds / n) / 100.0);
+  last_.barrier = mu_;
+  // f = f₀ + gᵀw + ½ wᵀ H w, of the part H w of hw.
+  program_.transpose_multiply(lambda_, residual_w_);
+  f_ = f0_ + g_.dot(w_) + 0.5 * w_.dot(hw_ - residual_w_);
+  last_.cost = f_;
+  const double worst =
+      std::max(last_.infeasibility, std::max(last_.optimality, last_.complementarity));
+  return worst <= tolerance && std::isfinite(f_ + rd_.sum() + c_.sum());
+}
+
+bool QuadraticMethod::proves_infeasible() {
+  const double size = largest(lambda_);
+  if (!(size > 1e3)) {
+    return false;
+  }
+  program_.transpose_multiply(lambda_, residual_w_);
+  double gap = c0_.dot(lambda_);
+  double left = 0.0;
+  for (Index i = 0; i < w_.size(); ++i) {
+    const double v = residual_w_(i);
+    if (v > 0.0) {
+      if (program_.lower(i) > -infinity) {
+        gap += program_.lower(i) * v;
+      } else {
+        left = std::max(left, v);
+      }
+    } else if (program_.upper(i) < infinity) {
+      gap += program_.upper(i) * v;
+    } else {
+      left = std::max(left, -v);
+    }
+  }
+  if (gap > 1e-7 * size && left <= 1e-7 * gap) {
+    certificate_.head(lambda_.size()) = lambda_ / size;
+    return true;
+  }
+  return false;
+}
+
+bool QuadraticMethod::proves_unbounded() {
+  const double size = largest(w_);
+  if (!(size > 1e4)) {
+    return false;
+  }
+  for (const VectorXd* direction : {&w_, &affine_w_}) {
+    const double length = largest(*direction);
+    if (!(length > 0.0)) {
+      continue;
+    }
+    fix_w_ = *direction / length;
+    fix_c_.setZero();
+    program_.multiply(fix_w_, fix_c_, residual_w_, residual_c_);
+    const double slope = g_.dot(fix_w_);
+    double left = largest(residual_c_);
+    for (Index i = 0; i < w_.size(); ++i) {
+      left = std::max(left, std::abs(residual_w_(i)));
+      left = std::max(left, program_.lower(i) > -infinity ? -fix_w_(i) : 0.0);
+      left = std::max(left, program_.upper(i) < infinity ? fix_w_(i) : 0.0);
+    }
+    if (slope < -1e-6 && left <= 1e-4 * -slope / std::max(1.0, largest(g_)) && left < 1e-6) {
+      certificate_.head(w_.size()) = fix_w_;
+      return true;
+    }
+  }
+  return false;
+}
+
+SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool warm) {
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  counts_ = {};
+  last_ = {};
+  if (!begin(warm)) {
+    return SolveStatus::no_progress;
+  }
+  double best = infinity;
+  int since_best = 0;
+  D_.setZero();
+  for (;; ++last_.number) {
+    counts_.iterations = last_.number;
+    if (converged(options.tolerance)) {
+      return SolveStatus::solved;
+    }
+    if (last_.number > 0 && watch(last_)) {
+      return SolveStatus::stopped;
+    }
+    if (proves_infeasible()) {
+      return SolveStatus::infeasible;
+    }
+    if (proves_unbounded()) {
+      return SolveStatus::unbounded;
+    }
+    if (last_.number >= options.max_iterations) {
+      return SolveStatus::iteration_limit;
+    }
+    if (std::chrono::duration<double>(Clock::now() - start).count() > options.time_limit) {
+      return SolveStatus::time_limit;
+    }
+    const double worst =
+        std::max(last_.infeasibility, std::max(last_.optimality, last_.complementarity));
+    since_best = worst < 0.9 * best ? 0 : since_best + 1;
+    best = std::min(best, worst);
+    if (since_best > 25 || !std::isfinite(worst)) {
+      return worst <= 1e3 * options.tolerance ? SolveStatus::acceptable : SolveStatus::no_progress;
+    }
+
+    diagonal_ = ((zl_.array() / sl_.array() + zu_.array() / su_.array()) * free_.array()).matrix();
+    diagonal_.array() += 1e-12 * size_;
+    ++counts_.factorizations;
+    if (!program_.factor(diagonal_, D_, true)) {
+      return SolveStatus::no_progress;
+    }
+    // Predictor: straight for complementarity zero.
+    rw_ = ((hw_ + g_).array() * free_.array()).matrix();
+    solve(affine_w_, affine_l_);
+    double primal = 1.0;
+    double dual = 1.0;
+    double gap = 0.0;
+    const auto shorten = [](double& alpha, double value, double change) {
+      if (change < 0.0 && value + alpha * change < 0.0) {
+        alpha = -value / change;
+      }
+    };
+    for (Index i = 0; i < w_.size(); ++i) {
+      dzl_(i) = -zl_(i) - zl_(i) / sl_(i) * affine_w_(i);
+      dzu_(i) = -zu_(i) + zu_(i) / su_(i) * affine_w_(i);
+      shorten(primal, sl_(i), affine_w_(i));
+      shorten(primal, su_(i), -affine_w_(i));
+      shorten(dual, zl_(i), dzl_(i));
+      shorten(dual, zu_(i), dzu_(i));
+    }
+    for (Index i = 0; i < w_.size(); ++i) {
+      gap += zl_(i) > 0.0 ? (sl_(i) + primal * affine_w_(i)) * (zl_(i) + dual * dzl_(i)) : 0.0;
+      gap += zu_(i) > 0.0 ? (su_(i) - primal * affine_w_(i)) * (zu_(i) + dual * dzu_(i)) : 0.0;
+    }
+    const double reached = pairs_ > 0 ? gap / pairs_ : 0.0;
+    const double ratio = mu_ > 0.0 ? reached / mu_ : 0.0;
+    const double target = std::min(1.0, ratio * ratio * ratio) * mu_;
+    // Corrector: for the products of the predictor, and to the center.
+    for (Index i = 0; i < w_.size(); ++i) {
+      const double low = zl_(i) > 0.0 ? (target - affine_w_(i) * dzl_(i)) / sl_(i) : 0.0;
+      const double high = zu_(i) > 0.0 ? (target + affine_w_(i) * dzu_(i)) / su_(i) : 0.0;
+      rw_(i) = (hw_(i) + g_(i) - low + high) * free_(i);
+      low_target_(i) = low;
+      high_target_(i) = high;
+    }
+    solve(dw_, dl_);
+    primal = 1.0 / 0.995;
+    dual = 1.0 / 0.995;
+    for (Index i = 0; i < w_.size(); ++i) {
+      dzl_(i) = low_target_(i) - zl_(i) - zl_(i) / sl_(i) * dw_(i);
+      dzu_(i) = high_target_(i) - zu_(i) + zu_(i) / su_(i) * dw_(i);
+      shorten(primal, sl_(i), dw_(i));
+      shorten(primal, su_(i), -dw_(i));
+      shorten(dual, zl_(i), dzl_(i));
+      shorten(dual, zu_(i), dzu_(i));
+    }
+    const double keep = std::max(0.995, 1.0 - mu_);
+    primal = std::min(1.0, keep * primal);
+    dual = std::min(1.0, keep * dual);
+    if (pairs_ == 0) {
+      primal = dual = 1.0;
+    }
+    if (has_curvature_) {
+      primal = dual = std::min(primal, dual);
+    }
+    w_ += primal * dw_;
+    lambda_ += dual * dl_;
+    zl_ += dual * dzl_;
+    zu_ += dual * dzu_;
+    distances();
+    last_.step = primal;
+    last_.dual_step = dual;
+    last_.trials = 1;
+  }
+}
+
+}  // namespace flyball::optimization::detail

@@ -1,0 +1,309 @@
+#include <flyball/optimization/problem/problem.hpp>
+
+#include <cmath>
+#include <string>
+
+#include <Eigen/Dense>
+#include <gtest/gtest.h>
+
+#include <flyball/core/random.hpp>
+
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Vector2d;
+using Eigen::VectorXd;
+using namespace flyball;
+using namespace flyball::optimization;
+
+// Section 17.1.1: from 0 to 2 m in 3.5 s within 1 m/s and 1 m/s², 5 ms a step. CasADi with IPOPT
+// found the cost 904.84318 of steps of exactly constant acceleration.
+TEST(Problem, DoubleIntegratorOfTheBook) {
+  const int N = 700;
+  const double dt = 0.005;
+  const double r = 2.0;
+  Problem problem;
+  const ExpressionMatrix X = problem.decision_variable(2, N + 1);
+  const ExpressionMatrix U = problem.decision_variable(1, N);
+  for (int k = 0; k < N; ++k) {
+    problem.subject_to(X(0, k + 1) == X(0, k) + X(1, k) * dt + 0.5 * dt * dt * U(0, k));
+    problem.subject_to(X(1, k + 1) == X(1, k) + U(0, k) * dt);
+  }
+  problem.subject_to(X.col(0) == Vector2d(0.0, 0.0));
+  problem.subject_to(X.col(N) == Vector2d(r, 0.0));
+  problem.subject_to(-1.0 <= X.row(1));
+  problem.subject_to(X.row(1) <= 1.0);
+  problem.subject_to(-1.0 <= U);
+  problem.subject_to(U <= 1.0);
+  Expression J = 0.0;
+  for (int k = 0; k <= N; ++k) {
+    J += pow(r - X(0, k), 2);
+  }
+  problem.minimize(J);
+  const auto solution = problem.solve().value();
+  EXPECT_EQ(solution.status, SolveStatus::solved) << solution.message;
+  EXPECT_EQ(solution.cost_degree, Degree::quadratic);
+  EXPECT_EQ(solution.equality_degree, Degree::linear);
+  EXPECT_EQ(solution.inequality_degree, Degree::linear);
+  EXPECT_NEAR(solution.cost, 904.84318, 2e-5);
+  EXPECT_NEAR(U.value(0, 0), 1.0, 1e-6);
+  EXPECT_NEAR(U.value(0, 300), 0.0, 1e-5);
+  EXPECT_NEAR(U.value(0, 410), -0.898, 1e-3);
+  EXPECT_NEAR(X.value(0, 350), 1.25, 1e-6);
+  EXPECT_NEAR(X.value(1, 350), 1.0, 1e-6);
+}
+
+TEST(Problem, DegreesOfExpressions) {
+  Problem problem;
+  const Expression x = problem.decision_variable();
+  const Expression y = problem.decision_variable();
+  const Expression p = problem.parameter(3.0);
+  EXPECT_EQ((p * p + 1.0).degree(), Degree::constant);
+  EXPECT_EQ((2.0 * x - p * y + 1.0).degree(), Degree::linear);
+  EXPECT_EQ((x / p).degree(), Degree::linear);
+  EXPECT_EQ((x * y + x).degree(), Degree::quadratic);
+  EXPECT_EQ(pow(x - y, 2).degree(), Degree::quadratic);
+  EXPECT_EQ((x * x * y).degree(), Degree::nonlinear);
+  EXPECT_EQ(sin(x).degree(), Degree::nonlinear);
+  EXPECT_EQ(sin(p).degree(), Degree::constant);
+  EXPECT_EQ((0.0 * x).degree(), Degree::constant);
+}
+
+// Klee and Minty's cube, on which the simplex method may visit all 2ⁿ corners: max Σ 2^(n-j) xⱼ
+// subject to 2 Σ_{j<i} 2^(i-j) xⱼ + xᵢ ≤ 5ⁱ, x ≥ 0; the optimum is 5ⁿ.
+TEST(Problem, KleeMinty) {
+  const int n = 6;
+  Problem problem;
+  const ExpressionMatrix x = problem.decision_variable(n);
+  Expression gain = 0.0;
+  for (int i = 1; i <= n; ++i) {
+    gain += std::pow(2.0, n - i) * x(i - 1);
+    Expression left = x(i - 1);
+    for (int j = 1; j < i; ++j) {
+      left += 2.0 * std::pow(2.0, i - j) * x(j - 1);
+    }
+    problem.subject_to(left <= std::pow(5.0, i));
+  }
+  problem.subject_to(x >= 0.0);
+  problem.maximize(gain);
+  const auto solution = problem.solve().value();
+  EXPECT_EQ(solution.status, SolveStatus::solved) << solution.message;
+  EXPECT_NEAR(solution.cost, std::pow(5.0, n), 1e-5 * std::pow(5.0, n));
+  EXPECT_NEAR(x.value(n - 1), std::pow(5.0, n), 1e-5 * std::pow(5.0, n));
+}
+
+// Beale's example, on which the simplex method with the textbook's rule runs in a circle.
+TEST(Problem, BealesCycle) {
+  Problem problem;
+  const ExpressionMatrix x = problem.decision_variable(4);
+  problem.subject_to(0.25 * x(0) - 8.0 * x(1) - x(2) + 9.0 * x(3) <= 0.0);
+  problem.subject_to(0.5 * x(0) - 12.0 * x(1) - 0.5 * x(2) + 3.0 * x(3) <= 0.0);
+  problem.subject_to(x(2) <= 1.0);
+  problem.subject_to(x >= 0.0);
+  problem.minimize(-0.75 * x(0) + 20.0 * x(1) - 0.5 * x(2) + 6.0 * x(3));
+  const auto solution = problem.solve().value();
+  EXPECT_EQ(solution.status, SolveStatus::solved) << solution.message;
+  EXPECT_NEAR(solution.cost, -1.25, 1e-7);
+  EXPECT_NE(solution.method.find("linear program"), std::string::npos);
+}
+
+// The first-order conditions of convex programs, from values and multipliers alone.
+TEST(Problem, RandomQuadraticPrograms) {
+  Random random(17);
+  for (int round = 0; round < 40; ++round) {
+    const int n = 3 + round % 8;
+    const int m = 1 + round % 5;
+    const MatrixXd F = MatrixXd::NullaryExpr(n, n - round % 3, [&] { return random.normal(); });
+    const MatrixXd Q = F * F.transpose();
+    const VectorXd q = VectorXd::NullaryExpr(n, [&] { return random.normal(); });
+    const MatrixXd A = MatrixXd::NullaryExpr(m, n, [&] { return random.normal(); });
+    const VectorXd inside = VectorXd::NullaryExpr(n, [&] { return random.uniform(0.1, 0.9); });
+    const VectorXd b = A * inside;
+    Problem problem;
+    ExpressionMatrix x = problem.decision_variable(n);
+    const bool has_equality = round % 2 == 0 && m < n;
+    problem.subject_to(has_equality ? ExpressionMatrix(A) * x == b
+                                    : ExpressionMatrix(A) * x <= VectorXd(b.array() + 0.1));
+    problem.subject_to(x >= 0.0);
+    problem.subject_to(x <= 1.0);
+    problem.minimize((0.5 * x.transpose() * ExpressionMatrix(Q) * x)(0) +
+                     (x.transpose() * ExpressionMatrix(q))(0));
+    const auto solution = problem.solve().value();
+    ASSERT_EQ(solution.status, SolveStatus::solved) << round << ": " << solution.message;
+    const VectorXd at = x.value();
+    const VectorXd l = solution.multipliers;
+    // ∇f = Σ λ ∇c with c = Ax - b or b + 0.1 - Ax, x, 1 - x.
+    const VectorXd slope = Q * at + q - (has_equality ? 1.0 : -1.0) * A.transpose() * l.head(m) -
+                           l.segment(m, n) + l.tail(n);
+    EXPECT_LT(slope.cwiseAbs().maxCoeff(), 1e-7) << round;
+    EXPECT_GT(l.tail(2 * n).minCoeff(), -1e-12);
+    EXPECT_LT((at.array() * l.segment(m, n).array()).abs().maxCoeff(), 1e-7);
+    EXPECT_LT(((1.0 - at.array()) * l.tail(n).array()).abs().maxCoeff(), 1e-7);
+    EXPECT_GT(at.minCoeff(), -1e-8);
+    const VectorXd rows = A * at - b;
+    if (has_equality) {
+      EXPECT_LT(rows.cwiseAbs().maxCoeff(), 1e-7);
+    } else {
+      EXPECT_LT((rows.array() - 0.1).maxCoeff(), 1e-7);
+      EXPECT_GT(l.head(m).minCoeff(), -1e-8);
+      EXPECT_LT(((0.1 - rows.array()) * l.head(m).array()).abs().maxCoeff(), 1e-7);
+    }
+  }
+}
+
+// x + y ≥ 3 and 2x + y ≤ 1 for x, y ≥ 0: the first less the second less x is -x ≥ 2.
+TEST(Problem, InfeasibleWithACertificate) {
+  Problem problem;
+  const Expression x = problem.decision_variable();
+  const Expression y = problem.decision_variable();
+  problem.subject_to(x + y >= 3.0, "enough");
+  problem.subject_to(2.0 * x + y <= 1.0, "not too much");
+  problem.subject_to(x >= 0.0);
+  problem.subject_to(y >= 0.0);
+  problem.minimize(x + y);
+  const auto solution = problem.solve().value();
+  EXPECT_EQ(solution.status, SolveStatus::infeasible);
+  ASSERT_EQ(solution.certificate.size(), 4);
+  // The combination u (x + y - 3) + v (1 - 2x - y) with u, v ≥ 0 is negative wherever x, y ≥ 0.
+  const double u = std::abs(solution.certificate(0));
+  const double v = std::abs(solution.certificate(1));
+  EXPECT_LE(u - 2.0 * v, 1e-5);
+  EXPECT_LE(u - v, 1e-5);
+  EXPECT_LT(-3.0 * u + v, 0.0);
+  EXPECT_NE(solution.message.find("violated"), std::string::npos);
+}
+
+TEST(Problem, UnboundedWithADirection) {
+  Problem problem;
+  const Expression x = problem.decision_variable();
+  const Expression y = problem.decision_variable();
+  problem.subject_to(x - y <= 1.0);
+  problem.subject_to(x >= 0.0);
+  problem.minimize(-x - y);
+  const auto solution = problem.solve().value();
+  EXPECT_EQ(solution.status, SolveStatus::unbounded);
+  ASSERT_EQ(solution.certificate.size(), 2);
+  EXPECT_GT(solution.certificate.sum(), 0.5);
+  EXPECT_LE(solution.certificate(0) - solution.certificate(1), 1e-6);
+}
+
+TEST(Problem, ContradictoryBoundsAreNamed) {
+  Problem problem;
+  const ExpressionMatrix x = problem.decision_variable(3);
+  problem.subject_to(x >= 1.0, "the floor");
+  problem.subject_to(x(1) <= 0.25, "the ceiling");
+  problem.minimize(x.sum());
+  const auto solution = problem.solve().value();
+  EXPECT_EQ(solution.status, SolveStatus::infeasible);
+  EXPECT_EQ(solution.violations.front().name, "the floor, entry 0");
+  EXPECT_NE(solution.message.find("is violated by 1"), std::string::npos) << solution.message;
+}
+
+// x² + y² ≤ 1 and x + y ≥ 3: no point; nearest, where the sum of both violations is least.
+TEST(Problem, NonlinearInfeasible) {
+  Problem problem;
+  ExpressionMatrix x = problem.decision_variable(2);
+  problem.subject_to(x(0) * x(0) + x(1) * x(1) <= 1.0, "the disc");
+  problem.subject_to(x(0) + x(1) >= 3.0, "the half-plane");
+  problem.minimize(x(0));
+  const auto solution = problem.solve().value();
+  EXPECT_EQ(solution.status, SolveStatus::infeasible);
+  ASSERT_FALSE(solution.violations.empty());
+  EXPECT_NE(solution.message.find("the "), std::string::npos) << solution.message;
+}
+
+// min -x y over the unit disc is no convex quadratic program: the general method takes it.
+TEST(Problem, NotConvex) {
+  Problem problem;
+  ExpressionMatrix x = problem.decision_variable(2);
+  x.set_value(Vector2d(0.4, 0.1));
+  problem.subject_to(x >= -1.0);
+  problem.subject_to(x <= 2.0);
+  problem.minimize(-x(0) * x(1));
+  const auto solution = problem.solve().value();
+  EXPECT_EQ(solution.status, SolveStatus::solved);
+  EXPECT_NEAR(solution.cost, -4.0, 1e-6);
+}
+
+TEST(Problem, NoConstraintsAndNoCost) {
+  Problem problem;
+  ExpressionMatrix x = problem.decision_variable(2);
+  problem.minimize(exp(x(0)) - x(0) + pow(x(1) - 3.0, 4));
+  EXPECT_EQ(problem.solve().value().status, SolveStatus::solved);
+  EXPECT_NEAR(x.value(0), 0.0, 1e-5);
+  Problem system;
+  ExpressionMatrix y = system.decision_variable(2);
+  y.set_value(Vector2d(1.0, 2.0));
+  system.subject_to(y(0) * y(0) + y(1) * y(1) == 25.0);
+  system.subject_to(y(0) * y(1) == 12.0);
+  EXPECT_EQ(system.solve().value().status, SolveStatus::solved);
+  EXPECT_NEAR(y.value(0), 3.0, 1e-7);
+  EXPECT_NEAR(y.value(1), 4.0, 1e-7);
+}
+
+TEST(Problem, ParametersChangeBetweenSolves) {
+  Problem problem;
+  const ExpressionMatrix x = problem.decision_variable(2);
+  Expression goal = problem.parameter(1.0);
+  Expression limit = problem.parameter(10.0);
+  problem.minimize(pow(x(0) - goal, 2) + pow(x(1) + goal, 2));
+  problem.subject_to(x(0) <= limit);
+  const auto first = problem.solve().value();
+  EXPECT_NEAR(x.value(0), 1.0, 1e-7);
+  goal.set_value(4.0);
+  limit.set_value(3.0);
+  const auto second = problem.solve().value();
+  EXPECT_NEAR(x.value(0), 3.0, 1e-7);
+  EXPECT_NEAR(x.value(1), -4.0, 1e-7);
+  EXPECT_NEAR(second.multipliers(0), 2.0, 1e-6);  // the slope of (x - 4)² at 3, to limit - x ≥ 0
+  EXPECT_LE(second.counts.iterations, first.counts.iterations + 8);
+}
+
+TEST(Problem, NotFiniteIsNamed) {
+  Problem problem;
+  ExpressionMatrix x = problem.decision_variable(2);
+  problem.minimize(x(0));
+  problem.subject_to(x(1) <= 1.0);
+  problem.subject_to(log(x(0) - 1.0) >= 0.0, "the logarithm");
+  const auto solution = problem.solve().value();
+  EXPECT_EQ(solution.status, SolveStatus::not_finite);
+  EXPECT_EQ(solution.message, "the logarithm is not finite");
+}
+
+TEST(Problem, MisuseIsRefused) {
+  Problem empty;
+  EXPECT_TRUE(empty.solve().error().is(ProblemError::no_variables));
+  Problem problem;
+  const ExpressionMatrix x = problem.decision_variable(2, 2);
+  problem.subject_to(x.col(0) == Eigen::Vector3d(1.0, 2.0, 3.0));
+  EXPECT_TRUE(problem.solve().error().is(ProblemError::wrong_shape));
+  Problem other;
+  const Expression y = other.decision_variable();
+  other.minimize(x(0, 0) + 1.0);
+  EXPECT_TRUE(other.solve().error().is(ProblemError::other_problem));
+  Problem not_finite;
+  const Expression z = not_finite.decision_variable();
+  not_finite.subject_to(z * std::numeric_limits<double>::infinity() + z <= 1.0, "the rule");
+  const auto refused = not_finite.solve();
+  ASSERT_FALSE(refused);
+  EXPECT_TRUE(refused.error().is(ProblemError::not_finite));
+  EXPECT_NE(to_string(refused.error()).find("the rule"), std::string::npos);
+  (void)y;
+}
+
+TEST(Problem, LimitsAreHonoured) {
+  Problem problem;
+  ExpressionMatrix x = problem.decision_variable(2);
+  x.set_value(Vector2d(-1.2, 1.0));
+  problem.minimize(100.0 * pow(x(1) - pow(x(0), 2), 2) + pow(1.0 - x(0), 2));
+  SolverOptions few;
+  few.max_iterations = 3;
+  const auto stopped = problem.solve(few).value();
+  EXPECT_EQ(stopped.status, SolveStatus::iteration_limit);
+  EXPECT_EQ(stopped.counts.iterations, 3);
+  EXPECT_EQ(stopped.iterations.size(), 3U);
+  EXPECT_EQ(problem.solve().value().status, SolveStatus::solved);
+  EXPECT_NEAR(x.value(0), 1.0, 1e-7);
+}
+
+}  // namespace
