@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "numeric/laws.hpp"
+#include "numeric/mu_laws.hpp"
 #include "numeric/quad.hpp"
 
 namespace flyball::fuzz {
@@ -354,6 +355,9 @@ std::vector<Verdict> check_answer(const solve::Kind& kind, const json& problem,
     if (value != answer.end() && !field.unbounded && !is_finite(*value)) {
       return {{"finite " + std::string(field.name), never}};
     }
+  }
+  if (kind.name == "mu") {
+    return mu_verdicts(problem, answer);
   }
   Laws laws(problem, answer);
   if (const auto found = table().find(kind.name); found != table().end()) {

@@ -31,10 +31,18 @@ class Maker {
     }
   }
 
-  json object(std::span<const Field> fields) {
+  /// @param all, none  Optional fields that are there, or not.
+  json object(std::span<const Field> fields, std::span<const std::string_view> all = {},
+              std::span<const std::string_view> none = {}) {
+    const auto is_of = [](std::span<const std::string_view> names, const Field& field) {
+      return std::find(names.begin(), names.end(), field.name) != names.end();
+    };
     std::vector<const Field*> there;
     for (const Field& field : fields) {
-      if (field.absent == Absent::refused || choices_.below(2) == 1) {
+      if (is_of(none, field)) {
+        continue;
+      }
+      if (is_of(all, field) || field.absent == Absent::refused || choices_.below(2) == 1) {
         there.push_back(&field);
       } else if (field.absent == Absent::identity && field.rows.size() == 1) {
         size(field.rows) = size_of(field.columns);
@@ -237,6 +245,35 @@ class Maker {
     return made;
   }
 
+  /// Uncertain blocks that share out m inputs and p outputs.
+  json blocks() {
+    Index inputs = size("m");
+    Index outputs = size("p");
+    json made = json::array();
+    while (inputs > 0 && outputs > 0) {
+      const bool last = made.size() >= 5 || choices_.once_in(5);
+      const Index k = 1 + static_cast<Index>(
+                              choices_.below(static_cast<std::size_t>(std::min(inputs, outputs))));
+      if (last || (choices_.below(3) == 0 && inputs != outputs)) {
+        made.push_back("full " + std::to_string(inputs) + "x" + std::to_string(outputs));
+        return made;
+      }
+      // A full block with less of the one side evens them out.
+      const Index rows = inputs > outputs ? inputs - outputs + k : k;
+      const Index columns = outputs > inputs ? outputs - inputs + k : k;
+      if (rows != columns || choices_.below(3) == 0) {
+        made.push_back("full " + std::to_string(rows) + "x" + std::to_string(columns));
+        inputs -= rows;
+        outputs -= columns;
+        continue;
+      }
+      made.push_back((choices_.below(2) == 0 ? "real " : "complex ") + std::to_string(k));
+      inputs -= k;
+      outputs -= k;
+    }
+    return made;
+  }
+
   json value(const Field& field) {
     switch (field.type) {
       case FieldType::number:
@@ -277,6 +314,9 @@ class Maker {
         return {{"num", rows_of(matrix(1, size_of(field.rows)))[0]},
                 {"den", rows_of(matrix(1, size_of(field.columns)))[0]}};
       case FieldType::texts:
+        if (field.name == "blocks") {
+          return blocks();
+        }
         return json(std::vector<std::string>(static_cast<std::size_t>(size_of(field.rows)), "x"));
       default:
         return nullptr;
@@ -291,6 +331,14 @@ class Maker {
 }  // namespace
 
 json make_problem(const solve::Kind& kind, Choices& choices) {
+  if (kind.name == "mu") {
+    static constexpr std::string_view constant[] = {"M"};
+    static constexpr std::string_view parts[] = {"M", "M_imag"};
+    static constexpr std::string_view system[] = {"A", "B", "C"};
+    static constexpr std::string_view matrices[] = {"A", "B", "C", "D"};
+    return choices.below(3) == 0 ? Maker(choices).object(kind.fields, system, parts)
+                                 : Maker(choices).object(kind.fields, constant, matrices);
+  }
   return Maker(choices).object(kind.fields);
 }
 

@@ -1,6 +1,7 @@
 #include <utility>
 
 #include <flyball/control/certificate.hpp>
+#include <flyball/control/robust/structured_singular_value.hpp>
 #include <flyball/systems/discretize.hpp>
 
 #include "core/format.hpp"
@@ -79,11 +80,146 @@ Outcome solve_certify(const Problem& problem, JsonWriter& answer) {
   return {};
 }
 
+/// A system M, or a constant one.
+Expected<ContinuousSystem<>> uncertain_system(const Problem& problem) {
+  constexpr std::string_view where = "mu";
+  const bool constant = problem.has("M");
+  const bool matrices = problem.has("A") || problem.has("B") || problem.has("C");
+  if (constant == matrices) {
+    return refusal(ArgumentError::malformed, where, "the system")
+        .got(constant ? "told twice, as M and as matrices" : "left out")
+        .expected("M, or A, B and C");
+  }
+  if (constant) {
+    const MatrixXd& M = problem.matrix("M");
+    return ContinuousSystem<>{MatrixXd(0, 0), MatrixXd(0, M.cols()), MatrixXd(M.rows(), 0), M};
+  }
+  for (const char* name : {"A", "B", "C"}) {
+    if (!problem.has(name)) {
+      return refusal(ArgumentError::malformed, where, name)
+          .got("left out")
+          .expected("there: a state space has A, B and C");
+    }
+  }
+  if (problem.has("M_imag")) {
+    return refusal(ArgumentError::malformed, where, "M_imag")
+        .got("beside a state space")
+        .expected("a part of M alone");
+  }
+  const MatrixXd& B = problem.matrix("B");
+  const MatrixXd& C = problem.matrix("C");
+  return ContinuousSystem<>{
+      problem.matrix("A"), B, C,
+      problem.has("D") ? problem.matrix("D") : MatrixXd::Zero(C.rows(), B.cols())};
+}
+
+void write_complex(JsonWriter& answer, std::string_view name, const Eigen::MatrixXcd& M) {
+  answer.add(name, MatrixXd(M.real()));
+  answer.add(std::string(name) + "_imag", MatrixXd(M.imag()));
+}
+
+/// Bounds of M's largest µ with some of the blocks; of a constant M at no frequency.
+Expected<StructuredPeak> peak_of(const Problem& problem, const ContinuousSystem<>& system,
+                                 const std::vector<UncertaintyBlock>& blocks) {
+  if (problem.has("M")) {
+    Eigen::MatrixXcd M = system.D.cast<std::complex<double>>();
+    if (problem.has("M_imag")) {
+      M.imag() = problem.matrix("M_imag").topLeftCorner(M.rows(), M.cols());
+    }
+    FLYBALL_TRY(auto mu, structured_singular_value(M, blocks));
+    return StructuredPeak{mu.lower,    mu.upper,   0.0, std::move(mu.delta),
+                          mu.residual, mu.scaling, 0.0, {}};
+  }
+  const double dt = problem.number("dt");
+  FLYBALL_CHECK(Checks("mu").not_negative(dt, "dt", "s"));
+  return dt > 0.0 ? structured_peak(
+                        DiscreteSystem<>{system.A, system.B, system.C, system.D, Time(dt)}, blocks)
+                  : structured_peak(system, blocks);
+}
+
+Outcome solve_mu(const Problem& problem, JsonWriter& answer) {
+  FLYBALL_TRY(const auto system, uncertain_system(problem));
+  std::vector<UncertaintyBlock> blocks;
+  for (const std::string& text : problem.texts("blocks")) {
+    FLYBALL_TRY_IN("mu", const auto block, parse_uncertainty_block(text));
+    blocks.push_back(block);
+  }
+  FLYBALL_TRY(const auto peak, peak_of(problem, system, blocks));
+  answer.add("lower", peak.lower);
+  answer.add("upper", peak.upper);
+  if (problem.choice("question") == "performance") {
+    if (blocks.size() < 2) {
+      return refusal(ArgumentError::wrong_shape, "mu", "blocks")
+          .got("one")
+          .expected("the uncertain ones, then the performance's");
+    }
+    const UncertaintyBlock last = blocks.back();
+    blocks.pop_back();
+    const Index columns = last.kind == UncertaintyKind::full ? last.columns : last.rows;
+    ContinuousSystem<> part = system;
+    part.B = MatrixXd(part.B.leftCols(part.B.cols() - last.rows));
+    part.C = MatrixXd(part.C.topRows(part.C.rows() - columns));
+    part.D = MatrixXd(part.D.topLeftCorner(part.C.rows(), part.B.cols()));
+    FLYBALL_TRY(const auto stability, peak_of(problem, part, blocks));
+    answer.add("stability_lower", stability.lower);
+    answer.add("stability_upper", stability.upper);
+  }
+  if (!problem.has("M")) {
+    answer.add("frequency", peak.frequency);
+    answer.add("scaling_frequency", peak.scaling_frequency);
+    answer.add("stretches", static_cast<int>(peak.stretches.size()));
+  }
+  write_complex(answer, "delta", peak.delta);
+  answer.add("residual", peak.residual);
+  write_complex(answer, "D_out", peak.scaling.D_out);
+  write_complex(answer, "D_in", peak.scaling.D_in);
+  write_complex(answer, "G", peak.scaling.G);
+  return {};
+}
+
 }  // namespace
 
 std::vector<Kind> certificate_kinds() {
   using namespace field;
   return {
+      {"mu",
+       "structured singular value of a matrix, or the largest over frequency of a stable system: "
+       "bounds of 1/min{σ(Δ) : det(I - M Δ) = 0}, the upper one proven by scalings for all "
+       "frequencies, the lower one by a Δ; below one, every Δ with σ(Δ) <= 1 is borne",
+       {optional(matrix("M", "p", "m", "a constant one, w to z: z = M w, w = Δ z")),
+        optional(matrix("M_imag", "p", "m", "its imaginary part")),
+        optional(matrix("A", "n", "n", "or a system: how its states move by themselves")),
+        optional(matrix("B", "n", "m", "how w moves them")),
+        optional(matrix("C", "p", "n", "how z sees them")),
+        optional(matrix("D", "p", "m", "how w reaches z")),
+        or_number(number("dt", "s", "sample period; 0 of a continuous system"), 0.0),
+        texts("blocks", "K",
+              "of Δ, in the order of M's inputs and outputs: \"real\", \"real 3\" (δ I), "
+              "\"complex\", \"complex 3\", \"full 2x3\" (rows x columns)"),
+        or_first(choice("question", "stability performance",
+                        "performance: the last block leads from errors to disturbances, and the "
+                        "others' own bounds are answered too"))},
+       {number("lower", "", "µ is at least this: 1/σ(delta)"),
+        number("upper", "", "and at most this, proven; of a system at every frequency"),
+        optional(number("stability_lower", "", "without the last block, of performance")),
+        optional(number("stability_upper", "", "likewise: the loop is stable for σ(Δ) < 1/this")),
+        unbounded(optional(number("frequency", "rad/s", "of a system, where delta is worst"))),
+        unbounded(optional(
+            number("scaling_frequency", "rad/s", "of a system, where the bound is largest"))),
+        optional(integer("stretches", "of frequencies, each with scalings of its own")),
+        matrix("delta", "m", "p", "the smallest Δ found with det(I - M Δ) = 0; zero if none"),
+        matrix("delta_imag", "m", "p", "its imaginary part"),
+        number("residual", "", "what is left of (I - M Δ) z, relative"),
+        matrix("D_out", "p", "p",
+               "with D_in and G proves the bound (there): upper² D_in - Mᴴ D_out M - j (G M - Mᴴ "
+               "Gᴴ) is positive definite"),
+        matrix("D_out_imag", "p", "p", "its imaginary part"),
+        matrix("D_in", "m", "m", "the same numbers in the sizes of the inputs"),
+        matrix("D_in_imag", "m", "m", "its imaginary part"),
+        matrix("G", "m", "p", "of real blocks, Hermitian; else zero"),
+        matrix("G_imag", "m", "p", "its imaginary part")},
+       R"({"M": [[1, 2, 0], [3, 1, 1], [0, 1, 2]], "blocks": ["real", "complex", "full 1x1"]})",
+       &solve_mu},
       {"certify",
        "whether a sampled loop is stable for every plant of a set, proven, and with which margins; "
        "or the plant that breaks it",

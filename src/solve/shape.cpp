@@ -40,6 +40,7 @@ constexpr std::array letters{Letter{'n', "states"},
                              Letter{'x', "coefficients of D"},
                              Letter{'F', "coefficients of W3"},
                              Letter{'G', "coefficients of W3's denominator"},
+                             Letter{'K', "blocks"},
                              Letter{'l', "numbers"},
                              Letter{'w', "frequencies"}};
 

@@ -141,7 +141,8 @@ TEST_P(EveryKind, Example) {
   const solve::Kind& kind = solve::kinds()[GetParam()];
   const solve::Solver solver = solve::Solver::create(kind.name).value();
   // Those of a design that is searched for, a hundred thousand and more, at steps of a hundredth.
-  const bool is_search = kind.name == "certify" || kind.name == "hinfsyn" || kind.name == "mixsyn";
+  const bool is_search = kind.name == "certify" || kind.name == "mu" || kind.name == "hinfsyn" ||
+                         kind.name == "mixsyn";
   try_every_allocation(
       std::string(kind.name), [&] { return solver.solve(kind.example).json; }, is_search);
 }

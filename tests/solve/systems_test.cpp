@@ -56,6 +56,31 @@ TEST(SolveSystems, HInfinityNorm) {
   EXPECT_EQ(refusal("hinf-norm", R"({"A":[[0]],"B":[[1]]})"), "not_stable");
 }
 
+// x yᵀ with Σ |x_i y_i| = 1 + 6 + 12; [0 1; -1 0] bears every real number; 1/(s + 1) and its
+// performance as a sum of two, 0.5 + 0.25 at s = 0.
+TEST(SolveSystems, StructuredSingularValue) {
+  const Json sum =
+      answer("mu", R"({"M":[[1,2,4],[3,6,12],[3,6,12]],"blocks":["complex","real","full 1x1"]})");
+  EXPECT_NEAR(number(sum, "lower"), 19.0, 1e-5);
+  EXPECT_NEAR(number(sum, "upper"), 19.0, 1e-5);
+  EXPECT_FALSE(sum.contains("frequency"));
+  const Json none = answer("mu", R"({"M":[[0,1],[-1,0]],"blocks":["real 2"]})");
+  EXPECT_EQ(number(none, "upper"), 0.0);
+  const Json turned = answer("mu", R"({"M":[[0]],"M_imag":[[3]],"blocks":["complex"]})");
+  EXPECT_NEAR(turned.at("delta_imag").at(0).at(0).get<double>(), -1.0 / 3.0, 1e-9);
+  const Json both = answer("mu", R"({"A":[[-1]],"B":[[1,1]],"C":[[0.5],[0.25]],)"
+                                 R"("blocks":["real","full 1x1"],"question":"performance"})");
+  EXPECT_NEAR(number(both, "lower"), 0.75, 1e-6);
+  EXPECT_NEAR(number(both, "upper"), 0.75, 1e-3);
+  EXPECT_NEAR(number(both, "stability_upper"), 0.5, 1e-3);
+  EXPECT_EQ(number(both, "frequency"), 0.0);
+  EXPECT_EQ(refusal("mu", R"({"M":[[1]],"blocks":["reel"]})"), "malformed");
+  EXPECT_EQ(refusal("mu", R"({"M":[[1]],"blocks":["real","real"]})"), "wrong_shape");
+  EXPECT_EQ(refusal("mu", R"({"M":[[1]],"blocks":["real"],"question":"performance"})"),
+            "wrong_shape");
+  EXPECT_EQ(refusal("mu", R"({"A":[[1]],"B":[[1]],"C":[[1]],"blocks":["real"]})"), "not_stable");
+}
+
 // dx/dt = g u, u = -8 x each half second: stable for 0 < g < 1/2. α = 2 (2 - 4 g)/(2 + 4 g). A
 // plant p x + u with p in [-1, 1] and the gain 8: |e^{pT} - 8 (e^{pT} - 1)/p| < 1 fails at p = 1.
 TEST(SolveSystems, Certify) {

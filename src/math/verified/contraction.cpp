@@ -3,49 +3,11 @@
 
 #include "math/dense/dense.hpp"
 #include "math/verified/contraction.hpp"
+#include "math/verified/definite.hpp"
 
 namespace flyball::detail {
 
 namespace {
-
-/// ‖A‖₂ from above, A without negative entries, exact or rounded up.
-double norm_above(const Eigen::MatrixXd& A) {
-  const double columns = A.colwise().sum().maxCoeff();
-  const double rows = A.rowwise().sum().maxCoeff();
-  return std::sqrt(columns * rows) * inflation * inflation + underflow;
-}
-
-/// More than the relative error of an inner product of n terms and some operations around it.
-double gamma_of(Eigen::Index n) {
-  return static_cast<double>(2 * n + 8) * unit_roundoff;
-}
-
-/// Whether S + G is positive definite for every symmetric ‖G‖₂ <= error, S symmetric (its lower
-/// half is read).
-bool surely_positive(Eigen::MatrixXd S, double error) {
-  const Eigen::Index n = S.rows();
-  const double trace = S.diagonal().cwiseAbs().sum();
-  if (!(error < 1e300) || !(trace < 1e300)) {
-    return false;
-  }
-  const double shift = (error + 2.0 * gamma_of(n) * trace) * inflation + underflow;
-  S.diagonal().array() -= shift;
-  for (Eigen::Index j = 0; j < n; ++j) {
-    if (!(S(j, j) > 0.0)) {
-      return false;
-    }
-    const double pivot = std::sqrt(S(j, j));
-    for (Eigen::Index i = j; i < n; ++i) {
-      S(i, j) /= pivot;
-    }
-    for (Eigen::Index k = j + 1; k < n; ++k) {
-      for (Eigen::Index i = k; i < n; ++i) {
-        S(i, k) -= S(i, j) * S(k, j);
-      }
-    }
-  }
-  return true;
-}
 
 /// T⁻¹ by substitution, T triangular or not.
 Eigen::MatrixXd near_inverse(const Eigen::MatrixXd& T) {
@@ -66,7 +28,7 @@ Eigen::MatrixXd magnitude_of(const MatrixFamily& family) {
 
 /// The radius with what the sums of `vertex` and products with two further matrices round.
 Eigen::MatrixXd radius_with_rounding(const MatrixFamily& family) {
-  const double each = 2.0 * gamma_of(family.centre.rows()) +
+  const double each = 2.0 * product_rounding(family.centre.rows()) +
                       2.0 * unit_roundoff * static_cast<double>(family.slopes.size() + 1);
   return (family.radius + each * magnitude_of(family)).array() * inflation + underflow;
 }
@@ -83,7 +45,7 @@ bool contracts(const MatrixFamily& family, const Eigen::MatrixXd& T) {
   const Eigen::MatrixXd Z_size = Z.cwiseAbs();
   const Eigen::MatrixXd TZ_I = (T.lazyProduct(Z) - Eigen::MatrixXd::Identity(n, n)).cwiseAbs();
   const Eigen::MatrixXd TZ_size = T_size.lazyProduct(Z_size);
-  const double delta = norm_above(TZ_I + gamma_of(n) * TZ_size) * inflation;
+  const double delta = norm_above(TZ_I + product_rounding(n) * TZ_size) * inflation;
   const Eigen::MatrixXd radius = radius_with_rounding(family);
   const Eigen::MatrixXd left = T_size.lazyProduct(radius);
   double rest = norm_above(left.lazyProduct(Z_size)) * inflation;
@@ -104,7 +66,7 @@ bool contracts(const MatrixFamily& family, const Eigen::MatrixXd& T) {
     Eigen::MatrixXd S = -W.transpose().lazyProduct(W);
     const double size = -S.trace();
     S.diagonal().array() += bound;
-    if (!surely_positive(std::move(S), gamma_of(n) * (size + 1.0))) {
+    if (!surely_positive(std::move(S), product_rounding(n) * (size + 1.0))) {
       return false;
     }
   }
@@ -134,7 +96,7 @@ bool surely_unstable(const MatrixFamily& family) {
   const Eigen::VectorXd x = eigen.vectors.col(0);
   const double form = x.dot(P.lazyProduct(x));
   const double form_error =
-      gamma_of(2 * n) * x.cwiseAbs().dot(P.cwiseAbs().lazyProduct(x.cwiseAbs()));
+      product_rounding(2 * n) * x.cwiseAbs().dot(P.cwiseAbs().lazyProduct(x.cwiseAbs()));
   if (!(form + form_error * inflation < 0.0)) {
     return false;
   }
@@ -156,7 +118,7 @@ bool surely_unstable(const MatrixFamily& family) {
   const Eigen::MatrixXd P_reach = P_size.lazyProduct(reach);
   const Eigen::MatrixXd error =
       2.0 * reach.transpose().lazyProduct(PR) +
-      2.0 * gamma_of(2 * n) * (P_size + reach.transpose().lazyProduct(P_reach));
+      2.0 * product_rounding(2 * n) * (P_size + reach.transpose().lazyProduct(P_reach));
   const Eigen::MatrixXd PN = P.lazyProduct(N);
   const Eigen::MatrixXd S = symmetrized(P - N.transpose().lazyProduct(PN));
   return surely_positive(S, norm_above(error) * inflation);

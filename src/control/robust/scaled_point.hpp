@@ -1,0 +1,32 @@
+#pragma once
+
+#include <optional>
+
+#include "control/robust/member_search.hpp"
+#include "control/robust/structured_bound.hpp"
+
+namespace flyball::detail {
+
+/// A matrix with its bound, and the coordinates in which the bound is a largest singular value,
+/// near enough: 2^-size F_out M F_in⁻¹.
+struct ScaledPoint {
+  Eigen::MatrixXcd F_out, F_in_inverse;
+  double scale = 1.0;         ///< 2^size
+  double beta = 0.0;          ///< Proven, of M.
+  StructuredScaling scaling;  ///< Of M itself.
+
+  [[nodiscard]] Eigen::MatrixXcd coordinates_of(const Eigen::MatrixXcd& M) const;
+  /// The member in which the largest singular value's vectors are aligned.
+  [[nodiscard]] UnitMember first_member(const Eigen::MatrixXcd& M, const MemberClimb& climb,
+                                        double frequency) const;
+};
+
+/// @param enough  Below this β the bound need not be the least.
+[[nodiscard]] ScaledPoint scaled_point(const Eigen::MatrixXcd& M,
+                                       const UncertaintyStructure& structure, double enough = 0.0);
+
+/// What is left of (I - M Δ) z beside (1 + ‖M‖ ‖Δ‖) ‖z‖; all in a point's coordinates.
+[[nodiscard]] double residual_of(const Eigen::MatrixXcd& M, const Eigen::MatrixXcd& Q,
+                                 const SingularMember& found);
+
+}  // namespace flyball::detail
