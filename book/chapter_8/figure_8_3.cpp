@@ -1,6 +1,6 @@
 #include <flyball/control/lqr.hpp>
 #include <flyball/mechanisms/differential_drive.hpp>
-#include <flyball/planning/generate_trapezoid_profile.hpp>
+#include <flyball/planning/profiles/generate_trapezoid_profile.hpp>
 #include <flyball/simulation/linear_loop.hpp>
 #include <flyball/systems/discretize.hpp>
 

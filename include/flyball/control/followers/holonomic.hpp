@@ -4,7 +4,7 @@
 
 #include <flyball/control/followers/follower.hpp>
 #include <flyball/core/quantity.hpp>
-#include <flyball/planning/trapezoid_profile.hpp>
+#include <flyball/planning/profiles/trapezoid_profile.hpp>
 
 namespace flyball {
 
