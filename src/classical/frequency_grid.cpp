@@ -37,6 +37,13 @@ Landmarks landmarks_of(const FrequencyResponse& response) {
       const auto factors = response.factors(i, j);
       if (!factors) {
         found.known = false;
+        const auto hints = response.hints();
+        found.delay = std::max(found.delay, hints.delay);
+        for (const Complex place : hints.places) {
+          if (place.imag() >= 0.0) {
+            found.roots.push_back(place);
+          }
+        }
         continue;
       }
       found.delay = std::max(found.delay, factors->delay);

@@ -69,6 +69,7 @@ class EntrySource final : public FrequencyResponse::Source {
   [[nodiscard]] std::optional<Factors> factors(Index /*output*/, Index /*input*/) const override {
     return whole_.factors(output_, input_);
   }
+  [[nodiscard]] Hints hints() const override { return whole_.hints(); }
   [[nodiscard]] VectorXd known_frequencies() const override { return whole_.known_frequencies(); }
 
  private:
@@ -121,6 +122,10 @@ VectorXcd settled(VectorXcd roots, const VectorXd& p, bool discrete) {
 
 std::optional<Factors> FrequencyResponse::Source::factors(Index /*output*/, Index /*input*/) const {
   return std::nullopt;
+}
+
+FrequencyResponse::Source::Hints FrequencyResponse::Source::hints() const {
+  return {};
 }
 
 VectorXd FrequencyResponse::Source::known_frequencies() const {

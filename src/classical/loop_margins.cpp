@@ -415,7 +415,7 @@ Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
   FLYBALL_TRY(const detail::LoopPeaks peaks, detail::loop_peaks(response));
   margins.sensitivity = peaks.sensitivity;
   margins.complementary = peaks.complementary;
-  margins.disk_margin = margins.stable ? 2.0 / peaks.spread : 0.0;
+  margins.disk_margin = margins.stable ? 2.0 / peaks.spread.value : 0.0;
   return margins;
 }
 

@@ -9,11 +9,18 @@ namespace flyball::classical::detail {
 struct LoopPeaks {
   Peak sensitivity;    ///< max |1/(1 + L)|
   Peak complementary;  ///< max |L/(1 + L)|
-  double spread;       ///< max |(1 - L)/(1 + L)|
+  Peak spread;         ///< max |(1 - L)/(1 + L)|
 };
 
 /// To 1e-5 by bounds on what ln L moves between two frequencies, and refined.
 /// @param response  L, whose factors are known. @errors As `frequency_grid`.
 [[nodiscard]] Expected<LoopPeaks> loop_peaks(const FrequencyResponse& response);
+
+/// `loop_margins` of a response, and where the disk margin is found.
+struct WholeMargins {
+  LoopMargins margins;
+  Peak spread;  ///< max |(1 - L)/(1 + L)|, stable or not.
+};
+[[nodiscard]] Expected<WholeMargins> whole_margins(const FrequencyResponse& loop);
 
 }  // namespace flyball::classical::detail

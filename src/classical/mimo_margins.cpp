@@ -5,6 +5,8 @@
 #include <type_traits>
 #include <utility>
 
+#include <flyball/classical/delay_margins.hpp>
+#include <flyball/classical/delay_poles.hpp>
 #include <flyball/classical/response_margins.hpp>
 #include <flyball/math/search/minimum.hpp>
 #include <flyball/systems/interconnection.hpp>
@@ -259,6 +261,53 @@ Expected<GangOfFour> gang_of(const System& P, const System& C) {
 
 }  // namespace
 
+Expected<MimoMargins> mimo_margins(const DelaySystem& loop) {
+  constexpr std::string_view where = "mimo_margins";
+  if (loop.inputs() != loop.outputs()) {
+    return refusal(ArgumentError::wrong_shape, where, "the loop")
+        .got(flyball::detail::format("{} x {}", loop.outputs(), loop.inputs()))
+        .expected("square: as many outputs as inputs");
+  }
+  if (loop.period()) {
+    return loop.to_discrete().and_then(
+        [](const DiscreteSystem<>& states) { return mimo_margins(states); });
+  }
+  if (!loop.has_delay()) {
+    return loop.to_continuous().and_then(
+        [](const ContinuousSystem<>& states) { return mimo_margins(states); });
+  }
+  const Index m = loop.inputs();
+  const MatrixXd one = MatrixXd::Identity(m, m);
+  // u = r - y; S is u, T is y.
+  FLYBALL_TRY_IN(where, const DelaySystem S, rewired(loop, {-one, one, -one, one}));
+  FLYBALL_TRY_IN(where, const DelaySystem T, rewired(loop, {-one, one, one, 0.0 * one}));
+  FLYBALL_TRY_IN(where, const DelaySystem difference, rewired(loop, {-one, one, -2.0 * one, one}));
+  MimoMargins margins;
+  FLYBALL_TRY_IN(where, margins.stable, is_stable(S));
+  FLYBALL_TRY_IN(where, margins.sensitivity, peak_gain(S));
+  FLYBALL_TRY_IN(where, margins.complementary, peak_gain(T));
+  FLYBALL_TRY_IN(where, const Peak of_difference, peak_gain(difference));
+  margins.full_disk_margin = margins.stable ? 2.0 / of_difference.value : 0.0;
+  margins.disk_margin = margins.full_disk_margin;
+  margins.disk_frequency = of_difference.frequency;
+  if (m > 1) {
+    FLYBALL_TRY_IN(where, const auto response, frequency_response(difference));
+    FLYBALL_TRY_IN(where, const Peak scaled,
+                   largest_scaled_gain(response, of_difference.frequency));
+    margins.disk_margin = margins.stable ? 2.0 / scaled.value : 0.0;
+    margins.disk_frequency = scaled.frequency;
+  }
+  for (Index channel = 0; channel < m; ++channel) {
+    MatrixXd others = -one;
+    others(channel, channel) = 0.0;
+    FLYBALL_TRY_IN(
+        where, const DelaySystem opened,
+        rewired(loop, {others, one.col(channel), one.row(channel), MatrixXd::Zero(1, 1)}));
+    FLYBALL_TRY_IN(where, auto alone, loop_margins(opened));
+    margins.loop_at_a_time.push_back(std::move(alone));
+  }
+  return margins;
+}
 Expected<MimoMargins> mimo_margins(const ContinuousSystem<>& loop) {
   return margins_of(loop);
 }

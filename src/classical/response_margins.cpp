@@ -426,7 +426,7 @@ detail::LoopPeaks peaks_of(const BoundedLoop& loop, const Step& range, const Eig
                            bool discrete) {
   detail::LoopPeaks peaks{largest(loop, range, grid, Measure::sensitivity),
                           largest(loop, range, grid, Measure::complementary),
-                          largest(loop, range, grid, Measure::spread).value};
+                          largest(loop, range, grid, Measure::spread)};
   const Index excess = loop.factors().poles.size() - loop.factors().zeros.size();
   const double direct = excess == 0 ? loop.factors().gain : 0.0;
   if (discrete || (loop.factors().delay > 0.0 && direct != 0.0)) {
@@ -443,7 +443,7 @@ detail::LoopPeaks peaks_of(const BoundedLoop& loop, const Step& range, const Eig
   if (direct != 0.0) {
     consider(std::abs(direct) * last, peaks.complementary);
   }
-  peaks.spread = std::max(peaks.spread, std::abs(1.0 - direct) * last);
+  consider(std::abs(1.0 - direct) * last, peaks.spread);
   return peaks;
 }
 
@@ -452,7 +452,7 @@ detail::LoopPeaks peaks_of(const BoundedLoop& loop, const Step& range, const Eig
 Expected<detail::LoopPeaks> detail::loop_peaks(const FrequencyResponse& response) {
   auto factors = response.factors();
   if (factors->gain == 0.0) {
-    return LoopPeaks{{1.0, 0.0}, {0.0, 0.0}, 1.0};
+    return LoopPeaks{{1.0, 0.0}, {0.0, 0.0}, {1.0, 0.0}};
   }
   FLYBALL_TRY(const FrequencyGrid grid, frequency_grid(response));
   const BoundedLoop loop(response, *std::move(factors));
@@ -460,6 +460,11 @@ Expected<detail::LoopPeaks> detail::loop_peaks(const FrequencyResponse& response
 }
 
 Expected<LoopMargins> loop_margins(const FrequencyResponse& response) {
+  return detail::whole_margins(response).map(
+      [](detail::WholeMargins&& whole) { return std::move(whole.margins); });
+}
+
+Expected<detail::WholeMargins> detail::whole_margins(const FrequencyResponse& response) {
   constexpr std::string_view where = "margins";
   FLYBALL_TRY(const NyquistData curve, nyquist(response).map_error([&](Error&& error) {
     return std::move(error).in(std::string(where));
@@ -473,7 +478,7 @@ Expected<LoopMargins> loop_margins(const FrequencyResponse& response) {
     margins.sensitivity = {1.0, 0.0};
     margins.delay_margin = margins.stable ? infinity : 0.0;
     margins.disk_margin = margins.stable ? 2.0 : 0.0;
-    return margins;
+    return WholeMargins{std::move(margins), {1.0, 0.0}};
   }
   const BoundedLoop loop(response, *std::move(factors));
   const Step range = loop.range();
@@ -520,8 +525,8 @@ Expected<LoopMargins> loop_margins(const FrequencyResponse& response) {
   const auto peaks = peaks_of(loop, range, curve.frequency, response.period().has_value());
   margins.sensitivity = peaks.sensitivity;
   margins.complementary = peaks.complementary;
-  margins.disk_margin = margins.stable ? 2.0 / peaks.spread : 0.0;
-  return margins;
+  margins.disk_margin = margins.stable ? 2.0 / peaks.spread.value : 0.0;
+  return WholeMargins{std::move(margins), peaks.spread};
 }
 
 Expected<SampleDelayReport> sample_delay_report(const TransferFunction& loop, Time period) {

@@ -38,6 +38,7 @@ enum class Token : std::uint8_t {
   open,
   close,
   list,
+  comma,  ///< Between the arguments of feedback.
   end,
 };
 
@@ -167,6 +168,10 @@ class Parser {
       }
       here_ = {Token::name, {at_, end - at_}};
       at_ = end;
+      return;
+    }
+    if (c == ',' && calls_ > 0) {
+      here_ = {Token::comma, {at_++, 1}};
       return;
     }
     for (const Spelling& spelling : spellings) {
@@ -406,17 +411,63 @@ class Parser {
       return 0;
     }
     if (here_.token != Token::close) {
-      fail(Error(ExpressionError::unclosed_parenthesis)
-               .about("\"(\"")
-               .got("not closed")
-               .hint("write the ) that closes it"),
-           open);
+      not_closed(open);
       return 0;
     }
     // The parentheses are part of what they enclose, for messages.
     syntax_.nodes[inner].place = open.to(here_.place);
     next();
     return inner;
+  }
+
+  /// feedback(G, H), or feedback(G) with H = 1.
+  std::size_t feedback(TextPlace place) {
+    if (here_.token != Token::open) {
+      fail(Error(ExpressionError::missing_operand)
+               .about(quote(text_, place))
+               .got("a function without an argument")
+               .hint("write feedback(G, H) for G/(1 + G*H)"),
+           place);
+      return 0;
+    }
+    const TextPlace open = here_.place;
+    ++calls_;
+    next();
+    const std::size_t forward = sum();
+    std::size_t back = 0;
+    if (!error_ && here_.token == Token::comma) {
+      next();
+      back = sum();
+    } else if (!error_) {
+      back = push({.place = open, .number = 1.0});
+    }
+    --calls_;
+    if (error_) {
+      return 0;
+    }
+    if (here_.token == Token::comma) {
+      fail(Error(ExpressionError::stray_character)
+               .about(quote(text_, here_.place))
+               .got("before a third argument")
+               .hint("write feedback(G, H) for G/(1 + G*H)"),
+           here_.place);
+      return 0;
+    }
+    if (here_.token != Token::close) {
+      not_closed(open);
+      return 0;
+    }
+    const TextPlace whole = place.to(here_.place);
+    next();
+    return push({.kind = TransferNode::Kind::feedback, .place = whole, .a = forward, .b = back});
+  }
+
+  void not_closed(TextPlace open) {
+    fail(Error(ExpressionError::unclosed_parenthesis)
+             .about("\"(\"")
+             .got("not closed")
+             .hint("write the ) that closes it"),
+         open);
   }
 
   std::size_t name(TextPlace place) {
@@ -441,6 +492,9 @@ class Parser {
     }
     if (word == "pi") {
       return push({.place = place, .number = std::numbers::pi});
+    }
+    if (word == "feedback") {
+      return feedback(place);
     }
     if (word == "exp" || word == "sqrt") {
       if (here_.token != Token::open) {
@@ -467,7 +521,8 @@ class Parser {
   }
 
   void unknown(std::string_view word, TextPlace place) {
-    static constexpr std::array<std::string_view, 6> known{"s", "z", "exp", "sqrt", "pi", "e"};
+    static constexpr std::array<std::string_view, 7> known{"s",  "z", "exp",     "sqrt",
+                                                           "pi", "e", "feedback"};
     std::string hint;
     if (word == "S" || word == "p" || word == "P") {
       hint = "write s for the Laplace variable";
@@ -588,6 +643,7 @@ class Parser {
   std::size_t at_ = 0;
   Lexeme here_;
   int depth_ = 0;
+  int calls_ = 0;  ///< Of feedback, whose arguments a comma separates.
   std::optional<Error> error_;
   TransferSyntax syntax_;
 };

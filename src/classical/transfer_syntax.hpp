@@ -41,6 +41,7 @@ struct TransferNode {
     power,
     exponential,
     square_root,
+    feedback,  ///< a/(1 + a b)
   };
 
   Kind kind = Kind::number;

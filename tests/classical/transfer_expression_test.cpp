@@ -225,6 +225,113 @@ TEST(TransferExpression, ErrorsAndTheirPlaces) {
   refuse("1/(s+1)\x01", ExpressionError::stray_character, "       ^~~~");
 }
 
+/// The same expression by complex arithmetic.
+struct Late {
+  std::string text;
+  std::complex<double> (*value)(std::complex<double> s);
+};
+
+// What has several dead times is a system in which they stand; nothing is approximated.
+TEST(TransferExpression, SeveralDeadTimes) {
+  static constexpr auto e = [](Complex x) { return std::exp(x); };
+  const Late cases[] = {
+      {"exp(-s)/(s+1) + exp(-0.3*s)/(s+2)",
+       [](Complex s) { return e(-s) / (s + 1.0) + e(-0.3 * s) / (s + 2.0); }},
+      {"1/s + exp(-s)/s", [](Complex s) { return (1.0 + e(-s)) / s; }},
+      {"feedback(2/s*exp(-s), 1)", [](Complex s) { return 2.0 * e(-s) / (s + 2.0 * e(-s)); }},
+      {"feedback(2/s*exp(-s))", [](Complex s) { return 2.0 * e(-s) / (s + 2.0 * e(-s)); }},
+      {"exp(-s)/(s + exp(-s))", [](Complex s) { return e(-s) / (s + e(-s)); }},
+      {"(s^3+1)/(s^3 + 2s^2*exp(-0.1s) + 3exp(-0.5s))",
+       [](Complex s) {
+         return (s * s * s + 1.0) / (s * s * s + 2.0 * s * s * e(-0.1 * s) + 3.0 * e(-0.5 * s));
+       }},
+      {"feedback(exp(-0.2s)/(s+1)^2, exp(-0.3s)*(0.1 + 1/(s+3)))*(2 - exp(-s))/(s^2+s+4)",
+       [](Complex s) {
+         const Complex G = e(-0.2 * s) / ((s + 1.0) * (s + 1.0));
+         const Complex H = e(-0.3 * s) * (0.1 + 1.0 / (s + 3.0));
+         return G / (1.0 + G * H) * (2.0 - e(-s)) / (s * s + s + 4.0);
+       }},
+      {"(1 + exp(-s))^3/(s+1)^2",
+       [](Complex s) {
+         const Complex a = 1.0 + e(-s);
+         return a * a * a / ((s + 1.0) * (s + 1.0));
+       }},
+      {"(0.5 - exp(-0.7s))^-1", [](Complex s) { return 1.0 / (0.5 - e(-0.7 * s)); }},
+  };
+  for (const Late& c : cases) {
+    const std::string texts[] = {c.text};
+    const auto parsed = parse_transfer_system(texts, {.gain = -1.5, .delay = Time(0.25)});
+    ASSERT_TRUE(parsed) << c.text << ": " << to_string(parsed.error());
+    const auto* system = std::get_if<DelaySystem>(&*parsed);
+    ASSERT_NE(system, nullptr) << c.text;
+    for (const Complex s : {Complex(0.0, 0.3), Complex(0.2, -2.0), Complex(-0.1, 11.0)}) {
+      const Complex expected = -1.5 * e(-0.25 * s) * c.value(s);
+      EXPECT_LE(std::abs(system->at(s).value()(0, 0) - expected), 2e-13 * std::abs(expected))
+          << c.text;
+    }
+  }
+  // No pole stands twice: that of s alone is the integrator, not two of them.
+  const std::string shared[] = {"1/s + exp(-s)/s"};
+  EXPECT_EQ(std::get<DelaySystem>(parse_transfer_system(shared).value()).states(), 1);
+  // What cancels leaves a rational function, and so do delays that are one but for rounding.
+  for (const char* text :
+       {"feedback(1/s, 1)", "(exp(-s)+2)/(exp(-s)+2)/s", "exp(-0.1s)*exp(-0.2s)/s + exp(-0.3s)/s^2",
+        "(1/s + exp(-s)/s)/(1 + exp(-s))", "exp(-s)/s + 1/s - exp(-s)/s"}) {
+    const std::string texts[] = {text};
+    EXPECT_TRUE(std::holds_alternative<TransferFunction>(parse_transfer_system(texts).value()))
+        << text;
+  }
+  EXPECT_EQ(parse_transfer_function("feedback(2/(s+1), 3)").value().den(),
+            Eigen::Vector2d(1.0, 7.0));
+}
+
+// Of random degree: the chain keeps what companion matrices lose.
+TEST(TransferExpression, SeveralDeadTimesOfHighOrder) {
+  Random random(3);
+  for (int i = 0; i < 40; ++i) {
+    std::string den;
+    std::vector<double> at;
+    for (int k = 0; k < 12; ++k) {
+      const std::string digits = std::to_string(std::pow(10.0, 4.0 * random.uniform() - 2.0));
+      at.push_back(std::stod(digits));
+      den += "(s+" + digits + ")";
+    }
+    const std::string texts[] = {"(s+2)*exp(-0.1s)/(" + den + " + exp(-0.4s))"};
+    const auto system = std::get<DelaySystem>(parse_transfer_system(texts).value());
+    EXPECT_EQ(system.states(), 12);
+    for (const double w : {0.02, 0.7, 30.0}) {
+      const std::complex<double> s(0.0, w);
+      std::complex<double> below = 1.0;
+      for (const double p : at) {
+        below *= s + p;
+      }
+      const auto expected = (s + 2.0) * std::exp(-0.1 * s) / (below + std::exp(-0.4 * s));
+      EXPECT_LE(std::abs(system.at(s).value()(0, 0) - expected), 1e-11 * std::abs(expected));
+    }
+  }
+}
+
+TEST(TransferExpression, ErrorsOfSeveralDeadTimes) {
+  const auto refused = [](const char* text) {
+    const std::string texts[] = {text};
+    return parse_transfer_system(texts).error();
+  };
+  EXPECT_TRUE(refused("1/(1 + s*exp(-s))").is(TransferError::improper));
+  EXPECT_TRUE(refused("s + exp(-s)").is(TransferError::improper));
+  EXPECT_TRUE(refused("1/(exp(-2s) + exp(-s))").is(TransferTextError::negative_delay));
+  EXPECT_TRUE(refused("feedback(1, -1)").is(TransferError::zero_denominator));
+  EXPECT_TRUE(refused("feedback").is(ExpressionError::missing_operand));
+  EXPECT_TRUE(refused("feedback(1/s").is(ExpressionError::unclosed_parenthesis));
+  EXPECT_TRUE(refused("feedback(1/s, 1, 2)").is(ExpressionError::stray_character));
+  EXPECT_TRUE(refused("exp(-(1+exp(-s)))").is(TransferTextError::not_a_delay));
+  EXPECT_TRUE(refused("(1+exp(-s)+exp(-pi*s))^20/s").is(TransferTextError::degree_too_high));
+  EXPECT_EQ(
+      to_string(parse_transfer_function("1/s + exp(-s)/s").error()),
+      "transfer function: \"1/s + exp(-s)/s\" is made of parts of several dead times; it must "
+      "be a rational function behind one dead time; approximate the others by (1 - T*s/2)/(1 "
+      "+ T*s/2) (offset = 0, length = 15)");
+}
+
 TEST(TransferExpression, Sentences) {
   const auto said = [](std::string_view text) {
     return to_string(parse_transfer_function(text).error());

@@ -12,6 +12,8 @@
 /// What linear systems do to sinusoids, whatever they are made of (sections E.3 and E.7).
 namespace flyball::classical {
 
+class DelaySystem;
+
 /// A transfer function from one input to one output as a product,
 /// gain Π(s - zᵢ)/Π(s - pⱼ) e^{-delay s}, of a discrete one in z with its delay in seconds.
 struct Factors {
@@ -28,6 +30,12 @@ class FrequencyResponse {
   /// What stands behind one; a further kind of system is a further source.
   class Source {
    public:
+    /// Where a grid of frequencies may begin.
+    struct Hints {
+      Eigen::VectorXcd places;  ///< In s, near which the response is steep.
+      double delay = 0.0;       ///< s, the longest.
+    };
+
     Source() = default;
     Source(const Source&) = delete;
     Source& operator=(const Source&) = delete;
@@ -47,6 +55,8 @@ class FrequencyResponse {
     /// One entry as a product, where it is one; the phase and the grid are then known exactly.
     [[nodiscard]] virtual std::optional<Factors> factors(Eigen::Index output,
                                                          Eigen::Index input) const;
+    /// Of one without factors.
+    [[nodiscard]] virtual Hints hints() const;
     /// The frequencies of which anything is known, increasing; empty where all are.
     [[nodiscard]] virtual Eigen::VectorXd known_frequencies() const;
   };
@@ -75,6 +85,7 @@ class FrequencyResponse {
                                                Eigen::Index input = 0) const {
     return source_->factors(output, input);
   }
+  [[nodiscard]] Source::Hints hints() const { return source_->hints(); }
   [[nodiscard]] Eigen::VectorXd known_frequencies() const { return source_->known_frequencies(); }
   /// From one input to one output. @errors ArgumentError::out_of_range.
   [[nodiscard]] Expected<FrequencyResponse> entry(Eigen::Index output, Eigen::Index input) const;
@@ -93,6 +104,10 @@ class FrequencyResponse {
                                                              Time delay = Time(0.0));
 [[nodiscard]] Expected<FrequencyResponse> frequency_response(const DiscreteSystem<>& system,
                                                              Time delay = Time(0.0));
+
+/// Of a system with dead time anywhere in it, exact; its factors are not known.
+/// Cost: O((n + delays)³) a frequency.
+[[nodiscard]] Expected<FrequencyResponse> frequency_response(const DelaySystem& system);
 
 /// How a grid of frequencies is chosen.
 struct FrequencyGridOptions {

@@ -4,7 +4,9 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <variant>
 
+#include <flyball/classical/delay_system.hpp>
 #include <flyball/classical/transfer_function.hpp>
 #include <flyball/classical/zero_pole_gain.hpp>
 
@@ -30,8 +32,8 @@ enum class TransferTextError {
 ///
 /// Numbers, s or z, + - * / ^ with whole powers, parentheses, products without a sign (2s, 3(s+1)),
 /// dead time as exp(-T*s) or e^(-T*s), powers z^-1, coefficients in descending powers ([1 2]/[1 3
-/// 2]), pi, sqrt(number). −, ·, ×, ², ³ and ** are read, too. Whatever a division 1/2s might mean
-/// is asked, not guessed.
+/// 2]), pi, sqrt(number), feedback(G, H) for G/(1 + G H), H = 1 if left out. −, ·, ×, ², ³ and **
+/// are read, too. Whatever a division 1/2s might mean is asked, not guessed.
 ///
 /// Factors stay factors: nothing is multiplied out but where a sum needs it, and then in 31 digits.
 /// Sums of fractions have the least common denominator of the factors as written, and compound
@@ -50,6 +52,25 @@ enum class TransferTextError {
 /// plant. @errors As above, and `text` as evidence: which of them, from 0.
 [[nodiscard]] Expected<TransferFunction> parse_transfer_product(
     std::span<const std::string> texts, std::optional<Time> period = std::nullopt);
+
+/// A rational function behind one dead time, or a system with several of them.
+using TransferSystem = std::variant<TransferFunction, DelaySystem>;
+
+/// What stands before an expression beside the texts.
+struct TransferScale {
+  double gain = 1.0;
+  std::optional<Time> period{};  ///< Of z.
+  Time delay{0.0};               ///< s, further dead time of the whole.
+};
+
+/// The product of several texts in which dead times may stand anywhere: in sums of different ones,
+/// and below, so that "exp(-s)/(s+1) + exp(-0.3*s)/(s+2)", "exp(-s)/(s + exp(-s))" and
+/// "feedback(2/s*exp(-s), 1)" are read and nothing is approximated. A quotient of sums of them
+/// becomes one chain of states, of the degree that stands below.
+/// @errors As `parse_transfer_product`, but not delay_in_loop; TransferError::improper where the
+/// highest derivative below is delayed.
+[[nodiscard]] Expected<TransferSystem> parse_transfer_system(std::span<const std::string> texts,
+                                                             const TransferScale& loop = {});
 
 /// The same by its roots: those of each factor as it is written, so that (s+1)^20 has twenty poles
 /// at -1. It may be improper. @errors As above, and SystemError::no_convergence.

@@ -1,0 +1,354 @@
+#include <flyball/classical/delay_margins.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include <flyball/classical/delay_poles.hpp>
+#include <flyball/classical/response_margins.hpp>
+#include <flyball/math/search/minimum.hpp>
+#include <flyball/math/search/roots.hpp>
+#include <flyball/systems/system_error.hpp>
+
+#include "classical/delay_bounds.hpp"
+#include "core/format.hpp"
+#include "core/try.hpp"
+#include "math/dense/dense.hpp"
+
+namespace flyball::classical {
+
+using detail::DelayBall;
+using detail::DelayBounds;
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+using Complex = std::complex<double>;
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double pi = std::numbers::pi;
+constexpr double closest = 1e-13;
+/// Of the disk's radius, how far the ends of an interval are from its middle.
+constexpr double share = 0.25;
+
+struct Step {
+  double from = 0.0;
+  double to = 0.0;
+
+  [[nodiscard]] double middle() const { return 0.5 * (from + to); }
+  [[nodiscard]] double half() const { return 0.5 * (to - from); }
+  [[nodiscard]] bool is_short() const { return to - from <= closest * to; }
+  /// Its halves, the higher one first.
+  [[nodiscard]] std::array<Step, 2> halves() const {
+    const double cut = to > 2.0 * from && from > 0.0 ? std::sqrt(from * to) : middle();
+    return {Step{cut, to}, Step{from, cut}};
+  }
+};
+
+DelayBall around(const DelayBounds& bounds, const Step& step) {
+  return bounds.around(step.middle(), step.half() / share);
+}
+
+Expected<void> check_single(const DelaySystem& loop, std::string_view where) {
+  if (loop.inputs() != 1 || loop.outputs() != 1) {
+    return refusal(ArgumentError::wrong_shape, where, "the loop")
+        .got(flyball::detail::format("{} x {}", loop.outputs(), loop.inputs()))
+        .expected("of one input and one output");
+  }
+  return {};
+}
+
+/// Gain or phase of a loop, as what is zero where it crosses.
+struct Crossing {
+  double (*value)(Complex L);
+  /// Of L'/L along the axis.
+  double (*part)(Complex slope);
+  /// Whether it may be zero where L is within `off` of a value.
+  bool (*possible)(Complex L, double off);
+};
+
+constexpr Crossing gain_crossing{
+    [](Complex L) { return std::log(std::abs(L)); }, [](Complex slope) { return slope.real(); },
+    [](Complex L, double off) { return std::abs(std::abs(L) - 1.0) <= off; }};
+constexpr Crossing phase_crossing{
+    [](Complex L) { return std::arg(-L); }, [](Complex slope) { return slope.imag(); },
+    // The distance from the negative half of the real line.
+    [](Complex L, double off) {
+      return (L.real() < 0.0 ? std::abs(L.imag()) : std::abs(L)) <= off;
+    }};
+
+/// Every zero on the range, nothing where they do not end. What holds on the whole of a step of
+/// which ln L moves by less than a radian: its slope's part keeps the sign, or it is halved.
+std::optional<std::vector<double>> zeros(const DelaySystem& loop, const DelayBounds& bounds,
+                                         const Step& range, const Crossing& crossing) {
+  std::vector<double> found;
+  std::vector<Step> pending{range};
+  constexpr int most_steps = 60'000;
+  const auto value = [&](double w) { return crossing.value(loop.response(w)(0, 0)); };
+  for (int count = 0; !pending.empty(); ++count) {
+    if (count == most_steps) {
+      return std::nullopt;
+    }
+    const Step step = pending.back();
+    pending.pop_back();
+    const DelayBall ball = around(bounds, step);
+    const Complex L = ball.value(0, 0);
+    const Complex slope = ball.slope(0, 0) * Complex(0.0, 1.0);
+    const double bound = ball.bound(0, 0);
+    const double off = bound * share;
+    if (std::isfinite(off) && !crossing.possible(L, off)) {
+      continue;
+    }
+    // Re or Im of L' conj(L), against what both can change by.
+    const double bend = bound * share / step.half() * (1.0 / ((1.0 - share) * (1.0 - share)) - 1.0);
+    const double changed = bend * (std::abs(L) + off) + std::abs(slope) * off;
+    const bool monotone = std::isfinite(off) && off < 0.5 * std::abs(L) &&
+                          std::abs(crossing.part(slope * std::conj(L))) > changed;
+    if (monotone) {
+      const double at_start = value(step.from);
+      const double at_end = value(step.to);
+      if ((at_start > 0.0) != (at_end > 0.0)) {
+        if (const auto root = find_root(value, step.from, step.to, at_start, at_end)) {
+          found.push_back(root->x);
+        }
+      }
+      continue;
+    }
+    if (step.is_short()) {
+      // It touches zero, or there is a pole or zero of L on the axis, which is no crossing.
+      if (std::isfinite(off) && off < 0.1 * std::abs(L) && std::abs(crossing.value(L)) < 1e-9) {
+        found.push_back(step.middle());
+      }
+      continue;
+    }
+    for (const Step& half : step.halves()) {
+      pending.push_back(half);
+    }
+  }
+  std::sort(found.begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end(),
+                          [](double a, double b) { return b - a <= 1e-12 * b; }),
+              found.end());
+  return found;
+}
+
+/// From where the asymptote K ω^{-N} rules, so that it does not cross one below.
+double lowest(const DelaySystem& loop, const DelayBounds& bounds) {
+  double from = 1e-6 * bounds.slowest();
+  const double here = std::abs(loop.response(from)(0, 0));
+  const double before = std::abs(loop.response(0.5 * from)(0, 0));
+  const double integrators = std::round(std::log2(before / here));
+  if (std::isfinite(integrators) && integrators != 0.0 && here > 0.0 &&
+      (here < 1.0) == (integrators > 0.0)) {
+    from *= 0.1 * std::pow(here, 1.0 / integrators);
+  }
+  return std::max(from, 1e-290);
+}
+
+/// From where on the gain stays below a level; infinite if that is not known.
+double last_above(const DelayBounds& bounds, double level) {
+  const auto below = [&](double w) {
+    const MatrixXd most = bounds.beyond(w);
+    return most.allFinite() && flyball::detail::singular_values_of(most)(0) < level;
+  };
+  if (!below(infinity)) {
+    return infinity;
+  }
+  double high = bounds.fastest();
+  for (int i = 0; i < 200 && !below(high); ++i) {
+    high *= 2.0;
+  }
+  return high;
+}
+
+/// u = F y + E r, y' = H y + J r with multiples of the identity.
+Expected<DelaySystem> closed(const DelaySystem& loop, double of_output, double of_input) {
+  const MatrixXd one = MatrixXd::Identity(loop.inputs(), loop.inputs());
+  return rewired(loop, {-one, one, of_output * one, of_input * one});
+}
+
+double largest(const MatrixXcd& G) {
+  return G.allFinite() ? flyball::detail::singular_values_of_complex(G)(0) : 0.0;
+}
+
+double wrapped(double degrees) {
+  const double turned = std::remainder(degrees, 360.0);
+  return turned == -180.0 ? 180.0 : turned;
+}
+
+}  // namespace
+
+Expected<Peak> peak_gain(const DelaySystem& system) {
+  constexpr std::string_view where = "peak gain";
+  if (system.period()) {
+    return refusal(TransferError::period_mismatch, where, "the system")
+        .got(flyball::detail::format("sampled at {} s", system.period()->si()))
+        .expected("continuous");
+  }
+  FLYBALL_TRY_IN(where, const auto response, frequency_response(system));
+  FLYBALL_TRY_IN(where, const auto grid, frequency_grid(response));
+  DelayBounds bounds(system);
+  Peak best;
+  const auto consider = [&](double value, double w) {
+    if (value > best.value) {
+      best = {value, w};
+    }
+  };
+  const auto size = [&](double w) { return largest(system.response(w)); };
+  consider(size(0.0), 0.0);
+  std::vector<Step> pending;
+  double last = 0.0;
+  for (const double w : grid.frequency) {
+    consider(size(w), w);
+    pending.push_back({last, w});
+    last = w;
+  }
+  // As far as anything above the best can be.
+  constexpr double tolerance = 1e-5;
+  const double at_infinity = bounds.largest_at_infinity();
+  const double most = std::max(best.value, at_infinity) * (1.0 + 1e-3);
+  const double end = std::min(last_above(bounds, most), 1e3 * std::max(bounds.fastest(), last));
+  for (; last < end; last *= 2.0) {
+    pending.push_back({last, 2.0 * last});
+  }
+  std::reverse(pending.begin(), pending.end());
+  constexpr int most_steps = 20'000;
+  for (int count = 0; !pending.empty() && count < most_steps; ++count) {
+    const Step step = pending.back();
+    pending.pop_back();
+    const DelayBall ball = around(bounds, step);
+    consider(largest(ball.value), step.middle());
+    // Straight between the ends, of which the norm is largest at one, and what is left.
+    const double rest = ball.bound.norm() * share * share / (1.0 - share);
+    const MatrixXcd moved = ball.slope * Complex(0.0, step.half());
+    const double bound =
+        std::isfinite(rest)
+            ? std::max(largest(ball.value + moved), largest(ball.value - moved)) + rest
+            : infinity;
+    if (bound > best.value * (1.0 + tolerance) && !step.is_short()) {
+      for (const Step& half : step.halves()) {
+        pending.push_back(half);
+      }
+    }
+  }
+  if (best.frequency > 0.0) {
+    for (const double width : {1e-2, 1e-4}) {
+      const auto top = find_minimum([&](double w) { return -size(w); },
+                                    best.frequency * (1.0 - width), best.frequency * (1.0 + width));
+      if (top) {
+        consider(-top->value, top->x);
+      }
+    }
+  }
+  if (at_infinity > best.value * (1.0 - 1e-12)) {
+    best = {at_infinity, infinity};
+  }
+  return best;
+}
+
+Expected<LoopMargins> loop_margins(const DelaySystem& loop) {
+  constexpr std::string_view where = "margins";
+  FLYBALL_CHECK(check_single(loop, where));
+  if (loop.period()) {
+    FLYBALL_TRY_IN(where, const auto states, loop.to_discrete());
+    FLYBALL_TRY_IN(where, const auto response, frequency_response(states));
+    return loop_margins(response);
+  }
+  if (!loop.has_delay()) {
+    FLYBALL_TRY_IN(where, const auto states, loop.to_continuous());
+    FLYBALL_TRY_IN(where, const auto response, frequency_response(states));
+    return loop_margins(response);
+  }
+  FLYBALL_TRY_IN(where, const DelaySystem T, feedback(loop));
+  FLYBALL_TRY_IN(where, const DelayPoles poles, rightmost_poles(T));
+  LoopMargins margins;
+  margins.stable = poles.stable;
+  margins.unstable_poles = poles.unstable;
+  DelayBounds bounds(loop);
+  bounds.consider(poles.poles);
+  const double fastest = 10.0 * bounds.fastest();
+  const double from = lowest(loop, bounds);
+  const double end = last_above(bounds, 1.0);
+  const auto unit_gain = zeros(
+      loop, bounds, {from, std::isfinite(end) ? std::max(end, fastest) : fastest}, gain_crossing);
+  const auto places = zeros(loop, bounds, {from, fastest}, phase_crossing);
+  if (!unit_gain || !places) {
+    return refusal(SystemError::no_convergence, where,
+                   !unit_gain ? "gain crossings" : "phase crossings")
+        .got("without end: the loop stays where it crosses, or crosses very often");
+  }
+  double further = infinity;
+  for (const double w : *unit_gain) {
+    const double margin = wrapped(180.0 + std::arg(loop.response(w)(0, 0)) * 180.0 / pi);
+    margins.gain_crossings.push_back({w, margin});
+    further = std::min(further, (margin > 0.0 ? margin : margin + 360.0) * pi / 180.0 / w);
+    if (!margins.phase_margin || std::abs(margin) < std::abs(*margins.phase_margin)) {
+      margins.phase_margin = margin;
+    }
+  }
+  const bool jumps = std::isinf(end) && bounds.largest_at_infinity() >= 1.0;
+  margins.delay_margin = margins.stable && !jumps ? further : 0.0;
+  constexpr std::size_t most = 1000;
+  for (const double w : *places) {
+    const double gain = std::abs(loop.response(w)(0, 0));
+    if (!(gain > 0.0) || !std::isfinite(gain) || margins.phase_crossings.size() == most) {
+      continue;
+    }
+    margins.phase_crossings.push_back({w, 1.0 / gain});
+    if (!margins.gain_margin ||
+        std::abs(std::log(gain)) < std::abs(std::log(*margins.gain_margin))) {
+      margins.gain_margin = 1.0 / gain;
+    }
+  }
+  FLYBALL_TRY_IN(where, const DelaySystem S, closed(loop, -1.0, 1.0));
+  FLYBALL_TRY_IN(where, const DelaySystem difference, closed(loop, -2.0, 1.0));
+  FLYBALL_TRY_IN(where, margins.sensitivity, peak_gain(S));
+  FLYBALL_TRY_IN(where, margins.complementary, peak_gain(T));
+  FLYBALL_TRY_IN(where, const Peak spread, peak_gain(difference));
+  margins.disk_margin = margins.stable ? 2.0 / spread.value : 0.0;
+  return margins;
+}
+
+Expected<std::optional<double>> bandwidth(const DelaySystem& system, double factor) {
+  constexpr std::string_view where = "bandwidth";
+  FLYBALL_CHECK(check_single(system, where));
+  const double rest = std::abs(system.dc_gain()(0, 0));
+  if (!(rest > 0.0) || !std::isfinite(rest)) {
+    return std::optional<double>();
+  }
+  // |G| crosses factor |G(0)| where |G/(factor |G(0)|)| crosses one.
+  const MatrixXd scale = MatrixXd::Constant(1, 1, 1.0 / (factor * rest));
+  FLYBALL_TRY_IN(where, const DelaySystem gain, DelaySystem::gain(scale, system.period()));
+  FLYBALL_TRY_IN(where, const DelaySystem scaled, series(system, gain));
+  const auto falls = [&](double w) {
+    return std::abs(scaled.response(w * (1.0 + 1e-6))(0, 0)) < 1.0;
+  };
+  if (scaled.period() || !scaled.has_delay()) {
+    FLYBALL_TRY_IN(where, const LoopMargins margins, loop_margins(scaled));
+    for (const GainCrossing& at : margins.gain_crossings) {
+      if (falls(at.frequency)) {
+        return std::optional(at.frequency);
+      }
+    }
+    return std::optional<double>();
+  }
+  const DelayBounds bounds(scaled);
+  const double end = last_above(bounds, 1.0);
+  const auto crossings = zeros(
+      scaled, bounds, {lowest(scaled, bounds), std::isfinite(end) ? end : 10.0 * bounds.fastest()},
+      gain_crossing);
+  if (!crossings) {
+    return refusal(SystemError::no_convergence, where, "gain crossings").got("without end");
+  }
+  for (const double w : *crossings) {
+    if (falls(w)) {
+      return std::optional(w);
+    }
+  }
+  return std::optional<double>();
+}
+
+}  // namespace flyball::classical
