@@ -6,6 +6,7 @@
 
 #include <flyball/core/expected.hpp>
 #include <flyball/core/time_series.hpp>
+#include <flyball/mechanisms/power/winding.hpp>
 #include <flyball/mechanisms/powertrain.hpp>
 
 /// How fast a mechanism can get somewhere: its whole nonlinear motion under the strongest push and
@@ -22,19 +23,7 @@ enum class TravelError {
 };
 [[nodiscard]] ErrorInfo error_info(TravelError code);
 
-/// The windings of a motor as one warm body: C dT/dt = I² R(T) - (T - T_ambient)/R_th with
-/// R(T) = R (1 + α (T - T_ambient)), all of one motor.
-struct Winding {
-  double heat_capacity = std::numeric_limits<double>::infinity();       ///< C, J/K.
-  double thermal_resistance = std::numeric_limits<double>::infinity();  ///< R_th, K/W.
-  double ambient = 25.0;    ///< °C, where it starts and the datasheet's R holds.
-  double copper = 0.00393;  ///< α, 1/K.
-
-  /// Whether anything is known of how warm it gets.
-  [[nodiscard]] bool is_known() const noexcept {
-    return heat_capacity < std::numeric_limits<double>::infinity();
-  }
-};
+using mechanisms::Winding;
 
 /// A motion that has to be as fast as possible.
 struct TravelJob {

@@ -12,14 +12,18 @@
 namespace flyball::mechanisms::detail {
 
 Expected<Shaft> checked_shaft(const DriveShaft& shaft, std::string_view where,
-                              std::string_view name) {
+                              std::string_view name, bool may_be_massless) {
   const auto& [motor, gearing, inertia, friction, damping] = shaft;
   const auto of = [&](std::string_view what) {
     return flyball::detail::format("{} of {}", what, name);
   };
   return Checks(where)
       .also([&] { return check_drive(motor, gearing, where, of("the gearing")); })
-      .positive(inertia.si(), of("moment_of_inertia"), "kg m^2")
+      .also([&] {
+        return may_be_massless
+                   ? check_not_negative(inertia.si(), where, of("moment_of_inertia"), "kg m^2")
+                   : check_positive(inertia.si(), where, of("moment_of_inertia"), "kg m^2");
+      })
       .not_negative(friction, of("friction"), "N m")
       .not_negative(damping, of("damping"), "N m s/rad")
       .map([&] {

@@ -5,7 +5,7 @@
 namespace flyball::mechanisms {
 
 double detail::rail_under_load(const Battery& battery, std::span<const MotorTerminal> motors,
-                               std::span<const double> back_emf,
+                               std::span<const double> R, std::span<const double> back_emf,
                                std::span<const double> wanted) noexcept {
   using flyball::detail::signal_or_zero;
   const double open = signal_or_zero(battery.open_circuit_voltage) -
@@ -16,14 +16,14 @@ double detail::rail_under_load(const Battery& battery, std::span<const MotorTerm
   // What motors feed back is at most e²/(4 R) each, so that no rail is above this.
   double fed_back = 0.0;
   for (std::size_t k = 0; k < motors.size(); ++k) {
-    fed_back += 0.25 * back_emf[k] * back_emf[k] / motors[k].R;
+    fed_back += 0.25 * back_emf[k] * back_emf[k] / R[k];
   }
   const double top = std::max(open, 0.0) + std::sqrt(battery.resistance * fed_back);
   if (!(top > 0.0)) {
     return 0.0;
   }
   const auto excess = [&](double rail) {
-    return rail_excess<double>(battery, motors, back_emf, wanted, rail);
+    return rail_excess<double>(battery, motors, R, back_emf, wanted, rail);
   };
   double high = top;
   double at_high = excess(high);

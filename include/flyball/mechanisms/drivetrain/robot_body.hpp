@@ -58,9 +58,10 @@ struct Shaft {
   }
 };
 
+/// @param may_be_massless  Whether an inertia of zero will do.
 /// @errors ArgumentError: as `check_drive`; inertia not positive, friction or damping negative.
 [[nodiscard]] Expected<Shaft> checked_shaft(const DriveShaft& shaft, std::string_view where,
-                                            std::string_view name);
+                                            std::string_view name, bool may_be_massless = false);
 /// @errors ArgumentError: mass or J not positive, the centre of mass not finite.
 [[nodiscard]] Expected<void> check_body(const RobotBody& body, std::string_view where);
 /// @errors ArgumentError: friction, stiffness, rest speed not positive, shape not in [1, 2].

@@ -35,25 +35,33 @@ struct MotorTerminal {
 ///
 /// The last two always have e in common. A motor that turns faster than the rail and its stator
 /// limit can hold gets the rail, whatever flows then. What it feeds back is not limited.
-/// @param rail  V >= 0. Source: book, Snippet 12.1 (predictive), and for the supply.
-template <class Scalar>
-[[nodiscard]] Scalar allowed_voltage(const MotorTerminal& motor, const Scalar& back_emf,
-                                     const Scalar& wanted, const Scalar& rail) {
+/// @param R  Ω, of the windings as warm as they are. @param rail  V >= 0.
+/// Source: book, Snippet 12.1 (predictive), and for the supply.
+template <class Scalar, class Resistance>
+[[nodiscard]] Scalar allowed_voltage(const CurrentLimits& limits, const Resistance& R,
+                                     const Scalar& back_emf, const Scalar& wanted,
+                                     const Scalar& rail) {
   using std::sqrt;
   Scalar V = wanted;
-  if (motor.limits.stator < largest_signal) {
-    const double most = motor.limits.stator * motor.R;
+  if (limits.stator < largest_signal) {
+    const Resistance most = limits.stator * R;
     V = V > back_emf + most   ? Scalar(back_emf + most)
         : V < back_emf - most ? Scalar(back_emf - most)
                               : V;
   }
-  if (motor.limits.supply < largest_signal) {
+  if (limits.supply < largest_signal) {
     const Scalar half = 0.5 * back_emf;
     // 1e-12 V² keeps the root's derivative finite at rest with a limit of zero.
-    const Scalar root = sqrt(Scalar(half * half + motor.R * motor.limits.supply * rail + 1e-12));
+    const Scalar root = sqrt(Scalar(half * half + R * limits.supply * rail + 1e-12));
     V = V > half + root ? Scalar(half + root) : V < half - root ? Scalar(half - root) : V;
   }
   return V > rail ? rail : V < -rail ? Scalar(-rail) : V;
+}
+/// The same of cold windings.
+template <class Scalar>
+[[nodiscard]] Scalar allowed_voltage(const MotorTerminal& motor, const Scalar& back_emf,
+                                     const Scalar& wanted, const Scalar& rail) {
+  return allowed_voltage(motor.limits, motor.R, back_emf, wanted, rail);
 }
 
 /// What flows while M controllers are asked for voltages.
@@ -70,20 +78,21 @@ namespace detail {
 
 /// The rail's voltage V with V = V_open - R_battery (I_other + Σ V_k (V_k - e_k)/(R_k V)), the
 /// largest there is: that which a battery under load comes down to. 0 where there is none.
-/// Cost: up to 24 + 60 evaluations of the sum; no allocation. @param back_emf, wanted  V.
+/// Cost: up to 24 + 60 evaluations of the sum; no allocation. @param R  Ω. @param back_emf, wanted
+/// V.
 [[nodiscard]] double rail_under_load(const Battery& battery, std::span<const MotorTerminal> motors,
-                                     std::span<const double> back_emf,
+                                     std::span<const double> R, std::span<const double> back_emf,
                                      std::span<const double> wanted) noexcept;
 
 /// V_open - R_battery (I_other + Σ supply currents) - V, over a generic scalar.
 template <class Scalar>
 [[nodiscard]] Scalar rail_excess(const Battery& battery, std::span<const MotorTerminal> motors,
-                                 std::span<const Scalar> back_emf, std::span<const Scalar> wanted,
-                                 const Scalar& rail) {
+                                 std::span<const Scalar> R, std::span<const Scalar> back_emf,
+                                 std::span<const Scalar> wanted, const Scalar& rail) {
   Scalar current(battery.other_current);
   for (std::size_t k = 0; k < motors.size(); ++k) {
-    const Scalar V = allowed_voltage(motors[k], back_emf[k], wanted[k], rail);
-    current += V * (V - back_emf[k]) / (motors[k].R * rail);
+    const Scalar V = allowed_voltage(motors[k].limits, R[k], back_emf[k], wanted[k], rail);
+    current += V * (V - back_emf[k]) / (R[k] * rail);
   }
   return battery.open_circuit_voltage - battery.resistance * current - rail;
 }
@@ -114,19 +123,32 @@ struct PowerBus {
   template <class Scalar>
   [[nodiscard]] PowerFlow<M, Scalar> flow(const std::array<Scalar, M>& wanted,
                                           const std::array<Scalar, M>& speeds) const {
+    std::array<Scalar, M> R;
+    for (std::size_t k = 0; k < M; ++k) {
+      R[k] = Scalar(motors[k].R);
+    }
+    return flow(wanted, speeds, R);
+  }
+  /// The same of windings that are warm. @param R  Ω, of each motor's windings; positive.
+  template <class Scalar>
+  [[nodiscard]] PowerFlow<M, Scalar> flow(const std::array<Scalar, M>& wanted,
+                                          const std::array<Scalar, M>& speeds,
+                                          const std::array<Scalar, M>& R) const {
     using detail::value_of;
     std::array<Scalar, M> volts;
     std::array<Scalar, M> emf;
     std::array<double, M> volt_values;
     std::array<double, M> emf_values;
+    std::array<double, M> R_values;
     for (std::size_t k = 0; k < M; ++k) {
       volts[k] = is_signal(value_of(wanted[k])) ? wanted[k] : Scalar(0.0);
       emf[k] = is_signal(value_of(speeds[k])) ? Scalar(speeds[k] / motors[k].Kv) : Scalar(0.0);
       volt_values[k] = value_of(volts[k]);
       emf_values[k] = value_of(emf[k]);
+      R_values[k] = value_of(R[k]);
     }
     PowerFlow<M, Scalar> result;
-    const double rail = detail::rail_under_load(battery, motors, emf_values, volt_values);
+    const double rail = detail::rail_under_load(battery, motors, R_values, emf_values, volt_values);
     result.rail = Scalar(rail);
     if constexpr (!std::is_same_v<Scalar, double>) {
       if (rail > 0.0 && battery.resistance > 0.0) {
@@ -135,14 +157,16 @@ struct PowerBus {
         using Slope = Dual<1>;
         std::array<Slope, M> volt_constants;
         std::array<Slope, M> emf_constants;
+        std::array<Slope, M> R_constants;
         for (std::size_t k = 0; k < M; ++k) {
           volt_constants[k] = Slope(volt_values[k]);
           emf_constants[k] = Slope(emf_values[k]);
+          R_constants[k] = Slope(R_values[k]);
         }
-        const Slope along = detail::rail_excess<Slope>(battery, motors, emf_constants,
+        const Slope along = detail::rail_excess<Slope>(battery, motors, R_constants, emf_constants,
                                                        volt_constants, Slope::variable(rail, 0, 1));
         for (int step = 0; step < 2; ++step) {
-          result.rail -= detail::rail_excess<Scalar>(battery, motors, emf, volts, result.rail) /
+          result.rail -= detail::rail_excess<Scalar>(battery, motors, R, emf, volts, result.rail) /
                          along.gradient(0);
         }
       }
@@ -150,8 +174,8 @@ struct PowerBus {
     result.battery_current = Scalar(battery.other_current);
     for (std::size_t k = 0; k < M; ++k) {
       const Scalar& V = result.voltage[k] =
-          allowed_voltage(motors[k], emf[k], volts[k], result.rail);
-      result.current[k] = (V - emf[k]) / motors[k].R;
+          allowed_voltage(motors[k].limits, R[k], emf[k], volts[k], result.rail);
+      result.current[k] = (V - emf[k]) / R[k];
       result.supply[k] = rail > 0.0 ? Scalar(V * result.current[k] / result.rail) : Scalar(0.0);
       result.battery_current += result.supply[k];
     }
