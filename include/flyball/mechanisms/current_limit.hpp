@@ -15,9 +15,9 @@ namespace flyball::mechanisms {
 /// Source: book, Snippet 12.1 (predictive), for both signs of the current.
 [[nodiscard]] inline double limit_predicted_current(const DcMotor& motor, double voltage,
                                                     double omega, double I_max) noexcept {
-  const double back = detail::signal_or_zero(omega) / motor.Kv;
-  const double most = I_max > 0.0 ? detail::signal_or_zero(I_max) * motor.R : 0.0;
-  const double wanted = detail::signal_or_zero(voltage);
+  const double back = flyball::detail::signal_or_zero(omega) / motor.Kv;
+  const double most = I_max > 0.0 ? flyball::detail::signal_or_zero(I_max) * motor.R : 0.0;
+  const double wanted = flyball::detail::signal_or_zero(voltage);
   return wanted > back + most ? back + most : wanted < back - most ? back - most : wanted;
 }
 
@@ -29,8 +29,8 @@ namespace flyball::mechanisms {
 [[nodiscard]] inline double limit_measured_current(const DcMotor& motor, double voltage,
                                                    double applied, double current,
                                                    double I_max) noexcept {
-  const double omega =
-      motor.Kv * (detail::signal_or_zero(applied) - detail::signal_or_zero(current) * motor.R);
+  const double omega = motor.Kv * (flyball::detail::signal_or_zero(applied) -
+                                   flyball::detail::signal_or_zero(current) * motor.R);
   return limit_predicted_current(motor, voltage, omega, I_max);
 }
 
@@ -42,12 +42,12 @@ namespace flyball::mechanisms {
 [[nodiscard]] inline double limit_predicted_supply_current(const DcMotor& motor, double voltage,
                                                            double omega, double rail,
                                                            double I_max) noexcept {
-  const double half = 0.5 * detail::signal_or_zero(omega) / motor.Kv;
-  const double most = I_max > 0.0 ? detail::signal_or_zero(I_max) : 0.0;
-  const double power = rail > 0.0 ? most * detail::signal_or_zero(rail) : 0.0;
+  const double half = 0.5 * flyball::detail::signal_or_zero(omega) / motor.Kv;
+  const double most = I_max > 0.0 ? flyball::detail::signal_or_zero(I_max) : 0.0;
+  const double power = rail > 0.0 ? most * flyball::detail::signal_or_zero(rail) : 0.0;
   // V² - e V - R V_rail I_max = 0
   const double root = std::hypot(half, std::sqrt(motor.R * power));
-  const double wanted = detail::signal_or_zero(voltage);
+  const double wanted = flyball::detail::signal_or_zero(voltage);
   return wanted > half + root ? half + root : wanted < half - root ? half - root : wanted;
 }
 
@@ -57,8 +57,8 @@ namespace flyball::mechanisms {
 [[nodiscard]] inline double limit_measured_supply_current(const DcMotor& motor, double voltage,
                                                           double applied, double current,
                                                           double rail, double I_max) noexcept {
-  const double omega =
-      motor.Kv * (detail::signal_or_zero(applied) - detail::signal_or_zero(current) * motor.R);
+  const double omega = motor.Kv * (flyball::detail::signal_or_zero(applied) -
+                                   flyball::detail::signal_or_zero(current) * motor.R);
   return limit_predicted_supply_current(motor, voltage, omega, rail, I_max);
 }
 
@@ -78,7 +78,7 @@ class PeakCurrentLimit {
   /// @param current  A, measured now; its sign does not matter, and what is no number counts as
   /// zero. @return The limit for the next period, A.
   double update(double current) noexcept {
-    const double size = std::abs(detail::signal_or_zero(current));
+    const double size = std::abs(flyball::detail::signal_or_zero(current));
     if (size > sustained_) {
       above_ += period_;
     } else if (size < 0.95 * sustained_) {
