@@ -20,38 +20,32 @@ void JerkMotion::add(double duration, double jerk) noexcept {
     return;
   }
   // While a motion is built its goal is where it has come to.
-  Piece& piece = piece_[count_++];
-  piece = {end_, goal_, jerk};
-  goal_ = after(piece, duration);
+  begin_[count_] = end_;
+  position_[count_] = goal_.position;
+  velocity_[count_] = goal_.velocity;
+  acceleration_[count_] = goal_.acceleration;
+  jerk_[count_] = jerk;
+  goal_ = after({end_, goal_, jerk}, duration);
+  ++count_;
   end_ += duration;
 }
 
 MotionState JerkMotion::sample(double t) const noexcept {
   if (!(t < end_)) {
     if (!(t >= end_)) {
-      return piece_[0].at;  // no time at all
+      return piece(0).at;  // no time at all
     }
     const double past = std::isfinite(t) ? t - end_ : 0.0;
     const double position = goal_.position + goal_.velocity * past;
     return {std::isfinite(position) ? position : goal_.position, goal_.velocity,
             past > 0.0 ? 0.0 : goal_.acceleration};
   }
-  int i = count_ - 1;
-  while (i > 0 && t < piece_[i].begin) {
-    --i;
-  }
-  return after(piece_[i], t > 0.0 ? t - piece_[i].begin : 0.0);
+  const int i = index_at(t);
+  return after(piece(i), t > 0.0 ? t - begin_[i] : 0.0);
 }
 
 double JerkMotion::jerk(double t) const noexcept {
-  if (!(t >= 0.0 && t < end_)) {
-    return 0.0;
-  }
-  int i = count_ - 1;
-  while (i > 0 && t < piece_[i].begin) {
-    --i;
-  }
-  return piece_[i].jerk;
+  return t >= 0.0 && t < end_ ? jerk_[index_at(t)] : 0.0;
 }
 
 }  // namespace flyball

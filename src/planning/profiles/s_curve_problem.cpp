@@ -134,7 +134,7 @@ bool keeps(const SCurveProblem& p, const SCurvePhases& phases) {
          std::abs(along.distance - p.distance) <= close * reach;
 }
 
-void solve(SCurvePlan& plan) {
+void solve(SCurvePlan& plan, bool inside_first) {
   bring_acceleration_inside(plan);
   SCurveProblem p = plan.problem;
   double side = 1.0;
@@ -146,10 +146,14 @@ void solve(SCurvePlan& plan) {
       return;
     }
   }
-  // Near a goal that can itself not be gone on from within the limits, they still hold to there.
-  plan.phases = fastest_motion(plan.problem);
-  if (keeps(plan.problem, plan.phases)) {
-    return;
+  // Near a goal that can itself not be gone on from within the limits, they still hold to there;
+  // and the fastest motion may brake all the way.
+  if (!inside_first) {
+    plan.phases = fastest_motion(plan.problem);
+    plan.straight = keeps(plan.problem, plan.phases);
+    if (plan.straight) {
+      return;
+    }
   }
   SCurvePlan first = plan;
   SCurvePlan smooth = plan;
@@ -210,10 +214,10 @@ bool is_usable(const MotionLimits& limits, const MotionState& start,
 }
 
 SCurvePlan plan_motion(const MotionLimits& limits, const MotionState& start,
-                       const MotionState& goal) noexcept {
+                       const MotionState& goal, bool inside_first) noexcept {
   SCurvePlan plan = prepared(limits, start, goal);
   if (plan.usable) {
-    solve(plan);
+    solve(plan, inside_first);
     plan.usable = std::isfinite(plan.duration());
   }
   return plan;

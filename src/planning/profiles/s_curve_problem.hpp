@@ -20,6 +20,7 @@ struct SCurvePlan {
   MotionState goal{};       ///< In the limits.
   double jerk = 0.0;        ///< What lengths and velocities of the problem are to be multiplied by.
   bool usable = false;
+  bool straight = false;  ///< Its start is outside of the limits, and it comes inside on its way.
 
   [[nodiscard]] double duration() const noexcept { return brake_time + phases.duration(); }
 };
@@ -32,8 +33,9 @@ inline constexpr double largest_motion = 1e30;
                              const MotionState& goal) noexcept;
 
 /// The fastest motion from state to state.
+/// @param inside_first  No `straight` plan: what remains then has a start within the limits.
 [[nodiscard]] SCurvePlan plan_motion(const MotionLimits& limits, const MotionState& start,
-                                     const MotionState& goal) noexcept;
+                                     const MotionState& goal, bool inside_first = false) noexcept;
 
 /// The fastest change to the goal's velocity and acceleration.
 [[nodiscard]] SCurvePlan plan_velocity(const MotionLimits& limits, const MotionState& start,

@@ -101,7 +101,7 @@ bool SCurveProfile::reversible() const noexcept {
   double low = goal().velocity;
   double high = low;
   for (int i = 0; i < pieces(); ++i) {
-    const Piece& p = piece(i);
+    const Piece p = piece(i);
     low = std::min(low, p.at.velocity);
     high = std::max(high, p.at.velocity);
     // Between, where the acceleration is zero.

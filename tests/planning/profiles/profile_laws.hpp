@@ -19,11 +19,49 @@ struct ProfileDemand {
   bool replan = true;  ///< A plan made on the way is the rest of the way.
 };
 
+/// Of `broken_law`: plans from the way, and the way back.
+template <MotionProfile Profile>
+std::string broken_law_of_plans(const Profile& profile, const ProfileDemand& demand, double x_tol,
+                                double v_tol, double a_out) {
+  const double end = profile.total_time();
+  const MotionLimits limits = demand.limits.both_ways();
+  const MotionState& start = demand.start;
+  const MotionState& goal = demand.goal;
+  char text[400];
+  const auto broken = [&](const char* law, double t, double got, double limit) {
+    std::snprintf(text, sizeof text, "%s at %.17g of %.17g s: %.17g, allowed %.17g", law, t, end,
+                  got, limit);
+    return std::string(text);
+  };
+  if (demand.replan && end > 0.0) {
+    const double t = 0.37 * end;
+    const Profile rest = profile.replanned(profile.sample(t), goal);
+    // The time of a way is the root of its length, whose rounding is that of its ends.
+    const double ulps = 1e-15 * (std::abs(start.position) + std::abs(goal.position));
+    const double root = demand.order >= 3 && std::isfinite(limits.jerk)
+                            ? std::cbrt(ulps / limits.jerk)
+                            : std::sqrt(ulps / a_out);
+    if (!(rest.total_time() <= (end - t) * (1.0 + 1e-6) + 1e-6 * end + root)) {
+      return broken("a plan from the way", t, rest.total_time(), end - t);
+    }
+  }
+  if (profile.reversible()) {
+    const ReversedMotion<Profile> back(profile);
+    const MotionState there = back.sample(0.25 * end);
+    const MotionState here = profile.sample(0.75 * end);
+    if (std::abs(there.position - here.position) > x_tol ||
+        std::abs(there.velocity + here.velocity) > v_tol) {
+      return broken("backwards", 0.25 * end, there.velocity, -here.velocity);
+    }
+  }
+  return {};
+}
+
 /// The first law that a profile breaks, in words; empty if it keeps all.
 ///
 /// Between any two samples h apart a motion within its limits obeys the inequalities below; a
 /// motion that broke a limit in between, jumped, or did not integrate, would break one of them.
-template <MotionProfile Profile>
+template <class Profile>
 std::string broken_law(const Profile& profile, const ProfileDemand& demand) {
   const MotionLimits limits = demand.limits.both_ways();
   const MotionState& start = demand.start;
@@ -121,26 +159,8 @@ std::string broken_law(const Profile& profile, const ProfileDemand& demand) {
     }
     before = now;
   }
-  if (demand.replan && end > 0.0) {
-    const double t = 0.37 * end;
-    const Profile rest = profile.replanned(profile.sample(t), goal);
-    // The time of a way is the root of its length, whose rounding is that of its ends.
-    const double ulps = 1e-15 * (std::abs(start.position) + std::abs(goal.position));
-    const double root = demand.order >= 3 && std::isfinite(limits.jerk)
-                            ? std::cbrt(ulps / limits.jerk)
-                            : std::sqrt(ulps / a_out);
-    if (!(rest.total_time() <= (end - t) * (1.0 + 1e-6) + 1e-6 * end + root)) {
-      return broken("a plan from the way", t, rest.total_time(), end - t);
-    }
-  }
-  if (profile.reversible()) {
-    const ReversedMotion<Profile> back(profile);
-    const MotionState there = back.sample(0.25 * end);
-    const MotionState here = profile.sample(0.75 * end);
-    if (std::abs(there.position - here.position) > x_tol ||
-        std::abs(there.velocity + here.velocity) > v_tol) {
-      return broken("backwards", 0.25 * end, there.velocity, -here.velocity);
-    }
+  if constexpr (MotionProfile<Profile>) {
+    return broken_law_of_plans(profile, demand, x_tol, v_tol, a_out);
   }
   return {};
 }

@@ -29,12 +29,18 @@ class JerkMotion {
   [[nodiscard]] double jerk(double t) const noexcept;
   [[nodiscard]] int pieces() const noexcept { return count_; }
   /// @param i  0..pieces()-1.
-  [[nodiscard]] const Piece& piece(int i) const noexcept { return piece_[i]; }
+  [[nodiscard]] Piece piece(int i) const noexcept {
+    return {begin_[i], {position_[i], velocity_[i], acceleration_[i]}, jerk_[i]};
+  }
   [[nodiscard]] const MotionState& goal() const noexcept { return goal_; }
 
  protected:
   void begin(const MotionState& start) noexcept {
-    piece_[0].at = start;
+    position_[0] = start.position;
+    velocity_[0] = start.velocity;
+    acceleration_[0] = start.acceleration;
+    jerk_[0] = 0.0;
+    begin_[0] = 0.0;
     goal_ = start;
     count_ = 0;
     end_ = 0.0;
@@ -49,9 +55,22 @@ class JerkMotion {
   MotionState goal_{};  ///< While a motion is built: where it has come to.
 
  private:
+  [[nodiscard]] int index_at(double t) const noexcept {
+    int i = count_ - 1;
+    while (i > 0 && t < begin_[i]) {
+      --i;
+    }
+    return i;
+  }
+
   int count_ = 0;
   double end_ = 0.0;
-  Piece piece_[capacity];
+  // Of the pieces; what is beyond the count is not written, which takes longer than the rest.
+  double begin_[capacity];
+  double position_[capacity];
+  double velocity_[capacity];
+  double acceleration_[capacity];
+  double jerk_[capacity];
 };
 
 /// The fastest motion between two states under limits of velocity, acceleration and jerk: seven
