@@ -53,6 +53,71 @@ TEST(Problem, DoubleIntegratorOfTheBook) {
   EXPECT_NEAR(X.value(1, 350), 1.0, 1e-6);
 }
 
+/// Σ (10 - x)² of x⁺ = a x + (1 - a) u, |u| ≤ 12, over N steps of a second in all.
+ProblemSolution solve_flywheel(int N, bool shuffled) {
+  Problem problem;
+  ExpressionMatrix X = problem.decision_variable(1, N + 1);
+  const ExpressionMatrix U = problem.decision_variable(1, N);
+  const double a = std::exp(-5.0 / N);
+  for (int k = 0; k < N; ++k) {
+    const int at = shuffled ? (7 * k) % N : k;
+    problem.subject_to(X(0, at + 1) == a * X(0, at) + (1.0 - a) * U(0, at));
+  }
+  problem.subject_to(X(0, 0) == 0.0);
+  problem.subject_to(-12.0 <= U);
+  problem.subject_to(U <= 12.0);
+  Expression J = 0.0;
+  for (int k = 0; k <= N; ++k) {
+    J += pow(10.0 - X(0, k), 2);
+  }
+  problem.minimize(J);
+  return problem.solve().value();
+}
+
+// CasADi with IPOPT: 794.34071. Rows in any order are found to be stages.
+TEST(Problem, FlywheelAlongItsStages) {
+  for (const bool shuffled : {false, true}) {
+    const ProblemSolution solution = solve_flywheel(100, shuffled);
+    EXPECT_EQ(solution.status, SolveStatus::solved);
+    EXPECT_NEAR(solution.cost, 794.34071, 1e-4);
+    EXPECT_NE(solution.method.find("along 101 stages"), std::string::npos) << solution.method;
+  }
+}
+
+// A row that couples the first and the last state is no matter of stages; the answer is the same
+// as where it is left out, since it holds anyway.
+TEST(Problem, WithoutStagesTheSparseFactorsAnswerTheSame) {
+  const int N = 30;
+  const auto solve = [&](bool coupled) {
+    Problem problem;
+    const ExpressionMatrix X = problem.decision_variable(2, N + 1);
+    const ExpressionMatrix U = problem.decision_variable(1, N);
+    for (int k = 0; k < N; ++k) {
+      problem.subject_to(X(0, k + 1) == X(0, k) + 0.1 * X(1, k));
+      problem.subject_to(X(1, k + 1) == X(1, k) + 0.1 * (U(0, k) - sin(X(0, k))));
+    }
+    problem.subject_to(X.col(0) == Vector2d(0.0, 0.0));
+    problem.subject_to(X.col(N) == Vector2d(1.0, 0.0));
+    problem.subject_to(U <= 2.0);
+    if (coupled) {
+      problem.subject_to(X(0, 1) + X(0, N - 1) <= 100.0);
+    }
+    Expression J = 0.0;
+    for (int k = 0; k < N; ++k) {
+      J += U(0, k) * U(0, k);
+    }
+    problem.minimize(J);
+    return problem.solve().value();
+  };
+  const ProblemSolution along = solve(false);
+  const ProblemSolution across = solve(true);
+  EXPECT_EQ(along.status, SolveStatus::solved);
+  EXPECT_EQ(across.status, SolveStatus::solved);
+  EXPECT_EQ(along.method, "filter interior-point method along 31 stages");
+  EXPECT_EQ(across.method, "filter interior-point method");
+  EXPECT_NEAR(along.cost, across.cost, 1e-6 * along.cost);
+}
+
 TEST(Problem, DegreesOfExpressions) {
   Problem problem;
   const Expression x = problem.decision_variable();

@@ -99,10 +99,11 @@ bool soften(double* P, double* E, const double* D, std::size_t n, std::size_t wi
   return true;
 }
 
-template <class Row>
+/// @tparam States, Inputs  The system's, where known: loops become straight lines; 0, 0: any.
+template <class Row, std::size_t States, std::size_t Inputs>
 bool factor_rows(const StageSystem& s) {
-  const std::size_t n = s.states;
-  const std::size_t size = n + s.inputs;
+  const std::size_t n = States > 0 ? States : s.states;
+  const std::size_t size = States > 0 ? States + Inputs : n + s.inputs;
   const std::size_t width = s.width;
   double* const M = s.scratch;
   double* const W = s.scratch + size * width;
@@ -197,23 +198,40 @@ bool factor_rows(const StageSystem& s) {
   return true;
 }
 
-template <class Row>
+/// y += a x, of `size` numbers: scalars that were just written are not read as a vector.
+inline void add_few(double* y, double a, const double* x, std::size_t size) {
+  for (std::size_t i = 0; i < size; ++i) {
+    y[i] += a * x[i];
+  }
+}
+
+template <class Row, std::size_t States, std::size_t Inputs>
 void solve_rows(const StageSystem& s, const StageVectors& v) {
-  const std::size_t n = s.states;
-  const std::size_t size = n + s.inputs;
+  constexpr bool few = States > 0;
+  const std::size_t n = few ? States : s.states;
+  const std::size_t size = few ? States + Inputs : n + s.inputs;
   const std::size_t width = s.width;
-  double* const y = s.scratch;  // A z + b and the like
-  double* const q = s.scratch + width;
+  double small_y[few ? States : 1];
+  double small_q[few ? States + Inputs : 1];
+  double* const y = few ? small_y : s.scratch;  // A z + b and the like
+  double* const q = few ? small_q : s.scratch + width;
+  const auto add = [&](double* to, double a, const double* x) {
+    if constexpr (few) {
+      add_few(to, a, x, States + Inputs);
+    } else {
+      Row::add(to, a, x, width);
+    }
+  };
   for (std::size_t k = s.stages; k-- > 0;) {
     const unsigned char* const fixed = s.fixed + k * size;
     for (std::size_t i = 0; i < size; ++i) {
       q[i] = v.h[k * size + i];
     }
-    for (std::size_t i = size; i < width; ++i) {
+    for (std::size_t i = size; i < width && !few; ++i) {
       q[i] = 0.0;
     }
     for (std::size_t r = s.first_row[k]; r < s.first_row[k + 1]; ++r) {
-      Row::add(q, v.e[r], s.G + r * width, width);
+      add(q, v.e[r], s.G + r * width);
     }
     if (k + 1 < s.stages) {
       const double* const AB = s.AB + k * n * width;
@@ -225,18 +243,24 @@ void solve_rows(const StageSystem& s, const StageVectors& v) {
         for (std::size_t j = 0; j < n; ++j) {
           sum += P[i * width + j] * b[j];
         }
-        Row::add(q, sum, AB + i * width, width);
+        add(q, sum, AB + i * width);
       }
     }
     double* const g = v.g + k * size;
-    const std::size_t end = k == 0 ? 0 : n;
-    for (std::size_t j = size; j-- > end;) {
-      if (fixed[j] != 0) {
-        continue;
+    const auto eliminate = [&](std::size_t j) {
+      if (fixed[j] == 0) {
+        const double q_j = q[j];
+        g[j] = q_j * s.pivots[k * size + j];
+        add(q, -q_j, s.L + (k * size + j) * width);
       }
-      const double q_j = q[j];
-      g[j] = q_j * s.pivots[k * size + j];
-      Row::add(q, -q_j, s.L + (k * size + j) * width, width);
+    };
+    for (std::size_t j = size; j-- > n;) {
+      eliminate(j);
+    }
+    if (k == 0) {
+      for (std::size_t j = n; j-- > 0;) {
+        eliminate(j);
+      }
     }
     if (k == 0) {
       continue;
@@ -263,18 +287,21 @@ void solve_rows(const StageSystem& s, const StageVectors& v) {
   for (std::size_t k = 0; k < s.stages; ++k) {
     const unsigned char* const fixed = s.fixed + k * size;
     double* const z = v.dz + k * size;
-    const std::size_t begin = k == 0 ? 0 : n;
-    for (std::size_t j = begin; j < size; ++j) {
-      z[j] = 0.0;
-      if (fixed[j] != 0) {
-        continue;
-      }
+    const auto recover = [&](std::size_t j) {
       double sum = -v.g[k * size + j];
       const double* const L = s.L + (k * size + j) * width;
       for (std::size_t a = 0; a < j; ++a) {
         sum -= L[a] * z[a];
       }
-      z[j] = sum;
+      z[j] = fixed[j] != 0 ? 0.0 : sum;
+    };
+    if (k == 0) {
+      for (std::size_t j = 0; j < n; ++j) {
+        recover(j);
+      }
+    }
+    for (std::size_t j = n; j < size; ++j) {
+      recover(j);
     }
     if (k + 1 == s.stages) {
       break;
@@ -301,36 +328,49 @@ void solve_rows(const StageSystem& s, const StageVectors& v) {
   }
 }
 
-}  // namespace
-
-bool factor_stages(const StageSystem& system) noexcept {
+template <class Work>
+auto with_sizes(const StageSystem& system, Work&& work) {
+  const auto is = [&](std::size_t states, std::size_t inputs) {
+    return system.states == states && system.inputs == inputs;
+  };
+  if (is(1, 1)) {
+    return work.template operator()<Rows<4, 1>, 1, 1>();
+  }
+  if (is(2, 1)) {
+    return work.template operator()<Rows<4, 1>, 2, 1>();
+  }
+  if (is(4, 1)) {
+    return work.template operator()<Rows<8, 1>, 4, 1>();
+  }
+  if (is(4, 2)) {
+    return work.template operator()<Rows<8, 1>, 4, 2>();
+  }
   switch (system.width) {
     case 4:
-      return factor_rows<Rows<4, 1>>(system);
+      return work.template operator()<Rows<4, 1>, 0, 0>();
     case 8:
-      return factor_rows<Rows<8, 1>>(system);
+      return work.template operator()<Rows<8, 1>, 0, 0>();
     case 16:
-      return factor_rows<Rows<8, 2>>(system);
+      return work.template operator()<Rows<8, 2>, 0, 0>();
     case 24:
-      return factor_rows<Rows<8, 3>>(system);
+      return work.template operator()<Rows<8, 3>, 0, 0>();
     default:
-      return factor_rows<Rows<8, 0>>(system);
+      return work.template operator()<Rows<8, 0>, 0, 0>();
   }
 }
 
+}  // namespace
+
+bool factor_stages(const StageSystem& system) noexcept {
+  return with_sizes(system, [&]<class Row, std::size_t States, std::size_t Inputs>() {
+    return factor_rows<Row, States, Inputs>(system);
+  });
+}
+
 void solve_stages(const StageSystem& system, const StageVectors& vectors) noexcept {
-  switch (system.width) {
-    case 4:
-      return solve_rows<Rows<4, 1>>(system, vectors);
-    case 8:
-      return solve_rows<Rows<8, 1>>(system, vectors);
-    case 16:
-      return solve_rows<Rows<8, 2>>(system, vectors);
-    case 24:
-      return solve_rows<Rows<8, 3>>(system, vectors);
-    default:
-      return solve_rows<Rows<8, 0>>(system, vectors);
-  }
+  with_sizes(system, [&]<class Row, std::size_t States, std::size_t Inputs>() {
+    solve_rows<Row, States, Inputs>(system, vectors);
+  });
 }
 
 }  // namespace flyball::optimization::detail::FLYBALL_VARIANT

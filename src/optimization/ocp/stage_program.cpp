@@ -2,6 +2,7 @@
 #include <cmath>
 #include <utility>
 
+#include "optimization/ocp/riccati_dispatch.hpp"
 #include "optimization/ocp/stage_program.hpp"
 
 namespace flyball::optimization::detail {
@@ -13,29 +14,6 @@ namespace {
 constexpr std::size_t lanes = LaneTape::lanes;
 /// What stands for 0 on the diagonal of an equality's multiplier.
 constexpr double regularization = 1e-8;
-
-struct Kernels {
-  bool (*factor)(const StageSystem&) noexcept;
-  void (*solve)(const StageSystem&, const StageVectors&) noexcept;
-};
-
-Kernels kernels_for_this_processor() {
-#ifdef FLYBALL_WIDE_VECTORS
-  if (__builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
-      __builtin_cpu_supports("avx512vl") != 0) {
-    return {widest::factor_stages, widest::solve_stages};
-  }
-  if (flyball::detail::has_wide_vectors()) {
-    return {wide::factor_stages, wide::solve_stages};
-  }
-#endif
-  return {baseline::factor_stages, baseline::solve_stages};
-}
-
-const Kernels& kernels() {
-  static const Kernels chosen = kernels_for_this_processor();
-  return chosen;
-}
 
 }  // namespace
 
@@ -374,7 +352,7 @@ bool StageProgram::factor(const Eigen::VectorXd& diagonal, const Eigen::VectorXd
   system.pivots = pivots_.data();
   system.scratch = scratch_.data();
   system_ = system;
-  return kernels().factor(system_);
+  return riccati_kernels().factor(system_);
 }
 
 void StageProgram::solve(const Eigen::VectorXd& rw, const Eigen::VectorXd& rc, Eigen::VectorXd& dw,
@@ -394,7 +372,7 @@ void StageProgram::solve(const Eigen::VectorXd& rw, const Eigen::VectorXd& rc, E
   vectors.dl = dl.data();
   vectors.p = p_.data();
   vectors.g = g_.data();
-  kernels().solve(system_, vectors);
+  riccati_kernels().solve(system_, vectors);
   for (std::size_t k = 0; k < problem_.stages; ++k) {
     const double* const z = dw.data() + k * size_;
     for (std::size_t r = first_row_[k]; r < first_row_[k + 1]; ++r) {

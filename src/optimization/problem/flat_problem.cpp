@@ -33,6 +33,12 @@ struct KeyHash {
   }
 };
 
+/// A node and what it is multiplied by.
+struct Part {
+  std::uint32_t node;
+  double factor;
+};
+
 class Flattener {
  public:
   Flattener(const ExpressionGraph& graph, FlatProblem& flat)
@@ -81,37 +87,37 @@ class Flattener {
     number_ = number;
     double offset = 0.0;
     const std::size_t begin = flat_.columns.size();
-    if (graph_.degree(root) <= Degree::linear) {
-      walk(
-          root, 1.0,
-          [&](int variable, double c) {
-            int& at = column_at_[static_cast<std::size_t>(variable)];
-            if (at >= static_cast<int>(begin)) {
-              flat_.coefficients[static_cast<std::size_t>(at)] += c;
-              return;
-            }
-            at = static_cast<int>(flat_.columns.size());
-            flat_.columns.push_back(variable);
-            flat_.coefficients.push_back(c);
-          },
-          offset, row);
-      for (std::size_t i = begin; i < flat_.columns.size(); ++i) {
-        column_at_[static_cast<std::size_t>(flat_.columns[i])] = -1;
-      }
-      const std::size_t count = flat_.columns.size() - begin;
-      if (!std::isfinite(offset) || (count > 0 && !std::isfinite(flat_.coefficients.back()))) {
-        flat_.not_finite = flat_.not_finite == -1 ? number : flat_.not_finite;
-      }
-      if (count <= 1) {
-        const double slope = count == 1 ? flat_.coefficients.back() : 0.0;
-        const int variable = count == 1 ? flat_.columns.back() : 0;
-        flat_.columns.resize(begin);
-        flat_.coefficients.resize(begin);
-        bound(variable, slope, offset, equality, number);
-        return;
-      }
-    } else {
-      term(root, 1.0, row);
+    leaves_.clear();
+    walk(
+        root, 1.0,
+        [&](int variable, double c) {
+          int& at = column_at_[static_cast<std::size_t>(variable)];
+          if (at >= static_cast<int>(begin)) {
+            flat_.coefficients[static_cast<std::size_t>(at)] += c;
+            return;
+          }
+          at = static_cast<int>(flat_.columns.size());
+          flat_.columns.push_back(variable);
+          flat_.coefficients.push_back(c);
+        },
+        offset, row);
+    for (std::size_t i = begin; i < flat_.columns.size(); ++i) {
+      column_at_[static_cast<std::size_t>(flat_.columns[i])] = -1;
+    }
+    const std::size_t count = flat_.columns.size() - begin;
+    if (!std::isfinite(offset) || (count > 0 && !std::isfinite(flat_.coefficients.back()))) {
+      flat_.not_finite = flat_.not_finite == -1 ? number : flat_.not_finite;
+    }
+    if (count <= 1 && leaves_.empty()) {
+      const double slope = count == 1 ? flat_.coefficients.back() : 0.0;
+      const int variable = count == 1 ? flat_.columns.back() : 0;
+      flat_.columns.resize(begin);
+      flat_.coefficients.resize(begin);
+      bound(variable, slope, offset, equality, number);
+      return;
+    }
+    if (!leaves_.empty()) {
+      term(leaves_, row);
     }
     flat_.offsets.push_back(offset);
     flat_.row_start.push_back(static_cast<int>(flat_.columns.size()));
@@ -210,13 +216,17 @@ class Flattener {
         default:
           break;
       }
-      term(i, c, row);
+      leaves_.push_back({i, c});
+      if (row < 0) {  // terms of the cost are each their own
+        term(leaves_, row);
+        leaves_.clear();
+      }
     }
   }
 
-  /// A term that is not linear: its key is its operations, in an order of their own, with its
-  /// variables and numbers by their places; terms of one key are of one shape.
-  void term(std::uint32_t root, double factor, int row) {
+  /// A weighted sum that is not linear: its key is its operations, in an order of their own, with
+  /// its variables and numbers by their places; terms of one key are of one shape.
+  void term(const std::vector<Part>& roots, int row) {
     key_.clear();
     variables_.clear();
     data_.clear();
@@ -224,7 +234,9 @@ class Flattener {
     next_local_ = 0;
     order_.clear();
     visit_.clear();
-    visit_.push_back(root);
+    for (std::size_t k = roots.size(); k-- > 0;) {
+      visit_.push_back(roots[k].node);
+    }
     while (!visit_.empty()) {
       const std::uint32_t i = visit_.back();
       if (seen_[i] == stamp_) {
@@ -268,15 +280,21 @@ class Flattener {
         }
       }
     }
+    if (roots.size() > 1) {
+      for (const Part& root : roots) {
+        key_.push_back(local_[root.node]);
+        data_.push_back(root.factor);
+      }
+    }
     const auto [found, is_new] = shapes_.try_emplace(key_, flat_.shapes.size());
     if (is_new) {
-      flat_.shapes.push_back(shape(root));
+      flat_.shapes.push_back(shape(roots));
     }
     Shape& shape = flat_.shapes[found->second];
     shape.columns.insert(shape.columns.end(), variables_.begin(), variables_.end());
     shape.data.insert(shape.data.end(), data_.begin(), data_.end());
     shape.rows.push_back(row);
-    shape.factors.push_back(factor);
+    shape.factors.push_back(roots.size() > 1 ? 1.0 : roots.front().factor);
     for (const double number : data_) {
       if (!std::isfinite(number) && flat_.not_finite == -1) {
         flat_.not_finite = row < 0 ? -2 : number_;
@@ -290,7 +308,7 @@ class Flattener {
            graph_.degree(node.b) == Degree::constant;
   }
 
-  [[nodiscard]] Shape shape(std::uint32_t root) const {
+  [[nodiscard]] Shape shape(const std::vector<Part>& roots) const {
     Shape made;
     made.variables = variables_.size();
     made.numbers = data_.size();
@@ -316,15 +334,15 @@ class Flattener {
         slot = builder.node(node);
       }
     }
-    const Slot output = slots[local_[root]];
+    Slot output = slots[local_[roots.front().node]];
+    for (std::size_t k = 0; k < roots.size() && roots.size() > 1; ++k) {
+      const Slot weighted = builder.binary(Operation::multiply, builder.input(number++),
+                                           slots[local_[roots[k].node]]);
+      output = k == 0 ? weighted : builder.binary(Operation::add, output, weighted);
+    }
     made.tape = builder.finish({&output, 1});
     return made;
   }
-
-  struct Part {
-    std::uint32_t node;
-    double factor;
-  };
 
   const ExpressionGraph& graph_;
   const Node* nodes_;
@@ -335,7 +353,7 @@ class Flattener {
   std::uint32_t stamp_ = 0;
   std::uint32_t next_local_ = 0;
   int number_ = -1;  // of the constraint at hand
-  std::vector<Part> stack_;
+  std::vector<Part> stack_, leaves_;
   std::vector<std::uint32_t> visit_, order_, key_;
   std::vector<int> variables_;
   std::vector<double> data_;

@@ -265,6 +265,9 @@ ProblemSolution Problem::Parts::run(FlatProblem flat, const SolverOptions& optio
     solution.method = "filter interior-point method";
     take(*general);
   }
+  if (p.stages() > 0) {
+    solution.method += fmt::format(" along {} stages", p.stages());
+  }
   solution.status = status;
   if (status == SolveStatus::not_finite) {
     const int row = p.find_fault(*w);

@@ -117,6 +117,7 @@ void SparseProgram::build_pattern() {
     h_rows_.push_back(static_cast<int>(key / n_));
     h_columns_.push_back(static_cast<int>(key % n_));
   }
+  a_is_linear_.assign(a_columns_.size(), 1);
   h_.assign(hessian.size(), 0.0);
   a_.assign(a_columns_.size(), 0.0);
   for (std::size_t s = 0; s < flat_.shapes.size(); ++s) {
@@ -131,6 +132,7 @@ void SparseProgram::build_pattern() {
           const auto end =
               a_columns_.begin() + a_start_[static_cast<std::size_t>(shape.rows[t]) + 1];
           place = static_cast<int>(std::lower_bound(begin, end, place) - a_columns_.begin());
+          a_is_linear_[static_cast<std::size_t>(place)] = 0;
         }
         compiled.jacobian_places.push_back(place);
       }
@@ -281,6 +283,7 @@ bool SparseProgram::derivatives(const VectorXd& w, const VectorXd& lambda, doubl
       a_[static_cast<std::size_t>(e)] *= row_scale_[r];
     }
   }
+  values_moved_ = false;
   return std::isfinite(check);
 }
 
@@ -316,6 +319,15 @@ void SparseProgram::multiply(const VectorXd& dw, const VectorXd& dl, VectorXd& o
 }
 
 void SparseProgram::analyze() {
+  analyzed_ = true;
+  values_moved_ = false;
+  along_.assign(static_cast<std::size_t>(m_), 0.0);
+  stages_ = std::make_unique<StageFactor>();
+  if (stages_->find({n_, m_, a_start_, a_columns_, a_linear_, a_is_linear_, flat_.equality, h_rows_,
+                     h_columns_, fixed_})) {
+    return;
+  }
+  stages_.reset();
   std::vector<int> rows;
   std::vector<int> columns;
   for (int i = 0; i < n_ + m_; ++i) {
@@ -340,17 +352,13 @@ void SparseProgram::analyze() {
   ldlt_.analyze(n_ + m_, rows, columns);
   kkt_.assign(rows.size(), 0.0);
   rhs_.assign(static_cast<std::size_t>(n_ + m_), 0.0);
-  analyzed_ = true;
 }
 
 bool SparseProgram::factor(const VectorXd& diagonal, const VectorXd& D, bool with_hessian) {
   if (!analyzed_) {
     analyze();
   }
-  double* to = kkt_.data();
-  for (int i = 0; i < n_; ++i) {
-    *to++ = fixed_[static_cast<std::size_t>(i)] != 0 ? 1.0 : diagonal(i);
-  }
+  bool soft = false;
   for (std::size_t r = 0; r < static_cast<std::size_t>(m_); ++r) {
     double d = D(static_cast<Index>(r));
     if (slack_[r] >= 0) {
@@ -359,9 +367,23 @@ bool SparseProgram::factor(const VectorXd& diagonal, const VectorXd& D, bool wit
         return false;
       }
       d += 1.0 / slack_diagonal_[r];
+    } else {
+      soft = soft || d > 0.0;
     }
-    d = std::max(d, regularization);
-    row_diagonal_[r] = d;
+    row_diagonal_[r] = std::max(d, regularization);
+  }
+  if (stages_) {
+    if (!values_moved_) {
+      stages_->set_values(h_, a_);
+      values_moved_ = true;
+    }
+    return stages_->factor(diagonal.data(), row_diagonal_.data(), soft, with_hessian);
+  }
+  double* to = kkt_.data();
+  for (int i = 0; i < n_; ++i) {
+    *to++ = fixed_[static_cast<std::size_t>(i)] != 0 ? 1.0 : diagonal(i);
+  }
+  for (const double d : row_diagonal_) {
     *to++ = -d;
   }
   for (std::size_t e = 0; e < h_.size(); ++e) {
@@ -376,25 +398,28 @@ bool SparseProgram::factor(const VectorXd& diagonal, const VectorXd& D, bool wit
 }
 
 void SparseProgram::solve(const VectorXd& rw, const VectorXd& rc, VectorXd& dw, VectorXd& dl) {
-  for (int i = 0; i < n_; ++i) {
-    rhs_[static_cast<std::size_t>(i)] = fixed_[static_cast<std::size_t>(i)] != 0 ? 0.0 : -rw(i);
-  }
   for (std::size_t r = 0; r < static_cast<std::size_t>(m_); ++r) {
-    double e = rc(static_cast<Index>(r));
+    along_[r] = rc(static_cast<Index>(r));
     if (slack_[r] >= 0) {
-      e += rw(slack_[r]) / slack_diagonal_[r];
+      along_[r] += rw(slack_[r]) / slack_diagonal_[r];
     }
-    rhs_[static_cast<std::size_t>(n_) + r] = -e;
   }
-  ldlt_.solve(rhs_.data());
-  for (int i = 0; i < n_; ++i) {
-    dw(i) = rhs_[static_cast<std::size_t>(i)];
+  if (stages_) {
+    stages_->solve(rw.data(), along_.data(), dw.data(), dl.data());
+  } else {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(n_); ++i) {
+      rhs_[i] = fixed_[i] != 0 ? 0.0 : -rw.data()[i];
+    }
+    for (std::size_t r = 0; r < static_cast<std::size_t>(m_); ++r) {
+      rhs_[static_cast<std::size_t>(n_) + r] = -along_[r];
+    }
+    ldlt_.solve(rhs_.data());
+    std::copy_n(rhs_.data(), n_, dw.data());
+    std::copy_n(rhs_.data() + n_, m_, dl.data());
   }
   for (std::size_t r = 0; r < static_cast<std::size_t>(m_); ++r) {
-    const double multiplier = rhs_[static_cast<std::size_t>(n_) + r];
-    dl(static_cast<Index>(r)) = multiplier;
     if (slack_[r] >= 0) {
-      dw(slack_[r]) = (multiplier - rw(slack_[r])) / slack_diagonal_[r];
+      dw(slack_[r]) = (dl(static_cast<Index>(r)) - rw(slack_[r])) / slack_diagonal_[r];
     }
   }
 }

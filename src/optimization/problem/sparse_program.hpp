@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include <Eigen/Core>
@@ -9,6 +10,7 @@
 #include <flyball/math/expression/lane_tape.hpp>
 
 #include "optimization/problem/flat_problem.hpp"
+#include "optimization/problem/stage_factor.hpp"
 #include "optimization/solver/program.hpp"
 #include "optimization/solver/sparse_ldlt.hpp"
 
@@ -44,6 +46,8 @@ class SparseProgram final : public Program {
   }
   /// Whether the cost is quadratic at most and all rows are linear.
   [[nodiscard]] bool is_quadratic() const noexcept;
+  /// Stages that the KKT systems are factorised along, once one was; 0: there are none.
+  [[nodiscard]] std::size_t stages() const noexcept { return stages_ ? stages_->stages() : 0; }
   /// The row (or -1: the cost) that is not finite at a point; -2: none.
   [[nodiscard]] int find_fault(const Eigen::VectorXd& w);
 
@@ -74,7 +78,11 @@ class SparseProgram final : public Program {
   std::vector<double> row_scale_;
   double objective_scale_ = 1.0;
   SparseLdlt ldlt_;
+  std::unique_ptr<StageFactor> stages_;  // where there are stages
   bool analyzed_ = false;
+  bool values_moved_ = false;  // whether the stages have the newest numbers
+  std::vector<unsigned char> a_is_linear_;
+  std::vector<double> along_;
   std::vector<double> kkt_, rhs_, slack_diagonal_, row_diagonal_;
   std::vector<unsigned char> fixed_;
 };

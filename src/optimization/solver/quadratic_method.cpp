@@ -23,9 +23,9 @@ double largest(const VectorXd& v) {
 QuadraticMethod::QuadraticMethod(Program& program) : program_(program) {
   const Index n = program.variables();
   const Index m = program.constraints();
-  for (VectorXd* v :
-       {&w_, &zl_, &zu_, &sl_, &su_, &free_, &g_, &rd_, &diagonal_, &rw_, &dw_, &dzl_, &dzu_,
-        &affine_w_, &residual_w_, &fix_w_, &hw_, &low_target_, &high_target_}) {
+  for (VectorXd* v : {&w_,          &zl_,       &zu_, &sl_, &su_,  &free_,       &g_,
+                      &rd_,         &diagonal_, &rw_, &dw_, &dzl_, &dzu_,        &affine_w_,
+                      &residual_w_, &fix_w_,    &hw_, &il_, &iu_,  &low_target_, &high_target_}) {
     v->setZero(n);
   }
   for (VectorXd* v : {&lambda_, &c0_, &c_, &D_, &dl_, &affine_l_, &residual_c_, &fix_c_, &hc_}) {
@@ -47,8 +47,11 @@ void QuadraticMethod::residuals() {
   c_ = hc_ + c0_;
 }
 
-void QuadraticMethod::solve(VectorXd& dw, VectorXd& dl) {
+void QuadraticMethod::solve(VectorXd& dw, VectorXd& dl, bool refined) {
   program_.solve(rw_, c_, dw, dl);
+  if (!refined) {
+    return;
+  }
   const double size = std::max(largest(rw_), largest(c_));
   double before = infinity;
   for (int round = 0; round < 3; ++round) {
@@ -56,7 +59,7 @@ void QuadraticMethod::solve(VectorXd& dw, VectorXd& dl) {
     residual_w_ = ((residual_w_ + rw_).array() + diagonal_.array() * dw.array()) * free_.array();
     residual_c_ += c_;
     const double left = std::max(largest(residual_w_), largest(residual_c_));
-    if (!(left > 1e-10 * size) || !(left < 0.5 * before)) {
+    if (!(left > 1e-7 * size) || !(left < 0.5 * before)) {
       return;
     }
     before = left;
@@ -116,7 +119,7 @@ bool QuadraticMethod::begin(bool warm) {
       return false;
     }
     rw_ = ((hw_ + g_).array() * free_.array()).matrix();
-    solve(dw_, dl_);
+    solve(dw_, dl_, true);
     w_ += dw_;
     lambda_ += dl_;
   }
@@ -167,9 +170,8 @@ bool QuadraticMethod::converged(double tolerance) {
   last_.optimality = largest(rd_) / dual_scale;
   last_.complementarity = most / (std::max(100.0, bounds / n) / 100.0);
   last_.barrier = mu_;
-  // f = f₀ + gᵀw + ½ wᵀ H w, of the part H w of hw.
-  program_.transpose_multiply(lambda_, residual_w_);
-  f_ = f0_ + g_.dot(w_) + 0.5 * w_.dot(hw_ - residual_w_);
+  // f = f₀ + gᵀw + ½ wᵀHw, of hw = Hw + Aᵀλ and hc = Aw.
+  f_ = f0_ + g_.dot(w_) + 0.5 * (w_.dot(hw_) - lambda_.dot(hc_));
   last_.cost = f_;
   const double worst =
       std::max(last_.infeasibility, std::max(last_.optimality, last_.complementarity));
@@ -178,7 +180,7 @@ bool QuadraticMethod::converged(double tolerance) {
 
 bool QuadraticMethod::proves_infeasible() {
   const double size = largest(lambda_);
-  if (!(size > 1e3)) {
+  if (!(size > 1e3) || last_.infeasibility < 1e-6) {
     return false;
   }
   program_.transpose_multiply(lambda_, residual_w_);
@@ -272,7 +274,9 @@ SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool
       return worst <= 1e3 * options.tolerance ? SolveStatus::acceptable : SolveStatus::no_progress;
     }
 
-    diagonal_ = ((zl_.array() / sl_.array() + zu_.array() / su_.array()) * free_.array()).matrix();
+    il_ = sl_.cwiseInverse();
+    iu_ = su_.cwiseInverse();
+    diagonal_ = zl_.cwiseProduct(il_) + zu_.cwiseProduct(iu_);
     diagonal_.array() += 1e-12 * size_;
     ++counts_.factorizations;
     if (!program_.factor(diagonal_, D_, true)) {
@@ -280,52 +284,58 @@ SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool
     }
     // Predictor: straight for complementarity zero.
     rw_ = ((hw_ + g_).array() * free_.array()).matrix();
-    solve(affine_w_, affine_l_);
-    double primal = 1.0;
-    double dual = 1.0;
-    double gap = 0.0;
-    const auto shorten = [](double& alpha, double value, double change) {
-      if (change < 0.0 && value + alpha * change < 0.0) {
-        alpha = -value / change;
-      }
-    };
+    solve(affine_w_, affine_l_, false);
+    // Steps end where the first distance or multiplier would vanish; of the predictor
+    // Δz/z = -1 - Δs/s.
+    double most_primal = 1.0;
+    double most_dual = 1.0;
     for (Index i = 0; i < w_.size(); ++i) {
-      dzl_(i) = -zl_(i) - zl_(i) / sl_(i) * affine_w_(i);
-      dzu_(i) = -zu_(i) + zu_(i) / su_(i) * affine_w_(i);
-      shorten(primal, sl_(i), affine_w_(i));
-      shorten(primal, su_(i), -affine_w_(i));
-      shorten(dual, zl_(i), dzl_(i));
-      shorten(dual, zu_(i), dzu_(i));
+      const double low = affine_w_(i) * il_(i);
+      const double high = affine_w_(i) * iu_(i);
+      most_primal = std::max(most_primal, std::max(-low, high));
+      most_dual = std::max(
+          most_dual, std::max(zl_(i) > 0.0 ? 1.0 + low : 0.0, zu_(i) > 0.0 ? 1.0 - high : 0.0));
+      dzl_(i) = -zl_(i) - zl_(i) * low;
+      dzu_(i) = -zu_(i) + zu_(i) * high;
     }
+    double primal = 1.0 / most_primal;
+    double dual = 1.0 / most_dual;
+    double gap = 0.0;
     for (Index i = 0; i < w_.size(); ++i) {
       gap += zl_(i) > 0.0 ? (sl_(i) + primal * affine_w_(i)) * (zl_(i) + dual * dzl_(i)) : 0.0;
       gap += zu_(i) > 0.0 ? (su_(i) - primal * affine_w_(i)) * (zu_(i) + dual * dzu_(i)) : 0.0;
     }
     const double reached = pairs_ > 0 ? gap / pairs_ : 0.0;
     const double ratio = mu_ > 0.0 ? reached / mu_ : 0.0;
-    const double target = std::min(1.0, ratio * ratio * ratio) * mu_;
+    double centering = std::min(1.0, ratio * ratio * ratio);
+    // After a short step: to the middle first.
+    if (last_.number > 0 && last_.step < 0.1) {
+      centering = std::max(centering, 0.5);
+    }
+    const double target = centering * mu_;
     // Corrector: for the products of the predictor, and to the center.
     for (Index i = 0; i < w_.size(); ++i) {
-      const double low = zl_(i) > 0.0 ? (target - affine_w_(i) * dzl_(i)) / sl_(i) : 0.0;
-      const double high = zu_(i) > 0.0 ? (target + affine_w_(i) * dzu_(i)) / su_(i) : 0.0;
+      const double low = zl_(i) > 0.0 ? (target - affine_w_(i) * dzl_(i)) * il_(i) : 0.0;
+      const double high = zu_(i) > 0.0 ? (target + affine_w_(i) * dzu_(i)) * iu_(i) : 0.0;
       rw_(i) = (hw_(i) + g_(i) - low + high) * free_(i);
       low_target_(i) = low;
       high_target_(i) = high;
     }
-    solve(dw_, dl_);
-    primal = 1.0 / 0.995;
-    dual = 1.0 / 0.995;
-    for (Index i = 0; i < w_.size(); ++i) {
-      dzl_(i) = low_target_(i) - zl_(i) - zl_(i) / sl_(i) * dw_(i);
-      dzu_(i) = high_target_(i) - zu_(i) + zu_(i) / su_(i) * dw_(i);
-      shorten(primal, sl_(i), dw_(i));
-      shorten(primal, su_(i), -dw_(i));
-      shorten(dual, zl_(i), dzl_(i));
-      shorten(dual, zu_(i), dzu_(i));
-    }
+    solve(dw_, dl_, true);
     const double keep = std::max(0.995, 1.0 - mu_);
-    primal = std::min(1.0, keep * primal);
-    dual = std::min(1.0, keep * dual);
+    most_primal = keep;
+    most_dual = keep;
+    for (Index i = 0; i < w_.size(); ++i) {
+      const double low = dw_(i) * il_(i);
+      const double high = dw_(i) * iu_(i);
+      most_primal = std::max(most_primal, std::max(-low, high));
+      dzl_(i) = low_target_(i) - zl_(i) - zl_(i) * low;
+      dzu_(i) = high_target_(i) - zu_(i) + zu_(i) * high;
+      most_dual = zl_(i) > 0.0 ? std::max(most_dual, -dzl_(i) / zl_(i)) : most_dual;
+      most_dual = zu_(i) > 0.0 ? std::max(most_dual, -dzu_(i) / zu_(i)) : most_dual;
+    }
+    primal = keep / most_primal;
+    dual = keep / most_dual;
     if (pairs_ == 0) {
       primal = dual = 1.0;
     }

@@ -40,7 +40,8 @@ class QuadraticMethod {
   void residuals();
   void distances();
   [[nodiscard]] bool converged(double tolerance);
-  void solve(Eigen::VectorXd& dw, Eigen::VectorXd& dl);
+  /// @param refined  Whether what the system leaves is solved for again.
+  void solve(Eigen::VectorXd& dw, Eigen::VectorXd& dl, bool refined);
   [[nodiscard]] bool proves_infeasible();
   [[nodiscard]] bool proves_unbounded();
 
@@ -48,7 +49,7 @@ class QuadraticMethod {
   Eigen::VectorXd w_, lambda_, zl_, zu_, sl_, su_, free_;
   Eigen::VectorXd g_, c0_, c_, rd_, diagonal_, D_, rw_, dw_, dl_, dzl_, dzu_, affine_w_, affine_l_;
   Eigen::VectorXd residual_w_, residual_c_, fix_w_, fix_c_, hw_, hc_, certificate_, low_target_,
-      high_target_;
+      high_target_, il_, iu_;
   double f_ = 0.0, f0_ = 0.0, mu_ = 0.0, size_ = 1.0;
   int pairs_ = 0;
   bool has_curvature_ = false;
