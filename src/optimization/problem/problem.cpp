@@ -26,6 +26,8 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr std::size_t most_violations = 10;
+/// As for optimal control problems: the first steps look for a trajectory.
+constexpr double first_barrier_of_stages = 30.0;
 
 }  // namespace
 
@@ -256,11 +258,15 @@ ProblemSolution Problem::Parts::run(FlatProblem flat, const SolverOptions& optio
     } else {
       general->start(begin.size() > 0 ? begin : p.start(graph.values));
     }
-    status = general->run(options, watch);
+    SolverOptions chosen = options;
+    if (chosen.first_barrier <= 0.0 && p.stages() > 0 && !is_warm) {
+      chosen.first_barrier = first_barrier_of_stages;
+    }
+    status = general->run(chosen, watch);
     if (is_warm && status != SolveStatus::solved && status != SolveStatus::stopped &&
         status != SolveStatus::time_limit) {
       general->start(p.start(graph.values));
-      status = general->run(options, watch);
+      status = general->run(chosen, watch);
     }
     solution.method = "filter interior-point method";
     take(*general);

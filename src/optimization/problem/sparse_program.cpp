@@ -429,20 +429,27 @@ VectorXd SparseProgram::start(const std::vector<double>& x) {
   for (int i = 0; i < n_; ++i) {
     w(i) = std::clamp(x[static_cast<std::size_t>(i)], lower(i), upper(i));
   }
-  // Scales: slopes of more than 100 are divided down to that.
+  if (!analyzed_) {
+    analyze();
+  }
+  // Scales: slopes of more than 100 are divided down to that. A cost along stages is the mean of
+  // its stages, so that iterations do not depend on their number.
   objective_scale_ = 1.0;
   std::fill(row_scale_.begin(), row_scale_.end(), 1.0);
   VectorXd gradient(variables());
   const VectorXd lambda = VectorXd::Zero(m_);
   if (derivatives(w, lambda, 1.0, gradient)) {
     const double most = gradient.size() > 0 ? gradient.lpNorm<Eigen::Infinity>() : 0.0;
-    objective_scale_ = most > 100.0 ? std::max(100.0 / most, 1e-8) : 1.0;
+    objective_scale_ = stages_        ? 1.0 / static_cast<double>(stages_->stages())
+                       : most > 100.0 ? std::max(100.0 / most, 1e-8)
+                                      : 1.0;
     for (std::size_t r = 0; r < static_cast<std::size_t>(m_); ++r) {
       double slope = 0.0;
       for (int e = a_start_[r]; e < a_start_[r + 1]; ++e) {
         slope = std::max(slope, std::abs(a_[static_cast<std::size_t>(e)]));
       }
-      row_scale_[r] = slope > 100.0 ? std::max(100.0 / slope, 1e-8) : 1.0;
+      row_scale_[r] =
+          slope > 100.0 && !(stages_ && !is_quadratic()) ? std::max(100.0 / slope, 1e-8) : 1.0;
     }
   }
   VectorXd c(m_);
