@@ -269,7 +269,7 @@ Expected<LoopCertificate> certify_loop(const UncertainLoop& loop,
   FLYBALL_CHECK(check(loop));
   FLYBALL_CHECK(check_within(options.closeness, 0.0, 0.999, where, "closeness"));
   LoopCertificate certificate;
-  detail::MemberSearch search(loop, options.margins);
+  detail::MemberSearch search(loop, options.margins, options.most_work);
   search.run();
   if (!search.found()) {
     return refusal(ArgumentError::out_of_range, where, "the set")

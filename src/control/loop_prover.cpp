@@ -158,17 +158,30 @@ bool LoopProver::show_on(const SetPiece& piece, const DelayBranch& branch,
       Z = other;
     }
   }
-  std::vector<MatrixXd> vertices;
-  for (const MatrixXd& M : members) {
-    vertices.push_back(T_0->lazyProduct(M).lazyProduct(Z));
+  // Of a loop of many states a single step may take more than all work that is allowed, and more
+  // memory than there is.
+  const double step = work_of(members.size(), size, fixed);
+  const double affordable = (options_.most_work - work_) / step;
+  bool found = false;
+  if (family.slopes.empty() || affordable < 1.0) {
+    T = *T_0;
+    found = contracts(family, T);
+    work_ += affordable < 1.0 ? step : 0.0;
   }
-  LyapunovSearch search;
-  const bool found = common_lyapunov(vertices, fixed, search, [&](const MatrixXd& found_T) {
-                       return contracts(family, found_T.lazyProduct(*T_0));
-                     }).has_value();
-  work_ += work_of(vertices.size(), size, fixed) * (search.steps + 1);
-  if (search.last.rows() == size) {
-    T = MatrixXd(search.last.lazyProduct(*T_0));
+  if (!found && affordable >= 1.0) {
+    std::vector<MatrixXd> vertices;
+    for (const MatrixXd& M : members) {
+      vertices.push_back(T_0->lazyProduct(M).lazyProduct(Z));
+    }
+    LyapunovSearch search;
+    search.most_steps = static_cast<int>(std::min<double>(search.most_steps, affordable));
+    found = common_lyapunov(vertices, fixed, search, [&](const MatrixXd& found_T) {
+              return contracts(family, found_T.lazyProduct(*T_0));
+            }).has_value();
+    work_ += step * (search.steps + 1);
+    if (search.last.rows() == size) {
+      T = MatrixXd(search.last.lazyProduct(*T_0));
+    }
   }
   if (found && options_.keep_proof) {
     proof_.push_back(

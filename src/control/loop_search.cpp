@@ -49,6 +49,8 @@ bool MemberSearch::look_at(const VectorXd& z) {
   }
   const Eigen::MatrixXd M = family_of(*forms).centre;
   const Index n = M.rows() - 1;
+  const auto size = static_cast<double>(n);
+  work_ += (margins_ ? 300.0 : 20.0) * size * size * size;
   LoopMember member{.parameters = parameters_at(loop_.set, z)};
   member.spectral_radius =
       n == 0 ? 0.0 : eigenvalues_of(M.topLeftCorner(n, n)).cwiseAbs().maxCoeff();
@@ -79,7 +81,7 @@ void MemberSearch::descend(const Found& best) {
       better = false;
       for (Index i = 0; i < loop_.set.axes.cols(); ++i) {
         for (const double side : {-1.0, 1.0}) {
-          if (looks >= most_looks || unstable()) {
+          if (looks >= most_looks || unstable() || work_ > most_work_) {
             return;
           }
           VectorXd z = best().z;
@@ -103,10 +105,13 @@ void MemberSearch::run() {
   look_at(VectorXd::Zero(d));
   for (Index i = 0; i < d; ++i) {
     for (const double side : {-1.0, 1.0}) {
-      look_at(VectorXd(side * VectorXd::Unit(d, i)));
+      if (work_ <= most_work_) {
+        look_at(VectorXd(side * VectorXd::Unit(d, i)));
+      }
     }
   }
-  for (unsigned corner = 0; d > 1 && corner < (1u << d) && !unstable(); ++corner) {
+  for (unsigned corner = 0; d > 1 && corner < (1u << d) && !unstable() && work_ <= most_work_;
+       ++corner) {
     VectorXd z(d);
     for (Index i = 0; i < d; ++i) {
       z(i) = ((corner >> i) & 1u) != 0u ? 1.0 : -1.0;

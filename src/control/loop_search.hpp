@@ -16,7 +16,9 @@ struct FoundMember {
 class MemberSearch {
  public:
   /// @param margins  Whether disk margins matter; without they are not computed.
-  MemberSearch(const UncertainLoop& loop, bool margins) : loop_(loop), margins_(margins) {}
+  /// @param most_work  Floating-point operations after which `run` ends, about.
+  MemberSearch(const UncertainLoop& loop, bool margins, double most_work)
+      : loop_(loop), margins_(margins), most_work_(most_work) {}
 
   /// Corners, middles of faces and the centre, then downhill from the worst: twice, for the
   /// spectral radius and for the disk margin. Ends at the first unstable one.
@@ -42,6 +44,8 @@ class MemberSearch {
 
   const UncertainLoop& loop_;
   bool margins_;
+  double most_work_;
+  double work_ = 0.0;
   bool looked_ = false;
   FoundMember slowest_, thinnest_;
 };

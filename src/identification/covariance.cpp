@@ -213,6 +213,38 @@ double Covariances::standard_error(const Eigen::VectorXd& gradient) const {
   return std::sqrt(largest + of_model * of_model);
 }
 
+namespace {
+
+/// A + (B - A)₊, no smaller than A or B; in units of their diagonals.
+Eigen::MatrixXd above_both(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B) {
+  const Eigen::VectorXd units =
+      A.diagonal().cwiseMax(B.diagonal()).cwiseMax(0.0).cwiseSqrt().unaryExpr([](double s) {
+        return s > 0.0 ? s : 1.0;
+      });
+  const Eigen::VectorXd inverse = units.cwiseInverse();
+  const Eigen::MatrixXd difference = inverse.asDiagonal() * (B - A) * inverse.asDiagonal();
+  const auto eigen = detail::symmetric_eigensystem_of(detail::symmetrized(difference));
+  const Eigen::MatrixXd V = units.asDiagonal() * eigen.vectors;
+  const Eigen::VectorXd positive = eigen.values.cwiseMax(0.0);
+  return A + V * positive.asDiagonal() * V.transpose();
+}
+
+}  // namespace
+
+Eigen::MatrixXd Covariances::joint(const Eigen::MatrixXd& gradients) const {
+  const Eigen::Index count = gradients.rows();
+  Eigen::MatrixXd bound = Eigen::MatrixXd::Zero(count, count);
+  for (const Eigen::MatrixXd& covariance : estimates) {
+    bound = above_both(bound, gradients * covariance * gradients.transpose());
+  }
+  Eigen::MatrixXd of_model = Eigen::MatrixXd::Zero(count, count);
+  for (const Eigen::VectorXd& doubt : doubts) {
+    const Eigen::VectorXd step = gradients * doubt;
+    of_model = above_both(of_model, step * step.transpose());
+  }
+  return detail::symmetrized(bound + of_model);
+}
+
 Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
                         const std::vector<bool>& free, const Bounds& bounds,
                         const ChannelScales& scales) {

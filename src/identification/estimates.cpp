@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 
@@ -23,6 +24,7 @@ constexpr double widest_time_constant = 0.6;  // relative half-width beyond whic
 constexpr double voltage_allowance = 1e-3;  // V, standard error added to kS and kG
 constexpr double speed_allowance = 2e-4;    // relative, added to kV
 constexpr double inertia_allowance = 2e-3;  // relative, added to kA
+constexpr double delay_allowance = 2e-4;    // s, added to delays
 constexpr double small_sample = 1.1;        // of all standard errors
 
 /// @param allowance  Standard error of what the model leaves out, in the gain's unit.
@@ -93,6 +95,29 @@ GainEstimate inertia_gain(const PreparedRecording& prepared, const Eigen::Vector
   return kA;
 }
 
+/// [kV/its value, ln kA, delays] with the allowances of their standard errors.
+void joint_covariance(const Eigen::VectorXd& x, const Covariances& spread, FeedforwardFit& fit) {
+  Eigen::MatrixXd gradients = Eigen::MatrixXd::Zero(4, x.size());
+  const double kV = x[parameter::velocity_gain];
+  gradients(0, parameter::velocity_gain) = 1.0 / kV;
+  gradients(1, parameter::velocity_gain) = 1.0 / kV;
+  gradients(1, parameter::log_time_constant) = 1.0;
+  gradients(2, parameter::position_delay) = 1.0;
+  gradients(3, parameter::velocity_delay) = 1.0;
+  const Eigen::MatrixXd joint = small_sample * small_sample * spread.joint(gradients);
+  const std::array<double, 4> allowances{speed_allowance, inertia_allowance, delay_allowance,
+                                         delay_allowance};
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t j = 0; j < 4; ++j) {
+      fit.joint_covariance[i][j] =
+          joint(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+    if (fit.joint_covariance[i][i] > 0.0) {
+      fit.joint_covariance[i][i] += allowances[i] * allowances[i];
+    }
+  }
+}
+
 void gravity_gains(const Eigen::VectorXd& x, const Covariances& spread, FeedforwardFit& fit) {
   const double cosine = x[parameter::gravity_cosine];
   const double sine = x[parameter::gravity_sine];
@@ -153,6 +178,7 @@ Expected<void> estimate_gains(const PreparedRecording& prepared, const Eigen::Ve
                      spread.standard_error(unit_gradient(x.size(), parameter::velocity_gain)),
                      speed_allowance * x[parameter::velocity_gain]);
   fit.kA = inertia_gain(prepared, x, spread, bounds);
+  joint_covariance(x, spread, fit);
   gravity_gains(x, spread, fit);
 
   const bool kV_at_bound =

@@ -70,6 +70,9 @@ struct Covariances {
   [[nodiscard]] double inflation(Eigen::Index parameter) const;
   /// Largest of the three standard errors of gradient · x, with the largest doubt.
   [[nodiscard]] double standard_error(const Eigen::VectorXd& gradient) const;
+  /// A covariance of gradients · x that is no smaller than any of the three, with the doubts, in
+  /// any direction. @param gradients  One a row.
+  [[nodiscard]] Eigen::MatrixXd joint(const Eigen::MatrixXd& gradients) const;
 };
 
 [[nodiscard]] Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,

@@ -1,6 +1,7 @@
 #include <utility>
 
 #include <flyball/control/certificate.hpp>
+#include <flyball/control/parameter_ellipsoid.hpp>
 #include <flyball/control/robust/structured_singular_value.hpp>
 #include <flyball/systems/discretize.hpp>
 
@@ -45,8 +46,12 @@ Outcome solve_certify(const Problem& problem, JsonWriter& answer) {
   const Time period(problem.number("T"));
   const MatrixXd& low = problem.matrix("low");
   const MatrixXd& high = problem.matrix("high");
-  FLYBALL_TRY(auto set, parameter_box({low.data(), low.data() + low.size()},
-                                      {high.data(), high.data() + high.size()}));
+  const std::vector<double> from(low.data(), low.data() + low.size());
+  const std::vector<double> to(high.data(), high.data() + high.size());
+  FLYBALL_TRY(auto set, problem.has("covariance")
+                            ? parameter_ellipsoid(from, to, problem.matrix("covariance"),
+                                                  problem.number("probability"))
+                            : parameter_box(from, to));
   const Index parameters = set.centre.size() - 2;
 
   LinearPlantFamily family{.A = A, .B = B, .A_p = {}, .B_p = {}, .E = {}, .E_p = {}};
@@ -235,6 +240,10 @@ std::vector<Kind> certificate_kinds() {
              "the least of each of the plant's parameters, of a factor on its "
              "input, and of the delay in s"),
         list("high", "z", "", "the largest"),
+        optional(matrix("covariance", "z", "z",
+                        "of estimated ones, whose low and high are the estimate; zeros of the "
+                        "others. The set is the joint confidence ellipsoid")),
+        or_number(number("probability", "", "that it contains the truth"), 0.95),
         optional(samples("A_p", "i", "n",
                          "how each parameter changes A: matrices, one below the "
                          "other")),

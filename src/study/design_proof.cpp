@@ -1,8 +1,11 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
+
+#include <flyball/control/parameter_ellipsoid.hpp>
 
 #include "core/try.hpp"
 #include "study/design_steps.hpp"
@@ -39,10 +42,16 @@ UncertainLoop uncertain_loop(const LoopDesign& loop, const DesignJob& job) {
   return uncertain;
 }
 
+/// How far a parameter reaches to either side of the centre.
+double reach_of(const ParameterSet& set, Index parameter) {
+  const auto row = set.axes.row(parameter);
+  return row.head(set.round).norm() + row.tail(row.size() - set.round).cwiseAbs().sum();
+}
+
 Expected<PlantProof> proof_of(std::string of, std::string set, const UncertainLoop& loop) {
   PlantProof proof{.of = std::move(of), .set = std::move(set)};
   const Index last = loop.set.centre.size() - 1;
-  const double delay = loop.set.centre(last) + loop.set.axes.row(last).cwiseAbs().sum();
+  const double delay = loop.set.centre(last) + reach_of(loop.set, last);
   proof.states = static_cast<int>(loop.C.cols() + loop.A_c.rows()) +
                  static_cast<int>(std::ceil(delay / loop.period.si() - 1e-9));
   proof.tried = proof.states <= most_states;
@@ -60,15 +69,21 @@ Expected<PlantProof> proof_of(std::string of, std::string set, const UncertainLo
   return proof;
 }
 
-/// The box about the joint 95 % ellipsoid of kV and ln kA, however the two are correlated: each
-/// within √χ²(2) of its standard errors.
+/// The joint 95 % set of kV, ln kA and, where it is not said, the delay.
 Expected<ParameterSet> confidence_set(const PlantSpread& spread, const PlantDescription& plant,
                                       double delay) {
-  const double joint = 2.447746830680816;  // √5.99146
-  const double log_kA = std::log(plant.gains.kA);
-  return parameter_box(
-      {plant.gains.kV - joint * spread.kV, log_kA - joint * spread.log_kA, 1.0, delay},
-      {plant.gains.kV + joint * spread.kV, log_kA + joint * spread.log_kA, 1.0, delay});
+  const double kV = plant.gains.kV;
+  const std::vector<double> estimate{kV, std::log(plant.gains.kA), 1.0, delay};
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(4, 4);
+  const std::array<Index, 3> places{0, 1, 3};
+  const Eigen::Vector3d units(kV, 1.0, 1.0);
+  for (Index i = 0; i < 3; ++i) {
+    for (Index j = 0; j < 3; ++j) {
+      covariance(places[static_cast<std::size_t>(i)], places[static_cast<std::size_t>(j)]) =
+          units(i) * spread.covariance(i, j) * units(j);
+    }
+  }
+  return parameter_ellipsoid(estimate, estimate, covariance);
 }
 
 }  // namespace
@@ -110,8 +125,11 @@ Expected<std::vector<PlantProof>> proofs_of(const LoopDesign& loop, const Design
   if (plant.spread && plant.kA_determined) {
     std::get<MechanismFamily>(uncertain.plant).logarithmic = true;
     FLYBALL_TRY(uncertain.set, confidence_set(*plant.spread, plant, delay));
-    FLYBALL_TRY(auto identified,
-                proof_of("identified", "a kV and a kA of the log's joint 95 % set", uncertain));
+    FLYBALL_TRY(auto identified, proof_of("identified",
+                                          plant.spread->covariance(2, 2) > 0.0
+                                              ? "a kV, a kA and a delay of the log's joint 95 % set"
+                                              : "a kV and a kA of the log's joint 95 % set",
+                                          uncertain));
     proofs.push_back(std::move(identified));
   }
   return proofs;

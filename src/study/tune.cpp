@@ -1,6 +1,8 @@
 #include <flyball/study/tune.hpp>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <utility>
 
 #include <flyball/core/progress.hpp>
@@ -8,6 +10,37 @@
 #include "core/try.hpp"
 
 namespace flyball::study {
+
+namespace {
+
+/// The fit's covariance with the standard errors that are told, which a comparison of logs may have
+/// widened; of those alone, one that is right for any correlation of the two.
+PlantSpread spread_of(const identification::FeedforwardFit& fit) {
+  const auto& joint = fit.joint_covariance;
+  // The delay is that of the column that the loop is closed over.
+  const std::array<std::size_t, 3> rows{0, 1, controls_velocity(fit.mechanism) ? 3u : 2u};
+  const std::array<double, 2> told{fit.kV.standard_error / fit.kV.value,
+                                   fit.kA.standard_error / fit.kA.value};
+  PlantSpread spread;
+  if (!(joint[0][0] > 0.0) || !(joint[1][1] > 0.0)) {
+    spread.covariance.diagonal() << 2.0 * told[0] * told[0], 2.0 * told[1] * told[1], 0.0;
+    return spread;
+  }
+  Eigen::Vector3d wider = Eigen::Vector3d::Ones();
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const auto row = rows[static_cast<std::size_t>(i)];
+    for (Eigen::Index j = 0; j < 3; ++j) {
+      spread.covariance(i, j) = joint[row][rows[static_cast<std::size_t>(j)]];
+    }
+    if (i < 2) {
+      wider(i) = std::max(1.0, told[static_cast<std::size_t>(i)] / std::sqrt(joint[row][row]));
+    }
+  }
+  spread.covariance = wider.asDiagonal() * spread.covariance * wider.asDiagonal();
+  return spread;
+}
+
+}  // namespace
 
 PlantDescription plant_from_fit(const identification::FeedforwardFit& fit) {
   PlantDescription plant;
@@ -24,7 +57,7 @@ PlantDescription plant_from_fit(const identification::FeedforwardFit& fit) {
   plant.kA_upper_bound = fit.kA.determined ? 0.0 : fit.kA.upper_bound;
   plant.kA_reason = fit.kA.determined ? "" : fit.kA.reason;
   if (fit.kA.determined) {
-    plant.spread = PlantSpread{fit.kV.standard_error, fit.kA.standard_error / fit.kA.value};
+    plant.spread = spread_of(fit);
   }
   plant.gains.kG = fit.kG ? known(*fit.kG) : 0.0;
   if (fit.gravity_with_friction) {
@@ -48,6 +81,9 @@ DesignJob loop_job(const DesignJob& said, const identification::FeedforwardFit& 
   if (!job.controller.delay) {
     // A sensor cannot show the future; a negative delay is skew between the logger's channels.
     job.controller.delay = std::max(0.0, velocity_loop ? fit.velocity_delay : fit.position_delay);
+  } else if (job.plant.spread) {
+    job.plant.spread->covariance.row(2).setZero();  // It is said, not seen.
+    job.plant.spread->covariance.col(2).setZero();
   }
   const double seen_noise = velocity_loop ? fit.velocity_noise : fit.position_noise;
   if (!job.estimator.measurement_std && seen_noise > 0.0) {

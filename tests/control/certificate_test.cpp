@@ -113,6 +113,23 @@ TEST(Certificate, ABallIsLessThanItsBox) {
   EXPECT_EQ(certified(loop).verdict, LoopVerdict::unstable);
 }
 
+// dx/dt = g u, u = -x delayed by d periods: stable iff κ < 2 sin(π/(2(2d + 1))) (Levin and May).
+// Many states end in time and memory, proven where one function does it, and without a wrong word.
+TEST(Certificate, AnswersOfLongDelaysInTime) {
+  for (const int d : {10, 30, 80}) {
+    const double limit = 2.0 * std::sin(std::acos(-1.0) / (2.0 * (2.0 * d + 1.0))) / 4.0;
+    const auto verdict = [&](double low, double high) {
+      return certify_loop(integrator(low * limit, high * limit, d * T, d * T),
+                          {.most_work = 3e8, .margins = false})
+          .value()
+          .verdict;
+    };
+    EXPECT_EQ(verdict(0.5, 0.5), LoopVerdict::stable) << d;
+    EXPECT_EQ(verdict(0.5, 1.01), LoopVerdict::unstable) << d;
+    EXPECT_NE(verdict(0.5, 0.9), LoopVerdict::unstable) << d;
+  }
+}
+
 UncertainLoop elevator_loop(double delay, std::variant<LinearPlantFamily, MechanismFamily> family,
                             const ParameterSet& set) {
   const Regulated design = regulated_elevator();

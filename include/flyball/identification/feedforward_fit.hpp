@@ -69,6 +69,11 @@ struct FeedforwardFit {
   bool in_reverse = false;         ///< Whether that is kG − kS.
   std::vector<ModelTerm> terms{};  ///< Beyond the four gains; none of most logs.
 
+  /// Of [kV/its value, ln kA, position_delay, velocity_delay], delays in s: in no direction smaller
+  /// than any of the three variance estimates, with the allowances of the standard errors. Zero
+  /// where the log has no such column; all zero where no covariance is known.
+  std::array<std::array<double, 4>, 4> joint_covariance{};
+
   double r_squared = 0.0;        ///< Of the free-run simulated velocity, all used runs.
   double velocity_nrmse = 0.0;   ///< RMS error over standard deviation of the velocity.
   double position_delay = 0.0;   ///< s, age of the position column (0 if absent).

@@ -19,10 +19,10 @@
 
 namespace flyball::study {
 
-/// What an identification leaves open of the loop's plant: standard errors.
+/// What an identification leaves open of the loop's plant.
 struct PlantSpread {
-  double kV = 0.0;      ///< V·s/unit
-  double log_kA = 0.0;  ///< Of ln kA.
+  /// Of [kV/its value, ln kA, the loop's delay in s]; a row of zeros is known.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
 /// The mechanism to be controlled: gains (identified, or computed from mass, gearing and motors).
