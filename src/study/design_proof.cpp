@@ -124,12 +124,26 @@ Expected<std::vector<PlantProof>> proofs_of(const LoopDesign& loop, const Design
   }
   if (plant.spread && plant.kA_determined) {
     std::get<MechanismFamily>(uncertain.plant).logarithmic = true;
-    FLYBALL_TRY(uncertain.set, confidence_set(*plant.spread, plant, delay));
-    FLYBALL_TRY(auto identified, proof_of("identified",
-                                          plant.spread->covariance(2, 2) > 0.0
-                                              ? "a kV, a kA and a delay of the log's joint 95 % set"
-                                              : "a kV and a kA of the log's joint 95 % set",
-                                          uncertain));
+    PlantSpread spread = *plant.spread;
+    FLYBALL_TRY(uncertain.set, confidence_set(spread, plant, delay));
+    const bool delays = spread.covariance(2, 2) > 0.0;
+    FLYBALL_TRY(auto identified,
+                proof_of("identified",
+                         delays ? "a kV, a kA and a delay of the log's joint 95 % set"
+                                : "a kV and a kA of the log's joint 95 % set",
+                         uncertain));
+    if (delays && identified.certificate.verdict == LoopVerdict::undecided) {
+      // A delay that a log leaves wide open is more than the work suffices for: what is shown then
+      // is of the delay that the loop is designed for.
+      spread.covariance.row(2).setZero();
+      spread.covariance.col(2).setZero();
+      FLYBALL_TRY(uncertain.set, confidence_set(spread, plant, delay));
+      FLYBALL_TRY(auto nearer,
+                  proof_of("identified", "a kV and a kA of the log's joint 95 % set", uncertain));
+      if (nearer.tried && nearer.certificate.verdict != LoopVerdict::undecided) {
+        identified = std::move(nearer);
+      }
+    }
     proofs.push_back(std::move(identified));
   }
   return proofs;

@@ -55,6 +55,13 @@ TEST(Tune, GoesFromALogToAProvenController) {
   for (const PlantProof& proof : design.proofs) {
     EXPECT_EQ(proof.certificate.verdict, LoopVerdict::stable) << proof.set;
   }
+  // The joint set is no smaller than what each gain is told with.
+  const auto& joint = fit.joint_covariance;
+  EXPECT_GE(std::sqrt(joint[0][0]) * fit.kV.value, fit.kV.standard_error * (1.0 - 1e-9));
+  EXPECT_GE(std::sqrt(joint[1][1]) * fit.kA.value, fit.kA.standard_error * (1.0 - 1e-9));
+  EXPECT_GT(joint[2][2], 0.0);
+  EXPECT_LT(joint[0][1] * joint[0][1], joint[0][0] * joint[1][1]);
+  EXPECT_EQ(joint[1][2], joint[2][1]);
   // The delay that the log shows is the one that the loop is designed for.
   EXPECT_NEAR(*design.job.controller.delay, std::max(0.0, fit.position_delay), 1e-12);
 

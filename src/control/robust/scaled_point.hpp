@@ -21,9 +21,10 @@ struct ScaledPoint {
                                         double frequency) const;
 };
 
-/// @param enough  Below this β the bound need not be the least.
+/// @param enough  Below this β the bound need not be the least. @param accuracy  Of β².
 [[nodiscard]] ScaledPoint scaled_point(const Eigen::MatrixXcd& M,
-                                       const UncertaintyStructure& structure, double enough = 0.0);
+                                       const UncertaintyStructure& structure, double enough = 0.0,
+                                       double accuracy = 1e-7);
 
 /// What is left of (I - M Δ) z beside (1 + ‖M‖ ‖Δ‖) ‖z‖; all in a point's coordinates.
 [[nodiscard]] double residual_of(const Eigen::MatrixXcd& M, const Eigen::MatrixXcd& Q,

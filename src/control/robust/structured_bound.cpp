@@ -89,14 +89,16 @@ class ScalingSearch {
     add_form();
   }
 
-  StructuredBound run(double enough) {
+  StructuredBound run(double enough, double accuracy) {
+    constexpr Index few = 60;  // unknowns: then the least bound costs little
+    accuracy = x_.size() <= few ? std::min(accuracy, 1e-7) : accuracy;
     constexpr int most_levels = 80;
     constexpr double share = 0.1;
     const double scale = M_.squaredNorm();
     StructuredBound best{scaling_at(x_), largest_at(x_)};
     double level = best.squared + 0.1 * std::abs(best.squared) + 1e-14 * scale;
     int idle = 0;
-    for (int k = 0; k < most_levels; ++k) {
+    for (int k = 0; k < most_levels && best.squared > enough; ++k) {
       if (!center(level)) {
         break;
       }
@@ -104,13 +106,13 @@ class ScalingSearch {
       if (!std::isfinite(squared)) {
         break;
       }
-      idle = squared > best.squared - 1e-6 * std::abs(best.squared) ? idle + 1 : 0;
+      idle = squared > best.squared - 10.0 * accuracy * std::abs(best.squared) ? idle + 1 : 0;
       if (squared < best.squared) {
         best = {scaling_at(x_), squared};
       }
       // Beyond zero a form that is definite by more than rounding proves that nothing is singular.
-      if (best.squared <= enough || best.squared < -1e-6 * scale || idle >= 3 ||
-          level - squared < 1e-7 * std::abs(squared) + 1e-15 * scale) {
+      if (best.squared < -1e-6 * scale || idle >= 3 ||
+          level - squared < accuracy * std::abs(squared) + 1e-15 * scale) {
         break;
       }
       level = squared + share * (level - squared);
@@ -282,8 +284,8 @@ class ScalingSearch {
 }  // namespace
 
 StructuredBound least_structured_bound(const MatrixXcd& M, const UncertaintyStructure& structure,
-                                       double enough) {
-  return ScalingSearch(M, structure).run(enough);
+                                       double enough, double accuracy) {
+  return ScalingSearch(M, structure).run(enough, accuracy);
 }
 
 }  // namespace flyball::detail

@@ -11,11 +11,12 @@ struct StructuredBound {
   double squared = 0.0;  ///< β², negative where the form is definite with none.
 };
 
-/// The smallest bound there is, to 1e-5 or so; `scaling` is that of the best point of the way.
-/// @param enough  Below this β² the search may end.
+/// The smallest bound there is; `scaling` is that of the best point of the way.
+/// @param enough  Below this β² the search may end. @param accuracy  Relative, of β², where there
+/// are many unknowns.
 [[nodiscard]] StructuredBound least_structured_bound(const Eigen::MatrixXcd& M,
                                                      const UncertaintyStructure& structure,
-                                                     double enough = -1.0);
+                                                     double enough = -1.0, double accuracy = 1e-7);
 
 /// β² D_in - Mᴴ D_out M - j (G M - Mᴴ Gᴴ).
 [[nodiscard]] Eigen::MatrixXcd structured_form(const Eigen::MatrixXcd& M,

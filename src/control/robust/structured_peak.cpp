@@ -29,6 +29,9 @@ using Eigen::MatrixXd;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 /// How far above the largest bound at a frequency the proven level is.
 constexpr double above_all = 1.0002;
+/// A bound this far below the level holds over a good stretch, and need not be the least.
+constexpr double well_below = 0.97;
+constexpr double accuracy = 2e-5;  ///< Of β² elsewhere.
 
 /// A frequency that was looked at.
 struct Visit {
@@ -86,7 +89,7 @@ class PeakSearch {
  private:
   void visit(double frequency) {
     Visit made{frequency, detail::response_at(system_, frequency), {}, {frequency, frequency}};
-    made.point = detail::scaled_point(made.M, structure_, level_ / above_all);
+    made.point = detail::scaled_point(made.M, structure_, well_below * level_, accuracy);
     level_ = std::max(level_, above_all * made.point.beta);
     visits_.push_back(std::move(made));
   }

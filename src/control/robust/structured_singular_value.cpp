@@ -44,10 +44,11 @@ UnitMember ScaledPoint::first_member(const MatrixXcd& M, const MemberClimb& clim
   return climb.aligned(w, M.lazyProduct(w), frequency);
 }
 
-ScaledPoint scaled_point(const MatrixXcd& M, const UncertaintyStructure& structure, double enough) {
+ScaledPoint scaled_point(const MatrixXcd& M, const UncertaintyStructure& structure, double enough,
+                         double accuracy) {
   const BalancedMatrix balance = balanced(M, structure);
   const double inside = std::ldexp(enough, -balance.size);
-  StructuredBound bound = least_structured_bound(balance.M, structure, inside * inside);
+  StructuredBound bound = least_structured_bound(balance.M, structure, inside * inside, accuracy);
   // Entries that powers of two bring below the normal numbers are known to within those.
   constexpr double lost = 0x1p-600;
   const double beta = proven_bound(balance.M, bound, lost);

@@ -110,7 +110,8 @@ struct StructuredPeak {
 /// @param system  M, of at most `most_structured_size` inputs or outputs.
 /// @param blocks  As above.
 /// @errors ArgumentError for the system and the blocks; SystemError::not_stable with the pole.
-/// Cost: some ten to thirty structured singular values and Hamiltonian eigenvalues. Deterministic.
+/// Cost: some ten to thirty structured singular values and Hamiltonian eigenvalues: milliseconds,
+/// and seconds of a number that is repeated ten times. Deterministic.
 /// Source: Lawrence, Tits and Van Dooren, Automatica 36 (2000); Roos and Biannic, ASME Advances in
 /// Robust Control (2010).
 [[nodiscard]] Expected<StructuredPeak> structured_peak(const ContinuousSystem<>& system,
