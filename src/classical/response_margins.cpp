@@ -37,6 +37,23 @@ class BoundedLoop {
       : loop_(loop), period_(loop.period()), factors_(std::move(factors)) {}
 
   [[nodiscard]] Complex at(double w) const { return loop_.at(w)(0, 0); }
+  /// The same by its factors, many times as fast: what is bounded needs no last digits.
+  [[nodiscard]] Complex near(double w) const {
+    const double T = period_ ? period_->si() : 1.0;
+    const Complex z = period_ ? std::polar(1.0, w * T) : Complex(0.0, w);
+    Complex value = std::polar(1.0, -w * factors_.delay) * factors_.gain;
+    const Index common = std::min(factors_.zeros.size(), factors_.poles.size());
+    for (Index i = 0; i < common; ++i) {
+      value *= (z - factors_.zeros(i)) / (z - factors_.poles(i));
+    }
+    for (Index i = common; i < factors_.zeros.size(); ++i) {
+      value *= z - factors_.zeros(i);
+    }
+    for (Index i = common; i < factors_.poles.size(); ++i) {
+      value /= z - factors_.poles(i);
+    }
+    return value;
+  }
   [[nodiscard]] const Factors& factors() const { return factors_; }
   [[nodiscard]] double variation(const Step& step) const {
     return detail::variation(factors_, step.from, step.to, period_);
@@ -153,16 +170,18 @@ class BoundedLoop {
     return {std::min(slowest, loop_.highest_frequency()), fastest};
   }
 
-  /// Up to where phase crossings are told: with dead time there is no last one.
+  /// Up to where phase crossings are told: with dead time a continuous loop has no last one.
   [[nodiscard]] double last_phase() const {
-    return factors_.delay > 0.0 ? 10.0 * extremes().to : infinity;
+    return factors_.delay > 0.0 && !period_ ? 10.0 * extremes().to : infinity;
   }
 
   /// From where on, and up to where, |L| and its phase do not cross any more.
   [[nodiscard]] Step range() const {
     const auto [slowest, fastest] = extremes();
     const double end = loop_.highest_frequency();
-    Step range{1e-6 * slowest, factors_.delay > 0.0 ? 10.0 * fastest : 1e6 * fastest};
+    Step range{1e-6 * slowest, period_                ? end
+                               : factors_.delay > 0.0 ? 10.0 * fastest
+                                                      : 1e6 * fastest};
     // Beyond, the asymptotes K ω^{-N} and k ω^{-excess} are within a factor of two.
     const detail::Asymptote low = detail::low_asymptote(factors_, period_);
     if (low.integrators != 0) {
@@ -219,7 +238,12 @@ std::optional<std::vector<double>> zeros(const BoundedLoop& loop, const Step& ra
     const Step step = pending.back();
     pending.pop_back();
     const double moved = (loop.*crossing.motion)(step);
-    const double at_start = value(step.from);
+    // The factors' value where that is far from deciding.
+    double at_start = crossing.value(loop.near(step.from));
+    if (std::abs(at_start) > moved + 1e-6) {
+      continue;
+    }
+    at_start = value(step.from);
     if (std::abs(at_start) > moved) {
       continue;
     }
@@ -313,7 +337,7 @@ struct LogSlope {
 std::optional<LogSlope> log_slope(const BoundedLoop& loop, const Step& step, double v,
                                   Measure measure) {
   const double h = step.to - step.from;
-  const Complex L = loop.at(step.from);
+  const Complex L = loop.near(step.from);
   const Complex by_log = loop.slope(step.from);
   const double curvature = loop.curvature(step);
   const double steepest = std::abs(by_log) + curvature * h;
@@ -348,6 +372,10 @@ Peak largest(const BoundedLoop& loop, const Step& range, const Eigen::VectorXd& 
     const double value = size_of(measure, loop.at(w));
     return std::isnan(value) ? 0.0 : value;
   };
+  const auto roughly = [&](double w) {
+    const double value = size_of(measure, loop.near(w));
+    return std::isnan(value) ? 0.0 : value;
+  };
   const auto consider = [&](double value, double w) {
     if (value > best.value) {
       best = {value, w};
@@ -356,7 +384,7 @@ Peak largest(const BoundedLoop& loop, const Step& range, const Eigen::VectorXd& 
   std::vector<Step> pending;
   double last = range.from;
   for (const double w : grid) {
-    consider(size(w), w);
+    consider(roughly(w), w);
     if (w > last && w < range.to) {
       pending.push_back({last, w});
       last = w;
@@ -366,40 +394,62 @@ Peak largest(const BoundedLoop& loop, const Step& range, const Eigen::VectorXd& 
   // The low ones first: where the work ends before the steps do, what was not looked at is high up.
   std::reverse(pending.begin(), pending.end());
   constexpr double tolerance = 1e-5;
+  std::vector<Step> near_the_best;  // where a maximum may be above it by less than that
   constexpr int most = 60'000;
   for (int count = 0; !pending.empty() && count < most; ++count) {
     const Step step = pending.back();
     pending.pop_back();
-    const Complex L = loop.at(step.from);
-    const double here = size(step.from);
+    const Complex L = loop.near(step.from);
+    const double here = roughly(step.from);
     consider(here, step.from);
-    consider(size(step.to), step.to);
-    const double beyond = best.value * (1.0 + tolerance);
+    consider(roughly(step.to), step.to);
+    const double width = step.to - step.from;
     const double v = loop.variation(step);
-    if (bound_of(measure, L, v) <= beyond ||
-        bound_by_size(measure, std::abs(L), loop.swing(step)) <= beyond ||
-        !(step.to - step.from > 1e-13 * step.to)) {
+    double bound =
+        std::min(bound_of(measure, L, v), bound_by_size(measure, std::abs(L), loop.swing(step)));
+    if (!(bound > best.value) || width <= 1e-13 * step.to) {
       continue;
     }
-    if (v < 1.0) {
-      const auto slope = log_slope(loop, step, v, measure);
-      if (slope &&
-          (slope->is_monotone() ||
-           here * std::exp((step.to - step.from) * (slope->value + slope->change)) <= beyond)) {
+    if (const auto slope = v < 1.0 ? log_slope(loop, step, v, measure) : std::nullopt) {
+      if (slope->is_monotone()) {
         continue;
       }
+      bound = std::min(bound, here * std::exp(width * (slope->value + slope->change)));
     }
-    pending.push_back(halves(step, true));
-    pending.push_back(halves(step, false));
+    if (bound > best.value * (1.0 + tolerance)) {
+      pending.push_back(halves(step, true));
+      pending.push_back(halves(step, false));
+    } else if (bound > best.value) {
+      near_the_best.push_back(step);
+    }
   }
   // What is left once the work is done may be larger: then nothing is told.
   constexpr double doubtful = 1.01;
   for (const Step& step : pending) {
-    const Complex L = loop.at(step.from);
+    const Complex L = loop.near(step.from);
     if (bound_of(measure, L, loop.variation(step)) > doubtful * best.value &&
         bound_by_size(measure, std::abs(L), loop.swing(step)) > doubtful * best.value) {
       constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
       return {unknown, unknown};
+    }
+  }
+  best.value = size(best.frequency);
+  std::erase_if(near_the_best, [&](const Step& step) {
+    return roughly(step.from) < best.value * (1.0 - 2.0 * tolerance);
+  });
+  std::sort(near_the_best.begin(), near_the_best.end(),
+            [](const Step& a, const Step& b) { return a.from < b.from; });
+  constexpr int most_tops = 20;
+  int tops = 0;
+  for (std::size_t i = 0; i < near_the_best.size() && tops < most_tops; ++tops) {
+    Step whole = near_the_best[i++];
+    while (i < near_the_best.size() && near_the_best[i].from <= whole.to * (1.0 + 1e-12)) {
+      whole.to = near_the_best[i++].to;
+    }
+    const auto top =
+        find_minimum([&](double w) { return -size(w); }, whole.from, std::min(whole.to, range.to));
+    if (top) {
+      consider(-top->value, top->x);
     }
   }
   for (const double width : {1e-2, 1e-4}) {
@@ -412,6 +462,10 @@ Peak largest(const BoundedLoop& loop, const Step& range, const Eigen::VectorXd& 
     if (top) {
       consider(-top->value, top->x);
     }
+  }
+  // A maximum at the end is flat there.
+  if (const double at_end = size(range.to); at_end >= best.value * (1.0 - 1e-13)) {
+    best = {std::max(at_end, best.value), range.to};
   }
   return best;
 }

@@ -22,6 +22,7 @@ ErrorInfo error_info(PidDesignError code) {
       {"unlimited", "nothing limits the gains", ErrorKind::no_answer},
       {"phase_not_reached", "the controller cannot turn the phase as far", ErrorKind::no_answer},
       {"unstable_loop", "the loop is not stable", ErrorKind::no_answer},
+      {"not_dominant", "another pole is slower", ErrorKind::no_answer},
   };
   return detail::info_of(code, "pid design", rows);
 }

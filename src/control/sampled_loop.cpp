@@ -120,6 +120,26 @@ std::complex<double> SampledLoop::response(double theta) const {
   return v * delay;
 }
 
+Expected<classical::FrequencyResponse> SampledLoop::open(Time period) const {
+  const Eigen::Index n = A_.rows();
+  const Eigen::Index q = A_c_.rows();
+  const Eigen::Index before = B_1_.isZero(0.0) ? 0 : 1;  // the input of the last period
+  DiscreteSystem<> L{Eigen::MatrixXd::Zero(n + before + q, n + before + q),
+                     Eigen::MatrixXd::Zero(n + before + q, 1),
+                     Eigen::MatrixXd::Zero(1, n + before + q), Eigen::MatrixXd::Zero(1, 1), period};
+  L.A.topLeftCorner(n, n) = A_;
+  L.B.topRows(n) = B_0_;
+  if (before > 0) {
+    L.A.block(0, n, n, 1) = B_1_;
+    L.B(n, 0) = 1.0;
+  }
+  L.A.bottomLeftCorner(q, n) = B_c_ * C_;
+  L.A.bottomRightCorner(q, q) = A_c_;
+  L.C.leftCols(n) = D_c_ * C_;
+  L.C.rightCols(q) = C_c_;
+  return classical::frequency_response(L, Time(whole_delays_ * period.si()));
+}
+
 Eigen::MatrixXd SampledLoop::closed(double gain) const {
   const Eigen::Index n = A_.rows();
   const Eigen::Index n_delayed = delayed_A_.rows();

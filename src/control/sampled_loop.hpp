@@ -2,6 +2,7 @@
 
 #include <complex>
 
+#include <flyball/classical/frequency_response.hpp>
 #include <flyball/control/margins.hpp>
 
 namespace flyball::detail {
@@ -15,6 +16,10 @@ class SampledLoop {
 
   /// L(e^{iθ}). @param theta  rad a sample, 0 to π.
   [[nodiscard]] std::complex<double> response(double theta) const;
+
+  /// L as `classical` knows it: states of the plant, a part of a period, and the controller, behind
+  /// the whole periods of delay. @param period  The loop's. @errors As `frequency_response`.
+  [[nodiscard]] Expected<classical::FrequencyResponse> open(Time period) const;
 
   /// The closed loop's matrix with a factor on the plant input; its states are the plant's, the
   /// inputs on their way, and the controller's.

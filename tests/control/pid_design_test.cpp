@@ -350,5 +350,58 @@ TEST(PidDesign, RobustPidOfManyLags) {
                   .is(ArgumentError::out_of_range));
 }
 
+// The pair stays where it was placed, dead time and filter or not.
+TEST(PidDesign, DominantPolesAreWhereTheyWerePlaced) {
+  Random random(11);
+  int placed = 0;
+  for (int i = 0; i < 60; ++i) {
+    const bool discrete = i % 3 == 2;
+    const double period = discrete ? 0.05 : 0.0;
+    const double pole = 0.3 + random.uniform();
+    const double z = std::exp(-0.05 * pole);
+    const TransferFunction P =
+        discrete ? plant({0.0013, 0.0012}, {1.0, -1.0 - z, z}, i % 2 == 0 ? 0.1 : 0.0, period)
+                 : lags(1.5, {}, {1.0 / pole, 0.3, 0.2}, i % 2 == 0 ? 0.15 : 0.0);
+    const PidForm form = discrete ? PidForm::pd : i % 4 < 2 ? PidForm::pi : PidForm::pid;
+    const DominantPoles goal{.natural_frequency = 0.4 + 0.5 * random.uniform(),
+                             .damping_ratio = 0.5 + 0.4 * random.uniform()};
+    const auto loop = tune_by_poles(P, form, goal);
+    if (!loop) {
+      // Or derivatives so large that their filter runs away from them.
+      EXPECT_TRUE(loop.error().is(PidDesignError::not_dominant) ||
+                  loop.error().is(PidDesignError::unstable_loop) ||
+                  loop.error().is(PidDesignError::no_rule))
+          << to_string(loop.error());
+      continue;
+    }
+    ++placed;
+    const double w = goal.natural_frequency;
+    const double zeta = goal.damping_ratio;
+    std::vector<Complex> points{w * Complex(-zeta, std::sqrt(1.0 - zeta * zeta))};
+    if (form == PidForm::pid) {
+      points.emplace_back(-w);
+      EXPECT_NEAR(loop->derivative_time_constant, std::abs(loop->gains.kd / loop->gains.kp) / 10.0,
+                  1e-12);
+    }
+    const auto L = series(loop->controller, P).value();
+    for (const Complex& s : points) {
+      EXPECT_LE(std::abs(1.0 + L.at(discrete ? std::exp(s * period) : s).value()), 1e-9) << i;
+    }
+    EXPECT_TRUE(loop->margins.stable);
+  }
+  EXPECT_GT(placed, 20);
+  const TransferFunction P = lags(1.0, {}, {1.0, 1.0});
+  const auto refused = [&](PidForm form, const DominantPoles& goal) {
+    return tune_by_poles(P, form, goal).error();
+  };
+  EXPECT_TRUE(refused(PidForm::p, {.natural_frequency = 1.0}).is(PidDesignError::no_rule));
+  EXPECT_TRUE(refused(PidForm::pi, {.natural_frequency = 0.0}).is(ArgumentError::not_positive));
+  EXPECT_TRUE(refused(PidForm::pi, {.natural_frequency = 1.0, .damping_ratio = 1.0})
+                  .is(ArgumentError::out_of_range));
+  // PI on two lags of 1 s does not move the poles' sum: the third is at -2 + 2ζω.
+  EXPECT_TRUE(refused(PidForm::pi, {.natural_frequency = 1.2, .damping_ratio = 0.7})
+                  .is(PidDesignError::not_dominant));
+}
+
 }  // namespace
 }  // namespace flyball

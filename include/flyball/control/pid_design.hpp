@@ -18,6 +18,7 @@ enum class PidDesignError {
   unlimited,          ///< Any integral gain would do: the plant has too little lag to limit it.
   phase_not_reached,  ///< The form cannot turn the phase as far as the margin needs.
   unstable_loop,      ///< What the method gives does not stabilise the plant.
+  not_dominant,       ///< Another pole of the loop is slower than those that were placed.
 };
 [[nodiscard]] ErrorInfo error_info(PidDesignError code);
 
@@ -129,5 +130,24 @@ struct LoopShapeGoal {
 /// Cost: some milliseconds. Source: book, section E.3.6; the two sliders are MATLAB's PID Tuner's.
 [[nodiscard]] Expected<PidLoop> tune_by_loop_shape(const classical::TransferFunction& plant,
                                                    PidForm form, const LoopShapeGoal& goal);
+
+/// Poles that are to decide about the closed loop.
+struct DominantPoles {
+  double natural_frequency = 0.0;  ///< ω, rad/s.
+  double damping_ratio = 0.7;      ///< ζ of the pair, below 1.
+  double third_pole = 1.0;         ///< α: PID's third is at -α ω.
+  double filter_ratio = 10.0;      ///< N, τ = T_d/N; of continuous plants not zero.
+};
+
+/// Gains with which s² + 2ζω s + ω² is a factor of the closed loop, dead time exact: 1 + P C = 0 at
+/// the pair has two equations, for PI or PD; PID has a real pole at -α ω, too. Of a discrete plant
+/// the poles are those of e^{sT}.
+/// @errors ArgumentError for the goal (ζ from 1 on, a pair above Nyquist's frequency);
+///         PidDesignError::no_rule for P, for poles where the plant is zero and where the filter's
+///         time does not settle; unstable_loop with the count of unstable poles; not_dominant with
+///         the pole that is slower. Cost: some milliseconds.
+/// Source: Åström and Hägglund, "Advanced PID Control" (2006), section 6.4; book, section 7.6.
+[[nodiscard]] Expected<PidLoop> tune_by_poles(const classical::TransferFunction& plant,
+                                              PidForm form, const DominantPoles& goal);
 
 }  // namespace flyball
