@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 
+#include "core/format.hpp"
 #include "core/try.hpp"
 #include "mechanisms/motor_checks.hpp"
 
@@ -46,17 +47,26 @@ Expected<LimiterNumbers> check_limiter(const SwerveLimits& limits, const SwerveF
                     .positive(forces->friction, "friction"));
   FLYBALL_CHECK(check_limit(forces->stator_limit, "stator_limit", "A"));
   FLYBALL_CHECK(check_limit(forces->supply_limit, "supply_limit", "A"));
+  const double free =
+      forces->rail.si() * forces->motor.Kv * forces->wheel_radius.si() / forces->gearing;  // m/s
+  if (numbers.max_speed > 0.98 * free) {
+    return refusal(ArgumentError::out_of_range, where, "max_speed")
+        .got(format_number(numbers.max_speed) + " m/s")
+        .expected(flyball::detail::format(
+            "at most {:.4g} m/s, 0.98 of what the motors reach on {:.4g} V without load",
+            0.98 * free, forces->rail.si()))
+        .hint("take a lower speed, less gearing or a larger wheel");
+  }
   numbers.has_forces = true;
   numbers.mass = forces->body.mass.si();
   numbers.inertia = forces->body.moment_of_inertia.si();
   numbers.grip = forces->friction * standard_gravity;
   numbers.center = forces->body.center_of_mass;
-  numbers.wheel = {.motor = {.R = forces->motor.R,
-                             .Kv = forces->motor.Kv,
-                             .limits = {forces->stator_limit, forces->supply_limit}},
-                   .gearing_over_radius = forces->gearing / forces->wheel_radius.si(),
-                   .Kt = forces->motor.Kt,
-                   .rail = forces->rail.si()};
+  numbers.wheel =
+      WheelForce({.R = forces->motor.R,
+                  .Kv = forces->motor.Kv,
+                  .limits = {forces->stator_limit, forces->supply_limit}},
+                 forces->gearing / forces->wheel_radius.si(), forces->motor.Kt, forces->rail.si());
   return numbers;
 }
 

@@ -37,6 +37,15 @@ Expected<Eigen::MatrixXd> detail::wheel_matrix(std::span<const WheelMount> mount
                                        wheel.roller_angle))
           .expected("one whose rollers' axis is not across that direction");
     }
+    for (Eigen::Index j = 0; j < i; ++j) {
+      const WheelMount& other = mounts[static_cast<std::size_t>(j)];
+      if (other.position == wheel.position && other.direction == wheel.direction) {
+        return refusal(ArgumentError::out_of_range, where, name)
+            .got(flyball::detail::format("at ({:.4g} m, {:.4g} m), where wheel {} is",
+                                         wheel.position(0), wheel.position(1), j + 1))
+            .expected("in a place of its own");
+      }
+    }
     const double x = std::cos(wheel.direction + wheel.roller_angle) / grip;
     const double y = std::sin(wheel.direction + wheel.roller_angle) / grip;
     M.row(i) << x, y, wheel.position(0) * y - wheel.position(1) * x;

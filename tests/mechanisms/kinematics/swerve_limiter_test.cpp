@@ -319,6 +319,12 @@ TEST(SwerveLimiter, Errors) {
   made.body.mass = Mass(0.0);
   EXPECT_EQ(swerve_limiter(kinematics, limits, made, Time(period)).error().subject(), "mass");
   made = forces();
+  made.gearing = 8.5;
+  EXPECT_EQ(
+      to_string(swerve_limiter(kinematics, limits, made, Time(period)).error()),
+      "swerve_limiter: max_speed is 4.5 m/s; it must be at most 3.642 m/s, 0.98 of what the "
+      "motors reach on 12 V without load; take a lower speed, less gearing or a larger wheel");
+  made = forces();
   made.gearing = 0.0;
   EXPECT_EQ(swerve_limiter(kinematics, limits, made, Time(period)).error().subject(), "gearing");
 }

@@ -111,6 +111,14 @@ TEST(WheelKinematics, TheGroundHoldsTheRollersAxis) {
   EXPECT_NEAR(kinematics.wheels({0.0, 1.0, 0.0})(0), 1.0, 1e-16);
 }
 
+TEST(WheelKinematics, RefusesWheelsInOnePlace) {
+  EXPECT_EQ(to_string(mecanum_kinematics(
+                          {Eigen::Vector2d(0.3, 0.25), {0.3, -0.25}, {0.3, 0.25}, {-0.3, -0.25}})
+                          .error()),
+            "mecanum_kinematics: wheel 3 is at (0.3 m, 0.25 m), where wheel 1 is; it must be in a "
+            "place of its own");
+}
+
 TEST(WheelKinematics, RefusesWhatSeesNotEveryMotion) {
   // All forward, on one line across: vy turns nothing.
   const auto parallel = wheel_kinematics(

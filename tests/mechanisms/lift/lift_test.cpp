@@ -1,6 +1,7 @@
 #include <cmath>
 #include <limits>
 
+#include <Eigen/Dense>
 #include <gtest/gtest.h>
 
 #include <flyball/core/random.hpp>

@@ -38,19 +38,34 @@ struct SwerveForces {
 namespace detail {
 
 /// A module's drive in plain numbers: the largest force along its wheel at a speed.
-struct WheelForce {
-  MotorTerminal motor{};
-  double gearing_over_radius = 1.0;  ///< G/r, 1/m
-  double Kt = 0.0;                   ///< N m/A
-  double rail = 12.0;                ///< V
+class WheelForce {
+ public:
+  WheelForce() = default;
+  /// @param gearing_over_radius  G/r, 1/m. @param Kt  N m/A. @param rail  V.
+  WheelForce(const MotorTerminal& motor, double gearing_over_radius, double Kt,
+             double rail) noexcept
+      : motor_(motor), gearing_over_radius_(gearing_over_radius), Kt_(Kt), rail_(rail) {}
 
-  /// N, towards `direction` (±1) at a speed along the ground (m/s); not negative.
+  /// N, towards `direction` (±1) at a speed along the ground (m/s). Of a wheel at its motor's free
+  /// speed and beyond it, which others drag along, a twentieth of that at rest: what stands in for
+  /// nothing, so that a robot which was pushed there does not stay there.
   [[nodiscard]] double most(double speed, double direction) const noexcept {
-    const double emf = direction * gearing_over_radius * speed / motor.Kv;
-    const double volts = allowed_voltage(motor, emf, rail, rail);
-    const double force = gearing_over_radius * Kt * (volts - emf) / motor.R;
-    return force > 0.0 ? force : 0.0;
+    const double force = at(speed, direction);
+    const double least = 0.05 * at(0.0, 1.0);
+    return force > least ? force : least;
   }
+
+ private:
+  [[nodiscard]] double at(double speed, double direction) const noexcept {
+    const double emf = direction * gearing_over_radius_ * speed / motor_.Kv;
+    const double volts = allowed_voltage(motor_, emf, rail_, rail_);
+    return gearing_over_radius_ * Kt_ * (volts - emf) / motor_.R;
+  }
+
+  MotorTerminal motor_{};
+  double gearing_over_radius_ = 1.0;
+  double Kt_ = 0.0;
+  double rail_ = 12.0;
 };
 
 /// The limits in plain numbers, checked.
@@ -143,6 +158,9 @@ class SwerveLimiter {
             shortest_turn({1.0, Rotation2d::from_direction(to.vx, to.vy)}, last_.modules[i].angle);
         waits = waits || std::abs(turn(last_.modules[i].angle, there.angle)) > most_turn;
       }
+    }
+    if (waits) {
+      last_.speeds = {};  // of what was slow
     }
     const double progress = waits ? 0.0 : largest(ways, most_turn, pushed(goal));
     take(goal, progress, most_turn);
@@ -314,19 +332,19 @@ class SwerveLimiter {
           consider((way.from(0) * border(1) - way.from(1) * border(0)) / slope);
         }
       }
-      // Where it gets slow, it may turn: |from + s change|² = slow².
+      // Where it gets slow, it may turn: |from + s change|² = (0.9 slow)², clear of the border.
       const double a = way.change.squaredNorm();
       const double b = way.from.dot(way.change);
-      const double root = b * b - a * (way.from.squaredNorm() - slow * slow);
+      const double root = b * b - a * (way.from.squaredNorm() - 0.81 * slow * slow);
       if (a > 0.0 && root > 0.0) {
-        consider((-b + std::sqrt(root)) / a * (1.0 - 1e-12));
-        consider((-b - std::sqrt(root)) / a * (1.0 + 1e-12));
+        consider((-b + std::sqrt(root)) / a);
+        consider((-b - std::sqrt(root)) / a);
       }
     }
     return best;
   }
   /// The setpoint at s, its modules turned the shorter way; those that stand turn on towards where
-  /// the goal will need them.
+  /// they will be needed.
   void take(const ChassisSpeeds& goal, double s, double most_turn) noexcept {
     const ChassisSpeeds from = last_.speeds;
     const Eigen::Vector3d speeds = from.vector() + s * (goal.vector() - from.vector());
@@ -350,12 +368,19 @@ class SwerveLimiter {
         }
         last_.rates[i].steer_rate = turned / dt;
       } else {
-        // It stands; what is left of its speed goes along the direction it has, or will have.
+        // It stands, and turns to where its velocity will leave the slow ones on the way to the
+        // goal; what is left of its speed goes along the direction it has.
         const ChassisSpeeds later = goal.at(r);
         double turned = 0.0;
         if (std::hypot(later.vx, later.vy) > slow) {
-          const SwerveModule needed =
-              shortest_turn({1.0, Rotation2d::from_direction(later.vx, later.vy)}, before.angle);
+          const Eigen::Vector2d v(there.vx, there.vy);
+          const Eigen::Vector2d change(later.vx - there.vx, later.vy - there.vy);
+          const double a = change.squaredNorm();
+          const double b = v.dot(change);
+          const double on = (std::sqrt(b * b + a * (slow * slow - v.squaredNorm())) - b) / a;
+          const Eigen::Vector2d leaving = v + on * change;
+          const SwerveModule needed = shortest_turn(
+              {1.0, Rotation2d::from_direction(leaving(0), leaving(1))}, before.angle);
           turned = std::clamp(turn(before.angle, needed.angle), -most_turn, most_turn);
           module.angle = before.angle * Rotation2d(turned);
         }
@@ -399,7 +424,8 @@ template <std::size_t N>
   return detail::make_limiter(kinematics, limits, nullptr, period);
 }
 /// Limits by rates, and by what motors, currents and tires can do. @errors As above, and as
-/// `check_drive`; ArgumentError for the body, the friction and the current limits.
+/// `check_drive`; ArgumentError for the body, the friction and the current limits;
+/// out_of_range for a max_speed above 0.98 of what the motors reach without load on the rail.
 template <std::size_t N>
 [[nodiscard]] Expected<SwerveLimiter<N>> swerve_limiter(const SwerveKinematics<N>& kinematics,
                                                         const SwerveLimits& limits,

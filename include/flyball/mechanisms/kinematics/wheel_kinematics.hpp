@@ -93,9 +93,10 @@ namespace detail {
 /// Three or more wheels with rollers, omni or mecanum, anywhere. The contact moves with
 /// v + ω × r, of which the ground holds the part along the rollers' axis a; so with the rolling
 /// direction d the wheel's speed is (v + ω × r)·a/(d·a).
-/// @errors ArgumentError::not_finite; out_of_range for a layout that leaves a motion without an
-///         answer (all directions parallel, all wheels about one point), or rollers across the
-///         rolling direction. Cost: allocates. Source: book, section 11.4; (11.13).
+/// @errors ArgumentError::not_finite; out_of_range for two wheels in one place, for a layout that
+///         leaves a motion without an answer (all directions parallel, all wheels about one point),
+///         and for rollers across the rolling direction.
+/// Cost: allocates. Source: book, section 11.4; (11.13).
 template <std::size_t W>
 [[nodiscard]] Expected<WheelKinematics<static_cast<int>(W)>> wheel_kinematics(
     const std::array<WheelMount, W>& mounts) {
