@@ -1,4 +1,5 @@
 #include <cmath>
+#include <limits>
 
 #include <flyball/control/lqr.hpp>
 #include <flyball/systems/discretize.hpp>
@@ -42,6 +43,7 @@ DriveFeedback cross_track() {
                             .voltage_limit = largest_voltage,
                             .period = drive_period};
   settings.low_speed = {least_velocity, LowSpeed::CrossTrack::holds};
+  settings.farthest_error = std::numeric_limits<double>::infinity();
   settings.largest_velocity = 10.0;
   const auto follower =
       LtvDriveFollower::create(case_study_drive(), drive_trackwidth, settings).value();

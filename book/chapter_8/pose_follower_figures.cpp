@@ -1,4 +1,5 @@
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -62,6 +63,7 @@ LtvUnicycleFollower unicycle_follower() {
                                .period = drive_period};
   // Linearised around a slightly nonzero velocity where the reference stands.
   settings.low_speed = {1e-9, LowSpeed::CrossTrack::holds};
+  settings.farthest_error = std::numeric_limits<double>::infinity();
   return LtvUnicycleFollower::create(settings).value();
 }
 

@@ -33,6 +33,20 @@ Eigen::Vector3d tracking_error(const Pose2d& pose, const Pose2d& r) noexcept {
   return {c * dx + s * dy, c * dy - s * dx, std::atan2(s_r * c - c_r * s, c_r * c + s_r * s)};
 }
 
+Pose2d pose_after(const Pose2d& pose, const mechanisms::ChassisSpeeds& speeds,
+                  double delay) noexcept {
+  const Eigen::Vector3d twist = speeds.vector() * delay;
+  return is_signal(twist) ? pose * Pose2d::exp(twist) : pose;
+}
+
+Eigen::Vector3d no_farther(const Eigen::Vector3d& error, double distance) noexcept {
+  const double away = std::hypot(error(0), error(1));
+  if (!(away > distance)) {
+    return error;
+  }
+  return {error(0) / away * distance, error(1) / away * distance, error(2)};
+}
+
 bool within_tolerance(const Eigen::Vector3d& error, const PoseTolerance& tolerance) noexcept {
   return std::abs(error(0)) <= tolerance.x && std::abs(error(1)) <= tolerance.y &&
          std::abs(error(2)) <= tolerance.heading;
@@ -129,6 +143,10 @@ Expected<void> check_speed_limits(const SpeedLimits& limits, std::string_view wh
   FLYBALL_CHECK(check_limit(limits.angular_velocity, where, "limits.angular_velocity", "rad/s"));
   FLYBALL_CHECK(check_limit(limits.wheel_velocity, where, "limits.wheel_velocity", "m/s"));
   return check_not_negative(limits.trackwidth, where, "limits.trackwidth", "m");
+}
+
+Expected<void> check_farthest(double distance, std::string_view where) {
+  return check_limit(distance, where, "farthest_error", "m");
 }
 
 Expected<void> check_low_speed(const LowSpeed& low, std::string_view where) {

@@ -50,7 +50,8 @@ Expected<LtvDriveFollower> LtvDriveFollower::create(const mechanisms::Differenti
                     .positive(settings.voltage_limit, "voltage_limit", "V")
                     .positive(settings.period.si(), "period", "s")
                     .not_negative(settings.largest_velocity, "largest_velocity", "m/s")
-                    .also([&] { return detail::check_low_speed(settings.low_speed, where); }));
+                    .also([&] { return detail::check_low_speed(settings.low_speed, where); })
+                    .also([&] { return detail::check_farthest(settings.farthest_error, where); }));
   FLYBALL_TRY_IN(where, const DriveInversion inversion,
                  DriveInversion::create(drive, settings.period));
   LtvDriveFollower follower(settings, trackwidth.si(), inversion);
@@ -168,7 +169,7 @@ DriveCommand LtvDriveFollower::calculate(const DriveState& x, const DriveState& 
   // What is not measured counts as what it should be.
   Eigen::Vector<double, 5> e = Eigen::Vector<double, 5>::Zero();
   if (placed) {
-    e.head<3>() = tracking_error(x.pose, r.pose);
+    e.head<3>() = no_farther(tracking_error(x.pose, r.pose), settings_.farthest_error);
   }
   if (moving) {
     e.tail<2>() << r.left - x.left, r.right - x.right;

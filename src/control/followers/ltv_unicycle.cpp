@@ -25,6 +25,7 @@ Expected<LtvUnicycleFollower> LtvUnicycleFollower::create(const LtvUnicycleSetti
           .positive(settings.period.si(), "period", "s")
           .within(settings.period.si(), 0.0, 1e25, "period", "s")
           .also([&] { return detail::check_low_speed(settings.low_speed, where); })
+          .also([&] { return detail::check_farthest(settings.farthest_error, where); })
           .also([&] { return detail::check_speed_limits(settings.limits, where); }));
   return LtvUnicycleFollower(settings);
 }
@@ -74,7 +75,7 @@ FollowerCommand LtvUnicycleFollower::calculate(const Pose2d& pose,
     return {settings_.limits.on_arc(r.speeds.vx, r.speeds.omega, saturated),
             FollowerStatus::no_pose};
   }
-  const Eigen::Vector3d e = tracking_error(pose, r.pose);
+  const Eigen::Vector3d e = no_farther(tracking_error(pose, r.pose), settings_.farthest_error);
   const Turning k = turning_gains(r.speeds.vx);
   // u = K(v) e                                                                       (8.34)
   const double v = r.speeds.vx + k_x_ * e(0);

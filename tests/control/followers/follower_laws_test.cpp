@@ -277,6 +277,28 @@ TEST(TrackingMonitor, SettlesAndIsLost) {
   EXPECT_FALSE(at_reference({1.0, 2.0, pi}, {1.01, 2.01, 0.0}, {}));
 }
 
+// Half a second at 2 m/s and 1 rad/s is an arc of 1 m and 0.5 rad; numbers that are none stand.
+TEST(PoseAfter, MovesAlongTheArc) {
+  const Pose2d after = pose_after({1.0, 2.0, 0.0}, {2.0, 0.0, 1.0}, 0.5);
+  EXPECT_NEAR(after.x(), 1.0 + 2.0 * std::sin(0.5), 1e-15);
+  EXPECT_NEAR(after.y(), 2.0 + 2.0 * (1.0 - std::cos(0.5)), 1e-15);
+  EXPECT_NEAR(after.angle(), 0.5, 1e-15);
+  EXPECT_EQ(pose_after({1.0, 2.0, 0.3}, {std::nan(""), 0.0, 1.0}, 0.5).x(), 1.0);
+  EXPECT_EQ(pose_after({1.0, 2.0, 0.3}, {1.0, 0.0, 1.0}, infinity).x(), 1.0);
+}
+
+// Far away the pull of a position is that of the farthest error, its direction kept.
+TEST(NoFarther, KeepsTheDirection) {
+  EXPECT_LE((no_farther({3.0, -4.0, 2.0}, 0.5) - Eigen::Vector3d(0.3, -0.4, 2.0)).norm(), 1e-15);
+  EXPECT_EQ(no_farther({0.3, -0.4, 2.0}, 0.6), Eigen::Vector3d(0.3, -0.4, 2.0));
+  const auto far = LtvUnicycleFollower::create().value();
+  const auto at = [&](double distance) {
+    return far.calculate({}, {{distance, 0.0, 0.0}, {1.0, 0.0, 0.0}}).speeds.vx;
+  };
+  EXPECT_LT(at(0.3), at(0.4));
+  EXPECT_DOUBLE_EQ(at(0.4), at(40.0));
+}
+
 // Scaling keeps the arc: v and ω by one factor, to the nearest limit.
 TEST(SpeedLimits, KeepTheArc) {
   bool saturated = false;

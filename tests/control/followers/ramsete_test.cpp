@@ -55,7 +55,7 @@ void move(const RamseteFollower& follower, Eigen::Vector<double, 6>& both, doubl
 // vanishes. Starts: anywhere within 3 m, any heading; references: any constant v_d, ω_d.
 TEST(Ramsete, LyapunovFunctionFalls) {
   Random random(11);
-  for (int run = 0; run < 24; ++run) {
+  for (int run = 0; run < 12; ++run) {
     const auto follower =
         RamseteFollower::create({.b = random.uniform(0.5, 4.0), .zeta = random.uniform(0.3, 0.9)})
             .value();

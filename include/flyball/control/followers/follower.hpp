@@ -56,6 +56,16 @@ concept PoseFollower = requires(F& follower, const Pose2d& pose, const TrackingP
 /// allocation-free.
 [[nodiscard]] Eigen::Vector3d tracking_error(const Pose2d& pose, const Pose2d& r) noexcept;
 
+/// Where a robot is that was at a pose a while ago and moves on as it did: x Exp(v dt). What is
+/// seen or acted on late is followed better from where the robot will be.
+/// @param speeds  In the robot's frame, measured. @param delay  s. @return The pose itself where
+/// speeds or delay are not finite numbers. Noexcept, allocation-free.
+[[nodiscard]] Pose2d pose_after(const Pose2d& pose, const mechanisms::ChassisSpeeds& speeds,
+                                double delay) noexcept;
+
+/// The error with its position no farther than that, in its direction. @param distance  m, > 0.
+[[nodiscard]] Eigen::Vector3d no_farther(const Eigen::Vector3d& error, double distance) noexcept;
+
 /// How near a reference counts as at it.
 struct PoseTolerance {
   double x = 0.05;        ///< m, ahead or behind.
@@ -142,6 +152,7 @@ namespace detail {
 
 /// @errors ArgumentError::not_positive and not_finite, for the limits' own constraints.
 [[nodiscard]] Expected<void> check_speed_limits(const SpeedLimits& limits, std::string_view where);
+[[nodiscard]] Expected<void> check_farthest(double distance, std::string_view where);
 [[nodiscard]] Expected<void> check_low_speed(const LowSpeed& low, std::string_view where);
 /// A tolerance of Bryson's rule as the weight 1/tolerance²; infinite is 0.
 [[nodiscard]] Expected<void> check_tolerance(double tolerance, std::string_view where,

@@ -43,6 +43,10 @@ struct LtvDriveSettings {
   double voltage_limit = 12.0;       ///< V
   Time period{0.02};                 ///< T > 0.
   LowSpeed low_speed{};
+  /// m, > 0: a position that is farther off pulls as one at this distance does. A linear regulator
+  /// far from its path asks for more than the limits give, most of it ahead, and cannot turn; the
+  /// book's has no such bound.
+  double farthest_error = 0.4;
   GainSource source = GainSource::each_period;
   /// m/s: the gain of a faster robot is that of this velocity. Zero: one and a half times what the
   /// voltage limit can reach.

@@ -15,6 +15,10 @@ struct LtvUnicycleSettings {
   double angular_velocity_tolerance = 2.0;  ///< rad/s
   Time period{0.02};                        ///< T > 0.
   LowSpeed low_speed{};
+  /// m, > 0: a position that is farther off pulls as one at this distance does. A linear regulator
+  /// far from its path asks for more than the limits give, most of it ahead, and cannot turn; the
+  /// book's has no such bound.
+  double farthest_error = 0.4;
   SpeedLimits limits{};
 };
 
