@@ -45,6 +45,8 @@ void campaign(const char* name, const M& model, const SwingUpOptions& options, i
   int stands = 0;
   int left = 0;
   int given_up = 0;
+  int later = 0;
+  int caught = 0;
   double farthest = 0.0;
   double largest = 0.0;
   std::vector<double> times;
@@ -59,7 +61,13 @@ void campaign(const char* name, const M& model, const SwingUpOptions& options, i
     largest = std::max(largest, run.largest_input);
     if (run.stands) {
       times.push_back(run.time);
-    } else if (k - stands < 8) {
+      continue;
+    }
+    SwingUpTrial longer = trial;
+    longer.duration = 2.0 * trial.duration;
+    later += try_swing_up(model, design->controller, x, longer).stands ? 1 : 0;
+    caught += std::isfinite(run.taken) ? 1 : 0;
+    if (k - stands < 8) {
       std::printf("  fails from");
       for (int i = 0; i < N; ++i) {
         std::printf(" %.4f", x(i));
@@ -67,6 +75,12 @@ void campaign(const char* name, const M& model, const SwingUpOptions& options, i
       std::printf(": nearest V %.3g of the level, taken at %.2f s, given up %d times\n",
                   run.nearest, run.taken, run.given_up);
     }
+  }
+  if (stands < starts) {
+    std::printf(
+        "  of the %d that fail %d were taken over too late to have settled, %d stand in twice the "
+        "time\n",
+        starts - stands, caught, later);
   }
   std::sort(times.begin(), times.end());
   const auto quantile = [&](double share) {

@@ -108,14 +108,15 @@ Names sections_of(JobKind job) {
   static constexpr std::array<std::string_view, 9> all{"log",       "mechanism", "controller",
                                                        "estimator", "sensor",    "battery",
                                                        "profile",   "mechanism", "gains"};
-  static constexpr std::array<std::string_view, 8> design{
-      "mechanism", "gains", "controller", "estimator", "sensor", "battery", "profile", "point"};
+  static constexpr std::array<std::string_view, 9> design{"mechanism", "gains",  "controller",
+                                                          "estimator", "sensor", "battery",
+                                                          "profile",   "point",  "swing_up"};
   static constexpr std::array<std::string_view, 8> analyze{
       "mechanism", "gains.kS",          "gains.kV", "gains.kA",
       "gains.kG",  "controller.period", "model",    "point"};
-  static constexpr std::array<std::string_view, 10> simulate{
-      "simulation", "point",  "model",     "mechanism", "gains",
-      "controller", "sensor", "estimator", "battery",   "profile"};
+  static constexpr std::array<std::string_view, 11> simulate{
+      "simulation", "point",     "model",   "mechanism", "gains",   "controller",
+      "sensor",     "estimator", "battery", "profile",   "swing_up"};
   static constexpr std::array<std::string_view, 5> experiment{"experiment", "log", "mechanism",
                                                               "gains", "sensor"};
   static constexpr std::array<std::string_view, 3> identify{"log", "fit", "model.parameters"};

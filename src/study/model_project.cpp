@@ -40,6 +40,7 @@ class ModelReader : private NamedValues {
       return std::nullopt;
     }
     const std::optional<AnyModel> model = compile_model();
+    ModelSwingUp swing_up = swing_up_of();
     const ModelSizes sizes{static_cast<Index>(states_.size()), static_cast<Index>(inputs_.size())};
     VectorPair point{Eigen::VectorXd::Zero(sizes.states), Eigen::VectorXd::Zero(sizes.inputs)};
     read_values("point.at", project_.point.at, Range::any, &point.x, &point.u);
@@ -74,7 +75,9 @@ class ModelReader : private NamedValues {
                     .reference = std::move(reference),
                     .run = std::move(simulation),
                     .fit = std::move(fit),
-                    .estimate = std::move(estimate)};
+                    .estimate = std::move(estimate),
+                    .equations = std::move(equations_),
+                    .swing_up = std::move(swing_up)};
   }
 
  private:
@@ -168,12 +171,59 @@ class ModelReader : private NamedValues {
     }
     auto model = formula_model(formulas);
     if (model) {
+      read_equations(formulas);
       return *std::move(model);
     }
     for (Error& error : model.error()) {
       refuse(std::move(error));
     }
     return std::nullopt;
+  }
+
+  /// The equations and the energy, of a model whose own formulas are right.
+  void read_equations(const ModelFormulas& formulas) {
+    std::vector<expression::Formula> further;
+    if (!project_.swing_up.energy.empty()) {
+      further.push_back({"energy", project_.swing_up.energy, ""});
+    }
+    auto made = model_equations(formulas, further);
+    if (made) {
+      equations_ = *std::move(made);
+      return;
+    }
+    for (Error& error : made.error()) {
+      document_.refuse_part("swing_up", "energy", std::move(error));
+    }
+  }
+
+  ModelSwingUp swing_up_of() {
+    const auto n = static_cast<Index>(states_.size());
+    const SwingUpSection& said = project_.swing_up;
+    ModelSwingUp result{.has_energy = !said.energy.empty(),
+                        .hold = Eigen::VectorXd::Zero(n),
+                        .reach = Eigen::VectorXd::Constant(n, infinity),
+                        .sharpness = said.sharpness.value_or(10.0)};
+    read_values("swing_up.reach", said.reach, Range::positive, &result.reach, nullptr);
+    for (const NamedText& one : said.hold) {
+      const std::size_t place = place_of(states_, one.name);
+      if (place == states_.size()) {
+        document_.refuse("swing_up.hold", one.name, unknown(one.name, {&states_}, "a state"));
+        continue;
+      }
+      const std::string unit =
+          inputs_.size() == 1 ? fmt::format("({})/({})", inputs_[0].unit, states_[place].unit) : "";
+      if (const auto gain = value("swing_up.hold", one, unit, Range::any)) {
+        result.hold(static_cast<Index>(place)) = *gain;
+      }
+    }
+    if (result.has_energy && inputs_.size() != 1) {
+      document_.refuse("swing_up", "energy",
+                       Error(ArgumentError::out_of_range)
+                           .about("swing_up.energy")
+                           .got(fmt::format("for a model of {} inputs", inputs_.size()))
+                           .expected("for a model of one input"));
+    }
+    return result;
   }
 
   void refuse_no_states() {
@@ -244,6 +294,7 @@ class ModelReader : private NamedValues {
   }
 
   const FormulaSection& said_;
+  expression::CompiledFormulas equations_{};
 };
 
 }  // namespace

@@ -494,6 +494,26 @@ constexpr std::array estimate_fields{
         .called("tune-noise")
         .without("false")};
 
+constexpr std::array swing_up_fields{
+    text("energy", at<&SwingUpSection::energy>(), "\"J*omega^2/2 - m*g*l*cos(theta)\"",
+         "What swings: a formula of the states ([formulas](formulas.md)) whose value at the point "
+         "is "
+         "what it is brought to; of a cart-pole that of the pole")
+        .without("no swing-up")
+        .no_option(),
+    map("hold", at<&SwingUpSection::hold>(), "{ x = \"10 N/m\", v = \"10 N s/m\" }",
+        "Meanwhile, the input that holds states at the point, for each unit that one is off")
+        .without("none")
+        .no_option(),
+    map("reach", at<&SwingUpSection::reach>(), "{ x = \"2 m\" }",
+        "How far from the point a state may be, such as to the end of a track")
+        .without("as far as it goes")
+        .no_option(),
+    quantity("sharpness", at<&SwingUpSection::sharpness>(), dimensionless, positive, "10",
+             "The input is at its limit while more than one over this of the energy is missing")
+        .without("10")
+        .of(model)};
+
 constexpr std::array sections{
     Section{"mechanism", mechanism_fields, &within<&Project::parts>,
             "What the mechanism is, and the parts it is made of.", "every mechanism", mechanism},
@@ -511,6 +531,10 @@ constexpr std::array sections{
     Section{"estimate", estimate_fields, &within<&Project::estimate>,
             "What `flyball estimate LOG PROJECT.toml` does with a model; channels and times of the "
             "log are those of [fit].",
+            "", model},
+    Section{"swing_up", swing_up_fields, &within<&Project::swing_up>,
+            "How a model by formula comes to an unstable point from afar: by its energy, and from "
+            "where the regulator is proven to hold it, by that.",
             "", model},
     Section{"gains", gains_fields, &within<&Project::gains>,
             "Feedforward gains that are known, in place of those that follow from the parts. With "

@@ -18,6 +18,7 @@
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "study/model_loop_response.hpp"
+#include "study/model_swing_up.hpp"
 #include "study/simulation_record.hpp"
 #include "study/told.hpp"
 
@@ -290,10 +291,8 @@ Expected<Simulation> simulate_open_loop(const ModelJob& job) {
   return recorded(described(model.names(), job.path, run, job.outputs_are_states), std::move(rows));
 }
 
-namespace {
-
-Expected<Simulation> closed_loop(const ModelJob& job, const ModelRegulator& regulator) {
-  const ModelRun& run = job.run;
+Expected<Simulation> simulate_with(const ModelJob& job, const ModelRegulator& regulator,
+                                   const ModelRun& run, ControlLaw law) {
   const AnyModel& model = job.model;
   if (run.duration < job.period) {
     return refusal(ArgumentError::out_of_range, where, "simulation.duration")
@@ -316,7 +315,6 @@ Expected<Simulation> closed_loop(const ModelJob& job, const ModelRegulator& regu
   }
   FLYBALL_TRY(auto plant, ModelPlant::create(model, or_else(run.initial, regulator.point.x),
                                              {.accuracy = run.accuracy}));
-  FLYBALL_TRY(auto law, Regulating::create(job, regulator));
   auto looped = flyball::simulate_closed_loop(plant, law, loop);
   if (!looped) {
     return tl::unexpected(std::move(looped).error().in(std::string(where)));
@@ -330,6 +328,13 @@ Expected<Simulation> closed_loop(const ModelJob& job, const ModelRegulator& regu
   result.diagnostics = regulator.diagnostics;
   summarize(result);
   return result;
+}
+
+namespace {
+
+Expected<Simulation> closed_loop(const ModelJob& job, const ModelRegulator& regulator) {
+  FLYBALL_TRY(auto law, Regulating::create(job, regulator));
+  return simulate_with(job, regulator, job.run, law);
 }
 
 }  // namespace
@@ -355,6 +360,12 @@ ExpectedAll<Simulation> simulate(const Project& project) {
       return simulate_open_loop(job);
     }
     FLYBALL_TRY(const auto regulator, regulate(job));
+    if (job.swing_up.has_energy) {
+      FLYBALL_TRY(const auto region, region_of(job, regulator));
+      return swing_up(job, regulator, region).map([](SwingUpRunResult result) {
+        return std::move(result.simulation);
+      });
+    }
     return simulate_closed_loop(job, regulator);
   };
   if (!project.model_job && project.plant_error) {
@@ -370,14 +381,15 @@ ExpectedAll<ModelDesign> design_model(const ModelJob& job) {
   ModelDesign result{.job = job, .regulator = std::move(regulator), .simulation = {}};
   const ModelRegulator& made = result.regulator;
   ModelRun& run = result.job.run;
-  if (run.initial.array().isNaN().all()) {
+  const bool afar = job.swing_up.has_energy;  // then the start is the swing-up's
+  if (afar || run.initial.array().isNaN().all()) {
     constexpr double share = 0.2;
     run.initial = made.point.x.array() + share * made.Q.diagonal().array().rsqrt();
     note(result.regulator.diagnostics, "assumed",
          "the simulation begins a fifth of each tolerance beside the point (simulation.initial "
          "says another)");
   }
-  if (!job.run.duration_is_given) {
+  if (afar || !job.run.duration_is_given) {
     // Eight time constants of the slowest pole of the loop as it runs.
     constexpr double time_constants = 8.0;
     const double constant = std::isfinite(made.time_constant) ? made.time_constant : job.period;
@@ -385,6 +397,26 @@ ExpectedAll<ModelDesign> design_model(const ModelJob& job) {
   }
   result.regulator.frequency_responses = loop_responses(made, Time(job.delay));
   FLYBALL_TRY(result.simulation, simulate_closed_loop(result.job, made));
+  result.job.run = job.run;
+  if (wants_region(job, made)) {
+    auto region = region_of(job, made);
+    if (region) {
+      result.region = *std::move(region);
+    } else if (afar) {
+      return refused(where, std::move(region).error(), made.diagnostics);
+    } else {
+      note(result.regulator.diagnostics, "no_region", "no region of attraction is proven: {}",
+           to_string(region.error()));
+    }
+  }
+  if (afar) {
+    auto swung = swing_up(job, made, *result.region);
+    if (!swung) {
+      return refused(where, std::move(swung).error(), made.diagnostics);
+    }
+    result.swing_up = *std::move(swung);
+  }
+  result.simulation.diagnostics = result.regulator.diagnostics;
   return result;
 }
 

@@ -308,7 +308,34 @@ std::vector<Coordinate> output_coordinates(const ModelFormulas& model,
   return in_si(std::move(coordinates));
 }
 
+/// Names, parameters and definitions, without outputs.
+FormulaSet set_of(const ModelFormulas& formulas) {
+  FormulaSet set;
+  for (const std::vector<Coordinate>* list : {&formulas.states, &formulas.inputs}) {
+    for (const Coordinate& coordinate : *list) {
+      set.variables.push_back({coordinate.name, coordinate.unit});
+    }
+  }
+  for (const Parameter& parameter : formulas.parameters) {
+    set.parameters.push_back({parameter.name, parameter.unit, parameter.value});
+  }
+  set.definitions = formulas.definitions;
+  return set;
+}
+
 }  // namespace
+
+tl::expected<CompiledFormulas, std::vector<Error>> model_equations(
+    const ModelFormulas& formulas, const std::vector<Formula>& further) {
+  std::vector<Error> errors;
+  FormulaSet set = set_of(formulas);
+  set.outputs = ordered_derivatives(formulas, errors);
+  if (!errors.empty()) {
+    return tl::unexpected(std::move(errors));
+  }
+  set.outputs.insert(set.outputs.end(), further.begin(), further.end());
+  return compile(set);
+}
 
 tl::expected<AnyModel, std::vector<Error>> formula_model(const ModelFormulas& formulas) {
   std::vector<Error> errors;
@@ -320,16 +347,7 @@ tl::expected<AnyModel, std::vector<Error>> formula_model(const ModelFormulas& fo
   }
   const std::vector<Formula> derivatives = ordered_derivatives(formulas, errors);
   const std::vector<Formula> outputs = named_outputs(formulas, errors);
-  FormulaSet set;
-  for (const std::vector<Coordinate>* list : {&formulas.states, &formulas.inputs}) {
-    for (const Coordinate& coordinate : *list) {
-      set.variables.push_back({coordinate.name, coordinate.unit});
-    }
-  }
-  for (const Parameter& parameter : formulas.parameters) {
-    set.parameters.push_back({parameter.name, parameter.unit, parameter.value});
-  }
-  set.definitions = formulas.definitions;
+  FormulaSet set = set_of(formulas);
   // All at once for the errors, each being told once, then as two tapes.
   set.outputs = derivatives;
   set.outputs.insert(set.outputs.end(), outputs.begin(), outputs.end());

@@ -7,6 +7,7 @@
 #include <flyball/core/quantity.hpp>
 #include <flyball/estimation/outlier_guard.hpp>
 #include <flyball/identification/prediction_error.hpp>
+#include <flyball/math/expression/formula.hpp>
 #include <flyball/math/expression/tape.hpp>
 #include <flyball/systems/any_model.hpp>
 
@@ -101,6 +102,22 @@ struct ModelEstimate {
   Eigen::VectorXd upper{};  ///< and at most, ∞.
 };
 
+/// [swing_up]: how a model comes to an unstable point from afar.
+struct SwingUpSection {
+  std::string energy{};               ///< A formula of the states.
+  NamedTexts hold{};                  ///< Feedback of states meanwhile, input/state.
+  NamedTexts reach{};                 ///< How far a state may be from the point.
+  std::optional<double> sharpness{};  ///< Full input while more than one over it is missing.
+};
+
+/// The same, checked, in SI.
+struct ModelSwingUp {
+  bool has_energy = false;  ///< The equations' last output is the energy.
+  Eigen::VectorXd hold{};   ///< n, input/state.
+  Eigen::VectorXd reach{};  ///< n, infinite for as far as it goes.
+  double sharpness = 10.0;
+};
+
 /// The inputs of an open loop, over time.
 class InputSignals {
  public:
@@ -146,6 +163,9 @@ struct ModelJob {
   ModelRun run{};
   ModelFit fit{};
   ModelEstimate estimate{};
+  /// dx/dt and, where [swing_up] says it, the energy.
+  expression::CompiledFormulas equations{};
+  ModelSwingUp swing_up{};
 };
 
 }  // namespace flyball::study

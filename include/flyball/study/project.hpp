@@ -73,6 +73,7 @@ struct Project {
   ExperimentLimits experiment{};
   FitSection fit{};
   EstimateSection estimate{};
+  SwingUpSection swing_up{};
   DesignJob job;  ///< Its plant comes from the parts and the gains.
   /// Why the file does not define a mechanism, if it does not: all that is missing.
   std::optional<Errors> plant_error{};

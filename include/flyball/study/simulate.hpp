@@ -1,5 +1,6 @@
 #pragma once
 
+#include <flyball/control/lyapunov/region_of_attraction.hpp>
 #include <flyball/core/answer.hpp>
 #include <flyball/study/design_model.hpp>
 #include <flyball/study/project.hpp>
@@ -64,11 +65,34 @@ struct Simulation {
 /// and inputs over time. Schema "flyball.simulate/1".
 [[nodiscard]] Answer answer_of(const Simulation& result);
 
+/// From where a regulator is proven to hold its point.
+struct ModelRegion {
+  SaturatedLoop loop;  ///< The inputs acting at all times.
+  CertifiedRegion certified{};
+  SampledRegion sampled{};  ///< Over the plane below.
+  Eigen::Index first = 0;   ///< The states that are shown.
+  Eigen::Index second = 1;
+};
+
+/// A model brought to its point from afar.
+struct SwingUpRunResult {
+  expression::Tape law;  ///< From [x; u*] to the energy and what the input does to it.
+  std::vector<double> parameters{};
+  double energy = 0.0;             ///< At the point,
+  double scale = 0.0;              ///< and half of its range over the angles.
+  Eigen::VectorXd start{};         ///< n
+  std::optional<double> taken{};   ///< s, when the regulator took over for good.
+  std::optional<double> stands{};  ///< s, from when V is below a hundredth of the level.
+  Simulation simulation{};
+};
+
 /// A designed loop about a point, tried on the model itself from a small deviation.
 struct ModelDesign {
   ModelJob job;
   ModelRegulator regulator;
   Simulation simulation;
+  std::optional<ModelRegion> region{};
+  std::optional<SwingUpRunResult> swing_up{};
 };
 
 /// @errors As `regulate` and `simulate_closed_loop`.

@@ -52,4 +52,11 @@ struct ModelFormulas {
 [[nodiscard]] tl::expected<AnyModel, std::vector<Error>> formula_model(
     const ModelFormulas& formulas);
 
+/// The derivatives of a model, in the order of its states, and further formulas of its names after
+/// them, as one tape of [x; u]: what proofs, energies and generated code are made of.
+/// @param further  Each with its name, for messages. @errors As `formula_model`, whose outputs are
+/// not looked at. Cost: linear in the text; allocates.
+[[nodiscard]] tl::expected<expression::CompiledFormulas, std::vector<Error>> model_equations(
+    const ModelFormulas& formulas, const std::vector<expression::Formula>& further = {});
+
 }  // namespace flyball

@@ -273,6 +273,7 @@ Answer answer_of(const ModelDesign& result) {
       json.add("R", regulator.R);
     });
     json.object("simulation", [&] { write_simulation(json, result.simulation); });
+    write_region(json, result);
     json.add("diagnostics", result.simulation.diagnostics);
   });
   answer.json = std::move(json).text();
@@ -290,6 +291,7 @@ Answer answer_of(const ModelDesign& result) {
   append(answer.figures, frequency_figures(result));
   append(answer.figures, figures_of(result.simulation));
   answer.files = {data_file(result.simulation)};
+  append_region(result, answer);
   return answer;
 }
 

@@ -18,6 +18,11 @@ void write_point(JsonWriter& json, const OperatingPoint& point);
 /// States, inputs and outputs over time, in that section.
 [[nodiscard]] std::vector<Figure> figures_of(const Simulation& result);
 [[nodiscard]] AnswerFile data_file(const Simulation& result);
+/// From where the regulator is proven to hold, and the swing-up: sections, pictures, what is pasted
+/// into a robot's code, and the members "region" and "swing_up".
+void append_region(const ModelDesign& result, Answer& answer);
+void write_region(JsonWriter& json, const ModelDesign& result);
+
 /// The members of "flyball.simulate/1", without the schema and the diagnostics.
 void write_simulation(JsonWriter& json, const Simulation& result);
 
