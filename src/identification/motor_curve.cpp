@@ -72,6 +72,33 @@ Index steady_rows(const VectorXd& current) {
   return rows;
 }
 
+/// C of V/I = R_0 (1 + α E/C), E the energy until then, J.
+Expected<GainEstimate> heat_capacity(const VectorXd& time, const VectorXd& voltage,
+                                     const VectorXd& current) {
+  constexpr double copper = 0.00393;  // 1/K
+  const Index rows = time.size();
+  const VectorXd power = voltage.cwiseProduct(current);
+  MatrixXd X(rows, 2);
+  X.col(0).setOnes();
+  X(0, 1) = 0.0;
+  for (Index k = 1; k < rows; ++k) {
+    X(k, 1) = X(k - 1, 1) + 0.5 * (power(k) + power(k - 1)) * (time(k) - time(k - 1));
+  }
+  LeastSquaresOptions options;
+  options.errors = ErrorModel::hac;
+  FLYBALL_TRY(const LeastSquares line, least_squares(X, voltage.cwiseQuotient(current), options));
+  const double slope = line.coefficients(1);
+  const double error = line.standard_errors(1);
+  // Of a slope that its error reaches to zero the inverse is anything.
+  if (!(slope > 3.0 * error)) {
+    GainEstimate unknown;
+    unknown.determined = false;
+    return unknown;
+  }
+  const double C = copper * line.coefficients(0) / slope;
+  return symmetric_estimate(C, C * error / slope);
+}
+
 double root_mean_square(const VectorXd& values) {
   return values.norm() / std::sqrt(static_cast<double>(values.size()));
 }
@@ -165,6 +192,7 @@ Expected<LockedRotorConstants> fit_locked_rotor(const LockedRotor& run) {
   found.Kt = symmetric_estimate(torque.coefficients(0), torque.standard_errors(0));
   found.R = symmetric_estimate(resistance.coefficients(0), resistance.standard_errors(0));
   found.R_rise = resistance.coefficients(1) * time(used - 1) / resistance.coefficients(0);
+  FLYBALL_TRY(found.heat_capacity, heat_capacity(time, run.voltage.head(used), current));
   return found;
 }
 

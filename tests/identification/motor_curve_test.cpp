@@ -93,6 +93,32 @@ TEST(MotorCurve, ALockedRotorHeats) {
   EXPECT_LT(noisy.R.standard_error, 0.001);
 }
 
+// R = R_0 (1 + α E/C) with E the trapezoidal energy of the rows themselves.
+TEST(MotorCurve, ALockedRotorTellsTheHeatOfItsWindings) {
+  constexpr double C = 45.0;
+  constexpr Eigen::Index rows = 60;
+  LockedRotor run;
+  run.time = VectorXd::LinSpaced(rows, 0.0, 5.0);
+  run.voltage = VectorXd::Constant(rows, 4.0);
+  run.current = VectorXd::Constant(rows, 4.0 / 0.09);
+  double energy = 0.0;
+  for (Eigen::Index k = 1; k < rows; ++k) {
+    double more = 0.0;
+    for (int i = 0; i < 60; ++i) {
+      run.current(k) = 4.0 / (0.09 * (1.0 + 0.00393 * (energy + more) / C));
+      more = 2.0 * (run.current(k) + run.current(k - 1)) * (run.time(k) - run.time(k - 1));
+    }
+    energy += more;
+  }
+  run.torque = 0.0184 * run.current;
+  const auto found = fit_locked_rotor(run).value();
+  ASSERT_TRUE(found.heat_capacity.determined);
+  EXPECT_NEAR(found.heat_capacity.value, C, 1e-9 * C);
+  // What does not warm tells nothing.
+  run.current.setConstant(40.0);
+  EXPECT_FALSE(fit_locked_rotor(run)->heat_capacity.determined);
+}
+
 TEST(MotorCurve, Refusals) {
   const MotorCurve good = curve_of(mechanisms::motor("NEO").value(), 5);
   const auto code_of = [](const MotorCurve& curve) {

@@ -40,6 +40,9 @@ struct LockedRotorConstants {
   GainEstimate Kt{};      ///< N m/A, τ = K_t I (12.2).
   Eigen::Index rows = 0;  ///< Used: from the first until the current has changed by a fifth.
   double R_rise = 0.0;    ///< Of R from the first row to the last that is used, as a share.
+  /// J/K, of the windings: all that the motor took warms them, and copper's R rises by 0.393 % a
+  /// kelvin; not determined where R does not rise beyond its scatter.
+  GainEstimate heat_capacity{};
 };
 
 /// The constants of a motor from its curve: torque and current are straight lines of the speed
@@ -54,7 +57,8 @@ struct LockedRotorConstants {
 
 /// K_t by least squares through the origin; R = V/I as a line of time, at the first row, both until
 /// the current has changed by a fifth: then the windings are warm, or burn. The errors of rows that
-/// follow each other are correlated (Newey and West).
+/// follow each other are correlated (Newey and West). The windings' heat capacity C is that of
+/// R = R_0 (1 + α/C ∫ V I dt), α = 0.00393/K, the energy by the trapezoidal rule.
 /// @errors as fit_motor_curve; at least five rows.
 /// Cost: O(rows). Source: book, equations 12.1, 12.2 and 12.5.
 [[nodiscard]] Expected<LockedRotorConstants> fit_locked_rotor(const LockedRotor& run);

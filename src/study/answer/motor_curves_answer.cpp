@@ -52,6 +52,9 @@ std::string to_json(const MotorCurvesResult& result) {
                     {"current_deviation", file.curve->current_deviation}});
         } else {
           json.add({{"R_rise", file.locked->R_rise}});
+          if (file.locked->heat_capacity.determined) {
+            write_gain(json, "heat_capacity", file.locked->heat_capacity);
+          }
         }
       });
     });
@@ -107,6 +110,9 @@ Section section_of(const MotorCurveFile& file, std::size_t index) {
         file.rows, number(file.voltage, 4), percent(file.curve->torque_deviation, 2),
         percent(file.curve->current_deviation, 2));
   } else {
+    if (file.locked->heat_capacity.determined) {
+      add_constant(table, "heat capacity", file.locked->heat_capacity, 1.0, "J/K", std::nullopt);
+    }
     words = fmt::format(
         "A locked rotor at {} V, the first {} of {} rows, until the current changes by a fifth. R "
         "is that of the first row; until the last of these it rises by {}.",

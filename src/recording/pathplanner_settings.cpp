@@ -1,0 +1,175 @@
+// PathPlanner's settings.json: a robot, field by field.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/core/text.hpp>
+#include <flyball/io/file.hpp>
+#include <flyball/recording/trajectory_file.hpp>
+
+#include "core/diagnose.hpp"
+#include "core/try.hpp"
+#include "recording/json_objects.hpp"
+
+namespace flyball {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr double degree = std::numbers::pi / 180.0;
+
+/// A number of the file, and what it is in SI.
+struct NumberField {
+  const char* key;
+  std::optional<double> PathPlannerSettings::* member;
+  double factor;
+  bool positive;  ///< Whether it must be; otherwise not negative.
+};
+
+constexpr std::array numbers{
+    NumberField{"robotWidth", &PathPlannerSettings::robot_width, 1.0, true},
+    NumberField{"robotLength", &PathPlannerSettings::robot_length, 1.0, true},
+    NumberField{"defaultMaxVel", &PathPlannerSettings::max_velocity, 1.0, true},
+    NumberField{"defaultMaxAccel", &PathPlannerSettings::max_acceleration, 1.0, true},
+    NumberField{"defaultMaxAngVel", &PathPlannerSettings::max_angular_velocity, degree, true},
+    NumberField{"defaultMaxAngAccel", &PathPlannerSettings::max_angular_acceleration, degree, true},
+    NumberField{"defaultNominalVoltage", &PathPlannerSettings::nominal_voltage, 1.0, true},
+    NumberField{"robotMass", &PathPlannerSettings::mass, 1.0, true},
+    NumberField{"robotMOI", &PathPlannerSettings::moment_of_inertia, 1.0, true},
+    NumberField{"robotTrackwidth", &PathPlannerSettings::trackwidth, 1.0, true},
+    NumberField{"driveWheelRadius", &PathPlannerSettings::wheel_radius, 1.0, true},
+    NumberField{"driveGearing", &PathPlannerSettings::gearing, 1.0, true},
+    NumberField{"maxDriveSpeed", &PathPlannerSettings::max_drive_speed, 1.0, true},
+    NumberField{"driveCurrentLimit", &PathPlannerSettings::current_limit, 1.0, true},
+    NumberField{"wheelCOF", &PathPlannerSettings::wheel_friction, 1.0, true}};
+
+constexpr std::array<const char*, 4> module_names{"fl", "fr", "bl", "br"};
+constexpr std::array<std::string_view, 4> other_keys{"holonomicMode", "pathFolders", "autoFolders",
+                                                     "robotFeatures"};
+
+Expected<std::vector<std::string>> texts_of(const json& file, const char* key,
+                                            const std::string& source) {
+  std::vector<std::string> texts;
+  const auto found = file.find(key);
+  if (found == file.end()) {
+    return texts;
+  }
+  const auto is_text = [](const json& element) { return element.is_string(); };
+  if (!found->is_array() || !std::all_of(found->begin(), found->end(), is_text)) {
+    return refusal(TrajectoryFileError::wrong_sample, source, key)
+        .got(shortened(found->dump()))
+        .expected("a list of texts");
+  }
+  for (const json& element : *found) {
+    texts.push_back(element.get<std::string>());
+  }
+  return texts;
+}
+
+Expected<void> read_modules(const json& file, const std::string& source,
+                            PathPlannerSettings& settings) {
+  for (std::size_t i = 0; i < module_names.size(); ++i) {
+    const std::string x = fmt::format("{}ModuleX", module_names[i]);
+    const std::string y = fmt::format("{}ModuleY", module_names[i]);
+    if (!file.contains(x) && !file.contains(y)) {
+      continue;
+    }
+    Eigen::Vector2d place;
+    FLYBALL_TRY(place(0), recording::number_of(file, x.c_str(), x, source));
+    FLYBALL_TRY(place(1), recording::number_of(file, y.c_str(), y, source));
+    settings.modules[i] = place;
+  }
+  return {};
+}
+
+void tell_unknown(const json& file, PathPlannerSettings& settings) {
+  std::vector<std::string> known(other_keys.begin(), other_keys.end());
+  for (const NumberField& field : numbers) {
+    known.emplace_back(field.key);
+  }
+  known.insert(known.end(), {"driveMotorType", "bumperOffsetX", "bumperOffsetY"});
+  for (const char* module : module_names) {
+    known.push_back(fmt::format("{}ModuleX", module));
+    known.push_back(fmt::format("{}ModuleY", module));
+  }
+  const std::vector<std::string_view> names(known.begin(), known.end());
+  for (const auto& [key, value] : file.items()) {
+    if (std::find(names.begin(), names.end(), key) == names.end()) {
+      const std::string nearest = nearest_name(key, names);
+      warn(settings.diagnostics, "unknown_key", "the settings' \"{}\" means nothing here{}", key,
+           nearest.empty() ? std::string() : fmt::format("; did they mean \"{}\"?", nearest));
+    }
+  }
+}
+
+}  // namespace
+
+Expected<PathPlannerSettings> parse_pathplanner_settings(std::string_view text,
+                                                         const std::string& source) {
+  FLYBALL_TRY(const json file, recording::json_of(text, source));
+  PathPlannerSettings settings;
+  const auto is_known = [&](const NumberField& field) {
+    return file.is_object() && file.contains(field.key);
+  };
+  if (std::none_of(numbers.begin(), numbers.end(), is_known)) {
+    return refusal(TrajectoryFileError::not_a_trajectory, source, "the JSON")
+        .got("without a field of PathPlanner's settings")
+        .expected("settings.json with robotMass, robotMOI, driveWheelRadius, driveGearing, …");
+  }
+  for (const NumberField& field : numbers) {
+    if (!file.contains(field.key)) {
+      continue;
+    }
+    FLYBALL_TRY(const double value, recording::number_of(file, field.key, field.key, source));
+    if (!(value > 0.0)) {
+      return refusal(TrajectoryFileError::wrong_sample, source, field.key)
+          .got(format_number(value))
+          .expected("positive");
+    }
+    settings.*field.member = field.factor * value;
+  }
+  if (const auto found = file.find("holonomicMode"); found != file.end()) {
+    if (!found->is_boolean()) {
+      return refusal(TrajectoryFileError::wrong_sample, source, "holonomicMode")
+          .got(shortened(found->dump()))
+          .expected("true or false");
+    }
+    settings.holonomic = found->get<bool>();
+  }
+  if (const auto found = file.find("driveMotorType"); found != file.end()) {
+    if (!found->is_string()) {
+      return refusal(TrajectoryFileError::wrong_sample, source, "driveMotorType")
+          .got(shortened(found->dump()))
+          .expected("a motor's name, such as \"krakenX60\"");
+    }
+    settings.motor = found->get<std::string>();
+  }
+  FLYBALL_TRY(settings.path_folders, texts_of(file, "pathFolders", source));
+  FLYBALL_TRY(settings.auto_folders, texts_of(file, "autoFolders", source));
+  if (const auto found = file.find("robotFeatures"); found != file.end() && found->is_array()) {
+    for (const json& feature : *found) {  // objects in texts, or objects
+      settings.features.push_back(feature.is_string() ? feature.get<std::string>()
+                                                      : feature.dump());
+    }
+  }
+  FLYBALL_CHECK(read_modules(file, source, settings));
+  FLYBALL_TRY(settings.bumper_offset(0),
+              recording::number_of(file, "bumperOffsetX", "bumperOffsetX", source, 0.0));
+  FLYBALL_TRY(settings.bumper_offset(1),
+              recording::number_of(file, "bumperOffsetY", "bumperOffsetY", source, 0.0));
+  tell_unknown(file, settings);
+  return settings;
+}
+
+Expected<PathPlannerSettings> read_pathplanner_settings(const std::string& path) {
+  constexpr std::size_t largest = 1 << 22;
+  FLYBALL_TRY(const std::string text, read_file(path, largest));
+  return parse_pathplanner_settings(text, path);
+}
+
+}  // namespace flyball
