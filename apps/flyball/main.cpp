@@ -69,6 +69,8 @@ int run(int argc, char** argv) {
       "  flyball estimate swing.csv pendulum.toml   states from a log, by filter and smoother\n"
       "  flyball simulate pendulum.toml             a mechanism, or a model by formula\n"
       "  flyball experiment elevator.toml           which tests tell the gains best\n"
+      "  flyball size elevator.toml                 the best gear ratio, by simulated motions\n"
+      "  flyball drive robot.toml                   a drivetrain that follows a trajectory\n"
       "  flyball motors krakenX60                   what the motor table knows\n"
       "  flyball motor-curves cim.csv               a motor's constants from a dynamometer\n"
       "  flyball units velocity                     the units that quantities are read in\n"
@@ -92,6 +94,8 @@ int run(int argc, char** argv) {
   flyball::app::add_merge_command(program, invocation);
   flyball::app::add_design_command(program, invocation);
   flyball::app::add_simulate_command(program, invocation);
+  flyball::app::add_size_command(program, invocation);
+  flyball::app::add_drive_command(program, invocation);
   flyball::app::add_tune_command(program, invocation);
   flyball::app::add_estimate_command(program, invocation);
   flyball::app::add_experiment_command(program, invocation);

@@ -41,7 +41,7 @@ std::string_view to_string(PowerBound bound) {
     case PowerBound::voltage:
       return "the voltage limit";
     case PowerBound::rail:
-      return "the battery's sag";
+      return "the battery's voltage";
     case PowerBound::battery:
       return "the battery's power";
     case PowerBound::stator:

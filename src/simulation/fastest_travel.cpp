@@ -122,7 +122,7 @@ class Motion {
       return phase;
     }
     double h = first_step(from.y, push);
-    constexpr int most_steps = 200'000;
+    constexpr int most_steps = 20'000;
     for (int i = 0; i < most_steps; ++i) {
       const Row& last = phase.rows.back();
       State error;

@@ -37,8 +37,14 @@ enum class FieldType {
 /// What a number must be, each of a list.
 enum class Range { any, not_zero, not_negative, positive };
 
-/// What a key or a section is about; what is about the other kind of file is refused.
-enum class Subject { any, mechanism, model };
+/// What a key or a section is about; what is about another kind of file is refused. Motors are
+/// those of a mechanism or of a drivetrain.
+enum class Subject { any, mechanism, model, drive, motors };
+
+/// Whether what is about one thing has no meaning in a file of another.
+[[nodiscard]] constexpr bool is_about_other(Subject of, Subject file) {
+  return of == Subject::motors ? file == Subject::model : of != Subject::any && of != file;
+}
 
 /// TOML's largest whole number.
 constexpr long long largest_whole = std::numeric_limits<long long>::max();
@@ -53,11 +59,12 @@ struct SignalDimensions {
   Dimension output = Dimension::dimensionless;  ///< What is measured and followed.
   Dimension rate = Dimension::dimensionless;    ///< By which the output changes.
   Dimension acceleration = Dimension::dimensionless;
+  Dimension effort = Dimension::dimensionless;  ///< What pushes it: a force or a torque.
 };
 
 /// A dimension that is fixed, or one of the mechanism's.
 struct FieldDimension {
-  enum Of { fixed, output, rate, acceleration, states };
+  enum Of { fixed, output, rate, acceleration, effort, states };
 
   // NOLINTNEXTLINE(google-explicit-constructor): rows say `voltage` or `FieldDimension::output`.
   constexpr FieldDimension(Dimension of_every_mechanism) : dimension(of_every_mechanism) {}

@@ -122,7 +122,15 @@ Names sections_of(JobKind job) {
   static constexpr std::array<std::string_view, 3> identify{"log", "fit", "model.parameters"};
   static constexpr std::array<std::string_view, 6> estimate{
       "estimate", "fit.period", "fit.from", "fit.to", "fit.hold", "model.parameters"};
+  static constexpr std::array<std::string_view, 5> size{"size", "mechanism", "gains.kS",
+                                                        "controller.max_voltage", "battery"};
+  static constexpr std::array<std::string_view, 5> drive{
+      "drive", "disturbance", "controller.period", "controller.max_voltage", "battery"};
   switch (job) {
+    case JobKind::drive:
+      return drive;
+    case JobKind::size:
+      return size;
     case JobKind::estimate:
       return estimate;
     case JobKind::experiment:
@@ -263,12 +271,14 @@ std::string project_schema() {
       key = {{"anyOf", {key, schema_of(section)}}};
     }
   }
-  const Json schema = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
-                       {"title", "A Flyball project file"},
-                       {"type", "object"},
-                       {"additionalProperties", false},
-                       {"anyOf", {{{"required", {"mechanism"}}}, {{"required", {"model"}}}}},
-                       {"properties", std::move(properties)}};
+  const Json schema = {
+      {"$schema", "https://json-schema.org/draft/2020-12/schema"},
+      {"title", "A Flyball project file"},
+      {"type", "object"},
+      {"additionalProperties", false},
+      {"anyOf",
+       {{{"required", {"mechanism"}}}, {{"required", {"model"}}}, {{"required", {"drive"}}}}},
+      {"properties", std::move(properties)}};
   return schema.dump(2) + "\n";
 }
 

@@ -174,10 +174,19 @@ ExpectedAll<Project> read(std::string_view text, const std::string& name,
   auto& type = project.parts.type;
   const auto& logged = project.log.mechanism;
   const bool formulas = document.subject() == Subject::model;
-  if (source != Source::log && document.is_toml() && !formulas && !document.writes(part_section)) {
+  const bool drives = document.subject() == Subject::drive;
+  if (source != Source::log && document.is_toml() && !formulas && !drives &&
+      !document.writes(part_section)) {
     document.miss("", part_section,
-                  "begin with [mechanism] and type = \"elevator\", \"arm\" or \"flywheel\", or "
-                  "with [model] and formulas");
+                  "begin with [mechanism] and type = \"elevator\", \"arm\" or \"flywheel\", "
+                  "with [drive] and a drivetrain, or with [model] and formulas");
+  }
+  if (drives) {
+    project.plant_error = Error(ProjectError::wrong_value)
+                              .in(name)
+                              .about("[drive]")
+                              .got("a drivetrain, which `flyball drive` simulates")
+                              .expected("a [mechanism] for this command");
   }
   if (formulas) {
     project.model_job = model_job(document, project);

@@ -8,8 +8,10 @@
 #include <flyball/study/project.hpp>
 
 #include "core/try.hpp"
+#include "study/drive_fields.hpp"
 #include "study/field.hpp"
 #include "study/mechanism_parts.hpp"
+#include "study/size_fields.hpp"
 
 namespace flyball::study {
 
@@ -21,6 +23,7 @@ using Of = FieldDimension;
 using recording::LogSelection;
 using Subject::mechanism;
 using Subject::model;
+using Subject::motors;
 
 Expected<void> check_kind(const std::string& text) {
   return mechanisms::parse_mechanism_kind(text).map([](auto) {});
@@ -228,7 +231,7 @@ constexpr std::array controller_fields{
         .of(mechanism),
     quantity("max_voltage", at<&ControllerOptions::max_voltage>(), voltage, positive, "\"12 V\"",
              "Limit of the voltage")
-        .of(mechanism),
+        .of(motors),
     quantity("delay", at<&ControllerOptions::delay>(), time, not_negative, "\"10 ms\"",
              "Delay from sensing to acting")
         .without("what the log shows, else none"),
@@ -551,10 +554,18 @@ constexpr std::array sections{
     Section{"sensor", sensor_fields, &within<&Project::job, &DesignJob::sensor>,
             "The sensor of the simulation.", "", mechanism},
     Section{"battery", battery_fields, &within<&Project::job, &DesignJob::battery>,
-            "The battery whose voltage sags in the simulation; needs a motor.", "", mechanism},
+            "The battery whose voltage sags in the simulation; needs a motor.", "", motors},
     Section{"profile", profile_fields, &within<&Project::job>, "The motion that is simulated."},
     Section{"experiment", experiment_fields, &within<&Project::experiment>,
-            "What tests may do that `flyball experiment` plans.", "", mechanism}};
+            "What tests may do that `flyball experiment` plans.", "", mechanism},
+    Section{"size", size_fields, &within<&Project::size>,
+            "The motion for which `flyball size` finds the gearing, and what it is done with.", "",
+            mechanism},
+    Section{"drive", drive_fields, &within<&Project::drive>,
+            "A drivetrain, what it follows and how: what `flyball drive` simulates.",
+            "every drivetrain", Subject::drive},
+    Section{"disturbance", disturbance_fields, &within<&Project::disturbance>,
+            "What the drivetrain meets that its follower does not know.", "", Subject::drive}};
 
 std::optional<SignalDimensions> signals(const void* document) {
   const auto& project = *static_cast<const Project*>(document);
@@ -563,6 +574,14 @@ std::optional<SignalDimensions> signals(const void* document) {
 }
 
 }  // namespace
+
+Expected<void> check_drive_type(const std::string& text) {
+  return check_choice(text, {"differential", "swerve", "mecanum"});
+}
+
+Expected<void> check_drive_follower(const std::string& text) {
+  return check_choice(text, {"ramsete", "ltv unicycle", "ltv drive", "holonomic"});
+}
 
 const Document& project_document() {
   static constexpr Document document{sections, &signals};

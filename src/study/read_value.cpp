@@ -282,6 +282,8 @@ std::vector<Dimension> dimensions_of(const Field& field,
       return {signals->output};
     case Of::rate:
       return {signals->rate};
+    case Of::effort:
+      return {signals->effort};
     default:
       return {signals->acceleration};
   }

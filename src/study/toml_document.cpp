@@ -174,7 +174,7 @@ void TomlDocument::read_section(const Section& section, const toml::table& keys,
 bool TomlDocument::refuse_other(const Section& section, const Field* field) {
   const Subject of =
       field != nullptr && field->subject != Subject::any ? field->subject : section.subject;
-  if (of == Subject::any || of == subject()) {
+  if (!is_about_other(of, subject())) {
     return false;
   }
   const auto [parent, name] = split(section.name);
@@ -184,8 +184,12 @@ bool TomlDocument::refuse_other(const Section& section, const Field* field) {
     refuse(within, key,
            Error(ProjectError::wrong_value)
                .about(this->name(within, key))
-               .got(of == Subject::model ? "for a model by formula" : "for a mechanism")
-               .hint(of == Subject::model
+               .got(of == Subject::model   ? "for a model by formula"
+                    : of == Subject::drive ? "for a drivetrain"
+                                           : "for a mechanism")
+               .hint(of == Subject::drive || subject() == Subject::drive
+                         ? "a file has one of [drive], [mechanism] and [model]"
+                     : of == Subject::model
                          ? "the file has no [model]; a mechanism has state_tolerance, max_voltage, "
                            "[sensor] and [profile]"
                      : section.subject == Subject::any

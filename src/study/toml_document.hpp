@@ -33,9 +33,9 @@ class TomlDocument {
   [[nodiscard]] bool is_toml() const { return is_toml_; }
   /// Whether the file has a section, or what is none in its place; not only the command line.
   [[nodiscard]] bool writes(std::string_view section) const;
-  /// What the file is about: a model if it has one.
+  /// What the file is about: a model if it has one, a drivetrain if it has one.
   [[nodiscard]] Subject subject() const {
-    return writes("model") ? Subject::model : Subject::mechanism;
+    return writes("model") ? Subject::model : writes("drive") ? Subject::drive : Subject::mechanism;
   }
   /// Whether a key is the command line's alone.
   [[nodiscard]] bool is_new(std::string_view section, std::string_view key) const;

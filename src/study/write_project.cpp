@@ -87,8 +87,10 @@ std::string write_project(const Project& project, std::string_view heading,
                           std::span<const KeyComment> comments) {
   const Document& document = project_document();
   const auto signals = document.signals(&project);
-  const Subject subject = project.model.states.empty() ? Subject::mechanism : Subject::model;
-  const auto is_other = [&](Subject of) { return of != Subject::any && of != subject; };
+  const Subject subject = !project.model.states.empty() ? Subject::model
+                          : !project.drive.type.empty() ? Subject::drive
+                                                        : Subject::mechanism;
+  const auto is_other = [&](Subject of) { return is_about_other(of, subject); };
   std::string text;
   for (const std::string_view line : text::split(heading, "\n")) {
     text += fmt::format("# {}\n", line);

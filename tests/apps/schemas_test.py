@@ -134,6 +134,16 @@ def check_answers(folder):
         check_answer(["analyze", examples / f"{model}.toml"], 0, folder)
         check_answer(["design", examples / f"{model}.toml"], 0, folder, "design_model")
     check_answer(["simulate", examples / "elevator.toml"], 0, folder)
+    for name in ("sized_elevator", "sized_arm"):
+        check("project", tomllib.loads((examples / f"{name}.toml").read_text()), name)
+    check_answer(["size", examples / "sized_elevator.toml", "--compare-motors=false"], 0, folder)
+    check_answer(["size", examples / "sized_arm.toml", "--stator-limit", "0.1A"], 1, folder)
+    check_answer(["size", examples / "pendulum.toml"], 2, folder)
+    for name in ("drive_differential", "drive_swerve"):
+        check("project", tomllib.loads((examples / f"{name}.toml").read_text()), name)
+    check_answer(["drive", examples / "drive_differential.toml"], 0, folder)
+    check_answer(["drive", examples / "drive_differential.toml", "--path-velocity", "40m/s"], 1, folder)
+    check_answer(["drive", examples / "elevator.toml"], 2, folder)
     check_model_fit(folder)
     (folder / "discrete.json").write_text('{"A":[[0.5]],"B":[[1]],"domain":"discrete","T":0.02}')
     check_answer(["analyze", "discrete.json"], 0, folder)

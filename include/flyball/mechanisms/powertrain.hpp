@@ -22,7 +22,7 @@ enum class PowerBound {
   grip,     ///< What wheels can push on the floor.
 };
 inline constexpr int power_bounds = 6;
-/// "the voltage", "the battery's sag", …
+/// "the voltage limit", "the battery's voltage", …
 [[nodiscard]] std::string_view to_string(PowerBound bound);
 
 /// Limits of a drive, for all motors together.

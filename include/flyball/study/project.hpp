@@ -6,8 +6,10 @@
 #include <string_view>
 
 #include <flyball/core/errors.hpp>
+#include <flyball/study/drive_section.hpp>
 #include <flyball/study/experiment.hpp>
 #include <flyball/study/model_job.hpp>
+#include <flyball/study/size_section.hpp>
 #include <flyball/study/tune.hpp>
 
 namespace flyball::study {
@@ -74,6 +76,9 @@ struct Project {
   FitSection fit{};
   EstimateSection estimate{};
   SwingUpSection swing_up{};
+  SizeSection size{};
+  DriveSection drive{};
+  DisturbanceSection disturbance{};
   DesignJob job;  ///< Its plant comes from the parts and the gains.
   /// Why the file does not define a mechanism, if it does not: all that is missing.
   std::optional<Errors> plant_error{};
@@ -136,7 +141,7 @@ struct KeyComment {
                                                         std::span<const Override> overrides = {});
 
 /// The jobs whose fields a person may set.
-enum class JobKind { identify, design, tune, analyze, simulate, experiment, estimate };
+enum class JobKind { identify, design, tune, analyze, simulate, experiment, estimate, size, drive };
 
 /// A field of a job, for whoever asks a person for it: a command line, a form, a binding.
 struct FieldInfo {

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <memory>
+
+#include <Eigen/Core>
+
+#include <flyball/core/expected.hpp>
+#include <flyball/study/drive.hpp>
+
+/// What a robot runs each period to follow a trajectory, down to its motors' voltages.
+namespace flyball::study {
+
+/// What it is told by its sensors.
+struct DriveReading {
+  Pose2d pose{};
+  Eigen::VectorXd wheels{};  ///< m/s, of each shaft.
+  Eigen::VectorXd module_angles{}, module_rates{};
+};
+
+/// What it asks for.
+struct DriveOrder {
+  Eigen::VectorXd volts{};             ///< One a motor, within the limit.
+  mechanisms::ChassisSpeeds speeds{};  ///< That it wants, in the robot's frame.
+  bool saturated = false;              ///< Whether it wanted more.
+};
+
+class DriveLaw {
+ public:
+  virtual ~DriveLaw() = default;
+  DriveLaw() = default;
+  DriveLaw(const DriveLaw&) = delete;
+  DriveLaw& operator=(const DriveLaw&) = delete;
+
+  /// @param now, next  Of the trajectory, now and a period later.
+  virtual DriveOrder step(const DriveReading& reading, const MotionSample& now,
+                          const MotionSample& next) = 0;
+};
+
+/// @errors Those of the followers and models.
+[[nodiscard]] Expected<std::unique_ptr<DriveLaw>> make_drive_law(const DriveJob& job);
+
+/// A sample as followers take it: its velocity in the robot's own frame.
+[[nodiscard]] TrackingPoint tracking_point(const MotionSample& sample) noexcept;
+
+}  // namespace flyball::study

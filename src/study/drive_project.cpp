@@ -1,0 +1,408 @@
+// What a project file says of a drivetrain that follows a trajectory.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/planning/splines/spline.hpp>
+#include <flyball/planning/trajectory/trajectory.hpp>
+#include <flyball/study/drive.hpp>
+#include <flyball/study/project.hpp>
+
+#include "core/diagnose.hpp"
+#include "core/try.hpp"
+#include "core/wording.hpp"
+#include "study/field.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+using Eigen::Vector2d;
+
+std::string beside(const std::string& project, const std::string& file) {
+  const std::size_t slash = project.find_last_of('/');
+  return file.starts_with('/') || slash == std::string::npos ? file
+                                                             : project.substr(0, slash + 1) + file;
+}
+
+Error wrong(const Project& project, std::string_view key, std::string got) {
+  return Error(ProjectError::wrong_value)
+      .in(project.path)
+      .about(fmt::format("drive.{}", key))
+      .got(std::move(got));
+}
+
+Expected<DriveKind> kind_of(const Project& project, const PathPlannerSettings& settings) {
+  const std::string& type = project.drive.type;
+  const DriveKind kind = type == "swerve"    ? DriveKind::swerve
+                         : type == "mecanum" ? DriveKind::mecanum
+                                             : DriveKind::differential;
+  if (settings.holonomic && *settings.holonomic != (kind != DriveKind::differential)) {
+    return tl::unexpected(wrong(project, "type", fmt::format("\"{}\"", type))
+                              .expected(*settings.holonomic
+                                            ? "\"swerve\" or \"mecanum\", as the settings are of a "
+                                              "holonomic drive"
+                                            : "\"differential\", as the settings are not of a "
+                                              "holonomic drive"));
+  }
+  return kind;
+}
+
+/// "0.27 m, 0.27 m" as quantities. @param dimensions  Of each, the last ones optional.
+Expected<std::vector<double>> quantities_of(const std::string& text,
+                                            std::initializer_list<Dimension> dimensions,
+                                            std::size_t least, const std::string& name) {
+  const auto parts = text::split(text, ",");
+  if (parts.size() < least || parts.size() > dimensions.size()) {
+    return refusal(ArgumentError::malformed, {}, name)
+        .got(fmt::format("\"{}\", {} values", shortened(text), parts.size()))
+        .expected(least == dimensions.size() ? fmt::format("{} values, separated by commas", least)
+                                             : fmt::format("{} to {} values, separated by commas",
+                                                           least, dimensions.size()));
+  }
+  std::vector<double> values;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    FLYBALL_TRY(const double value, parse_quantity(parts[i], *(dimensions.begin() + i), name));
+    values.push_back(value);
+  }
+  return values;
+}
+
+/// Everything that is missing at once.
+class Parts {
+ public:
+  Parts(const Project& project, std::string_view settings)
+      : project_(project), settings_(settings) {}
+
+  template <class Said>
+  double number(std::string_view key, const std::optional<Said>& said,
+                const std::optional<double>& by_settings, std::string_view example) {
+    if (said) {
+      if constexpr (requires { said->si(); }) {
+        return said->si();
+      } else {
+        return *said;
+      }
+    }
+    if (!by_settings) {
+      miss(key, example);
+    }
+    return by_settings.value_or(1.0);
+  }
+  void miss(std::string_view key, std::string_view example) {
+    missing_.push_back(
+        {Error(ProjectError::missing_key)
+             .in(project_.path)
+             .about(fmt::format("drive.{}", key))
+             .got("missing")
+             .hint(fmt::format("a drivetrain needs it, for example {} = {}{}", key, example,
+                               settings_.empty() ? "; PathPlanner's settings.json may say it: "
+                                                   "settings = \"settings.json\""
+                                                 : "; the settings do not say it")),
+         {},
+         {}});
+  }
+  [[nodiscard]] ExpectedAll<void> all() const {
+    return missing_.empty() ? ExpectedAll<void>() : tl::unexpected(Errors(missing_));
+  }
+
+ private:
+  const Project& project_;
+  std::string_view settings_;
+  std::vector<QuotedError> missing_;
+};
+
+Expected<void> take_modules(const Project& project, const PathPlannerSettings& settings,
+                            DriveRobot& robot, bool is_track_known) {
+  const DriveSection& said = project.drive;
+  if (!said.modules.empty()) {
+    if (said.modules.size() != 4) {
+      return tl::unexpected(wrong(project, "modules", fmt::format("{} places", said.modules.size()))
+                                .expected("four: front left, front right, back left, back right"));
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+      auto place = quantities_of(said.modules[i], {Dimension::length, Dimension::length}, 2,
+                                 fmt::format("drive.modules[{}]", i));
+      if (!place) {
+        return tl::unexpected(std::move(place).error().in(project.path));
+      }
+      robot.modules[i] = {(*place)[0], (*place)[1]};
+    }
+    return {};
+  }
+  const bool from_settings = !said.trackwidth && !said.wheelbase &&
+                             std::all_of(settings.modules.begin(), settings.modules.end(),
+                                         [](const auto& place) { return place.has_value(); });
+  if (from_settings) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      robot.modules[i] = *settings.modules[i];
+    }
+  } else if (is_track_known) {
+    const double y = 0.5 * robot.trackwidth;
+    const double x = 0.5 * said.wheelbase.value_or(Length(robot.trackwidth)).si();
+    robot.modules = {Vector2d(x, y), Vector2d(x, -y), Vector2d(-x, y), Vector2d(-x, -y)};
+  }
+  return {};
+}
+
+ExpectedAll<DriveRobot> robot_of(const Project& project, const PathPlannerSettings& settings) {
+  const DriveSection& said = project.drive;
+  DriveRobot robot;
+  FLYBALL_TRY(robot.kind, kind_of(project, settings));
+  const bool sides = robot.kind == DriveKind::differential;
+  Parts parts(project, said.settings);
+  robot.mass = parts.number("mass", said.mass, settings.mass, "\"54 kg\"");
+  robot.moment_of_inertia = parts.number("moment_of_inertia", said.moment_of_inertia,
+                                         settings.moment_of_inertia, "\"6 kg m^2\"");
+  robot.gearing = parts.number("gearing", said.gearing, settings.gearing, "8.45");
+  robot.wheel_radius =
+      parts.number("wheel_radius", said.wheel_radius, settings.wheel_radius, "\"3 in\"");
+  const bool has_modules = !said.modules.empty() || (settings.modules[0] && settings.modules[1] &&
+                                                     settings.modules[2] && settings.modules[3]);
+  const bool is_track_known = said.trackwidth || settings.trackwidth;
+  if (sides || !has_modules) {
+    robot.trackwidth =
+        parts.number("trackwidth", said.trackwidth, settings.trackwidth, "\"0.6 m\"");
+  }
+  const std::string name = !said.motor.empty() ? said.motor : settings.motor;
+  if (name.empty()) {
+    parts.miss("motor", "\"NEO\"");
+  }
+  FLYBALL_CHECK(parts.all());
+  const int count = said.motor_count.value_or(sides ? 2 : 1);
+  const auto motor_of = [&](const std::string& called, int n,
+                            std::string_view key) -> Expected<mechanisms::DcMotor> {
+    auto motor = mechanisms::motor(called, n);
+    if (!motor) {
+      return tl::unexpected(
+          std::move(motor).error().in(fmt::format("{}: drive.{}", project.path, key)));
+    }
+    return motor;
+  };
+  FLYBALL_TRY(robot.motor, motor_of(name, count, said.motor.empty() ? "settings" : "motor"));
+  FLYBALL_TRY(robot.steer_motor, motor_of(said.steer_motor.empty() ? name : said.steer_motor, 1,
+                                          said.steer_motor.empty() ? "motor" : "steer_motor"));
+  FLYBALL_CHECK(take_modules(project, settings, robot, is_track_known));
+  robot.wheel_inertia = said.wheel_inertia.si();
+  robot.wheelbase = sides ? said.wheelbase.value_or(Length(0.0)).si() : 0.0;
+  robot.grip = said.grip.value_or(settings.wheel_friction.value_or(robot.grip));
+  const double none = std::numeric_limits<double>::infinity();
+  const double n = count;
+  robot.stator_limit = said.stator_limit        ? n * said.stator_limit->si()
+                       : settings.current_limit ? n * *settings.current_limit
+                                                : none;
+  robot.supply_limit = said.supply_limit ? n * said.supply_limit->si() : none;
+  robot.steer_gearing = said.steer_gearing;
+  robot.steer_inertia = said.steer_inertia.si();
+  double x = 0.5 * robot.wheelbase;
+  double y = 0.5 * robot.trackwidth;
+  for (const Vector2d& module : robot.modules) {
+    x = std::max(x, module(0));
+    y = std::max(y, module(1));
+  }
+  constexpr double around = 0.3;  // m, of bumpers and frame
+  robot.length = said.bumper_length
+                     ? said.bumper_length->si()
+                     : settings.robot_length.value_or(2.0 * std::max(x, 0.8 * y) + around);
+  robot.width =
+      said.bumper_width ? said.bumper_width->si() : settings.robot_width.value_or(2.0 * y + around);
+  return robot;
+}
+
+/// Waypoints as a path with times.
+Expected<RobotTrajectory> trajectory_of(const Project& project, const DriveJob& job,
+                                        const PathPlannerSettings& settings) {
+  const DriveSection& said = project.drive;
+  const bool sides = job.robot.kind == DriveKind::differential;
+  std::vector<Pose2d> poses;
+  std::vector<double> looks;
+  for (std::size_t i = 0; i < said.waypoints.size(); ++i) {
+    const std::string name = fmt::format("drive.waypoints[{}]", i);
+    auto values = quantities_of(
+        said.waypoints[i],
+        {Dimension::length, Dimension::length, Dimension::angle, Dimension::angle}, 3, name);
+    if (!values) {
+      return tl::unexpected(std::move(values).error().in(project.path));
+    }
+    if (values->size() > 3 && sides) {
+      return tl::unexpected(wrong(project, fmt::format("waypoints[{}]", i), "of four values")
+                                .hint("a differential drive looks where it goes: leave the fourth "
+                                      "out"));
+    }
+    poses.emplace_back((*values)[0], (*values)[1], (*values)[2]);
+    looks.push_back(values->size() > 3 ? (*values)[3] : (*values)[2]);
+  }
+  const auto named = [&](Error error) {
+    return tl::unexpected(std::move(error).in(fmt::format("{}: drive.waypoints", project.path)));
+  };
+  auto spline = quintic_spline(poses);
+  if (!spline) {
+    return named(std::move(spline).error());
+  }
+  const double top = job.robot.free_speed(job.max_voltage);
+  const double usual = 2.5;       // m/s²
+  const double usual_bend = 2.0;  // m/s²
+  const double share = 0.6;       // of the free speed: what is left for feedback
+  PathLimits limits{.velocity = said.max_velocity ? said.max_velocity->si()
+                                                  : settings.max_velocity.value_or(share * top),
+                    .acceleration = said.max_acceleration
+                                        ? said.max_acceleration->si()
+                                        : settings.max_acceleration.value_or(usual),
+                    .centripetal = said.max_centripetal ? said.max_centripetal->si() : usual_bend};
+  auto path = sample_path(*spline);
+  if (!path) {
+    return named(std::move(path).error());
+  }
+  auto timed = time_path(*path, limits);
+  if (!timed) {
+    return named(std::move(timed).error());
+  }
+  RobotTrajectory trajectory{.source = project.path};
+  // The way the robot looks goes on evenly along the path between two waypoints.
+  std::vector<double> lengths{0.0};
+  const auto& points = timed->points();
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    lengths.push_back(lengths.back() +
+                      (points[i].pose.translation() - points[i - 1].pose.translation()).norm());
+  }
+  const bool turns_apart = !sides && std::any_of(said.waypoints.begin(), said.waypoints.end(),
+                                                 [](const std::string& text) {
+                                                   return text::split(text, ",").size() > 3;
+                                                 });
+  std::vector<double> stations;
+  std::vector<double> angles;
+  for (std::size_t w = 0, at = 0; w < poses.size(); ++w) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t i = at; i < points.size(); ++i) {
+      const double d = (points[i].pose.translation() - poses[w].translation()).norm();
+      if (d < nearest - 1e-12) {
+        nearest = d;
+        at = i;
+      }
+      if (d < 1e-9) {
+        break;
+      }
+    }
+    stations.push_back(lengths[at]);
+    angles.push_back(angles.empty() ? looks[w]
+                                    : angles.back() + std::remainder(looks[w] - angles.back(),
+                                                                     2.0 * std::numbers::pi));
+  }
+  std::size_t w = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const TrajectoryPoint& point = points[i];
+    const double sign = said.reversed && sides ? -1.0 : 1.0;
+    MotionSample sample{.time = point.time, .pose = point.pose};
+    const Vector2d way(point.pose.rotation().cos(), point.pose.rotation().sin());
+    sample.velocity = point.velocity * way;
+    sample.acceleration = point.acceleration * way;
+    sample.omega = point.velocity * point.curvature;
+    if (sign < 0.0) {
+      sample.pose = point.pose * Pose2d(0.0, 0.0, std::numbers::pi);
+    }
+    if (turns_apart) {
+      while (w + 2 < stations.size() && lengths[i] > stations[w + 1]) {
+        ++w;
+      }
+      const double span = stations[w + 1] - stations[w];
+      const double s = span > 0.0 ? std::clamp((lengths[i] - stations[w]) / span, 0.0, 1.0) : 1.0;
+      const double slope = span > 0.0 ? (angles[w + 1] - angles[w]) / span : 0.0;
+      // Smoothly at the waypoints: 3 s² - 2 s³.
+      sample.pose = Pose2d(point.pose.x(), point.pose.y(),
+                           angles[w] + (angles[w + 1] - angles[w]) * s * s * (3.0 - 2.0 * s));
+      sample.omega = point.velocity * slope * 6.0 * s * (1.0 - s);
+    }
+    trajectory.samples.push_back(sample);
+  }
+  trajectory.holonomic = turns_apart;
+  return trajectory;
+}
+
+Expected<DriveFollower> follower_of(const Project& project, DriveKind kind) {
+  const std::string& said = project.drive.follower;
+  const bool sides = kind == DriveKind::differential;
+  if (said.empty()) {
+    return sides ? DriveFollower::ltv_unicycle : DriveFollower::holonomic;
+  }
+  for (const DriveFollower follower : {DriveFollower::ramsete, DriveFollower::ltv_unicycle,
+                                       DriveFollower::ltv_drive, DriveFollower::holonomic}) {
+    if (said == to_string(follower)) {
+      if ((follower == DriveFollower::holonomic) == sides) {
+        return tl::unexpected(
+            wrong(project, "follower", fmt::format("\"{}\"", said))
+                .expected(sides ? "one of a differential drive: ramsete, ltv unicycle, ltv drive"
+                                : fmt::format("holonomic, for a {} drive", to_string(kind))));
+      }
+      return follower;
+    }
+  }
+  return tl::unexpected(wrong(project, "follower", fmt::format("\"{}\"", shortened(said)))
+                            .expected("ramsete, ltv unicycle, ltv drive or holonomic"));
+}
+
+}  // namespace
+
+ExpectedAll<DriveJob> drive_job(const std::string& path, std::span<const Override> overrides) {
+  FLYBALL_TRY(const auto project, read_project(path, overrides));
+  const DriveSection& said = project.drive;
+  if (said.type.empty()) {
+    return tl::unexpected(Errors(Error(ProjectError::missing_key)
+                                     .in(project.path)
+                                     .about("[drive]")
+                                     .got("missing")
+                                     .hint("say what the drivetrain is: [drive] and type = "
+                                           "\"differential\", \"swerve\" or \"mecanum\"")));
+  }
+  PathPlannerSettings settings;
+  if (!said.settings.empty()) {
+    FLYBALL_TRY(settings, read_pathplanner_settings(beside(path, said.settings)));
+  }
+  DriveJob job{.path = path};
+  FLYBALL_TRY(job.robot, robot_of(project, settings));
+  FLYBALL_TRY(job.follower, follower_of(project, job.robot.kind));
+  job.diagnostics = settings.diagnostics;
+  job.b = said.b;
+  job.zeta = said.zeta;
+  if (job.follower == DriveFollower::holonomic) {
+    job.x_tolerance = 0.05;
+    job.y_tolerance = 0.05;
+    job.heading_tolerance = 0.1;
+  }
+  job.x_tolerance = said.x_tolerance.value_or(Length(job.x_tolerance)).si();
+  job.y_tolerance = said.y_tolerance.value_or(Length(job.y_tolerance)).si();
+  job.heading_tolerance = said.heading_tolerance.value_or(Angle(job.heading_tolerance)).si();
+  job.velocity_tolerance = said.velocity_tolerance.value_or(Velocity(job.velocity_tolerance)).si();
+  job.period = project.job.controller.period;
+  job.max_voltage = project.job.controller.max_voltage;
+  job.battery = {.open_circuit_voltage = project.job.battery.open_circuit_voltage,
+                 .resistance = project.job.battery.resistance};
+  job.disturbance = project.disturbance;
+  job.seed = project.job.seed;
+  if (said.trajectory.empty() == said.waypoints.empty()) {
+    return tl::unexpected(
+        Errors(Error(ProjectError::missing_key)
+                   .in(project.path)
+                   .about("drive.trajectory")
+                   .got(said.trajectory.empty() ? "missing, and so are waypoints"
+                                                : "there beside waypoints")
+                   .expected("one of them")
+                   .hint("waypoints = [\"1 m, 1 m, 0 deg\", \"4 m, 2 m, 0 deg\"], or a WPILib "
+                         "trajectory: trajectory = \"path.wpilib.json\"")));
+  }
+  if (!said.trajectory.empty()) {
+    FLYBALL_TRY(job.trajectory, read_trajectory(beside(path, said.trajectory)));
+  } else {
+    FLYBALL_TRY(job.trajectory, trajectory_of(project, job, settings));
+  }
+  for (const Diagnostic& diagnostic : job.trajectory.diagnostics) {
+    job.diagnostics.push_back(diagnostic);
+  }
+  return job;
+}
+
+}  // namespace flyball::study
