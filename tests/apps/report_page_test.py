@@ -214,6 +214,12 @@ class Page(unittest.TestCase):
                     first: drawing.time[0], last: drawing.time[drawing.time.length - 1],
                     look: drawing.canvas.toDataURL()};""")
 
+    def test_a_drawing_opens_when_it_comes_into_view(self):
+        self.open(plots=False)
+        self.js("document.querySelector('figure.animation').parentElement.scrollIntoView()")
+        self.frames()
+        self.assertEqual(self.find("figure.animation.on .live").get_attribute("aria-label"), "Motion of the elevator")
+
     def test_the_drawing_moves_with_the_plots(self):
         self.open()
         live = self.find("figure.animation .live")

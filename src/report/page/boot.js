@@ -42,6 +42,7 @@
   function open(element) {
     if (element.plot !== undefined) return;
     element.plot = null;
+    element.classList.remove('waiting');
     try {
       element.matches('.animation') ? animate(element) : build(element);
     } catch (problem) {
@@ -62,6 +63,8 @@
     }
     if (!performance.getEntriesByName('interactive').length) performance.mark('interactive');
   }, {rootMargin: '300px'});
+  // What has no box comes into no view: a drawing has none before it is opened, but a place.
+  figures.filter(figure => figure.matches('.animation')).forEach(figure => figure.classList.add('waiting'));
   figures.forEach(figure => near.observe(figure));
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', 
       () => [...flyball.all, ...flyball.animations].forEach(plot => plot.restyle()));
