@@ -22,6 +22,10 @@ Expected<json> json_of(std::string_view text, const std::string& source) {
     return json::parse(text);
   } catch (const json::parse_error& problem) {
     at = problem.byte > 0 ? problem.byte - 1 : 0;
+  } catch (const json::exception&) {  // 1e999
+    return refusal(TrajectoryFileError::not_json, source, "a number of the text")
+        .got("larger than a double holds")
+        .expected("a finite number");
   }
   const Place place = place_of(text, at);
   std::size_t begin = std::min(at, text.size());

@@ -220,7 +220,7 @@ Expected<Winding> winding_of(const Project& project, std::vector<Diagnostic>& di
 ExpectedAll<SizeJob> size_job(const std::string& path, std::span<const Override> overrides) {
   // A file beside a log may lack parts: here the gearing.
   FLYBALL_TRY(const auto project, read_project_beside_log(path, overrides));
-  if (project.model_job) {
+  if (project.model_job || !project.drive.type.empty()) {
     return tl::unexpected(*project.plant_error);
   }
   FLYBALL_CHECK(check_parts(project));

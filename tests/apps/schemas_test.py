@@ -142,7 +142,8 @@ def check_answers(folder):
     for name in ("drive_differential", "drive_swerve"):
         check("project", tomllib.loads((examples / f"{name}.toml").read_text()), name)
     check_answer(["drive", examples / "drive_differential.toml"], 0, folder)
-    check_answer(["drive", examples / "drive_differential.toml", "--path-velocity", "40m/s"], 1, folder)
+    check_answer(["drive", examples / "drive_differential.toml", "--path-velocity", "40m/s", "--path-acceleration",
+                  "90m/s^2", "--path-centripetal", "90m/s^2"], 1, folder)
     check_answer(["drive", examples / "elevator.toml"], 2, folder)
     check_model_fit(folder)
     (folder / "discrete.json").write_text('{"A":[[0.5]],"B":[[1]],"domain":"discrete","T":0.02}')

@@ -106,6 +106,7 @@ TEST(TrajectoryFile, WhatIsWrongIsToldWithItsPlaceAndMend) {
   EXPECT_NE(refused("{}").find("a list of"), std::string::npos);
   EXPECT_NE(refused(R"({"name": "a", "trajectory": {"samples": []}})").find("Choreo"),
             std::string::npos);
+  EXPECT_NE(refused("[{\"time\": 1e999}]").find("larger than a double"), std::string::npos);
   EXPECT_NE(refused("[1, 2]").find("the sample is no object"), std::string::npos)
       << refused("[1, 2]");
 }

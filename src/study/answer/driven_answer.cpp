@@ -27,7 +27,8 @@ constexpr double degree = std::numbers::pi / 180.0;
 constexpr double brownout = 6.75;  // V
 
 std::string centimetres(double metres) {
-  return fmt::format("{} cm", number(100.0 * metres, 3));
+  constexpr double seen = 5e-5;  // m, a twentieth of a millimetre
+  return fmt::format("{} cm", number(std::abs(metres) < seen ? 0.0 : 100.0 * metres, 3));
 }
 
 std::string degrees(double angle) {

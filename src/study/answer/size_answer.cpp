@@ -240,7 +240,7 @@ Section motors_section(const SizeResult& result) {
 Verdict verdict_of(const SizeResult& result) {
   Verdict verdict;
   verdict.line =
-      fmt::format("A gearing of {} is the fastest: {} for {}.", number(result.best.gearing, 3),
+      fmt::format("A gearing of {} is the fastest: {}, {}.", number(result.best.gearing, 3),
                   seconds(result.best.travel.time), motion_in_words(result));
   if (result.best.browns_out) {
     verdict.add(Tone::bad, fmt::format("the battery falls to {} V, a brownout",
