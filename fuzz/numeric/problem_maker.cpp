@@ -52,21 +52,34 @@ class Maker {
     for (const Field* field : there) {
       made[std::string(field->name)] = value(*field);
     }
+    const auto find = [&](std::string_view name) {
+      return std::find_if(fields.begin(), fields.end(),
+                          [&](const Field& field) { return field.name == name; });
+    };
+    // An expression, or num and den; seldom both or neither.
+    if (const auto expr = find("expr"); expr != fields.end() && !choices_.once_in(12)) {
+      const bool by_text = choices_.below(3) == 0;
+      for (const std::string_view name : {"num", "den", "expr"}) {
+        if ((name == "expr") != by_text) {
+          made.erase(std::string(name));
+        } else if (!made.contains(name)) {
+          made[std::string(name)] = value(*find(name));
+        }
+      }
+    }
     return made;
   }
 
  private:
-  Index& size(std::string_view letter) {
-    return sizes_[static_cast<std::size_t>(letter.front() - 'a')];
-  }
+  Index& size(std::string_view letter) { return sizes_[static_cast<std::size_t>(letter.front())]; }
   /// "n", "1", "n+p".
   Index size_of(std::string_view text) {
     Index sum = 0;
     for (const char c : text) {
-      if (c >= 'a' && c <= 'z') {
-        sum += size({&c, 1});
-      } else if (c >= '0' && c <= '9') {
+      if (c >= '0' && c <= '9') {
         sum += c - '0';
+      } else if (c != '+') {
+        sum += size({&c, 1});
       }
     }
     return sum;
@@ -195,6 +208,43 @@ class Maker {
     return choices_.one_of({0.02, 1.0, 1e-6, 1e6, 1e-3, 1e-300, 1e300, 5e-324, 100.0});
   }
 
+  /// A transfer function in words, of s, seldom of z.
+  std::string expression(int depth) {
+    const auto operand = [&] { return "(" + expression(depth - 1) + ")"; };
+    if (depth > 0) {
+      switch (choices_.below(7)) {
+        case 0:
+          return operand() + "+" + operand();
+        case 1:
+          return operand() + "-" + operand();
+        case 2:
+          return operand() + "*" + operand();
+        case 3:
+          return operand() + "/" + operand();
+        case 4:
+          return "feedback(" + expression(depth - 1) + "," + expression(depth - 1) + ")";
+        case 5:
+          return operand() + "^" + std::to_string(choices_.below(4));
+        default:
+          break;
+      }
+    }
+    const std::string one = std::to_string(entry());
+    const std::string other = std::to_string(entry());
+    switch (choices_.below(6)) {
+      case 0:
+        return "s";
+      case 1:
+        return "exp(-" + std::to_string(std::abs(entry())) + "*s)";
+      case 2:
+        return "[" + one + " " + other + "]/[1 " + one + " 2]";
+      case 3:
+        return choices_.once_in(8) ? "z" : one;
+      default:
+        return "(" + other + ")/(s+" + "(" + one + "))";
+    }
+  }
+
   double integer() {
     if (choices_.once_in(40)) {
       return choices_.one_of({-1.0, 1e9, 1e6, 0.0, -1e9});
@@ -310,7 +360,30 @@ class Maker {
                 {"C", rows_of(matrix(p, n))},
                 {"D", rows_of(matrix(p, m))}};
       }
+      case FieldType::text:
+        return expression(3);
+      case FieldType::transfers: {
+        json rows = json::array();
+        const Index columns = size_of(field.columns);
+        for (Index i = 0; i < size_of(field.rows); ++i) {
+          rows.push_back(json::array());
+          for (Index j = 0; j < columns; ++j) {
+            rows.back().push_back(expression(1));
+          }
+        }
+        return rows;
+      }
+      case FieldType::objects: {
+        json all = json::array();
+        for (std::size_t i = choices_.below(4); i > 0; --i) {
+          all.push_back(object(*field.inner));
+        }
+        return all;
+      }
       case FieldType::transfer:
+        if (choices_.once_in(4)) {
+          return expression(2);
+        }
         return {{"num", rows_of(matrix(1, size_of(field.rows)))[0]},
                 {"den", rows_of(matrix(1, size_of(field.columns)))[0]}};
       case FieldType::texts:
@@ -325,7 +398,7 @@ class Maker {
 
   Choices& choices_;
   std::size_t mood_;
-  std::array<Index, 26> sizes_{};
+  std::array<Index, 128> sizes_{};
 };
 
 }  // namespace

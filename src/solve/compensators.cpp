@@ -11,7 +11,7 @@
 #include <flyball/systems/model_reduction.hpp>
 
 #include "core/try.hpp"
-#include "solve/row.hpp"
+#include "solve/transfer_problem.hpp"
 
 // Controllers from transfer functions and by robust synthesis, and smaller models.
 namespace flyball::solve {
@@ -22,24 +22,6 @@ using classical::TransferFunction;
 using Eigen::VectorXd;
 using Continuous = ContinuousSystem<>;
 using Discrete = DiscreteSystem<>;
-
-double or_nan(const std::optional<double>& value) {
-  return value.value_or(std::numeric_limits<double>::quiet_NaN());
-}
-
-Expected<TransferFunction> plant_of(const Problem& problem, std::string_view where) {
-  const double dt = problem.number("dt");
-  FLYBALL_CHECK(Checks(where).not_negative(dt, "dt", "s"));
-  FLYBALL_TRY_IN(where, auto plant,
-                 TransferFunction::create(problem.matrix("num"), problem.matrix("den"),
-                                          dt > 0.0 ? std::optional(Time(dt)) : std::nullopt,
-                                          Time(problem.number("delay"))));
-  return plant;
-}
-
-std::optional<double> optional_number(const Problem& problem, std::string_view name) {
-  return problem.has(name) ? std::optional(problem.number(name)) : std::nullopt;
-}
 
 void write_margins(const classical::LoopMargins& margins, JsonWriter& answer) {
   answer.add("stable", margins.stable);
@@ -53,7 +35,7 @@ void write_margins(const classical::LoopMargins& margins, JsonWriter& answer) {
 // PID.
 
 Outcome solve_pidtune(const Problem& problem, JsonWriter& answer) {
-  FLYBALL_TRY(const auto plant, plant_of(problem, "pidtune"));
+  FLYBALL_TRY(const auto plant, transfer_of(problem, "pidtune"));
   const std::string_view name = problem.choice("form");
   const PidForm form = name == "p"    ? PidForm::p
                        : name == "pi" ? PidForm::pi
@@ -62,10 +44,17 @@ Outcome solve_pidtune(const Problem& problem, JsonWriter& answer) {
   const double ratio = problem.number("filter_ratio");
   const std::string_view method = problem.choice("method");
   const bool shaped = problem.has("crossover");
+  const bool by_poles = problem.has("natural_frequency");
+  if (by_poles != (method == "poles")) {
+    return refusal(ArgumentError::malformed, "pidtune", "natural_frequency")
+        .got(by_poles ? "given" : "left out")
+        .expected(by_poles ? "left out unless the method is poles"
+                           : "given with the method poles, rad/s");
+  }
   if (shaped && method != "robust" && method != "loop-shape") {
     return refusal(ArgumentError::malformed, "pidtune", "crossover")
         .got("given")
-        .expected("left out with the method simc");
+        .expected("left out with the methods simc and poles");
   }
   if (method == "loop-shape" && !shaped) {
     return refusal(ArgumentError::malformed, "pidtune", "crossover")
@@ -82,6 +71,11 @@ Outcome solve_pidtune(const Problem& problem, JsonWriter& answer) {
                                                       {.crossover = problem.number("crossover"),
                                                        .phase_margin = problem.number("phase_margin"),
                                                        .filter_ratio = ratio})
+              : by_poles         ? tune_by_poles(plant, form,
+                                                 {.natural_frequency = problem.number("natural_frequency"),
+                                                  .damping_ratio = problem.number("damping_ratio"),
+                                                  .third_pole = problem.number("third_pole"),
+                                                  .filter_ratio = ratio})
               : method == "simc" ? tune_simc(plant, form, problem.number("closed_loop_time"), ratio)
                                  : tune_by_robustness(plant, form, robust));
   answer.add("kp", loop.gains.kp);
@@ -95,16 +89,7 @@ Outcome solve_pidtune(const Problem& problem, JsonWriter& answer) {
   answer.add("crossover", loop.margins.gain_crossings.empty()
                               ? std::numeric_limits<double>::quiet_NaN()
                               : loop.margins.gain_crossings.back().frequency);
-  const auto& step = loop.reference;
-  answer.object("step", [&] {
-    answer.add({{"rise_time", or_nan(step.rise_time)},
-                {"settling_time", or_nan(step.settling_time)},
-                {"overshoot", 100.0 * or_nan(step.overshoot)},
-                {"undershoot", 100.0 * or_nan(step.undershoot)},
-                {"peak", or_nan(step.peak)},
-                {"peak_time", or_nan(step.peak_time)},
-                {"final_value", step.final_value}});
-  });
+  write_step_metrics("step", loop.reference, answer);
   const LoadResponse load = loop.load.value_or(LoadResponse{});
   answer.object("load", [&] {
     answer.add({{"peak", load.peak},
@@ -121,7 +106,7 @@ Outcome solve_pidtune(const Problem& problem, JsonWriter& answer) {
 
 Outcome solve_compensator(const Problem& problem, JsonWriter& answer) {
   constexpr std::string_view where = "compensator";
-  FLYBALL_TRY(const auto plant, plant_of(problem, where));
+  FLYBALL_TRY(const auto plant, transfer_of(problem, where));
   std::optional<double> gain = optional_number(problem, "gain");
   if (problem.has("error_constant")) {
     if (gain) {
@@ -298,15 +283,6 @@ Outcome solve_reduce(const Problem& problem, JsonWriter& answer) {
   });
 }
 
-const std::vector<Field>& plant_fields() {
-  static const std::vector<Field> fields{
-      list("num", "v", "", "the plant's numerator, the highest power first"),
-      list("den", "o", "", "its denominator"),
-      or_number(number("dt", "s", "sample period of a discrete one, of z; 0 for one of s"), 0.0),
-      or_number(number("delay", "s", "dead time, exact"), 0.0)};
-  return fields;
-}
-
 const std::vector<Field>& margin_fields() {
   static const std::vector<Field> fields{
       flag("stable", "whether the closed loop is"),
@@ -404,11 +380,11 @@ std::vector<Kind> compensator_kinds() {
   std::vector<Kind> all{
       {"pidtune",
        "PID gains of a plant: the most integral gain for a robustness, by crossover and phase "
-       "margin, or SIMC",
-       plant_fields() +
+       "margin, SIMC, or dominant poles",
+       transfer_fields() +
            std::vector{
                or_first(choice("form", "pid pi pd p", "which terms the controller has")),
-               or_first(choice("method", "robust loop-shape simc",
+               or_first(choice("method", "robust loop-shape simc poles",
                                "what decides; with a crossover it is loop-shape")),
                optional(number("crossover", "rad/s", "where |L| is to be 1")),
                or_number(number("phase_margin", "deg", "there"), 60.0),
@@ -417,6 +393,10 @@ std::vector<Kind> compensator_kinds() {
                or_number(number("closed_loop_time", "s",
                                 "of simc, the time constant it aims at; 0 takes the delay"),
                          0.0),
+               optional(number("natural_frequency", "rad/s", "of poles, ω of the dominant pair")),
+               or_number(number("damping_ratio", "", "of poles, ζ of the pair"), 0.7),
+               or_number(number("third_pole", "", "of poles with PID, α of a real pole at -αω"),
+                         1.0),
                or_number(number("filter_ratio", "", "N of the derivative's filter, T_d/N"), 10.0)},
        std::vector{number("kp", "input/output", "proportional gain"),
                    number("ki", "input/(output s)", "integral gain"),
@@ -426,15 +406,13 @@ std::vector<Kind> compensator_kinds() {
            std::vector{
                unbounded(number("Mt", "", "max |T|")),
                unbounded(number("crossover", "rad/s", "the last at which |L| = 1")),
-               record("step",
-                      "rise_time settling_time overshoot undershoot peak peak_time final_value",
-                      "of the output to the reference, as in tf"),
+               step_metrics_field("step", "of the output to the reference, as in tf"),
                record("load", "peak peak_time recovery_time integral absolute_integral final_value",
                       "of the output to a step of load at the plant's input")},
        R"({"num": [1], "den": [1, 3, 3, 1], "delay": 0.2, "form": "pi", "method": "simc"})",
        &solve_pidtune},
       {"compensator", "a lead, lag or lead-lag compensator in front of a plant",
-       plant_fields() +
+       transfer_fields() +
            std::vector{
                or_first(choice("type", "lead lag lead-lag", "what it is")),
                optional(number("crossover", "rad/s", "where |L| is to be 1")),

@@ -49,7 +49,18 @@ std::string type_of(const Field& field) {
     case FieldType::system:
       return fmt::format("system of {}", shape);
     case FieldType::transfer:
-      return "transfer function, num and den";
+      return "transfer function, num and den, or expr";
+    case FieldType::transfers:
+      return fmt::format("rows of transfer functions, {}", shape);
+    case FieldType::objects: {
+      std::string names;
+      for (const Field& inner : *field.inner) {
+        const bool refused = inner.absent == Absent::refused;
+        names += fmt::format("{}{}{}{}", names.empty() ? "" : ", ", refused ? "" : "[", inner.name,
+                             refused ? "" : "]");
+      }
+      return "list of objects with " + names;
+    }
   }
   return {};
 }

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include <flyball/classical/delay_margins.hpp>
 #include <flyball/classical/describing_function.hpp>
 #include <flyball/classical/discretization_error.hpp>
 #include <flyball/classical/frequency_response.hpp>
@@ -18,13 +19,14 @@
 
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
-#include "solve/row.hpp"
+#include "solve/transfer_problem.hpp"
 
 // What systems do to sinusoids, and how far loops are from instability (sections E.3 to E.7).
 namespace flyball::solve {
 
 namespace {
 
+using classical::DelaySystem;
 using classical::FrequencyResponse;
 using classical::LoopMargins;
 using classical::TransferFunction;
@@ -38,6 +40,7 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 /// A system told as a transfer function or as matrices, continuous or with the period dt.
 struct Told {
   std::optional<TransferFunction> transfer;
+  std::optional<DelaySystem> late;  ///< Of several dead times, also of several channels.
   ContinuousSystem<> system;
   std::optional<Time> period;
   Time delay{0.0};
@@ -46,10 +49,12 @@ struct Told {
     return {system.A, system.B, system.C, system.D, *period};
   }
   [[nodiscard]] bool is_single() const {
-    return transfer || (system.B.cols() == 1 && system.C.rows() == 1);
+    return transfer || (late && late->inputs() == 1 && late->outputs() == 1) ||
+           (!late && system.B.cols() == 1 && system.C.rows() == 1);
   }
   [[nodiscard]] Expected<FrequencyResponse> response() const {
     return transfer ? classical::frequency_response(*transfer)
+           : late   ? classical::frequency_response(*late)
            : period ? classical::frequency_response(sampled(), delay)
                     : classical::frequency_response(system, delay);
   }
@@ -61,23 +66,20 @@ Expected<Told> told(const Problem& problem, std::string_view where) {
   FLYBALL_CHECK(Checks(where).not_negative(dt, "dt", "s"));
   it.period = dt > 0.0 ? std::optional(Time(dt)) : std::nullopt;
   it.delay = Time(problem.number("delay"));
-  const bool transfer = problem.has("num") || problem.has("den");
+  const bool transfer = problem.has("num") || problem.has("den") || problem.has("expr");
   const bool matrices = problem.has("A") || problem.has("B") || problem.has("C");
-  for (const char* name : {"num", "den"}) {
-    if (transfer && !problem.has(name)) {
-      return refusal(ArgumentError::malformed, where, name)
-          .got("left out")
-          .expected("there: a transfer function has num and den");
-    }
-  }
   if (transfer == matrices) {
     return refusal(ArgumentError::malformed, where, "the system")
-        .got(transfer ? "told twice, as num and den and as matrices" : "left out")
-        .expected("num and den, or A, B and C");
+        .got(transfer ? "told twice, as a transfer function and as matrices" : "left out")
+        .expected("num and den, expr, or A, B and C");
   }
   if (transfer) {
-    FLYBALL_TRY(it.transfer, TransferFunction::create(problem.matrix("num"), problem.matrix("den"),
-                                                      it.period, it.delay));
+    FLYBALL_TRY(auto system, transfer_system_of(problem, where));
+    if (auto* late = std::get_if<DelaySystem>(&system)) {
+      it.late = std::move(*late);
+    } else {
+      it.transfer = std::get<TransferFunction>(std::move(system));
+    }
     return it;
   }
   for (const char* name : {"A", "B", "C"}) {
@@ -154,7 +156,8 @@ Outcome solve_nyquist(const Problem& problem, JsonWriter& answer) {
   constexpr std::string_view where = "nyquist";
   FLYBALL_TRY(const Told it, told(problem, where));
   FLYBALL_TRY(const auto response, single_response(it, where));
-  FLYBALL_TRY(const auto curve, classical::nyquist(response));
+  FLYBALL_TRY(const auto curve,
+              it.late ? classical::nyquist(*it.late) : classical::nyquist(response));
   answer.add("w", curve.frequency);
   answer.add("real", VectorXd(curve.value.real()));
   answer.add("imag", VectorXd(curve.value.imag()));
@@ -237,6 +240,19 @@ void write_peak(std::string_view name, const classical::Peak& peak, JsonWriter& 
   answer.object(name, [&] { answer.add({{"Ms", peak.value}, {"w", peak.frequency}}); });
 }
 
+/// Of a loop of several channels, each behind the delay.
+Expected<classical::MimoMargins> channel_margins(const Told& loop) {
+  if (loop.delay.si() == 0.0) {
+    return loop.period ? classical::mimo_margins(loop.sampled())
+                       : classical::mimo_margins(loop.system);
+  }
+  FLYBALL_TRY(const auto prompt,
+              loop.period ? DelaySystem::create(loop.sampled()) : DelaySystem::create(loop.system));
+  FLYBALL_TRY(const auto late,
+              prompt.with_input_delays(VectorXd::Constant(prompt.inputs(), loop.delay.si())));
+  return classical::mimo_margins(late);
+}
+
 Outcome solve_margins(const Problem& problem, JsonWriter& answer) {
   constexpr std::string_view where = "margins";
   if (problem.has("K")) {
@@ -263,23 +279,18 @@ Outcome solve_margins(const Problem& problem, JsonWriter& answer) {
                                  (loop.period ? loop.transfer->delay() / loop.period->si() : 0.0) <=
                              static_cast<double>(most_states);
     FLYBALL_TRY(const LoopMargins margins,
-                short_one ? classical::loop_margins(*loop.transfer)
-                          : loop.response().and_then([](const FrequencyResponse& response) {
-                              return classical::loop_margins(response);
-                            }));
+                short_one   ? classical::loop_margins(*loop.transfer)
+                : loop.late ? classical::loop_margins(*loop.late)
+                            : loop.response().and_then([](const FrequencyResponse& response) {
+                                return classical::loop_margins(response);
+                              }));
     answer.add("stable", margins.stable);
     answer.add("disk_margin", margins.disk_margin);
     write_margins(margins, answer);
     write_peak("sensitivity_peak", margins.sensitivity, answer);
     return {};
   }
-  if (loop.delay.si() > 0.0) {
-    return refusal(ArgumentError::out_of_range, where, "delay")
-        .got("not zero")
-        .expected("zero, for a loop of several channels");
-  }
-  FLYBALL_TRY(const auto margins, loop.period ? classical::mimo_margins(loop.sampled())
-                                              : classical::mimo_margins(loop.system));
+  FLYBALL_TRY(const auto margins, channel_margins(loop));
   answer.add("stable", margins.stable);
   answer.add("disk_margin", margins.disk_margin);
   answer.add("disk_frequency", margins.disk_frequency);
@@ -391,15 +402,12 @@ Outcome solve_discretizations(const Problem& problem, JsonWriter& answer) {
 std::vector<Kind> frequency_response_kinds() {
   using namespace field;
   const Field some_B = optional(matrix("B", "n", "m", "how the inputs move the states"));
-  const std::vector<Field> told_system{
-      optional(list("num", "v", "", "the numerator's coefficients, the highest power first")),
-      optional(list("den", "o", "", "the denominator's")),
-      or_number(number("dt", "s", "sample period of a discrete one; 0 for a continuous"), 0.0),
-      or_number(number("delay", "s", "dead time, exact"), 0.0),
-      optional(matrix("A", "n", "n", "in place of num and den: how the states move")),
-      some_B,
-      optional(matrix("C", "p", "n", "how the outputs see the states")),
-      optional(matrix("D", "p", "m", "how the inputs reach the outputs, zero if left out"))};
+  const std::vector<Field> told_system =
+      transfer_fields() +
+      std::vector{
+          optional(matrix("A", "n", "n", "in place of num and den: how the states move")), some_B,
+          optional(matrix("C", "p", "n", "how the outputs see the states")),
+          optional(matrix("D", "p", "m", "how the inputs reach the outputs, zero if left out"))};
   const std::vector<Field> element{
       choice("nonlinearity", "saturation dead-zone relay hysteresis backlash",
              "what stands before the loop's linear part"),

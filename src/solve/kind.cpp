@@ -55,6 +55,7 @@ std::span<const Kind> kinds() {
     add("Frequency responses and margins", frequency_response_kinds());
     add("Realizations", realization_kinds());
     add("Interconnections", interconnection_kinds());
+    add("Interconnections", diagram_kinds());
     add("Regulators", regulator_kinds());
     add("Feedforward and delay", feedforward_kinds());
     add("Certificates", certificate_kinds());

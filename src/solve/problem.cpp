@@ -38,15 +38,20 @@ constexpr std::array<Field, 4> fields_of_system(const Field& system) {
           matrix("D", system.outputs, system.columns, Absent::zero)};
 }
 
-constexpr std::array<Field, 4> fields_of_transfer(const Field& transfer) {
+constexpr std::array<Field, 5> fields_of_transfer(const Field& transfer) {
   const auto list = [](std::string_view name, std::string_view length) {
-    return Field{.name = name, .type = FieldType::list, .rows = length, .columns = "1"};
+    return Field{.name = name,
+                 .type = FieldType::list,
+                 .rows = length,
+                 .columns = "1",
+                 .absent = Absent::nothing};
   };
   const auto or_zero = [](std::string_view name) {
     return Field{.name = name, .type = FieldType::number, .absent = Absent::number};
   };
   return {list("num", transfer.rows), list("den", transfer.columns), or_zero("dt"),
-          or_zero("delay")};
+          or_zero("delay"),
+          Field{.name = "expr", .type = FieldType::text, .absent = Absent::nothing}};
 }
 
 std::string in_quotes(std::string_view text) {
@@ -86,7 +91,11 @@ class ProblemReader {
   [[nodiscard]] Expected<std::string_view> choice(const Field& field, const Json& json) const;
   [[nodiscard]] Expected<void> matrix(const Field& field, const Json& json, MatrixXd& M);
   [[nodiscard]] Expected<ContinuousSystem<>> system(const Field& field, const Json& json);
-  [[nodiscard]] Expected<TransferCoefficients> transfer(const Field& field, const Json& json);
+  [[nodiscard]] Expected<TransferCoefficients> transfer(const Field& field, const Json& json,
+                                                        std::string_view place = {});
+  [[nodiscard]] Expected<std::vector<std::vector<TransferCoefficients>>> transfers(
+      const Field& field, const Json& json);
+  [[nodiscard]] Expected<std::vector<Problem>> objects(const Field& field, const Json& json);
   [[nodiscard]] Expected<void> refused_if(const Verdict& verdict, const Field& field) const {
     if (verdict) {
       return tl::unexpected(malformed(field, verdict->got, verdict->expected));
@@ -176,8 +185,22 @@ Expected<void> ProblemReader::read_value(const Field& field, const Json& json, V
       FLYBALL_TRY(value, transfer(field, json));
       return {};
     }
-    case FieldType::flag:
+    case FieldType::transfers: {
+      FLYBALL_TRY(value, transfers(field, json));
+      return {};
+    }
+    case FieldType::objects: {
+      FLYBALL_TRY(auto all, objects(field, json));
+      value = std::make_shared<const std::vector<Problem>>(std::move(all));
+      return {};
+    }
     case FieldType::text:
+      if (!json.is_string()) {
+        return tl::unexpected(malformed(field, kind_of(json), "a text"));
+      }
+      value = json.get<std::string>();
+      return {};
+    case FieldType::flag:
     case FieldType::matrices:
     case FieldType::record:
     case FieldType::records:
@@ -287,17 +310,88 @@ Expected<ContinuousSystem<>> ProblemReader::system(const Field& field, const Jso
   return inner.system();
 }
 
-Expected<TransferCoefficients> ProblemReader::transfer(const Field& field, const Json& json) {
-  if (!json.is_object()) {
-    return tl::unexpected(malformed(
-        field, kind_of(json), "a transfer function, such as {\"num\": [1], \"den\": [1, 2]}"));
+Expected<TransferCoefficients> ProblemReader::transfer(const Field& field, const Json& json,
+                                                       std::string_view place) {
+  TransferCoefficients found;
+  const std::string name = std::string(field.name).append(place);
+  if (json.is_string()) {
+    found.expr = json.get<std::string>();
+    return found;
   }
-  const std::array<Field, 4> fields = fields_of_transfer(field);
-  const std::string prefix = full(field.name) + '.';
+  if (!json.is_object()) {
+    return refusal(ArgumentError::malformed, where_, full(name))
+        .got(kind_of(json))
+        .expected("a transfer function, such as \"1/(s + 2)\" or {\"num\": [1], \"den\": [1, 2]}");
+  }
+  const std::array<Field, 5> fields = fields_of_transfer(field);
+  const std::string prefix = full(name) + '.';
   Problem inner;
   FLYBALL_CHECK(ProblemReader(json, where_, prefix, sizes_).read(fields, inner));
-  return TransferCoefficients{inner.matrix("num"), inner.matrix("den"), inner.number("dt"),
-                              inner.number("delay")};
+  if (inner.has("expr")) {
+    found.expr = inner.text("expr");
+  }
+  for (const char* polynomial : {"num", "den"}) {
+    if (inner.has(polynomial) == inner.has("expr")) {
+      return refusal(ArgumentError::malformed, where_, prefix + polynomial)
+          .got(inner.has("expr") ? "given beside expr" : "left out")
+          .expected("num and den, or expr in their place");
+    }
+    if (inner.has(polynomial)) {
+      (polynomial[0] == 'n' ? found.num : found.den) = inner.matrix(polynomial);
+    }
+  }
+  found.dt = inner.number("dt");
+  found.delay = inner.number("delay");
+  return found;
+}
+
+Expected<std::vector<std::vector<TransferCoefficients>>> ProblemReader::transfers(
+    const Field& field, const Json& json) {
+  const auto refuse = [&](std::string got) {
+    return tl::unexpected(malformed(field, std::move(got),
+                                    "rows of transfer functions of one length, such as "
+                                    "[[\"1/(s+1)\", \"0\"], [\"0\", \"2/s\"]]"));
+  };
+  if (!json.is_array() || json.empty()) {
+    return refuse(json.is_array() ? "empty" : kind_of(json));
+  }
+  std::vector<std::vector<TransferCoefficients>> rows;
+  for (const Json& row : json) {
+    if (!row.is_array() || row.empty() || row.size() != json.front().size()) {
+      return refuse(row.is_array() ? "of rows of several lengths" : "a list of " + kind_of(row));
+    }
+    rows.emplace_back();
+    for (const Json& entry : row) {
+      // Each has as many coefficients as it likes.
+      Sizes own;
+      const std::string place = fmt::format("[{}][{}]", rows.size() - 1, rows.back().size());
+      FLYBALL_TRY(auto one,
+                  ProblemReader(object_, where_, prefix_, own).transfer(field, entry, place));
+      rows.back().push_back(std::move(one));
+    }
+  }
+  sizes_.bind(field.rows, static_cast<Index>(rows.size()));
+  sizes_.bind(field.columns, static_cast<Index>(rows.front().size()));
+  return rows;
+}
+
+Expected<std::vector<Problem>> ProblemReader::objects(const Field& field, const Json& json) {
+  if (!json.is_array()) {
+    return tl::unexpected(malformed(field, kind_of(json), "a list of objects"));
+  }
+  std::vector<Problem> all;
+  for (const Json& one : json) {
+    const std::string name = fmt::format("{}[{}]", full(field.name), all.size());
+    if (!one.is_object()) {
+      return refusal(ArgumentError::malformed, where_, name)
+          .got(kind_of(one))
+          .expected("an object");
+    }
+    const std::string prefix = name + '.';
+    Sizes own;
+    FLYBALL_CHECK(ProblemReader(one, where_, prefix, own).read(*field.inner, all.emplace_back()));
+  }
+  return all;
 }
 
 Expected<Problem> Problem::read(const Json& object, std::span<const Field> fields,

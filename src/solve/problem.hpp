@@ -2,6 +2,8 @@
 
 #include <complex>
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -18,8 +20,9 @@ namespace flyball::solve {
 
 /// A transfer function as it is written: nothing of it is checked but that its lists are numbers.
 struct TransferCoefficients {
-  Eigen::VectorXd num;  ///< Descending powers.
-  Eigen::VectorXd den;
+  std::optional<std::string> expr{};  ///< In place of num and den.
+  Eigen::VectorXd num{};              ///< Descending powers.
+  Eigen::VectorXd den{};
   double dt = 0.0;     ///< s; 0 of a continuous one.
   double delay = 0.0;  ///< s
 };
@@ -60,6 +63,19 @@ class Problem {
   [[nodiscard]] const TransferCoefficients& transfer(std::string_view name) const {
     return get<TransferCoefficients>(name);
   }
+  [[nodiscard]] const std::string& text(std::string_view name) const {
+    return get<std::string>(name);
+  }
+  /// Rows of one length.
+  [[nodiscard]] const std::vector<std::vector<TransferCoefficients>>& transfers(
+      std::string_view name) const {
+    return get<std::vector<std::vector<TransferCoefficients>>>(name);
+  }
+  [[nodiscard]] const std::vector<Problem>& objects(std::string_view name) const {
+    static const std::vector<Problem> none{};
+    const auto& held = get<std::shared_ptr<const std::vector<Problem>>>(name);
+    return held ? *held : none;
+  }
   [[nodiscard]] const std::vector<std::string>& texts(std::string_view name) const {
     return get<std::vector<std::string>>(name);
   }
@@ -76,7 +92,9 @@ class Problem {
  private:
   using Value =
       std::variant<std::monostate, double, std::string_view, Eigen::MatrixXd, Eigen::VectorXcd,
-                   ContinuousSystem<>, std::vector<std::string>, TransferCoefficients>;
+                   ContinuousSystem<>, std::vector<std::string>, TransferCoefficients, std::string,
+                   std::vector<std::vector<TransferCoefficients>>,
+                   std::shared_ptr<const std::vector<Problem>>>;
   friend class ProblemReader;
 
   [[nodiscard]] std::size_t index_of(std::string_view name) const;

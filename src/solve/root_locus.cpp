@@ -7,14 +7,13 @@
 #include <vector>
 
 #include "core/try.hpp"
-#include "solve/row.hpp"
+#include "solve/transfer_problem.hpp"
 
 // Root loci (appendix E).
 namespace flyball::solve {
 
 namespace {
 
-using classical::TransferFunction;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
@@ -34,12 +33,7 @@ void write_angles(JsonWriter& answer, std::string_view name,
 }
 
 Outcome solve_root_locus(const Problem& problem, JsonWriter& answer) {
-  const double dt = problem.number("dt");
-  FLYBALL_CHECK(Checks("rlocus").not_negative(dt, "dt", "s"));
-  FLYBALL_TRY(const auto loop,
-              TransferFunction::create(problem.matrix("num"), problem.matrix("den"),
-                                       dt > 0.0 ? std::optional(Time(dt)) : std::nullopt,
-                                       Time(problem.number("delay"))));
+  FLYBALL_TRY(const auto loop, transfer_of(problem, "rlocus"));
   classical::RootLocusOptions options{.negative = problem.choice("feedback") == "positive",
                                       .largest_gain = {}};
   if (problem.has("largest_gain")) {
@@ -83,13 +77,11 @@ std::vector<Kind> root_locus_kinds() {
   return {
       {"rlocus",
        "the closed loop's poles, 1 + kL = 0, as k goes from 0 to infinity",
-       {list("num", "v", "", "the numerator's coefficients of L, the highest power first"),
-        list("den", "o", "", "the denominator's"),
-        or_number(number("dt", "s", "sample period of a discrete one, of z; 0 for one of s"), 0.0),
-        or_number(number("delay", "s", "whole periods of dead time of a discrete one"), 0.0),
-        or_first(choice("feedback", "negative positive", "positive: k from 0 to -infinity")),
-        optional(number("largest_gain", "", "|k| up to which the branches are followed")),
-        optional(number("damping", "", "a damping ratio below 1 whose gains are told"))},
+       transfer_fields("whole periods of dead time of a discrete one") +
+           std::vector{
+               or_first(choice("feedback", "negative positive", "positive: k from 0 to -infinity")),
+               optional(number("largest_gain", "", "|k| up to which the branches are followed")),
+               optional(number("damping", "", "a damping ratio below 1 whose gains are told"))},
        {complex_list("zeros", "z", "of L"), complex_list("poles", "n", "of L"),
         records("branch_points", "real imag gain", "where branches meet"),
         records("crossings", "w gain", "of the border of stability: rad/s"),

@@ -89,6 +89,19 @@ constexpr Field transfer(std::string_view name, std::string_view num, std::strin
   return {.name = name, .type = FieldType::transfer, .rows = num, .columns = den, .help = help};
 }
 
+/// Rows of transfer functions.
+constexpr Field transfers(std::string_view name, std::string_view rows, std::string_view columns,
+                          std::string_view help) {
+  return {
+      .name = name, .type = FieldType::transfers, .rows = rows, .columns = columns, .help = help};
+}
+
+/// @param inner  The fields of each; letters of its shapes are its own.
+constexpr Field objects(std::string_view name, const std::vector<Field>& inner,
+                        std::string_view help) {
+  return {.name = name, .type = FieldType::objects, .help = help, .inner = &inner};
+}
+
 // What holds for a field that is left out.
 
 constexpr Field optional(Field field, Absent absent = Absent::nothing, double otherwise = 0.0) {
@@ -185,6 +198,7 @@ template <class Function>
 [[nodiscard]] std::vector<Kind> frequency_response_kinds();
 [[nodiscard]] std::vector<Kind> realization_kinds();
 [[nodiscard]] std::vector<Kind> interconnection_kinds();
+[[nodiscard]] std::vector<Kind> diagram_kinds();
 [[nodiscard]] std::vector<Kind> certificate_kinds();
 [[nodiscard]] std::vector<Kind> regulator_kinds();
 [[nodiscard]] std::vector<Kind> feedforward_kinds();

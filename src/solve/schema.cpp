@@ -20,6 +20,8 @@ Json list_of(Json items) {
   return {{"type", "array"}, {"items", std::move(items)}};
 }
 
+Json object_of(const std::vector<Field>& fields, bool problem);
+
 Json any_of(Json one, Json other) {
   return {{"anyOf", Json::array({std::move(one), std::move(other)})}};
 }
@@ -66,6 +68,10 @@ Json type_of(const Field& field, bool problem) {
       return reference("system");
     case FieldType::transfer:
       return reference("transfer");
+    case FieldType::transfers:
+      return list_of(list_of(reference("transfer")));
+    case FieldType::objects:
+      return list_of(object_of(*field.inner, problem));
   }
   return {};
 }
@@ -77,7 +83,7 @@ std::string description_of(const Field& field) {
 }
 
 Json object_of(const std::vector<Field>& fields, bool problem) {
-  Json properties = {{"id", true}};
+  Json properties = Json::object();
   Json required = Json::array();
   for (const Field& field : fields) {
     Json property = type_of(field, problem);
@@ -113,11 +119,16 @@ std::string json_schema() {
                                    Json::array({"A", "B"})),
                        object_with({{"D", matrix}}, Json::array({"D"})));
   const Json coefficients = list_of(reference("number"));
-  Json transfer = object_with({{"num", coefficients},
-                               {"den", coefficients},
-                               {"dt", reference("number")},
-                               {"delay", reference("number")}},
-                              Json::array({"num", "den"}));
+  const Json number = reference("number");
+  Json transfer = {
+      {"anyOf",
+       Json::array(
+           {object_with(
+                {{"num", coefficients}, {"den", coefficients}, {"dt", number}, {"delay", number}},
+                Json::array({"num", "den"})),
+            object_with({{"expr", {{"type", "string"}}}, {"dt", number}, {"delay", number}},
+                        Json::array({"expr"})),
+            {{"type", "string"}}})}};
   Json definitions = {
       {"number", any_of({{"type", "number"}}, {{"enum", Json::array({"inf", "-inf", nullptr})}})},
       {"complex",
@@ -136,11 +147,17 @@ std::string json_schema() {
         {"required", Json::array({"error"})},
         {"additionalProperties", false}}}};
   for (const Kind& kind : kinds()) {
-    Json problem = object_of(kind.fields, true);
+    const auto with_id = [](Json object) {
+      Json properties = {{"id", true}};
+      properties.update(object["properties"]);
+      object["properties"] = std::move(properties);
+      return object;
+    };
+    Json problem = with_id(object_of(kind.fields, true));
     problem["description"] = kind.help;
     problem["examples"] = Json::array({Json::parse(kind.example)});
     definitions[fmt::format("{}.problem", kind.name)] = std::move(problem);
-    definitions[fmt::format("{}.answer", kind.name)] = object_of(kind.answer, false);
+    definitions[fmt::format("{}.answer", kind.name)] = with_id(object_of(kind.answer, false));
   }
   const Json schema = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
                        {"title", "Problems and answers of flyball solve"},

@@ -38,6 +38,7 @@ constexpr std::array letters{Letter{'n', "states"},
                              Letter{'o', "coefficients of B, or of a denominator"},
                              Letter{'t', "coefficients of C"},
                              Letter{'x', "coefficients of D"},
+                             Letter{'T', "dead times"},
                              Letter{'F', "coefficients of W3"},
                              Letter{'G', "coefficients of W3's denominator"},
                              Letter{'K', "blocks"},
@@ -87,8 +88,8 @@ Index Sizes::value_of(std::string_view size) const {
   Index sum = 0;
   for (const std::string_view part : text::split(size, "+")) {
     const char first = part.front();
-    const Index term =
-        first >= 'a' && first <= 'z' ? known_[static_cast<std::size_t>(first - 'a')] : first - '0';
+    const bool digit = first >= '0' && first <= '9';
+    const Index term = digit ? first - '0' : known_[static_cast<std::size_t>(first)];
     if (term < 0) {
       return -1;
     }
@@ -100,7 +101,7 @@ Index Sizes::value_of(std::string_view size) const {
 Index Sizes::bind(std::string_view size, Index actual) {
   const Index value = value_of(size);
   if (value < 0 && size.size() == 1) {
-    known_[static_cast<std::size_t>(size.front() - 'a')] = actual;
+    known_[static_cast<std::size_t>(size.front())] = actual;
   }
   return value < 0 ? actual : value;
 }
@@ -125,6 +126,8 @@ std::string shape_of(const Field& field) {
   switch (field.type) {
     case FieldType::matrix:
     case FieldType::samples:
+      return fmt::format("{} x {}", field.rows, field.columns);
+    case FieldType::transfers:
       return fmt::format("{} x {}", field.rows, field.columns);
     case FieldType::matrices:
       return fmt::format("each {} x {}", field.rows, field.columns);

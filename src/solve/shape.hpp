@@ -33,7 +33,7 @@ class Sizes {
  private:
   [[nodiscard]] Eigen::Index value_of(std::string_view size) const;
 
-  std::array<Eigen::Index, 26> known_;
+  std::array<Eigen::Index, 128> known_;  ///< By letter.
 };
 
 /// Shape, at least one entry, and all of them finite.

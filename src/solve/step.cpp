@@ -1,15 +1,15 @@
 #include <cmath>
-#include <limits>
 #include <optional>
-#include <utility>
+#include <variant>
 #include <vector>
 
+#include <flyball/classical/delay_response.hpp>
 #include <flyball/classical/step_metrics.hpp>
 #include <flyball/classical/transfer_function.hpp>
 #include <flyball/systems/response.hpp>
 
 #include "core/try.hpp"
-#include "solve/row.hpp"
+#include "solve/transfer_problem.hpp"
 
 // Step responses of transfer functions (appendix E).
 namespace flyball::solve {
@@ -20,7 +20,7 @@ using classical::TransferFunction;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// y at the samples, behind the dead time.
+/// y at the samples of one that is rational, behind the dead time.
 Expected<LinearResponse> response_of(const TransferFunction& transfer,
                                      const std::optional<ResponseTimes>& times) {
   const ContinuousSystem<> system = transfer.to_state_space();
@@ -31,27 +31,27 @@ Expected<LinearResponse> response_of(const TransferFunction& transfer,
   return step_response(system, 0, times);
 }
 
-Outcome solve_step(const Problem& problem, JsonWriter& answer) {
+Expected<std::optional<ResponseTimes>> times_of(const Problem& problem,
+                                                const std::optional<Time>& period) {
   constexpr std::string_view where = "step";
-  const double dt = problem.number("dt");
-  FLYBALL_CHECK(Checks(where).not_negative(dt, "dt", "s"));
-  FLYBALL_TRY(const auto transfer,
-              TransferFunction::create(problem.matrix("num"), problem.matrix("den"),
-                                       dt > 0.0 ? std::optional(Time(dt)) : std::nullopt,
-                                       Time(problem.number("delay"))));
-  std::optional<ResponseTimes> times;
-  if (problem.has("duration")) {
-    const double duration = problem.number("duration");
-    FLYBALL_CHECK(Checks(where).positive(duration, "duration", "s"));
-    const double count = transfer.period() ? std::floor(duration / dt * (1.0 + 1e-12)) + 1.0
-                                           : problem.number("samples");
-    FLYBALL_CHECK(check_size(2.0 * count, where, "duration"));
-    if (count < 2.0 && !transfer.period()) {
-      return refusal(ArgumentError::out_of_range, where, "samples").expected("two at least");
-    }
-    times = ResponseTimes{transfer.period() ? *transfer.period() : Time(duration / (count - 1.0)),
-                          static_cast<Index>(count)};
+  if (!problem.has("duration")) {
+    return std::optional<ResponseTimes>();
   }
+  const double duration = problem.number("duration");
+  FLYBALL_CHECK(Checks(where).positive(duration, "duration", "s"));
+  const double count = period ? std::floor(duration / period->si() * (1.0 + 1e-12)) + 1.0
+                              : problem.number("samples");
+  FLYBALL_CHECK(check_size(2.0 * count, where, "duration"));
+  if (count < 2.0 && !period) {
+    return refusal(ArgumentError::out_of_range, where, "samples").expected("two at least");
+  }
+  return std::optional(
+      ResponseTimes{period ? *period : Time(duration / (count - 1.0)), static_cast<Index>(count)});
+}
+
+Outcome solve_step_of(const TransferFunction& transfer, const Problem& problem,
+                      JsonWriter& answer) {
+  FLYBALL_TRY(const auto times, times_of(problem, transfer.period()));
   FLYBALL_TRY(const auto metrics, classical::step_metrics(transfer));
   VectorXd time;
   VectorXd y;
@@ -66,38 +66,46 @@ Outcome solve_step(const Problem& problem, JsonWriter& answer) {
   }
   answer.add("time", VectorXd(time.array() + transfer.delay()));
   answer.add("y", y);
-  const auto or_nan = [](const std::optional<double>& value) {
-    return value.value_or(std::numeric_limits<double>::quiet_NaN());
-  };
-  answer.add("metrics", {{"rise_time", or_nan(metrics.rise_time)},
-                         {"settling_time", or_nan(metrics.settling_time)},
-                         {"overshoot", 100.0 * or_nan(metrics.overshoot)},
-                         {"undershoot", 100.0 * or_nan(metrics.undershoot)},
-                         {"peak", or_nan(metrics.peak)},
-                         {"peak_time", or_nan(metrics.peak_time)},
-                         {"final_value", metrics.final_value}});
+  write_step_metrics("metrics", metrics, answer);
   return {};
+}
+
+/// Of several dead times: from the beginning on.
+Outcome solve_step_of(const classical::DelaySystem& system, const Problem& problem,
+                      JsonWriter& answer) {
+  FLYBALL_TRY(const auto times, times_of(problem, system.period()));
+  FLYBALL_TRY(const auto metrics, classical::step_metrics(system, 0, 0));
+  FLYBALL_TRY(const auto response, classical::step_response(system, 0, times));
+  answer.add("time", response.time);
+  answer.add("y", VectorXd(response.y.col(0)));
+  write_step_metrics("metrics", metrics, answer);
+  return {};
+}
+
+Outcome solve_step(const Problem& problem, JsonWriter& answer) {
+  FLYBALL_TRY(const auto system, transfer_system_of(problem, "step"));
+  return std::visit([&](const auto& one) { return solve_step_of(one, problem, answer); }, system);
 }
 
 }  // namespace
 
 std::vector<Kind> step_kinds() {
-  return {
-      {"step",
-       "a transfer function's output after its input has gone from 0 to 1, from rest",
-       {list("num", "v", "", "the numerator's coefficients, the highest power first"),
-        list("den", "o", "", "the denominator's"),
-        or_number(number("dt", "s", "sample period of a discrete one, of z; 0 for one of s"), 0.0),
-        or_number(number("delay", "s", "dead time, exact"), 0.0),
-        optional(number("duration", "s", "how long after the dead time; chosen if left out")),
-        or_number(integer("samples", "of a continuous one, with a duration"), 601.0)},
-       {list("time", "t", "s", "from the end of the dead time, before which y is 0"),
-        list("y", "t", "", "the output"),
-        record("metrics", "rise_time settling_time overshoot undershoot peak peak_time final_value",
-               "10 to 90 %, 2 %, percent of the final value; exact in time, null where there "
-               "is none")},
-       R"({"num": [100], "den": [1, 2, 100], "duration": 3})",
-       &solve_step}};
+  return {{"step",
+           "a transfer function's output after its input has gone from 0 to 1, from rest",
+           transfer_fields() +
+               std::vector{
+                   optional(
+                       number("duration", "s", "how long after the dead time; chosen if left out")),
+                   or_number(integer("samples", "of a continuous one, with a duration"), 601.0)},
+           {list("time", "t", "s",
+                 "from the end of the dead time, before which y is 0; from 0 with several"),
+            list("y", "t", "", "the output"),
+            step_metrics_field(
+                "metrics",
+                "10 to 90 %, 2 %, percent of the final value; exact in time, null where there "
+                "is none")},
+           R"({"num": [100], "den": [1, 2, 100], "duration": 3})",
+           &solve_step}};
 }
 
 }  // namespace flyball::solve

@@ -1,15 +1,16 @@
 #include <limits>
-#include <optional>
+#include <string>
 #include <utility>
 
 #include <flyball/classical/delay_poles.hpp>
 #include <flyball/classical/partial_fractions.hpp>
 #include <flyball/classical/steady_state.hpp>
 #include <flyball/classical/transfer_matrix.hpp>
+#include <flyball/systems/realization.hpp>
 #include <flyball/systems/transmission_zeros.hpp>
 
 #include "core/try.hpp"
-#include "solve/row.hpp"
+#include "solve/transfer_problem.hpp"
 
 // What transfer functions are made of and made into (appendices A and E.2, E.3).
 namespace flyball::solve {
@@ -23,23 +24,6 @@ using Eigen::Index;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
-Expected<TransferFunction> transfer_of(const VectorXd& num, const VectorXd& den, double dt,
-                                       double delay) {
-  FLYBALL_CHECK(Checks("transfer function").not_negative(dt, "dt", "s"));
-  return TransferFunction::create(num, den, dt > 0.0 ? std::optional(Time(dt)) : std::nullopt,
-                                  Time(delay));
-}
-
-Expected<TransferFunction> transfer_of(const Problem& problem) {
-  return transfer_of(problem.matrix("num"), problem.matrix("den"), problem.number("dt"),
-                     problem.number("delay"));
-}
-
-Expected<TransferFunction> transfer_of(const Problem& problem, std::string_view name) {
-  const TransferCoefficients& G = problem.transfer(name);
-  return transfer_of(G.num, G.den, G.dt, G.delay);
-}
-
 void write_cancellations(const std::vector<classical::Cancellation>& cancelled, bool hides,
                          JsonWriter& answer) {
   VectorXcd zeros(static_cast<Index>(cancelled.size()));
@@ -48,6 +32,34 @@ void write_cancellations(const std::vector<classical::Cancellation>& cancelled, 
   }
   answer.add("cancelled", zeros);
   answer.add("hides_instability", hides);
+}
+
+/// All of them, rows of outputs.
+template <class System>
+Outcome write_channels(const System& plant, double tolerance, JsonWriter& answer) {
+  FLYBALL_TRY(auto G, classical::TransferMatrix::of(plant));
+  if (tolerance > 0.0) {
+    FLYBALL_TRY(G, G.without_cancellations(tolerance));
+  }
+  std::vector<std::vector<TransferFunction>> rows;
+  for (Index i = 0; i < G.outputs(); ++i) {
+    rows.emplace_back();
+    for (Index j = 0; j < G.inputs(); ++j) {
+      FLYBALL_TRY(auto entry, G(i, j).to_transfer_function());
+      rows.back().push_back(std::move(entry));
+    }
+  }
+  answer.list("G", rows, [&](const std::vector<TransferFunction>& row) {
+    answer.open('[');
+    for (const TransferFunction& entry : row) {
+      answer.object([&] {
+        answer.add("num", entry.num());
+        answer.add("den", entry.den());
+      });
+    }
+    answer.close(']');
+  });
+  return {};
 }
 
 Outcome solve_ss2tf(const Problem& problem, JsonWriter& answer) {
@@ -65,12 +77,55 @@ Outcome solve_ss2tf(const Problem& problem, JsonWriter& answer) {
     answer.add("poles", left.transfer.poles());
     answer.add("gain", left.transfer.gain());
     write_cancellations(left.cancelled, left.hides_instability, answer);
+    if (plant.B.cols() * plant.C.rows() > 1) {
+      FLYBALL_CHECK(write_channels(plant, problem.number("tolerance"), answer));
+    }
     return {};
   });
 }
 
+/// Of several channels, of as few states as needed.
+Outcome solve_matrix_tf2ss(const Problem& problem, JsonWriter& answer) {
+  constexpr std::string_view where = "tf2ss";
+  for (const char* name : {"num", "den", "expr"}) {
+    if (problem.has(name)) {
+      return refusal(ArgumentError::malformed, where, name)
+          .got("given beside G")
+          .expected("left out: the entries of G are the transfer functions");
+    }
+  }
+  const double dt = problem.number("dt");
+  const double delay = problem.number("delay");
+  std::vector<std::vector<TransferFunction>> entries;
+  for (const auto& row : problem.transfers("G")) {
+    entries.emplace_back();
+    for (TransferCoefficients written : row) {
+      written.dt = written.dt > 0.0 ? written.dt : dt;
+      written.delay += delay;
+      FLYBALL_TRY(auto entry, transfer_of(written, where));
+      entries.back().push_back(std::move(entry));
+    }
+  }
+  FLYBALL_TRY_IN(where, const auto G, classical::TransferMatrix::create(entries));
+  if (G.period()) {
+    // The dead times of a discrete one are states.
+    FLYBALL_TRY_IN(where, const auto late, G.to_delay_system());
+    FLYBALL_TRY_IN(where, const DiscreteSystem<> states, late.to_discrete());
+    FLYBALL_TRY_IN(where, const auto least, minimal_realization(states));
+    write_system(least.system, answer);
+  } else {
+    FLYBALL_TRY_IN(where, const ContinuousSystem<> least, G.to_continuous());
+    write_system(least, answer);
+  }
+  answer.add("delay", 0.0);
+  return {};
+}
+
 Outcome solve_tf2ss(const Problem& problem, JsonWriter& answer) {
-  FLYBALL_TRY(const TransferFunction G, transfer_of(problem));
+  if (problem.has("G")) {
+    return solve_matrix_tf2ss(problem, answer);
+  }
+  FLYBALL_TRY(const TransferFunction G, transfer_of(problem, "tf2ss"));
   FLYBALL_TRY(const DelaySystem late, DelaySystem::create(G));
   if (G.period()) {
     // The dead time of a discrete one is states.
@@ -96,9 +151,31 @@ Outcome solve_zeros(const Problem& problem, JsonWriter& answer) {
   });
 }
 
+/// Improper ones, too.
+Expected<classical::PartialFractions> fractions_of(const Problem& problem) {
+  constexpr std::string_view where = "residue";
+  for (const char* name : {"num", "den"}) {
+    if (problem.has(name) == problem.has("expr")) {
+      return refusal(ArgumentError::malformed, where, name)
+          .got(problem.has(name) ? "given beside expr" : "left out")
+          .expected("num and den, or expr in their place");
+    }
+  }
+  if (!problem.has("expr")) {
+    return classical::partial_fractions(problem.matrix("num"), problem.matrix("den"));
+  }
+  const std::string texts[] = {problem.text("expr")};
+  FLYBALL_TRY(const ZeroPoleGain whole, classical::parse_zero_pole_gain(texts));
+  if (whole.delay() > 0.0) {
+    return refusal(ArgumentError::out_of_range, where, "expr")
+        .got("a function with dead time")
+        .expected("one without: the fractions are those of num/den");
+  }
+  return classical::partial_fractions(whole);
+}
+
 Outcome solve_residue(const Problem& problem, JsonWriter& answer) {
-  FLYBALL_TRY(const auto found,
-              classical::partial_fractions(problem.matrix("num"), problem.matrix("den")));
+  FLYBALL_TRY(const auto found, fractions_of(problem));
   Index count = 0;
   for (const classical::PartialFraction& fraction : found.fractions) {
     count += fraction.residues.size();
@@ -123,36 +200,25 @@ Outcome solve_residue(const Problem& problem, JsonWriter& answer) {
 }
 
 Outcome solve_interconnect(const Problem& problem, JsonWriter& answer) {
-  FLYBALL_TRY(const TransferFunction G, transfer_of(problem, "G"));
-  FLYBALL_TRY(const TransferFunction H, transfer_of(problem, "H"));
-  const auto write = [&](std::string_view name, const TransferFunction& made) {
-    answer.object(name, [&] {
-      answer.add("num", made.num());
-      answer.add("den", made.den());
-      if (made.period()) {
-        answer.add("dt", made.period()->si());
-      }
-      if (made.delay() > 0.0) {
-        answer.add("delay", made.delay());
-      }
-    });
-  };
+  constexpr std::string_view where = "interconnect";
+  FLYBALL_TRY(const TransferFunction G, transfer_of(problem.transfer("G"), where));
+  FLYBALL_TRY(const TransferFunction H, transfer_of(problem.transfer("H"), where));
   FLYBALL_TRY(const auto cascade, classical::series(G, H));
   FLYBALL_TRY(const auto loop, classical::feedback(G, H, true));
-  write("series", cascade);
+  write_transfer("series", cascade, answer);
   if (const auto sum = classical::parallel(G, H)) {
-    write("parallel", *sum);
+    write_transfer("parallel", *sum, answer);
   }
-  write("feedback_neg", loop);
+  write_transfer("feedback_neg", loop, answer);
   if (const auto positive = classical::feedback(G, H, false)) {
-    write("feedback_pos", *positive);
+    write_transfer("feedback_pos", *positive, answer);
   }
   return {};
 }
 
 Outcome solve_closed_loop_poles(const Problem& problem, JsonWriter& answer) {
-  FLYBALL_TRY(const TransferFunction L, transfer_of(problem));
-  FLYBALL_TRY(const DelaySystem open, DelaySystem::create(L));
+  FLYBALL_TRY(const auto L, transfer_system_of(problem, "closed-loop-poles"));
+  FLYBALL_TRY(const DelaySystem open, delay_system_of(L));
   FLYBALL_TRY(const DelaySystem loop, classical::feedback(open));
   FLYBALL_TRY(const auto found, classical::rightmost_poles(loop));
   answer.add("poles", found.poles);
@@ -165,17 +231,16 @@ Outcome solve_closed_loop_poles(const Problem& problem, JsonWriter& answer) {
 }
 
 Outcome solve_steady_state(const Problem& problem, JsonWriter& answer) {
-  FLYBALL_TRY(const TransferFunction L, transfer_of(problem));
+  FLYBALL_TRY(const TransferFunction L, transfer_of(problem, "steady-state-error"));
   FLYBALL_TRY(const auto error, classical::steady_state_error(L));
-  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   answer.add("type", error.type);
   answer.add("stable", error.stable);
   answer.add("Kp", error.position_constant);
   answer.add("Kv", error.velocity_constant);
   answer.add("Ka", error.acceleration_constant);
-  answer.add("step", error.step.value_or(nan));
-  answer.add("ramp", error.ramp.value_or(nan));
-  answer.add("parabola", error.parabola.value_or(nan));
+  answer.add("step", or_nan(error.step));
+  answer.add("ramp", or_nan(error.ramp));
+  answer.add("parabola", or_nan(error.parabola));
   return {};
 }
 
@@ -183,11 +248,7 @@ Outcome solve_steady_state(const Problem& problem, JsonWriter& answer) {
 
 std::vector<Kind> transfer_algebra_kinds() {
   using namespace field;
-  const std::vector<Field> given{
-      list("num", "v", "", "the numerator's coefficients, the highest power first"),
-      list("den", "o", "", "the denominator's"),
-      or_number(number("dt", "s", "sample period of a discrete one, of z; 0 for one of s"), 0.0),
-      or_number(number("delay", "s", "dead time, exact"), 0.0)};
+  const std::vector<Field> given = transfer_fields();
   const std::vector<Field> any_system{A, B, C, D, or_first(domain), any_period};
   const Field tolerance =
       or_number(number("tolerance", "",
@@ -196,7 +257,8 @@ std::vector<Kind> transfer_algebra_kinds() {
                 0.0);
   return {
       {"ss2tf",
-       "the transfer function of one channel of a system, by its zeros and poles",
+       "the transfer function of one channel of a system by its zeros and poles, and all of "
+       "several",
        any_system +
            std::vector{or_number(integer("input", "from which of the inputs, from 0"), 0.0),
                        or_number(integer("output", "to which of the outputs, from 0"), 0.0),
@@ -207,10 +269,18 @@ std::vector<Kind> transfer_algebra_kinds() {
         complex_list("poles", "s", "of the denominator"),
         number("gain", "", "k of k Π(s - z)/Π(s - p)"),
         complex_list("cancelled", "c", "poles that zeros took away"),
-        flag("hides_instability", "whether one of those is unstable or its zero nonminimum phase")},
+        flag("hides_instability", "whether one of those is unstable or its zero nonminimum phase"),
+        optional(transfers("G", "p", "m", "every channel, of a system of several"))},
        R"({"A": [[0, 1], [-2, -3]], "B": [[0], [1]], "C": [[1, 0]]})",
        &solve_ss2tf},
-      {"tf2ss", "a transfer function as a system, in sections of its roots", given,
+      {"tf2ss",
+       "a transfer function as a system, in sections of its roots, or a matrix of them as one of "
+       "as "
+       "few states as needed",
+       given + std::vector{optional(transfers(
+                   "G", "p", "m",
+                   "in place of one: rows of outputs, an entry an input; dt and delay are theirs "
+                   "where an entry says none"))},
        answered_system("n", "m", "p") +
            std::vector{number("delay", "s",
                               "dead time before its input; that of a discrete one is states")},
@@ -229,8 +299,9 @@ std::vector<Kind> transfer_algebra_kinds() {
        &solve_zeros},
       {"residue",
        "num/den as partial fractions, Σ r/(s - p)^k and a polynomial",
-       {list("num", "v", "", "the numerator's coefficients, the highest power first"),
-        list("den", "o", "", "the denominator's, of any degree")},
+       {optional(list("num", "v", "", "the numerator's coefficients, the highest power first")),
+        optional(list("den", "o", "", "the denominator's, of any degree")),
+        optional(text("expr", "in place of num and den, in s; it may be improper"))},
        {complex_list("residues", "r", "r"), complex_list("poles", "r", "p of each"),
         list("powers", "r", "", "k of each"),
         list("polynomial", "q", "", "coefficients, empty of a strictly proper function"),

@@ -30,7 +30,10 @@ enum class FieldType {
   record,        ///< Of an answer: numbers by name, {"w": 1.5, "gm": 3}; `choices` are the names.
   records,       ///< A list of such.
   system,        ///< {"A": …, "B": …, "C": …, "D": …}; C left out is the identity, D zero.
-  transfer,      ///< {"num": …, "den": …}, of a problem with "dt" and "delay", zero if left out.
+  transfer,      ///< {"num": …, "den": …} or {"expr": …}, of a problem with "dt" and "delay", zero
+                 ///< if left out; an expression alone stands for one, too.
+  transfers,     ///< Rows of them.
+  objects,       ///< A list of objects with the fields `inner`.
 };
 
 /// What stands for a field that a problem leaves out. In an answer, everything but `refused` says
@@ -52,6 +55,7 @@ struct Field {
   Absent absent = Absent::refused;
   double otherwise = 0.0;  ///< The number that stands for one left out.
   bool unbounded = false;  ///< Of an answer: whether infinity and NaN say something.
+  const std::vector<Field>* inner = nullptr;  ///< Of objects. They outlive it.
 };
 
 /// One kind of problem: everything that is known of it. The reader, the help, the documentation and
