@@ -26,7 +26,7 @@ void add_motor_curves_command(CLI::App& program, Invocation& invocation);
 void add_localize_command(CLI::App& program, Invocation& invocation);
 void add_motors_command(CLI::App& program, Invocation& invocation);
 void add_book_command(CLI::App& program, Invocation& invocation);
-/// bode, nyquist, nichols, rlocus, step, impulse, margins and sisotool.
+/// bode, nyquist, nichols, rlocus, step, impulse, margins, sisotool and pidtune.
 void add_loop_commands(CLI::App& program, Invocation& invocation);
 void add_analyze_command(CLI::App& program, Invocation& invocation);
 void add_units_command(CLI::App& program, Invocation& invocation);

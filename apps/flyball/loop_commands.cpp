@@ -39,6 +39,8 @@ constexpr LoopCommand loop_commands[] = {
      "Write the report into this folder: margins, Bode plot"},
     {study::LoopView::sisotool, "One page of a loop: root locus, Bode, Nyquist, closed-loop step",
      "Write the page into this folder"},
+    {study::LoopView::pidtune, "PID gains of a plant: by robustness, crossover or rule, judged",
+     "Write the report into this folder: Bode plot of the loop, its responses"},
 };
 
 struct Options {
@@ -77,8 +79,13 @@ void add_loop_commands(CLI::App& program, Invocation& invocation) {
         "exp(-T*s)\n"
         "for dead time, z^-1, coefficients such as [1 2]/[1 3 2]; or a JSON file with expr, or num "
         "and den,\n"
-        "and dt, delay. Several are shown in one picture. The loop is 1/(1 + k C EXPR), negative "
-        "feedback.\n"
+        "and dt, delay. Several dead times stand anywhere: exp(-s)/(s+1) + exp(-0.3*s), "
+        "feedback(G, H).\n"
+        "Several are shown in one picture. " +
+        std::string(of.view == study::LoopView::pidtune
+                        ? "EXPR is the plant; the gains are those of a PID controller before it."
+                        : "The loop is 1/(1 + k C EXPR), negative feedback.") +
+        "\n"
         "\n  flyball " +
         std::string(to_string(of.view)) + " \"2/(s^2+3*s+2)" +
         (of.view == study::LoopView::rlocus ? "\"" : "*exp(-0.1*s)\"") + " --out report");

@@ -78,6 +78,7 @@ int run(int argc, char** argv) {
       "  flyball analyze elevator.toml              poles, what can be moved and seen, gains\n"
       "  flyball bode \"2/(s^2+3*s+2)*exp(-0.1*s)\"   margins and curves of a loop; sisotool: all "
       "of it\n"
+      "  flyball pidtune \"exp(-s)/(s+1)\" --form pi  PID gains of a plant, and their loop\n"
       "  flyball solve dare < problems.jsonl        any kernel, from any language\n"
       "  flyball book 6.3                           a figure of the book, from this library\n"
       "\n"

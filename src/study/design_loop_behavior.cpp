@@ -7,9 +7,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <flyball/classical/frequency_response.hpp>
 #include <flyball/control/running_loop.hpp>
 #include <flyball/math/dense/linear_algebra.hpp>
 
+#include "control/sampled_loop.hpp"
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "core/wording.hpp"
@@ -107,12 +109,17 @@ Expected<std::vector<FrequencyPoint>> frequency_response(const LoopDesign& loop,
   const auto& [believed, K, K_e] = loop.regulator;
   FLYBALL_TRY(const auto opened,
               observer_regulator_loop(model.A, model.B, model.C, believed, K, K_e, delay_of(job)));
-  constexpr int points = 300;
+  FLYBALL_TRY(const auto sampled, flyball::detail::SampledLoop::create(opened));
+  FLYBALL_TRY(const auto open, sampled.open(Time(job.controller.period)));
   const double nyquist = std::numbers::pi / job.controller.period;
+  FLYBALL_TRY(
+      const auto data,
+      classical::bode(open, classical::FrequencyGridOptions{
+                                .low = 1e-3 * nyquist, .high = nyquist, .most_points = 600}));
   std::vector<FrequencyPoint> response;
-  for (const double frequency : frequencies_between(1e-3 * nyquist, nyquist, points)) {
-    FLYBALL_TRY(const auto gain, loop_response(opened, frequency));
-    append(response, frequency, gain);
+  for (Eigen::Index k = 0; k < data.frequency.size(); ++k) {
+    response.push_back({data.frequency(k), data.curves.front().gain(k),
+                        data.curves.front().phase(k) * std::numbers::pi / 180.0});
   }
   return response;
 }

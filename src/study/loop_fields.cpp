@@ -9,6 +9,7 @@
 #include <flyball/study/loop_study.hpp>
 
 #include "core/try.hpp"
+#include "core/wording.hpp"
 #include "study/field.hpp"
 #include "study/toml_document.hpp"
 
@@ -27,9 +28,10 @@ template <class... Views>
 constexpr unsigned views(Views... some) {
   return (bit(some) | ...);
 }
-constexpr unsigned every = 0xFF;
-constexpr unsigned in_frequency = views(bode, nyquist, nichols, sisotool);
-constexpr unsigned in_time = views(step, impulse, sisotool);
+constexpr unsigned every = 0x1FF;
+constexpr unsigned in_frequency = views(bode, nyquist, nichols, sisotool, pidtune);
+constexpr unsigned in_time = views(step, impulse, sisotool, pidtune);
+constexpr unsigned tuning = views(pidtune);
 
 /// A row, and whose it is.
 struct LoopRow {
@@ -42,7 +44,24 @@ struct Typed {
   LoopJob job{};
   std::string num{};
   std::string den{};
+  std::string form = "pid";
+  std::string method{};
 };
+
+Expected<void> known_word(const std::string& text, std::string_view words) {
+  const std::vector<std::string_view> all = text::split(words, ", ");
+  if (std::find(all.begin(), all.end(), text) != all.end()) {
+    return {};
+  }
+  const std::string nearest = nearest_name(text, all);
+  return refusal(ArgumentError::unknown_name)
+      .got("\"" + text + "\"")
+      .expected("one of " + std::string(words))
+      .hint(nearest.empty() ? "" : "did you mean \"" + nearest + "\"?");
+}
+
+constexpr std::string_view forms = "pid, pi, pd, p";
+constexpr std::string_view methods = "robust, loop-shape, simc, poles";
 
 const std::array rows{
     LoopRow{text("num", at<&Typed::num>(), "\"1 2\"",
@@ -93,7 +112,94 @@ const std::array rows{
     LoopRow{quantity("duration", at<&Typed::job, &LoopJob::duration>(), time, positive, "\"5 s\"",
                      "How long the response is followed")
                 .without("until it has settled"),
-            in_time}};
+            in_time},
+    LoopRow{text("form", at<&Typed::form>(), "pi", "The terms that the controller has")
+                .one_of(forms)
+                .checked([](const std::string& text) { return known_word(text, forms); })
+                .without("pid"),
+            tuning},
+    LoopRow{text("method", at<&Typed::method>(), "simc",
+                 "What decides: the most integral gain for a robustness, crossover and phase "
+                 "margin, Skogestad's rules, or a dominant pair of poles")
+                .one_of(methods)
+                .checked([](const std::string& text) { return known_word(text, methods); })
+                .without("robust; loop-shape with --crossover, poles with --natural-frequency"),
+            tuning},
+    LoopRow{quantity("ms", at<&Typed::job, &LoopJob::pid, &PidGoal::sensitivity>(), dimensionless,
+                     positive, "1.4", "Of robust, the largest |1/(1 + L)|: 1.2 is calm, 2 lively")
+                .takes("NUMBER")
+                .without("1.4"),
+            tuning},
+    LoopRow{quantity("mt", at<&Typed::job, &LoopJob::pid, &PidGoal::complementary>(), dimensionless,
+                     positive, "1.3", "Of robust, the largest |L/(1 + L)|")
+                .takes("NUMBER")
+                .without("any"),
+            tuning},
+    LoopRow{quantity("crossover", at<&Typed::job, &LoopJob::pid, &PidGoal::crossover>(),
+                     angular_velocity, positive, "\"2 rad/s\"", "Of loop-shape, where |L| is 1")
+                .takes("FREQUENCY")
+                .without("needed with loop-shape"),
+            tuning},
+    LoopRow{quantity("phase_margin", at<&Typed::job, &LoopJob::pid, &PidGoal::phase_margin>(),
+                     dimensionless, positive, "60", "Of loop-shape, there, in degrees")
+                .takes("DEGREES")
+                .without("60"),
+            tuning},
+    LoopRow{
+        quantity("closed_loop_time", at<&Typed::job, &LoopJob::pid, &PidGoal::closed_loop_time>(),
+                 time, not_negative, "\"0.5 s\"", "Of simc, the time constant that it aims at")
+            .without("the dead time"),
+        tuning},
+    LoopRow{
+        quantity("natural_frequency", at<&Typed::job, &LoopJob::pid, &PidGoal::natural_frequency>(),
+                 angular_velocity, positive, "\"2 rad/s\"",
+                 "Of poles, that of the dominant pair; PID has a real pole as far away, too")
+            .takes("FREQUENCY")
+            .without("needed with poles"),
+        tuning},
+    LoopRow{quantity("damping_ratio", at<&Typed::job, &LoopJob::pid, &PidGoal::damping_ratio>(),
+                     dimensionless, positive, "0.7", "Of poles, that of the pair, below 1")
+                .takes("RATIO")
+                .without("0.7"),
+            tuning},
+    LoopRow{quantity("filter_ratio", at<&Typed::job, &LoopJob::pid, &PidGoal::filter_ratio>(),
+                     dimensionless, positive, "10", "The derivative's time over that of its filter")
+                .takes("NUMBER")
+                .without("10"),
+            tuning}};
+
+/// The words of a form and a method, and which of the others' options do not go with it.
+Expected<void> settle_pid(const Typed& typed, PidGoal& goal) {
+  goal.form = typed.form == "p"    ? PidForm::p
+              : typed.form == "pi" ? PidForm::pi
+              : typed.form == "pd" ? PidForm::pd
+                                   : PidForm::pid;
+  std::string method = typed.method;
+  if (method.empty()) {
+    method = goal.crossover ? "loop-shape" : goal.natural_frequency ? "poles" : "robust";
+  }
+  goal.method = method == "loop-shape" ? PidMethod::loop_shape
+                : method == "simc"     ? PidMethod::simc
+                : method == "poles"    ? PidMethod::poles
+                                       : PidMethod::robust;
+  struct Owned {
+    const char* option;
+    const char* method;
+    bool given;
+  };
+  for (const Owned& one :
+       {Owned{"--crossover", "loop-shape", goal.crossover.has_value()},
+        Owned{"--natural-frequency", "poles", goal.natural_frequency.has_value()}}) {
+    if (one.given != (method == one.method)) {
+      return refusal(ArgumentError::malformed, "pidtune", one.option)
+          .got(one.given ? "given" : "left out")
+          .expected(one.given ? "left out with --method " + method
+                              : std::string("given with --method ") + one.method + ", such as " +
+                                    one.option + " 2rad/s");
+    }
+  }
+  return {};
+}
 
 constexpr std::string_view section_name = "loop";
 
@@ -174,8 +280,8 @@ Expected<std::string> expression_of(const std::string& path, LoopJob& job) {
 }  // namespace
 
 std::string_view to_string(LoopView view) {
-  static constexpr std::array<std::string_view, 8> names{"bode", "nyquist", "nichols", "rlocus",
-                                                         "step", "impulse", "margins", "sisotool"};
+  static constexpr std::array<std::string_view, 9> names{
+      "bode", "nyquist", "nichols", "rlocus", "step", "impulse", "margins", "sisotool", "pidtune"};
   return names[static_cast<std::size_t>(view)];
 }
 
@@ -213,6 +319,10 @@ ExpectedAll<LoopJob> loop_job(LoopView view, const std::vector<std::string>& exp
     return tl::unexpected(*std::move(errors));
   }
   LoopJob job = std::move(typed.job);
+  if (view == pidtune) {
+    FLYBALL_CHECK(
+        settle_pid(typed, job.pid).map_error([](Error error) { return Errors(std::move(error)); }));
+  }
   for (const std::string& expression : expressions) {
     if (expression.ends_with(".json")) {
       FLYBALL_TRY(std::string read, expression_of(expression, job));

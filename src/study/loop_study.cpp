@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include <flyball/classical/delay_margins.hpp>
+#include <flyball/classical/delay_poles.hpp>
 #include <flyball/classical/delay_response.hpp>
 #include <flyball/classical/transfer_expression.hpp>
 #include <flyball/math/expression/formula.hpp>
@@ -19,7 +21,9 @@ namespace flyball::study {
 
 namespace {
 
+using classical::DelaySystem;
 using classical::TransferFunction;
+using classical::TransferSystem;
 using Eigen::Index;
 using Eigen::VectorXd;
 using enum LoopView;
@@ -49,19 +53,37 @@ std::vector<std::string> texts_of(const LoopJob& job, const std::string& express
 }
 
 /// k C G, with the dead time of the job.
-ExpectedAll<TransferFunction> transfer_of(const LoopJob& job, const std::string& expression) {
+ExpectedAll<TransferSystem> system_of(const LoopJob& job, const std::string& expression) {
   const std::vector<std::string> texts = texts_of(job, expression);
-  auto parsed = classical::parse_transfer_product(texts, job.period);
+  auto parsed = classical::parse_transfer_system(
+      texts, {.gain = job.gain, .period = job.period, .delay = job.delay});
   if (!parsed) {
     return tl::unexpected(quoted(std::move(parsed).error(), texts));
   }
-  return TransferFunction::create(job.gain * parsed->num(), parsed->den(), parsed->period(),
-                                  Time(parsed->delay() + job.delay.si()))
-      .map_error([](Error error) { return Errors(std::move(error)); });
+  return *std::move(parsed);
+}
+
+Expected<DelaySystem> as_delay_system(const TransferSystem& system) {
+  if (const auto* late = std::get_if<DelaySystem>(&system)) {
+    return *late;
+  }
+  return DelaySystem::create(std::get<TransferFunction>(system));
 }
 
 std::vector<double> list(const auto& values) {
   return {values.begin(), values.end()};
+}
+
+/// The response of one with dead time in its loops, or several of them.
+Expected<LoopResponse> late_response(const DelaySystem& system, bool impulse,
+                                     const std::optional<ResponseTimes>& times) {
+  FLYBALL_TRY(const auto found, impulse ? classical::impulse_response(system, 0, times)
+                                        : classical::step_response(system, 0, times));
+  LoopResponse response{.time = list(found.time), .value = list(found.y.col(0)), .metrics = {}};
+  if (!impulse) {
+    FLYBALL_TRY(response.metrics, classical::step_metrics(system, 0, 0));
+  }
+  return response;
 }
 
 /// The response of a rational function behind its dead time.
@@ -104,18 +126,18 @@ class Study {
 
   ExpectedAll<LoopResult> run() {
     for (const std::string& expression : job().expressions) {
-      FLYBALL_TRY(auto transfer, transfer_of(job(), expression));
-      result_.loops.push_back({.name = expression, .transfer = std::move(transfer)});
+      FLYBALL_TRY(auto system, system_of(job(), expression));
+      result_.loops.push_back({.name = expression, .system = std::move(system)});
     }
     for (LoopFindings& loop : result_.loops) {
       if (auto found = look(loop); !found) {
         return tl::unexpected(named(loop, std::move(found).error()));
       }
     }
-    if (in({bode, nichols, sisotool, margins})) {
+    if (in({bode, nichols, sisotool, margins, pidtune})) {
       FLYBALL_CHECK(bode_curves().map_error([](Error error) { return Errors(std::move(error)); }));
     }
-    if (in({step, impulse, sisotool})) {
+    if (in({step, impulse, sisotool, pidtune})) {
       FLYBALL_CHECK(responses().map_error([](Error error) { return Errors(std::move(error)); }));
     }
     return std::move(result_);
@@ -145,6 +167,85 @@ class Study {
 
   /// What needs no common axis.
   Expected<void> look(LoopFindings& loop) {
+    if (loop.rational() != nullptr) {
+      FLYBALL_CHECK(look_at_roots(loop));
+    } else {
+      FLYBALL_TRY(const auto found, classical::rightmost_poles(std::get<DelaySystem>(loop.system)));
+      loop.poles = found.poles;
+    }
+    if (job().view == pidtune) {
+      return tune(loop);
+    }
+    if (in({bode, nyquist, nichols, margins, sisotool})) {
+      FLYBALL_TRY(loop.margins, std::visit([](const auto& L) { return classical::loop_margins(L); },
+                                           loop.system));
+      FLYBALL_TRY(loop.bandwidth,
+                  std::visit([](const auto& L) { return classical::bandwidth(L); }, loop.system));
+    }
+    if (in({nyquist, sisotool})) {
+      FLYBALL_TRY(loop.nyquist, nyquist_of(loop));
+    }
+    if (in({rlocus, sisotool})) {
+      FLYBALL_CHECK(locus(loop));
+    }
+    return {};
+  }
+
+  [[nodiscard]] Expected<classical::NyquistData> nyquist_of(const LoopFindings& loop) const {
+    if (const TransferFunction* transfer = loop.rational()) {
+      FLYBALL_TRY(const auto response, classical::frequency_response(*transfer));
+      return classical::nyquist(response, grid_options());
+    }
+    return classical::nyquist(std::get<DelaySystem>(loop.system), grid_options());
+  }
+
+  /// Gains for the plant, and the loop with them in its place.
+  Expected<void> tune(LoopFindings& loop) const {
+    const TransferFunction* plant = loop.rational();
+    if (plant == nullptr) {
+      return tl::unexpected(several_dead_times());
+    }
+    const PidGoal& goal = job().pid;
+    FLYBALL_TRY(auto tuned, tuned_for(*plant, goal));
+    FLYBALL_TRY(auto open, classical::series(tuned.controller, *plant));
+    loop.margins = tuned.margins;
+    loop.pid = std::move(tuned);
+    loop.plant = *plant;
+    loop.system = std::move(open);
+    return {};
+  }
+
+  static Expected<PidLoop> tuned_for(const TransferFunction& plant, const PidGoal& goal) {
+    switch (goal.method) {
+      case PidMethod::simc:
+        return tune_simc(plant, goal.form, goal.closed_loop_time.si(), goal.filter_ratio);
+      case PidMethod::loop_shape:
+        return tune_by_loop_shape(plant, goal.form,
+                                  {.crossover = goal.crossover ? goal.crossover->si() : 0.0,
+                                   .phase_margin = goal.phase_margin,
+                                   .filter_ratio = goal.filter_ratio});
+      case PidMethod::poles:
+        return tune_by_poles(
+            plant, goal.form,
+            {.natural_frequency = goal.natural_frequency ? goal.natural_frequency->si() : 0.0,
+             .damping_ratio = goal.damping_ratio,
+             .filter_ratio = goal.filter_ratio});
+      case PidMethod::robust:
+        break;
+    }
+    RobustnessGoal robust{.sensitivity = goal.sensitivity, .filter_ratio = goal.filter_ratio};
+    robust.complementary = goal.complementary.value_or(robust.complementary);
+    return tune_by_robustness(plant, goal.form, robust);
+  }
+
+  [[nodiscard]] Error several_dead_times() const {
+    return refusal(classical::TransferError::delay_in_loop, to_string(job().view), "EXPR")
+        .got("made of parts of several dead times")
+        .expected("a rational function behind one dead time")
+        .hint("bode, nyquist, nichols, margins and step take it as it is");
+  }
+
+  Expected<void> look_at_roots(LoopFindings& loop) {
     FLYBALL_TRY(const auto roots,
                 classical::parse_zero_pole_gain(texts_of(job(), loop.name), job().period));
     loop.zeros = roots.zeros();
@@ -166,23 +267,13 @@ class Study {
              pole);
       }
     }
-    if (in({bode, nyquist, nichols, margins, sisotool})) {
-      FLYBALL_TRY(loop.margins, classical::loop_margins(loop.transfer));
-      FLYBALL_TRY(loop.bandwidth, classical::bandwidth(loop.transfer));
-    }
-    if (in({nyquist, sisotool})) {
-      FLYBALL_TRY(const auto response, classical::frequency_response(loop.transfer));
-      FLYBALL_TRY(loop.nyquist, classical::nyquist(response, grid_options()));
-    }
-    if (in({rlocus, sisotool})) {
-      FLYBALL_CHECK(locus(loop));
-    }
     return {};
   }
 
   Expected<void> locus(LoopFindings& loop) {
-    const bool late = !loop.transfer.period() && loop.transfer.delay() > 0.0;
-    if (job().view == sisotool && (late || loop.transfer.order() == 0)) {
+    const TransferFunction* transfer = loop.rational();
+    const bool late = transfer == nullptr || (!transfer->period() && transfer->delay() > 0.0);
+    if (job().view == sisotool && (late || transfer->order() == 0)) {
       if (late) {
         note(result_.diagnostics, "no_locus",
              "there is no root locus of a loop with dead time: it has infinitely many branches; "
@@ -190,17 +281,20 @@ class Study {
       }
       return {};
     }
+    if (transfer == nullptr) {
+      return tl::unexpected(several_dead_times());
+    }
     // Of C G: k is what the locus is about.
     FLYBALL_TRY(const auto without_gain,
-                TransferFunction::create(loop.transfer.num() / job().gain, loop.transfer.den(),
-                                         loop.transfer.period(), Time(loop.transfer.delay())));
+                TransferFunction::create(transfer->num() / job().gain, transfer->den(),
+                                         transfer->period(), Time(transfer->delay())));
     FLYBALL_TRY(loop.locus, classical::root_locus(
                                 without_gain, {.negative = job().negative, .largest_gain = {}}));
     if (job().damping) {
       FLYBALL_TRY(loop.at_damping, classical::locus_at_damping(without_gain, *job().damping));
     }
-    if (auto closed = classical::unity_feedback(
-            loop.transfer.delay() > 0.0 ? with_late_poles(loop.transfer) : loop.transfer)) {
+    if (auto closed = classical::unity_feedback(transfer->delay() > 0.0 ? with_late_poles(*transfer)
+                                                                        : *transfer)) {
       FLYBALL_TRY(loop.closed_poles, closed->poles());
     }
     return {};
@@ -219,7 +313,9 @@ class Study {
     std::vector<classical::FrequencyResponse> all;
     std::vector<double> frequencies;
     for (const LoopFindings& loop : result_.loops) {
-      FLYBALL_TRY(auto response, classical::frequency_response(loop.transfer));
+      FLYBALL_TRY(
+          auto response,
+          std::visit([](const auto& L) { return classical::frequency_response(L); }, loop.system));
       FLYBALL_TRY(const auto grid, classical::frequency_grid(response, grid_options()));
       frequencies.insert(frequencies.end(), grid.frequency.begin(), grid.frequency.end());
       all.push_back(std::move(response));
@@ -230,7 +326,7 @@ class Study {
                     [](double a, double b) { return std::abs(a - b) <= 1e-12 * std::abs(b); }),
         frequencies.end());
     if (const double highest =
-            result_.loops.front().transfer.period() ? all.front().highest_frequency() : HUGE_VAL;
+            result_.loops.front().period() ? all.front().highest_frequency() : HUGE_VAL;
         !frequencies.empty()) {
       frequencies.back() = std::min(frequencies.back(), highest);
     }
@@ -243,32 +339,31 @@ class Study {
     return {};
   }
 
-  /// The closed loop where it has dead time.
-  Expected<LoopResponse> late_response(const TransferFunction& loop, bool impulse,
-                                       const std::optional<ResponseTimes>& times) const {
-    FLYBALL_TRY(const auto open, classical::DelaySystem::create(loop));
-    FLYBALL_TRY(const auto closed, classical::feedback(open));
-    FLYBALL_TRY(const auto found, impulse ? classical::impulse_response(closed, 0, times)
-                                          : classical::step_response(closed, 0, times));
-    LoopResponse response{.time = list(found.time), .value = list(found.y.col(0)), .metrics = {}};
-    if (!impulse) {
-      FLYBALL_TRY(response.metrics, classical::step_metrics(closed, 0, 0));
+  /// G/(1 + G H), rational where it can be.
+  static Expected<TransferSystem> closed(const TransferSystem& G, const TransferFunction& H) {
+    const auto* forward = std::get_if<TransferFunction>(&G);
+    if (forward == nullptr || (!forward->period() && forward->delay() + H.delay() > 0.0)) {
+      FLYBALL_TRY(const auto late, as_delay_system(G));
+      FLYBALL_TRY(const auto back, DelaySystem::create(H));
+      return classical::feedback(late, back).map([](DelaySystem&& loop) {
+        return TransferSystem(std::move(loop));
+      });
     }
-    return response;
+    const auto prompt = [](const TransferFunction& transfer) {
+      return transfer.delay() > 0.0 ? with_late_poles(transfer) : transfer;
+    };
+    return classical::feedback(prompt(*forward), prompt(H)).map([](TransferFunction&& loop) {
+      return TransferSystem(std::move(loop));
+    });
   }
 
-  Expected<LoopResponse> response_of(const LoopFindings& loop,
+  Expected<LoopResponse> response_of(const TransferSystem& system,
                                      const std::optional<ResponseTimes>& times) const {
     const bool impulse = job().view == LoopView::impulse;
-    const bool closed = job().closed || job().view == sisotool;
-    TransferFunction shown = loop.transfer;
-    if (closed) {
-      if (!shown.period() && shown.delay() > 0.0) {
-        return late_response(shown, impulse, times);
-      }
-      FLYBALL_TRY(shown,
-                  classical::unity_feedback(shown.delay() > 0.0 ? with_late_poles(shown) : shown));
+    if (const auto* late = std::get_if<DelaySystem>(&system)) {
+      return late_response(*late, impulse, times);
     }
+    const auto& shown = std::get<TransferFunction>(system);
     if (shown.order() == 0) {
       LoopResponse response = static_response(
           shown, times ? times->step.si() * static_cast<double>(times->samples) : 1.0);
@@ -287,10 +382,21 @@ class Study {
     return response;
   }
 
+  Expected<LoopResponse> response_of(const LoopFindings& loop,
+                                     const std::optional<ResponseTimes>& times) const {
+    if (!job().closed && !in({sisotool, pidtune})) {
+      return response_of(loop.system, times);
+    }
+    FLYBALL_TRY(const auto one,
+                TransferFunction::create(VectorXd::Ones(1), VectorXd::Ones(1), loop.period()));
+    FLYBALL_TRY(const auto whole, closed(loop.system, one));
+    return response_of(whole, times);
+  }
+
   Expected<void> responses() {
     std::vector<LoopResponse> found;
     double end = 0.0;
-    const auto& period = result_.loops.front().transfer.period();
+    const auto period = result_.loops.front().period();
     for (const LoopFindings& loop : result_.loops) {
       std::optional<ResponseTimes> times;
       if (job().duration) {
@@ -311,7 +417,12 @@ class Study {
           found[i] = *std::move(longer);
         }
       }
-      result_.loops[i].response = std::move(found[i]);
+      LoopFindings& loop = result_.loops[i];
+      loop.response = std::move(found[i]);
+      if (loop.pid && loop.margins->stable) {
+        FLYBALL_TRY(const auto load, closed(*loop.plant, loop.pid->controller));
+        FLYBALL_TRY(loop.load, response_of(load, times_until(loop.response->time.back(), period)));
+      }
     }
     return {};
   }
@@ -330,6 +441,25 @@ class Study {
 };
 
 }  // namespace
+
+std::optional<Time> LoopFindings::period() const {
+  return std::visit([](const auto& L) { return std::optional<Time>(L.period()); }, system);
+}
+
+double LoopFindings::dc_gain() const {
+  const TransferFunction* transfer = rational();
+  return transfer != nullptr ? transfer->dc_gain() : std::get<DelaySystem>(system).dc_gain()(0, 0);
+}
+
+std::vector<double> LoopFindings::delays() const {
+  if (const TransferFunction* transfer = rational()) {
+    return transfer->delay() > 0.0 ? std::vector{transfer->delay()} : std::vector<double>{};
+  }
+  std::vector<double> all = list(std::get<DelaySystem>(system).delays());
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  return all;
+}
 
 ExpectedAll<LoopResult> study_loops(const LoopJob& job) {
   if (job.expressions.empty()) {

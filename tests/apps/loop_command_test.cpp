@@ -146,6 +146,68 @@ TEST_F(LoopCommand, PolesAsWritten) {
   }
 }
 
+// k (e^{-s} + e^{-3s})/s is real and negative first at π/4, where it is -8k cos(π/4)/π.
+TEST_F(LoopCommand, SeveralDeadTimes) {
+  const Json loop = answer("margins '0.5*(exp(-s) + exp(-3s))/s'").at("loops").at(0);
+  const double pi = std::acos(-1.0);
+  EXPECT_NEAR(loop.at("margins").at("gain_margin").get<double>(), pi / (4.0 * std::cos(pi / 4.0)),
+              1e-11);
+  EXPECT_EQ(loop.at("delays"), Json::parse("[1.0, 3.0]"));
+  EXPECT_FALSE(loop.contains("num"));
+  const Json late = answer("bode 'feedback(exp(-s)/(s+1), exp(-0.5*s))'").at("loops").at(0);
+  EXPECT_NEAR(late.at("gain_db").front().get<double>(), 20.0 * std::log10(0.5), 1e-2);
+  // y = t - 1 of the first path from 1 s on, and t - 3 of the second from 3 s on.
+  const Json step =
+      answer("step '(exp(-s) + exp(-3s))/s' --duration 6s").at("loops").at(0).at("response");
+  for (std::size_t i = 0; i < step.at("time").size(); ++i) {
+    const double t = step.at("time")[i].get<double>();
+    EXPECT_NEAR(step.at("value")[i].get<double>(), std::max(0.0, t - 1.0) + std::max(0.0, t - 3.0),
+                1e-9);
+  }
+  const Json counted = answer("nyquist '0.6*(exp(-s) + exp(-3s))/s'").at("loops").at(0);
+  EXPECT_EQ(counted.at("nyquist").at("encirclements"), 2);
+  EXPECT_EQ(counted.at("margins").at("unstable_poles"), 2);
+  const Answer told = run("sisotool 'exp(-s)/(s+1) + exp(-0.3*s)/(s+2)' --out late");
+  ASSERT_EQ(told.status, 0) << told.err;
+  EXPECT_TRUE(holds(told.out, "300 ms")) << told.out;
+  expect_refused("rlocus 'exp(-s)/s + 1/s'", "delay_in_loop", "several dead times");
+}
+
+TEST_F(LoopCommand, PidTune) {
+  // C = 2 ζ... by crossover: |L| = 1 at 3 rad/s with 55°.
+  const Json shaped =
+      answer("pidtune '1/(s*(s+1))' --form pd --crossover '3 rad/s' --phase-margin 55")
+          .at("loops")
+          .at(0);
+  EXPECT_NEAR(shaped.at("margins").at("phase_margin_deg").get<double>(), 55.0, 1e-8);
+  EXPECT_NEAR(shaped.at("margins").at("phase_margins").at(0).at("w").get<double>(), 3.0, 1e-8);
+  EXPECT_EQ(shaped.at("pid").at("ki"), 0.0);
+  const Json robust = answer("pidtune 'exp(-0.2*s)/(s+1)^3' --form pi --ms 1.4").at("loops").at(0);
+  EXPECT_NEAR(robust.at("margins").at("sensitivity_peak").at("Ms").get<double>(), 1.4, 1e-3);
+  // With an integral the load is gone in the end, and ∫ e dt is 1/ki.
+  EXPECT_NEAR(robust.at("load").at("value").back().get<double>(), 0.0, 0.02);
+  EXPECT_NEAR(robust.at("response").at("step").at("final_value").get<double>(), 1.0, 1e-12);
+  const Json rule = answer("pidtune 'exp(-s)/(2s+1)' --method simc --form pi").at("loops").at(0);
+  EXPECT_NEAR(rule.at("pid").at("kp").get<double>(), 1.0, 1e-12);  // τ/(K (θ + θ))
+  EXPECT_NEAR(rule.at("pid").at("ki").get<double>(), 0.5, 1e-12);
+  const Json placed = answer("pidtune '1/s^2' --form pd --natural-frequency 2rad/s");
+  EXPECT_TRUE(placed.at("loops").at(0).at("margins").at("stable").get<bool>());
+  const Json sampled = answer("pidtune '0.1*z^-1/(1-0.9z^-1)' --period 20ms --form pi --ms 1.6");
+  EXPECT_TRUE(sampled.at("loops").at(0).at("margins").at("stable").get<bool>());
+  const Answer told = run("pidtune 'exp(-0.2*s)/(s+1)^3' --out pid");
+  ASSERT_EQ(told.status, 0) << told.err;
+  EXPECT_TRUE(holds(told.out, "Kp")) << told.out;
+  for (const char* file :
+       {"index.html", "data/load.csv", "pictures/bode.svg", "pictures/step_response.svg"}) {
+    EXPECT_TRUE(std::filesystem::exists(work() / "pid" / file)) << file;
+  }
+  expect_refused("pidtune '1/s' --method loop-shape", "malformed", "--crossover");
+  expect_refused("pidtune '1/s' --method simc --crossover 2rad/s", "malformed", "--crossover");
+  expect_refused("pidtune '1/s' --form q", "unknown_name", "--form");
+  expect_refused("pidtune '1/s + exp(-s)/s'", "delay_in_loop", "several dead times");
+  expect_refused("pidtune '1/(s+1)' --form pi", "unlimited", "any is as robust", 1);
+}
+
 TEST_F(LoopCommand, AReportOfTheLoop) {
   const Answer told = run("sisotool '2/(s^2+3*s+2)*exp(-0.1*s)' --gain 3 --out report");
   ASSERT_EQ(told.status, 0) << told.err;

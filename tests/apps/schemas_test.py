@@ -150,6 +150,9 @@ def check_answers(folder):
     check_answer(["analyze", "discrete.json"], 0, folder)
     for view in ("bode", "nyquist", "nichols", "step", "impulse", "margins", "sisotool"):
         check_answer([view, "2/(s^2+3*s+2)*exp(-0.1*s)", "--gain", "2"], 0, folder, "loop")
+    for view in ("bode", "nyquist", "nichols", "step", "impulse", "margins", "sisotool"):
+        check_answer([view, "exp(-s)/(s+1) + exp(-0.3*s)/(s+2)"], 0, folder, "loop")
+    check_answer(["pidtune", "exp(-0.2*s)/(s+1)^2", "1/(s*(s+1)^2)"], 0, folder, "loop")
     for view in ("rlocus", "sisotool"):
         check_answer([view, "0.1*z^-1/(1-0.9z^-1)", "1/(z-0.5)", "--period", "20ms", "--damping", "0.5"], 0, folder, "loop")
     check("loop", answer(["bode", "1/(s+1"], 2, folder), "bode of what is no expression")

@@ -12,6 +12,8 @@
 #include <flyball/classical/nyquist.hpp>
 #include <flyball/classical/root_locus.hpp>
 #include <flyball/classical/step_metrics.hpp>
+#include <flyball/classical/transfer_expression.hpp>
+#include <flyball/control/pid_design.hpp>
 #include <flyball/core/answer.hpp>
 #include <flyball/core/diagnostic.hpp>
 #include <flyball/study/project.hpp>
@@ -19,12 +21,34 @@
 namespace flyball::study {
 
 /// How a loop is looked at.
-enum class LoopView { bode, nyquist, nichols, rlocus, step, impulse, margins, sisotool };
-inline constexpr std::array loop_views{LoopView::bode,    LoopView::nyquist, LoopView::nichols,
-                                       LoopView::rlocus,  LoopView::step,    LoopView::impulse,
-                                       LoopView::margins, LoopView::sisotool};
+enum class LoopView { bode, nyquist, nichols, rlocus, step, impulse, margins, sisotool, pidtune };
+inline constexpr std::array loop_views{LoopView::bode,    LoopView::nyquist,  LoopView::nichols,
+                                       LoopView::rlocus,  LoopView::step,     LoopView::impulse,
+                                       LoopView::margins, LoopView::sisotool, LoopView::pidtune};
 /// The command's name: "bode".
 [[nodiscard]] std::string_view to_string(LoopView view);
+
+/// What decides about PID gains.
+enum class PidMethod {
+  robust,      ///< The most integral gain for a robustness (`tune_by_robustness`).
+  loop_shape,  ///< Crossover and phase margin (`tune_by_loop_shape`).
+  simc,        ///< `tune_simc`
+  poles,       ///< `tune_by_poles`
+};
+
+/// PID gains that are asked for.
+struct PidGoal {
+  PidForm form = PidForm::pid;
+  PidMethod method = PidMethod::robust;  ///< With a crossover loop_shape, a frequency poles.
+  double sensitivity = 1.4;              ///< max |S|, of robust.
+  std::optional<double> complementary{};
+  std::optional<AngularVelocity> crossover{};
+  double phase_margin = 60.0;                          ///< deg, of loop_shape.
+  Time closed_loop_time{0.0};                          ///< s, of simc; 0: the delay.
+  std::optional<AngularVelocity> natural_frequency{};  ///< Of poles.
+  double damping_ratio = 0.7;
+  double filter_ratio = 10.0;  ///< N, τ = T_d/N.
+};
 
 /// Transfer functions, each the plant of a loop 1/(1 + k C G) or a system of its own, and what of
 /// them is asked for.
@@ -41,6 +65,7 @@ struct LoopJob {
   std::optional<AngularVelocity> from{};   ///< Frequencies; absent: chosen.
   std::optional<AngularVelocity> to{};
   std::optional<Time> duration{};  ///< Of responses; absent: until they have settled.
+  PidGoal pid{};                   ///< Of pidtune, whose plants are C G with k = 1.
 };
 
 /// The fields that a view has, for whoever asks a person for them.
@@ -64,8 +89,8 @@ struct LoopResponse {
 
 /// One of the transfer functions, as far as its view needs it.
 struct LoopFindings {
-  std::string name;                      ///< As typed.
-  classical::TransferFunction transfer;  ///< k C G.
+  std::string name;                  ///< As typed.
+  classical::TransferSystem system;  ///< k C G, or what pidtune found times C G.
   Eigen::VectorXcd zeros{};
   Eigen::VectorXcd poles{};
   std::optional<classical::LoopMargins> margins{};
@@ -76,6 +101,19 @@ struct LoopFindings {
   std::vector<classical::LocusPoint> at_damping{};
   std::optional<Eigen::VectorXcd> closed_poles{};  ///< Of 1 + k C G, without dead time.
   std::optional<LoopResponse> response{};
+  std::optional<PidLoop> pid{};
+  std::optional<classical::TransferFunction> plant{};  ///< Of pid: C G.
+  std::optional<LoopResponse>
+      load{};  ///< Of pidtune: the output after a step at the plant's input.
+
+  /// Null where it has several dead times.
+  [[nodiscard]] const classical::TransferFunction* rational() const {
+    return std::get_if<classical::TransferFunction>(&system);
+  }
+  [[nodiscard]] std::optional<Time> period() const;
+  [[nodiscard]] double dc_gain() const;
+  /// s, each once, rising; empty without dead time.
+  [[nodiscard]] std::vector<double> delays() const;
 };
 
 /// What a view shows.

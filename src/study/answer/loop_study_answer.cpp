@@ -58,11 +58,13 @@ Value stability_of(const LoopFindings& loop) {
   if (loop.margins->stable) {
     return {"stable", Tone::good};
   }
-  return {
-      fmt::format("unstable, {} {}",
-                  text::count(static_cast<std::size_t>(loop.margins->unstable_poles), "pole"),
-                  loop.transfer.period() ? "not inside the unit circle" : "not left of the axis"),
-      Tone::bad};
+  if (loop.margins->unstable_poles == std::numeric_limits<int>::max()) {
+    return {"unstable, infinitely many poles not left of the axis", Tone::bad};
+  }
+  return {fmt::format("unstable, {} {}",
+                      text::count(static_cast<std::size_t>(loop.margins->unstable_poles), "pole"),
+                      loop.period() ? "not inside the unit circle" : "not left of the axis"),
+          Tone::bad};
 }
 
 Section margins_section(const LoopResult& result) {
@@ -92,7 +94,7 @@ Section margins_section(const LoopResult& result) {
   Value peak = quantity(m.sensitivity.value, "");
   peak.text += fmt::format(" at {} rad/s", number(m.sensitivity.frequency));
   facts.add("largest |1/(1 + L)|", std::move(peak));
-  facts.add("L(0)", quantity(loop.transfer.dc_gain(), ""));
+  facts.add("L(0)", quantity(loop.dc_gain(), ""));
   if (loop.bandwidth) {
     facts.add("bandwidth of L", quantity(*loop.bandwidth, "rad/s"));
   }
@@ -195,12 +197,11 @@ void add_locus(Section& section, const LoopResult& result, const LoopFindings& l
   section.blocks.push_back(std::move(facts));
   Table table{.header = {"on the locus", "k", "s", "frequency (rad/s)", "damping ratio"},
               .words = {0, 2}};
-  if (loop.transfer.period()) {
+  if (loop.period()) {
     table.header[2] = "z";
   }
   const auto row = [&](std::string what, std::optional<double> gain, std::complex<double> point) {
-    const std::complex<double> s =
-        loop.transfer.period() ? std::log(point) / loop.transfer.period()->si() : point;
+    const std::complex<double> s = loop.period() ? std::log(point) / loop.period()->si() : point;
     const double frequency = std::abs(s);
     table.rows.push_back(
         {std::move(what), gain ? quantity(*gain, "", 6) : Value("", Tone::quiet),
@@ -251,8 +252,47 @@ Section locus_section(const LoopResult& result) {
   return section;
 }
 
+/// Gains of one plant, a row each of several.
+Section pid_section(const LoopResult& result) {
+  std::vector<Column> columns{{"Kp"}, {"Ki (1/s)"}, {"Kd (s)"}, {"Ti"}, {"Td"}, {"filter τ"}};
+  for (const LoopFindings& loop : result.loops) {
+    const auto& [kp, ki, kd] = loop.pid->gains;
+    columns[0].values.push_back(quantity(kp, "", 6));
+    columns[1].values.push_back(quantity(ki, "", 6));
+    columns[2].values.push_back(quantity(kd, "", 6));
+    columns[3].values.push_back(ki != 0.0 ? quantity(kp / ki, "s") : Value("none", Tone::quiet));
+    columns[4].values.push_back(kd != 0.0 && kp != 0.0 ? quantity(kd / kp, "s")
+                                                       : Value("none", Tone::quiet));
+    columns[5].values.push_back(kd != 0.0 ? quantity(loop.pid->derivative_time_constant, "s")
+                                          : Value("none", Tone::quiet));
+  }
+  Section section{"pid", "PID gains", {told(result, std::move(columns))}};
+  section.blocks.push_back(
+      Paragraph{result.job.period || result.loops.front().period()
+                    ? "u = Kp e + Ki T Σ e + Kd (change of the filtered e per sample)"
+                    : "u = Kp e + Ki ∫ e dt + Kd d/dt of e behind the filter 1/(τ s + 1)",
+                Tone::quiet});
+  return section;
+}
+
+/// What a step of load at the plant's input does.
+Section load_section(const LoopResult& result) {
+  std::vector<Column> columns{
+      {"largest deviation"}, {"at"}, {"recovered after"}, {"∫ e dt"}, {"∫ |e| dt"}};
+  for (const LoopFindings& loop : result.loops) {
+    const LoadResponse load = loop.pid->load.value_or(LoadResponse{});
+    columns[0].values.push_back(quantity(load.peak, ""));
+    columns[1].values.push_back(quantity(load.peak_time, "s"));
+    columns[2].values.push_back(or_none(load.recovery_time, "s"));
+    columns[3].values.push_back(quantity(load.integral, "s"));
+    columns[4].values.push_back(quantity(load.absolute_integral, "s"));
+  }
+  return {"load", "After a step of load at the plant's input", {told(result, std::move(columns))}};
+}
+
 Section response_section(const LoopResult& result) {
-  const bool closed = result.job.closed || result.job.view == sisotool;
+  const bool closed =
+      result.job.closed || result.job.view == sisotool || result.job.view == pidtune;
   Section section{"response",
                   result.job.view == LoopView::impulse ? "Impulse response"
                   : closed                             ? "Step response of the closed loop"
@@ -317,8 +357,17 @@ Section system_section(const LoopResult& result) {
       }
       return texts.empty() ? std::string("none") : fmt::format("{}", fmt::join(texts, ", "));
     };
-    table.rows.push_back({short_name(loop), roots(loop.zeros), roots(loop.poles),
-                          quantity(loop.transfer.delay(), "s")});
+    if (loop.rational() != nullptr) {
+      table.rows.push_back({short_name(loop), roots(loop.zeros), roots(loop.poles),
+                            quantity(loop.delays().empty() ? 0.0 : loop.delays().front(), "s")});
+      continue;
+    }
+    std::vector<std::string> delays;
+    for (const double delay : loop.delays()) {
+      delays.push_back(text::seconds(delay));
+    }
+    table.rows.push_back({short_name(loop), Value("not counted", Tone::quiet),
+                          "rightmost " + roots(loop.poles), text::enumerate(delays)});
   }
   section.blocks.push_back(std::move(table));
   Facts facts;
@@ -328,7 +377,7 @@ Section system_section(const LoopResult& result) {
   if (result.job.gain != 1.0) {
     facts.add("gain k", quantity(result.job.gain, "", 6));
   }
-  if (const auto& period = result.loops.front().transfer.period()) {
+  if (const auto& period = result.loops.front().period()) {
     facts.add("sample period", text::seconds(period->si()), Tone::plain);
   }
   if (!facts.facts.empty()) {
@@ -379,9 +428,9 @@ Verdict verdict_of(const LoopResult& result) {
 }
 
 std::string title_of(const LoopResult& result) {
-  static constexpr std::array<std::string_view, 8> titles{
-      "Bode plot",     "Nyquist curve",    "Nichols plot", "Root locus",
-      "Step response", "Impulse response", "Margins",      "Loop"};
+  static constexpr std::array<std::string_view, 9> titles{
+      "Bode plot",        "Nyquist curve", "Nichols plot", "Root locus", "Step response",
+      "Impulse response", "Margins",       "Loop",         "PID gains"};
   const auto view = static_cast<std::size_t>(result.job.view);
   return result.loops.size() == 1
              ? fmt::format("{} of {}", titles[view], short_name(result.loops.front()))
@@ -392,6 +441,9 @@ Document document_of(const LoopResult& result) {
   Document document{.title = title_of(result), .verdict = verdict_of(result)};
   const LoopFindings& first = result.loops.front();
   document.sections.push_back(system_section(result));
+  if (first.pid) {
+    document.sections.push_back(pid_section(result));
+  }
   if (first.locus) {
     document.sections.push_back(locus_section(result));
   }
@@ -403,6 +455,9 @@ Document document_of(const LoopResult& result) {
   }
   if (first.response) {
     document.sections.push_back(response_section(result));
+  }
+  if (first.pid && first.pid->load) {
+    document.sections.push_back(load_section(result));
   }
   if (!result.diagnostics.empty()) {
     document.sections.push_back(diagnostics_section(result.diagnostics));
@@ -477,8 +532,19 @@ void write_locus(JsonWriter& json, const LoopFindings& loop) {
   });
 }
 
-void write_response(JsonWriter& json, const LoopResponse& response) {
-  json.object("response", [&] {
+void write_pid(JsonWriter& json, const PidLoop& pid) {
+  json.object("pid", [&] {
+    json.add({{"kp", pid.gains.kp},
+              {"ki", pid.gains.ki},
+              {"kd", pid.gains.kd},
+              {"derivative_time_constant", pid.derivative_time_constant}});
+    json.add("num", pid.controller.num());
+    json.add("den", pid.controller.den());
+  });
+}
+
+void write_response(JsonWriter& json, std::string_view name, const LoopResponse& response) {
+  json.object(name, [&] {
     json.add("time", response.time);
     json.add("value", response.value);
     if (response.metrics) {
@@ -507,15 +573,19 @@ std::string to_json(const LoopResult& result) {
     json.list("loops", result.loops, [&](const LoopFindings& loop) {
       json.object([&] {
         json.add("expression", loop.name);
-        json.add("num", loop.transfer.num());
-        json.add("den", loop.transfer.den());
-        json.add("delay", loop.transfer.delay());
-        if (loop.transfer.period()) {
-          json.add("dt", loop.transfer.period()->si());
+        if (const classical::TransferFunction* transfer = loop.rational()) {
+          json.add("num", transfer->num());
+          json.add("den", transfer->den());
+          json.add("delay", transfer->delay());
+        } else {
+          json.add("delays", loop.delays());
+        }
+        if (loop.period()) {
+          json.add("dt", loop.period()->si());
         }
         json.add("zeros", loop.zeros);
         json.add("poles", loop.poles);
-        json.add("dcgain", loop.transfer.dc_gain());
+        json.add("dcgain", loop.dc_gain());
         if (loop.margins) {
           write_margins(json, loop);
         }
@@ -543,8 +613,14 @@ std::string to_json(const LoopResult& result) {
         if (loop.closed_poles) {
           json.add("closed_loop_poles", *loop.closed_poles);
         }
+        if (loop.pid) {
+          write_pid(json, *loop.pid);
+        }
         if (loop.response) {
-          write_response(json, *loop.response);
+          write_response(json, "response", *loop.response);
+        }
+        if (loop.load) {
+          write_response(json, "load", *loop.load);
         }
       });
     });

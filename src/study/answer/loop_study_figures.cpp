@@ -233,7 +233,9 @@ Figure nichols_figure(const LoopResult& result) {
   }
   // A dead time turns for ever: four turns are shown.
   low = std::max(low, high - 1440.0);
-  const double first = std::floor((low + 180.0) / 360.0) * 360.0 - 180.0;
+  // From the lowest cross that the curves come near.
+  constexpr double near = 60.0;
+  const double first = std::ceil((low - near + 180.0) / 360.0) * 360.0 - 180.0;
   PlotLine crosses{.label = "0 dB at −180°", .style = LineStyle::crosses, .color = 1};
   for (double center = first; center <= high + 1.0; center += 360.0) {
     crosses.x.push_back(center);
@@ -251,11 +253,13 @@ Figure nichols_figure(const LoopResult& result) {
         const bool jumps = k > 0 && std::abs(angle - before) > 180.0;
         before = angle;
         angle += center;
-        if (jumps || gain < floor || gain > roof) {
+        const bool seen = gain >= floor && gain <= roof && angle >= std::min(low, center) - near &&
+                          angle <= std::max(high, center) + near;
+        if (jumps || !seen) {
           guide.x.push_back(nan);
           guide.y.push_back(nan);
         }
-        if (gain >= floor && gain <= roof) {
+        if (seen) {
           guide.x.push_back(angle);
           guide.y.push_back(gain);
         }
@@ -302,8 +306,37 @@ std::vector<Complex> complex_list(const auto& values) {
   return {values.begin(), values.end()};
 }
 
+/// The grid of damping ratios reaches from the poles and zeros to where branches are shown, with
+/// its labels, which stand upon each other else.
+void widen_grid(PlotPanel& panel, double reach, const std::vector<PolePlotGroup>& groups) {
+  double largest = 0.0;
+  for (const PolePlotGroup& group : groups) {
+    for (const auto* roots : {&group.poles, &group.zeros}) {
+      for (const Complex& root : *roots) {
+        largest = std::max(largest, std::abs(root));
+      }
+    }
+  }
+  if (!(largest > 0.0)) {
+    return;
+  }
+  const double wider = std::max(1.0, 0.85 * reach / largest);
+  for (PlotLine& line : panel.lines) {
+    if (line.style == LineStyle::guide) {
+      for (std::size_t k = 0; k < line.x.size(); ++k) {
+        line.x[k] *= wider;
+        line.y[k] *= wider;
+      }
+    }
+  }
+  for (PlotNote& note : panel.notes) {
+    note.x *= wider;
+    note.y *= wider;
+  }
+}
+
 Figure locus_figure(const LoopResult& result) {
-  const bool discrete = result.loops.front().transfer.period().has_value();
+  const bool discrete = result.loops.front().period().has_value();
   Figure figure{
       "rlocus",
       "root_locus",
@@ -325,6 +358,9 @@ Figure locus_figure(const LoopResult& result) {
   figure.plot = pole_plot(figure.title, groups, discrete);
   PlotPanel& panel = figure.plot.panels.front();
   const double reach = discrete ? std::max(1.5, std::min(1.2 * size, 4.0)) : 1.6 * size;
+  if (!discrete) {
+    widen_grid(panel, reach, groups);
+  }
   std::vector<PlotLine> under;
   for (std::size_t i = 0; i < result.loops.size(); ++i) {
     const LoopFindings& loop = result.loops[i];
@@ -376,9 +412,10 @@ Figure locus_figure(const LoopResult& result) {
 }
 
 Figure response_figure(const LoopResult& result) {
-  const bool closed = result.job.closed || result.job.view == sisotool;
+  const bool closed =
+      result.job.closed || result.job.view == sisotool || result.job.view == pidtune;
   const bool impulse = result.job.view == LoopView::impulse;
-  const bool discrete = result.loops.front().transfer.period().has_value();
+  const bool discrete = result.loops.front().period().has_value();
   const std::string what = fmt::format("{} response{}", impulse ? "Impulse" : "Step",
                                        closed ? " of the closed loop" : "");
   Figure figure = over_time(
@@ -389,8 +426,15 @@ Figure response_figure(const LoopResult& result) {
   PlotPanel panel{.y_label = "Output"};
   for (std::size_t i = 0; i < result.loops.size(); ++i) {
     const LoopFindings& loop = result.loops[i];
-    panel.lines.push_back(line(label_of(result, loop), loop.response->time, loop.response->value,
-                               color_of(i), discrete ? LineStyle::steps : LineStyle::solid));
+    panel.lines.push_back(line(
+        is_single(result) && loop.load ? "after a step of the reference" : label_of(result, loop),
+        loop.response->time, loop.response->value, color_of(i),
+        discrete ? LineStyle::steps : LineStyle::solid));
+    if (loop.load) {
+      panel.lines.push_back(line(is_single(result) ? "after a step of load" : "", loop.load->time,
+                                 loop.load->value, is_single(result) ? quiet_color : color_of(i),
+                                 LineStyle::dashed));
+    }
   }
   if (const auto& metrics = result.loops.front().response->metrics;
       is_single(result) && metrics && std::isfinite(metrics->final_value)) {
@@ -442,7 +486,7 @@ std::vector<Figure> figures_of(const LoopResult& result) {
   if ((view == rlocus || view == sisotool) && first.locus) {
     figures.push_back(locus_figure(result));
   }
-  if (view == bode || view == margins || view == sisotool) {
+  if (view == bode || view == margins || view == sisotool || view == pidtune) {
     figures.push_back(bode_figure(result));
   }
   if (view == nyquist || view == sisotool) {
@@ -496,6 +540,10 @@ std::vector<AnswerFile> data_files(const LoopResult& result) {
       files.push_back(
           {fmt::format("data/response{}.csv", number),
            csv_of({{"time (s)", loop.response->time}, {"output", loop.response->value}})});
+    }
+    if (loop.load) {
+      files.push_back({fmt::format("data/load{}.csv", number),
+                       csv_of({{"time (s)", loop.load->time}, {"output", loop.load->value}})});
     }
     if (loop.nyquist) {
       std::vector<double> real;
