@@ -52,6 +52,8 @@ namespace flyball::book {
 [[nodiscard]] FigureResult figure_10_3();
 [[nodiscard]] FigureResult figure_10_4();
 [[nodiscard]] FigureResult figure_12_2();
+[[nodiscard]] FigureResult figure_15_1();
+[[nodiscard]] FigureResult figure_15_2();
 [[nodiscard]] FigureResult figure_B_1();
 [[nodiscard]] FigureResult figure_B_2();
 [[nodiscard]] FigureResult figure_B_3();

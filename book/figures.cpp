@@ -89,6 +89,8 @@ constexpr std::array table{
     FigureEntry{"10.3", "Pose estimation: error of y", "10.2.4", compute<figure_10_3>},
     FigureEntry{"10.4", "Pose estimation: error of the heading", "10.2.4", compute<figure_10_4>},
     FigureEntry{"12.2", "Datasheet curves of a 775pro", "12.1.2", compute<figure_12_2>},
+    FigureEntry{"15.1", "Trapezoid profile", "15.1", compute<figure_15_1>},
+    FigureEntry{"15.2", "S-curve profile", "15.1", compute<figure_15_2>},
     FigureEntry{"B.1", "Elevator with a delay of 50 ms", "B.4", compute<figure_B_1>},
     FigureEntry{"B.2", "Elevator with a delay of 50 ms, compensated", "B.4", compute<figure_B_2>},
     FigureEntry{"B.3", "Drivetrain velocity with a delay of 40 ms", "B.4.2", compute<figure_B_3>},

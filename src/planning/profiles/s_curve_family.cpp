@@ -489,7 +489,11 @@ SCurvePhases fastest_motion(const SCurveProblem& p) noexcept {
   const SCurveFamily f = family_of(p, !rises_first(p));
   const SCurveShape start = direct(f);
   const double beyond = f.X - distance_of(f, start);
-  if (std::abs(beyond) <= slack_of(f, start) + root_slack(f, start, start.a_1)) {
+  // Seldom so near that it is worth to say how near is near.
+  const double size =
+      (std::abs(f.K_0) + std::abs(start.v_p) + std::abs(f.K)) * (start.time() + f.up);
+  if (std::abs(beyond) <= 1e-5 * (std::abs(f.X) + size) + f.slack &&
+      std::abs(beyond) <= slack_of(f, start) + root_slack(f, start, start.a_1)) [[unlikely]] {
     return phases_of(f, start);
   }
   if (beyond > 0.0) {

@@ -101,8 +101,9 @@ void bring_acceleration_inside(SCurvePlan& plan) {
   }
 }
 
-bool overshoots(const SCurveProblem& p) {
-  return p.v_0 + (p.a_0 > 0.0 ? 0.5 * p.a_0 * p.a_0 : 0.0) > p.high * (1.0 + near);
+/// Whether a start is beyond the upper limit, or cannot but go beyond.
+bool overshoots(double v, double a, double limit) {
+  return v + (a > 0.0 ? 0.5 * a * a : 0.0) > limit * (1.0 + near);
 }
 
 /// Whether the phases end at the goal and keep the velocity limits all the way behind the start.
@@ -136,15 +137,16 @@ bool keeps(const SCurveProblem& p, const SCurvePhases& phases) {
 
 void solve(SCurvePlan& plan, bool inside_first) {
   bring_acceleration_inside(plan);
+  const SCurveProblem& from = plan.problem;
+  const bool above = overshoots(from.v_0, from.a_0, from.high);
+  if (!above && !overshoots(-from.v_0, -from.a_0, from.low)) [[likely]] {
+    plan.phases = fastest_motion(plan.problem);
+    return;
+  }
   SCurveProblem p = plan.problem;
-  double side = 1.0;
-  if (!overshoots(p)) {
+  const double side = above ? 1.0 : -1.0;
+  if (!above) {
     mirror(p);
-    side = -1.0;
-    if (!overshoots(p)) {
-      plan.phases = fastest_motion(plan.problem);
-      return;
-    }
   }
   // Near a goal that can itself not be gone on from within the limits, they still hold to there;
   // and the fastest motion may brake all the way.

@@ -1,0 +1,250 @@
+// Profiles: how long a plan takes, and whether any of many millions breaks a law.
+//
+//   bench_profiles                  times of each profile over random states, beside the
+//   trapezoid's bench_profiles --campaign N     N random boundary-value problems a profile through
+//   the law suite
+//                                   (tests/planning/profiles/profile_laws.hpp); says each law
+//                                   broken
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include <flyball/core/random.hpp>
+#include <flyball/planning/profiles/exponential_profile.hpp>
+#include <flyball/planning/profiles/minimum_jerk_profile.hpp>
+#include <flyball/planning/profiles/parabolic_profile.hpp>
+#include <flyball/planning/profiles/synchronized_motion.hpp>
+
+#include "planning/profiles/profile_laws.hpp"
+
+namespace {
+
+using namespace flyball;
+
+/// States as Ruckig's own benchmark draws them: places N(0, 4), velocities and accelerations N(0,
+/// 0.8) or zero, limits U(0.1, 12) above those of the goal.
+struct Case {
+  MotionLimits limits;
+  MotionState start;
+  MotionState goal;
+};
+
+Case random_case(Random& random) {
+  const auto moving = [&](double share) {
+    return random.uniform() < share ? random.normal(0.0, 0.8) : 0.0;
+  };
+  while (true) {
+    Case c;
+    c.start = {random.normal(0.0, 4.0), moving(0.9), moving(0.8)};
+    c.goal = {random.normal(0.0, 4.0), moving(0.7), moving(0.6)};
+    c.limits = {random.uniform(0.1, 12.0) + std::abs(c.goal.velocity),
+                random.uniform(0.1, 12.0) + std::abs(c.goal.acceleration)};
+    c.limits.jerk = random.uniform(0.1, 12.0);
+    const double drift = 0.5 * c.goal.acceleration * std::abs(c.goal.acceleration) / c.limits.jerk;
+    if (std::abs(c.goal.velocity - drift) <= c.limits.velocity &&
+        std::abs(c.goal.velocity + drift) <= c.limits.velocity) {
+      return c;
+    }
+  }
+}
+
+/// The least mean of several passes over all cases, ns.
+template <class Plan>
+double nanoseconds(const std::vector<Case>& cases, Plan&& plan, double& sum) {
+  using Clock = std::chrono::steady_clock;
+  double best = 1e300;
+  for (int pass = 0; pass < 15; ++pass) {
+    const auto start = Clock::now();
+    for (const Case& c : cases) {
+      sum += plan(c);
+    }
+    const std::chrono::duration<double, std::nano> elapsed = Clock::now() - start;
+    best = std::min(best, elapsed.count() / static_cast<double>(cases.size()));
+  }
+  return best;
+}
+
+template <int Axes>
+double synchronized_nanoseconds(const std::vector<Case>& cases, double& sum) {
+  using Motion = SynchronizedMotion<Axes>;
+  std::vector<typename Motion::Limits> limits(cases.size() / Axes);
+  std::vector<typename Motion::States> start(limits.size());
+  std::vector<typename Motion::States> goal(limits.size());
+  for (std::size_t k = 0; k < limits.size(); ++k) {
+    for (std::size_t i = 0; i < Axes; ++i) {
+      const Case& c = cases[k * Axes + i];
+      limits[k][i] = c.limits;
+      start[k][i] = c.start;
+      goal[k][i] = c.goal;
+    }
+  }
+  using Clock = std::chrono::steady_clock;
+  double best = 1e300;
+  for (int pass = 0; pass < 10; ++pass) {
+    const auto begin = Clock::now();
+    for (std::size_t k = 0; k < limits.size(); ++k) {
+      sum += Motion(limits[k], start[k], goal[k]).total_time();
+    }
+    const std::chrono::duration<double, std::nano> elapsed = Clock::now() - begin;
+    best = std::min(best, elapsed.count() / static_cast<double>(limits.size()));
+  }
+  return best;
+}
+
+void time_all() {
+  Random random(42);
+  std::vector<Case> cases(21000);
+  for (Case& c : cases) {
+    c = random_case(random);
+  }
+  double sum = 0.0;
+  const double period = 0.02;
+  // Rebuilt each period from its own last sample, as a loop on a robot does.
+  const auto loop = [&](std::vector<Case> one) {
+    MotionState at = one.front().start;
+    int left = 200;
+    return nanoseconds(
+        std::vector<Case>(20000, one.front()),
+        [&](const Case& c) {
+          if (--left == 0) {
+            at = c.start;
+            left = 200;
+          }
+          at = TrapezoidProfile(c.limits, at, c.goal).sample(period);
+          return at.position;
+        },
+        sum);
+  };
+  const double trapezoid_loop = loop({{{1.5, 3.0}, {}, {4.0}}});
+  const double trapezoid = nanoseconds(
+      cases,
+      [&](const Case& c) {
+        return TrapezoidProfile(c.limits, c.start, c.goal).sample(period).position;
+      },
+      sum);
+  const double s_curve = nanoseconds(
+      cases, [&](const Case& c) { return SCurveProfile(c.limits, c.start, c.goal).total_time(); },
+      sum);
+  const double parabolic = nanoseconds(
+      cases,
+      [&](const Case& c) { return ParabolicProfile(c.limits, c.start, c.goal).total_time(); }, sum);
+  const double exponential = nanoseconds(
+      cases,
+      [&](const Case& c) {
+        const MotorMotionLimits motor{
+            .kV = 12.0 / c.limits.velocity, .kA = 12.0 / c.limits.acceleration, .voltage = 12.0};
+        return ExponentialProfile(motor, c.start, c.goal).total_time();
+      },
+      sum);
+  const std::vector<Case> few(cases.begin(), cases.begin() + 500);
+  const double minimum_jerk = nanoseconds(
+      few,
+      [&](const Case& c) { return MinimumJerkProfile(c.limits, c.start, c.goal).total_time(); },
+      sum);
+  const double three = synchronized_nanoseconds<3>(cases, sum);
+  const double seven = synchronized_nanoseconds<7>(cases, sum);
+  std::printf("%-44s %10s %10s\n", "plan", "ns", "ratio");
+  const auto row = [&](const char* name, double ns) {
+    std::printf("%-44s %10.1f %10.2f\n", name, ns, ns / trapezoid);
+  };
+  row("trapezoid and one sample, rebuilt in a loop", trapezoid_loop);
+  row("trapezoid and one sample, random states", trapezoid);
+  row("S-curve, random states", s_curve);
+  row("S-curve, 3 axes at once", three);
+  row("S-curve, 7 axes at once", seven);
+  row("parabolic", parabolic);
+  row("exponential", exponential);
+  row("minimum jerk", minimum_jerk);
+  std::printf("(checksum %.9g)\n", sum);
+}
+
+template <class Try>
+void campaign(const char* name, long count, Try&& attempt) {
+  Random random(20260101);
+  long broken = 0;
+  for (long i = 0; i < count; ++i) {
+    const std::string law = attempt(random);
+    if (!law.empty() && ++broken <= 10) {
+      std::printf("%s, problem %ld: %s\n", name, i, law.c_str());
+    }
+  }
+  std::printf("%-28s %10ld problems, %ld broke a law\n", name, count, broken);
+  std::fflush(stdout);
+}
+
+void run_campaigns(long count) {
+  for (const bool outside : {false, true}) {
+    campaign(outside ? "trapezoid, from outside" : "trapezoid", count, [&](Random& random) {
+      const test::ProfileDemand demand = test::random_demand(random, 2, outside);
+      return test::broken_law(TrapezoidProfile(demand.limits, demand.start, demand.goal), demand);
+    });
+    campaign(outside ? "s-curve, from outside" : "s-curve", count, [&](Random& random) {
+      const test::ProfileDemand demand = test::random_demand(random, 3, outside);
+      return test::broken_law(SCurveProfile(demand.limits, demand.start, demand.goal), demand);
+    });
+  }
+  campaign("parabolic", count, [&](Random& random) {
+    test::ProfileDemand demand = test::random_demand(random, 2, false);
+    demand.limits = {demand.limits.velocity, demand.limits.acceleration};
+    demand.start.velocity =
+        std::clamp(demand.start.velocity, -demand.limits.velocity, demand.limits.velocity);
+    demand.goal.velocity =
+        std::clamp(demand.goal.velocity, -demand.limits.velocity, demand.limits.velocity);
+    demand.replan = false;
+    return test::broken_law(ParabolicProfile(demand.limits, demand.start, demand.goal), demand);
+  });
+  campaign("exponential", count, [&](Random& random) {
+    test::ProfileDemand demand = test::random_demand(random, 2, false);
+    const MotorMotionLimits motor{.kV = 12.0 / demand.limits.velocity,
+                                  .kA = 12.0 / demand.limits.acceleration,
+                                  .voltage = 12.0,
+                                  .kS = random.uniform(0.0, 1.0),
+                                  .kG = random.uniform(-3.0, 3.0)};
+    const double top = 8.0 / motor.kV;
+    demand.start.velocity = std::clamp(demand.start.velocity, -top, top);
+    demand.goal.velocity = std::clamp(demand.goal.velocity, -top, top);
+    demand.replan = false;
+    const ExponentialProfile profile(motor, demand.start, demand.goal);
+    demand.limits = {2.0 * demand.limits.velocity, 28.0 / motor.kA};
+    return test::broken_law(profile, demand);
+  });
+  campaign("three axes at once", count / 3, [&](Random& random) {
+    SynchronizedMotion<3>::Limits limits;
+    SynchronizedMotion<3>::States start;
+    SynchronizedMotion<3>::States goal;
+    test::ProfileDemand demands[3];
+    for (std::size_t i = 0; i < 3; ++i) {
+      demands[i] = test::random_demand(random, 3, false);
+      limits[i] = demands[i].limits;
+      start[i] = demands[i].start;
+      goal[i] = demands[i].goal;
+    }
+    const SynchronizedMotion<3> motion(limits, start, goal);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const JerkMotion& axis = motion.axis(static_cast<int>(i));
+      if (std::abs(axis.total_time() - motion.total_time()) > 1e-9 * motion.total_time()) {
+        return std::string("an axis ends by itself");
+      }
+      std::string law = test::broken_law(axis, demands[i]);
+      if (!law.empty()) {
+        return law;
+      }
+    }
+    return std::string();
+  });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc == 3 && std::strcmp(argv[1], "--campaign") == 0) {
+    run_campaigns(std::atol(argv[2]));
+    return 0;
+  }
+  time_all();
+  return 0;
+}
