@@ -242,6 +242,15 @@ def check_motors(folder):
     check_answer(["motor-curves", "cim.csv", "--motor", "nothing"], 2, folder)
 
 
+def check_profile(folder):
+    limits = ["profile", "--to", "1.2m", "--velocity", "1.5m/s", "--acceleration", "3m/s^2"]
+    check_answer(limits, 0, folder)
+    for more in (["--kind", "s-curve"], ["--resonance", "4Hz"], ["--kind", "minimum-jerk"], ["--kv", "4", "--ka", "1"]):
+        check_answer([*limits, *more], 0, folder)
+    check_answer([*limits, "--kind", "curve"], 2, folder)
+    check_answer(["profile", "--to", "1m"], 2, folder)
+
+
 def check_localize(folder):
     (folder / "odometry.csv").write_text(
         "time,v,w\n" + "\n".join(f"{0.1 * k:.2f},0.2,0.1" for k in range(100)))
@@ -342,6 +351,7 @@ with tempfile.TemporaryDirectory() as name:
     check_estimate(pathlib.Path(name))
     check_motors(pathlib.Path(name))
     check_units(pathlib.Path(name))
+    check_profile(pathlib.Path(name))
     check_places(pathlib.Path(name))
     check_reader_and_schema(pathlib.Path(name))
 check_project_schema()

@@ -46,11 +46,19 @@ int roots(const double* c, int n, double T, double* at) {
     if ((value(c, n, low) > 0.0) == (value(c, n, high) > 0.0)) {
       continue;
     }
-    for (int k = 0; k < 50 && low < high; ++k) {
-      const double middle = 0.5 * (low + high);
-      ((value(c, n, middle) > 0.0) == rises ? high : low) = middle;
+    // Newton's method, and halves where it leaves the interval.
+    double t = 0.5 * (low + high);
+    for (int k = 0; k < 60; ++k) {
+      const double y = value(c, n, t);
+      ((y > 0.0) == rises ? high : low) = t;
+      const double next = t - y / value(d, n - 1, t);
+      const double last = t;
+      t = next > low && next < high ? next : 0.5 * (low + high);
+      if (std::abs(t - last) <= 1e-14 * T) {
+        break;
+      }
     }
-    at[found++] = 0.5 * (low + high);
+    at[found++] = t;
   }
   return found;
 }

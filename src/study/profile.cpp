@@ -1,0 +1,229 @@
+#include <flyball/study/profile.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/planning/profiles/minimum_jerk_profile.hpp>
+#include <flyball/planning/profiles/parabolic_profile.hpp>
+
+#include "core/try.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+constexpr std::string_view where = "profile";
+
+Expected<std::optional<MotorMotionLimits>> motor_of(const ProfileJob& job) {
+  if (!job.kV) {
+    if (job.kA) {
+      return refusal(ArgumentError::empty, where, "kV").got("left out").expected("given with kA");
+    }
+    return std::optional<MotorMotionLimits>{};
+  }
+  if (!job.kA) {
+    return refusal(ArgumentError::empty, where, "kA").got("left out").expected("given with kV");
+  }
+  MotorMotionLimits motor{
+      .kV = *job.kV, .kA = *job.kA, .voltage = job.voltage.si(), .kS = job.kS, .kG = job.kG};
+  FLYBALL_CHECK(Checks(where)
+                    .positive(motor.kV, "kV")
+                    .positive(motor.kA, "kA")
+                    .positive(motor.voltage, "voltage", "V")
+                    .not_negative(motor.kS, "kS", "V")
+                    .finite(motor.kG, "kG"));
+  if (job.current) {
+    if (!job.resistance) {
+      return refusal(ArgumentError::empty, where, "resistance")
+          .got("left out")
+          .expected("given with current");
+    }
+    motor.current_voltage = job.current->si() * job.resistance->si();
+  }
+  if (job.velocity > 0.0) {
+    motor.velocity = job.velocity;
+  }
+  const double held = std::abs(motor.kG) + motor.kS;
+  const double most = std::min(motor.voltage, motor.current_voltage);
+  if (held >= most) {
+    return refusal(ArgumentError::out_of_range, where, "friction and gravity")
+        .got(fmt::format("{} V together", format_number(held)))
+        .expected(fmt::format("below the {} V that the motor has at rest", format_number(most)))
+        .hint("add motors, gear lower or counterbalance");
+  }
+  return std::optional(motor);
+}
+
+/// Limits as given; what is left out is the motor's.
+Expected<MotionLimits> limits_of(const ProfileJob& job,
+                                 const std::optional<MotorMotionLimits>& motor) {
+  MotionLimits limits{job.velocity, job.acceleration, job.deceleration, job.reverse_velocity};
+  if (motor) {
+    // Half of the top speed leaves half of the acceleration.
+    const double top = (motor->voltage - motor->kS - std::abs(motor->kG)) / motor->kV;
+    limits.velocity = limits.velocity > 0.0 ? limits.velocity : 0.5 * top;
+    if (!(limits.acceleration > 0.0)) {
+      limits.acceleration = std::max(motor->most(limits.velocity), 1e-3 * motor->most(0.0));
+    }
+  }
+  for (const auto& [value, name, unit] : {std::tuple(limits.velocity, "velocity", "/s"),
+                                          {limits.acceleration, "acceleration", "/s²"}}) {
+    if (!(value > 0.0)) {
+      return refusal(ArgumentError::empty, where, name)
+          .got("left out")
+          .expected(fmt::format("a limit such as --{} \"2 {}{}\", or a motor by --kv and --ka",
+                                name, job.angle ? "rad" : "m", unit));
+    }
+  }
+  return limits;
+}
+
+double default_ramp(const MotionLimits& limits) {
+  return 0.25 * limits.velocity / limits.acceleration;
+}
+
+/// Each period, then the end.
+template <MotionProfile Profile>
+Expected<void> tabulate(const Profile& profile, ProfileResult& result) {
+  const double end = profile.total_time();
+  const double period = result.job.period.si();
+  constexpr double most_rows = 1e6;
+  if (!(end / period < most_rows)) {
+    return refusal(ArgumentError::out_of_range, where, "the profile")
+        .got(fmt::format("{} s long, {:.3g} periods", format_number(end), end / period))
+        .expected("at most a million periods long")
+        .hint("raise the limits or --period");
+  }
+  result.duration = end;
+  std::vector<double> time;
+  std::vector<double> x;
+  std::vector<double> v;
+  std::vector<double> a;
+  const auto add = [&](double t) {
+    const MotionState at = profile.sample(t);
+    time.push_back(t);
+    x.push_back(at.position);
+    v.push_back(at.velocity);
+    a.push_back(at.acceleration);
+    result.peak_velocity = std::max(result.peak_velocity, std::abs(at.velocity));
+    result.peak_acceleration = std::max(result.peak_acceleration, std::abs(at.acceleration));
+  };
+  const auto rows = static_cast<long>(end / period * (1.0 - 1e-12));
+  for (long k = 0; k <= rows; ++k) {
+    add(static_cast<double>(k) * period);
+  }
+  add(end);
+  TimeSeries table(std::move(time));
+  FLYBALL_CHECK(table.add("position", result.unit, std::move(x)));
+  FLYBALL_CHECK(table.add("velocity", result.unit + "/s", std::move(v)));
+  FLYBALL_CHECK(table.add("acceleration", result.unit + "/s²", std::move(a)));
+  result.table = std::move(table);
+  return {};
+}
+
+Expected<void> plan(ProfileResult& result, const std::optional<MotorMotionLimits>& motor,
+                    double jump) {
+  const MotionState& from = result.job.from;
+  const MotionState& to = result.job.to;
+  const MotionLimits& limits = result.limits;
+  switch (result.kind) {
+    case ProfileKind::s_curve:
+      return tabulate(SCurveProfile(limits, from, to), result);
+    case ProfileKind::exponential:
+      return tabulate(ExponentialProfile(*motor, from, to), result);
+    case ProfileKind::parabolic:
+      return tabulate(ParabolicProfile(limits, from, to), result);
+    case ProfileKind::stepper:
+      return tabulate(StepperProfile(limits, jump, from, to), result);
+    case ProfileKind::minimum_jerk: {
+      const MinimumJerkProfile profile(limits, from, to);
+      if (!profile.keeps_limits()) {
+        return refusal(ArgumentError::out_of_range, where, "a fifth-degree polynomial")
+            .got("beyond the limits at every duration")
+            .expected("ends within the limits")
+            .hint("s-curve goes between all states");
+      }
+      return tabulate(profile, result);
+    }
+    case ProfileKind::trapezoid:
+      break;
+  }
+  return tabulate(TrapezoidProfile(limits, from, to), result);
+}
+
+}  // namespace
+
+Expected<ProfileResult> plan_profile(const ProfileJob& job) {
+  ProfileResult result{.job = job, .unit = job.angle ? "rad" : "m"};
+  FLYBALL_TRY(const std::optional<MotorMotionLimits> motor, motor_of(job));
+  FLYBALL_TRY(result.limits, limits_of(job, motor));
+  const MotionState& from = job.from;
+  if (job.continuous) {
+    result.job.to.position = nearest_turn(job.to.position, from.position);
+  }
+  const MotionState& to = result.job.to;
+  constexpr double largest = 1e30;
+  for (const auto& [value, name] : {std::pair(from.position, "from"),
+                                    {to.position, "to"},
+                                    {from.velocity, "start_velocity"},
+                                    {to.velocity, "goal_velocity"},
+                                    {from.acceleration, "start_acceleration"},
+                                    {to.acceleration, "goal_acceleration"},
+                                    {result.limits.velocity, "velocity"},
+                                    {result.limits.acceleration, "acceleration"}}) {
+    if (!(std::abs(value) <= largest)) {
+      return refusal(ArgumentError::out_of_range, where, name)
+          .got(format_number(value))
+          .expected("a size up to 1e30");
+    }
+  }
+  FLYBALL_CHECK(Checks(where).positive(job.period.si(), "period", "s"));
+
+  double jump = job.jump;
+  if (job.kind.empty() && motor && !(job.velocity > 0.0) && !(job.acceleration > 0.0)) {
+    result.kind = ProfileKind::exponential;
+    result.reasons.emplace_back(
+        "Only the motor limits it: along its torque-speed curve nothing is faster.");
+  } else if (job.kind.empty()) {
+    ProfileNeeds needs{
+        .limits = result.limits,
+        .distance = to.position - from.position,
+        .unit = result.unit,
+        .actuator = job.step_motor ? ActuatorKind::step_motor : ActuatorKind::dc_motor,
+        .motor = motor,
+        .delicate = job.delicate};
+    if (job.resonance) {
+      needs.resonance = job.resonance->si();
+    }
+    if (needs.distance == 0.0) {
+      needs.distance = result.limits.velocity * result.limits.velocity / result.limits.acceleration;
+    }
+    FLYBALL_TRY(const ProfileAdvice advice, select_profile(needs));
+    result.kind = advice.kind;
+    result.reasons = advice.reasons;
+    result.limits.jerk = advice.limits.jerk;
+    jump = std::max(jump, advice.jump);
+  } else {
+    FLYBALL_TRY(result.kind, parse_profile_kind(job.kind));
+  }
+  if (result.kind == ProfileKind::exponential && !motor) {
+    return refusal(ArgumentError::empty, where, "the motor")
+        .got("left out")
+        .expected("--kv and --ka of an exponential profile");
+  }
+  if (job.ramp) {
+    result.limits.jerk = result.limits.acceleration / job.ramp->si();
+  } else if (result.kind == ProfileKind::s_curve && !std::isfinite(result.limits.jerk)) {
+    result.limits.jerk = result.limits.acceleration / default_ramp(result.limits);
+  }
+  FLYBALL_CHECK(plan(result, motor, jump));
+  const TrapezoidProfile trapezoid(result.limits, from, to);
+  result.other_duration = trapezoid.total_time();
+  return result;
+}
+
+}  // namespace flyball::study
