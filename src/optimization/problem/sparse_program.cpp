@@ -440,9 +440,9 @@ VectorXd SparseProgram::start(const std::vector<double>& x) {
   const VectorXd lambda = VectorXd::Zero(m_);
   if (derivatives(w, lambda, 1.0, gradient)) {
     const double most = gradient.size() > 0 ? gradient.lpNorm<Eigen::Infinity>() : 0.0;
-    objective_scale_ = stages_        ? 1.0 / static_cast<double>(stages_->stages())
-                       : most > 100.0 ? std::max(100.0 / most, 1e-8)
-                                      : 1.0;
+    objective_scale_ = stages_ && !is_quadratic() ? 1.0 / static_cast<double>(stages_->stages())
+                       : most > 100.0             ? std::max(100.0 / most, 1e-8)
+                                                  : 1.0;
     for (std::size_t r = 0; r < static_cast<std::size_t>(m_); ++r) {
       double slope = 0.0;
       for (int e = a_start_[r]; e < a_start_[r + 1]; ++e) {

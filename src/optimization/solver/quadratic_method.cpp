@@ -59,7 +59,7 @@ void QuadraticMethod::solve(VectorXd& dw, VectorXd& dl, bool refined) {
     residual_w_ = ((residual_w_ + rw_).array() + diagonal_.array() * dw.array()) * free_.array();
     residual_c_ += c_;
     const double left = std::max(largest(residual_w_), largest(residual_c_));
-    if (!(left > 1e-7 * size) || !(left < 0.5 * before)) {
+    if (!(left > 1e-10 * size) || !(left < 0.5 * before)) {
       return;
     }
     before = left;
@@ -173,8 +173,9 @@ bool QuadraticMethod::converged(double tolerance) {
   // f = f₀ + gᵀw + ½ wᵀHw, of hw = Hw + Aᵀλ and hc = Aw.
   f_ = f0_ + g_.dot(w_) + 0.5 * (w_.dot(hw_) - lambda_.dot(hc_));
   last_.cost = f_;
+  // The last digits of inputs that the cost hardly feels are worth a step more.
   const double worst =
-      std::max(last_.infeasibility, std::max(last_.optimality, last_.complementarity));
+      std::max(std::max(last_.infeasibility, last_.optimality), 10.0 * last_.complementarity);
   return worst <= tolerance && std::isfinite(f_ + rd_.sum() + c_.sum());
 }
 
