@@ -57,6 +57,7 @@ struct Problem::Parts {
   std::unique_ptr<InteriorPoint> general{};
   std::unique_ptr<QuadraticMethod> quadratic{};
   bool is_warm = false;
+  std::vector<double> solved_parameters{};  // of the program's numbers
 
   void refuse(Error problem_error) {
     if (!error) {
@@ -65,7 +66,8 @@ struct Problem::Parts {
   }
   [[nodiscard]] std::string name_of(std::size_t constraint) const;
   void report(ProblemSolution& solution, const FlatProblem& flat) const;
-  [[nodiscard]] ProblemSolution run(FlatProblem flat, const SolverOptions& options,
+  /// @param flat  The problem's numbers; null: they are those of the program.
+  [[nodiscard]] ProblemSolution run(FlatProblem* flat, const SolverOptions& options,
                                     FunctionRef<bool(const Iteration&)> watch);
 };
 
@@ -76,6 +78,7 @@ Problem::~Problem() = default;
 
 Expression Problem::decision_variable() {
   parts_->is_warm = false;
+  parts_->program.reset();
   return {&parts_->graph, parts_->graph.input()};
 }
 
@@ -193,18 +196,18 @@ void Problem::Parts::report(ProblemSolution& solution, const FlatProblem& flat) 
   }
 }
 
-ProblemSolution Problem::Parts::run(FlatProblem flat, const SolverOptions& options,
+ProblemSolution Problem::Parts::run(FlatProblem* flat, const SolverOptions& options,
                                     FunctionRef<bool(const Iteration&)> watch) {
   ProblemSolution solution;
-  const double direction = flat.sign;
-  if (!program || !program->update(flat)) {
-    program = std::make_unique<SparseProgram>(std::move(flat));
+  if (flat != nullptr && (!program || !program->update(*flat))) {
+    program = std::make_unique<SparseProgram>(std::move(*flat));
     general.reset();
     quadratic.reset();
     is_warm = false;
   }
   SparseProgram& p = *program;
   const FlatProblem& stated = p.flat();
+  const double direction = stated.sign;
   solution.cost_degree = stated.cost_degree;
   solution.equality_degree = stated.equality_degree;
   solution.inequality_degree = stated.inequality_degree;
@@ -330,27 +333,33 @@ Expected<ProblemSolution> Problem::solve(const SolverOptions& options,
           Error(ProblemError::not_finite).in("problem").about("a variable's start"));
     }
   }
-  FlatProblem flat = detail::flatten(parts.graph, parts.cost, parts.sign, parts.constraints);
-  if (flat.not_finite != -1) {
-    return tl::unexpected(Error(ProblemError::not_finite)
-                              .in("problem")
-                              .about(flat.not_finite == -2 ? std::string("the cost")
-                                                           : parts.name_of(static_cast<std::size_t>(
-                                                                 flat.not_finite))));
-  }
   ProblemSolution solution;
   std::vector<Iteration> rows;
-  if (flat.impossible >= 0) {
-    solution.status = SolveStatus::infeasible;
-    solution.method = "presolve";
-    parts.report(solution, flat);
-    return solution;
+  FlatProblem flat;
+  const bool is_new = !parts.program || parts.solved_parameters != parts.graph.parameter_values;
+  if (is_new) {
+    flat = detail::flatten(parts.graph, parts.cost, parts.sign, parts.constraints);
+    if (flat.not_finite != -1) {
+      return tl::unexpected(
+          Error(ProblemError::not_finite)
+              .in("problem")
+              .about(flat.not_finite == -2
+                         ? std::string("the cost")
+                         : parts.name_of(static_cast<std::size_t>(flat.not_finite))));
+    }
+    if (flat.impossible >= 0) {
+      solution.status = SolveStatus::infeasible;
+      solution.method = "presolve";
+      parts.report(solution, flat);
+      return solution;
+    }
+    parts.solved_parameters = parts.graph.parameter_values;
   }
   const auto look = [&](const Iteration& row) {
     rows.push_back(row);
     return watch(row);
   };
-  solution = parts.run(std::move(flat), options, look);
+  solution = parts.run(is_new ? &flat : nullptr, options, look);
   solution.iterations = std::move(rows);
   if (!solution.solved() && solution.status != SolveStatus::not_finite) {
     parts.report(solution, parts.program->flat());
