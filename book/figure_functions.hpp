@@ -54,6 +54,9 @@ namespace flyball::book {
 [[nodiscard]] FigureResult figure_12_2();
 [[nodiscard]] FigureResult figure_15_1();
 [[nodiscard]] FigureResult figure_15_2();
+[[nodiscard]] FigureResult figure_17_1();
+[[nodiscard]] FigureResult figure_17_2();
+[[nodiscard]] FigureResult figure_17_3();
 [[nodiscard]] FigureResult figure_B_1();
 [[nodiscard]] FigureResult figure_B_2();
 [[nodiscard]] FigureResult figure_B_3();
