@@ -38,7 +38,7 @@ DoubleIntegrator solve_double_integrator() {
     J += pow(r - X(0, k), 2);
   }
   problem.minimize(J);
-  const ProblemSolution solution = problem.solve({.tolerance = 1e-11}).value();
+  const ProblemSolution solution = problem.solve({.tolerance = 1e-12}).value();
   return {X.row(0).value(), X.row(1).value(), U.value(), solution.cost};
 }
 

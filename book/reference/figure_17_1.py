@@ -45,7 +45,7 @@ for name, figure, values in (("position", "17.1", p), ("velocity", "17.2", v), (
     document = {
         "figure": figure,
         "source": "the optimum from its structure, in exact fractions (book/reference/figure_17_1.py)",
-        "tolerance": 1e-6,
+        "tolerance": 1e-9,
         "numbers": [{"name": "cost", "value": float(cost)}],
         "series": [{"name": name, "length": len(numbers), "rows": at, "values": [numbers[k] for k in at],
                     "min": min(numbers), "max": max(numbers), "mean": float(sum(values) / len(values))}],
