@@ -399,16 +399,18 @@ bool InteriorPoint::search() {
   return false;
 }
 
-bool InteriorPoint::restore(const SolverOptions& options, Watch watch) {
+/// @return solved where the filter's method can go on from the point that was found; infeasible
+/// where the violation is at a minimum; otherwise why it ended.
+SolveStatus InteriorPoint::restore(const SolverOptions& options, double seconds_left, Watch watch) {
   if (is_restoration_) {
-    return false;
+    return SolveStatus::no_progress;
   }
   if (!restoration_) {
     restoration_ = std::make_unique<Restoration>(program_);
   }
   const double theta = c_.lpNorm<1>();
   if (!(theta > 0.1 * options.tolerance)) {
-    return false;
+    return SolveStatus::no_progress;
   }
   ++counts_.restorations;
   filter_.add((1.0 - 1e-5) * theta, barrier(w_, f_) - 1e-5 * theta);
@@ -418,13 +420,15 @@ bool InteriorPoint::restore(const SolverOptions& options, Watch watch) {
   restoring.set_reference(w_, mu);
   restoring.begin(w_, c_, mu, zl_, zu_, solver);
   bool enough = false;
+  bool stopped = false;
   const int before = last_.number;
   const auto check = [&](const Iteration& iteration) {
     last_.number = before + iteration.number;
     Iteration shown = iteration;
     shown.number = last_.number;
     shown.restoration = true;
-    if (watch(shown)) {
+    stopped = watch(shown);
+    if (stopped) {
       return true;
     }
     trial_ = solver.w().head(w_.size());
@@ -438,14 +442,17 @@ bool InteriorPoint::restore(const SolverOptions& options, Watch watch) {
   SolverOptions inner = options;
   inner.first_barrier = mu;
   inner.max_iterations = std::max(0, options.max_iterations - before);
+  inner.time_limit = seconds_left;
   const SolveStatus status = solver.run(inner, check);
-  if (!enough) {
-    trial_ = solver.w().head(w_.size());
-    if (program_.values(trial_, trial_f_, trial_c_) && trial_c_.lpNorm<1>() <= 0.5 * theta &&
-        status == SolveStatus::solved) {
-      enough = true;
-      reset_filter();
-    }
+  counts_.factorizations += solver.counts().factorizations;
+  counts_.evaluations += solver.counts().evaluations;
+  trial_ = solver.w().head(w_.size());
+  if (!program_.values(trial_, trial_f_, trial_c_)) {
+    return SolveStatus::not_finite;
+  }
+  if (!enough && trial_c_.lpNorm<1>() <= 0.5 * theta) {
+    enough = true;  // much is won, though not by the filter's measure
+    reset_filter();
   }
   w_ = trial_;
   c_ = trial_c_;
@@ -454,7 +461,10 @@ bool InteriorPoint::restore(const SolverOptions& options, Watch watch) {
   zl_ = (zl_.array() > 0.0).select((mu_ / sl_.array()).matrix(), 0.0);
   zu_ = (zu_.array() > 0.0).select((mu_ / su_.array()).matrix(), 0.0);
   lambda_.setZero();
-  return enough;
+  if (stopped || status == SolveStatus::iteration_limit || status == SolveStatus::time_limit) {
+    return stopped ? SolveStatus::stopped : status;
+  }
+  return enough ? SolveStatus::solved : SolveStatus::infeasible;
 }
 
 SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
@@ -501,6 +511,9 @@ SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
     if (error.largest() <= options.tolerance) {
       return SolveStatus::solved;
     }
+    if (f_ < -1e20 && error.primal < 1e-4) {
+      return SolveStatus::unbounded;
+    }
     if (k > 0 && watch(last_)) {
       return SolveStatus::stopped;
     }
@@ -531,13 +544,18 @@ SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
     if (!std::isfinite(gradient_.sum())) {
       return SolveStatus::not_finite;
     }
-    if (!restore(options, watch)) {
-      const double left = error.largest();
-      if (left <= 1e3 * options.tolerance) {
-        return SolveStatus::acceptable;
-      }
-      return error.primal > 1e-6 ? SolveStatus::infeasible : SolveStatus::no_progress;
+    const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+    const SolveStatus restored =
+        restore(options, std::max(0.0, options.time_limit - seconds), watch);
+    if (restored == SolveStatus::solved) {
+      continue;
     }
+    counts_.iterations = last_.number;
+    if (error.largest() <= 1e3 * options.tolerance) {
+      return SolveStatus::acceptable;
+    }
+    return restored == SolveStatus::infeasible && !(error.primal > 1e-6) ? SolveStatus::no_progress
+                                                                         : restored;
   }
 }
 

@@ -67,7 +67,7 @@ class InteriorPoint {
   [[nodiscard]] double dual_step(double tau) const;
   [[nodiscard]] bool search();
   void accept(double alpha, double alpha_dual);
-  [[nodiscard]] bool restore(const SolverOptions& options, Watch watch);
+  [[nodiscard]] SolveStatus restore(const SolverOptions& options, double seconds_left, Watch watch);
   void reset_filter();
   void bound_multipliers();
 
