@@ -9,11 +9,11 @@
 
 #include <flyball/systems/system_error.hpp>
 
+#include "classical/delay_characteristic.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/spectral_blocks.hpp"
-#include "systems/balance.hpp"
 
 namespace flyball::classical {
 
@@ -23,8 +23,11 @@ using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 using Complex = std::complex<double>;
+using detail::Characteristic;
+using detail::jump_abscissa;
+using detail::largest_radius;
+using detail::radius_of;
 using flyball::detail::eigenvalues_of;
-using flyball::detail::product;
 
 namespace {
 
@@ -34,209 +37,11 @@ constexpr Index most_points = 500;
 constexpr std::size_t most_poles = 30;
 constexpr std::string_view where = "poles";
 
-double radius_of(const MatrixXd& M) {
-  return M.size() > 0 ? eigenvalues_of(M).cwiseAbs().maxCoeff() : 0.0;
-}
-
 /// How much of an equation's own size a sum may vanish to.
 Refusal not_found(std::string got) {
   return refusal(SystemError::no_convergence, where, "the rightmost poles")
       .got(std::move(got))
       .hint("a rational approximation has as many poles as its order (`pade`)");
-}
-
-/// The characteristic matrix of the loops alone.
-class Characteristic {
- public:
-  explicit Characteristic(const DelayForm& form) : delays_(form.delays), D_(form.D22) {
-    const auto scaling = flyball::detail::scaling_of(form.A, form.B2, form.C2).states;
-    const VectorXd inverse = scaling.cwiseInverse();
-    A_ = inverse.asDiagonal() * form.A * scaling.asDiagonal();
-    B_ = inverse.asDiagonal() * form.B2;
-    C_ = form.C2 * scaling.asDiagonal();
-    open_ = flyball::detail::eigenvalues_by_parts_of(A_);
-  }
-
-  [[nodiscard]] Index states() const { return A_.rows(); }
-  [[nodiscard]] const VectorXd& delays() const { return delays_; }
-  [[nodiscard]] const MatrixXd& jumps() const { return D_; }
-  [[nodiscard]] const VectorXcd& open_poles() const { return open_; }
-
-  [[nodiscard]] VectorXcd late(Complex s) const {
-    VectorXcd factors(delays_.size());
-    for (Index i = 0; i < factors.size(); ++i) {
-      factors(i) = std::exp(-s * delays_(i));
-    }
-    return factors;
-  }
-  [[nodiscard]] MatrixXcd at(Complex s) const {
-    const Index n = states();
-    const Index k = delays_.size();
-    const VectorXcd factors = late(s);
-    MatrixXcd M(n + k, n + k);
-    M.topLeftCorner(n, n) = -A_.cast<Complex>();
-    M.topLeftCorner(n, n).diagonal().array() += s;
-    M.topRightCorner(n, k) = -B_.cast<Complex>() * factors.asDiagonal();
-    M.bottomLeftCorner(k, n) = -C_.cast<Complex>();
-    M.bottomRightCorner(k, k) = -D_.cast<Complex>() * factors.asDiagonal();
-    M.bottomRightCorner(k, k).diagonal().array() += 1.0;
-    return M;
-  }
-  /// d/ds of it.
-  [[nodiscard]] MatrixXcd slope(Complex s) const {
-    const Index n = states();
-    const Index k = delays_.size();
-    const VectorXcd factors = late(s).cwiseProduct(delays_.cast<Complex>());
-    MatrixXcd M = MatrixXcd::Zero(n + k, n + k);
-    M.topLeftCorner(n, n).setIdentity();
-    M.topRightCorner(n, k) = B_.cast<Complex>() * factors.asDiagonal();
-    M.bottomRightCorner(k, k) = D_.cast<Complex>() * factors.asDiagonal();
-    return M;
-  }
-  /// H = C(sI - A)⁻¹B + D, from w to z.
-  [[nodiscard]] MatrixXcd around(Complex s) const {
-    const Index n = states();
-    if (n == 0) {
-      return D_.cast<Complex>();
-    }
-    MatrixXcd shifted = -A_.cast<Complex>();
-    shifted.diagonal().array() += s;
-    return flyball::detail::complex_product(
-               C_.cast<Complex>(), flyball::detail::solve_complex(shifted, B_.cast<Complex>())) +
-           D_.cast<Complex>();
-  }
-  /// No loop gain at jω exceeds it, whatever the phases of the delays.
-  [[nodiscard]] double gain(double frequency) const {
-    const MatrixXd size = around({0.0, frequency}).cwiseAbs();
-    return size.allFinite() ? radius_of(size) : infinity;
-  }
-
-  /// x' and the delay lines v' = -dv/dθ at Chebyshev's points of each.
-  [[nodiscard]] MatrixXd discretised(const std::vector<Index>& points) const;
-
- private:
-  MatrixXd A_;
-  MatrixXd B_;
-  MatrixXd C_;
-  VectorXd delays_;
-  MatrixXd D_;
-  VectorXcd open_;
-};
-
-/// Of functions at the p + 1 points (1 - cos πj/p)/2 of [0, 1].
-MatrixXd chebyshev_derivative(Index p) {
-  const auto node = [&](Index j) {
-    return 0.5 * (1.0 - std::cos(pi * static_cast<double>(j) / static_cast<double>(p)));
-  };
-  MatrixXd D = MatrixXd::Zero(p + 1, p + 1);
-  for (Index i = 0; i <= p; ++i) {
-    const double ci = i == 0 || i == p ? 2.0 : 1.0;
-    for (Index j = 0; j <= p; ++j) {
-      if (i != j) {
-        const double cj = j == 0 || j == p ? 2.0 : 1.0;
-        D(i, j) = ci / cj * ((i + j) % 2 == 0 ? 1.0 : -1.0) / (node(i) - node(j));
-        D(i, i) -= D(i, j);
-      }
-    }
-  }
-  return D;
-}
-
-MatrixXd Characteristic::discretised(const std::vector<Index>& points) const {
-  const Index n = states();
-  const Index k = delays_.size();
-  Index size = n;
-  std::vector<Index> first;
-  for (const Index p : points) {
-    first.push_back(size);
-    size += p;
-  }
-  MatrixXd w = MatrixXd::Zero(k, size);
-  for (Index i = 0; i < k; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    w(i, first[at] + points[at] - 1) = 1.0;
-  }
-  MatrixXd z = product(D_, w);
-  z.leftCols(n) += C_;
-  MatrixXd M = MatrixXd::Zero(size, size);
-  M.topRows(n) = product(B_, w);
-  M.topLeftCorner(n, n) += A_;
-  for (Index i = 0; i < k; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const Index p = points[at];
-    const MatrixXd D = chebyshev_derivative(p) / delays_(i);
-    M.block(first[at], first[at], p, p) -= D.bottomRightCorner(p, p);
-    M.middleRows(first[at], p) -= D.col(0).tail(p) * z.row(i);
-  }
-  return M;
-}
-
-/// The largest ρ(D diag e^{jθ}) that a search over the angles finds.
-double largest_radius(const MatrixXd& D) {
-  const Index k = D.rows();
-  const auto radius = [&](const VectorXd& angles) {
-    VectorXcd turned(k);
-    for (Index i = 0; i < k; ++i) {
-      turned(i) = std::polar(1.0, angles(i));
-    }
-    return flyball::detail::eigenvalues_of_complex(D.cast<Complex>() * turned.asDiagonal())
-        .cwiseAbs()
-        .maxCoeff();
-  };
-  double best = 0.0;
-  for (int start = 0; start < (k == 1 ? 1 : 12); ++start) {
-    VectorXd angles(k);
-    for (Index i = 0; i < k; ++i) {
-      // Spread evenly enough, the same each time.
-      angles(i) =
-          std::fmod(2.399963 * static_cast<double>((start + 1) * (i + 1) * (i + 2)), 2.0 * pi) *
-          (start == 0 ? 0.0 : 1.0);
-    }
-    double here = radius(angles);
-    for (double step = 1.0; step > 1e-6; step *= 0.5) {
-      for (bool better = true; better;) {
-        better = false;
-        for (Index i = 0; i < k; ++i) {
-          for (const double sign : {1.0, -1.0}) {
-            VectorXd moved = angles;
-            moved(i) += sign * step;
-            const double there = radius(moved);
-            if (there > here * (1.0 + 1e-12)) {
-              here = there;
-              angles = moved;
-              better = true;
-            }
-          }
-        }
-      }
-    }
-    best = std::max(best, here);
-  }
-  return best;
-}
-
-/// c for which the loops of jumps decay like e^{ct}: ρ(|D| diag e^{-cτ}) = 1.
-double jump_abscissa(const MatrixXd& D, const VectorXd& delays) {
-  const auto radius = [&](double c) {
-    return radius_of(D.cwiseAbs() * (-c * delays).array().exp().matrix().asDiagonal());
-  };
-  if (radius_of(D.cwiseAbs()) == 0.0) {
-    return -infinity;
-  }
-  const double unit = 1.0 / delays.maxCoeff();
-  double low = -unit;
-  double high = unit;
-  while (radius(low) < 1.0 && low > -1e6 * unit) {
-    low *= 2.0;
-  }
-  while (radius(high) > 1.0 && high < 1e6 * unit) {
-    high *= 2.0;
-  }
-  for (int i = 0; i < 100; ++i) {
-    const double middle = 0.5 * (low + high);
-    (radius(middle) > 1.0 ? low : high) = middle;
-  }
-  return 0.5 * (low + high);
 }
 
 /// The frequency beyond which no loop has a gain that matters.
