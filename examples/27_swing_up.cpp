@@ -45,9 +45,9 @@ int main() {
       region.refuted);
 
   //! [run]
-  // From hanging nearly still, every 5 ms.
+  // From rest, both rods one radian off hanging; every 5 ms.
   auto controller = design->controller;
-  Eigen::Vector4d x(0.1, 0.0, 0.0, 0.0);
+  Eigen::Vector4d x(1.0, 0.0, 0.0, 0.0);
   const double period = 0.005;
   double stood = 0.0;
   double time = 0.0;

@@ -135,6 +135,7 @@ Section swing_up_section(const ModelDesign& result) {
             run.taken ? Value(text::seconds(*run.taken)) : Value("not within the run", Tone::bad));
   facts.add("it stands after", run.stands ? Value(text::seconds(*run.stands), Tone::good)
                                           : Value("not within the run", Tone::bad));
+  facts.add("the controller in C++17", "swing_up.hpp, with --out");
   section.blocks.emplace_back(std::move(facts));
   return section;
 }
@@ -175,9 +176,7 @@ void append_region(const ModelDesign& result, Answer& answer) {
     data.name = "data/swing_up.csv";
     answer.files.push_back(std::move(data));
     if (auto header = exports::swing_up_header(program_of(result))) {
-      answer.files.push_back({"swing_up.hpp", *header});
-      made.back().blocks.emplace_back(
-          Code{"The controller in C++17", *std::move(header), "swing_up.hpp"});
+      answer.files.push_back({"swing_up.hpp", *std::move(header)});
     }
   }
   sections.insert(diagnostics, std::make_move_iterator(made.begin()),

@@ -80,8 +80,11 @@ struct CartPoleShaper {
 ///   q̈₂ = -ω₀² k q₂ - ω₀ d q̇₂ + ω₀² sat(κ (E* - E)/E* q̇₁/ω₀, s),  ω₀² = (G's slope)/(M's sum)
 ///   upright,
 /// by collocated partial feedback linearisation: straightened where the energy is right, kicked
-/// along with the first link where it is too small. Source: Spong, "The swing up control problem
-/// for the Acrobot", IEEE Control Systems 15 (1995).
+/// along with the first link where it is too small. What it adds is in proportion to what moves:
+/// from hanging nearly still, below a tenth of a radian, two rods of 1 m take more than half a
+/// minute, and from rest more than a minute.
+///
+/// Source: Spong, "The swing up control problem for the Acrobot", IEEE Control Systems 15 (1995).
 struct AcrobotShaper {
   mechanisms::Acrobot model{};
   double stiffness = 10.5;  ///< k
