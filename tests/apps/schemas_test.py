@@ -286,10 +286,13 @@ def check_reader_and_schema(folder):
         if section in ("model", "point", "simulation", "fit", "estimate"):
             continue
         for key in told["properties"]:
-            if key in ("type", "motor", "tolerance", "limit", "reference", "mechanism"):
+            if key in ("type", "motor", "tolerance", "limit", "reference", "mechanism", "follower"):
                 continue
+            drives = section in ("drive", "disturbance")
             for text, value in values.items():
-                head = base if section == "mechanism" else f"{base}[{section}]\n"
+                head = '[drive]\ntype = "swerve"\n' if drives else base
+                if section not in ("mechanism", "drive"):
+                    head += f"[{section}]\n"
                 (folder / "one.toml").write_text(f"{head}{key} = {text}\n")
                 done = subprocess.run([command, "analyze", "one.toml", "--json"], cwd=folder,
                                       capture_output=True, text=True)
@@ -298,7 +301,7 @@ def check_reader_and_schema(folder):
                 name = f"{section}.{key} "
                 refused = any(f": {name}is " in e["message"] and "is missing" not in e["message"]
                               for e in errors)
-                project = {"mechanism": {"type": "elevator"}}
+                project = {"drive": {"type": "swerve"}} if drives else {"mechanism": {"type": "elevator"}}
                 project.setdefault(section, {})[key] = value
                 wrong = not validator("project").is_valid(project)
                 # A text with a number is the schema's limit: units are the reader's.

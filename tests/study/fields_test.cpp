@@ -78,7 +78,8 @@ Project any_project(mechanisms::MechanismKind kind) {
   const std::size_t states = row.signals.states.size();
   const bool custom = *rc::gen::arbitrary<bool>();
   for (const Section& section : project_document().sections) {
-    if (section.subject == Subject::model || (section.name == "mechanism.motor" && !custom)) {
+    if (section.subject == Subject::model || section.subject == Subject::drive ||
+        (section.name == "mechanism.motor" && !custom)) {
       continue;
     }
     void* object = section.within(&project, true);
