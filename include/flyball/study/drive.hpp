@@ -23,7 +23,9 @@ namespace flyball::study {
 
 struct Override;
 
+/// What a drivetrain moves by.
 enum class DriveKind { differential, swerve, mecanum };
+/// "differential", "swerve", "mecanum".
 [[nodiscard]] std::string_view to_string(DriveKind kind);
 
 /// What follows the trajectory.
@@ -33,6 +35,7 @@ enum class DriveFollower {
   ltv_drive,     ///< Section 8.7: voltages of the whole state.
   holonomic,     ///< Section 8.6.
 };
+/// "ramsete", "ltv unicycle", "ltv drive", "holonomic".
 [[nodiscard]] std::string_view to_string(DriveFollower follower);
 
 /// A drivetrain in SI.
