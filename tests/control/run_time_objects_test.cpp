@@ -20,6 +20,8 @@
 #include <flyball/core/random.hpp>
 #include <flyball/estimation/kalman_filter.hpp>
 #include <flyball/mechanisms/elevator.hpp>
+#include <flyball/planning/profiles/exponential_profile.hpp>
+#include <flyball/planning/profiles/s_curve_profile.hpp>
 #include <flyball/planning/profiles/trapezoid_profile.hpp>
 #include <flyball/systems/discretize.hpp>
 
@@ -278,6 +280,30 @@ std::vector<Subject> subjects() {
                                         profile.total_time(), profile.cruise_velocity()};
                    };
                  }});
+  // Inputs: v_max, a_max, jerk, start (3) and goal (3), t.
+  all.push_back({"SCurveProfile", 10, 0, [=]() -> Step {
+                   return [k = 0](const Faults& faults) mutable {
+                     const SCurveProfile profile(
+                         {of(faults, 0, 1.0), of(faults, 1, 2.0), 0.0, 0.0, of(faults, 2, 9.0)},
+                         {of(faults, 3, 0.1), of(faults, 4, 0.2), of(faults, 5, -0.3)},
+                         {of(faults, 6, 2.0), of(faults, 7, 0.3), of(faults, 8, 0.4)});
+                     const MotionState at = profile.sample(of(faults, 9, 0.02 * k++));
+                     return std::vector{at.position, at.velocity, at.acceleration,
+                                        profile.total_time()};
+                   };
+                 }});
+  // Inputs: kV, kA, voltage, kS, kG, start and goal (2 each), t.
+  all.push_back(
+      {"ExponentialProfile", 10, 0, [=]() -> Step {
+         return [k = 0](const Faults& faults) mutable {
+           const ExponentialProfile profile(
+               {of(faults, 0, 4.0), of(faults, 1, 0.4), of(faults, 2, 12.0), of(faults, 3, 0.2),
+                of(faults, 4, 0.8)},
+               {of(faults, 5, 0.1), of(faults, 6, 0.2)}, {of(faults, 7, 2.0), of(faults, 8, 0.3)});
+           const MotionState at = profile.sample(of(faults, 9, 0.02 * k++));
+           return std::vector{at.position, at.velocity, at.acceleration, profile.total_time()};
+         };
+       }});
   // Inputs: position, velocity, acceleration, next velocity, voltage, rail.
   all.push_back({"feedforwards", 6, 1, [=]() -> Step {
                    const auto simple =
