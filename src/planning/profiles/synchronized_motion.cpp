@@ -110,6 +110,7 @@ class StretchedMotion {
   struct Piece {
     double duration = 0.0;
     double jerk = 0.0;
+    bool cruises = false;
   };
 
   StretchedMotion(const SCurveProblem& p, double T) {
@@ -126,7 +127,7 @@ class StretchedMotion {
       add(c.first.ramp, c.first.sign);
       add(c.first.hold, 0.0);
       add(c.first.back, -c.first.sign);
-      add(std::max(0.0, c.time), 0.0);
+      add(c.time, 0.0, true);
       add(c.second.back, -c.second.sign);
       add(c.second.hold, 0.0);
       add(c.second.ramp, c.second.sign);
@@ -139,9 +140,9 @@ class StretchedMotion {
   [[nodiscard]] const Piece& operator[](int i) const { return pieces_[i]; }
 
  private:
-  void add(double duration, double jerk) {
+  void add(double duration, double jerk, bool cruises = false) {
     if (duration > 0.0 && size_ < capacity) {
-      pieces_[size_++] = {duration, jerk};
+      pieces_[size_++] = {duration, jerk, cruises};
     }
   }
 
@@ -245,6 +246,9 @@ double AxisMotions::synchronize(Synchronization how, double least) noexcept {
       }
       const StretchedMotion rest(plan.problem, T - plan.brake_time);
       for (int k = 0; k < rest.size(); ++k) {
+        if (rest[k].cruises) {
+          axis.goal_.acceleration = 0.0;  // over a long wait its rounding would add up
+        }
         axis.add(rest[k].duration, rest[k].jerk * plan.jerk);
       }
     }

@@ -113,9 +113,10 @@ Answer answer_of(const ProfileResult& result) {
   Answer answer{.schema = schema, .json = to_json(result)};
   Document& document = answer.document;
   document.title = "Motion profile";
-  document.verdict.line = fmt::format("A {} profile over {} {} takes {} s.", to_string(result.kind),
-                                      number(result.job.to.position - result.job.from.position),
-                                      unit, number(result.duration));
+  const bool vowel = result.kind == ProfileKind::exponential || result.kind == ProfileKind::s_curve;
+  document.verdict.line = fmt::format(
+      "{} {} profile over {} {} takes {} s.", vowel ? "An" : "A", to_string(result.kind),
+      number(result.job.to.position - result.job.from.position), unit, number(result.duration));
   Section motion{"motion", "The motion", {}};
   Facts facts;
   facts.add("duration", quantity(result.duration, "s", 6));
