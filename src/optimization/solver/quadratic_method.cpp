@@ -241,10 +241,13 @@ SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool
   const auto start = Clock::now();
   counts_ = {};
   last_ = {};
+  refined_ = false;
   if (!begin(warm)) {
     return SolveStatus::no_progress;
   }
   double best = infinity;
+  double expected_primal = infinity;
+  double expected_dual = infinity;
   int since_best = 0;
   D_.setZero();
   for (;; ++last_.number) {
@@ -252,6 +255,10 @@ SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool
     if (converged(options.tolerance)) {
       return SolveStatus::solved;
     }
+    // A step along a line takes its share off the residuals; where it did not, the system was not
+    // solved well, and is solved again for what it leaves from now on.
+    refined_ = refined_ || largest(c_) > expected_primal + 0.05 * options.tolerance ||
+               largest(rd_) > expected_dual + 0.05 * options.tolerance;
     if (last_.number > 0 && watch(last_)) {
       return SolveStatus::stopped;
     }
@@ -271,8 +278,9 @@ SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool
         std::max(last_.infeasibility, std::max(last_.optimality, last_.complementarity));
     since_best = worst < 0.9 * best ? 0 : since_best + 1;
     best = std::min(best, worst);
+    const bool is_good = worst <= std::max(1e3 * options.tolerance, 1e-8);
     if (since_best > 25 || !std::isfinite(worst)) {
-      return worst <= 1e3 * options.tolerance ? SolveStatus::acceptable : SolveStatus::no_progress;
+      return is_good ? SolveStatus::acceptable : SolveStatus::no_progress;
     }
 
     il_ = sl_.cwiseInverse();
@@ -281,7 +289,7 @@ SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool
     diagonal_.array() += 1e-12 * size_;
     ++counts_.factorizations;
     if (!program_.factor(diagonal_, D_, true)) {
-      return SolveStatus::no_progress;
+      return is_good ? SolveStatus::acceptable : SolveStatus::no_progress;
     }
     // Predictor: straight for complementarity zero.
     rw_ = ((hw_ + g_).array() * free_.array()).matrix();
@@ -322,7 +330,7 @@ SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool
       low_target_(i) = low;
       high_target_(i) = high;
     }
-    solve(dw_, dl_, true);
+    solve(dw_, dl_, refined_);
     const double keep = std::max(0.995, 1.0 - mu_);
     most_primal = keep;
     most_dual = keep;
@@ -343,6 +351,8 @@ SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool
     if (has_curvature_) {
       primal = dual = std::min(primal, dual);
     }
+    expected_primal = (1.0 - primal) * largest(c_);
+    expected_dual = has_curvature_ ? (1.0 - dual) * largest(rd_) : infinity;
     w_ += primal * dw_;
     lambda_ += dual * dl_;
     zl_ += dual * dzl_;

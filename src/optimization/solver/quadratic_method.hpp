@@ -53,6 +53,7 @@ class QuadraticMethod {
   double f_ = 0.0, f0_ = 0.0, mu_ = 0.0, size_ = 1.0;
   int pairs_ = 0;
   bool has_curvature_ = false;
+  bool refined_ = false;
   Iteration last_;
   SolverCounts counts_;
 };
