@@ -12,6 +12,7 @@
 #include <flyball/math/derivatives/dual.hpp>
 
 #include "optimization/cart_pole.hpp"
+#include "support/allocation_count.hpp"
 
 namespace {
 
@@ -258,6 +259,30 @@ TEST(OptimalControl, LimitsAreHonoured) {
   EXPECT_EQ(solver.solve({}, watch).status, SolveStatus::stopped);
   EXPECT_EQ(seen, 3);
   EXPECT_EQ(solver.solve().status, SolveStatus::solved);  // none of it left a trace
+}
+
+// From the first step to the last no memory is asked for: the restoration phase alone is made when
+// it is first needed, and this swing-up does without.
+TEST(OptimalControl, IterationsDoNotAllocate) {
+  if (!test::counts_allocations()) {
+    GTEST_SKIP() << "a sanitizer has its own allocator";
+  }
+  OptimalControlProblem problem = cart_pole::problem(80);
+  problem.set_start(cart_pole::start(80), MatrixXd::Zero(1, 80));
+  auto solver = OptimalControlSolver::make(problem).value();
+  std::size_t at_first = 0;
+  std::size_t at_last = 0;
+  int steps = 0;
+  const auto watch = [&](const Iteration&) {
+    at_last = test::allocation_count();
+    at_first = steps++ == 0 ? at_last : at_first;
+    return false;
+  };
+  const OptimalControlSolution solution = solver.solve({}, watch);
+  ASSERT_EQ(solution.status, SolveStatus::solved);
+  ASSERT_EQ(solution.counts.restorations, 0);
+  EXPECT_GT(steps, 10);
+  EXPECT_EQ(at_last, at_first);
 }
 
 TEST(OptimalControl, AnotherInitialStateTakesFewerIterations) {
