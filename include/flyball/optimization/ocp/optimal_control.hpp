@@ -22,12 +22,6 @@ using ExpressionVector = Eigen::Matrix<Expression, Eigen::Dynamic, 1>;
 
 namespace detail {
 
-/// A function of (x, u, p, d), recorded once.
-struct RecordedFunction {
-  expression::Tape tape{};
-  int size = 0;
-};
-
 /// Calls f with as many of (x, u, p, d) as it takes.
 template <class F>
 [[nodiscard]] auto call_stage_function(const F& f, const ExpressionVector& x,
@@ -219,7 +213,6 @@ struct OptimalControlSolution {
   double complementarity = 0.0;  ///< max product of a distance from a bound and its multiplier.
   SolverCounts counts{};
   double seconds = 0.0;                 ///< Wall time of the solve.
-  std::vector<Iteration> iterations{};  ///< Where they were asked for.
   std::vector<Violation> violations{};  ///< The largest first, at most ten; empty where solved.
   std::string message{};                ///< What a person should know; empty where solved.
   [[nodiscard]] bool solved() const noexcept {
