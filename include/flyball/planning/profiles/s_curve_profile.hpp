@@ -56,7 +56,7 @@ class JerkMotion {
 
  private:
   [[nodiscard]] int index_at(double t) const noexcept {
-    int i = count_ - 1;
+    int i = count_ > 0 ? count_ - 1 : 0;  // without pieces: the start
     while (i > 0 && t < begin_[i]) {
       --i;
     }
