@@ -6,6 +6,7 @@
 #include <flyball/estimation/fixed_lag_smoother.hpp>
 #include <flyball/estimation/multiple_model.hpp>
 #include <flyball/estimation/smoother.hpp>
+#include <flyball/geometry/se2.hpp>
 
 // Smoothers of three states, against a plain transcription of Theorem 9.7.1 in fixed-size Eigen
 // with the inverse of P⁻. Budget: 100 µs for an update of a smoother with a lag of 50 steps.
@@ -32,6 +33,20 @@ void fixed_lag_update(benchmark::State& state) {
   }
 }
 BENCHMARK(fixed_lag_update);
+
+void fixed_lag_update_of_poses(benchmark::State& state) {
+  ManifoldFixedLagSmoother<Pose2d, 50> smoother(Pose2d(), Matrix3d::Identity());
+  int k = 0;
+  Pose2d pose;
+  for (auto _ : state) {
+    const FilterStep<3> one = step(++k);
+    const Pose2d prior = pose.plus(Vector3d(0.02, 0.0, 0.01 * (k % 3)));
+    pose = prior.plus(Vector3d(1e-3, -1e-3, 1e-3));
+    smoother.take({one.F, one.Q, prior, pose, one.P});
+    benchmark::DoNotOptimize(smoother.at(50));
+  }
+}
+BENCHMARK(fixed_lag_update_of_poses);
 
 void fixed_lag_update_transcribed(benchmark::State& state) {
   constexpr std::size_t lag = 50;

@@ -6,8 +6,10 @@
 #include <Eigen/Core>
 
 #include <flyball/core/signal.hpp>
+#include <flyball/estimation/estimate.hpp>
 #include <flyball/estimation/semidefinite_solve.hpp>
 #include <flyball/estimation/smoother.hpp>
+#include <flyball/geometry/lie_group.hpp>
 
 namespace flyball {
 
@@ -22,18 +24,21 @@ namespace flyball {
 /// const auto [x, P] = smoother.at(10);  // ten periods ago
 /// ```
 ///
+/// The state is a vector or any other Manifold, such as a pose (FixedLagSmoother is that of
+/// vectors); a covariance is then in the frame of its estimate, as an `Estimate` has it.
+///
 /// Each step stores the gain back over it, so that `at` only has to go back by Theorem 9.7.1.
 /// Run-time object: noexcept, finite whatever comes, of fixed capacity, and for states known at
 /// compile time allocation-free; a step that comes when all places are taken replaces the oldest.
 /// `smooth` gives the same for a whole record.
 /// Source: book, Theorem 9.7.1; Simon, "Optimal State Estimation" (2006), section 9.3.
-template <int States, int Lag>
-class FixedLagSmoother {
+template <Manifold X, int Lag>
+class ManifoldFixedLagSmoother {
   static_assert(Lag > 0, "a lag of no steps is the filter itself");
 
  public:
-  using StateVector = Eigen::Matrix<double, States, 1>;
-  using StateMatrix = Eigen::Matrix<double, States, States>;
+  using StateVector = X;
+  using StateMatrix = TangentMatrix<X>;
 
   /// An estimate of one instant.
   struct Estimate {
@@ -43,9 +48,13 @@ class FixedLagSmoother {
 
   /// @param x0, P0  The filter's estimate before the first step; what `reset` would not take counts
   /// as zero.
-  FixedLagSmoother(const StateVector& x0, const StateMatrix& P0) : newest_{x0, P0} {
+  ManifoldFixedLagSmoother(const StateVector& x0, const StateMatrix& P0) : newest_{x0, P0} {
     if (!reset(x0, P0)) {
-      newest_.x.setZero();
+      if constexpr (detail::EigenVector<X>) {
+        newest_.x.setZero();
+      } else {
+        newest_.x = X();
+      }
       newest_.P.setZero();
     }
   }
@@ -53,7 +62,7 @@ class FixedLagSmoother {
   /// Takes a step of the filter. @return  Whether it was taken: one with a number that is not
   /// finite, or whose variances are beyond the square of `largest_signal`, is not, and `at` stays
   /// what it was. Cost: O(n³).
-  bool take(const FilterStep<States>& step) noexcept;
+  bool take(const FilterStepOf<X>& step) noexcept;
 
   /// How many steps `at` can go back: those taken, Lag at most.
   [[nodiscard]] int available() const noexcept { return available_; }
@@ -65,7 +74,7 @@ class FixedLagSmoother {
   /// Starts again. @return  Whether it did: not with a number that is not finite, or beyond what
   /// `take` takes, and nothing changes.
   bool reset(const StateVector& x0, const StateMatrix& P0) noexcept {
-    if (!is_signal(x0) || !is_covariance(P0)) {
+    if (!detail::is_usable(x0, x0) || !is_covariance(P0)) {
       return false;
     }
     newest_ = {x0, P0};
@@ -78,7 +87,13 @@ class FixedLagSmoother {
     return (P.array().abs() <= largest_signal * largest_signal).all();
   }
 
-  /// The estimate before a step given the one after it: N(x + K(x_after - x_prior), P).
+  /// P <- J P Jᵀ
+  static void transport(const StateMatrix& J, StateMatrix& P) noexcept {
+    const StateMatrix half = J * P;
+    P.noalias() = half * J.transpose();
+  }
+
+  /// The estimate before a step given the one after it: N(x ⊕ K(x_after ⊖ x_prior), P).
   struct Back {
     StateVector x;
     StateVector x_prior;
@@ -92,8 +107,12 @@ class FixedLagSmoother {
   int available_ = 0;
 };
 
+/// The smoother of vectors.
 template <int States, int Lag>
-bool FixedLagSmoother<States, Lag>::take(const FilterStep<States>& step) noexcept {
+using FixedLagSmoother = ManifoldFixedLagSmoother<Eigen::Matrix<double, States, 1>, Lag>;
+
+template <Manifold X, int Lag>
+bool ManifoldFixedLagSmoother<X, Lag>::take(const FilterStepOf<X>& step) noexcept {
   const StateMatrix& P = newest_.P;
   StateMatrix FP = P;
   FP.noalias() = step.F * P;
@@ -111,9 +130,9 @@ bool FixedLagSmoother<States, Lag>::take(const FilterStep<States>& step) noexcep
   rest.noalias() = half * left.transpose();
   half.noalias() = solved.transpose() * step.Q;
   rest.noalias() += half * solved;
-  const bool usable = is_signal(step.F) && is_signal(step.x) && is_signal(step.x_prior) &&
-                      is_signal(solved) && is_covariance(step.Q) && is_covariance(rest) &&
-                      is_covariance(step.P);
+  const bool usable = is_signal(step.F) && detail::is_usable(step.x, newest_.x) &&
+                      detail::is_usable(step.x_prior, newest_.x) && is_signal(solved) &&
+                      is_covariance(step.Q) && is_covariance(rest) && is_covariance(step.P);
   if (!usable) {
     return false;
   }
@@ -128,22 +147,31 @@ bool FixedLagSmoother<States, Lag>::take(const FilterStep<States>& step) noexcep
   return true;
 }
 
-template <int States, int Lag>
-auto FixedLagSmoother<States, Lag>::at(int lag) const noexcept -> Estimate {
+template <Manifold X, int Lag>
+auto ManifoldFixedLagSmoother<X, Lag>::at(int lag) const noexcept -> Estimate {
   lag = lag < 0 ? 0 : lag > available_ ? available_ : lag;
   Estimate estimate = newest_;
-  StateVector difference = newest_.x;
+  TangentOf<X> difference = minus(newest_.x, newest_.x);
   StateMatrix half = newest_.P;
   std::size_t place = next_;
   for (int i = 0; i < lag; ++i) {
     place = (place == 0 ? steps_.size() : place) - 1;
     const Back& back = steps_[place];
-    difference = estimate.x - back.x_prior;
-    estimate.x = back.x;
-    estimate.x.noalias() += back.K * difference;  // (9.42)
+    difference = minus(estimate.x, back.x_prior);
+    if constexpr (!detail::EigenVector<X>) {
+      transport(right_jacobian_inverse<X>(difference), estimate.P);  // into the frame of x⁻
+      difference = back.K * difference;
+      estimate.x = plus(back.x, difference);  // (9.42)
+    } else {
+      estimate.x = back.x;
+      estimate.x.noalias() += back.K * difference;  // (9.42)
+    }
     half.noalias() = back.K * estimate.P;
     estimate.P = back.P;
     estimate.P.noalias() += half * back.K.transpose();  // (9.43)
+    if constexpr (!detail::EigenVector<X>) {
+      transport(right_jacobian<X>(difference), estimate.P);  // into that of the smoothed x
+    }
     half = estimate.P.transpose();
     estimate.P = 0.5 * (estimate.P + half);
   }

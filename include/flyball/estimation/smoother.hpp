@@ -6,21 +6,26 @@
 #include <Eigen/Core>
 
 #include <flyball/estimation/covariance.hpp>
+#include <flyball/geometry/manifold.hpp>
 #include <flyball/systems/system.hpp>
 
 namespace flyball {
 
 /// What a filter, linear or extended, did between two of its estimates: the prediction
 /// x⁻ = f(x of before), P⁻ = F P Fᵀ + Q with P of before, and the estimate that its measurements
-/// made of it.
-template <int States = Eigen::Dynamic>
-struct FilterStep {
-  Eigen::Matrix<double, States, States> F;   ///< n x n, A or ∂f/∂x at the estimate of before.
-  Eigen::Matrix<double, States, States> Q;   ///< n x n, covariance of the noise of this step.
-  Eigen::Matrix<double, States, 1> x_prior;  ///< n, x⁻.
-  Eigen::Matrix<double, States, 1> x;        ///< n, x⁺; x⁻ where nothing was measured.
-  Eigen::Matrix<double, States, States> P;   ///< n x n, P⁺.
+/// made of it. X is a vector or any other Manifold; its matrices are of its differences.
+template <Manifold X>
+struct FilterStepOf {
+  TangentMatrix<X> F;  ///< n x n, A or ∂f/∂x at the estimate of before.
+  TangentMatrix<X> Q;  ///< n x n, covariance of the noise of this step.
+  X x_prior;           ///< x⁻.
+  X x;                 ///< x⁺; x⁻ where nothing was measured.
+  TangentMatrix<X> P;  ///< n x n, P⁺.
 };
+
+/// The same of vectors, n x 1.
+template <int States = Eigen::Dynamic>
+using FilterStep = FilterStepOf<Eigen::Matrix<double, States, 1>>;
 
 /// The F and Q of a filter that has no Jacobian, such as an unscented one: F = XᵀP⁺, the linear map
 /// that explains most of x⁻, and Q = P⁻ - F P Fᵀ, the rest and the noise.
