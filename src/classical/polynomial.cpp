@@ -165,6 +165,29 @@ Polynomial bilinear(const Polynomial& p, Index degree) {
   return sum;
 }
 
+void settle_on_border(Eigen::VectorXcd& roots, const Polynomial& p, bool discrete) {
+  constexpr double beside = 1e-4;  // what rounding leaves of a triple root
+  for (std::complex<double>& root : roots) {
+    const std::complex<double> on = !discrete ? std::complex<double>(0.0, root.imag())
+                                    : root.imag() == 0.0
+                                        ? std::complex<double>(std::copysign(1.0, root.real()), 0.0)
+                                    : std::abs(root) == 0.0 ? std::complex<double>(1.0)
+                                                            : root / std::abs(root);
+    if (root == on || !(std::abs(root - on) <= beside * std::abs(on))) {
+      continue;
+    }
+    std::complex<double> sum = 0.0;
+    double size = 0.0;
+    for (Eigen::Index i = 0; i < p.rows(); ++i) {
+      sum = sum * on + p.hi(i, 0);
+      size = size * std::abs(on) + std::abs(p.hi(i, 0));
+    }
+    if (std::abs(sum) <= 1e-15 * static_cast<double>(p.rows()) * size) {
+      root = on;
+    }
+  }
+}
+
 std::optional<std::vector<double>> positive_roots(const Polynomial& p) {
   const Polynomial q = trimmed(p);
   if (q.hi.isZero(0.0)) {

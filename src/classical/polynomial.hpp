@@ -24,6 +24,11 @@ using Polynomial = flyball::detail::DoubleDoubleMatrix;
 /// Nothing where the iteration does not end. Zeros at the end are roots at zero.
 [[nodiscard]] std::optional<Eigen::VectorXcd> roots(const Polynomial& p);
 
+/// Moves roots onto the border of stability, the imaginary axis or (discrete) the unit circle, that
+/// are beside it only because of the coefficients' rounding: where the polynomial's value is
+/// rounding of its terms. An integrator among other poles stays one when they are multiplied out.
+void settle_on_border(Eigen::VectorXcd& roots, const Polynomial& p, bool discrete);
+
 /// The power of two nearest to the geometric mean of a polynomial's roots that are not zero.
 [[nodiscard]] int unit_of(const Eigen::VectorXd& p);
 /// p(2^unit s) as a polynomial in s.

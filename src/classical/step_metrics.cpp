@@ -220,9 +220,9 @@ Expected<StepMetrics> step_metrics(const TransferFunction& transfer, double band
   }
   FLYBALL_TRY(const auto poles, transfer.poles());
   const bool discrete = transfer.period().has_value();
-  const bool stable = discrete ? is_stable_discrete(poles) : is_stable_continuous(poles);
+  FLYBALL_TRY(const bool stable, transfer.is_stable());
   const double dc = transfer.dc_gain();
-  if (!stable) {
+  if (!stable || !std::isfinite(dc)) {
     return StepMetrics{.final_value = std::isfinite(dc) ? nan : dc};
   }
   if (dc == 0.0) {
@@ -271,8 +271,11 @@ Expected<StepMetrics> step_metrics(const TransferFunction& transfer, double band
   constexpr long most_points = 500'000;
   for (long point = 0; time < end; ++point) {
     if (point == most_points) {
+      // What has stayed in the band for twelve of the slowest time constants does not leave it.
       StepMetrics metrics = judge.metrics(dc, delay);
-      metrics.settling_time.reset();
+      if (slowest * (time - (*metrics.settling_time - delay)) < 12.0) {
+        metrics.settling_time.reset();
+      }
       return metrics;
     }
     double rate = slowest;

@@ -1,5 +1,6 @@
 #include <flyball/classical/transfer_function.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -9,6 +10,7 @@
 
 #include <flyball/systems/system_error.hpp>
 
+#include "classical/factors.hpp"
 #include "classical/polynomial.hpp"
 #include "classical/whole_periods.hpp"
 #include "core/error_rows.hpp"
@@ -167,12 +169,16 @@ Expected<VectorXcd> TransferFunction::zeros() const {
 }
 
 Expected<VectorXcd> TransferFunction::poles() const {
-  return roots_of(den_, "poles");
+  FLYBALL_TRY(VectorXcd found, roots_of(den_, "poles"));
+  detail::settle_on_border(found, detail::polynomial(den_), period_.has_value());
+  return found;
 }
 
 Expected<bool> TransferFunction::is_stable() const {
   return poles().map([&](const VectorXcd& p) {
-    return period_ ? is_stable_discrete(p) : is_stable_continuous(p);
+    return (period_ ? is_stable_discrete(p) : is_stable_continuous(p)) &&
+           std::none_of(p.begin(), p.end(),
+                        [&](const Complex& pole) { return detail::on_axis(pole, period_); });
   });
 }
 
@@ -302,7 +308,8 @@ Expected<TransferFunction> feedback(const TransferFunction& forward, const Trans
   if (forward.delay() + back.delay() > 0.0) {
     return refusal(TransferError::delay_in_loop, where, "the loop's delay")
         .got(flyball::detail::format("{} s", forward.delay() + back.delay()))
-        .expected("zero, or a rational approximation of it (`pade`)");
+        .expected("zero, or a rational approximation of it (`pade`)")
+        .hint("exact it is as a DelaySystem, of an expression feedback(G, H)");
   }
   using detail::polynomial;
   using detail::times;

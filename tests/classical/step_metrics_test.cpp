@@ -105,6 +105,17 @@ TEST(StepMetrics, StiffSystems) {
   EXPECT_NEAR(*m.rise_time / std::log(9.0), 1.0, 1e-9);
 }
 
+// Fast poles keep the steps short long after the slow pair has settled.
+TEST(StepMetrics, ASlowPairBesideFastPoles) {
+  const StepMetrics m =
+      step_metrics(transfer({-0.20581874, 1.17337759, -2.2173414, 1.56306478, -0.35251851},
+                            {1.0, 19.18047385, 106.36256923, 200.91118363, 108.54222583, 4.44965519,
+                             1.68270509}))
+          .value();
+  ASSERT_TRUE(m.settling_time);
+  EXPECT_NEAR(*m.settling_time / 654.548535291785, 1.0, 1e-6);  // by its partial fractions
+}
+
 TEST(StepMetrics, WhatDoesNotSettle) {
   for (const auto& G : {transfer({1.0}, {1.0, 0.0}), transfer({1.0}, {1.0, -1.0}),
                         transfer({1.0}, {1.0, 0.0, 1.0})}) {

@@ -149,6 +149,26 @@ TEST(TransferFunction, DcGainOfWhatCancels) {
   EXPECT_EQ(sampled(Eigen::Vector2d(1.0, -1.0), Eigen::Vector2d(1.0, -0.5)), 0.0);
 }
 
+// (z - 1)(z - 0.9) and (s² + 3)(s + 0.7): multiplied out in doubles the poles are beside the border
+// by rounding, on either side of it.
+TEST(TransferFunction, APoleOnTheBorderStaysThere) {
+  for (const double a : {0.9, 0.7, 0.3, 0.123, -0.4, 0.99}) {
+    const Eigen::Vector3d den(1.0, -1.0 - a, a);
+    const auto G = TransferFunction::create(VectorXd::Ones(1), den, Time(0.02)).value();
+    EXPECT_FALSE(G.is_stable().value()) << a;
+    EXPECT_TRUE((G.poles().value().array() == 1.0).any()) << a;
+    const auto H = transfer({1.0}, {1.0, a + 0.5, 3.0, 3.0 * (a + 0.5)});
+    EXPECT_FALSE(H.is_stable().value()) << a;
+  }
+  // What the coefficients do tell.
+  EXPECT_TRUE(
+      TransferFunction::create(VectorXd::Ones(1), Eigen::Vector2d(1.0, -1.0 + 1e-12), Time(1.0))
+          .value()
+          .is_stable()
+          .value());
+  EXPECT_TRUE(transfer({1.0}, {1.0, 1e-12, 1.0}).is_stable().value());
+}
+
 TEST(TransferFunction, DeadTimeIsExact) {
   const auto G = transfer({2.0}, {1.0, 1.0}, 0.3);
   EXPECT_LE(std::abs(G.response(5.0) - 2.0 / Complex(1.0, 5.0) * std::polar(1.0, -1.5)), 1e-15);
