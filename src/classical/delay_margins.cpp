@@ -292,6 +292,11 @@ Expected<LoopMargins> loop_margins(const DelaySystem& loop) {
   const bool jumps = std::isinf(end) && bounds.largest_at_infinity() >= 1.0;
   margins.delay_margin = margins.stable && !jumps ? further : 0.0;
   constexpr std::size_t most = 1000;
+  constexpr double integrator = 1e12;
+  if (const double rest = loop.response(0.0)(0, 0).real(); rest < 0.0 && rest > -integrator) {
+    margins.phase_crossings.push_back({0.0, -1.0 / rest});
+    margins.gain_margin = -1.0 / rest;
+  }
   for (const double w : *places) {
     const double gain = std::abs(loop.response(w)(0, 0));
     if (!(gain > 0.0) || !std::isfinite(gain) || margins.phase_crossings.size() == most) {

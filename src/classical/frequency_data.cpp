@@ -385,6 +385,14 @@ Expected<LoopMargins> loop_margins(const FrequencyData& loop, int open_loop_unst
   const double angle = std::arg(L_first);
   const double low_phase = -0.5 * pi * integrators;
   const bool negative = std::cos(angle - low_phase) < 0.0;
+  if (integrators == 0.0 && negative) {
+    const double value = 1.0 / std::abs(w(0) > 0.0 ? L_first : loop.values()(0, 0));
+    margins.phase_crossings.insert(margins.phase_crossings.begin(), {0.0, value});
+    if (!margins.gain_margin ||
+        std::abs(std::log(value)) < std::abs(std::log(*margins.gain_margin))) {
+      margins.gain_margin = value;
+    }
+  }
   // At ω → 0, before the quarter turn of each integrator, L is real.
   const double start = negative ? -pi : 0.0;
   double turned = 0.0;

@@ -9,6 +9,7 @@
 #include <flyball/math/search/roots.hpp>
 #include <flyball/systems/system_error.hpp>
 
+#include "classical/factors.hpp"
 #include "classical/loop_peaks.hpp"
 #include "classical/polynomial.hpp"
 #include "classical/whole_periods.hpp"
@@ -210,7 +211,16 @@ Expected<std::pair<double, double>> largest_ratio(const Polynomial& above,
   return std::pair(best, where);
 }
 
-/// Unstable roots of a closed loop's denominator, those on the border included.
+/// L(∞) of the rational part, of a discrete one L(-1): where the border ends.
+double at_infinity(const TransferFunction& loop) {
+  if (loop.period()) {
+    return loop.response(pi / loop.period()->si()).real();
+  }
+  return loop.relative_degree() > 0 ? 0.0 : loop.num()(0) / loop.den()(0);
+}
+
+/// Unstable roots of a closed loop's denominator, those on the border included; with a delay those
+/// at s = 0 only, as the others leave the border with the first delay (`loop_margins` counts them).
 Expected<int> unstable_roots(const TransferFunction& loop) {
   Polynomial den = detail::polynomial(loop.den());
   if (loop.period()) {
@@ -220,13 +230,22 @@ Expected<int> unstable_roots(const TransferFunction& loop) {
     }
   }
   const Polynomial closed = plus(den, 1.0, detail::polynomial(loop.num()));
-  const auto roots = detail::roots(closed);
+  auto roots = detail::roots(closed);
   if (!roots) {
     return no_convergence();
   }
+  detail::settle_on_border(*roots, closed, loop.period().has_value());
+  const bool leaves = !loop.period() && loop.delay() > 0.0;
   int count = 0;
   for (const Complex& root : *roots) {
-    count += (loop.period() ? std::abs(root) >= 1.0 : root.real() >= 0.0) ? 1 : 0;
+    if (detail::on_axis(root, loop.period())) {
+      count += leaves && root != 0.0 ? 0 : 1;
+    } else {
+      count += (loop.period() ? std::abs(root) > 1.0 : root.real() > 0.0) ? 1 : 0;
+    }
+  }
+  if ((closed.hi.array() == 0.0).all()) {
+    return 1;  // L is -1 everywhere
   }
   // A root at infinity: 1 + L(∞) = 0.
   return count + static_cast<int>(den.rows() - detail::trimmed(closed).rows());
@@ -357,19 +376,38 @@ Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
     const double margin = wrapped(180.0 + rational - w * border.delay() * 180.0 / pi);
     margins.gain_crossings.push_back({w, margin});
     // Roots cross the axis at w when the delay is (φ + 2πk)/w, rightwards where |L| falls.
-    const double turn = std::fmod(180.0 + rational + 720.0, 360.0) * pi / 180.0;
+    double turn = std::fmod(180.0 + rational + 720.0, 360.0) * pi / 180.0;
     const int direction = at(steepness, x) < 0.0 ? 2 : -2;
-    if (border.delay() > 0.0 && border.delay() * w > turn) {
-      const double crossings = std::floor((border.delay() * w - turn) / (2.0 * pi)) + 1.0;
+    if (turn < 1e-9 || turn > 2.0 * pi - 1e-9) {
+      // On the axis without a delay, and not counted there: they come, or have gone.
+      turn = direction > 0 ? 0.0 : 2.0 * pi;
+    }
+    if (border.delay() > 0.0 && border.delay() * w >= turn * (1.0 - 1e-14)) {
+      const double crossings =
+          std::floor((border.delay() * w - turn) / (2.0 * pi) * (1.0 + 1e-14)) + 1.0;
       unstable += direction * crossings;
     }
     const double ahead = margin > 0.0 ? margin : margin + 360.0;
     further = std::min(further, ahead * pi / 180.0 / w);
   }
+  const double last = std::abs(at_infinity(loop));
+  if (last >= 1.0 - 1e-14 && !loop.period()) {
+    // Behind a delay, |L(∞)| = e^{-σT} tells where infinitely many poles are.
+    unstable = border.delay() > 0.0 ? infinity : unstable;
+    further = 0.0;
+  } else if (last >= 1.0 - 1e-14) {
+    // The sign of 1 + L at z = -1 is L's, which one more period turns round.
+    further = std::min(further, loop.period()->si());
+  }
   margins.unstable_poles = static_cast<int>(std::clamp(unstable, 0.0, 2147483647.0));
   margins.stable = margins.unstable_poles == 0;
   margins.delay_margin = margins.stable ? further : 0.0;
 
+  // L is real at zero frequency, too.
+  const double rest = loop.dc_gain();
+  if (rest < 0.0 && std::isfinite(rest)) {
+    margins.phase_crossings.push_back({0.0, 1.0 / std::abs(rest)});
+  }
   FLYBALL_TRY(const auto places, phase_places(border));
   for (const double x : places) {
     const double gain = border.gain(x);
@@ -384,6 +422,10 @@ Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
     if (end.real() < 0.0 && std::isfinite(end.real())) {
       margins.phase_crossings.push_back({pi / loop.period()->si(), 1.0 / std::abs(end.real())});
     }
+  }
+  if (const double end = at_infinity(loop);
+      !loop.period() && border.delay() == 0.0 && loop.order() > 0 && end < 0.0) {
+    margins.phase_crossings.push_back({infinity, 1.0 / std::abs(end)});
   }
   for (const PhaseCrossing& crossing : margins.phase_crossings) {
     const auto off = [](double gain) { return std::abs(std::log(gain)); };

@@ -549,8 +549,20 @@ Expected<detail::WholeMargins> detail::whole_margins(const FrequencyResponse& re
     margins.gain_crossings.push_back({w, margin});
     further = std::min(further, (margin > 0.0 ? margin : margin + 360.0) * pi / 180.0 / w);
   }
-  margins.delay_margin = margins.stable ? further : 0.0;
+  // With an L(∞) of one or more the shortest delay has infinitely many poles on the right.
+  const bool ends = !response.period() && loop.factors().delay == 0.0;
+  const double direct =
+      loop.factors().zeros.size() == loop.factors().poles.size() ? loop.factors().gain : 0.0;
+  margins.delay_margin = margins.stable && !(ends && std::abs(direct) >= 1.0) ? further : 0.0;
+  constexpr double integrator = 1e12;
+  if (const double rest = response.at(0.0)(0, 0).real(); rest < 0.0 && rest > -integrator) {
+    margins.phase_crossings.push_back({0.0, -1.0 / rest});
+  }
   const double end = response.highest_frequency();
+  if (response.period() && margins.stable && std::abs(loop.at(end)) >= 1.0) {
+    // The sign of 1 + L at z = -1 is L's, which one more period turns round.
+    margins.delay_margin = std::min(further, response.period()->si());
+  }
   if (std::isfinite(end)) {
     std::erase_if(*places, [&](double w) { return w > end * (1.0 - 1e-9); });
     const Complex last = loop.at(end);
@@ -563,6 +575,9 @@ Expected<detail::WholeMargins> detail::whole_margins(const FrequencyResponse& re
     if (gain > 0.0 && std::isfinite(gain)) {
       margins.phase_crossings.push_back({w, 1.0 / gain});
     }
+  }
+  if (ends && direct < 0.0 && loop.factors().poles.size() > 0) {
+    margins.phase_crossings.push_back({infinity, -1.0 / direct});
   }
   const auto off = [](double gain) { return std::abs(std::log(gain)); };
   for (const PhaseCrossing& crossing : margins.phase_crossings) {

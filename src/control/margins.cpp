@@ -104,11 +104,6 @@ Expected<StabilityMargins> stability_margins(const PlantInputLoop& loop) {
         crossover(at.frequency / period, sampled.response(at.frequency)));
     thetas.push_back(at.frequency);
   }
-  // L is real at zero frequency, too; with an integrator it has no value there.
-  const Complex at_zero = sampled.response(0.0);
-  if (std::isfinite(at_zero.real()) && std::abs(at_zero) < 1e12 && at_zero.real() < 0.0) {
-    margins.phase_crossovers.push_back(crossover(0.0, at_zero.real()));
-  }
   for (const classical::PhaseCrossing& at : found.margins.phase_crossings) {
     margins.phase_crossovers.push_back(
         crossover(at.frequency / period, Complex(-1.0 / at.gain_margin, 0.0)));

@@ -384,6 +384,54 @@ TEST(LoopMargins, AFarZeroHidesNoCrossing) {
   EXPECT_NEAR(slow.phase_crossings[0].frequency, 1570.7, 0.2);
 }
 
+// 1 + L is real at s = 0 and at infinity: an unstable lag needs a gain, a lag with a direct path
+// bears one.
+TEST(LoopMargins, WhereTheBorderBeginsAndEnds) {
+  const LoopMargins lag = loop_margins(transfer({2.0}, {1.0, -1.0})).value();
+  ASSERT_EQ(lag.phase_crossings.size(), 1U);
+  EXPECT_EQ(lag.phase_crossings[0].frequency, 0.0);
+  EXPECT_EQ(*lag.gain_margin, 0.5);  // s - 1 + 2k
+  const LoopMargins direct = loop_margins(transfer({-0.5, -0.05}, {1.0, 1.0})).value();
+  ASSERT_EQ(direct.phase_crossings.size(), 2U);  // (1 - k/2) s + 1 - k/20
+  EXPECT_DOUBLE_EQ(direct.phase_crossings[0].gain_margin, 20.0);
+  EXPECT_TRUE(std::isinf(direct.phase_crossings[1].frequency));
+  EXPECT_EQ(*direct.gain_margin, 2.0);
+  const auto sampled =
+      TransferFunction::create(VectorXd::Ones(1), Eigen::Vector2d(1.0, -1.2), Time(1.0));
+  const LoopMargins of_z = loop_margins(sampled.value()).value();
+  ASSERT_EQ(of_z.phase_crossings.size(), 2U);  // z - 1.2 + k
+  EXPECT_NEAR(of_z.phase_crossings[0].gain_margin, 0.2, 1e-14);
+  EXPECT_NEAR(of_z.phase_crossings[1].gain_margin, 2.2, 1e-14);
+  EXPECT_FALSE(loop_margins(transfer({-1.0}, {1.0})).value().stable);
+}
+
+// Behind a delay T the poles far away are at e^{sT} = -L(∞): on the right from |L(∞)| = 1 on.
+TEST(LoopMargins, ADirectPathBehindDeadTime) {
+  for (const auto& [L, stable] : {std::pair{transfer({2.0}, {1.0}, 0.1), false},
+                                  {transfer({1.0}, {1.0}, 0.1), false},
+                                  {transfer({0.999}, {1.0}, 0.1), true},
+                                  {transfer({2.0, 0.0}, {1.0, 1.0}, 0.01), false},
+                                  {transfer({0.5, 1.0}, {1.0, 1.0}, 1.0), true}}) {
+    const LoopMargins m = loop_margins(L).value();
+    EXPECT_EQ(m.stable, stable) << L.num().transpose();
+    EXPECT_EQ(m.delay_margin > 0.0, stable) << L.num().transpose();
+  }
+  // Without a delay such a loop bears none.
+  EXPECT_EQ(loop_margins(transfer({2.0, 0.0}, {1.0, 1.0})).value().delay_margin, 0.0);
+  EXPECT_EQ(loop_margins(transfer({5.0}, {1.0})).value().delay_margin, 0.0);
+}
+
+// s^2 + 1 + e^{-sT} has two poles on the axis without T, which leave it to the right: two, not
+// four.
+TEST(LoopMargins, PolesThatLeaveTheBorder) {
+  EXPECT_EQ(loop_margins(transfer({1.0}, {1.0, 0.0, 1.0}, 0.1)).value().unstable_poles, 2);
+  EXPECT_EQ(loop_margins(transfer({1.0}, {1.0, 0.0, 0.0}, 1.0)).value().unstable_poles, 2);
+  // What L = -1/(s² + 1) and a delay move to the left: s² + 1 - e^{-sT} at s² = 0 stays.
+  EXPECT_EQ(loop_margins(transfer({-1.0}, {1.0, 1.0}, 1.0)).value().unstable_poles, 1);
+  // (s + 1)(s + 2)(s + 3) + 60 = (s + 6)(s² + 11): neither side by rounding.
+  EXPECT_EQ(loop_margins(transfer({60.0}, {1.0, 6.0, 11.0, 6.0})).value().unstable_poles, 2);
+}
+
 TEST(LoopMargins, NothingToCross) {
   const LoopMargins none = loop_margins(transfer({0.0}, {1.0, 1.0})).value();
   EXPECT_TRUE(none.stable);

@@ -60,7 +60,9 @@ void expect_same(const LoopMargins& a, const LoopMargins& b, int i) {
   }
   ASSERT_EQ(a.phase_crossings.size(), b.phase_crossings.size()) << i;
   for (std::size_t k = 0; k < a.phase_crossings.size(); ++k) {
-    EXPECT_NEAR(a.phase_crossings[k].frequency / b.phase_crossings[k].frequency, 1.0, 1e-8) << i;
+    EXPECT_NEAR(a.phase_crossings[k].frequency, b.phase_crossings[k].frequency,
+                1e-8 * b.phase_crossings[k].frequency)
+        << i;
     EXPECT_NEAR(a.phase_crossings[k].gain_margin / b.phase_crossings[k].gain_margin, 1.0, 1e-7)
         << i;
   }

@@ -14,9 +14,9 @@ struct GainCrossing {
   double phase_margin = 0.0;  ///< deg, 180 + arg L in (-180, 180].
 };
 
-/// Where L is real and negative.
+/// Where L is real and negative, at zero frequency and at the border's end, too.
 struct PhaseCrossing {
-  double frequency = 0.0;    ///< rad/s
+  double frequency = 0.0;    ///< rad/s; ∞ where L(∞) is negative.
   double gain_margin = 0.0;  ///< 1/|L|
 };
 

@@ -114,6 +114,12 @@ Section margins_section(const LoopResult& result) {
     std::stable_sort(table.rows.begin(), table.rows.end(), [](const auto& a, const auto& b) {
       return a.front().number.value_or(0.0) < b.front().number.value_or(0.0);
     });
+    // A dead time has them without end, of ever less gain: result.json has all.
+    constexpr std::size_t most_rows = 12;
+    if (table.rows.size() > most_rows) {
+      table.caption = fmt::format("The first {} of {} crossings", most_rows, table.rows.size());
+      table.rows.resize(most_rows);
+    }
     section.blocks.push_back(std::move(table));
   }
   return section;
@@ -152,8 +158,12 @@ Section nyquist_section(const LoopResult& result) {
                               {"distance from −1"}};
   for (const LoopFindings& loop : result.loops) {
     const classical::NyquistData& n = *loop.nyquist;
-    const auto counted = [](const std::optional<int>& count) {
-      return count ? Value(fmt::format("{}", *count)) : Value("none: the curve meets −1");
+    const bool endless =
+        loop.margins && loop.margins->unstable_poles == std::numeric_limits<int>::max();
+    const auto counted = [&](const std::optional<int>& count) {
+      return count     ? Value(fmt::format("{}", *count))
+             : endless ? Value("infinitely many")
+                       : Value("none: the curve meets −1");
     };
     columns[0].values.emplace_back(fmt::format("{}", n.open_loop_unstable));
     columns[1].values.push_back(counted(n.encirclements));

@@ -46,6 +46,11 @@ std::string title_of(const LoopResult& result, std::string_view what) {
                            : std::string(what);
 }
 
+/// Whether a frequency has a place on a logarithmic axis.
+bool is_drawn(double frequency) {
+  return frequency > 0.0 && std::isfinite(frequency);
+}
+
 /// The gain crossing whose margin is the loop's.
 const classical::GainCrossing* least_phase(const classical::LoopMargins& margins) {
   const auto& all = margins.gain_crossings;
@@ -109,7 +114,7 @@ Figure bode_figure(const LoopResult& result) {
                              true});
       gain.marks.push_back({at->frequency, "", true});
     }
-    if (const auto* at = least_gain(margins)) {
+    if (const auto* at = least_gain(margins); at != nullptr && is_drawn(at->frequency)) {
       gain.marks.push_back(
           {at->frequency,
            fmt::format("gain margin {} dB", text::number(decibels(at->gain_margin), 3)), true});
