@@ -17,6 +17,7 @@
 #include <flyball/systems/discretize.hpp>
 #include <flyball/systems/norms.hpp>
 
+#include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "solve/transfer_problem.hpp"
@@ -29,6 +30,7 @@ namespace {
 using classical::DelaySystem;
 using classical::FrequencyResponse;
 using classical::LoopMargins;
+using classical::TransferError;
 using classical::TransferFunction;
 using Eigen::Index;
 using Eigen::MatrixXcd;
@@ -114,6 +116,15 @@ Outcome solve_response(const Problem& problem, JsonWriter& answer) {
   const Index entries = response.outputs() * response.inputs();
   FLYBALL_CHECK(check_size(3.0 * static_cast<double>(w.size() * entries), where, "w"));
   FLYBALL_TRY(const MatrixXcd values, response.sample(w));
+  for (Index k = 0; k < w.size(); ++k) {
+    if (!values.col(k).allFinite()) {
+      return refusal(TransferError::at_a_pole, where,
+                     flyball::detail::format("w({}), {} rad/s,", k, format_number(w(k))))
+          .got("a pole of the system")
+          .expected("a frequency at which the response is finite")
+          .hint("leave it out, or take one beside it");
+    }
+  }
   if (it.is_single()) {
     answer.add("real", VectorXd(values.row(0).real().transpose()));
     answer.add("imag", VectorXd(values.row(0).imag().transpose()));
@@ -128,11 +139,7 @@ Outcome solve_response(const Problem& problem, JsonWriter& answer) {
     const MatrixXcd G = values.col(k).reshaped(response.outputs(), response.inputs());
     real.emplace_back(G.real());
     imaginary.emplace_back(G.imag());
-    if (G.allFinite()) {
-      sigma.row(k) = flyball::detail::singular_values_of_complex(G).transpose();
-    } else {
-      sigma.row(k).setConstant(nan);
-    }
+    sigma.row(k) = flyball::detail::singular_values_of_complex(G).transpose();
   }
   answer.add("G_real", real);
   answer.add("G_imag", imaginary);
