@@ -171,7 +171,15 @@ std::vector<char*> with_help_last(int argc, char** argv) {
   return arguments;
 }
 
-/// CLI11 takes "[1]/[1 2]" for a list of its own; behind a blank it is the text that it was.
+/// "-(s + 2)/(s + 1)" and "-2/s", which begin as an option does.
+bool is_negative_expression(std::string_view text) {
+  constexpr std::string_view begins = "([.0123456789sz";
+  return text.size() > 2 && text[0] == '-' && begins.find(text[1]) != std::string_view::npos &&
+         text.find_first_of("()[]*/^") != std::string_view::npos;
+}
+
+/// CLI11 takes "[1]/[1 2]" for a list of its own, and "-(s + 2)" for an option; behind a blank each
+/// is the text that it was.
 void keep_coefficients(std::vector<char*>& arguments, std::vector<std::string>& texts) {
   const std::string_view command = arguments.size() > 2 ? arguments[1] : "";
   const auto& views = flyball::study::loop_views;
@@ -182,7 +190,7 @@ void keep_coefficients(std::vector<char*>& arguments, std::vector<std::string>& 
   texts.reserve(arguments.size());
   for (char*& argument : arguments) {
     const std::string_view text = argument == nullptr ? "" : argument;
-    if (text.starts_with('[') && text.ends_with(']')) {
+    if ((text.starts_with('[') && text.ends_with(']')) || is_negative_expression(text)) {
       texts.push_back(" " + std::string(text));
       argument = texts.back().data();
     }

@@ -328,7 +328,8 @@ ExpectedAll<LoopJob> loop_job(LoopView view, const std::vector<std::string>& exp
       FLYBALL_TRY(std::string read, expression_of(expression, job));
       job.expressions.push_back(std::move(read));
     } else {
-      job.expressions.push_back(expression);
+      const std::size_t first = expression.find_first_not_of(' ');
+      job.expressions.push_back(expression.substr(std::min(first, expression.size())));
     }
   }
   if (!typed.num.empty() || !typed.den.empty()) {

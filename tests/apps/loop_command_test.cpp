@@ -49,10 +49,20 @@ TEST_F(LoopCommand, Margins) {
   write("text.json", R"j({"expr": "4/(s*(s+1)*(s+2))"})j");
   for (const char* same :
        {"'1/(s*(s+1)*(s+2))' --gain 4", "'1/(s*(s+1))' --compensator '4/(s+2)'", "'[4]/[1 3 2 0]'",
+        "'-(-4)/(s*(s+1)*(s+2))'", "'-4/(s*(s+1))' --compensator '-1/(s+2)'",
         "--num 4 --den '1 3 2 0'", "loop.json", "text.json"}) {
     const Json other = answer(std::string("margins ") + same).at("loops").at(0);
     EXPECT_NEAR(other.at("margins").at("gain_margin").get<double>(), 1.5, 1e-14) << same;
   }
+}
+
+// Without an end the curve has no count, and 0 rad/s no place in the picture.
+TEST_F(LoopCommand, ADirectPathBehindDeadTime) {
+  const Json loop = answer("margins '2*exp(-0.1s)'").at("loops").at(0).at("margins");
+  EXPECT_EQ(loop.at("stable"), false);
+  EXPECT_TRUE(holds(run("nyquist '2*exp(-0.1s)'").out, "infinitely many"));
+  EXPECT_EQ(answer("margins '2/(s-1)'").at("loops").at(0).at("margins").at("gain_margin"), 0.5);
+  EXPECT_EQ(run("bode '2/(s-1)' --out report").status, 0);
 }
 
 TEST_F(LoopCommand, Bode) {
