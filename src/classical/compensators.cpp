@@ -122,8 +122,10 @@ Expected<Compensation> judged(const TransferFunction& plant, double gain,
   FLYBALL_TRY_IN(where, auto margins, loop_margins(L));
   if (!margins.stable) {
     return refusal(CompensatorError::unstable_loop, where, "the closed loop")
-        .got(flyball::detail::format("unstable, of {} poles on or right of the border",
-                                     margins.unstable_poles))
+        .got(margins.unstable_poles == std::numeric_limits<int>::max()
+                 ? std::string("unstable, of infinitely many poles right of the border")
+                 : flyball::detail::format("unstable, of {} poles on or right of the border",
+                                           margins.unstable_poles))
         .hint("what was asked for is met at that frequency alone: choose another")
         .with("unstable poles", static_cast<double>(margins.unstable_poles));
   }

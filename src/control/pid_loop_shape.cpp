@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <string>
 
@@ -161,8 +162,10 @@ Expected<PidLoop> tune_by_loop_shape(const TransferFunction& plant, PidForm form
                  assess_pid(plant, {gain * kp, gain * ki, gain * kd}, shape.filter(time)));
   if (!loop.margins.stable) {
     return refusal(PidDesignError::unstable_loop, where, "the closed loop")
-        .got(flyball::detail::format("unstable, of {} poles on or right of the border",
-                                     loop.margins.unstable_poles))
+        .got(loop.margins.unstable_poles == std::numeric_limits<int>::max()
+                 ? std::string("unstable, of infinitely many poles right of the border")
+                 : flyball::detail::format("unstable, of {} poles on or right of the border",
+                                           loop.margins.unstable_poles))
         .hint(
             "the loop crosses |L| = 1 elsewhere too, or the plant needs a higher crossover to be "
             "stabilised")

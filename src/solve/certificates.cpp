@@ -14,6 +14,7 @@ namespace flyball::solve {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 namespace {
 
@@ -77,7 +78,10 @@ Outcome solve_certify(const Problem& problem, JsonWriter& answer) {
   answer.add("gain_down", certificate.gain_down);
   answer.add("gain_up", certificate.gain_up);
   answer.add("phase_margin", certificate.phase_margin);
-  answer.add("worst", certificate.worst.parameters);
+  // Centre and axis of a box are rounded.
+  const Eigen::Map<const VectorXd> least(low.data(), low.size());
+  const Eigen::Map<const VectorXd> most(high.data(), high.size());
+  answer.add("worst", VectorXd(certificate.worst.parameters.cwiseMax(least).cwiseMin(most)));
   answer.add("worst_radius", certificate.worst.spectral_radius);
   answer.add("worst_disk_margin", certificate.worst.disk_margin);
   answer.add("undecided_share", certificate.undecided_share);

@@ -26,6 +26,9 @@ TEST(SolveFrequencyResponses, ResponseOfEither) {
   EXPECT_EQ(refusal("freqresp", R"({"w":[1]})"), "malformed");
   EXPECT_EQ(refusal("freqresp", R"({"num":[1],"den":[1,1],"A":[[1]],"w":[1]})"), "malformed");
   EXPECT_EQ(refusal("freqresp", R"({"num":[1],"den":[1,1],"dt":0.1,"w":[40]})"), "out_of_range");
+  EXPECT_EQ(refusal("freqresp", R"({"num":[1],"den":[1,0],"w":[1,0]})"), "at_a_pole");
+  EXPECT_EQ(refusal("freqresp", R"({"A":[[0,1],[-1,0]],"B":[[0],[1]],"C":[[1,0]],"w":[1]})"),
+            "at_a_pole");
 }
 
 TEST(SolveFrequencyResponses, BodeAndNyquist) {

@@ -102,6 +102,10 @@ TEST(SolveSystems, Certify) {
   const Json plant = answer("certify", R"({"A":[[0]],"B":[[1]],"T":0.5,"K":[[3]],"low":[-1,1,0],)"
                                        R"("high":[1,1,0],"A_p":[[1]],"K_e":[[0.5]]})");
   EXPECT_NE(plant.at("verdict"), "undecided");
+  // The worst is of the set, to the last bit.
+  const Json corner = answer("certify", R"({"A":[[0]],"B":[[1]],"T":0.1,"K":[[19.9]],)"
+                                        R"("low":[0.9,0],"high":[1.01,0]})");
+  EXPECT_EQ(corner.at("worst").at(0).get<double>(), 1.01);
 }
 
 // dx/dt = u, x(t) = x + tu: ∫x² + r u² = T x² + T² x u + (T³/3 + rT) u².

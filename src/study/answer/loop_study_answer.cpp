@@ -213,11 +213,12 @@ void add_locus(Section& section, const LoopResult& result, const LoopFindings& l
   const auto row = [&](std::string what, std::optional<double> gain, std::complex<double> point) {
     const std::complex<double> s = loop.period() ? std::log(point) / loop.period()->si() : point;
     const double frequency = std::abs(s);
+    const double decay = std::abs(s.real()) > 1e-12 * frequency ? -s.real() : 0.0;
     table.rows.push_back(
         {std::move(what), gain ? quantity(*gain, "", 6) : Value("", Tone::quiet),
          text::complex_number(point, 6),
          std::isfinite(frequency) ? quantity(frequency, "rad/s", 5, false) : Value("∞"),
-         std::isfinite(frequency) && frequency > 0.0 ? quantity(-s.real() / frequency, "", 4)
+         std::isfinite(frequency) && frequency > 0.0 ? quantity(decay / frequency, "", 4)
                                                      : Value("")});
   };
   for (const classical::BranchPoint& at : locus.branch_points) {
