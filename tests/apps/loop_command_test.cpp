@@ -65,6 +65,12 @@ TEST_F(LoopCommand, ADirectPathBehindDeadTime) {
   EXPECT_EQ(run("bode '2/(s-1)' --out report").status, 0);
 }
 
+TEST_F(LoopCommand, WhatHasNoSettlingTime) {
+  EXPECT_TRUE(holds(run("step '1/s'").out, "Does not settle"));
+  EXPECT_TRUE(holds(run("step 's/(s+1)'").out, "Ends at 0, where it began"));
+  EXPECT_TRUE(holds(run("step '1/(s^2+1e-8s+1)'").out, "Ends at 1, after very long swinging"));
+}
+
 TEST_F(LoopCommand, Bode) {
   const Json json = answer("bode 'exp(-0.5s)/(s+1)' '1/(s+1)'");
   const Json& w = json.at("w");

@@ -325,10 +325,15 @@ Section response_section(const LoopResult& result) {
   std::vector<Column> columns{{"final value"}, {"rise 10–90 %"}, {"settled in 2 %"}, {"overshoot"},
                               {"undershoot"},  {"peak"},         {"peak at"}};
   bool restless = false;
+  bool returns = false;
+  bool slow = false;
   for (const LoopFindings& loop : result.loops) {
     const classical::StepMetrics m = loop.response->metrics.value_or(
         classical::StepMetrics{.final_value = std::numeric_limits<double>::quiet_NaN()});
-    restless = restless || !m.settling_time;
+    const bool ends = std::isfinite(m.final_value);
+    restless = restless || !ends;
+    returns = returns || (m.final_value == 0.0 && !m.settling_time);
+    slow = slow || (ends && m.final_value != 0.0 && !m.settling_time);
     columns[0].values.push_back(std::isnan(m.final_value) ? Value("none", Tone::quiet)
                                                           : quantity(m.final_value, "", 5));
     columns[1].values.push_back(or_none(m.rise_time, "s"));
@@ -344,6 +349,16 @@ Section response_section(const LoopResult& result) {
         Paragraph{"What does not settle (unstable, or with an integrator) has no final value, and "
                   "nothing that hangs on it.",
                   Tone::quiet});
+  }
+  if (returns) {
+    section.blocks.push_back(
+        Paragraph{"What ends at 0 has no shares of its final value: no rise, settling, overshoot.",
+                  Tone::quiet});
+  }
+  if (slow) {
+    section.blocks.push_back(Paragraph{
+        "What still swings after half a million steps is not followed until it has settled.",
+        Tone::quiet});
   }
   return section;
 }
@@ -433,6 +448,9 @@ Verdict verdict_of(const LoopResult& result) {
         m.settling_time
             ? fmt::format("Ends at {}, settled after {}, overshoot {}", number(m.final_value),
                           text::seconds(*m.settling_time), text::percent(m.overshoot.value_or(0.0)))
+        : m.final_value == 0.0 ? std::string("Ends at 0, where it began")
+        : std::isfinite(m.final_value)
+            ? fmt::format("Ends at {}, after very long swinging", number(m.final_value))
             : std::string("Does not settle");
   }
   return verdict;
