@@ -152,6 +152,48 @@ bool is_same(const MotionSample& a, const MotionSample& b) {
   return a.time == b.time && (a.pose.translation() - b.pose.translation()).norm() < near;
 }
 
+/// What the samples tell of the motion against where their poses are: a trajectory whose lengths,
+/// times or signs contradict each other can be read, but not followed.
+void compare_with_poses(RobotTrajectory& trajectory) {
+  constexpr double share = 0.5;
+  constexpr double least = 0.1;         // m
+  constexpr double least_turned = 0.2;  // rad
+  double moved = 0.0;
+  double told = 0.0;
+  double apart = 0.0;
+  double turned = 0.0;
+  double told_turned = 0.0;
+  double turned_apart = 0.0;
+  for (std::size_t i = 1; i < trajectory.samples.size(); ++i) {
+    const MotionSample& a = trajectory.samples[i - 1];
+    const MotionSample& b = trajectory.samples[i];
+    const double half = 0.5 * (b.time - a.time);
+    const Vector2d way = b.pose.translation() - a.pose.translation();
+    const Vector2d by_velocity = half * (a.velocity + b.velocity);
+    moved += way.norm();
+    told += by_velocity.norm();
+    apart += (way - by_velocity).norm();
+    const double by_rate = half * (a.omega + b.omega);
+    const double angle = std::remainder(b.pose.angle() - a.pose.angle(), 2.0 * std::numbers::pi);
+    turned += std::abs(angle);
+    told_turned += std::abs(by_rate);
+    turned_apart += std::abs(std::remainder(angle - by_rate, 2.0 * std::numbers::pi));
+  }
+  if (!(apart <= least + share * std::max(moved, told))) {
+    warn(trajectory.diagnostics, "poses_disagree",
+         "the poses move {:.3g} m and the velocities tell of {:.3g} m, {:.3g} m apart from sample "
+         "to sample: a length's unit, a sign, the times or one pose is wrong; generate the "
+         "trajectory again",
+         moved, told, apart);
+  } else if (!(turned_apart <= least_turned + share * std::max(turned, told_turned))) {
+    warn(trajectory.diagnostics, "headings_disagree",
+         "the poses turn by {:.3g} rad and the curvature or the turning rate tells of {:.3g} rad, "
+         "{:.3g} rad apart from sample to sample: an angle's unit or a sign is wrong; generate the "
+         "trajectory again",
+         turned, told_turned, turned_apart);
+  }
+}
+
 Expected<void> check_times(const RobotTrajectory& trajectory) {
   const auto& samples = trajectory.samples;
   for (std::size_t i = 1; i < samples.size(); ++i) {
@@ -269,6 +311,7 @@ Expected<RobotTrajectory> parse_trajectory(std::string_view text, const std::str
     note(result.diagnostics, "time_offset",
          "the trajectory begins at {:.6g} s, which counts as zero", first);
   }
+  compare_with_poses(result);
   return result;
 }
 
@@ -288,6 +331,23 @@ Expected<void> check_reach(const RobotTrajectory& trajectory, const DrivetrainRe
     const std::string where = at(trajectory.source, sample.place);
     const std::string which =
         fmt::format("sample {} (t = {} s)", i + 1, format_number(sample.time, 5));
+    if (i > 0) {
+      // Half as much again as the wheels can, and more than two pieces of a path may be apart.
+      constexpr double margin = 1.5;
+      constexpr double least_jump = 0.1;  // m
+      const MotionSample& before = trajectory.samples[i - 1];
+      const double jump = (sample.pose.translation() - before.pose.translation()).norm();
+      const double possible = reach.wheel_speed * (sample.time - before.time);
+      if (!(jump <= std::max(least_jump, margin * possible))) {
+        return refusal(TrajectoryFileError::too_tight, where, which)
+            .got(fmt::format("{} m from the sample before it, {} s earlier", format_number(jump, 4),
+                             format_number(sample.time - before.time, 4)))
+            .expected(fmt::format("within the {} m that this drivetrain's wheels go meanwhile",
+                                  format_number(possible, 4)))
+            .hint("mend its pose or its time, or generate the trajectory again")
+            .with("sample", static_cast<double>(i + 1));
+      }
+    }
     const double across = std::abs(sample.velocity(1) * sample.pose.rotation().cos() -
                                    sample.velocity(0) * sample.pose.rotation().sin());
     if (!reach.sideways && across > std::max(sideways_least, sideways_share * v)) {

@@ -216,7 +216,8 @@ Error never_there(const TravelJob& job, const Phase& phase) {
     return refusal(TravelError::too_long, where, "the motion")
         .got("at " + format_number(job.speed ? y(velocity) : y(position), 4) + " " + unit +
              " after " + format_number(job.longest, 4) + " s")
-        .expected("to " + format_number(job.end, 4) + " " + unit);
+        .expected("to " + format_number(job.end, 4) + " " + unit)
+        .hint("give it longer, more motors, a way that is shorter or a load that is less");
   }
   if (job.speed) {
     return refusal(TravelError::never_there, where, "the speed")

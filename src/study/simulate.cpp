@@ -386,8 +386,10 @@ ExpectedAll<ModelDesign> design_model(const ModelJob& job) {
     constexpr double share = 0.2;
     run.initial = made.point.x.array() + share * made.Q.diagonal().array().rsqrt();
     note(result.regulator.diagnostics, "assumed",
-         "the simulation begins a fifth of each tolerance beside the point (simulation.initial "
-         "says another)");
+         "the {} begins a fifth of each tolerance beside the point ({})",
+         afar ? "regulator's own simulation" : "simulation",
+         afar ? "simulation.initial is where the swing-up begins"
+              : "simulation.initial says another");
   }
   if (afar || !job.run.duration_is_given) {
     // Eight time constants of the slowest pole of the loop as it runs.

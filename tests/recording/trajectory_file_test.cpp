@@ -148,6 +148,56 @@ TEST(TrajectoryFile, MoreThanADrivetrainCanIsToldWithWhatItCan) {
   EXPECT_TRUE(check_reach(across, {.wheel_speed = 4.0, .trackwidth = 0.6, .sideways = true}));
 }
 
+TEST(TrajectoryFile, VelocitiesThatContradictThePosesAreToldOf) {
+  // A straight metre a second, and an arc of a radian a second; time, velocity, acceleration,
+  // curvature, x, y, heading.
+  const auto straight = [](double speed, double unit) {
+    std::string text = "[";
+    for (int i = 0; i <= 8; ++i) {
+      text += (i ? "," : "") + state(0.25 * i, speed, 0, 0, 0.25 * i * unit, 0, 0);
+    }
+    return parse_trajectory(text + "]", "path.json");
+  };
+  const auto arc = [](double curvature) {
+    std::string text = "[";
+    for (int i = 0; i <= 8; ++i) {
+      const double angle = 0.25 * i;
+      text += (i ? "," : "") +
+              state(angle, 1, 0, curvature, std::sin(angle), 1 - std::cos(angle), angle);
+    }
+    return parse_trajectory(text + "]", "path.json");
+  };
+  ASSERT_TRUE(straight(1, 1) && arc(1));
+  EXPECT_TRUE(straight(1, 1)->diagnostics.empty());
+  EXPECT_TRUE(arc(1)->diagnostics.empty());
+  for (const auto& [speed, unit] : {std::pair{-1.0, 1.0}, {1.0, 1000.0}, {1000.0, 1.0}}) {
+    const auto read = straight(speed, unit);
+    ASSERT_TRUE(read);
+    ASSERT_EQ(read->diagnostics.size(), 1u) << speed << " " << unit;
+    EXPECT_EQ(read->diagnostics[0].code, "poses_disagree");
+  }
+  const auto turned = arc(-1);
+  ASSERT_TRUE(turned);
+  ASSERT_EQ(turned->diagnostics.size(), 1u);
+  EXPECT_EQ(turned->diagnostics[0].code, "headings_disagree");
+}
+
+TEST(TrajectoryFile, APoseThatCannotBeGotToIsToldWithItsPlace) {
+  for (const double far : {2.0, 1e308}) {
+    auto read =
+        parse_trajectory("[" + state(0, 1, 0, 0, 0, 0, 0) + ",\n" + state(0.1, 1, 0, 0, 0.1, 0, 0) +
+                             ",\n" + state(0.2, 1, 0, 0, 0.2, 0, 0) + "]",
+                         "path.json");
+    ASSERT_TRUE(read);
+    EXPECT_TRUE(check_reach(*read, {.wheel_speed = 4.0, .trackwidth = 0.6, .sideways = true}));
+    read->samples[2].pose = Pose2d(far, 0.0, 0.0);
+    const auto checked = check_reach(*read, {.wheel_speed = 4.0, .trackwidth = 0.6});
+    ASSERT_FALSE(checked);
+    EXPECT_EQ(to_string(checked.error()).find("path.json:3:1: sample 3 (t = 0.2 s) is "), 0u)
+        << to_string(checked.error());
+  }
+}
+
 TEST(PathPlannerSettings, EveryFieldInSi) {
   const auto read = parse_pathplanner_settings(R"({
     "robotWidth": 0.9, "robotLength": 0.8, "holonomicMode": true, "pathFolders": ["a"],

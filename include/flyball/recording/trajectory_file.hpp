@@ -60,7 +60,8 @@ struct RobotTrajectory {
 /// holonomicRotation (degrees) and holonomicAngularVelocity (degrees a second) as PathPlanner 2023
 /// wrote it, then the robot looks that way; and the object {"samples": [{time, pose, velocity {vx,
 /// vy, omega}, …}]} of WPILib 2027, whose velocities are taken in the frame, robot's or field's, in
-/// which the poses move. Keys that are not known are left alone.
+/// which the poses move. Keys that are not known are left alone. A diagnostic warns of velocities
+/// or turning rates that tell of another motion than the poses (more than half of the way apart).
 /// @param text  The file. @param source  Its name for messages.
 /// @errors TrajectoryFileError::not_json, not_a_trajectory, wrong_sample, time_order, too_few, each
 ///         with line and column, the value, and how to mend it.
@@ -113,7 +114,8 @@ struct DrivetrainReach {
 };
 
 /// Whether a drivetrain can have every sample's motion: the wheels' speeds |v| + |ω| trackwidth/2,
-/// and of one that does not move sideways a velocity along its heading (to 5° and 5 cm/s).
+/// and of one that does not move sideways a velocity along its heading (to 5° and 5 cm/s); and
+/// whether each pose can be got to from the one before (by half more than the wheels go, or 10 cm).
 /// @errors TrajectoryFileError::too_tight with the place, the numbers and the speed that would do.
 [[nodiscard]] Expected<void> check_reach(const RobotTrajectory& trajectory,
                                          const DrivetrainReach& reach);
