@@ -245,6 +245,19 @@ ExpectedAll<SizeJob> size_job(const std::string& path, std::span<const Override>
   job.travel.longest = said.longest.si();
   take_motion(project, job.travel, job.diagnostics);
   FLYBALL_TRY(job.travel.winding, winding_of(project, job.diagnostics));
+  if (*project.parts.type == MechanismKind::arm) {
+    // About the joint it is that of a point mass there, at least; a twentieth for what is rounded.
+    constexpr double rounded = 0.95;
+    const double l = project.parts.center_of_mass->si();
+    const double least = project.parts.mass->si() * l * l;
+    if (job.travel.load.inertia < rounded * least) {
+      warn(job.diagnostics, "light_arm",
+           "an arm of this mass and centre of mass has at least {:.4g} kg m² about its joint, and "
+           "mechanism.moment_of_inertia is {:.4g} kg m²: times come out too short; give it about "
+           "the joint, which is that about the centre of mass and {:.4g} kg m² more",
+           least, job.travel.load.inertia, least);
+    }
+  }
   if (job.travel.load.rotor_inertia == 0.0) {
     note(job.diagnostics, "no_rotor",
          "the motors' rotors are taken to have no inertia: with size.rotor_inertia high gearings "

@@ -143,6 +143,24 @@ TEST(SizeJob, AGearingNeedNotBeThere) {
   EXPECT_NE(missing.find("mechanism.mass is missing"), std::string::npos) << missing;
 }
 
+TEST(SizeJob, AnArmLighterThanItsMassesPlaceIsToldOf) {
+  const auto arm = [](const std::string& inertia) {
+    return job_of(
+        "[mechanism]\ntype = \"arm\"\nmotor = \"NEO\"\nmass = \"4 kg\"\n"
+        "center_of_mass = \"50 cm\"\nmoment_of_inertia = \"" +
+        inertia + " kg m^2\"\n[size]\nrotor_inertia = \"5e-5 kg m^2\"\nend = \"1 rad\"\n");
+  };
+  const auto told = [](const auto& job) {
+    return job && std::any_of(job->diagnostics.begin(), job->diagnostics.end(),
+                              [](const Diagnostic& d) { return d.code == "light_arm"; });
+  };
+  ASSERT_TRUE(arm("1"));
+  EXPECT_FALSE(told(arm("1")));     // a point mass: 4 kg · (0.5 m)²
+  EXPECT_FALSE(told(arm("0.99")));  // rounded
+  EXPECT_TRUE(told(arm("0.9")));
+  EXPECT_TRUE(told(arm("0.333")));  // of a rod about its middle, that is
+}
+
 TEST(SizeJob, WhatHasNoMeaningOrCannotBeIsRefusedWithTheMend) {
   EXPECT_NE(refused(project("", "distance = \"5 m\"\n")).find("without meaning for this elevator"),
             std::string::npos);

@@ -170,7 +170,9 @@ void append_region(const ModelDesign& result, Answer& answer) {
     append(answer.figures, swing_up_figures(result));
     if (!result.swing_up->stands) {
       answer.document.verdict.add(Tone::caution,
-                                  "the swing-up does not stand at the end of its run");
+                                  "the swing-up does not stand at the end of its run: look at "
+                                  "simulation.duration, controller.limit, swing_up.hold and the "
+                                  "signs and factors of swing_up.energy");
     }
     AnswerFile data = data_file(result.swing_up->simulation);
     data.name = "data/swing_up.csv";
