@@ -331,23 +331,6 @@ Expected<void> check_reach(const RobotTrajectory& trajectory, const DrivetrainRe
     const std::string where = at(trajectory.source, sample.place);
     const std::string which =
         fmt::format("sample {} (t = {} s)", i + 1, format_number(sample.time, 5));
-    if (i > 0) {
-      // Half as much again as the wheels can, and more than two pieces of a path may be apart.
-      constexpr double margin = 1.5;
-      constexpr double least_jump = 0.1;  // m
-      const MotionSample& before = trajectory.samples[i - 1];
-      const double jump = (sample.pose.translation() - before.pose.translation()).norm();
-      const double possible = reach.wheel_speed * (sample.time - before.time);
-      if (!(jump <= std::max(least_jump, margin * possible))) {
-        return refusal(TrajectoryFileError::too_tight, where, which)
-            .got(fmt::format("{} m from the sample before it, {} s earlier", format_number(jump, 4),
-                             format_number(sample.time - before.time, 4)))
-            .expected(fmt::format("within the {} m that this drivetrain's wheels go meanwhile",
-                                  format_number(possible, 4)))
-            .hint("mend its pose or its time, or generate the trajectory again")
-            .with("sample", static_cast<double>(i + 1));
-      }
-    }
     const double across = std::abs(sample.velocity(1) * sample.pose.rotation().cos() -
                                    sample.velocity(0) * sample.pose.rotation().sin());
     if (!reach.sideways && across > std::max(sideways_least, sideways_share * v)) {
@@ -375,6 +358,23 @@ Expected<void> check_reach(const RobotTrajectory& trajectory, const DrivetrainRe
                             format_number(std::floor(1000.0 * possible) / 1000.0, 4)))
           .with("sample", static_cast<double>(i + 1))
           .with("wheel_speed", fastest);
+    }
+    if (i > 0) {
+      // Half as much again as the wheels can, and more than two pieces of a path may be apart.
+      constexpr double margin = 1.5;
+      constexpr double least_jump = 0.1;  // m
+      const MotionSample& before = trajectory.samples[i - 1];
+      const double jump = (sample.pose.translation() - before.pose.translation()).norm();
+      const double possible = reach.wheel_speed * (sample.time - before.time);
+      if (!(jump <= std::max(least_jump, margin * possible))) {
+        return refusal(TrajectoryFileError::too_tight, where, which)
+            .got(fmt::format("{} m from the sample before it, {} s earlier", format_number(jump, 4),
+                             format_number(sample.time - before.time, 4)))
+            .expected(fmt::format("within the {} m that this drivetrain's wheels go meanwhile",
+                                  format_number(possible, 4)))
+            .hint("mend its pose or its time, or generate the trajectory again")
+            .with("sample", static_cast<double>(i + 1));
+      }
     }
   }
   return {};
