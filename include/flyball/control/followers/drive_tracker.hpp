@@ -34,6 +34,8 @@ class DriveInversion {
   /// The discrete plant, 2 x 2 each.
   [[nodiscard]] const Eigen::Matrix2d& A() const noexcept { return A_; }
   [[nodiscard]] const Eigen::Matrix2d& B() const noexcept { return B_; }
+  [[nodiscard]] const Eigen::Matrix2d& B_inverse() const noexcept { return B_inverse_; }
+  [[nodiscard]] const Eigen::Vector2d& kS() const noexcept { return kS_; }  ///< V
 
  private:
   DriveInversion(const Eigen::Matrix2d& A, const Eigen::Matrix2d& B, const Eigen::Vector2d& kS);
@@ -71,6 +73,7 @@ class DriveVelocityTracker {
                                        const Eigen::Vector2d& r_next) const noexcept;
 
   [[nodiscard]] const Eigen::Matrix2d& K() const noexcept { return K_; }
+  [[nodiscard]] const DriveInversion& inversion() const noexcept { return inversion_; }
   [[nodiscard]] const DriveTrackerSettings& settings() const noexcept { return settings_; }
 
  private:

@@ -99,6 +99,7 @@ class LtvDriveFollower {
   [[nodiscard]] double schedule_error() const noexcept { return schedule_error_; }
   [[nodiscard]] const LtvDriveSettings& settings() const noexcept { return settings_; }
   [[nodiscard]] double trackwidth() const noexcept { return trackwidth_; }
+  [[nodiscard]] const DriveInversion& inversion() const noexcept { return inversion_; }
 
  private:
   LtvDriveFollower(const LtvDriveSettings& settings, double trackwidth,
