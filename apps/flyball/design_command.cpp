@@ -1,4 +1,5 @@
 #include <flyball/study/answer.hpp>
+#include <flyball/study/design_drive.hpp>
 #include <flyball/study/simulate.hpp>
 
 #include "job_command.hpp"
@@ -18,6 +19,15 @@ ExpectedAll<Answer> run(JobInput& input) {
       return study::answer_of(result);
     });
   }
+  if (project->plant_error && !project->drive.type.empty()) {
+    input.schema = "flyball.design_drive/1";
+    const auto job = study::drive_design_job(input.path, input.given);
+    if (!job) {
+      return tl::unexpected(job.error());
+    }
+    return ExpectedAll<study::FollowerDesign>(study::design_follower(*job))
+        .map([](const auto& result) { return study::answer_of(result); });
+  }
   if (project->plant_error) {
     return tl::unexpected(*project->plant_error);
   }
@@ -33,7 +43,7 @@ void add_design_command(CLI::App& program, Invocation& invocation) {
       program, invocation,
       {.name = "design",
        .schema = "flyball.design/2",
-       .help = "Design a controller from a project file: mass, gearing and motors, or gains",
+       .help = "Design a controller or a drivetrain's follower from a project file",
        .footer = "PROJECT.toml, for example:\n"
                  "  [mechanism]\n"
                  "  type = \"elevator\"\n"

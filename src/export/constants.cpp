@@ -59,6 +59,10 @@ std::vector<Constant> constants_of(const MechanismConstants& of, const UnitGains
   return all;
 }
 
+std::string called(const MechanismConstants& of) {
+  return of.name.empty() ? capitalized(of.kind) : of.name;
+}
+
 /// @param board  Of a loop on the motor controller.
 std::string heading(const MechanismConstants& of, std::string_view library, bool board,
                     Language language) {
@@ -67,8 +71,8 @@ std::string heading(const MechanismConstants& of, std::string_view library, bool
                                                         format_number(1e3 * of.delay, 3))
                                           : "";
   return comments(
-      fmt::format("// {}, for {}.\n// Loop period {} ms{}{}; volts are at the motor.\n",
-                  capitalized(of.kind), library, own ? "1" : format_number(1e3 * of.period, 4),
+      fmt::format("// {}, for {}.\n// Loop period {} ms{}{}; volts are at the motor.\n", called(of),
+                  library, own ? "1" : format_number(1e3 * of.period, 4),
                   own ? ", on the controller" : "", late.empty() || !own ? late : "," + late),
       language);
 }
@@ -100,7 +104,7 @@ std::string wpilib_constants(const MechanismConstants& of, Language language) {
   if (gains == nullptr) {
     return "";
   }
-  const std::string name = capitalized(of.kind) + "Constants";
+  const std::string name = called(of) + "Constants";
   const std::string period = literal(of.period, constant_digits);
   const std::string unit_velocity = of.unit == "m" ? "1_mps" : "1_rad_per_s";
   const bool gravity = has_gravity(of.kind);
@@ -211,7 +215,7 @@ std::string rev_constants(const MechanismConstants& of, Language language) {
   const bool java = language == Language::java;
   const bool python = language == Language::python;
   const bool flywheel = controls_velocity(of.kind);
-  const std::string name = capitalized(of.kind) + "SparkConstants";
+  const std::string name = called(of) + "SparkConstants";
   const std::string nominal = literal(of.nominal_voltage, constant_digits);
 
   std::string text = heading(of, "REVLib, per rotation and RPM of the mechanism", true, language);

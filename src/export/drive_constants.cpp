@@ -31,7 +31,76 @@ std::vector<Constant> constants_of(const DriveConstants& of) {
     all.push_back({"trackwidth", *of.trackwidth, "m, as the robot turns"});
   }
   all.push_back({"kP", of.kP, "V·s/" + of.unit + ", of each side's velocity"});
+  if (!of.follower) {
+    return all;
+  }
+  using Kind = WpilibFollower::Kind;
+  const WpilibFollower& follower = *of.follower;
+  if (follower.kind == Kind::ramsete) {
+    all.push_back({"b", follower.b, "rad²/m²"});
+    all.push_back({"zeta", follower.zeta, "1/rad"});
+    return all;
+  }
+  all.push_back({"xTolerance", follower.x_tolerance, "m"});
+  all.push_back({"yTolerance", follower.y_tolerance, "m"});
+  all.push_back({"headingTolerance", follower.heading_tolerance, "rad"});
+  if (follower.kind == Kind::ltv_unicycle) {
+    all.push_back({"velocityTolerance", follower.velocity_tolerance, "m/s"});
+    all.push_back({"angularVelocityTolerance", follower.angular_velocity_tolerance, "rad/s"});
+    all.push_back({"maxVelocity", follower.max_velocity, "m/s, of the gains' table"});
+  } else {
+    all.push_back({"velocityTolerance", follower.velocity_tolerance, "m/s, of a side"});
+    all.push_back({"voltageTolerance", follower.voltage_tolerance, "V"});
+  }
   return all;
+}
+
+/// What follows poses. @param whole  Whether there is a plant.
+std::string follower_object(const DriveConstants& of, Language language, bool whole) {
+  if (!of.follower) {
+    return "";
+  }
+  using Kind = WpilibFollower::Kind;
+  const bool cpp = language == Language::cpp;
+  const bool python = language == Language::python;
+  const std::string own = python ? "c." : "";
+  const std::string period = literal(of.period, constant_digits);
+  // A list of numbers, each with what stands before it.
+  const auto list = [&](std::initializer_list<const char*> names) {
+    std::string text;
+    for (const char* name : names) {
+      text += (text.empty() ? "" : ", ") + own + name;
+    }
+    return cpp ? "{" + text + "}" : python ? "(" + text + ")" : "VecBuilder.fill(" + text + ")";
+  };
+  const auto made = [&](const std::string& type, const std::string& arguments) {
+    return cpp      ? fmt::format("// frc::{} follower{{{}}};\n", type, arguments)
+           : python ? fmt::format("# follower = {}({})\n", type, arguments)
+                    : fmt::format("// {0} follower = new {0}({1});\n", type, arguments);
+  };
+  const std::string next = python ? "\n#     " : "\n//     ";
+  const auto with = [&](const char* name, const char* unit) {
+    return cpp ? fmt::format("{} * {}", name, unit) : own + name;
+  };
+  const std::string each = cpp ? period + " * 1_s" : period;
+  switch (of.follower->kind) {
+    case Kind::ramsete:
+      return made("RamseteController",
+                  with("b", "1_rad * 1_rad / (1_m * 1_m)") + ", " + with("zeta", "1 / 1_rad"));
+    case Kind::ltv_unicycle:
+      return made("LTVUnicycleController",
+                  next + list({"xTolerance", "yTolerance", "headingTolerance"}) + "," + next +
+                      list({"velocityTolerance", "angularVelocityTolerance"}) + ", " + each + ", " +
+                      with("maxVelocity", "1_mps"));
+    case Kind::ltv_drive:
+      break;
+  }
+  return whole ? made("LTVDifferentialDriveController",
+                      next + "plant, " + with("trackwidth", "1_m") + "," + next +
+                          list({"xTolerance", "yTolerance", "headingTolerance", "velocityTolerance",
+                                "velocityTolerance"}) +
+                          "," + next + list({"voltageTolerance", "voltageTolerance"}) + ", " + each)
+               : "";
 }
 
 /// What takes both modes' gains in metres and radians.
@@ -67,15 +136,23 @@ std::string objects(const DriveConstants& of, Language language) {
                               period);
     text += "  // answers in volts\n";
   }
-  return text;
+  return text + follower_object(of, language, whole);
 }
 
 /// The same for RobotPy.
 std::string python_objects(const DriveConstants& of) {
   const bool whole = of.unit == "m" && of.linear && of.angular && of.linear->kA > 0.0 &&
                      of.angular->kA > 0.0 && of.trackwidth;
+  using Kind = WpilibFollower::Kind;
   std::string text = fmt::format("# from wpimath.controller import PIDController{}\n",
                                  whole ? ", DifferentialDriveFeedforward" : "");
+  if (of.follower && (whole || of.follower->kind != Kind::ltv_drive)) {
+    text +=
+        fmt::format("# from wpimath.controller import {}\n",
+                    of.follower->kind == Kind::ramsete        ? "RamseteController"
+                    : of.follower->kind == Kind::ltv_unicycle ? "LTVUnicycleController"
+                                                              : "LTVDifferentialDriveController");
+  }
   if (of.trackwidth) {
     text += "# from wpimath.kinematics import DifferentialDriveKinematics\n";
   }
@@ -97,7 +174,7 @@ std::string python_objects(const DriveConstants& of) {
     text += fmt::format("# {} = PIDController(c.kP, 0.0, 0.0, {})  # answers in volts\n", side,
                         literal(of.period, constant_digits));
   }
-  return text;
+  return text + follower_object(of, Language::python, whole);
 }
 
 }  // namespace

@@ -4,9 +4,6 @@
 #include <utility>
 
 #include <flyball/control/followers/holonomic.hpp>
-#include <flyball/control/followers/ltv_drive.hpp>
-#include <flyball/control/followers/ltv_unicycle.hpp>
-#include <flyball/control/followers/ramsete.hpp>
 #include <flyball/control/lqr.hpp>
 #include <flyball/mechanisms/kinematics/swerve_kinematics.hpp>
 #include <flyball/mechanisms/kinematics/wheel_kinematics.hpp>
@@ -36,23 +33,6 @@ double rolling_mass(const DriveRobot& robot, int shafts) {
 /// V against the motors' own friction.
 double friction_volts(const mechanisms::DcMotor& motor) {
   return motor.free_current * motor.R;
-}
-
-Expected<mechanisms::DifferentialDrive> model_of(const DriveRobot& robot) {
-  const double half = 0.5 * robot.trackwidth;
-  const double wheels = robot.wheel_inertia / (robot.wheel_radius * robot.wheel_radius);
-  FLYBALL_TRY(auto model, mechanisms::differential_drive(
-                              {.motor = robot.motor,
-                               .left_gearing = robot.gearing,
-                               .right_gearing = robot.gearing,
-                               .mass = Mass(rolling_mass(robot, 2)),
-                               .wheel_radius = Length(robot.wheel_radius),
-                               .trackwidth = Length(robot.trackwidth),
-                               .moment_of_inertia = MomentOfInertia(robot.moment_of_inertia +
-                                                                    2.0 * wheels * half * half)}));
-  model.kS_left = friction_volts(robot.motor);
-  model.kS_right = model.kS_left;
-  return model;
 }
 
 SpeedLimits limits_of(const DriveJob& job) {
@@ -241,37 +221,19 @@ class SwerveLaw final : public DriveLaw {
 using Made = Expected<std::unique_ptr<DriveLaw>>;
 
 Made differential_law(const DriveJob& job) {
-  FLYBALL_TRY(const auto model, model_of(job.robot));
-  const Time period(job.period);
+  FLYBALL_TRY(const auto model, differential_model(job.robot));
   if (job.follower == DriveFollower::ltv_drive) {
-    const LtvDriveSettings settings{.x_tolerance = job.x_tolerance,
-                                    .y_tolerance = job.y_tolerance,
-                                    .heading_tolerance = job.heading_tolerance,
-                                    .velocity_tolerance = job.velocity_tolerance,
-                                    .voltage_tolerance = usual_voltage,
-                                    .voltage_limit = job.max_voltage,
-                                    .period = period};
-    FLYBALL_TRY(auto follower,
-                LtvDriveFollower::create(model, Length(job.robot.trackwidth), settings));
+    FLYBALL_TRY(auto follower, LtvDriveFollower::create(model, Length(job.robot.trackwidth),
+                                                        ltv_drive_settings(job)));
     return std::unique_ptr<DriveLaw>(std::make_unique<LtvDriveLaw>(std::move(follower)));
   }
-  FLYBALL_TRY(auto tracker,
-              DriveVelocityTracker::create(model, {.velocity_tolerance = job.velocity_tolerance,
-                                                   .voltage_tolerance = usual_voltage,
-                                                   .voltage_limit = job.max_voltage,
-                                                   .period = period}));
+  FLYBALL_TRY(auto tracker, DriveVelocityTracker::create(model, drive_tracker_settings(job)));
   if (job.follower == DriveFollower::ramsete) {
-    FLYBALL_TRY(auto follower,
-                RamseteFollower::create({.b = job.b, .zeta = job.zeta, .limits = limits_of(job)}));
+    FLYBALL_TRY(auto follower, RamseteFollower::create(ramsete_settings(job)));
     return std::unique_ptr<DriveLaw>(std::make_unique<ArcLaw<RamseteFollower>>(
         std::move(follower), std::move(tracker), job.robot.trackwidth));
   }
-  FLYBALL_TRY(auto follower,
-              LtvUnicycleFollower::create({.x_tolerance = job.x_tolerance,
-                                           .y_tolerance = job.y_tolerance,
-                                           .heading_tolerance = job.heading_tolerance,
-                                           .period = period,
-                                           .limits = limits_of(job)}));
+  FLYBALL_TRY(auto follower, LtvUnicycleFollower::create(ltv_unicycle_settings(job)));
   return std::unique_ptr<DriveLaw>(std::make_unique<ArcLaw<LtvUnicycleFollower>>(
       std::move(follower), std::move(tracker), job.robot.trackwidth));
 }
@@ -313,6 +275,52 @@ Made mecanum_law(const DriveJob& job) {
 }
 
 }  // namespace
+
+Expected<mechanisms::DifferentialDrive> differential_model(const DriveRobot& robot) {
+  const double half = 0.5 * robot.trackwidth;
+  const double wheels = robot.wheel_inertia / (robot.wheel_radius * robot.wheel_radius);
+  FLYBALL_TRY(auto model, mechanisms::differential_drive(
+                              {.motor = robot.motor,
+                               .left_gearing = robot.gearing,
+                               .right_gearing = robot.gearing,
+                               .mass = Mass(rolling_mass(robot, 2)),
+                               .wheel_radius = Length(robot.wheel_radius),
+                               .trackwidth = Length(robot.trackwidth),
+                               .moment_of_inertia = MomentOfInertia(robot.moment_of_inertia +
+                                                                    2.0 * wheels * half * half)}));
+  model.kS_left = friction_volts(robot.motor);
+  model.kS_right = model.kS_left;
+  return model;
+}
+
+RamseteSettings ramsete_settings(const DriveJob& job) {
+  return {.b = job.b, .zeta = job.zeta, .limits = limits_of(job)};
+}
+
+LtvUnicycleSettings ltv_unicycle_settings(const DriveJob& job) {
+  return {.x_tolerance = job.x_tolerance,
+          .y_tolerance = job.y_tolerance,
+          .heading_tolerance = job.heading_tolerance,
+          .period = Time(job.period),
+          .limits = limits_of(job)};
+}
+
+LtvDriveSettings ltv_drive_settings(const DriveJob& job) {
+  return {.x_tolerance = job.x_tolerance,
+          .y_tolerance = job.y_tolerance,
+          .heading_tolerance = job.heading_tolerance,
+          .velocity_tolerance = job.velocity_tolerance,
+          .voltage_tolerance = usual_voltage,
+          .voltage_limit = job.max_voltage,
+          .period = Time(job.period)};
+}
+
+DriveTrackerSettings drive_tracker_settings(const DriveJob& job) {
+  return {.velocity_tolerance = job.velocity_tolerance,
+          .voltage_tolerance = usual_voltage,
+          .voltage_limit = job.max_voltage,
+          .period = Time(job.period)};
+}
 
 TrackingPoint tracking_point(const MotionSample& sample) noexcept {
   const Vector2d v = sample.pose.rotation().inverse() * sample.velocity;

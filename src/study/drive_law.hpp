@@ -4,6 +4,9 @@
 
 #include <Eigen/Core>
 
+#include <flyball/control/followers/ltv_drive.hpp>
+#include <flyball/control/followers/ltv_unicycle.hpp>
+#include <flyball/control/followers/ramsete.hpp>
 #include <flyball/core/expected.hpp>
 #include <flyball/study/drive.hpp>
 
@@ -38,6 +41,14 @@ class DriveLaw {
 
 /// @errors Those of the followers and models.
 [[nodiscard]] Expected<std::unique_ptr<DriveLaw>> make_drive_law(const DriveJob& job);
+
+/// A differential drive as its follower knows it. @errors Those of the model.
+[[nodiscard]] Expected<mechanisms::DifferentialDrive> differential_model(const DriveRobot& robot);
+// What its follower and the tracker of its sides are tuned by.
+[[nodiscard]] RamseteSettings ramsete_settings(const DriveJob& job);
+[[nodiscard]] LtvUnicycleSettings ltv_unicycle_settings(const DriveJob& job);
+[[nodiscard]] LtvDriveSettings ltv_drive_settings(const DriveJob& job);
+[[nodiscard]] DriveTrackerSettings drive_tracker_settings(const DriveJob& job);
 
 /// A sample as followers take it: its velocity in the robot's own frame.
 [[nodiscard]] TrackingPoint tracking_point(const MotionSample& sample) noexcept;

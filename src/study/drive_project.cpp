@@ -345,10 +345,8 @@ Expected<DriveFollower> follower_of(const Project& project, DriveKind kind) {
                             .expected("ramsete, ltv unicycle, ltv drive or holonomic"));
 }
 
-}  // namespace
-
-ExpectedAll<DriveJob> drive_job(const std::string& path, std::span<const Override> overrides) {
-  FLYBALL_TRY(const auto project, read_project(path, overrides));
+/// All but the trajectory. @param settings  Set to what the project file refers to.
+ExpectedAll<DriveJob> drive_job_of(const Project& project, PathPlannerSettings& settings) {
   const DriveSection& said = project.drive;
   if (said.type.empty()) {
     return tl::unexpected(Errors(Error(ProjectError::missing_key)
@@ -358,11 +356,10 @@ ExpectedAll<DriveJob> drive_job(const std::string& path, std::span<const Overrid
                                      .hint("say what the drivetrain is: [drive] and type = "
                                            "\"differential\", \"swerve\" or \"mecanum\"")));
   }
-  PathPlannerSettings settings;
   if (!said.settings.empty()) {
-    FLYBALL_TRY(settings, read_pathplanner_settings(beside(path, said.settings)));
+    FLYBALL_TRY(settings, read_pathplanner_settings(beside(project.path, said.settings)));
   }
-  DriveJob job{.path = path};
+  DriveJob job{.path = project.path};
   FLYBALL_TRY(job.robot, robot_of(project, settings));
   FLYBALL_TRY(job.follower, follower_of(project, job.robot.kind));
   job.diagnostics = settings.diagnostics;
@@ -383,6 +380,23 @@ ExpectedAll<DriveJob> drive_job(const std::string& path, std::span<const Overrid
                  .resistance = project.job.battery.resistance};
   job.disturbance = project.disturbance;
   job.seed = project.job.seed;
+  return job;
+}
+
+}  // namespace
+
+ExpectedAll<DriveJob> drive_design_job(const std::string& path,
+                                       std::span<const Override> overrides) {
+  FLYBALL_TRY(const auto project, read_project(path, overrides));
+  PathPlannerSettings settings;
+  return drive_job_of(project, settings);
+}
+
+ExpectedAll<DriveJob> drive_job(const std::string& path, std::span<const Override> overrides) {
+  FLYBALL_TRY(const auto project, read_project(path, overrides));
+  PathPlannerSettings settings;
+  FLYBALL_TRY(auto job, drive_job_of(project, settings));
+  const DriveSection& said = project.drive;
   if (said.trajectory.empty() == said.waypoints.empty()) {
     return tl::unexpected(
         Errors(Error(ProjectError::missing_key)

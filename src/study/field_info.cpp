@@ -108,9 +108,9 @@ Names sections_of(JobKind job) {
   static constexpr std::array<std::string_view, 9> all{"log",       "mechanism", "controller",
                                                        "estimator", "sensor",    "battery",
                                                        "profile",   "mechanism", "gains"};
-  static constexpr std::array<std::string_view, 9> design{"mechanism", "gains",  "controller",
-                                                          "estimator", "sensor", "battery",
-                                                          "profile",   "point",  "swing_up"};
+  static constexpr std::array<std::string_view, 10> design{
+      "mechanism", "gains",   "controller", "estimator", "sensor",
+      "battery",   "profile", "point",      "swing_up",  "drive.follower"};
   static constexpr std::array<std::string_view, 8> analyze{
       "mechanism", "gains.kS",          "gains.kV", "gains.kA",
       "gains.kG",  "controller.period", "model",    "point"};

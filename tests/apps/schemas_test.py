@@ -145,6 +145,9 @@ def check_answers(folder):
     check_answer(["drive", examples / "drive_differential.toml", "--path-velocity", "40m/s", "--path-acceleration",
                   "90m/s^2", "--path-centripetal", "90m/s^2"], 1, folder)
     check_answer(["drive", examples / "elevator.toml"], 2, folder)
+    for follower in ("ramsete", "ltv unicycle", "ltv drive"):
+        check_answer(["design", examples / "drive_differential.toml", "--follower", follower], 0, folder, "design_drive")
+    check_answer(["design", examples / "drive_swerve.toml"], 2, folder, "design_drive")
     check_model_fit(folder)
     (folder / "discrete.json").write_text('{"A":[[0.5]],"B":[[1]],"domain":"discrete","T":0.02}')
     check_answer(["analyze", "discrete.json"], 0, folder)

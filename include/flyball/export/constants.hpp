@@ -22,6 +22,7 @@ struct UnitGains {
 /// A mechanism's controller as other tools know it.
 struct MechanismConstants {
   mechanisms::MechanismKind kind = mechanisms::MechanismKind::flywheel;
+  std::string name{};              ///< Of the constants, "Drivetrain"; empty: the kind's.
   std::string unit = "rad";        ///< "m" or "rad", for which there are gains.
   std::vector<UnitGains> gains{};  ///< Per that unit and, where it is known, "rotation" and "RPM".
   /// The same units with gains for a loop of 1 ms on the motor controller; empty: those above.

@@ -112,6 +112,10 @@ struct DriveResult {
 [[nodiscard]] ExpectedAll<DriveJob> drive_job(const std::string& project,
                                               std::span<const Override> overrides = {});
 
+/// The same without a trajectory, whether there is one or not: what a follower is designed for.
+[[nodiscard]] ExpectedAll<DriveJob> drive_design_job(const std::string& project,
+                                                     std::span<const Override> overrides = {});
+
 /// Simulates it: each period the follower gets a pose (as old and as noisy as the disturbance says)
 /// and what its wheels do, and answers voltages, which motors get within current limits from a
 /// battery that sags; the robot, its wheels that slip and its modules are integrated to the job's
