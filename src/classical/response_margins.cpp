@@ -59,10 +59,20 @@ class BoundedLoop {
     return detail::variation(factors_, step.from, step.to, period_);
   }
 
-  /// How far the phase can move on a step: each root of a continuous loop turns it one way.
+  /// How far the phase can move on a step: each root of a continuous loop turns it one way; of a
+  /// discrete one arg(z - r) has the slope T/2 + T (1 - |r|²)/2|z - r|², of a root on the circle
+  /// the first part alone.
   [[nodiscard]] double turn(const Step& step) const {
     if (period_) {
-      return variation(step);
+      double sum = factors_.delay * (step.to - step.from);
+      const double turned = 0.5 * period_->si() * (step.to - step.from);
+      for (const auto* roots : {&factors_.zeros, &factors_.poles}) {
+        for (const Complex root : *roots) {
+          const double off = off_circle(root);
+          sum += turned * (1.0 + (off > 0.0 ? off / squared_distance(root, step) : 0.0));
+        }
+      }
+      return std::min(sum, variation(step));
     }
     double sum = factors_.delay * (step.to - step.from);
     for (const auto* roots : {&factors_.zeros, &factors_.poles}) {
@@ -96,8 +106,18 @@ class BoundedLoop {
 
   /// The largest second derivative of the phase on a step: 2 |σ|/|jω - r|³ of each root.
   [[nodiscard]] double turn_curvature(const Step& step) const {
-    if (period_) {
-      return curvature(step);
+    if (period_) {  // T² |1 - |r|²| |r|/|z - r|³ is more than each root's.
+      double sum = 0.0;
+      const double T = period_->si();
+      for (const auto* roots : {&factors_.zeros, &factors_.poles}) {
+        for (const Complex root : *roots) {
+          if (const double off = off_circle(root); off > 0.0) {
+            const double square = squared_distance(root, step);
+            sum += T * T * off * std::abs(root) / (square * std::sqrt(square));
+          }
+        }
+      }
+      return std::min(sum, curvature(step));
     }
     double sum = 0.0;
     for (const auto* roots : {&factors_.zeros, &factors_.poles}) {
@@ -197,6 +217,21 @@ class BoundedLoop {
   }
 
  private:
+  /// |1 - |r|²|, zero on the circle but for rounding.
+  [[nodiscard]] static double off_circle(Complex root) {
+    const double size = std::abs(root);
+    const double off = std::abs((1.0 - size) * (1.0 + size));
+    return off <= 4.0 * std::numeric_limits<double>::epsilon() ? 0.0 : off;
+  }
+
+  /// The least |z - r|² on a step of a discrete loop.
+  [[nodiscard]] double squared_distance(Complex root, const Step& step) const {
+    const double T = period_->si();
+    const double own = std::abs(std::arg(root));
+    const double angle = std::clamp(own, step.from * T, step.to * T);
+    return std::norm(std::polar(1.0, angle) - std::polar(std::abs(root), own));
+  }
+
   const FrequencyResponse& loop_;
   std::optional<Time> period_;
   Factors factors_;

@@ -286,7 +286,7 @@ def check_reader_and_schema(folder):
     values = {"1": 1, "1.5": 1.5, '"10"': "10", '"x"': "x", '""': "", "true": True, "[]": [], "[1]": [1]}
     base = '[mechanism]\ntype = "elevator"\n'
     for section, told in schema["properties"].items():
-        if section in ("model", "point", "simulation", "fit", "estimate"):
+        if section in ("model", "point", "simulation", "fit", "estimate", "swing_up"):
             continue
         for key in told["properties"]:
             if key in ("type", "motor", "tolerance", "limit", "reference", "mechanism", "follower"):

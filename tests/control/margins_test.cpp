@@ -34,6 +34,29 @@ double radius(const PlantInputLoop& loop, double gain, double further_delay = 0.
   return closed_loop_radius(loop, gain, Time(further_delay)).value();
 }
 
+// u = -(30 x + 8 v) before 1/(2 s²): L's two poles at z = 1 hold its phase at -180° towards zero
+// frequency without ever reaching it. By hand L(-1) = 8 (T/2)/(-1 - 1) = -0.02.
+TEST(StabilityMargins, OfAMassThatIsPushed) {
+  Eigen::MatrixXd A(2, 2);
+  A << 0.0, 1.0, 0.0, 0.0;
+  const Eigen::MatrixXd B = Eigen::Vector2d(0.0, 0.5);
+  const Eigen::MatrixXd K = Eigen::RowVector2d(30.0, 8.0);
+  for (const double delay : {0.0, 0.004, 0.012}) {
+    const auto margins =
+        state_feedback_loop(A, B, K, Time(0.01), Time(delay)).and_then(&stability_margins);
+    ASSERT_TRUE(margins) << to_string(margins.error());
+    EXPECT_TRUE(margins->stable);
+    ASSERT_EQ(margins->gain_crossovers.size(), 1U);
+    if (delay == 0.0) {
+      EXPECT_NEAR(margins->gain_margin_up, 50.0, 1e-9);
+    }
+    // 180° + arg L where |L| = 1, behind half a period of hold and the delay.
+    const double w = margins->gain_crossovers[0].frequency;
+    const double expected = std::atan2(8.0 * w, 30.0) - w * (0.005 + delay);
+    EXPECT_NEAR(margins->phase_margin, expected * 180.0 / std::numbers::pi, 0.2);
+  }
+}
+
 // An integrator under zero-order hold: L = k T/(z - 1). It is unstable from k T = 2 on, at Nyquist.
 // |L| = 1 at 2 sin(θ/2) = kT, where the phase is -90° - θ/2, so PM = 90° - θ/2. The delay margin is
 // exact: z - 1 + kT z^{-d} or its fractional kin reaches the circle.
