@@ -82,7 +82,8 @@ Eigen::VectorXcd poles_of(const MatrixRef& A) {
       break;
     }
     const Eigen::MatrixXd Z = qr.Q.leftCols(rank);
-    M = detail::product(Z.transpose(), detail::product(M, Z)).eval();
+    // Moved: Eigen frees before it allocates when a matrix takes another size.
+    M = Eigen::MatrixXd(detail::product(Z.transpose(), detail::product(M, Z)));
   }
   poles.head(M.rows()) = detail::eigenvalues_of(M);
   return poles;

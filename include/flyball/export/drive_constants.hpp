@@ -18,6 +18,7 @@ struct DriveModeGains {
 /// What WPILib's follower of a drivetrain takes. Bryson's tolerances, of which infinite ones do not
 /// count.
 struct WpilibFollower {
+  /// Which of WPILib's controllers.
   enum class Kind { ramsete, ltv_unicycle, ltv_drive };
   Kind kind = Kind::ramsete;
   double b = 2.0;                           ///< rad²/m²

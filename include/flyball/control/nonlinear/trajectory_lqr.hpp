@@ -109,9 +109,11 @@ class TrajectoryRegulator {
     const auto last = static_cast<double>(table_.size() - 1);
     return k > 0.0 ? static_cast<std::size_t>(std::min(k, last)) : 0;
   }
+  /// K_k; of the last step from there on. @param step  k.
   [[nodiscard]] const Gain& K(std::size_t step) const noexcept {
     return table_[std::min(step, table_.size() - 1)].K;
   }
+  /// x_k of the trajectory; the last from there on. @param step  k.
   [[nodiscard]] const StateVector& reference(std::size_t step) const noexcept {
     return table_[std::min(step, table_.size() - 1)].x;
   }

@@ -70,6 +70,7 @@ class Balance {
  public:
   using State = Eigen::Vector<double, N>;
 
+  /// @param design  As `design_balance` gives it.
   explicit Balance(const BalanceDesign<N>& design) noexcept : design_(design) {}
 
   /// V(x), angles the shorter way round; infinite for what is no state.
@@ -122,6 +123,7 @@ class SwingUp {
  public:
   using State = Eigen::Vector<double, N>;
 
+  /// @param shaper  What brings it near. @param design  What holds it there.
   SwingUp(const Shaper& shaper, const BalanceDesign<N>& design) noexcept
       : shaper_(shaper), balance_(design) {}
 

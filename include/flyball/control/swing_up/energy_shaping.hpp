@@ -24,6 +24,7 @@ struct PendulumShaper {
   double limit = 0.0;  ///< u_max, N m.
   double sharpness = 10.0;
 
+  /// The torque, N m, within the limit. @param x  (θ, θ̇).
   [[nodiscard]] double calculate(const Eigen::Vector2d& x) const noexcept {
     const auto& [m, l, c, g] = model;
     const double top = m * g * l;
@@ -51,6 +52,7 @@ struct CartPoleShaper {
   double stiffness = 0.1;     ///< k
   double damping = 0.23;      ///< d
 
+  /// The force, N, within the limit. @param x  The cart-pole's state.
   [[nodiscard]] double calculate(const Eigen::Vector4d& x) const noexcept {
     const auto& [m_c, m_p, l, g] = model;
     const double room = x(2) >= 0.0 ? track - x(0) : track + x(0);
@@ -92,6 +94,7 @@ struct AcrobotShaper {
   double sharpness = 75.0;  ///< κ
   double kick = 16.7;       ///< s
 
+  /// The torque of the elbow, N m, within the limit. @param x  The acrobot's state.
   [[nodiscard]] double calculate(const Eigen::Vector4d& x) const noexcept {
     const mechanisms::TwoLink& links = model.links;
     const double top = model.energy_upright();

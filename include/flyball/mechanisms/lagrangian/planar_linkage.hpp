@@ -32,7 +32,7 @@ struct PlanarPose {
 /// the velocities by automatic differentiation along q̇.
 ///
 /// @tparam K  A type with `static constexpr int coordinates()`, `bodies()`, a std::array of
-/// PlanarBody, and `poses(q)` over a generic scalar S: a std::array of as many PlanarPose<S>. Its
+/// PlanarBody, and `poses(q)` over a generic scalar S: a std::array of as many PlanarPose of S. Its
 /// `input_matrix`, `dissipation` and `description` count if it has them, as MechanicalEnergies
 /// says. Source: book, chapter 13.
 template <class K>

@@ -28,15 +28,20 @@ class ExpressionGraph {
   using Operation = expression::Operation;
   using Node = expression::Node;
 
+  /// A new variable's node.
   std::uint32_t input();
+  /// A new parameter's node.
   std::uint32_t parameter(double value);
   std::uint32_t constant(double value) {
     nodes_.push_back(Node::constant(value));
     degrees_.push_back(Degree::constant);
     return static_cast<std::uint32_t>(nodes_.size() - 1);
   }
+  /// f(a), or the node that is that already.
   std::uint32_t unary(Operation operation, std::uint32_t a);
+  /// f(a, b), or the node that is that already.
   std::uint32_t binary(Operation operation, std::uint32_t a, std::uint32_t b);
+  /// The one or the other, by whether the condition is not zero.
   std::uint32_t select(std::uint32_t condition, std::uint32_t then, std::uint32_t otherwise);
 
   [[nodiscard]] const std::vector<Node>& nodes() const noexcept { return nodes_; }
@@ -153,7 +158,7 @@ using Constraints = std::vector<Constraint>;
 
 }  // namespace flyball::optimization
 
-/// Expressions in Eigen's vectors and matrices. @private
+/// @cond What Eigen asks of a scalar.
 template <>
 struct Eigen::NumTraits<flyball::optimization::Expression> : Eigen::GenericNumTraits<double> {
   using Real = flyball::optimization::Expression;
@@ -188,3 +193,4 @@ template <>
 struct std::common_type<double, flyball::optimization::Expression> {
   using type = flyball::optimization::Expression;
 };
+/// @endcond

@@ -63,8 +63,11 @@ class ExpressionMatrix {
   }
 
   [[nodiscard]] ExpressionMatrix block(Index row, Index column, Index rows, Index columns) const;
+  /// Row i, 1 x columns.
   [[nodiscard]] ExpressionMatrix row(Index i) const { return block(i, 0, 1, columns_); }
+  /// Column j, rows x 1.
   [[nodiscard]] ExpressionMatrix col(Index j) const { return block(0, j, rows_, 1); }
+  /// Entries first … first + count - 1 of a row or column.
   [[nodiscard]] ExpressionMatrix segment(Index first, Index count) const;
   [[nodiscard]] ExpressionMatrix transpose() const;
   /// The sum of all entries.

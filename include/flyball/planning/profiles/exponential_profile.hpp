@@ -38,19 +38,23 @@ struct MotorMotionLimits {
 /// Source: book, sections 6.10 (kV, kA) and 15.1.4; the maximum principle for x'' = a(v, ±V).
 class ExponentialProfile {
  public:
+  /// A motion from one state to another.
   ExponentialProfile(const MotorMotionLimits& motor, const MotionState& start,
                      const MotionState& goal) noexcept;
 
   [[nodiscard]] double total_time() const noexcept { return end_; }
+  /// s, from t to the end.
   [[nodiscard]] double remaining_time(double t) const noexcept {
     return t > 0.0 ? (t < end_ ? end_ - t : 0.0) : end_;
   }
+  /// @param t  s; before the start the start, after the end the goal, moving on with its velocity.
   [[nodiscard]] MotionState sample(double t) const noexcept;
   /// Velocity and the accelerations at rest; the motor's own limits are `motor()`.
   [[nodiscard]] MotionLimits limits() const noexcept;
   [[nodiscard]] const MotorMotionLimits& motor() const noexcept { return motor_; }
   /// Never: braking is easier than accelerating.
   [[nodiscard]] bool reversible() const noexcept { return false; }
+  /// The motion from another state on, within the same limits.
   [[nodiscard]] ExponentialProfile replanned(const MotionState& state,
                                              const MotionState& goal) const noexcept {
     return {motor_, state, goal};

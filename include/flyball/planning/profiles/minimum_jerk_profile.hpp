@@ -23,14 +23,18 @@ class MinimumJerkProfile {
                                                         const MotionState& goal) noexcept;
 
   [[nodiscard]] double total_time() const noexcept { return end_; }
+  /// s, from t to the end.
   [[nodiscard]] double remaining_time(double t) const noexcept {
     return t > 0.0 ? (t < end_ ? end_ - t : 0.0) : end_;
   }
+  /// @param t  s; before the start the start, after the end the goal, moving on with its velocity.
   [[nodiscard]] MotionState sample(double t) const noexcept;
+  /// Its jerk, m/s³ or rad/s³. @param t  s.
   [[nodiscard]] double jerk(double t) const noexcept;
   [[nodiscard]] MotionLimits limits() const noexcept { return limits_.both_ways(); }
   [[nodiscard]] bool keeps_limits() const noexcept { return keeps_limits_; }
   [[nodiscard]] bool reversible() const noexcept;
+  /// The motion from another state on, within the same limits.
   [[nodiscard]] MinimumJerkProfile replanned(const MotionState& state,
                                              const MotionState& goal) const noexcept {
     return {limits_, state, goal};

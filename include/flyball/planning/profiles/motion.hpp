@@ -74,6 +74,7 @@ concept MotionProfile =
 template <MotionProfile Profile>
 class ReversedMotion {
  public:
+  /// @param motion  What is to be gone back.
   explicit ReversedMotion(const Profile& motion) noexcept : motion_(motion) {}
 
   [[nodiscard]] double total_time() const noexcept { return motion_.total_time(); }

@@ -14,11 +14,13 @@ namespace flyball {
 /// object as TrapezoidProfile. Source: book, section 15.1.4.
 class ParabolicProfile : public JerkMotion {
  public:
+  /// A motion from one state to another.
   ParabolicProfile(const MotionLimits& limits, const MotionState& start,
                    const MotionState& goal) noexcept;
 
   [[nodiscard]] MotionLimits limits() const noexcept { return limits_; }
   [[nodiscard]] bool reversible() const noexcept { return true; }
+  /// The motion from another state on, within the same limits.
   [[nodiscard]] ParabolicProfile replanned(const MotionState& state,
                                            const MotionState& goal) const noexcept {
     return {limits_, state, goal};
@@ -50,6 +52,7 @@ class StepperProfile {
   [[nodiscard]] MotionLimits limits() const noexcept { return profile_.limits(); }
   [[nodiscard]] double jump() const noexcept { return jump_; }
   [[nodiscard]] bool reversible() const noexcept { return profile_.reversible(); }
+  /// The motion from another state on, within the same limits.
   [[nodiscard]] StepperProfile replanned(const MotionState& state,
                                          const MotionState& goal) const noexcept {
     return {profile_.limits(), jump_, state, goal};

@@ -11,6 +11,7 @@ struct SCurvePlan;
 /// A motion of pieces of constant jerk.
 class JerkMotion {
  public:
+  /// A part of constant jerk.
   struct Piece {
     double begin = 0.0;  ///< s
     MotionState at{};    ///< At its begin.
@@ -19,6 +20,7 @@ class JerkMotion {
   static constexpr int capacity = 16;
 
   [[nodiscard]] double total_time() const noexcept { return end_; }
+  /// s, from t to the end.
   [[nodiscard]] double remaining_time(double t) const noexcept {
     return t > 0.0 ? (t < end_ ? end_ - t : 0.0) : end_;
   }
@@ -35,6 +37,7 @@ class JerkMotion {
   [[nodiscard]] const MotionState& goal() const noexcept { return goal_; }
 
  protected:
+  /// Starts anew, without pieces.
   void begin(const MotionState& start) noexcept {
     position_[0] = start.position;
     velocity_[0] = start.velocity;
@@ -48,7 +51,9 @@ class JerkMotion {
   /// Nothing is added for no duration. Beyond the capacity nothing is either.
   void add(double duration, double jerk) noexcept;
   void finish(const MotionState& goal) noexcept { goal_ = goal; }
+  /// Appends the pieces of a plan.
   void add_plan(const detail::SCurvePlan& plan) noexcept;
+  /// Appends the pieces of a trapezoid.
   void add_trapezoid(const MotionLimits& limits, const MotionState& start,
                      const MotionState& goal) noexcept;
 

@@ -62,6 +62,7 @@ class SynchronizedMotion {
                      Synchronization how = Synchronization::time, double least = 0.0) noexcept;
 
   [[nodiscard]] double total_time() const noexcept { return total_; }
+  /// s, from t to the end of all axes.
   [[nodiscard]] double remaining_time(double t) const noexcept {
     return t > 0.0 ? (t < total_ ? total_ - t : 0.0) : total_;
   }
@@ -73,6 +74,7 @@ class SynchronizedMotion {
     }
     return all;
   }
+  /// The motion of one axis. @param i  Below the number of axes.
   [[nodiscard]] const JerkMotion& axis(int i) const noexcept {
     return axes_[static_cast<std::size_t>(i)];
   }
