@@ -6,6 +6,7 @@ usage: schemas_test.py COMMAND SCHEMAS EXAMPLES
 """
 
 import copy
+import functools
 import json
 import math
 import pathlib
@@ -22,6 +23,7 @@ command, schemas, examples = (pathlib.Path(argument).resolve() for argument in s
 failures = []
 
 
+@functools.cache  # checking a schema itself takes longer than all that is checked by it
 def validator(name):
     schema = json.loads((schemas / f"{name}.schema.json").read_text())
     jsonschema.Draft202012Validator.check_schema(schema)
