@@ -169,11 +169,15 @@ Section follower_section(const FollowerDesign& design) {
 }
 
 Figure schedule_figure(const FollowerDesign& design) {
-  Figure figure{"follower",
-                "schedule",
-                "Gains over the velocity",
-                "What an error of each state adds, over the robot's velocity.",
-                {}};
+  Figure figure{
+      "follower",
+      "schedule",
+      "Gains over the velocity",
+      answers_volts(design)
+          ? "What an error of each state adds, over the robot's velocity."
+          : "What an error adds, over the robot's velocity: ahead to v, across and of the "
+            "heading to ω.",
+      {}};
   figure.plot.title = figure.title;
   figure.plot.x_label = "Velocity (m/s)";
   const auto gain = [&](const char* name, Eigen::Index row, Eigen::Index column, int color) {
@@ -192,10 +196,9 @@ Figure schedule_figure(const FollowerDesign& design) {
         panel({"Of the sides", "V·s/m"},
               {gain("left", 0, 3, measured_color), gain("right", 0, 4, simulated_color)})};
   } else {
-    figure.plot.panels = {
-        panel({"v of the place ahead", "1/s"}, {gain("", 0, 0, measured_color)}),
-        panel({"ω of the place across", "rad/(s·m)"}, {gain("", 1, 1, simulated_color)}),
-        panel({"ω of the heading", "1/s"}, {gain("", 1, 2, voltage_color)})};
+    figure.plot.panels = {panel({"Ahead", "1/s"}, {gain("", 0, 0, measured_color)}),
+                          panel({"Across", "rad/(s·m)"}, {gain("", 1, 1, simulated_color)}),
+                          panel({"Heading", "1/s"}, {gain("", 1, 2, voltage_color)})};
   }
   return figure;
 }
