@@ -34,7 +34,7 @@ using detail::solve_loop;
 namespace {
 
 constexpr std::string_view noun = "delay system";
-constexpr Index most_states = 2000;
+constexpr Index most_states = 800;
 
 Expected<void> check_form(const DelayForm& f) {
   const Index n = f.A.rows();

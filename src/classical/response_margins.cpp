@@ -266,8 +266,10 @@ std::optional<std::vector<double>> zeros(const BoundedLoop& loop, const Step& ra
   const auto value = [&](double w) { return crossing.value(loop.at(w)); };
   constexpr double closest = 1e-13;
   constexpr int most_steps = 600'000;
+  constexpr int most_exact = 60'000;  // each costs as much as hundreds of the factors' values
+  int exact = 0;
   for (int count = 0; !pending.empty(); ++count) {
-    if (count == most_steps) {
+    if (count == most_steps || exact == most_exact) {
       return std::nullopt;
     }
     const Step step = pending.back();
@@ -278,6 +280,7 @@ std::optional<std::vector<double>> zeros(const BoundedLoop& loop, const Step& ra
     if (std::abs(at_start) > moved + 1e-6) {
       continue;
     }
+    ++exact;
     at_start = value(step.from);
     if (std::abs(at_start) > moved) {
       continue;

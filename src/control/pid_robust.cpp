@@ -7,6 +7,7 @@
 
 #include <flyball/control/pid_design.hpp>
 #include <flyball/math/search/minimum.hpp>
+#include <flyball/math/search/roots.hpp>
 
 #include "control/pid_basis.hpp"
 #include "core/format.hpp"
@@ -389,26 +390,26 @@ Expected<PidLoop> tune_by_robustness(const TransferFunction& plant, PidForm form
   }
   const double tau = search.filter(best->point);
   // Down by what the grid of frequencies may have missed.
-  const auto keeps = [&](double ki) {
+  const auto excess = [&](double ki) {
     Candidate trial = *best;
     trial.ki = ki;
     const auto margins = margins_of(plant, gains_of(trial), tau);
-    return margins && margins->stable &&
-           margins->sensitivity.value <= goal.sensitivity * (1.0 + 1e-9);
+    return margins && margins->stable ? margins->sensitivity.value - goal.sensitivity * (1.0 + 1e-9)
+                                      : infinity;
   };
-  if (!keeps(best->ki)) {
-    double low = 0.5 * best->ki;
-    double high = best->ki;
-    if (!keeps(low)) {
+  if (const double at_best = excess(best->ki); at_best > 0.0) {
+    const double half = 0.5 * best->ki;
+    const double at_half = excess(half);
+    if (at_half > 0.0) {
       return refusal(PidDesignError::nothing_robust, where, "the gains")
           .got("not as robust as on the grid of frequencies")
           .hint("ask for a crossover and a phase margin instead");
     }
-    for (int i = 0; i < 40 && high - low > 1e-12 * high; ++i) {
-      const double middle = 0.5 * (low + high);
-      (keeps(middle) ? low : high) = middle;
-    }
-    best->ki = low;
+    const auto limit =
+        find_root(excess, half, best->ki, at_half, at_best, {.relative_tolerance = 1e-12});
+    best->ki = !limit                   ? half
+               : limit->residual <= 0.0 ? limit->x
+                                        : std::min(limit->low, limit->high);
   }
   FLYBALL_TRY_IN(where, auto loop, assess_pid(plant, gains_of(*best), tau));
   return loop;

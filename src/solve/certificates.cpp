@@ -71,7 +71,7 @@ Outcome solve_certify(const Problem& problem, JsonWriter& answer) {
   const UncertainLoop loop{std::move(family), nominal.C,   period,      nominal.A_c,
                            nominal.B_c,       nominal.C_c, nominal.D_c, std::move(set)};
   // A problem of a stream is answered within about a second.
-  FLYBALL_TRY(const auto certificate, certify_loop(loop, {.most_work = 3e8}));
+  FLYBALL_TRY(const auto certificate, certify_loop(loop, {.most_work = 1.5e8}));
   answer.add("verdict", to_string(certificate.verdict));
   answer.add("decay", certificate.decay);
   answer.add("disk_margin", certificate.disk_margin);
