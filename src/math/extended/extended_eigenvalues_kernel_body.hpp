@@ -1,3 +1,5 @@
+#pragma once
+
 // Included with FLYBALL_VARIANT as the namespace, by each source that compiles it for one kind of
 // processor, with -ffp-contract=off: a fused product would be no longer what the next line
 // corrects.
