@@ -2,6 +2,7 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <utility>
 
 #include "control/placement.hpp"
 #include "math/extended/extended_eigenvalues.hpp"
@@ -45,9 +46,10 @@ Eigen::VectorXd moved_by(double unit, double norm, const Eigen::VectorXd& condit
 }
 
 /// In doubles where they tell the poles to 1e-10 of their scales; else in twice their precision.
-Spectrum spectrum_of(const DoubleDoubleMatrix& similar, const Eigensystem& system,
-                     const Eigen::MatrixXcd& rows, const Eigen::VectorXd& formed,
-                     const Eigen::VectorXd& scales) {
+/// `terms`: the sizes that add up to `similar`.
+Spectrum spectrum_of(const DoubleDoubleMatrix& similar, const Eigen::MatrixXd& terms,
+                     const Eigensystem& system, const Eigen::MatrixXcd& rows,
+                     const Eigen::VectorXd& formed, const Eigen::VectorXd& scales) {
   constexpr double enough = 1e-10;
   constexpr double extended_unit = 1e-31;
   const Eigen::MatrixXd rounded = similar.rounded();
@@ -73,8 +75,11 @@ Spectrum spectrum_of(const DoubleDoubleMatrix& similar, const Eigensystem& syste
   }
   const std::vector<std::size_t> order = matched(system.values, *values);
   const Eigen::VectorXd bounds = moved_by(extended_unit, norm, condition);
-  const double most = norm * std::pow(extended_unit * static_cast<double>(condition.size()),
-                                      1.0 / static_cast<double>(condition.size()));
+  const double formed_norm = (d.cwiseInverse().asDiagonal() * terms * d.asDiagonal()).norm();
+  const auto n = static_cast<double>(condition.size());
+  const double most =
+      norm > 0.0 ? norm * std::pow(extended_unit * n * std::max(1.0, formed_norm / norm), 1.0 / n)
+                 : 0.0;
   for (Eigen::Index k = 0; k < system.values.size(); ++k) {
     spectrum.values(k) = (*values)(static_cast<Eigen::Index>(order[static_cast<std::size_t>(k)]));
     const double from_forming = extended_unit * formed(k);
@@ -128,11 +133,20 @@ std::vector<std::size_t> matched(const Eigen::VectorXcd& wanted, const Eigen::Ve
   return match;
 }
 
-Reached reached_by(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
-                   const DoubleDoubleMatrix& X, const DoubleDoubleMatrix& inverse,
-                   const StateUnits& units, const Eigen::VectorXcd& wanted) {
-  const Eigen::Index n = wanted.size();
+namespace {
+
+/// What is reached, with the largest uncertainty of a pole relative to its scale.
+struct Judged {
   Reached reached;
+  double uncertainty = infinite;
+};
+
+Judged judged_in(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
+                 const DoubleDoubleMatrix& X, const DoubleDoubleMatrix& inverse,
+                 const StateUnits& units, const Eigen::VectorXcd& wanted) {
+  const Eigen::Index n = wanted.size();
+  Judged judged;
+  Reached& reached = judged.reached;
   // X⁻¹ (A - B K) X has the same poles and is nearly triangular: that takes away what doubles would
   // lose in A - B K.
   const DoubleDoubleMatrix driven = product(DoubleDoubleMatrix(K), X);
@@ -141,7 +155,7 @@ Reached reached_by(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
   const DoubleDoubleMatrix exact = product(inverse, moved);
   const Eigen::MatrixXd similar = exact.rounded();
   if (!similar.allFinite() || !exact.all_finite()) {
-    return reached;
+    return judged;
   }
   Eigensystem system = eigensystem_of(similar);
   if (!system.values.allFinite()) {
@@ -150,7 +164,7 @@ Reached reached_by(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
     system = eigensystem_of((similar.array().abs() > rounding).select(similar, 0.0));
   }
   if (!system.values.allFinite()) {
-    return reached;
+    return judged;
   }
   const Eigen::MatrixXcd rows = solve_complex(system.vectors, Eigen::MatrixXcd::Identity(n, n));
   const Eigen::MatrixXcd right = complex_product(X.rounded().cast<Complex>(), system.vectors);
@@ -177,11 +191,17 @@ Reached reached_by(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
       y_B.transpose().cwiseProduct(product(K.cwiseAbs(), x)).colwise().sum().transpose();
   const Eigen::VectorXd scales = pole_scales(
       wanted, units.balanced.asDiagonal() * A * units.balanced.cwiseInverse().asDiagonal());
-  const Spectrum spectrum = spectrum_of(exact, system, rows, formed, scales);
+  const Spectrum spectrum =
+      spectrum_of(exact,
+                  product(inverse.rounded().cwiseAbs(),
+                          product(A.cwiseAbs(), X.rounded().cwiseAbs()) +
+                              product(B.cwiseAbs(), product(K.cwiseAbs(), X.rounded().cwiseAbs()))),
+                  system, rows, formed, scales);
   reached.poles.resize(n);
   reached.left.resize(n, n);
   reached.right.resize(n, n);
   reached.pole_error = 0.0;
+  judged.uncertainty = 0.0;
   reached.misplaced = K.allFinite() ? 0.0 : infinite;
   const std::vector<std::size_t> order = matched(wanted, spectrum.values);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -192,6 +212,7 @@ Reached reached_by(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
     double sensitivity = std::min(given_left.row(k).norm(), balanced_left(k) * balanced_sizes(k));
     sensitivity = std::isfinite(sensitivity) ? std::max(1.0, sensitivity) : infinite;
     const double error = std::abs(reached.poles(i) - wanted(i));
+    judged.uncertainty = std::max(judged.uncertainty, spectrum.uncertainty(k) / scales(i));
     const double relative = (error + spectrum.uncertainty(k)) / scales(i);
     reached.pole_error = std::isnan(relative) ? infinite : std::max(reached.pole_error, relative);
     reached.misplaced = std::max(reached.misplaced, error / (scale_of(wanted(i)) * sensitivity));
@@ -207,7 +228,25 @@ Reached reached_by(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
                 }))) {
     reached.misplaced = infinite;
   }
-  return reached;
+  return judged;
+}
+
+}  // namespace
+
+Reached reached_by(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
+                   const DoubleDoubleMatrix& X, const DoubleDoubleMatrix& inverse,
+                   const StateUnits& units, const Eigen::VectorXcd& wanted) {
+  Judged judged = judged_in(A, B, K, X, inverse, units, wanted);
+  constexpr double certain = 1e-10;
+  if (judged.uncertainty > certain) {
+    // Of vectors that are nearly dependent even 31 digits of X⁻¹ (A - B K) X are another matrix's.
+    const auto plain = DoubleDoubleMatrix::identity(wanted.size());
+    Judged direct = judged_in(A, B, K, plain, plain, units, wanted);
+    if (direct.uncertainty < judged.uncertainty) {
+      judged = std::move(direct);
+    }
+  }
+  return std::move(judged.reached);
 }
 
 Reached reached_by(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
