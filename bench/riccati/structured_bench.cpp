@@ -1,6 +1,7 @@
 // How long dare(), care() and the Lyapunov equations take on data with structure, beside SLICOT's
 // SB02OD, SB02MD and SB03MD on the same data in the same process, one thread:
-// `bench_structured [repetitions] [largest n]`. Minima over repetitions that alternate.
+// `bench_structured [repetitions] [largest n] [part of a table's heading]`. Minima over repetitions
+// that alternate.
 //
 // SB02MD takes G = B R⁻¹ Bᵀ, which is formed for it outside of what is timed.
 
@@ -8,7 +9,8 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <functional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Dense>
@@ -314,12 +316,16 @@ int main(int argc, char** argv) {
                              {"one input", &one_input},
                              {"modes not reached", &unreached},
                              {"no solution", &refused}};
+  const std::string_view part = argc > 3 ? argv[3] : "";
   std::printf("minima in microseconds, one thread, with the residual of each\n");
   for (const bool continuous : {true, false}) {
     for (const Family& family : families) {
-      std::printf("%s, %s\n%5s %12s %9s %12s %9s %7s %12s %9s %7s\n", continuous ? "care" : "dare",
-                  family.name, "n", "flyball", "residual", "SB02OD", "residual", "ratio", "SB02MD",
-                  "residual", "ratio");
+      const std::string heading = std::string(continuous ? "care, " : "dare, ") + family.name;
+      if (heading.find(part) == std::string::npos) {
+        continue;
+      }
+      std::printf("%s\n%5s %12s %9s %12s %9s %7s %12s %9s %7s\n", heading.c_str(), "n", "flyball",
+                  "residual", "SB02OD", "residual", "ratio", "SB02MD", "residual", "ratio");
       for (const int n : {4, 10, 20, 50, 100, 200}) {
         if (n <= largest) {
           const Equation e = family.make(n);
@@ -328,9 +334,13 @@ int main(int argc, char** argv) {
       }
     }
     for (const Family& family : {families[0], families[1]}) {
-      std::printf("%s, %s\n%5s %12s %9s %12s %9s %7s\n",
-                  continuous ? "lyapunov" : "discrete lyapunov", family.name, "n", "flyball",
-                  "residual", "SB03MD", "residual", "ratio");
+      const std::string heading =
+          std::string(continuous ? "lyapunov, " : "discrete lyapunov, ") + family.name;
+      if (heading.find(part) == std::string::npos) {
+        continue;
+      }
+      std::printf("%s\n%5s %12s %9s %12s %9s %7s\n", heading.c_str(), "n", "flyball", "residual",
+                  "SB03MD", "residual", "ratio");
       for (const int n : {4, 10, 20, 50, 100, 200}) {
         if (n <= largest) {
           const Equation e = family.make(n);

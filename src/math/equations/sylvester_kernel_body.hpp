@@ -325,8 +325,25 @@ class HessenbergSchur {
     answer_.condition = size > 0.0 ? std::max(1.0, gain * terms / size) : gain;
   }
 
-  /// What is left of each entry of the equation is rounding beside the terms that made it.
+  /// Whether the entries that are not zero are within eight digits of each other.
+  static bool alike(const double* M, int size) {
+    double least = std::numeric_limits<double>::infinity();
+    double most = 0.0;
+    for (int k = 0; k < size; ++k) {
+      const double entry = std::abs(M[k]);
+      least = entry > 0.0 ? std::min(least, entry) : least;
+      most = std::max(most, entry);
+    }
+    return most <= 1e8 * least;
+  }
+
+  /// What is left of each entry of the equation is rounding beside the terms that made it; those of
+  /// an entry that are less than a thousandth of what its row and its column have elsewhere count
+  /// as that: of entries that are zero nothing but rounding is there.
   bool holds_by_entries() {
+    // Unless the equation's own entries are so far apart that small ones count.
+    const double least =
+        alike(A_, lda_ * n_) && alike(B_, ldb_ * m_) && alike(F_, lda_ * m_) ? 1e-3 : 0.0;
     const auto magnitudes = [](double* to, const double* from, int size) {
       for (int k = 0; k < size; ++k) {
         to[k] = std::abs(from[k]);
@@ -337,10 +354,24 @@ class HessenbergSchur {
     magnitudes(Y_, X_, lda_ * m_);
     multiply(rows(lda_), first_, lda_, Y_, lda_, B_, ldb_, m_, m_);
     multiply(rows(lda_), second_, lda_, A_, lda_, data_.continuous ? Y_ : first_, lda_, n_, m_);
+    for (int k = 0; k < lda_ * m_; ++k) {
+      second_[k] += std::abs(F_[k]) + (data_.continuous ? first_[k] : Y_[k]);
+    }
+    double* const columns = vectors_;
     for (int j = 0; j < m_; ++j) {
+      columns[j] = 0.0;
       for (int i = 0; i < n_; ++i) {
+        columns[j] = std::max(columns[j], second_[i + j * lda_]);
+      }
+    }
+    for (int i = 0; i < n_; ++i) {
+      double row = 0.0;
+      for (int j = 0; j < m_; ++j) {
+        row = columns[j] > 0.0 ? std::max(row, second_[i + j * lda_] / columns[j]) : row;
+      }
+      for (int j = 0; j < m_; ++j) {
         const int k = i + j * lda_;
-        const double terms = std::abs(F_[k]) + second_[k] + (data_.continuous ? first_[k] : Y_[k]);
+        const double terms = std::max(second_[k], least * row * columns[j]);
         const double left = std::abs(R_[k]);
         if (!(left <= (16.0 + n_ + m_) * epsilon * terms)) {
           return false;
