@@ -68,41 +68,82 @@ Error diagnose_continuous(const RiccatiProblem& p) {
             in_units(p, closest));
 }
 
+/// Not inside the boundary by more than rounding may have put it there.
+bool may_be_unstable(const RiccatiProblem& p, std::complex<double> lambda) {
+  const double inside =
+      p.continuous ? -lambda.real() / std::max(p.A.norm(), 1e-300) : 1.0 - std::abs(lambda);
+  return !(inside > 1e-7);
+}
+
+/// Popov-Belevitch-Hautus: λ is reached by the inputs exactly if [A - λI, B] has rank n. B's size
+/// is the user's unit, so its columns are compared in A's.
+bool is_unreached(const RiccatiProblem& p, std::complex<double> lambda) {
+  const Index n = p.A.rows();
+  const Index m = p.B.cols();
+  const double size_A = p.A.norm();
+  const double size_B = p.B.norm();
+  const double unit = size_B > 0.0 && size_A > 0.0 ? size_A / size_B : 1.0;
+  // [Re -Im; Im Re] of the pencil has its singular values, each twice; the last diagonal entry of
+  // the pivoted triangle is the smallest of them but for a factor of order n.
+  MatrixXd pencil = MatrixXd::Zero(2 * (n + m), 2 * n);
+  pencil.block(0, 0, n, n) = p.A.transpose();
+  pencil.block(0, 0, n, n).diagonal().array() -= lambda.real();
+  pencil.block(n, 0, m, n) = unit * p.B.transpose();
+  pencil.bottomRightCorner(n + m, n) = pencil.topLeftCorner(n + m, n);
+  pencil.block(n + m, 0, n, n).diagonal().setConstant(-lambda.imag());
+  pencil.block(0, n, n, n).diagonal().setConstant(lambda.imag());
+  const double smallest = std::abs(pivoted_qr(pencil).R(2 * n - 1, 2 * n - 1));
+  return smallest <=
+         1e-12 * static_cast<double>(n) * (p.continuous ? size_A : std::max(1.0, size_A));
+}
+
+Error not_stabilizable(const RiccatiProblem& p, std::complex<double> lambda) {
+  return refusal(RiccatiError::not_stabilizable, p.continuous ? "care" : "dare", "(A, B)")
+      .hint("give this mode an input, or take it out of the model")
+      .with("eigenvalue", parts(p, lambda))
+      .with("magnitude", in_units(p, std::abs(lambda)));
+}
+
 }  // namespace
+
+std::optional<Error> unreached_at_sight(const RiccatiProblem& p) {
+  const Eigensystem system = eigensystem_of(p.A);
+  if (!system.values.allFinite()) {
+    return std::nullopt;
+  }
+  const Index n = p.A.rows();
+  bool any = false;
+  for (const std::complex<double>& lambda : system.values) {
+    any = any || may_be_unstable(p, lambda);
+  }
+  if (!any) {
+    return std::nullopt;
+  }
+  const Eigen::MatrixXcd left = solve_complex(system.vectors, Eigen::MatrixXcd::Identity(n, n));
+  if (!left.allFinite()) {
+    return std::nullopt;
+  }
+  const Eigen::MatrixXcd reached = complex_product(left, p.B.cast<std::complex<double>>());
+  const MatrixXd terms = product(left.cwiseAbs(), p.B.cwiseAbs());
+  const double rounding = 32.0 * static_cast<double>(n) * epsilon;
+  for (Index k = 0; k < n; ++k) {
+    const std::complex<double> lambda = system.values(k);
+    if (may_be_unstable(p, lambda) && reached.row(k).norm() <= rounding * terms.row(k).norm() &&
+        is_unreached(p, lambda)) {
+      return not_stabilizable(p, lambda);
+    }
+  }
+  return std::nullopt;
+}
 
 Error diagnose_riccati(const RiccatiProblem& p) {
   const Index n = p.A.rows();
   const Index m = p.B.cols();
   const char* const where = p.continuous ? "care" : "dare";
-
-  // Popov-Belevitch-Hautus: λ is reached by the inputs exactly if [A - λI, B] has rank n. B's size
-  // is the user's unit, so its columns are compared in A's.
-  const double size_A = p.A.norm();
-  const double size_B = p.B.norm();
-  const double unit = size_B > 0.0 && size_A > 0.0 ? size_A / size_B : 1.0;
   const Eigen::VectorXcd eigenvalues = eigenvalues_of(p.A);
-  for (Index k = 0; k < n; ++k) {
-    const double inside = p.continuous ? -eigenvalues(k).real() / std::max(size_A, 1e-300)
-                                       : 1.0 - std::abs(eigenvalues(k));
-    if (inside > 1e-7) {
-      continue;
-    }
-    // [Re -Im; Im Re] of the pencil has its singular values, each twice; the last diagonal entry of
-    // the pivoted triangle is the smallest of them but for a factor of order n.
-    MatrixXd pencil = MatrixXd::Zero(2 * (n + m), 2 * n);
-    pencil.block(0, 0, n, n) = p.A.transpose();
-    pencil.block(0, 0, n, n).diagonal().array() -= eigenvalues(k).real();
-    pencil.block(n, 0, m, n) = unit * p.B.transpose();
-    pencil.bottomRightCorner(n + m, n) = pencil.topLeftCorner(n + m, n);
-    pencil.block(n + m, 0, n, n).diagonal().setConstant(-eigenvalues(k).imag());
-    pencil.block(0, n, n, n).diagonal().setConstant(eigenvalues(k).imag());
-    const double smallest = std::abs(pivoted_qr(pencil).R(2 * n - 1, 2 * n - 1));
-    if (smallest <=
-        1e-12 * static_cast<double>(n) * (p.continuous ? size_A : std::max(1.0, size_A))) {
-      return refusal(RiccatiError::not_stabilizable, where, "(A, B)")
-          .hint("give this mode an input, or take it out of the model")
-          .with("eigenvalue", parts(p, eigenvalues(k)))
-          .with("magnitude", in_units(p, std::abs(eigenvalues(k))));
+  for (const std::complex<double>& lambda : eigenvalues) {
+    if (may_be_unstable(p, lambda) && is_unreached(p, lambda)) {
+      return not_stabilizable(p, lambda);
     }
   }
 

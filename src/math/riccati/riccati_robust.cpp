@@ -166,6 +166,9 @@ Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem) 
                          d.asDiagonal() * problem.N,
                          problem.continuous,
                          problem.rate};
+  if (auto why = unreached_at_sight(p)) {
+    return tl::unexpected(*std::move(why));
+  }
   const auto answer = solve_riccati_extended(p);
   if (!answer) {
     return tl::unexpected(diagnose_riccati(p));

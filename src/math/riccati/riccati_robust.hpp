@@ -112,6 +112,11 @@ struct RiccatiUnits {
 /// two. K does not change when Q, R and N are multiplied by one number, nor X but for it.
 [[nodiscard]] Expected<RiccatiSolution> solve_riccati_in_other_units(const RiccatiProblem& problem);
 
+/// An unstable mode whose left vector and B cancel to the last digits of their entries: whatever
+/// the digits of X, nothing reaches it. Found by one eigendecomposition, before anything that takes
+/// longer; a mode that hangs on its inputs by little but surely is not told here.
+[[nodiscard]] std::optional<Error> unreached_at_sight(const RiccatiProblem& p);
+
 /// Why there is no answer.
 [[nodiscard]] Error diagnose_riccati(const RiccatiProblem& p);
 
