@@ -20,14 +20,17 @@ inline double hessenberg_norm(int n, int ld, const double* H) {
 }
 
 /// The first row of the unreduced block that ends with row `end`; the subdiagonal entry above it,
-/// which is rounding beside its neighbours, is made zero.
-inline int start_of_block(int ld, double* H, int end, double norm) {
+/// which is rounding beside its neighbours, is made zero. After `iteration` sweeps without one so
+/// is what is rounding beside H: eigenvalues that are nothing beside others have no digits to lose.
+inline int start_of_block(int ld, double* H, int end, double norm, int iteration) {
+  constexpr int patience = 15;
+  const double nothing = iteration < patience ? 0.0 : epsilon * norm / (end + 1);
   for (int low = end; low > 0; --low) {
     double size_here = std::abs(H[low - 1 + (low - 1) * ld]) + std::abs(H[low + low * ld]);
     if (size_here == 0.0) {
       size_here = norm;
     }
-    if (std::abs(H[low + (low - 1) * ld]) <= epsilon * size_here) {
+    if (std::abs(H[low + (low - 1) * ld]) <= std::max(epsilon * size_here, nothing)) {
       H[low + (low - 1) * ld] = 0.0;
       return low;
     }

@@ -102,7 +102,7 @@ inline bool eigenvalues(Size<N> size, double* H, std::complex<double>* lambda) {
   double shift = 0.0;
   int iteration = 0;
   while (end >= 0) {
-    const int low = start_of_block(ld, H, end, norm);
+    const int low = start_of_block(ld, H, end, norm, iteration);
     double x = h(end, end);
     if (low == end) {
       lambda[end--] = x + shift;

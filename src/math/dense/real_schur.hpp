@@ -162,7 +162,7 @@ inline bool real_schur(int n, int ld, double* H, double* U) {
   int end = n - 1;
   int iteration = 0;
   while (end > 0) {
-    const int low = start_of_block(ld, H, end, norm);
+    const int low = start_of_block(ld, H, end, norm, iteration);
     if (low == end) {
       --end;
       iteration = 0;
