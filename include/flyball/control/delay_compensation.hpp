@@ -135,16 +135,9 @@ class DelayPredictor {
   /// measurement that is not there before this, as an observer does; what is beyond
   /// `largest_signal` is cut to it.
   [[nodiscard]] StateVector predict(const StateVector& x) const noexcept {
-    // x_{j+1} = A x_j + B_0 u_{j-d} + B_1 u_{j-d-1} over the whole periods, then the fraction.
-    StateVector state = within(x);
-    const std::size_t count = applied_.size();
-    for (std::size_t j = 0; j + 1 < count; ++j) {
-      const InputVector& older = applied_[(next_ + j) % count];
-      const InputVector& newer = applied_[(next_ + j + 1) % count];
-      state = within(A_ * state + B_0_ * newer + B_1_ * older);
-    }
-    const InputVector& last = applied_[(next_ + count - 1) % count];
-    return within(A_rest_ * state + B_rest_ * last);
+    const StateVector from = within(x);
+    const StateVector ahead = moved(from, [](const StateVector& state) { return state; });
+    return is_signal(ahead) ? ahead : within(moved(from, &DelayPredictor::within));
   }
 
   /// The input that was sent now. @return  Whether it can be one: what is not finite is remembered
@@ -178,6 +171,21 @@ class DelayPredictor {
   }
 
  private:
+  /// x_{j+1} = A x_j + B_0 u_{j-d} + B_1 u_{j-d-1} over the whole periods, each `kept`, then the
+  /// fraction.
+  template <class Kept>
+  [[nodiscard]] StateVector moved(const StateVector& x, const Kept& kept) const noexcept {
+    StateVector state = x;
+    const std::size_t count = applied_.size();
+    std::size_t older = next_;
+    for (std::size_t j = 1; j < count; ++j) {
+      const std::size_t newer = older + 1 < count ? older + 1 : 0;
+      state = kept((A_ * state + B_0_ * applied_[newer] + B_1_ * applied_[older]).eval());
+      older = newer;
+    }
+    return A_rest_ * state + B_rest_ * applied_[older];
+  }
+
   [[nodiscard]] static StateVector within(const StateVector& x) noexcept {
     StateVector state = x;
     for (Eigen::Index i = 0; i < state.size(); ++i) {
