@@ -49,6 +49,12 @@ Motion::Motion(const DelaySystem& system, Drive drive, double step, Index sample
 }
 
 Expected<DelayResponse> Motion::run(const VectorXd& x0) {
+  constexpr double least_step = 1e-280;  // of which `same` is a small part
+  if (samples_ > 1 && !(step_ >= least_step)) {
+    return refusal(ArgumentError::out_of_range, "response", "the time between two samples")
+        .got(flyball::detail::format("{} s", step_))
+        .expected("at least 1e-280 s");
+  }
   x_ = scaling_.cwiseInverse().asDiagonal() * x0;
   response_.time = VectorXd::LinSpaced(samples_, 0.0, end_);
   response_.x.resize(samples_, x_.size());

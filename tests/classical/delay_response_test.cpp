@@ -253,6 +253,8 @@ TEST(DelayResponse, Errors) {
   EXPECT_EQ(to_string(step_response(G, 0, every(1e4, 1001)).error()),
             "response: the shortest delay is 0.1 s; it must be at least a millionth of the time, "
             "10010000 s; ask for a shorter time, or leave the delay out");
+  EXPECT_EQ(to_string(step_response(G, 0, every(1e-303, 601)).error()),
+            "response: the time between two samples is 1e-303 s; it must be at least 1e-280 s");
   const auto unstable = system_of(transfer({1.0}, {1.0, -1.0}, 0.1));
   EXPECT_TRUE(step_response(unstable, 0, every(10.0, 100)).error().is(ArgumentError::not_finite));
   const auto sampled = DelaySystem::gain(MatrixXd::Ones(1, 1), Time(0.1)).value();
