@@ -14,6 +14,7 @@
 #include "core/diagnose.hpp"
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
+#include "recording/finish_trajectory.hpp"
 #include "recording/json_objects.hpp"
 
 namespace flyball {
@@ -224,6 +225,26 @@ ErrorInfo error_info(TrajectoryFileError code) {
   return flyball::detail::info_of(code, "trajectory_file", rows);
 }
 
+Expected<void> recording::check_samples(const RobotTrajectory& trajectory) {
+  if (trajectory.samples.size() < 2) {
+    return refusal(TrajectoryFileError::too_few, trajectory.source, "the trajectory")
+        .got(fmt::format("of {} samples", trajectory.samples.size()))
+        .expected("two samples or more");
+  }
+  return check_times(trajectory);
+}
+
+void recording::settle(RobotTrajectory& trajectory) {
+  if (const double first = trajectory.samples.front().time; first != 0.0) {
+    for (MotionSample& sample : trajectory.samples) {
+      sample.time -= first;
+    }
+    note(trajectory.diagnostics, "time_offset",
+         "the trajectory begins at {:.6g} s, which counts as zero", first);
+  }
+  compare_with_poses(trajectory);
+}
+
 MotionSample RobotTrajectory::at(double t) const noexcept {
   if (!(t > samples.front().time)) {
     return samples.front();
@@ -293,25 +314,13 @@ Expected<RobotTrajectory> parse_trajectory(std::string_view text, const std::str
          "out",
          repeated, index, repeated == 1 ? "repeats" : "repeat", repeated == 1 ? "is" : "are");
   }
-  if (result.samples.size() < 2) {
-    return refusal(TrajectoryFileError::too_few, source, "the trajectory")
-        .got(fmt::format("of {} samples", result.samples.size()))
-        .expected("two samples or more");
-  }
-  FLYBALL_CHECK(check_times(result));
+  FLYBALL_CHECK(recording::check_samples(result));
   if (all.front().velocity) {
     take_frame(all, result);
   } else if (std::all_of(all.begin(), all.end(), [](const Read& read) { return read.holonomic; })) {
     take_headings(all, result);
   }
-  if (const double first = result.samples.front().time; first != 0.0) {
-    for (MotionSample& sample : result.samples) {
-      sample.time -= first;
-    }
-    note(result.diagnostics, "time_offset",
-         "the trajectory begins at {:.6g} s, which counts as zero", first);
-  }
-  compare_with_poses(result);
+  recording::settle(result);
   return result;
 }
 

@@ -16,7 +16,6 @@ namespace flyball {
 
 namespace {
 
-using io::JsonMembersIn;
 using io::JsonNode;
 using io::JsonTree;
 
@@ -283,31 +282,12 @@ void look_at_version(const std::string& version, int newest, std::vector<Diagnos
   }
 }
 
-/// Reads what of it is known; members that a newer version has left out say themselves so.
-template <class T, class Describe>
-ExpectedAll<T> read_as(std::shared_ptr<const JsonTree> tree, const std::string& source, T value,
-                       Describe describe) {
-  io::JsonReading reading(std::move(tree), source);
-  if (!JsonMembersIn::read(reading, reading.tree()->root, value, describe)) {
-    return tl::unexpected(reading.error());
-  }
-  return value;
-}
-
 tl::unexpected<Errors> wrong_kind(const JsonTree& tree, const std::string& source,
                                   std::string_view expected, std::string_view hint) {
-  std::string got = std::string(to_string(tree.root.kind));
-  if (tree.root.kind == io::JsonKind::object) {
-    std::string keys;
-    for (std::size_t i = 0; i < std::min<std::size_t>(tree.root.children.size(), 4); ++i) {
-      keys += (i == 0 ? "" : ", ") + cut(printable(tree.root.children[i].key), 20);
-    }
-    got = keys.empty() ? "an empty object" : "an object of " + keys;
-  }
   return tl::unexpected(Errors(Error(MotionFileError::wrong_kind)
                                    .in(source)
                                    .about("the JSON")
-                                   .got(got)
+                                   .got(io::outline(tree.root))
                                    .expected(std::string(expected))
                                    .hint(std::string(hint))));
 }
@@ -346,7 +326,8 @@ ExpectedAll<ChoreoTrajectory> parse_choreo_trajectory(std::string_view text,
     return wrong_kind(*tree, source, "a Choreo trajectory: name, version, params, trajectory",
                       project ? "that is a project (.chor): give one of its .traj files" : "");
   }
-  FLYBALL_TRY(trajectory, read_as(tree, source, std::move(trajectory), DescribeTrajectory{}));
+  FLYBALL_TRY(trajectory,
+              io::read_document(tree, source, std::move(trajectory), DescribeTrajectory{}));
   if (!trajectory.is_2024) {
     look_at_version(trajectory.version, ChoreoTrajectory::newest, trajectory.diagnostics);
   }
@@ -363,7 +344,7 @@ ExpectedAll<ChoreoProject> parse_choreo_project(std::string_view text, const std
     return wrong_kind(*tree, source, "a Choreo project: name, version, type, config",
                       root.find("params") != nullptr ? "that is a trajectory (.traj)" : "");
   }
-  FLYBALL_TRY(project, read_as(tree, source, std::move(project), DescribeProject{}));
+  FLYBALL_TRY(project, io::read_document(tree, source, std::move(project), DescribeProject{}));
   look_at_version(project.version, ChoreoProject::newest, project.diagnostics);
   return project;
 }

@@ -183,6 +183,25 @@ bool read_value(JsonReading& reading, const JsonNode& node, AutoCommand& value) 
   return JsonMembersIn::read(reading, node, value, DescribeCommand{});
 }
 
+bool read_value(JsonReading& reading, const JsonNode& node, std::vector<bool>& values) {
+  if (node.kind != JsonKind::array) {
+    reading.refuse(node, "a list");
+    return false;
+  }
+  values.clear();
+  values.reserve(node.children.size());
+  for (const JsonNode& child : node.children) {
+    bool value = false;
+    reading.path.push_back(fmt::format("[{}]", values.size()));
+    if (!read_value(reading, child, value)) {
+      return false;
+    }
+    reading.path.pop_back();
+    values.push_back(value);
+  }
+  return true;
+}
+
 void JsonMembersIn::id(std::string_view key, std::string& value) {
   if (const JsonNode* node = find(key, false)) {
     in(key, [&] {
@@ -432,6 +451,15 @@ std::string written(const JsonSpot& spot, const ExpressedNumber& value) {
 
 std::string written(const JsonSpot& spot, const std::array<double, 4>& value) {
   return written(spot, std::vector<double>(value.begin(), value.end()));
+}
+
+std::string written(const JsonSpot& spot, const std::vector<bool>& values) {
+  std::vector<JsonPiece> pieces;
+  pieces.reserve(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    pieces.push_back({{}, written(spot.element(i), static_cast<bool>(values[i]))});
+  }
+  return compose_list(spot, pieces, false, true);
 }
 
 std::string written(const JsonSpot& spot, const AutoCommand& value) {

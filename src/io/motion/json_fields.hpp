@@ -66,6 +66,7 @@ bool read_value(JsonReading& reading, const JsonNode& node, JsonText& value);
 bool read_value(JsonReading& reading, const JsonNode& node, ExpressedNumber& value);
 bool read_value(JsonReading& reading, const JsonNode& node, std::array<double, 4>& value);
 bool read_value(JsonReading& reading, const JsonNode& node, AutoCommand& value);
+bool read_value(JsonReading& reading, const JsonNode& node, std::vector<bool>& values);
 
 template <class T>
 bool read_value(JsonReading& reading, const JsonNode& node, std::vector<T>& values) {
@@ -153,6 +154,10 @@ class JsonMembersIn {
       });
     }
   }
+  template <class T, class Describe>
+  void nullable(std::string_view key, std::optional<T>& value, Describe describe) {
+    object(key, value, describe);
+  }
   /// A list of objects. @param must  Whether it must be there.
   template <class T, class Describe>
   void list(std::string_view key, std::vector<T>& values, Describe describe, bool must = true) {
@@ -199,6 +204,18 @@ class JsonMembersIn {
     JsonMembersIn members(reading, node);
     describe(members, value);
     return !reading.failed();
+  }
+
+  /// A list of objects that is no member, such as a whole file.
+  template <class T, class Describe>
+  static bool read_list(JsonReading& reading, const JsonNode& node, std::vector<T>& values,
+                        Describe describe) {
+    if (node.kind != JsonKind::array) {
+      reading.refuse(node, "a list of objects");
+      return false;
+    }
+    JsonMembersIn members(reading, node);
+    return members.each(node, values, describe, false);
   }
 
   [[nodiscard]] bool has(std::string_view key) const { return node_.find(key) != nullptr; }
@@ -286,6 +303,7 @@ struct JsonPiece {
 [[nodiscard]] std::string written(const JsonSpot& spot, const ExpressedNumber& value);
 [[nodiscard]] std::string written(const JsonSpot& spot, const std::array<double, 4>& value);
 [[nodiscard]] std::string written(const JsonSpot& spot, const AutoCommand& value);
+[[nodiscard]] std::string written(const JsonSpot& spot, const std::vector<bool>& values);
 
 template <class T>
 [[nodiscard]] std::string written(const JsonSpot& spot, const std::vector<T>& values) {
@@ -354,6 +372,10 @@ class JsonMembersOut {
     value ? add(key, text(spot_.member(key), *value, describe)) : absent(key);
   }
   template <class T, class Describe>
+  void nullable(std::string_view key, const std::optional<T>& value, Describe describe) {
+    add(key, value ? text(spot_.member(key), *value, describe) : "null");
+  }
+  template <class T, class Describe>
   void part(std::string_view key, const T& value, Describe describe) {
     add(key, members(spot_.member(key), value, describe));
   }
@@ -383,6 +405,25 @@ class JsonMembersOut {
     return compose_object(spot, std::move(all.pieces_));
   }
 
+  /// A list of objects, or an object of objects by their names.
+  template <class T, class Describe>
+  static std::string list_text(const JsonSpot& spot, const std::vector<T>& values,
+                               Describe describe, bool named = false) {
+    std::vector<JsonPiece> pieces;
+    pieces.reserve(values.size());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      // Of what has no origin nothing is taken from what stood at its place.
+      JsonSpot element = spot.element(i);
+      element.old = nullptr;
+      std::string name;
+      if constexpr (requires { values[i].name; }) {
+        name = named ? values[i].name : "";
+      }
+      pieces.push_back({std::move(name), text(element, values[i], describe)});
+    }
+    return compose_list(spot, pieces, named, false);
+  }
+
   [[nodiscard]] bool has(std::string_view key) const {
     return spot_.old != nullptr && spot_.old->find(key) != nullptr;
   }
@@ -401,19 +442,7 @@ class JsonMembersOut {
       absent(key);
       return;
     }
-    std::vector<JsonPiece> pieces;
-    pieces.reserve(values.size());
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      // Of what has no origin nothing is taken from what stood at its place.
-      JsonSpot element = spot.element(i);
-      element.old = nullptr;
-      std::string name;
-      if constexpr (requires { values[i].name; }) {
-        name = named ? values[i].name : "";
-      }
-      pieces.push_back({std::move(name), text(element, values[i], describe)});
-    }
-    add(key, compose_list(spot, pieces, named, false));
+    add(key, list_text(spot, values, describe, named));
   }
 
   JsonSpot spot_;
@@ -436,12 +465,11 @@ template <class T, class Describe>
 /// A text that a writer made, if its numbers are finite. @errors MotionFileError::wrong_field.
 [[nodiscard]] Expected<std::string> checked_text(std::string text);
 
-/// A whole file. @errors MotionFileError.
+/// A whole file. @param value  What it is read into. @errors MotionFileError.
 template <class T, class Describe>
 [[nodiscard]] ExpectedAll<T> read_document(std::shared_ptr<const JsonTree> tree,
-                                           const std::string& source, Describe describe) {
+                                           const std::string& source, T value, Describe describe) {
   JsonReading reading(std::move(tree), source);
-  T value;
   if (!JsonMembersIn::read(reading, reading.tree()->root, value, describe)) {
     return tl::unexpected(reading.error());
   }

@@ -29,6 +29,47 @@ Place JsonOrigin::place() const {
   return node_ == nullptr ? Place{} : place_of(tree_->text, node_->begin);
 }
 
+std::vector<Place> places_of(std::span<const JsonOrigin> origins) {
+  std::vector<Place> places;
+  const io::JsonTree* tree = nullptr;
+  std::size_t done = 0;
+  Place place;
+  for (const JsonOrigin& origin : origins) {
+    if (origin.node() == nullptr) {
+      places.emplace_back();
+      continue;
+    }
+    const std::size_t begin = origin.node()->begin;
+    if (origin.tree() != tree || begin < done) {
+      tree = origin.tree();
+      done = 0;
+      place = {};
+    }
+    for (; done < begin; ++done) {
+      const char c = tree->text[done];
+      if (c == '\n') {
+        ++place.line;
+        place.column = 1;
+      } else if ((static_cast<unsigned char>(c) & 0xC0U) != 0x80U) {
+        ++place.column;
+      }
+    }
+    places.push_back(place);
+  }
+  return places;
+}
+
+ExpectedAll<std::vector<std::string>> json_keys(std::string_view text, const std::string& source) {
+  FLYBALL_TRY(const auto tree, io::parse_json_tree(text, source));
+  std::vector<std::string> keys;
+  for (const io::JsonNode& child : tree->root.children) {
+    if (tree->root.kind == io::JsonKind::object) {
+      keys.push_back(child.key);
+    }
+  }
+  return keys;
+}
+
 }  // namespace flyball
 
 namespace flyball::io {
@@ -439,6 +480,17 @@ QuotedError quoted_at(std::string_view text, std::size_t offset, std::size_t len
                                  std::string(width, ' '), std::string(shown_length, '^'));
   }
   return quoted;
+}
+
+std::string outline(const JsonNode& root) {
+  if (root.kind != JsonKind::object) {
+    return std::string(to_string(root.kind));
+  }
+  std::string keys;
+  for (std::size_t i = 0; i < std::min<std::size_t>(root.children.size(), 4); ++i) {
+    keys += (i == 0 ? "" : ", ") + cut(printable(root.children[i].key), 20);
+  }
+  return keys.empty() ? "an empty object" : "an object of " + keys;
 }
 
 std::string JsonTree::string(const JsonNode& node) const {

@@ -49,7 +49,7 @@ struct JsonTree {
 
 /// Most bytes, values and brackets inside each other that a file may have.
 inline constexpr std::size_t most_json_bytes = std::size_t{64} << 20;
-inline constexpr std::size_t most_json_values = 1'000'000;
+inline constexpr std::size_t most_json_values = 500'000;
 inline constexpr std::size_t most_json_depth = 200;
 
 /// The text taken apart: RFC 8259, a byte-order mark in front allowed; numbers must be finite and
@@ -57,6 +57,9 @@ inline constexpr std::size_t most_json_depth = 200;
 /// excerpt and caret. Cost: O(size), some 130 bytes a value.
 [[nodiscard]] ExpectedAll<std::shared_ptr<const JsonTree>> parse_json_tree(
     std::string_view text, const std::string& source);
+
+/// What a file of another kind is: "an object of a, b, c", "a list".
+[[nodiscard]] std::string outline(const JsonNode& root);
 
 /// An error of a place of a text, with the line's part around it and a caret below.
 /// @param length  Of what is wrong, bytes.

@@ -193,7 +193,7 @@ struct ChoreoProject {
 /// of a newer version as far as it says what those do, with a warning. Nothing is said of the
 /// motion itself: times may go back.
 /// @param text  The file. @param source  Its name for messages.
-/// @errors MotionFileError with line, column and caret. Cost: O(size); at most 64 MiB and a
+/// @errors MotionFileError with line, column and caret. Cost: O(size); at most 64 MiB and half a
 /// million values. Source: Choreo, its documentation of the format and its files of each version.
 [[nodiscard]] ExpectedAll<ChoreoTrajectory> parse_choreo_trajectory(std::string_view text,
                                                                     const std::string& source);

@@ -2,9 +2,13 @@
 
 #include <cstddef>
 #include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include <flyball/core/diagnostic.hpp>
-#include <flyball/core/error.hpp>
+#include <flyball/core/errors.hpp>
 
 namespace flyball {
 
@@ -34,12 +38,20 @@ class JsonOrigin {
 
   [[nodiscard]] const io::JsonNode* node() const noexcept { return node_; }
   [[nodiscard]] const io::JsonTree* tree() const noexcept { return tree_.get(); }
-  /// Line and column; 1, 1 of what comes from no file. Cost: O(size of the file before it).
+  /// Line and column; 1, 1 of what comes from no file. Cost: O(size of the file before it);
+  /// `places_of` for many.
   [[nodiscard]] Place place() const;
 
  private:
   std::shared_ptr<const io::JsonTree> tree_{};
   const io::JsonNode* node_ = nullptr;
 };
+
+/// Where parts stand. Cost: O(size of their file) for parts in its order.
+[[nodiscard]] std::vector<Place> places_of(std::span<const JsonOrigin> origins);
+
+/// The keys of the outermost object of a JSON text; none of a list. @errors MotionFileError.
+[[nodiscard]] ExpectedAll<std::vector<std::string>> json_keys(std::string_view text,
+                                                              const std::string& source);
 
 }  // namespace flyball
