@@ -1,0 +1,262 @@
+#include <algorithm>
+#include <cmath>
+
+#include <flyball/core/argument.hpp>
+
+#include "core/format.hpp"
+#include "core/try.hpp"
+#include "planning/configuration/polygons.hpp"
+#include "planning/configuration/region_node.hpp"
+#include "planning/configuration/space_checks.hpp"
+#include "planning/configuration/space_program.hpp"
+
+namespace flyball::detail {
+
+namespace {
+
+constexpr std::string_view where = "configuration space";
+
+Expected<void> check_coordinate(const std::vector<SpaceAxis>& axes, int coordinate,
+                                const std::string& name) {
+  if (coordinate < 0 || static_cast<std::size_t>(coordinate) >= axes.size()) {
+    return refusal(ArgumentError::out_of_range, where, name)
+        .got(format("about coordinate {}", coordinate))
+        .expected(format("about one of 0 to {}", axes.size() - 1));
+  }
+  return {};
+}
+
+Expected<void> check_node(const std::vector<SpaceAxis>& axes, const std::string& name,
+                          const RegionNode& node, int depth) {
+  using Kind = RegionNode::Kind;
+  constexpr int deepest = 1000;
+  if (depth > deepest) {
+    return refusal(ArgumentError::out_of_range, where, name)
+        .got("nested more than 1000 deep")
+        .expected("unions of flat lists");
+  }
+  switch (node.kind) {
+    case Kind::everything:
+      return {};
+    case Kind::half_space: {
+      if (node.normal.size() != axes.size()) {
+        return refusal(ArgumentError::wrong_shape, where, name)
+            .got(format("a normal of {} entries", node.normal.size()))
+            .expected(format("one for each of the {} axes", axes.size()));
+      }
+      FLYBALL_CHECK(check_finite(node.offset, where, name));
+      bool any = false;
+      for (std::size_t k = 0; k < axes.size(); ++k) {
+        FLYBALL_CHECK(check_finite(node.normal[k], where, name));
+        any = any || node.normal[k] != 0.0;
+        if (axes[k].wraps && node.normal[k] != 0.0) {
+          return refusal(ArgumentError::out_of_range, where, name)
+              .got("a half-space along " + axes[k].name + ", which wraps")
+              .expected("an interval or a polygon")
+              .hint("a circle has no half-space");
+        }
+      }
+      if (!any) {
+        return refusal(ArgumentError::out_of_range, where, name)
+            .got("a normal of zeros")
+            .expected("a direction");
+      }
+      return {};
+    }
+    case Kind::interval:
+      FLYBALL_CHECK(check_coordinate(axes, node.coordinate, name));
+      if (std::isnan(node.low) || std::isnan(node.high)) {
+        return refusal(ArgumentError::not_finite, where, name)
+            .got("a bound that is not a number, or missing")
+            .expected("a low and a high bound for each coordinate");
+      }
+      if (!(node.low <= node.high)) {
+        return refusal(ArgumentError::out_of_range, where, name)
+            .got(format("from {} to {}", format_number(node.low), format_number(node.high)))
+            .expected("low <= high")
+            .hint(axes[static_cast<std::size_t>(node.coordinate)].wraps
+                      ? "an interval of an angle that wraps may end beyond a turn: from 3 to 4"
+                      : "");
+      }
+      if (axes[static_cast<std::size_t>(node.coordinate)].wraps &&
+          !(std::isfinite(node.low) && std::isfinite(node.high))) {
+        return refusal(ArgumentError::not_finite, where, name)
+            .got("without an end along " + axes[static_cast<std::size_t>(node.coordinate)].name +
+                 ", which wraps")
+            .expected("from an angle to an angle");
+      }
+      return {};
+    case Kind::polygon:
+      FLYBALL_CHECK(check_coordinate(axes, node.coordinate, name));
+      FLYBALL_CHECK(check_coordinate(axes, node.up, name));
+      if (node.coordinate == node.up) {
+        return refusal(ArgumentError::out_of_range, where, name)
+            .got("a polygon over one coordinate")
+            .expected("two different ones");
+      }
+      return check_polygon(node.vertices, where, name);
+    case Kind::both:
+    case Kind::either:
+      FLYBALL_CHECK(check_node(axes, name, *node.a, depth + 1));
+      return check_node(axes, name, *node.b, depth + 1);
+    case Kind::complement:
+      return check_node(axes, name, *node.a, depth + 1);
+  }
+  return {};
+}
+
+Expected<void> check_point(const std::array<double, 2>& p, std::string_view name) {
+  return Checks(where).finite(p[0], name).finite(p[1], name);
+}
+
+Expected<void> check_joint(const PlanarMechanism& mechanism, int joint, const std::string& name) {
+  if (joint < 0 || static_cast<std::size_t>(joint) >= mechanism.joints.size()) {
+    return refusal(ArgumentError::out_of_range, where, name)
+        .got(format("on joint {}", joint))
+        .expected(format("on one of the {} joints", mechanism.joints.size()));
+  }
+  return {};
+}
+
+Expected<void> check_obstacle(const PlanarObstacle& obstacle, const std::string& name) {
+  using Shape = PlanarObstacle::Shape;
+  FLYBALL_CHECK(check_point(obstacle.at, name));
+  switch (obstacle.shape) {
+    case Shape::disc:
+      return check_not_negative(obstacle.radius, where, name + ".radius", "m");
+    case Shape::half_plane:
+      FLYBALL_CHECK(check_point(obstacle.normal, name));
+      if (obstacle.normal[0] == 0.0 && obstacle.normal[1] == 0.0) {
+        return refusal(ArgumentError::out_of_range, where, name + ".normal")
+            .got("zero")
+            .expected("the direction out of it, such as (0, 1) of a floor");
+      }
+      return {};
+    case Shape::polygon:
+      return check_polygon(obstacle.vertices, where, name);
+    case Shape::frame:
+      FLYBALL_CHECK(check_polygon(obstacle.vertices, where, name));
+      if (!is_convex(tidy(obstacle.vertices))) {
+        return refusal(ArgumentError::out_of_range, where, name)
+            .got("a frame that is not convex")
+            .expected("a convex one")
+            .hint("add what reaches in as a polygon");
+      }
+      return {};
+  }
+  return {};
+}
+
+bool has_body(const PlanarMechanism& mechanism, const std::string& name) {
+  return !name.empty() && std::any_of(mechanism.bodies.begin(), mechanism.bodies.end(),
+                                      [&](const LinkBody& body) { return body.name == name; });
+}
+
+}  // namespace
+
+Expected<void> check_axes(const std::vector<SpaceAxis>& axes) {
+  if (axes.empty() || axes.size() > static_cast<std::size_t>(most_axes)) {
+    return refusal(axes.empty() ? ArgumentError::empty : ArgumentError::out_of_range, where, "axes")
+        .got(format("{}", axes.size()))
+        .expected("1 to 16");
+  }
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const SpaceAxis& axis = axes[i];
+    const std::string name = axis.name.empty() ? format("axis {}", i + 1) : axis.name;
+    FLYBALL_CHECK(Checks(where)
+                      .finite(axis.low, name + ".low")
+                      .finite(axis.high, name + ".high")
+                      .positive(axis.scale, name + ".scale"));
+    if (!(axis.low < axis.high)) {
+      return refusal(ArgumentError::out_of_range, where, name)
+          .got(format("from {} to {}", format_number(axis.low), format_number(axis.high)))
+          .expected("a low stop below its high one");
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!axis.name.empty() && axes[j].name == axis.name) {
+        return refusal(ArgumentError::ambiguous_name, where, axis.name)
+            .got("the name of two axes")
+            .expected("different names");
+      }
+    }
+  }
+  return {};
+}
+
+Expected<void> check_region(const std::vector<SpaceAxis>& axes, const std::string& name,
+                            const Region& region) {
+  return check_node(axes, name.empty() ? "region" : name, region.node(), 0);
+}
+
+Expected<void> check_mechanism(const std::vector<SpaceAxis>& axes,
+                               const PlanarMechanism& mechanism) {
+  if (mechanism.joints.empty() || mechanism.joints.size() > static_cast<std::size_t>(most_joints)) {
+    return refusal(mechanism.joints.empty() ? ArgumentError::empty : ArgumentError::out_of_range,
+                   where, "joints")
+        .got(format("{}", mechanism.joints.size()))
+        .expected("1 to 16");
+  }
+  for (std::size_t j = 0; j < mechanism.joints.size(); ++j) {
+    const PlanarJoint& joint = mechanism.joints[j];
+    const std::string name = joint.name.empty() ? format("joint {}", j + 1) : joint.name;
+    FLYBALL_CHECK(
+        Checks(where).finite(joint.x, name).finite(joint.y, name).finite(joint.angle, name));
+    FLYBALL_CHECK(check_coordinate(axes, joint.coordinate, name));
+    if (joint.parent < -1 || joint.parent >= static_cast<int>(j)) {
+      return refusal(ArgumentError::out_of_range, where, name)
+          .got(format("carried by joint {}", joint.parent))
+          .expected("carried by an earlier one, or -1 for the robot");
+    }
+    if (joint.slides && axes[static_cast<std::size_t>(joint.coordinate)].wraps) {
+      return refusal(ArgumentError::out_of_range, where, name)
+          .got("sliding along a coordinate that wraps")
+          .expected("turning, or an axis with stops");
+    }
+  }
+  for (std::size_t b = 0; b < mechanism.bodies.size(); ++b) {
+    const LinkBody& body = mechanism.bodies[b];
+    const std::string name = body.name.empty() ? format("body {}", b + 1) : body.name;
+    FLYBALL_CHECK(check_joint(mechanism, body.joint, name));
+    FLYBALL_CHECK(check_point(body.from, name));
+    FLYBALL_CHECK(check_point(body.to, name));
+    FLYBALL_CHECK(check_not_negative(body.radius, where, name + ".radius", "m"));
+  }
+  for (std::size_t o = 0; o < mechanism.obstacles.size(); ++o) {
+    const PlanarObstacle& obstacle = mechanism.obstacles[o];
+    const std::string name = obstacle.name.empty() ? format("obstacle {}", o + 1) : obstacle.name;
+    FLYBALL_CHECK(check_obstacle(obstacle, name));
+    for (const std::string& spared : obstacle.spares) {
+      if (!has_body(mechanism, spared)) {
+        return refusal(ArgumentError::unknown_name, where, name + ".spares")
+            .got('"' + spared + '"')
+            .expected("the name of a body");
+      }
+    }
+  }
+  for (const auto& pair : mechanism.apart) {
+    for (const std::string& one : pair) {
+      if (!has_body(mechanism, one)) {
+        return refusal(ArgumentError::unknown_name, where, "apart")
+            .got('"' + one + '"')
+            .expected("the name of a body");
+      }
+    }
+    if (pair[0] == pair[1]) {
+      return refusal(ArgumentError::ambiguous_name, where, "apart")
+          .got('"' + pair[0] + "\" twice")
+          .expected("two bodies");
+    }
+  }
+  for (const LinkMass& mass : mechanism.masses) {
+    FLYBALL_CHECK(check_joint(mechanism, mass.joint, "mass"));
+    FLYBALL_CHECK(check_point(mass.at, "mass.at"));
+    FLYBALL_CHECK(check_not_negative(mass.mass, where, "mass", "kg"));
+  }
+  for (const HoldingLimit& hold : mechanism.holding) {
+    FLYBALL_CHECK(check_joint(mechanism, hold.joint, "holding limit"));
+    FLYBALL_CHECK(check_positive(hold.most, where, "holding limit"));
+  }
+  return check_finite(mechanism.gravity, where, "gravity");
+}
+
+}  // namespace flyball::detail

@@ -1,0 +1,24 @@
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+#include "planning/configuration/space_program.hpp"
+
+// For processors with 256-bit vectors and fused multiply-add, which instruction_set.hpp asks for
+// when running. Only functions of this variant's namespace are compiled for them.
+#ifdef FLYBALL_WIDE_VECTORS
+#define FLYBALL_VARIANT wide
+#define FLYBALL_WIDE_LANES
+#ifdef __clang__
+#pragma clang attribute push(__attribute__((target("avx2,fma"))), apply_to = function)
+#else
+#pragma GCC push_options
+#pragma GCC target("avx2,fma")
+#endif
+#include "planning/configuration/space_kernel_body.hpp"
+#ifdef __clang__
+#pragma clang attribute pop
+#else
+#pragma GCC pop_options
+#endif
+#endif
