@@ -22,9 +22,16 @@ struct OptimalControlData {
     std::string name{};
   };
 
+  /// Functions of some stages, in place of those of all.
+  struct Piece {
+    expression::Lagrangian functions{};
+    int first = 0, last = 0;
+  };
+
   int states = 0, inputs = 0, intervals = 0, parameters = 0, data_size = 0;
   std::optional<expression::Lagrangian> dynamics{};  ///< Of states and parameters.
   std::optional<expression::Lagrangian> cost{}, terminal_cost{};
+  std::vector<Piece> dynamics_at{}, cost_at{};  ///< Later ones count.
   std::vector<Row> rows{};
   Eigen::MatrixXd lower{}, upper{};  ///< (states + parameters + inputs) x (N + 1).
   Eigen::MatrixXd start{};           ///< Likewise.

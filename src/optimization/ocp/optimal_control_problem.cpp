@@ -108,6 +108,19 @@ void set_bounds(OptimalControlData& data, Index first, Index count, int stage,
   data.upper.block(first, begin, count, stages).colwise() = upper;
 }
 
+/// Keeps what was recorded for the stages first … last.
+void take_piece(OptimalControlData& data, std::optional<Lagrangian>& recorded,
+                std::vector<OptimalControlData::Piece>& pieces, int first, int last) {
+  if (first < 0 || last < first || last >= data.intervals) {
+    refuse(data, Error(ArgumentError::out_of_range)
+                     .about("the stages of a function")
+                     .expected(fmt::format("within 0 to {}", data.intervals - 1))
+                     .got(fmt::format("{} to {}", first, last)));
+  } else if (recorded) {
+    pieces.push_back({std::move(*recorded), first, last});
+  }
+}
+
 }  // namespace
 
 OptimalControlProblem::OptimalControlProblem(int states, int inputs, int intervals, int parameters,
@@ -219,6 +232,31 @@ void OptimalControlProblem::record_cost(detail::StageFunction f, bool terminal) 
                terminal ? "the terminal cost" : "the stage cost")) {
     (terminal ? data_->terminal_cost : data_->cost) = recording.lagrangian(*data_);
   }
+}
+
+void OptimalControlProblem::record_dynamics_at(detail::StageFunction f, int first, int last) {
+  std::optional<Lagrangian> all = std::move(data_->dynamics);
+  data_->dynamics.reset();
+  record_dynamics(f);
+  take_piece(*data_, data_->dynamics, data_->dynamics_at, first, last);
+  data_->dynamics = std::move(all);
+}
+
+void OptimalControlProblem::record_derivative_at(detail::StageFunction f, double step, int first,
+                                                 int last, const ButcherTableauView& method) {
+  std::optional<Lagrangian> all = std::move(data_->dynamics);
+  data_->dynamics.reset();
+  record_derivative(f, step * data_->intervals, -1, method);
+  take_piece(*data_, data_->dynamics, data_->dynamics_at, first, last);
+  data_->dynamics = std::move(all);
+}
+
+void OptimalControlProblem::record_cost_at(detail::StageFunction f, int first, int last) {
+  std::optional<Lagrangian> all = std::move(data_->cost);
+  data_->cost.reset();
+  record_cost(f, false);
+  take_piece(*data_, data_->cost, data_->cost_at, first, last);
+  data_->cost = std::move(all);
 }
 
 void OptimalControlProblem::record_constraint(detail::StageFunction f, const VectorRef& lower,

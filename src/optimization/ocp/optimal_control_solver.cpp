@@ -39,6 +39,16 @@ Lagrangian nothing(const OptimalControlData& data) {
   return expression::lagrangian(builder.finish({&zero, 1}), static_cast<std::size_t>(data.size()));
 }
 
+/// Which piece a stage has, the last that covers it, counted from 1; 0: none.
+std::size_t piece_at(const std::vector<OptimalControlData::Piece>& pieces, int stage) {
+  for (std::size_t i = pieces.size(); i > 0; --i) {
+    if (pieces[i - 1].first <= stage && stage <= pieces[i - 1].last) {
+      return i;
+    }
+  }
+  return 0;
+}
+
 /// Stages of one kind have the same functions.
 StageProblem stages_of(const OptimalControlData& data) {
   StageProblem problem;
@@ -52,23 +62,30 @@ StageProblem stages_of(const OptimalControlData& data) {
   problem.upper.bottomRightCorner(data.inputs, 1).setZero();
   problem.data = data.data;
   problem.objective_scale = 1.0 / (N + 1);
-  std::map<std::vector<bool>, std::size_t> known;
-  std::vector<bool> there(data.rows.size() + 1);
+  std::map<std::vector<std::size_t>, std::size_t> known;
+  std::vector<std::size_t> there(data.rows.size() + 3);
   for (int k = 0; k <= N; ++k) {
-    there[data.rows.size()] = k == N;
+    const std::size_t own_dynamics = k < N ? piece_at(data.dynamics_at, k) : 0;
+    const std::size_t own_cost = k < N ? piece_at(data.cost_at, k) : 0;
+    there[data.rows.size()] = k == N ? 1 : 0;
+    there[data.rows.size() + 1] = own_dynamics;
+    there[data.rows.size() + 2] = own_cost;
     for (std::size_t r = 0; r < data.rows.size(); ++r) {
-      there[r] = data.rows[r].first <= k && k <= data.rows[r].last;
+      there[r] = data.rows[r].first <= k && k <= data.rows[r].last ? 1 : 0;
     }
     const auto [found, is_new] = known.try_emplace(there, problem.kinds.size());
     if (is_new) {
       std::vector<Lagrangian> parts;
       if (k < N) {
-        parts.push_back(*data.dynamics);
+        parts.push_back(own_dynamics > 0 ? data.dynamics_at[own_dynamics - 1].functions
+                                         : *data.dynamics);
       }
       const std::optional<Lagrangian>& cost = k < N ? data.cost : data.terminal_cost;
-      parts.push_back(cost ? *cost : nothing(data));
+      parts.push_back(own_cost > 0 ? data.cost_at[own_cost - 1].functions
+                      : cost       ? *cost
+                                   : nothing(data));
       for (std::size_t r = 0; r < data.rows.size(); ++r) {
-        if (there[r]) {
+        if (there[r] != 0) {
           parts.push_back(data.rows[r].functions);
         }
       }
@@ -76,7 +93,7 @@ StageProblem stages_of(const OptimalControlData& data) {
     }
     problem.kind.push_back(found->second);
     for (std::size_t r = 0; r < data.rows.size(); ++r) {
-      if (there[r]) {
+      if (there[r] != 0) {
         const OptimalControlData::Row& row = data.rows[r];
         problem.row_lower.insert(problem.row_lower.end(), row.lower.begin(), row.lower.end());
         problem.row_upper.insert(problem.row_upper.end(), row.upper.begin(), row.upper.end());
@@ -113,7 +130,11 @@ Expected<OptimalControlSolver> OptimalControlSolver::make(const OptimalControlPr
   if (data.error) {
     return tl::unexpected(*data.error);
   }
-  if (!data.dynamics) {
+  bool has_dynamics = true;
+  for (int k = 0; k < data.intervals && !data.dynamics && has_dynamics; ++k) {
+    has_dynamics = piece_at(data.dynamics_at, k) > 0;
+  }
+  if (!has_dynamics) {
     return tl::unexpected(Error(ArgumentError::empty)
                               .in("optimal control")
                               .about("the problem's dynamics")

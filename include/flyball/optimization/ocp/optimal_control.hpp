@@ -99,6 +99,23 @@ class OptimalControlProblem {
                                      const ButcherTableauView& method = default_method()) {
     record_derivative(recorder(f), 0.0, duration, method);
   }
+  /// The dynamics of stages first … last alone, in place of those of all: several phases.
+  ///@{
+  template <class F>
+  void set_dynamics(const F& f, int first, int last) {
+    record_dynamics_at(recorder(f), first, last);
+  }
+  /// @param step  Of time, s; one step of the method.
+  template <class F>
+  void set_derivative(const F& f, double step, int first, int last,
+                      const ButcherTableauView& method = default_method()) {
+    record_derivative_at(recorder(f), step, first, last, method);
+  }
+  template <class F>
+  void set_stage_cost(const F& f, int first, int last) {
+    record_cost_at(recorder(f), first, last);
+  }
+  ///@}
   /// ℓ at stages 0 … N-1. @param f  Returns an expression.
   template <class F>
   void set_stage_cost(const F& f) {
@@ -151,6 +168,7 @@ class OptimalControlProblem {
 
  private:
   friend class OptimalControlSolver;
+  friend class ContinuousProblem;
 
   template <class F>
   [[nodiscard]] static auto recorder(const F& f) {
@@ -186,6 +204,10 @@ class OptimalControlProblem {
   void record_derivative(detail::StageFunction f, double duration, int free_duration,
                          const ButcherTableauView& method);
   void record_cost(detail::StageFunction f, bool terminal);
+  void record_dynamics_at(detail::StageFunction f, int first, int last);
+  void record_derivative_at(detail::StageFunction f, double step, int first, int last,
+                            const ButcherTableauView& method);
+  void record_cost_at(detail::StageFunction f, int first, int last);
   void record_constraint(detail::StageFunction f, const Eigen::Ref<const Eigen::VectorXd>& lower,
                          const Eigen::Ref<const Eigen::VectorXd>& upper, int first, int last,
                          std::string name);
