@@ -167,7 +167,10 @@ std::vector<Verdict> mu_verdicts(const json& problem, const json& answer) {
     verdicts.push_back({"proof", proven ? 0.0 : never});
     const double norm = std::sqrt(square_sum(M.re, M.im, largest));
     const auto share = static_cast<double>(Quad(upper) / largest);
-    verdicts.push_back({"below the norm", std::max(0.0, share / norm - 1.001)});
+    constexpr double least_normal = std::numeric_limits<double>::min();
+    if (largest > least_normal) {  // a bound below has no digits left
+      verdicts.push_back({"below the norm", std::max(0.0, share / norm - 1.001)});
+    }
   }
   if (lower > 0.0) {
     const std::vector<double> out = roots_of(D_out);

@@ -199,11 +199,12 @@ Expected<BalancedRealization<Continuous>> truncate(const System& given, TimeDoma
   // x = L_c V σ^{-1/2} x', x' = σ^{-1/2} Uᵀ L_oᵀ x.
   const Eigen::VectorXd root = svd.values.head(r).cwiseSqrt().cwiseInverse();
   BalancedRealization<Continuous> found;
-  found.T = factors.states.asDiagonal() * product(factors.controllability, svd.V.leftCols(r)) *
-            root.asDiagonal();
-  found.T_inverse = root.asDiagonal() *
-                    product(svd.U.leftCols(r).transpose(), factors.observability.transpose()) *
-                    factors.states.cwiseInverse().asDiagonal();
+  // In the states' units D first: products of entries in others' may be no doubles.
+  const Eigen::VectorXd D = factors.states;
+  const Eigen::VectorXd D_inverse = D.cwiseInverse();
+  found.T = product(factors.controllability, svd.V.leftCols(r)) * root.asDiagonal();
+  found.T_inverse =
+      root.asDiagonal() * product(svd.U.leftCols(r).transpose(), factors.observability.transpose());
   if (r == n) {
     // The smallest states' rows of T⁻¹ are sums that cancel: to the last digit.
     const auto inverse =
@@ -214,12 +215,17 @@ Expected<BalancedRealization<Continuous>> truncate(const System& given, TimeDoma
   }
   found.hankel = detail::times_power(svd.values, b + c);
   found.error_bound = 2.0 * found.hankel.tail(n - r).sum();
-  const int a = detail::unit_of(system.A);
+  const MatrixXd A = D_inverse.asDiagonal() * system.A * D.asDiagonal();
+  const int a = detail::unit_of(A);
   found.system = {
-      detail::times_power(
-          product(found.T_inverse, product(detail::times_power(system.A, -a), found.T)), a),
-      detail::times_power(product(found.T_inverse, system.B), (b + c) / 2),
-      detail::times_power(product(system.C, found.T), (b + c) / 2), system.D};
+      detail::times_power(product(found.T_inverse, product(detail::times_power(A, -a), found.T)),
+                          a),
+      detail::times_power(product(found.T_inverse, MatrixXd(D_inverse.asDiagonal() * system.B)),
+                          (b + c) / 2),
+      detail::times_power(product(MatrixXd(system.C * D.asDiagonal()), found.T), (b + c) / 2),
+      system.D};
+  found.T = D.asDiagonal() * found.T;
+  found.T_inverse = found.T_inverse * D_inverse.asDiagonal();
   found.T = detail::times_power(found.T, (b - c) / 2);
   found.T_inverse = detail::times_power(found.T_inverse, (c - b) / 2);
   const double left =

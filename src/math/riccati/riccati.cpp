@@ -147,14 +147,15 @@ Expected<void> solve_riccati(const RiccatiData& data, RiccatiAnswer& answer) {
   const int n = data.states;
   const int m = data.inputs;
   const double size_A = largest(data.A, n * n);
-  const bool ordinary = (is_ordinary(size_A) || (size_A < 1.0 && !data.continuous)) &&
-                        is_ordinary(largest(data.B, n * m)) &&
-                        is_ordinary(largest(data.Q, n * n)) &&
-                        is_ordinary(largest(data.R, m * m)) &&
-                        (data.N == nullptr || is_ordinary(largest(data.N, n * m)));
+  const bool ordinary =
+      (is_ordinary(size_A) ||
+       (size_A < 1.0 && !data.continuous && !(size_A > 0.0 && size_A < nearly_nothing))) &&
+      is_ordinary(largest(data.B, n * m)) && is_ordinary(largest(data.Q, n * n)) &&
+      is_ordinary(largest(data.R, m * m)) &&
+      (data.N == nullptr || is_ordinary(largest(data.N, n * m)));
   if (ordinary && symmetric(data.Q, n) && symmetric(data.R, m) &&
       solve_riccati_quickly(data, answer)) {
-    if (!in_units_far_apart(answer.X, n) && !(size_A > 0.0 && size_A < nearly_nothing)) {
+    if (!in_units_far_apart(answer.X, n)) {
       return {};
     }
     if (holds_in_given_units(data, answer)) {
