@@ -28,6 +28,8 @@ void add_motors_command(CLI::App& program, Invocation& invocation);
 void add_book_command(CLI::App& program, Invocation& invocation);
 /// bode, nyquist, nichols, rlocus, step, impulse, margins, sisotool and pidtune.
 void add_loop_commands(CLI::App& program, Invocation& invocation);
+void add_path_command(CLI::App& program, Invocation& invocation);
+void add_states_command(CLI::App& program, Invocation& invocation);
 void add_profile_command(CLI::App& program, Invocation& invocation);
 void add_analyze_command(CLI::App& program, Invocation& invocation);
 void add_units_command(CLI::App& program, Invocation& invocation);

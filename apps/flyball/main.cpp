@@ -79,6 +79,7 @@ int run(int argc, char** argv) {
       "  flyball bode \"2/(s^2+3*s+2)*exp(-0.1*s)\"   margins and curves of a loop; sisotool: all "
       "of it\n"
       "  flyball pidtune \"exp(-s)/(s+1)\" --form pi  PID gains of a plant, and their loop\n"
+      "  flyball path Score.path                    a path of a planning tool, timed and shown\n"
       "  flyball profile --to 2m --kv 4 --ka 0.4    a motion from state to state, and its table\n"
       "  flyball solve dare < problems.jsonl        any kernel, from any language\n"
       "  flyball book 6.3                           a figure of the book, from this library\n"
@@ -107,6 +108,7 @@ int run(int argc, char** argv) {
   flyball::app::add_book_command(program, invocation);
   flyball::app::add_analyze_command(program, invocation);
   flyball::app::add_loop_commands(program, invocation);
+  flyball::app::add_path_command(program, invocation);
   flyball::app::add_profile_command(program, invocation);
   flyball::app::add_solve_command(program, invocation);
   flyball::app::add_units_command(program, invocation);

@@ -99,8 +99,10 @@ inline constexpr std::array drive_fields{
              "\"0.85 m\"", "The same")
         .no_option()
         .without("what the settings say, else 0.3 m more than the wheels"),
-    text("trajectory", at<&DriveSection::trajectory>(), "\"path.wpilib.json\"",
-         "A WPILib trajectory (JSON), beside the project file")
+    text(
+        "trajectory", at<&DriveSection::trajectory>(), "\"path.wpilib.json\"",
+        "A trajectory or path of WPILib (JSON), Choreo (.traj) or PathPlanner (.path, .auto), or a "
+        "table (CSV), beside the project file")
         .takes("FILE")
         .without("the waypoints"),
     names("waypoints", at<&DriveSection::waypoints>(),

@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 
 #include <flyball/core/argument.hpp>
+#include <flyball/io/file.hpp>
 #include <flyball/planning/splines/spline.hpp>
 #include <flyball/planning/trajectory/trajectory.hpp>
 #include <flyball/study/drive.hpp>
@@ -17,6 +18,7 @@
 #include "core/try.hpp"
 #include "core/wording.hpp"
 #include "study/field.hpp"
+#include "study/path_route.hpp"
 
 namespace flyball::study {
 
@@ -323,6 +325,29 @@ Expected<RobotTrajectory> trajectory_of(const Project& project, const DriveJob& 
   return trajectory;
 }
 
+/// A trajectory, or a path that is timed for the robot.
+ExpectedAll<RobotTrajectory> followed_file(const Project& project, const DriveJob& job,
+                                           const std::string& file) {
+  FLYBALL_TRY(const std::string text, read_file(file));
+  const auto format = motion_format(text, file);
+  const bool planned =
+      format &&
+      (*format == MotionFormat::pathplanner_path || *format == MotionFormat::pathplanner_auto ||
+       *format == MotionFormat::choreo_trajectory || *format == MotionFormat::choreo_project ||
+       *format == MotionFormat::trajectory_table);
+  if (!planned) {
+    return parse_trajectory(text, file);
+  }
+  PathJob path{.files = {file}};
+  if (*format == MotionFormat::pathplanner_path || *format == MotionFormat::pathplanner_auto) {
+    path.velocity = project.drive.max_velocity;
+    path.acceleration = project.drive.max_acceleration;
+    path.centripetal = project.drive.max_centripetal;
+  }
+  FLYBALL_TRY(LoadedMotion motion, load_motion(file, path, job.robot, job.max_voltage));
+  return std::move(motion.trajectory);
+}
+
 Expected<DriveFollower> follower_of(const Project& project, DriveKind kind) {
   const std::string& said = project.drive.follower;
   const bool sides = kind == DriveKind::differential;
@@ -405,11 +430,11 @@ ExpectedAll<DriveJob> drive_job(const std::string& path, std::span<const Overrid
                    .got(said.trajectory.empty() ? "missing, and so are waypoints"
                                                 : "there beside waypoints")
                    .expected("one of them")
-                   .hint("waypoints = [\"1 m, 1 m, 0 deg\", \"4 m, 2 m, 0 deg\"], or a WPILib "
-                         "trajectory: trajectory = \"path.wpilib.json\"")));
+                   .hint("waypoints = [\"1 m, 1 m, 0 deg\", \"4 m, 2 m, 0 deg\"], or a file of "
+                         "WPILib, Choreo or PathPlanner: trajectory = \"path.wpilib.json\"")));
   }
   if (!said.trajectory.empty()) {
-    FLYBALL_TRY(job.trajectory, read_trajectory(beside(path, said.trajectory)));
+    FLYBALL_TRY(job.trajectory, followed_file(project, job, beside(path, said.trajectory)));
   } else {
     FLYBALL_TRY(job.trajectory, trajectory_of(project, job, settings));
   }

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <flyball/core/answer.hpp>
+#include <flyball/core/errors.hpp>
+#include <flyball/core/quantity.hpp>
+#include <flyball/io/motion/choreo.hpp>
+#include <flyball/io/motion/pathplanner.hpp>
+#include <flyball/recording/motion_file.hpp>
+#include <flyball/study/drive.hpp>
+#include <flyball/study/project.hpp>
+
+/// Paths and trajectories of planning tools: timed, turned to the other side, joined, shown and
+/// written as each other's files.
+namespace flyball::study {
+
+/// What is asked of a path.
+struct PathJob {
+  std::vector<std::string> files{};    ///< One after the other.
+  std::string project{};               ///< A project file with the robot, or empty.
+  std::string name{};                  ///< Of a path, where a file has several.
+  std::optional<Velocity> velocity{};  ///< Limits in place of the file's.
+  std::optional<Acceleration> acceleration{};
+  std::optional<Acceleration> centripetal{};
+  std::optional<AngularVelocity> angular_velocity{};
+  std::optional<AngularAcceleration> angular_acceleration{};
+  std::optional<Velocity> start_velocity{}, end_velocity{};
+  bool differential = false;  ///< It looks where it goes; else only if the file or robot says so.
+  bool retime = false;        ///< A trajectory's times are made anew; so they are with limits.
+  bool flip = false;          ///< Turned by half a turn about the field's middle.
+  bool mirror = false;        ///< Mirrored at the line between the alliances.
+  bool mirror_sides = false;  ///< Mirrored at the line along the field's middle.
+  bool reverse = false;       ///< Driven from its end to its start, backing.
+  Length field_length{17.548}, field_width{8.052};
+  std::string to{};  ///< "choreo", "wpilib", "csv", "c++", "pathplanner": what is written.
+};
+
+/// A stretch of a trajectory along which one limit holds it back.
+struct PathBinding {
+  double from = 0.0, to = 0.0;  ///< s
+  std::string limit{};          ///< "velocity", "centripetal acceleration", "wheel speed", …
+};
+
+/// What became of it.
+struct PathResult {
+  PathJob job{};
+  MotionFormat format = MotionFormat::choreo_trajectory;  ///< Of the first file.
+  bool timed = false;                                     ///< Whether the times were made here.
+  RobotTrajectory trajectory{};                           ///< The whole.
+  double length = 0.0;                                    ///< m
+  std::vector<PathBinding> binding{};                     ///< Empty of what came with its times.
+  std::optional<DriveRobot> robot{};
+  std::vector<double> fastest_wheel{};  ///< m/s at each sample, of a robot.
+  double wheel_limit = 0.0;             ///< m/s, of its wheels without load.
+  std::vector<std::string> parts{};     ///< What it was joined of.
+  std::vector<Diagnostic> diagnostics{};
+  std::string written{};  ///< The file that `to` asks for.
+};
+
+/// The options of `flyball path`.
+[[nodiscard]] std::vector<FieldInfo> path_fields();
+
+/// A job of a command line. @param files  Files of Choreo, PathPlanner, WPILib, CSV; a project file
+/// (.toml) among them is the robot's, and alone its waypoints are the path.
+/// @errors ProjectError, ArgumentError.
+[[nodiscard]] ExpectedAll<PathJob> path_job(const std::vector<std::string>& files,
+                                            std::span<const Override> given);
+
+/// Reads the files, times those that are paths, joins, turns and mirrors them.
+///
+/// A path is timed on a grid of its length: caps on the speed by the limits, and the speeds that
+/// the accelerations reach, forward from the start and back from the end (`time_route`).
+/// @errors FileError, MotionFileError, TrajectoryFileError, ArgumentError, those of the project.
+/// Cost: some milliseconds a path; allocates.
+[[nodiscard]] ExpectedAll<PathResult> plan_path(const PathJob& job);
+
+/// Numbers, pictures over time and on the field, an animation, and the motion as CSV, WPILib's
+/// JSON, Choreo's and a C++ table. Schema "flyball.path/1".
+[[nodiscard]] Answer answer_of(const PathResult& result);
+
+}  // namespace flyball::study

@@ -1,0 +1,200 @@
+#include <flyball/study/path.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/core/text.hpp>
+#include <flyball/export/motion_table.hpp>
+#include <flyball/io/csv.hpp>
+#include <flyball/io/file.hpp>
+
+#include "core/diagnose.hpp"
+#include "core/try.hpp"
+#include "study/path_route.hpp"
+
+namespace flyball::study {
+
+namespace {
+
+using Eigen::Vector2d;
+
+double length_of(const RobotTrajectory& trajectory) {
+  double length = 0.0;
+  for (std::size_t i = 1; i < trajectory.samples.size(); ++i) {
+    length +=
+        (trajectory.samples[i].pose.translation() - trajectory.samples[i - 1].pose.translation())
+            .norm();
+  }
+  return length;
+}
+
+/// The fastest wheel at each sample, m/s.
+std::vector<double> wheels_of(const RobotTrajectory& trajectory, const DriveRobot& robot) {
+  std::vector<double> fastest;
+  for (const MotionSample& sample : trajectory.samples) {
+    if (robot.kind == DriveKind::differential) {
+      fastest.push_back(std::abs(sample.forward()) +
+                        0.5 * robot.trackwidth * std::abs(sample.omega));
+      continue;
+    }
+    const Vector2d v = sample.pose.rotation().inverse() * sample.velocity;
+    double most = 0.0;
+    for (const Vector2d& module : robot.modules) {
+      const Vector2d w = v + sample.omega * Vector2d(-module(1), module(0));
+      most = std::max(
+          most, robot.kind == DriveKind::mecanum ? std::abs(w(0)) + std::abs(w(1)) : w.norm());
+    }
+    fastest.push_back(most);
+  }
+  return fastest;
+}
+
+/// The name of a trajectory, of its file's.
+std::string stem(const std::string& file) {
+  return std::filesystem::path(file).stem().stem().string();
+}
+
+tl::unexpected<Errors> cannot_write(const PathJob& job, std::string got, std::string expected) {
+  return tl::unexpected(Errors(Error(ArgumentError::out_of_range)
+                                   .in("--to")
+                                   .about(fmt::format("\"{}\"", cut(printable(job.to), 40)))
+                                   .got(std::move(got))
+                                   .expected(std::move(expected))));
+}
+
+std::optional<ChoreoSides> sides_of(const PathResult& result) {
+  const bool differential =
+      result.robot ? result.robot->kind == DriveKind::differential : result.job.differential;
+  constexpr double usual = 0.6;  // m
+  return differential ? std::optional(ChoreoSides{result.robot ? result.robot->trackwidth : usual})
+                      : std::nullopt;
+}
+
+/// What `to` asks for.
+ExpectedAll<std::string> written(PathResult& result) {
+  const PathJob& job = result.job;
+  const FieldChange change = FieldChange::of(job);
+  const bool one = job.files.size() == 1;
+  if (job.to == "pathplanner") {
+    if (!one || result.format != MotionFormat::pathplanner_path) {
+      return cannot_write(job, "asked of what is no single .path file",
+                          "choreo, wpilib, csv or c++ of a trajectory");
+    }
+    FLYBALL_TRY(const PathPlannerPath path, read_pathplanner_path(job.files.front()));
+    return to_pathplanner(changed(path, change, job.reverse));
+  }
+  if (job.to == "choreo") {
+    if (one && result.format == MotionFormat::choreo_trajectory && !result.timed && !job.reverse) {
+      FLYBALL_TRY(const ChoreoTrajectory file, read_choreo_trajectory(job.files.front()));
+      return to_choreo(change.none() ? file : changed(file, change));
+    }
+    const std::optional<ChoreoSides> sides = sides_of(result);
+    if (sides && result.trajectory.holonomic) {
+      return cannot_write(job, "of a robot that moves sideways", "one that looks where it goes");
+    }
+    return to_choreo(to_choreo_trajectory(result.trajectory, stem(job.files.front()), sides));
+  }
+  if (job.to == "wpilib") {
+    return to_wpilib(to_wpilib_trajectory(result.trajectory));
+  }
+  FLYBALL_TRY(const TimeSeries table, to_table(result.trajectory));
+  if (job.to == "csv") {
+    return to_csv(table);
+  }
+  return exports::motion_table(table, "path", "A trajectory of " + stem(job.files.front()));
+}
+
+Expected<void> check_job(const PathJob& job) {
+  for (const auto& [value, name] :
+       {std::pair(job.field_length.si(), "field_length"), {job.field_width.si(), "field_width"}}) {
+    FLYBALL_CHECK(Checks("path").positive(value, name, "m"));
+  }
+  if (job.files.size() > 200) {
+    return refusal(ArgumentError::out_of_range, "path", "the command line")
+        .got(fmt::format("of {} files", job.files.size()))
+        .expected("at most 200");
+  }
+  return {};
+}
+
+}  // namespace
+
+ExpectedAll<PathResult> plan_path(const PathJob& job) {
+  FLYBALL_CHECK(check_job(job));
+  PathResult result{.job = job};
+  double voltage = 12.0;
+  LoadedMotion motion;
+  if (!job.project.empty()) {
+    if (job.files.empty()) {
+      FLYBALL_TRY(const DriveJob drive, drive_job(job.project));
+      result.robot = drive.robot;
+      voltage = drive.max_voltage;
+      motion.trajectory = drive.trajectory;
+      motion.format = MotionFormat::wpilib_trajectory;
+      motion.parts = {job.project};
+    } else {
+      FLYBALL_TRY(const DriveJob drive, drive_design_job(job.project));
+      result.robot = drive.robot;
+      voltage = drive.max_voltage;
+      result.diagnostics = drive.diagnostics;
+    }
+  }
+  for (std::size_t i = 0; i < job.files.size(); ++i) {
+    PathJob one = job;
+    // Only the ends of the whole have the velocities that are asked for.
+    if (i > 0) {
+      one.start_velocity.reset();
+    }
+    if (i + 1 < job.files.size()) {
+      one.end_velocity.reset();
+    }
+    FLYBALL_TRY(const LoadedMotion next, load_motion(job.files[i], one, result.robot, voltage));
+    const MotionFormat format = i == 0 ? next.format : motion.format;
+    FLYBALL_CHECK(append(motion, next, 0.0));
+    motion.format = format;
+  }
+  result.format = motion.format;
+  result.timed = motion.timed;
+  result.binding = std::move(motion.binding);
+  result.parts = std::move(motion.parts);
+  result.trajectory = std::move(motion.trajectory);
+  if (job.reverse) {
+    const double end = result.trajectory.duration();
+    result.trajectory = reversed(result.trajectory);
+    std::reverse(result.binding.begin(), result.binding.end());
+    for (PathBinding& binding : result.binding) {
+      binding.from = end - std::exchange(binding.to, end - binding.from);
+    }
+  }
+  if (const FieldChange change = FieldChange::of(job); !change.none()) {
+    result.trajectory = changed(std::move(result.trajectory), change);
+  }
+  result.diagnostics.insert(result.diagnostics.end(), result.trajectory.diagnostics.begin(),
+                            result.trajectory.diagnostics.end());
+  result.length = length_of(result.trajectory);
+  if (result.robot) {
+    result.fastest_wheel = wheels_of(result.trajectory, *result.robot);
+    result.wheel_limit = result.robot->free_speed(voltage);
+    const double most = *std::max_element(result.fastest_wheel.begin(), result.fastest_wheel.end());
+    if (most > result.wheel_limit * (1.0 + 1e-6)) {
+      warn(result.diagnostics, "wheels_too_slow",
+           "a wheel would have to go {:.3g} m/s; without load this robot's reach {:.3g} m/s", most,
+           result.wheel_limit);
+    }
+    if (result.robot->kind == DriveKind::differential && result.trajectory.holonomic) {
+      warn(result.diagnostics, "moves_sideways",
+           "the trajectory moves sideways, which a differential drive does not");
+    }
+  }
+  if (!job.to.empty()) {
+    FLYBALL_TRY(result.written, written(result));
+  }
+  return result;
+}
+
+}  // namespace flyball::study

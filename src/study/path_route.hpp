@@ -1,0 +1,136 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <flyball/io/motion/choreo.hpp>
+#include <flyball/io/motion/pathplanner.hpp>
+#include <flyball/planning/splines/spline.hpp>
+#include <flyball/recording/trajectory_file.hpp>
+#include <flyball/study/path.hpp>
+
+/// Paths as lines of points, and times along them.
+namespace flyball::study {
+
+/// What a motion keeps to; infinite is no limit.
+struct RouteLimits {
+  double velocity = 0.0;              ///< m/s
+  double acceleration = 0.0;          ///< m/s², along the path.
+  double centripetal = 0.0;           ///< m/s², across.
+  double angular_velocity = 0.0;      ///< rad/s
+  double angular_acceleration = 0.0;  ///< rad/s²
+};
+
+/// A place along a path: 1.5 is halfway along the second segment's parameter.
+struct RouteHeading {
+  double position = 0.0;
+  double heading = 0.0;  ///< rad
+};
+
+/// Limits from a place to another.
+struct RouteZone {
+  double from = 0.0, to = 0.0;
+  RouteLimits limits{};
+  std::string name{};
+};
+
+/// A place that is looked at from a place to another.
+struct RoutePointing {
+  double from = 0.0, to = 0.0;
+  Eigen::Vector2d place = Eigen::Vector2d::Zero();
+  double offset = 0.0;  ///< rad
+};
+
+/// A path before it has times.
+struct RouteShape {
+  std::string source{};
+  Spline segments{};
+  std::vector<RouteHeading> headings{};  ///< Of a robot that looks elsewhere; empty: where it goes.
+  bool dense_headings = false;  ///< So many that the headings go straight from each to the next.
+  std::vector<RouteZone> zones{};
+  std::vector<RoutePointing> pointing{};
+  std::vector<double> stops{};  ///< Places at which it stops.
+  RouteLimits limits{};
+  bool reversed = false;                            ///< Of one that looks where it goes: it backs.
+  double start_velocity = 0.0, end_velocity = 0.0;  ///< m/s
+  std::vector<Diagnostic> diagnostics{};
+};
+
+/// The shapes that files say. @param holonomic  Whether the robot may look elsewhere.
+/// @errors ArgumentError, TrajectoryFileError.
+[[nodiscard]] Expected<RouteShape> shape_of(const PathPlannerPath& path, const std::string& source,
+                                            bool holonomic);
+[[nodiscard]] Expected<RouteShape> shape_of(const ChoreoTrajectory& trajectory,
+                                            const std::string& source);
+[[nodiscard]] Expected<RouteShape> shape_of(const RobotTrajectory& trajectory);
+
+/// A path with times, and what held it back.
+struct TimedRoute {
+  RobotTrajectory trajectory{};
+  std::vector<PathBinding> binding{};
+};
+
+/// The motion along a shape under its limits and those of a robot's wheels, motors and grip. The
+/// path is cut at corners of more than 3°, at which it stops; each part is taken at even distances
+/// (1 cm, at least 200 and at most 20 000 of them), with at each the largest speed that the limits
+/// leave
+///
+///     v <= v_max,  v² |κ| <= a_c,  v |θ'| <= ω,  v² |θ''| <= α,  v |p' + θ' × r_k| <= w,
+///     (v² κ)² + a² <= (μ g)²,
+///
+/// and between two of them accelerations within a_max, the angular acceleration |θ' a + θ'' v²| <=
+/// α, the motors' force at that speed and the grip.
+/// @param robot  Absent: only the limits count. @param voltage  V, of its motors.
+/// @errors ArgumentError::out_of_range (an end's velocity that cannot be), not_positive, empty.
+/// Cost: O(points). Source: Bobrow, Dubowsky, Gibson (1985); Kunz and Stilman (2012).
+[[nodiscard]] Expected<TimedRoute> time_route(const RouteShape& shape,
+                                              const std::optional<DriveRobot>& robot,
+                                              double voltage);
+
+/// A file as a motion.
+struct LoadedMotion {
+  MotionFormat format = MotionFormat::choreo_trajectory;
+  bool timed = false;  ///< Whether its times were made here.
+  RobotTrajectory trajectory{};
+  std::vector<PathBinding> binding{};
+  std::vector<std::string> parts{};
+};
+
+/// Reads a file and times it, if it is a path or the job says so; a routine's paths are those
+/// beside it (also in ../paths and ../../choreo), joined, its waits between them.
+/// @param job  Its limits, name, `retime` and `differential`. @param robot  Absent: none is known.
+[[nodiscard]] ExpectedAll<LoadedMotion> load_motion(const std::string& file, const PathJob& job,
+                                                    const std::optional<DriveRobot>& robot,
+                                                    double voltage);
+
+/// One motion after the other. @param wait  s, at rest between them.
+/// @errors ArgumentError::out_of_range where they are more than 10 cm apart.
+[[nodiscard]] Expected<void> append(LoadedMotion& motion, const LoadedMotion& next, double wait);
+
+/// A motion from its end to its start.
+[[nodiscard]] RobotTrajectory reversed(const RobotTrajectory& trajectory);
+
+/// The field turned or mirrored: x' = sx x + ox, y' = sy y + oy, θ' = sx sy θ + turn.
+struct FieldChange {
+  double sx = 1.0, ox = 0.0, sy = 1.0, oy = 0.0;
+
+  [[nodiscard]] static FieldChange of(const PathJob& job);
+  [[nodiscard]] bool none() const noexcept { return sx > 0.0 && sy > 0.0; }
+  [[nodiscard]] double hand() const noexcept { return sx * sy; }
+  [[nodiscard]] Eigen::Vector2d place(const Eigen::Vector2d& p) const {
+    return {sx * p(0) + ox, sy * p(1) + oy};
+  }
+  [[nodiscard]] Eigen::Vector2d vector(const Eigen::Vector2d& v) const {
+    return {sx * v(0), sy * v(1)};
+  }
+  /// rad
+  [[nodiscard]] double heading(double theta) const;
+};
+[[nodiscard]] RobotTrajectory changed(RobotTrajectory trajectory, const FieldChange& change);
+[[nodiscard]] ChoreoTrajectory changed(ChoreoTrajectory file, const FieldChange& change);
+[[nodiscard]] PathPlannerPath changed(PathPlannerPath path, const FieldChange& change,
+                                      bool reverse);
+
+}  // namespace flyball::study
