@@ -64,9 +64,16 @@ inline CharacterizationOptions session(const Truth& truth, std::uint64_t seed) {
 /// What a family of sessions adds to the clean one, and what the identification should say of it.
 struct Family {
   std::string_view name;
-  /// The codes of diagnoses, one of which is right; empty if the model can be right without.
-  std::array<std::string_view, 2> diagnoses;
+  /// The codes of diagnoses, or what `term_in_doubt` names, one of which is right; empty if the
+  /// model can be right without.
+  std::array<std::string_view, 3> diagnoses;
   void (*spoil)(const Truth& truth, flyball::Random& random, CharacterizationOptions& options);
+  /// Whether that kind of mechanism can have it.
+  bool (*has)(MechanismKind kind) = [](MechanismKind) { return true; };
+};
+
+inline constexpr auto not_a_flywheel = [](MechanismKind kind) {
+  return kind != MechanismKind::flywheel;
 };
 
 /// Half of the travel, or a turn of what turns on.
@@ -105,41 +112,40 @@ inline constexpr std::array<Family, 13> families{{
      {},
      [](const Truth&, flyball::Random&, CharacterizationOptions& options) {
        options.defects.stale_first_row = true;
-     }},
+     },
+     not_a_flywheel},
     {"spring",
-     {"spring", ""},
+     {"spring", "a force that grows along the travel"},
      [](const Truth&, flyball::Random& random, CharacterizationOptions& options) {
-       if (options.mechanism != MechanismKind::flywheel) {
-         options.defects.spring = random.uniform(0.2, 0.5) / reach(options);
-       }
-     }},
+       options.defects.spring = random.uniform(0.2, 0.5) / reach(options);
+     },
+     not_a_flywheel},
     {"drag",
-     {"drag", ""},
+     {"drag", "drag that grows"},
      [](const Truth& truth, flyball::Random& random, CharacterizationOptions& options) {
        const double top = (options.step_voltage - truth.kS) / truth.kV;
        options.defects.drag = random.uniform(0.3, 1.0) / (top * top);
      }},
     {"asymmetric friction",
-     {"asymmetric_friction", ""},
-     [](const Truth& truth, flyball::Random& random, CharacterizationOptions& options) {
-       // An elevator's is gravity: no log of it moving tells them apart.
-       if (truth.kind != MechanismKind::elevator) {
-         options.defects.friction_asymmetry = random.uniform(0.3, 0.5);
-       }
-     }},
+     {"asymmetric_friction", "friction that differs by direction"},
+     [](const Truth&, flyball::Random& random, CharacterizationOptions& options) {
+       options.defects.friction_asymmetry = random.uniform(0.3, 0.5);
+     },
+     // An elevator's is gravity: no log of it moving tells them apart.
+     [](MechanismKind kind) { return kind != MechanismKind::elevator; }},
     {"current limit",
-     {"current_limit", ""},
+     {"current_limit", "a current limit"},
      [](const Truth& truth, flyball::Random& random, CharacterizationOptions& options) {
        options.defects.headroom =
            random.uniform(0.4, 0.7) * options.step_voltage + truth.kG + truth.kS;
      }},
     {"sag",
-     {"sag", "current_limit"},
+     {"sag", "current_limit", "battery that sags"},
      [](const Truth&, flyball::Random& random, CharacterizationOptions& options) {
        options.defects.sag = random.uniform(0.1, 0.3);
      }},
     {"backlash",
-     {"elastic", "backlash"},
+     {"elastic", "backlash", "there is backlash"},
      [](const Truth&, flyball::Random& random, CharacterizationOptions& options) {
        options.defects.backlash =
            random.uniform(0.01, 0.03) * (options.mechanism == MechanismKind::elevator ? 0.1 : 1.0);

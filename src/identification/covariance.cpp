@@ -12,9 +12,16 @@
 namespace flyball::identification {
 namespace {
 
-constexpr double bin_width = 0.02;    // s
-constexpr int lags = 30;              // bins: correlation is followed for 0.6 s
-constexpr double block_length = 0.6;  // s
+constexpr int lags = 30;                 // bins, for which correlation is followed
+constexpr double shortest_memory = 0.6;  // s, that they are at least
+constexpr double longest_memory = 3.0;   // s
+constexpr double time_constants = 6.0;   // that they are: noise of the voltage decays so slowly
+
+/// s, of a bin.
+double bin_width_of(const Eigen::VectorXd& x) {
+  const double memory = time_constants * std::exp(x[parameter::log_time_constant]);
+  return std::clamp(memory, shortest_memory, longest_memory) / lags;
+}
 
 /// A run's residuals and Jacobians summed over bins of time, a bin a column.
 struct ChannelBins {
@@ -31,7 +38,7 @@ struct Bins {
 
 /// The bins of one channel of a run; adds to Σ Jᵀ ψ'(z) J.
 ChannelBins bin_channel(const Eigen::VectorXd& residuals, const ResidualBlock::Jacobian& jacobian,
-                        double inverse_scale, const std::vector<double>& times,
+                        double inverse_scale, const std::vector<double>& times, double bin_width,
                         Eigen::MatrixXd& hessian) {
   const double last = times.empty() ? -bin_width : *std::max_element(times.begin(), times.end());
   const auto bins = static_cast<Eigen::Index>(last / bin_width) + 1;
@@ -54,7 +61,7 @@ ChannelBins bin_channel(const Eigen::VectorXd& residuals, const ResidualBlock::J
 }
 
 std::vector<double> residual_times(const OutputErrorProblem& problem, std::size_t index,
-                                   Channel channel) {
+                                   Channel channel, double bin_width) {
   const ResidualRun& run = problem.runs()[index];
   const std::vector<double>& time = problem.recording().runs[run.prepared].run.time;
   // From the bin of the first row that is used: what stands before may be years away.
@@ -124,7 +131,7 @@ Eigen::MatrixXd scores_of(const Bins& run) {
   return scores;
 }
 
-/// To each of `count` columns the sum of it and of those of M up to 0.6 s later, with a weight for
+/// To each of `count` columns the sum of it and of those of M that come after, with a weight for
 /// each lag.
 Eigen::MatrixXd sum_later(const Eigen::MatrixXd& M, Eigen::Index count,
                           const std::array<double, lags + 1>& weights) {
@@ -143,7 +150,7 @@ Eigen::MatrixXd both_orders(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B) 
   return product + product.transpose();
 }
 
-/// Newey–West: the scores' own covariances up to 0.6 s under a Bartlett window.
+/// Newey–West: the scores' own covariances under a Bartlett window.
 Eigen::MatrixXd hac_middle(const Eigen::MatrixXd& scores) {
   std::array<double, lags + 1> weights{0.5};
   for (int lag = 1; lag <= lags; ++lag) {
@@ -152,9 +159,9 @@ Eigen::MatrixXd hac_middle(const Eigen::MatrixXd& scores) {
   return both_orders(scores, sum_later(scores, scores.cols(), weights));
 }
 
-/// Sums of scores over blocks of 0.6 s count as independent.
+/// Sums of scores over blocks as long as the memory count as independent.
 Eigen::MatrixXd block_middle(const Eigen::MatrixXd& scores, std::size_t& blocks) {
-  constexpr auto length = static_cast<Eigen::Index>(block_length / bin_width);
+  constexpr Eigen::Index length = lags;
   Eigen::MatrixXd sums(scores.rows(), (scores.cols() + length - 1) / length);
   for (Eigen::Index k = 0; k < sums.cols(); ++k) {
     const Eigen::Index begin = k * length;
@@ -251,6 +258,7 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
   const Eigen::Index n = x.size();
   Eigen::MatrixXd bread = Eigen::MatrixXd::Zero(n, n);
   std::vector<Bins> runs(problem.runs().size());
+  const double bin_width = bin_width_of(x);
   ResidualBlock block;
   for (std::size_t i = 0; i < runs.size(); ++i) {
     problem.evaluate(i, x, free, block);
@@ -260,9 +268,9 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
     runs[i].columns = block.columns;
     runs[i].channels = {
         bin_channel(block.difference, block.difference_jacobian, inverse(scales.difference),
-                    residual_times(problem, i, Channel::position), hessian),
+                    residual_times(problem, i, Channel::position, bin_width), bin_width, hessian),
         bin_channel(block.velocity, block.velocity_jacobian, inverse(scales.velocity),
-                    residual_times(problem, i, Channel::velocity), hessian)};
+                    residual_times(problem, i, Channel::velocity, bin_width), bin_width, hessian)};
     scatter(bread, hessian, block.columns);
   }
 
@@ -282,6 +290,12 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
     scatter(middles[0], hac_middle(scores), run.columns);
     scatter(middles[1], block_middle(scores, blocks), run.columns);
     scatter(middles[2], correlation_middle(run, run.ramp ? ramp_gamma : step_gamma), run.columns);
+  }
+  // What is known before the data has an error, too.
+  for (const OutputErrorProblem::Prior& prior : problem.priors()) {
+    for (Eigen::MatrixXd& middle : middles) {
+      middle(prior.parameter, prior.parameter) += 1.0 / square(prior.deviation);
+    }
   }
 
   std::vector<Eigen::Index> active;
@@ -307,11 +321,21 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
                                         factor.solve(Eigen::MatrixXd::Identity(size, size)) *
                                         equilibrium.asDiagonal();
   result.independent(active, active) = inverse_bread;
+  // Where in a row a ramp's sensor was read is not fitted, as a ramp cannot tell it from friction.
+  Eigen::MatrixXd of_fixed = Eigen::MatrixXd::Zero(size, size);
+  for (const OutputErrorProblem::Prior& prior : problem.priors()) {
+    const bool fixed = !free[static_cast<std::size_t>(prior.parameter)];
+    if (fixed && prior.parameter >= shared_parameter_count) {
+      const Eigen::VectorXd cross = bread.col(prior.parameter)(active);
+      const Eigen::VectorXd moved = prior.deviation * (inverse_bread * cross);
+      of_fixed += moved * moved.transpose();
+    }
+  }
   const double blocks_left = std::max(1.0, static_cast<double>(blocks) - static_cast<double>(size));
   for (std::size_t k = 0; k < middles.size(); ++k) {
     const Eigen::MatrixXd covariance = inverse_bread * middles[k](active, active) * inverse_bread *
                                        (k == 1 ? static_cast<double>(blocks) / blocks_left : 1.0);
-    result.estimates[k](active, active) = covariance;
+    result.estimates[k](active, active) = covariance + of_fixed;
   }
   return result;
 }

@@ -18,12 +18,12 @@ constexpr double normal_95 = 1.96;
 constexpr double longest_usual = 0.5;         // s, kA/kV that a ramp's friction allows for
 constexpr double widest_time_constant = 0.6;  // relative half-width beyond which kA is unknown
 
-// What residuals cannot tell: measured voltages are a millivolt off, clocks and encoders a few
-// parts in ten thousand, and the sensors are not quite what is supposed of them (simulated sessions
+// What residuals cannot tell: measured voltages are half a millivolt off, clocks and encoders a
+// part in ten thousand, and the sensors are not quite what is supposed of them (simulated sessions
 // with such sensors are covered to 95 % with these).
-constexpr double voltage_allowance = 1e-3;  // V, standard error added to kS and kG
-constexpr double speed_allowance = 2e-4;    // relative, added to kV
-constexpr double inertia_allowance = 2e-3;  // relative, added to kA
+constexpr double voltage_allowance = 5e-4;  // V, standard error added to kS and kG
+constexpr double speed_allowance = 1e-4;    // relative, added to kV
+constexpr double inertia_allowance = 1e-3;  // relative, added to kA
 constexpr double delay_allowance = 2e-4;    // s, added to delays
 constexpr double small_sample = 1.1;        // of all standard errors
 

@@ -206,6 +206,7 @@ double inflation_of(const Covariances& spread, const Term& term) {
 struct Judged {
   Term term;
   RobustFit fit;
+  double gain = 0.0;      ///< Of the cost.
   double evidence = 0.0;  ///< Over what is beyond doubt.
   Eigen::VectorXd moved;  ///< Of the parameters, by the term.
   [[nodiscard]] double chi_squared() const { return evidence * beyond_doubt(term); }
@@ -217,7 +218,7 @@ Judged judge(OutputErrorProblem& problem, const Bounds& bounds, const ChannelSca
   const Term& term = candidate.term;
   extend(problem, term, true);
   const RobustFit larger = refit(problem, candidate.start, bounds, scales);
-  Judged judged{term, larger, 0.0, Eigen::VectorXd::Zero(best.x.size())};
+  Judged judged{term, larger, 0.0, 0.0, Eigen::VectorXd::Zero(best.x.size())};
   if (larger.cost < best.cost && is_physical(term, larger.x[term.front()])) {
     problem.refresh_forces(larger.x);
     // Judged by the residuals that the larger model leaves, which are white if it is right.
@@ -229,10 +230,14 @@ Judged judge(OutputErrorProblem& problem, const Bounds& bounds, const ChannelSca
     problem.refresh_forces(best.x);
     const RobustFit without =
         minimize(problem, best.x, problem.free_parameters(), bounds, fresh, 60, 1e-2);
-    judged.evidence = spread.singular ? 0.0
-                                      : (without.cost - judged.fit.cost) /
-                                            inflation_of(spread, term) / beyond_doubt(term);
+    judged.gain = without.cost - judged.fit.cost;
+    judged.evidence =
+        spread.singular ? 0.0 : judged.gain / inflation_of(spread, term) / beyond_doubt(term);
     judged.moved = judged.fit.x - without.x;
+    // So far away, and no better: another valley, not a doubt.
+    if (judged.evidence < 1.0 && std::abs(judged.moved[parameter::log_time_constant]) > 0.5) {
+      judged.moved.setZero();
+    }
     judged.fit.iterations += larger.iterations + best.iterations;
   }
   extend(problem, term, false);
@@ -273,8 +278,12 @@ Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds, Channe
     const std::vector<Candidate> found = candidates(problem, bounds, scales, best);
     // To first order a term may look better than it is: some are fitted, the best is taken.
     std::vector<Judged> all;
-    for (std::size_t k = 0; k < std::min(most_fits, found.size()); ++k) {
-      if (found[k].evidence >= worth_a_fit * std::max(1.0, found.front().evidence)) {
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      const bool promising =
+          k < most_fits && found[k].evidence >= worth_a_fit * std::max(1.0, found[0].evidence);
+      const bool as_drag =
+          found[k].term.front() == parameter::sag && find(all, parameter::drag) != all.end();
+      if (promising || as_drag) {
         all.push_back(judge(problem, bounds, scales, best, found[k]));
       }
     }
@@ -282,23 +291,45 @@ Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds, Channe
       const bool sure = b.evidence >= 1.0;
       return (a.evidence >= 1.0) == sure ? a.chi_squared() < b.chi_squared() : sure;
     });
+    // A speed that rises late at first does so at a limit, too.
+    const auto limit = find(all, parameter::headroom);
+    if (better != all.end() && better->term.front() == parameter::take_up && limit != all.end() &&
+        better->evidence >= 1.0) {
+      if (limit->gain > 1.1 * better->gain) {
+        limit->evidence = std::max(limit->evidence, 1.0);
+        better = limit;
+      } else if (limit->gain > 0.5 * better->gain) {
+        Judged between = *limit;
+        between.moved -= better->moved;
+        between.term.push_back(parameter::take_up);
+        extension.doubts.push_back(doubt(between, 0.5));
+        extension.open.push_back({parameter::headroom, between.moved, true});
+      }
+    }
     if (better == all.end() || better->evidence < 1.0) {
       for (const Judged& judged : all) {
-        extension.doubts.push_back(doubt(judged, std::sqrt(probability(judged))));
-        extension.open.push_back({static_cast<int>(judged.term.front()), judged.moved});
+        // No log of a step of one height tells a sagging battery from more inertia.
+        const bool sags = judged.term.front() == parameter::sag && judged.chi_squared() > 1.0;
+        extension.doubts.push_back(doubt(judged, sags ? 1.0 : std::sqrt(probability(judged))));
+        extension.open.push_back({static_cast<int>(judged.term.front()), judged.moved, false});
       }
       break;
     }
     // At a flywheel a sagging battery looks like a little drag and more inertia.
     const auto sag = find(all, parameter::sag);
     const auto drag = find(all, parameter::drag);
-    if (sag != all.end() && drag != all.end() && (better == sag || better == drag) &&
-        std::abs(sag->evidence - drag->evidence) < as_good) {
-      better = sag;
+    if (sag != all.end() && drag != all.end() && (better == sag || better == drag)) {
       Judged between = *drag;
       between.moved -= sag->moved;
       between.term.push_back(parameter::sag);
-      extension.doubts.push_back(doubt(between, 0.5));
+      if (std::abs(sag->evidence - drag->evidence) < as_good) {
+        better = sag;
+        extension.doubts.push_back(doubt(between, 0.5));
+      } else if (better == drag && sag->gain > 0.5 * drag->gain) {
+        between.moved = -between.moved;
+        extension.doubts.push_back(doubt(between, 1.0));
+        extension.open.push_back({parameter::sag, between.moved, true});
+      }
     }
     extend(problem, better->term, true);
     problem.refresh_forces(better->fit.x);

@@ -13,6 +13,7 @@ struct Extension {
   struct Open {
     int term;  ///< Its first parameter.
     Eigen::VectorXd moved;
+    bool instead;  ///< Of another that was taken in: told in any case.
   };
   std::vector<Open> open{};
   bool extended = false;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/diagnose.hpp"
+#include "core/format.hpp"
 #include "identification/estimates.hpp"
 #include "identification/model_terms.hpp"
 
@@ -25,6 +26,17 @@ Eigen::VectorXd steepest_field(const OutputErrorProblem& problem, const Eigen::V
     }
   }
   return most;
+}
+
+/// kG of parameters that are moved by so much.
+double gravity_with(const FeedforwardFit& fit, const Eigen::VectorXd& moved) {
+  if (!fit.kG) {
+    return 0.0;
+  }
+  const double offset = fit.angle_offset ? fit.angle_offset->value : 0.0;
+  const double cosine = fit.kG->value * std::cos(offset) + moved[parameter::gravity_cosine];
+  const double sine = -fit.kG->value * std::sin(offset) + moved[parameter::gravity_sine];
+  return fit.angle_offset ? std::hypot(cosine, sine) : cosine;
 }
 
 }  // namespace
@@ -81,11 +93,23 @@ void report_open_terms(const Extension& extension, const FeedforwardFit& fit,
   constexpr double large = 0.4;  // of half an interval
   const double kV_half = 0.5 * (fit.kV.interval[1] - fit.kV.interval[0]);
   const double kS_half = 0.5 * (fit.kS.interval[1] - fit.kS.interval[0]);
-  for (const Extension::Open& open : extension.open) {
+  const double kA_half = 0.5 * (fit.kA.interval[1] - fit.kA.interval[0]);
+  std::vector<Extension::Open> all = extension.open;
+  std::stable_partition(all.begin(), all.end(), [](const Extension::Open& open) {
+    return open.term == parameter::sag;  // It moves kA most, of which nothing else tells.
+  });
+  for (const Extension::Open& open : all) {
     const double kV = fit.kV.value + open.moved[parameter::velocity_gain];
     const double kS = fit.kS.value + open.moved[parameter::static_friction];
+    const double kA =
+        fit.kA.value * std::exp(open.moved[parameter::log_time_constant]) * kV / fit.kV.value;
+    const bool of_kA = fit.kA.determined && std::abs(kA - fit.kA.value) >= large * kA_half;
+    // Gravity's share of an arm is told by its angle, which a force along the travel trades with.
+    const double kG = gravity_with(fit, open.moved);
+    const bool of_kG = fit.kG && std::abs(kG - fit.kG->value) >=
+                                     large * 0.5 * (fit.kG->interval[1] - fit.kG->interval[0]);
     if (std::abs(kV - fit.kV.value) < large * kV_half &&
-        std::abs(kS - fit.kS.value) < large * kS_half) {
+        std::abs(kS - fit.kS.value) < large * kS_half && !of_kA && !of_kG && !open.instead) {
       continue;
     }
     const bool lift = fit.mechanism == mechanisms::MechanismKind::elevator;
@@ -100,13 +124,16 @@ void report_open_terms(const Extension& extension, const FeedforwardFit& fit,
             ? "a force that grows along the travel (a spring, a cable, or a further stage that is "
               "lifted from some height on)"
             : "a force that grows along the travel (a spring, a counterbalance or a cable)";
-    note(
-        diagnostics, "term_in_doubt",
-        "the log leaves open whether there is {}: with it kV would be {:.4g} V·s/{} and kS {:.3g} "
-        "V. "
-        "The intervals hold both and are that wide for it; a second log, or tests over more of the "
-        "travel, decide",
-        what, kV, fit.unit, kS);
+    note(diagnostics, "term_in_doubt",
+         "the log leaves open whether there is {}{}: with it kV would be {:.4g} V·s/{}{}{} and kS "
+         "{:.3g} V. The intervals hold both and are that wide for it; {}",
+         what, open.instead ? " instead" : "", kV, fit.unit,
+         of_kA ? detail::format(", kA {:.4g} V·s²/{}", kA, fit.unit) : "",
+         of_kG ? detail::format(", kG {:.3g} V", kG) : "", kS,
+         open.term == parameter::sag || open.term == parameter::drag
+             ? "a log of the voltage at the motor (applied output times bus voltage), or steps of "
+               "another height, decide"
+             : "a second log, or tests over more of the travel, decide");
     return;  // the one that matters most
   }
 }
@@ -148,6 +175,13 @@ void report_terms(const FeedforwardFit& fit, std::vector<Diagnostic>& diagnostic
           "slack between them. The gains are those after it is taken up; a controller should not "
           "count on the load's moving before",
           value, term.unit);
+    } else if (term.name == "asymmetric_friction" && std::abs(value) > fit.kS.value) {
+      warn(diagnostics, "asymmetric_friction",
+           "a constant force of {:.3g} V acts against the motion {} and with it {}: friction that "
+           "differs by direction, a spring of little stiffness or a weight; the gains hold beside "
+           "it",
+           std::abs(value), value > 0.0 ? "forward" : "in reverse",
+           value > 0.0 ? "in reverse" : "forward");
     } else if (term.name == "asymmetric_friction") {
       warn(diagnostics, "asymmetric_friction",
            "friction differs by direction: kS is {:.3g} V forward and {:.3g} V in reverse",
