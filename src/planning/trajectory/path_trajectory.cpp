@@ -1,0 +1,193 @@
+#include <flyball/planning/trajectory/path_trajectory.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <flyball/core/argument.hpp>
+
+#include "core/format.hpp"
+#include "core/try.hpp"
+
+namespace flyball {
+
+namespace {
+
+/// sinh(√c t)/√c and (cosh(√c t) - 1)/c, for any sign of c.
+struct Growth {
+  double S;
+  double C;
+};
+
+Growth growth(double c, double t) noexcept {
+  const double z = c * t * t;
+  if (std::abs(z) < 0.25) {  // z⁷/15! < 1e-16
+    // Σ zᵏ/(2k + 1)! and Σ zᵏ/(2k + 2)!
+    constexpr double s[] = {1.0 / 6.0,      1.0 / 120.0,      1.0 / 5040.0,
+                            1.0 / 362880.0, 1.0 / 39916800.0, 1.0 / 6227020800.0};
+    constexpr double e[] = {0.5,
+                            1.0 / 24.0,
+                            1.0 / 720.0,
+                            1.0 / 40320.0,
+                            1.0 / 3628800.0,
+                            1.0 / 479001600.0,
+                            1.0 / 87178291200.0};
+    const double S =
+        1.0 + z * (s[0] + z * (s[1] + z * (s[2] + z * (s[3] + z * (s[4] + z * s[5])))));
+    const double C =
+        e[0] + z * (e[1] + z * (e[2] + z * (e[3] + z * (e[4] + z * (e[5] + z * e[6])))));
+    return {t * S, t * t * C};
+  }
+  const double root = std::sqrt(std::abs(c));
+  const double half = 0.5 * root * t;
+  if (c > 0.0) {
+    const double s = std::sinh(half);
+    return {2.0 * s * std::cosh(half) / root, 2.0 * s * s / c};
+  }
+  const double s = std::sin(half);
+  return {2.0 * s * std::cos(half) / root, -2.0 * s * s / c};
+}
+
+}  // namespace
+
+PathTrajectory::PathTrajectory(Path path, std::vector<Span> spans,
+                               std::vector<BindingLimit> binding)
+    : path_(std::move(path)), spans_(std::move(spans)), binding_(std::move(binding)) {
+  total_time_ = spans_.back().start + spans_.back().duration;
+  const std::size_t count = 2 * spans_.size();
+  buckets_per_second_ = total_time_ > 0.0 ? static_cast<double>(count) / total_time_ : 0.0;
+  buckets_.resize(count + 1);
+  std::size_t i = 0;
+  for (std::size_t k = 0; k <= count; ++k) {
+    const double t = static_cast<double>(k) / static_cast<double>(count) * total_time_;
+    while (i + 1 < spans_.size() && spans_[i + 1].start <= t) {
+      ++i;
+    }
+    buckets_[k] = i;
+  }
+}
+
+std::size_t PathTrajectory::span_at(double t) const noexcept {
+  const auto bucket =
+      std::min(static_cast<std::size_t>(t * buckets_per_second_), buckets_.size() - 2);
+  // By halves between two buckets' spans: many spans may lie in one bucket.
+  std::size_t low = buckets_[bucket];
+  std::size_t high = buckets_[bucket + 1];
+  while (low < high) {
+    const std::size_t middle = low + (high - low + 1) / 2;
+    if (spans_[middle].start <= t) {
+      low = middle;
+    } else {
+      high = middle - 1;
+    }
+  }
+  return low;
+}
+
+PathSample PathTrajectory::sample(double t) const noexcept {
+  t = t > 0.0 ? std::min(t, total_time_) : 0.0;
+  const Span& span = spans_[span_at(t)];
+  const double dt = std::min(t - span.start, span.duration);
+  const auto [S, C] = growth(span.c, dt);
+  // s'' = u + c s, s(0) = 0, s'(0) = rate
+  const double s = std::clamp(span.rate * S + span.u * C, 0.0, span.width);
+  const double rate = std::max(0.0, span.rate * (1.0 + span.c * C) + span.u * S);
+  const double u = span.u + span.c * s;
+
+  const PathPiece& piece = path_.pieces()[span.piece];
+  const Eigen::Index n = path_.coordinates();
+  const Eigen::Index columns = piece.coefficients.cols();
+  const double* c = piece.coefficients.data();
+  const double per_span = 1.0 / piece.span;
+  const double at = std::min(1.0, (span.parameter + s) * per_span);
+  PathSample sample;
+  sample.time = t;
+  sample.parameter = path_.breaks()[span.piece] + span.parameter + s;
+  sample.rate = rate;
+  sample.position.resize(n);
+  sample.velocity.resize(n);
+  sample.acceleration.resize(n);
+  const double per_time = rate * per_span;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    double q = c[(columns - 1) * n + j];
+    double first = 0.0;
+    double second = 0.0;
+    for (Eigen::Index k = columns - 2; k >= 0; --k) {
+      second = second * at + first;
+      first = first * at + q;
+      q = q * at + c[k * n + j];
+    }
+    sample.position(j) = q;
+    sample.velocity(j) = first * per_time;
+    sample.acceleration(j) = 2.0 * second * per_time * per_time + first * per_span * u;
+  }
+  return sample;
+}
+
+std::vector<double> PathTrajectory::parameters() const {
+  std::vector<double> all;
+  all.reserve(spans_.size() + 1);
+  for (const Span& span : spans_) {
+    all.push_back(path_.breaks()[span.piece] + span.parameter);
+  }
+  all.push_back(path_.parameter_end());
+  return all;
+}
+
+std::vector<double> PathTrajectory::times() const {
+  std::vector<double> all;
+  all.reserve(spans_.size() + 1);
+  for (const Span& span : spans_) {
+    all.push_back(span.start);
+  }
+  all.push_back(total_time_);
+  return all;
+}
+
+Expected<Trajectory> planar_trajectory(const PathTrajectory& trajectory, double step) {
+  constexpr std::string_view where = "planar_trajectory";
+  constexpr double most_points = 1e6;
+  const Path& path = trajectory.path();
+  if (path.coordinates() != 2 && path.coordinates() != 3) {
+    return refusal(ArgumentError::wrong_shape, where, "trajectory")
+        .got(detail::format("of {} coordinates", path.coordinates()))
+        .expected("of two (x, y) or three (x, y, θ)");
+  }
+  FLYBALL_CHECK(check_positive(step, where, "step", "s"));
+  if (trajectory.total_time() / step > most_points) {
+    return refusal(ArgumentError::out_of_range, where, "step")
+        .got(format_number(step) + " s")
+        .expected("one that gives a million points or less");
+  }
+  std::vector<double> times;
+  for (const double t : trajectory.times()) {
+    if (!times.empty()) {
+      const double from = times.back();
+      const auto parts = static_cast<int>(std::ceil((t - from) / step));
+      for (int k = 1; k < parts; ++k) {
+        times.push_back(from + (t - from) * k / parts);
+      }
+      if (!(t > from)) {
+        continue;
+      }
+    }
+    times.push_back(t);
+  }
+  std::vector<TrajectoryPoint> points;
+  points.reserve(times.size());
+  for (const double t : times) {
+    const PathSample sample = trajectory.sample(t);
+    const PathState state = path.at(sample.parameter);
+    const double travel = travel_heading(state);
+    const double heading = path.coordinates() == 3 ? state.position(2) : travel;
+    const double v = sample.velocity.head<2>().norm();
+    const double along =
+        sample.acceleration(0) * std::cos(travel) + sample.acceleration(1) * std::sin(travel);
+    const double bend = planar_curvature(state);
+    points.push_back({t, v, along, Pose2d(state.position(0), state.position(1), heading),
+                      std::isfinite(bend) ? bend : 0.0});
+  }
+  return Trajectory(std::move(points));
+}
+
+}  // namespace flyball

@@ -1,0 +1,359 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <flyball/core/argument.hpp>
+#include <flyball/planning/path/edit_path.hpp>
+#include <flyball/planning/trajectory/path_trajectory.hpp>
+
+#include "core/format.hpp"
+#include "core/try.hpp"
+#include "planning/trajectory/cell_rows.hpp"
+#include "planning/trajectory/motion_limit.hpp"
+#include "planning/trajectory/timing.hpp"
+
+namespace flyball {
+
+namespace {
+
+using detail::Bezier2;
+using detail::CellRows;
+using detail::TimingCell;
+using detail::TimingPasses;
+using detail::TimingRows;
+
+constexpr std::string_view where = "time_optimal";
+/// Intervals of a piece in the first pass.
+constexpr int first_cells = 3;
+/// Into how many one is cut at most, each time.
+constexpr int most_parts = 8;
+constexpr std::size_t most_cells = 200'000;
+
+/// Whether a piece goes anywhere.
+bool moves(const PathPiece& piece) {
+  const Eigen::MatrixXd& c = piece.coefficients;
+  return c.cols() > 1 && c.rightCols(c.cols() - 1).cwiseAbs().maxCoeff() > 0.0;
+}
+
+/// How x goes on from one piece to the next: (|q'-|/|q'+|)², 0 at a corner.
+double join_of(const Path& path, std::size_t piece, std::size_t next) {
+  const PathVector before = path.at(piece, 1.0).first;
+  const PathVector after = path.at(next, 0.0).first;
+  const double v = before.norm();
+  const double w = after.norm();
+  if (!(v > 0.0) || !(w > 0.0)) {
+    return 0.0;
+  }
+  if ((before / v - after / w).norm() > corner_angle) {
+    return 0.0;
+  }
+  const double ratio = v / w;
+  return std::abs(ratio - 1.0) < 1e-9 ? 1.0 : ratio * ratio;
+}
+
+/// The intervals of the first pass.
+std::vector<TimingCell> coarse_cells(const Path& path,
+                                     const std::vector<std::vector<double>>& cuts) {
+  std::vector<TimingCell> cells;
+  cells.reserve(path.pieces().size() * first_cells);
+  for (std::size_t i = 0; i < path.pieces().size(); ++i) {
+    const PathPiece& piece = path.pieces()[i];
+    if (!moves(piece)) {
+      continue;
+    }
+    double from = 0.0;
+    const std::size_t parts = cuts.empty() ? 1 : cuts[i].size() + 1;
+    for (std::size_t k = 0; k < parts; ++k) {
+      const double to = k + 1 < parts ? cuts[i][k] : 1.0;
+      for (int m = 0; m < first_cells; ++m) {
+        const double a = from + (to - from) * m / first_cells;
+        const double b = m + 1 == first_cells ? to : from + (to - from) * (m + 1) / first_cells;
+        cells.push_back({i, a, b, (b - a) * piece.span, 1.0});
+      }
+      from = to;
+    }
+    std::size_t next = i + 1;
+    while (next < path.pieces().size() && !moves(path.pieces()[next])) {
+      ++next;
+    }
+    if (next < path.pieces().size()) {
+      cells.back().join = join_of(path, i, next);
+    }
+  }
+  return cells;
+}
+
+double total_time(const std::vector<TimingCell>& cells, const std::vector<Bezier2>& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    sum += detail::cell_duration(b[i], cells[i].width);
+  }
+  return sum;
+}
+
+/// What each interval costs: its time times the share of the limits that it leaves. Where x is
+/// smallest that share slows down the way to it and from it, too.
+std::vector<double> losses(const std::vector<TimingCell>& cells, const std::vector<Bezier2>& b,
+                           const CellRows& limits, const TimingRows& rows) {
+  const std::size_t n = cells.size();
+  std::vector<double> left(n);
+  std::vector<double> time(n);
+  std::vector<double> loss(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const CellRows::Use use = limits.use(cells, i, b[i], rows);
+    double sum = 0.0;
+    for (const double at : use.at) {
+      sum += std::min(at, 1.0);
+    }
+    left[i] = 1.0 - 0.25 * sum;
+    time[i] = detail::cell_duration(b[i], cells[i].width);
+    loss[i] = left[i] * time[i];
+  }
+  for (std::size_t i = 1; i < n; ++i) {
+    const double x = b[i][0];
+    if (!(x < b[i - 1][0] && x <= b[i][2])) {
+      continue;
+    }
+    double weight = 0.0;
+    for (std::size_t k = i; k < n && b[k][2] >= b[k][0]; ++k) {
+      weight += time[k] * x / b[k][2];
+    }
+    for (std::size_t k = i; k-- > 0 && b[k][0] >= b[k][2];) {
+      weight += time[k] * x / b[k][0];
+    }
+    for (std::size_t k = i > 1 ? i - 2 : 0; k < std::min(n, i + 2); ++k) {
+      const double share = k == i || k + 1 == i ? 2.0 : 1.0;
+      loss[k] = std::max(loss[k], share * left[k] * weight);
+    }
+  }
+  return loss;
+}
+
+std::vector<TimingCell> refined(const std::vector<TimingCell>& cells,
+                                const std::vector<double>& loss, double allowed) {
+  std::vector<TimingCell> finer;
+  finer.reserve(4 * cells.size());
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const auto parts = static_cast<int>(
+        std::min<double>(most_parts, 1.0 + std::floor(std::sqrt(loss[i] / allowed))));
+    const TimingCell& cell = cells[i];
+    for (int m = 0; m < parts; ++m) {
+      TimingCell part = cell;
+      part.from = cell.from + (cell.to - cell.from) * m / parts;
+      part.to = m + 1 == parts ? cell.to : cell.from + (cell.to - cell.from) * (m + 1) / parts;
+      part.width = cell.width / parts;
+      part.join = m + 1 == parts ? cell.join : 1.0;
+      finer.push_back(part);
+    }
+  }
+  return finer;
+}
+
+/// How far a coordinate goes back and forth, at most.
+double travel_of(const Path& path, Eigen::Index j) {
+  double sum = 0.0;
+  for (const PathPiece& piece : path.pieces()) {  // |∫ q'| <= Σ |c_k| over t in [0, 1]
+    const Eigen::MatrixXd& c = piece.coefficients;
+    sum += c.row(j)
+               .tail(c.cols() - 1)
+               .cwiseAbs()
+               .dot(Eigen::RowVectorXd::LinSpaced(c.cols() - 1, 1.0,
+                                                  static_cast<double>(c.cols() - 1)));
+  }
+  return sum;
+}
+
+/// Where only accelerations are limited, the velocity that they reach over the path is a limit,
+/// too, which never binds: v² = v_0² + 2 a · travel, times 1.0001.
+std::vector<PathConstraint> with_reachable_velocity(const Path& path,
+                                                    std::span<const PathConstraint> constraints,
+                                                    const TimingOptions& options) {
+  const double start = std::max(options.start_velocity, options.end_velocity);
+  const auto reached = [&](double acceleration, double travel) {
+    return 1.0001 * std::sqrt(start * start + 2.0 * acceleration * travel);
+  };
+  std::vector<PathConstraint> all(constraints.begin(), constraints.end());
+  for (PathConstraint& constraint : all) {
+    if (auto* of = std::get_if<CoordinateLimits>(&constraint);
+        of != nullptr && of->acceleration.size() == path.coordinates()) {
+      if (of->velocity.size() == 0) {
+        of->velocity = Eigen::VectorXd::Constant(path.coordinates(), TravelLimits::none);
+      }
+      for (Eigen::Index j = 0; j < std::min(of->velocity.size(), of->acceleration.size()); ++j) {
+        const double travel = travel_of(path, j);
+        if (std::isinf(of->velocity(j)) && of->acceleration(j) > 0.0 && travel > 0.0) {
+          of->velocity(j) = reached(of->acceleration(j), travel);
+        }
+      }
+    } else if (auto* travel = std::get_if<TravelLimits>(&constraint);
+               travel != nullptr && std::isinf(travel->velocity) && travel->acceleration > 0.0 &&
+               path.coordinates() >= 2) {
+      travel->velocity = reached(travel->acceleration, travel_of(path, 0) + travel_of(path, 1));
+    }
+  }
+  return all;
+}
+
+/// What bound in each interval, neighbours of one limit together.
+std::vector<BindingLimit> bindings(const Path& path, const std::vector<TimingCell>& cells,
+                                   const std::vector<Bezier2>& b, const CellRows& limits,
+                                   const TimingRows& rows) {
+  std::vector<BindingLimit> all;
+  int before = -1;
+  double t = 0.0;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const TimingCell& cell = cells[i];
+    const CellRows::Use use = limits.use(cells, i, b[i], rows);
+    const double duration = detail::cell_duration(b[i], cell.width);
+    const double span = path.pieces()[cell.piece].span;
+    const double from = path.breaks()[cell.piece] + cell.from * span;
+    if (use.limit != before) {
+      all.push_back({from, from, t, t, limits.name(use.limit), 0.0});
+      before = use.limit;
+    }
+    BindingLimit& last = all.back();
+    last.use += duration * std::min(1.0, use.mean);
+    t += duration;
+    last.to = cell.to == 1.0 ? path.breaks()[cell.piece + 1] : from + cell.width;
+    last.end = t;
+  }
+  for (BindingLimit& limit : all) {
+    limit.use /= limit.end - limit.start;
+  }
+  return all;
+}
+
+/// x at an end of the path for a velocity there.
+double end_rate(const Path& path, double parameter, double velocity) {
+  const double rate = velocity > 0.0 ? velocity / path.at(parameter).first.norm() : 0.0;
+  return rate * rate;
+}
+
+/// @errors ArgumentError::out_of_range where nothing limits the velocity.
+Expected<void> check_limited(const Path& path, const std::vector<TimingCell>& cells,
+                             const TimingRows& rows) {
+  constexpr double unlimited = 1e200;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (!(rows.idle[i] < unlimited)) {
+      const double span = path.pieces()[cells[i].piece].span;
+      const double from = path.breaks()[cells[i].piece] + cells[i].from * span;
+      return refusal(ArgumentError::out_of_range, where, "constraints")
+          .got(detail::format("none on the velocity from parameter {:.4g} to {:.4g}", from,
+                              from + cells[i].width))
+          .expected("a limit of each motion of the path")
+          .hint("limit the velocity of all that moves there");
+    }
+  }
+  return {};
+}
+
+Refusal end_refusal(std::string_view name, double wanted, double possible) {
+  return refusal(ArgumentError::out_of_range, where, name)
+      .got(format_number(wanted))
+      .expected("at most " + format_number(possible) + " under the limits")
+      .hint("lower it, or raise the limits");
+}
+
+}  // namespace
+
+Expected<PathTrajectory> time_optimal(const Path& path, std::span<const PathConstraint> constraints,
+                                      const TimingOptions& options) {
+  FLYBALL_CHECK(Checks(where)
+                    .not_negative(options.start_velocity, "start velocity")
+                    .not_negative(options.end_velocity, "end velocity")
+                    .within(options.tolerance, 1e-6, 0.1, "tolerance"));
+  if (constraints.empty()) {
+    return refusal(ArgumentError::empty, where, "constraints").expected("one or more");
+  }
+  const std::vector<PathConstraint> bounded = with_reachable_velocity(path, constraints, options);
+  FLYBALL_TRY(auto limits, detail::motion_limits(path, bounded, where));
+  bool cubic = bounded.size() == 1 && std::holds_alternative<CoordinateLimits>(bounded[0]);
+  for (const PathPiece& piece : path.pieces()) {
+    cubic = cubic && piece.coefficients.cols() <= 4;
+  }
+  std::vector<std::vector<double>> cuts;
+  for (const auto& limit : limits) {
+    std::vector<double> t;
+    for (std::size_t i = 0; i < path.pieces().size(); ++i) {
+      t.clear();
+      limit->jumps(path.pieces()[i], t);
+      if (!t.empty()) {
+        cuts.resize(path.pieces().size());
+        cuts[i].insert(cuts[i].end(), t.begin(), t.end());
+      }
+    }
+  }
+  for (auto& at : cuts) {
+    std::sort(at.begin(), at.end());
+    double before = 0.0;
+    std::erase_if(at, [&](double t) {
+      const bool near = t - before < 1e-9 || t > 1.0 - 1e-9;
+      before = near ? before : t;
+      return near;
+    });
+  }
+  const std::unique_ptr<CellRows> making =
+      cubic ? detail::cubic_rows(path, std::get<CoordinateLimits>(bounded[0]))
+            : detail::collocated_rows(path, std::move(limits));
+
+  const double first = end_rate(path, 0.0, options.start_velocity);
+  const double last = end_rate(path, path.parameter_end(), options.end_velocity);
+  TimingRows rows;
+  TimingPasses passes;
+  std::vector<TimingCell> cells = coarse_cells(path, cuts);
+  constexpr int most_attempts = 20;
+  const auto solve = [&]() -> Expected<void> {
+    making->fill(cells, rows);
+    FLYBALL_CHECK(check_limited(path, cells, rows));
+    bool within = false;
+    for (int attempt = 0; attempt < most_attempts && !within; ++attempt) {
+      detail::pass_back(cells, rows, last, passes);
+      detail::pass_forward(cells, rows, first, passes);
+      within = making->verify(cells, passes.b, rows);
+    }
+    if (!within) {
+      return refusal(ArgumentError::out_of_range, where, "constraints")
+          .got("limits that jump along the path")
+          .expected("limits that a motion can keep to")
+          .hint("smooth the path, or raise the limits");
+    }
+    return {};
+  };
+  FLYBALL_CHECK(solve());
+  const std::vector<double> loss = losses(cells, passes.b, *making, rows);
+  const double allowed =
+      options.tolerance * total_time(cells, passes.b) / static_cast<double>(cells.size());
+  cells = refined(cells, loss, allowed);
+  FLYBALL_CHECK(solve());
+  constexpr double rounding = 1.0 + 1e-9;
+  if (first > passes.highest.front() * rounding) {
+    return end_refusal("start velocity", options.start_velocity,
+                       options.start_velocity * std::sqrt(passes.highest.front() / first));
+  }
+  if (last > passes.b.back()[2] * rounding) {
+    return end_refusal("end velocity", options.end_velocity,
+                       options.end_velocity * std::sqrt(passes.b.back()[2] / last));
+  }
+
+  std::vector<PathTrajectory::Span> spans;
+  spans.reserve(cells.size());
+  double t = 0.0;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const Bezier2& b = passes.b[i];
+    const TimingCell& cell = cells[i];
+    const double duration = detail::cell_duration(b, cell.width);
+    spans.push_back({t, duration, cell.from * path.pieces()[cell.piece].span, cell.width,
+                     std::sqrt(b[0]), (b[1] - b[0]) / cell.width,
+                     (b[0] - 2.0 * b[1] + b[2]) / (cell.width * cell.width), cell.piece});
+    t += duration;
+    if (!std::isfinite(t)) {
+      return refusal(ArgumentError::out_of_range, where, "constraints")
+          .got("limits that let nothing move")
+          .expected("limits that a motion can keep to")
+          .with("parameter", path.breaks()[cell.piece] + spans.back().parameter);
+    }
+  }
+  return PathTrajectory(path, std::move(spans), bindings(path, cells, passes.b, *making, rows));
+}
+
+}  // namespace flyball

@@ -1,0 +1,95 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "planning/trajectory/timing.hpp"
+
+namespace flyball::detail {
+
+void TimingRows::resize(std::size_t cells, int rows_of_cell, int uppers_of_cell) {
+  count = rows_of_cell;
+  uppers = uppers_of_cell;
+  upper.resize(3 * cells * static_cast<std::size_t>(uppers));
+  idle.resize(cells);
+  const std::size_t all = cells * static_cast<std::size_t>(count);
+  alpha.resize(all);
+  beta.resize(all);
+  gamma.resize(all);
+  cap.resize(cells);
+  capped_by.resize(cells);
+}
+
+IntervalProgram TimingRows::program(std::size_t cell) const noexcept {
+  const std::size_t from = cell * static_cast<std::size_t>(count);
+  return {alpha.data() + from,
+          beta.data() + from,
+          gamma.data() + from,
+          delta.empty() ? nullptr : delta.data() + from,
+          count,
+          margin.empty() ? 1.0 : margin[cell],
+          cap[cell],
+          upper.data() + 3 * cell * static_cast<std::size_t>(uppers),
+          uppers,
+          idle[cell]};
+}
+
+void pass_back(const std::vector<TimingCell>& cells, const TimingRows& rows, double last,
+               TimingPasses& passes) {
+  const std::size_t n = cells.size();
+  passes.highest.resize(n + 1);
+  passes.witness.resize(n);
+  passes.highest[n] = last;
+  for (std::size_t i = n; i-- > 0;) {
+    double most = last;
+    if (i + 1 < n) {
+      most = cells[i].join > 0.0 ? passes.highest[i + 1] / cells[i].join : 0.0;
+    }
+    passes.witness[i] = largest_first(rows.program(i), most);
+    passes.highest[i] = passes.witness[i][0];
+  }
+}
+
+void pass_forward(const std::vector<TimingCell>& cells, const TimingRows& rows, double first,
+                  TimingPasses& passes) {
+  const std::size_t n = cells.size();
+  passes.b.resize(n);
+  double x = first;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Bezier2& from = passes.witness[i];
+    Bezier2 inside = from;
+    if (x < from[0]) {
+      const double share = x / from[0];
+      inside = {x, share * from[1], share * from[2]};
+    }
+    double most = passes.highest[n];
+    if (i + 1 < n) {
+      most = cells[i].join > 0.0 ? passes.highest[i + 1] / cells[i].join : 0.0;
+    }
+    passes.b[i] = largest_last(rows.program(i), most, inside);
+    x = passes.b[i][2] * cells[i].join;
+  }
+}
+
+double cell_duration(const Bezier2& b, double width) noexcept {
+  const double sum = std::sqrt(b[0]) + std::sqrt(b[2]);
+  const double bend = b[0] - 2.0 * b[1] + b[2];  // c w²
+  if (!(sum > 0.0)) {                            // from rest to rest: half a period
+    return bend < 0.0 ? std::numbers::pi * width / std::sqrt(-bend)
+                      : std::numeric_limits<double>::infinity();
+  }
+  const double z = bend / (sum * sum);
+  const double straight = 2.0 * width / sum;
+  if (std::abs(z) < 0.02) {
+    return straight *
+           (1.0 +
+            z * (1.0 / 3.0 +
+                 z * (0.2 + z * (1.0 / 7.0 +
+                                 z * (1.0 / 9.0 +
+                                      z * (1.0 / 11.0 + z * (1.0 / 13.0 + z * (1.0 / 15.0))))))));
+  }
+  const double root = std::sqrt(std::abs(z));
+  return straight * (z > 0.0 ? std::atanh(root) : std::atan(root)) / root;
+}
+
+}  // namespace flyball::detail
