@@ -1,0 +1,20 @@
+#include "optimization/mpc/stage_qp.hpp"
+
+// For processors with 512-bit vectors and fused multiply-add, which stage_qp_solver.cpp asks for
+// when running. Only functions of this variant's namespace are compiled for them.
+#ifdef FLYBALL_WIDE_VECTORS
+#define FLYBALL_VARIANT widest
+#ifdef __clang__
+#pragma clang attribute push(__attribute__((target("avx512f,avx512dq,avx512vl,avx2,fma"))), \
+                             apply_to = function)
+#else
+#pragma GCC push_options
+#pragma GCC target("avx512f,avx512dq,avx512vl,avx2,fma")
+#endif
+#include "optimization/mpc/stage_qp_kernel_body.hpp"
+#ifdef __clang__
+#pragma clang attribute pop
+#else
+#pragma GCC pop_options
+#endif
+#endif
