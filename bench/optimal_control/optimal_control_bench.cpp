@@ -1,124 +1,18 @@
-// Problems along stages, each from nothing: model, derivatives, memory, solution. Times are of the
-// process, the smallest of several.
+// Problems along stages and starts that are disturbed.
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <ctime>
 
-#include <flyball/optimization/ocp/optimal_control.hpp>
-#include <flyball/optimization/problem/problem.hpp>
-
-#include "optimization/cart_pole.hpp"
+#include "problems.hpp"
 
 namespace {
 
+using namespace problems;
 using namespace flyball::optimization;
-
-double process_milliseconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
-}
-
-struct Row {
-  double milliseconds = 1e300;
-  double again = 1e300;  // solved again from what was found
-  int iterations = 0;
-  double cost = 0.0;
-  bool solved = false;
-};
-
-/// @param problem  Makes and solves it. @param repetitions  Of which the quickest counts.
-template <class Make>
-Row measure(int repetitions, Make&& make) {
-  Row row;
-  for (int k = 0; k < repetitions; ++k) {
-    make(row);
-  }
-  return row;
-}
 
 void print(const char* name, int N, const Row& row) {
   std::printf("| %s | %d | %.2f | %d | %.2f | %.9g |%s\n", name, N, row.milliseconds,
               row.iterations, row.again, row.cost, row.solved ? "" : " not solved");
-}
-
-template <class Solution>
-void keep(Row& row, double milliseconds, double again, const Solution& solution) {
-  row.milliseconds = std::min(row.milliseconds, milliseconds);
-  row.again = std::min(row.again, again);
-  row.iterations = solution.counts.iterations;
-  row.cost = solution.cost;
-  row.solved = solution.solved();
-}
-
-void swing_up(int N) {
-  print("cart-pole", N, measure(N > 1000 ? 3 : 7, [&](Row& row) {
-          const double begin = process_milliseconds();
-          OptimalControlProblem problem = cart_pole::problem(N);
-          problem.set_start(cart_pole::start(N), Eigen::MatrixXd::Zero(1, N));
-          auto solver = OptimalControlSolver::make(problem).value();
-          const OptimalControlSolution solution = solver.solve();
-          const double middle = process_milliseconds();
-          (void)solver.resolve();
-          keep(row, middle - begin, process_milliseconds() - middle, solution);
-        }));
-}
-
-void flywheel(int N) {
-  print("flywheel", N, measure(9, [&](Row& row) {
-          const double begin = process_milliseconds();
-          Problem problem;
-          const ExpressionMatrix X = problem.decision_variable(1, N + 1);
-          const ExpressionMatrix U = problem.decision_variable(1, N);
-          const double a = std::exp(-5.0 / N);
-          for (int k = 0; k < N; ++k) {
-            problem.subject_to(X(0, k + 1) == a * X(0, k) + (1.0 - a) * U(0, k));
-          }
-          problem.subject_to(X(0, 0) == 0.0);
-          problem.subject_to(-12.0 <= U);
-          problem.subject_to(U <= 12.0);
-          Expression J = 0.0;
-          for (int k = 0; k <= N; ++k) {
-            J += pow(10.0 - X(0, k), 2);
-          }
-          problem.minimize(J);
-          const ProblemSolution solution = problem.solve().value();
-          const double middle = process_milliseconds();
-          (void)problem.solve();
-          keep(row, middle - begin, process_milliseconds() - middle, solution);
-        }));
-}
-
-void double_integrator(int N) {
-  print("double integrator", N, measure(9, [&](Row& row) {
-          const double begin = process_milliseconds();
-          Problem problem;
-          const ExpressionMatrix X = problem.decision_variable(2, N + 1);
-          const ExpressionMatrix U = problem.decision_variable(1, N);
-          const double h = 3.5 / N;
-          for (int k = 0; k < N; ++k) {
-            problem.subject_to(X(0, k + 1) == X(0, k) + h * X(1, k) + 0.5 * h * h * U(0, k));
-            problem.subject_to(X(1, k + 1) == X(1, k) + h * U(0, k));
-          }
-          problem.subject_to(X.col(0) == Eigen::Vector2d(0.0, 0.0));
-          problem.subject_to(X.col(N) == Eigen::Vector2d(2.0, 0.0));
-          problem.subject_to(-1.0 <= X.row(1));
-          problem.subject_to(X.row(1) <= 1.0);
-          problem.subject_to(-1.0 <= U);
-          problem.subject_to(U <= 1.0);
-          Expression J = 0.0;
-          for (int k = 0; k <= N; ++k) {
-            J += pow(2.0 - X(0, k), 2);
-          }
-          problem.minimize(J);
-          const ProblemSolution solution = problem.solve().value();
-          const double middle = process_milliseconds();
-          (void)problem.solve();
-          keep(row, middle - begin, process_milliseconds() - middle, solution);
-        }));
 }
 
 /// Starts with noise in every entry: how many of 96 are solved.
@@ -155,12 +49,12 @@ void disturbed(int N, double amplitude) {
 int main() {
   std::printf("| problem | N | ms | iterations | again, ms | cost |\n|---|---|---|---|---|---|\n");
   for (const int N : {100, 300, 1000, 3000}) {
-    swing_up(N);
+    print("cart-pole", N, swing_up(N));
   }
   for (const int N : {100, 300, 1000, 3000}) {
-    flywheel(N);
+    print("flywheel", N, flywheel(N));
   }
-  double_integrator(700);
+  print("double integrator", 700, double_integrator(700));
   for (const double amplitude : {0.1, 0.3}) {
     for (const int N : {100, 300, 1000}) {
       disturbed(N, amplitude);
