@@ -382,6 +382,7 @@ TEST(ContinuousProblem, SaysWhatCannotBeDone) {
   ASSERT_FALSE(s.violations.empty());
   EXPECT_GT(s.violations[0].amount, 1e-4);
   EXPECT_NE(s.message.find("infeasible"), std::string::npos) << s.message;
+  EXPECT_NE(s.message.find(" s)"), std::string::npos) << s.message;  // when
   // A root of what turns negative.
   problem.set_derivative([](const auto& x, const auto& u) {
     return std::array<Expression, 2>{x(1), u(0) + sqrt(-1.0 - x(0) * x(0))};

@@ -155,6 +155,19 @@ bool divide(std::vector<VectorXd>& widths, const std::vector<PhaseTrajectory>& p
   return any;
 }
 
+/// " (phase 1, 0.35 s)" of a stage.
+std::string place_of(const TranscriptionLayout& layout, const std::vector<PhaseTrajectory>& phases,
+                     int stage) {
+  std::size_t i = 0;
+  while (i + 1 < phases.size() && stage >= layout.first[i + 1]) {
+    ++i;
+  }
+  const VectorXd& times = phases[i].times;
+  const double t = times(std::clamp<Index>(stage - layout.first[i], 0, times.size() - 1));
+  return phases.size() > 1 ? fmt::format(" (phase {}, {} s)", i, format_number(t, 4))
+                           : fmt::format(" ({} s)", format_number(t, 4));
+}
+
 Expected<void> check(const ContinuousData& data, const TranscriptionOptions& options) {
   if (data.error) {
     return tl::unexpected(*data.error);
@@ -306,6 +319,9 @@ Expected<ContinuousSolution> solve(const ContinuousProblem& problem,
     result.status = found.status;
     result.violations = found.violations;
     result.message = found.message;
+    if (!found.violations.empty()) {
+      result.message += place_of(layout, result.phases, found.violations.front().stage);
+    }
     result.counts.iterations += found.counts.iterations;
     result.counts.restorations += found.counts.restorations;
     result.counts.factorizations += found.counts.factorizations;
