@@ -54,6 +54,10 @@ namespace flyball::book {
 [[nodiscard]] FigureResult figure_12_2();
 [[nodiscard]] FigureResult figure_15_1();
 [[nodiscard]] FigureResult figure_15_2();
+[[nodiscard]] FigureResult figure_16_1();
+[[nodiscard]] FigureResult figure_16_2();
+[[nodiscard]] FigureResult figure_16_3();
+[[nodiscard]] FigureResult figure_16_4();
 [[nodiscard]] FigureResult figure_17_1();
 [[nodiscard]] FigureResult figure_17_2();
 [[nodiscard]] FigureResult figure_17_3();

@@ -30,6 +30,7 @@ void add_book_command(CLI::App& program, Invocation& invocation);
 void add_loop_commands(CLI::App& program, Invocation& invocation);
 void add_path_command(CLI::App& program, Invocation& invocation);
 void add_states_command(CLI::App& program, Invocation& invocation);
+void add_plan_command(CLI::App& program, Invocation& invocation);
 void add_profile_command(CLI::App& program, Invocation& invocation);
 void add_analyze_command(CLI::App& program, Invocation& invocation);
 void add_units_command(CLI::App& program, Invocation& invocation);

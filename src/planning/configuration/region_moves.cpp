@@ -276,6 +276,75 @@ double first_exit(const SpaceModel& model, const SpaceConstraint& constraint, co
   return in.front().second >= 1.0 ? none : in.front().second;
 }
 
+std::shared_ptr<const RegionNode> beyond_stops(const SpaceModel& model,
+                                               const std::shared_ptr<const RegionNode>& node) {
+  RegionNode to = *node;
+  // The stops as they were before a buffer was taken off.
+  struct Stops {
+    double low, high, range;
+    bool there;
+  };
+  const auto stops = [&](int coordinate) {
+    const auto k = static_cast<std::size_t>(coordinate);
+    const SpaceAxis& axis = model.axes[k];
+    const double low = axis.low - model.buffer[k];
+    const double high = axis.high + model.buffer[k];
+    return Stops{low, high, high - low, !axis.wraps};
+  };
+  switch (node->kind) {
+    case Kind::everything:
+    case Kind::half_space:
+      break;
+    case Kind::interval:
+      if (const Stops at = stops(to.coordinate); at.there) {
+        constexpr double infinite = std::numeric_limits<double>::infinity();
+        to.low = to.low <= at.low + touch * at.range ? -infinite : to.low;
+        to.high = to.high >= at.high - touch * at.range ? infinite : to.high;
+      }
+      break;
+    case Kind::polygon: {
+      std::vector<Point> vertices = tidy(to.vertices);
+      for (std::size_t k = 0; k < 2; ++k) {
+        const Stops at = stops(k == 0 ? to.coordinate : to.up);
+        if (!at.there) {
+          continue;
+        }
+        for (const bool up : {false, true}) {
+          const double stop = up ? at.high : at.low;
+          const double out = up ? at.high + at.range : at.low - at.range;
+          std::vector<Point> all;
+          for (std::size_t i = 0; i < vertices.size(); ++i) {
+            const Point& a = vertices[i];
+            const Point& b = vertices[(i + 1) % vertices.size()];
+            all.push_back(a);
+            if (std::abs(a[k] - stop) <= touch * at.range &&
+                std::abs(b[k] - stop) <= touch * at.range) {
+              Point a_out = a;
+              Point b_out = b;
+              a_out[k] = out;
+              b_out[k] = out;
+              all.push_back(a_out);
+              all.push_back(b_out);
+            }
+          }
+          vertices = std::move(all);
+        }
+      }
+      to.vertices = std::move(vertices);
+      break;
+    }
+    case Kind::both:
+    case Kind::either:
+      to.a = beyond_stops(model, node->a);
+      to.b = beyond_stops(model, node->b);
+      break;
+    case Kind::complement:
+      to.a = beyond_stops(model, node->a);
+      break;
+  }
+  return make(std::move(to));
+}
+
 std::shared_ptr<const RegionNode> offset_region(const std::shared_ptr<const RegionNode>& node,
                                                 const std::vector<double>& error, bool grow) {
   RegionNode to = *node;

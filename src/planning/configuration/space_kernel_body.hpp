@@ -13,8 +13,43 @@ using Real = double;
 using Mask = bool;
 #else
 using Number = float;
+#if defined(FLYBALL_WIDE_LANES) || !defined(__SSE2__)
 typedef float Real __attribute__((vector_size(32)));
 typedef int Mask __attribute__((vector_size(32)));
+#else
+// Halves, since compilers take vectors that the processor does not have apart lane by lane.
+typedef float Half __attribute__((vector_size(16)));
+typedef int HalfMask __attribute__((vector_size(16)));
+struct Mask {
+  HalfMask a, b;
+};
+struct Real {
+  Half a, b;
+  float operator[](int i) const { return i < 4 ? a[i] : b[i - 4]; }
+};
+#define FLYBALL_HALVES(type, op)                                          \
+  [[gnu::always_inline]] static inline type operator op(type x, type y) { \
+    return {x.a op y.a, x.b op y.b};                                      \
+  }
+#define FLYBALL_COMPARE(op)                                               \
+  [[gnu::always_inline]] static inline Mask operator op(Real x, Real y) { \
+    return {x.a op y.a, x.b op y.b};                                      \
+  }
+FLYBALL_HALVES(Real, +)
+FLYBALL_HALVES(Real, -)
+FLYBALL_HALVES(Real, *)
+FLYBALL_HALVES(Real, /)
+FLYBALL_HALVES(Mask, ^)
+FLYBALL_COMPARE(<)
+FLYBALL_COMPARE(>)
+FLYBALL_COMPARE(>=)
+#undef FLYBALL_HALVES
+#undef FLYBALL_COMPARE
+[[gnu::always_inline]] static inline Real operator-(Real x) {
+  return {-x.a, -x.b};
+}
+#define FLYBALL_HALF_LANES
+#endif
 #endif
 
 #define FLYBALL_LANE [[gnu::always_inline]] static inline
@@ -40,20 +75,73 @@ FLYBALL_LANE void sine_cosine(Real x, Real& s, Real& c) {
   c = __builtin_cos(x);
 }
 #else
+#if defined(FLYBALL_HALF_LANES)
+FLYBALL_LANE Real splat(Number x) {
+  return {Half{x, x, x, x}, Half{x, x, x, x}};
+}
+FLYBALL_LANE Real choose(Mask mask, Real a, Real b) {
+  return {mask.a ? a.a : b.a, mask.b ? a.b : b.b};
+}
+FLYBALL_LANE Mask choose(Mask mask, Mask a, Mask b) {
+  return {mask.a ? a.a : b.a, mask.b ? a.b : b.b};
+}
+FLYBALL_LANE Real root(Real x) {
+  return {reinterpret_cast<Half>(_mm_sqrt_ps(reinterpret_cast<__m128>(x.a))),
+          reinterpret_cast<Half>(_mm_sqrt_ps(reinterpret_cast<__m128>(x.b)))};
+}
+FLYBALL_LANE bool any_negative(Real x) {
+  return (_mm_movemask_ps(reinterpret_cast<__m128>(x.a)) |
+          _mm_movemask_ps(reinterpret_cast<__m128>(x.b))) != 0;
+}
+FLYBALL_LANE Mask bits(Real x) {
+  return {reinterpret_cast<HalfMask>(x.a), reinterpret_cast<HalfMask>(x.b)};
+}
+FLYBALL_LANE Real from_bits(Mask x) {
+  return {reinterpret_cast<Half>(x.a), reinterpret_cast<Half>(x.b)};
+}
+FLYBALL_LANE Mask has_bit(Mask x, int bit) {
+  return {(x.a & bit) != 0, (x.b & bit) != 0};
+}
+FLYBALL_LANE Mask bit_as_sign(Mask x, int add) {
+  return {((x.a + add) & 2) << 30, ((x.b + add) & 2) << 30};
+}
+FLYBALL_LANE Mask count_from(int i) {
+  return {HalfMask{i, i + 1, i + 2, i + 3}, HalfMask{i + 4, i + 5, i + 6, i + 7}};
+}
+FLYBALL_LANE int lane(Mask x, int i) {
+  return i < 4 ? x.a[i] : x.b[i - 4];
+}
+#else
 FLYBALL_LANE Real splat(Number x) {
   return Real{x, x, x, x, x, x, x, x};
 }
 FLYBALL_LANE Real choose(Mask mask, Real a, Real b) {
   return mask ? a : b;
 }
+FLYBALL_LANE Mask choose(Mask mask, Mask a, Mask b) {
+  return mask ? a : b;
+}
+FLYBALL_LANE Mask bits(Real x) {
+  return reinterpret_cast<Mask>(x);
+}
+FLYBALL_LANE Real from_bits(Mask x) {
+  return reinterpret_cast<Real>(x);
+}
+FLYBALL_LANE Mask has_bit(Mask x, int bit) {
+  return (x & bit) != 0;
+}
+FLYBALL_LANE Mask bit_as_sign(Mask x, int add) {
+  return ((x + add) & 2) << 30;
+}
+FLYBALL_LANE Mask count_from(int i) {
+  return Mask{i, i + 1, i + 2, i + 3, i + 4, i + 5, i + 6, i + 7};
+}
+FLYBALL_LANE int lane(Mask x, int i) {
+  return x[i];
+}
 FLYBALL_LANE Real root(Real x) {
 #if defined(FLYBALL_WIDE_LANES)
   return reinterpret_cast<Real>(_mm256_sqrt_ps(reinterpret_cast<__m256>(x)));
-#elif defined(__SSE2__)
-  typedef float Half __attribute__((vector_size(16)));
-  const Half low = reinterpret_cast<Half>(_mm_sqrt_ps(_mm_set_ps(x[3], x[2], x[1], x[0])));
-  const Half high = reinterpret_cast<Half>(_mm_sqrt_ps(_mm_set_ps(x[7], x[6], x[5], x[4])));
-  return Real{low[0], low[1], low[2], low[3], high[0], high[1], high[2], high[3]};
 #else
   Real y = x;
   for (int i = 0; i < lanes; ++i) {
@@ -65,9 +153,6 @@ FLYBALL_LANE Real root(Real x) {
 FLYBALL_LANE bool any_negative(Real x) {
 #if defined(FLYBALL_WIDE_LANES)
   return _mm256_movemask_ps(reinterpret_cast<__m256>(x)) != 0;
-#elif defined(__SSE2__)
-  return (_mm_movemask_ps(_mm_set_ps(x[3], x[2], x[1], x[0])) |
-          _mm_movemask_ps(_mm_set_ps(x[7], x[6], x[5], x[4]))) != 0;
 #else
   bool any = false;
   for (int i = 0; i < lanes; ++i) {
@@ -76,6 +161,7 @@ FLYBALL_LANE bool any_negative(Real x) {
   return any;
 #endif
 }
+#endif
 /// To the nearest whole number, of numbers far below 2^22.
 FLYBALL_LANE Real round_off(Real x) {
   const Real magic = splat(12582912.0F);
@@ -86,7 +172,7 @@ FLYBALL_LANE Real round_off(Real x) {
 FLYBALL_LANE void sine_cosine(Real x, Real& s, Real& c) {
   const Real magic = splat(12582912.0F);
   const Real biased = x * splat(0.636619772F) + magic;
-  const Mask quadrant = reinterpret_cast<Mask>(biased);
+  const Mask quadrant = bits(biased);
   const Real k = biased - magic;
   Real r = x - k * splat(1.5703125F);
   r = r - k * splat(4.83751296997e-4F);
@@ -99,13 +185,11 @@ FLYBALL_LANE void sine_cosine(Real x, Real& s, Real& c) {
                       r2 * r2 *
                           (splat(4.166664568298827e-2F) + r2 * (splat(-1.388731625493765e-3F) +
                                                                 r2 * splat(2.443315711809948e-5F)));
-  const Mask odd = (quadrant & 1) != 0;
+  const Mask odd = has_bit(quadrant, 1);
   const Real a = choose(odd, cosine, sine);
   const Real b = choose(odd, sine, cosine);
-  const Mask sine_sign = (quadrant & 2) << 30;
-  const Mask cosine_sign = ((quadrant + 1) & 2) << 30;
-  s = reinterpret_cast<Real>(reinterpret_cast<Mask>(a) ^ sine_sign);
-  c = reinterpret_cast<Real>(reinterpret_cast<Mask>(b) ^ cosine_sign);
+  s = from_bits(bits(a) ^ bit_as_sign(quadrant, 0));
+  c = from_bits(bits(b) ^ bit_as_sign(quadrant, 1));
 }
 #endif
 
@@ -491,8 +575,7 @@ FLYBALL_LANE Real reach(const SpaceView<Number>& space, const Real* q,
                              const float* inverse_scale, const float* turn,
                              const float* to) noexcept {
   Real best = splat(boundless);
-  Mask index = Mask{};
-  Mask here = Mask{0, 1, 2, 3, 4, 5, 6, 7};
+  Mask index = count_from(0);
   for (int i = 0; i < count; i += lanes) {
     Real squared = splat(0);
     for (int k = 0; k < dimension; ++k) {
@@ -507,15 +590,14 @@ FLYBALL_LANE Real reach(const SpaceView<Number>& space, const Real* q,
     }
     const Mask closer = squared < best;
     best = choose(closer, squared, best);
-    index = closer ? here : index;
-    here = here + 8;
+    index = choose(closer, count_from(i), index);
   }
   int least = 0;
   float distance = boundless;
   for (int i = 0; i < lanes; ++i) {
-    if (index[i] < count && best[i] < distance) {
+    if (lane(index, i) < count && best[i] < distance) {
       distance = best[i];
-      least = index[i];
+      least = lane(index, i);
     }
   }
   return least;

@@ -49,6 +49,11 @@ void complete(SpaceModel& model);
 [[nodiscard]] double first_exit(const SpaceModel& model, const SpaceConstraint& constraint,
                                 const double* from, const double* by);
 
+/// A region that goes on beyond the stops of the axes where it reaches them: no way leads along a
+/// stop through what is forbidden up to it.
+[[nodiscard]] std::shared_ptr<const RegionNode> beyond_stops(
+    const SpaceModel& model, const std::shared_ptr<const RegionNode>& node);
+
 /// A region shrunk (`grow` false) or grown by what may be off in each coordinate.
 [[nodiscard]] std::shared_ptr<const RegionNode> offset_region(
     const std::shared_ptr<const RegionNode>& node, const std::vector<double>& error, bool grow);

@@ -658,7 +658,8 @@ void complete(SpaceModel& model) {
     // A constraint keeps what the buffer leaves of it.
     const std::shared_ptr<const RegionNode> node(std::shared_ptr<const RegionNode>(),
                                                  &named.region.node());
-    std::shared_ptr<const RegionNode> kept = offset_region(node, model.buffer, named.forbidden);
+    std::shared_ptr<const RegionNode> kept =
+        offset_region(beyond_stops(model, node), model.buffer, named.forbidden);
     Builder builder(model);
     builder.add_region(*kept, named.forbidden);
     SpaceConstraint constraint{named.name, "",   std::move(builder.program),

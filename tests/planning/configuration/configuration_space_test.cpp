@@ -203,6 +203,25 @@ TEST(ConfigurationSpace, MovesMayRunAlongEdges) {
   EXPECT_NEAR(level.at, (1.0 - 0.25 * pi) / 2.0, 1e-9);
 }
 
+// What is forbidden up to a stop is forbidden along it.
+TEST(ConfigurationSpace, NoWayLeadsAlongAStop) {
+  for (const bool polygon : {false, true}) {
+    auto space = ConfigurationSpace::create({{.name = "x", .unit = "m", .low = -1.0, .high = 1.0},
+                                             {.name = "y", .unit = "m", .low = 0.0, .high = 5.0}})
+                     .value();
+    test::must(space.forbid(
+        "chassis", polygon
+                       ? Region::polygon(0, 1, {{-0.5, 0.0}, {0.5, 0.0}, {0.5, 2.0}, {-0.5, 2.0}})
+                       : Region::box({-0.5, 0.0}, {0.5, 2.0})));
+    EXPECT_FALSE(space.valid(std::vector{0.0, 0.0}));
+    EXPECT_TRUE(space.valid(std::vector{0.5, 0.0}));
+    EXPECT_TRUE(space.valid(std::vector{0.0, 2.0}));
+    const MoveCheck move = space.check_move(std::vector{-1.0, 0.0}, std::vector{2.0, 0.0});
+    EXPECT_FALSE(move.free);
+    EXPECT_NEAR(move.at, 0.25, 1e-9);
+  }
+}
+
 // What wraps goes the short way, and is the same a turn on.
 TEST(ConfigurationSpace, AnglesWrap) {
   Random random(2);

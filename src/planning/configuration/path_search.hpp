@@ -1,0 +1,160 @@
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include <flyball/core/random.hpp>
+#include <flyball/planning/configuration/path_planner.hpp>
+
+#include "planning/configuration/space_model.hpp"
+
+// What the planners share: judged moves, trees, bounds of work.
+namespace flyball::detail {
+
+using Configuration = std::array<float, most_axes>;
+using Path = std::vector<std::vector<double>>;
+
+/// Counts the work of a search and says when it is over.
+class WorkBound {
+ public:
+  WorkBound(long work, double seconds)
+      : left_(work),
+        end_(std::chrono::steady_clock::now() +
+             std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+                 std::chrono::duration<double>(std::min(seconds, 1e7)))) {}
+
+  /// Does one piece of work. @return Whether there was one left.
+  bool spend() noexcept {
+    if (--left_ < 0 || over_) {
+      return false;
+    }
+    if ((++done_ & 1023) == 0) {
+      over_ = std::chrono::steady_clock::now() > end_;
+    }
+    return !over_;
+  }
+  [[nodiscard]] long done() const noexcept { return done_; }
+  [[nodiscard]] bool late() const noexcept { return over_; }
+  [[nodiscard]] bool over() const noexcept { return over_ || left_ <= 0; }
+
+ private:
+  long left_;
+  long done_ = 0;
+  bool over_ = false;
+  std::chrono::steady_clock::time_point end_;
+};
+
+/// Judges moves and boxes of a space in lanes.
+class Judge {
+ public:
+  explicit Judge(const SpaceModel& model);
+
+  void use_wide(bool wide) noexcept { wide_ = wide; }
+
+  /// Whether the whole move is free; what is not proven is not.
+  [[nodiscard]] bool free(const float* from, const float* by) noexcept;
+  [[nodiscard]] bool free(const Configuration& from, const Configuration& by) noexcept {
+    return free(from.data(), by.data());
+  }
+
+  /// Smallest margins in shares of a box. @param q  dimension x 8.
+  /// @param half  Half of the box along each axis.
+  void box_reaches(const float* q, const double* half, float* to) noexcept;
+  /// The same for boxes of the halves that were set before.
+  void set_box(const double* half) noexcept;
+  void reaches_of_set(const float* q, float* to) noexcept;
+
+  [[nodiscard]] int nearest(const float* points, int stride, int count,
+                            const float* to) const noexcept;
+
+  /// to - from, the short way.
+  void difference(const float* from, const float* to, float* by) const noexcept {
+    for (int k = 0; k < dimension_; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      by[k] = to[k] - from[k];
+      if (turn_[i] > 0.0F) {
+        by[k] -= turn_[i] * __builtin_rintf(by[k] / turn_[i]);
+      }
+    }
+  }
+  [[nodiscard]] float length(const float* by) const noexcept {
+    float squared = 0.0F;
+    for (int k = 0; k < dimension_; ++k) {
+      const float d = by[k] * inverse_scale_[static_cast<std::size_t>(k)];
+      squared += d * d;
+    }
+    return __builtin_sqrtf(squared);
+  }
+  [[nodiscard]] int dimension() const noexcept { return dimension_; }
+  [[nodiscard]] const SpaceModel& model() const noexcept { return model_; }
+  long moves = 0;
+
+  /// Anywhere between the stops.
+  void sample(Random& random, float* to) const noexcept;
+  /// The size of the space in shares of the scale, for choosing steps.
+  [[nodiscard]] float extent() const noexcept { return extent_; }
+
+ private:
+  const SpaceModel& model_;
+  SpaceView<float> view_;
+  int dimension_;
+  bool wide_ = true;
+  bool empty_;
+  std::vector<float> rates_;
+  InverseRates<float> set_{};
+  Configuration inverse_scale_{};
+  Configuration turn_{};
+  float extent_ = 0.0F;
+};
+
+/// A tree of configurations, coordinate by coordinate.
+class Tree {
+ public:
+  explicit Tree(int dimension) : dimension_(dimension) { room(256); }
+
+  void clear() noexcept;
+  int add(const float* q, int parent);
+  [[nodiscard]] int size() const noexcept { return count_; }
+  void get(int i, float* q) const noexcept {
+    for (int k = 0; k < dimension_; ++k) {
+      q[k] = points_[static_cast<std::size_t>(k) * stride_ + static_cast<std::size_t>(i)];
+    }
+  }
+  [[nodiscard]] int parent(int i) const noexcept { return parents_[static_cast<std::size_t>(i)]; }
+  void set_parent(int i, int parent) noexcept { parents_[static_cast<std::size_t>(i)] = parent; }
+  [[nodiscard]] int nearest(const Judge& judge, const float* to) const noexcept {
+    return judge.nearest(points_.data(), static_cast<int>(stride_), count_, to);
+  }
+  /// From the root to a node.
+  [[nodiscard]] std::vector<int> way_to(int node) const;
+
+ private:
+  void room(std::size_t count);
+
+  int dimension_;
+  int count_ = 0;
+  std::size_t stride_ = 0;
+  std::vector<float> points_{};
+  std::vector<int> parents_{};
+};
+
+/// Random trees from both ends. @return The waypoints; nothing when the work is done.
+/// @param work  Moves of this call, within `bound`.
+std::optional<Path> rrt_connect(Judge& judge, Tree& a, Tree& b, const double* start,
+                                const double* goal, Random& random, long work, WorkBound& bound);
+
+/// The way of RRT*, if one was found when its nodes or its work are there.
+std::optional<Path> rrt_star(Judge& judge, Tree& tree, const double* start, const double* goal,
+                             Random& random, int nodes, WorkBound& bound);
+
+/// Makes angles that wrap go on from waypoint to waypoint.
+void lift(const SpaceModel& model, Path& path);
+
+/// Takes detours out: moves over waypoints, then over parts of moves.
+void shorten(Judge& judge, Path& path, Random& random, int rounds);
+
+}  // namespace flyball::detail
