@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -28,6 +29,11 @@ namespace {
 constexpr std::size_t most_violations = 10;
 /// As for optimal control problems: the first steps look for a trajectory.
 constexpr double first_barrier_of_stages = 30.0;
+/// Where a general problem is not solved in so many steps from the usual barrier, it is tried
+/// again: a small one keeps near the start what the barrier's own pull would lead astray, a large
+/// one looks farther.
+constexpr int patience = 300;
+constexpr double other_barriers[] = {1e-6, 1e3};
 
 }  // namespace
 
@@ -57,6 +63,7 @@ struct Problem::Parts {
   std::unique_ptr<InteriorPoint> general{};
   std::unique_ptr<QuadraticMethod> quadratic{};
   bool is_warm = false;
+  SolverCounts counts{};                    // of the general method's attempts
   std::vector<double> solved_parameters{};  // of the program's numbers
 
   void refuse(Error problem_error) {
@@ -66,6 +73,9 @@ struct Problem::Parts {
   }
   [[nodiscard]] std::string name_of(std::size_t constraint) const;
   void report(ProblemSolution& solution, const FlatProblem& flat) const;
+  [[nodiscard]] SolveStatus solve_general(const SolverOptions& options,
+                                          FunctionRef<bool(const Iteration&)> watch,
+                                          const VectorXd& begin);
   /// @param flat  The problem's numbers; null: they are those of the program.
   [[nodiscard]] ProblemSolution run(FlatProblem* flat, const SolverOptions& options,
                                     FunctionRef<bool(const Iteration&)> watch);
@@ -196,6 +206,52 @@ void Problem::Parts::report(ProblemSolution& solution, const FlatProblem& flat) 
   }
 }
 
+/// The filter method from where it stands, and where that fails from the variables' values with
+/// other barriers, within the limits of the options.
+SolveStatus Problem::Parts::solve_general(const SolverOptions& options,
+                                          FunctionRef<bool(const Iteration&)> watch,
+                                          const VectorXd& begin) {
+  using Clock = std::chrono::steady_clock;
+  const auto since = Clock::now();
+  counts = {};
+  SolverOptions attempt = options;
+  const auto run = [&](double barrier, int most) {
+    attempt.first_barrier = barrier;
+    attempt.max_iterations = std::min(most, options.max_iterations - counts.iterations);
+    const double seconds = std::chrono::duration<double>(Clock::now() - since).count();
+    attempt.time_limit = std::max(0.0, options.time_limit - seconds);
+    const SolveStatus status = general->run(attempt, watch);
+    const SolverCounts& of = general->counts();
+    counts.iterations += of.iterations;
+    counts.restorations += of.restorations;
+    counts.factorizations += of.factorizations;
+    counts.evaluations += of.evaluations;
+    counts.corrections += of.corrections;
+    return status;
+  };
+  const auto failed = [&](SolveStatus status) {
+    return (status == SolveStatus::no_progress || status == SolveStatus::iteration_limit) &&
+           counts.iterations < options.max_iterations;
+  };
+  const bool free = options.first_barrier <= 0.0 && program->stages() == 0;
+  SolveStatus status =
+      run(options.first_barrier, free && !is_warm ? patience : options.max_iterations);
+  if (is_warm && status != SolveStatus::solved && status != SolveStatus::stopped &&
+      status != SolveStatus::time_limit && counts.iterations < options.max_iterations) {
+    general->start(program->start(graph.values));
+    status = run(options.first_barrier, free ? patience : options.max_iterations);
+  }
+  for (const double barrier : other_barriers) {
+    if (!free || !failed(status)) {
+      break;
+    }
+    general->start(begin.size() > 0 ? begin : program->start(graph.values));
+    const bool is_last = barrier == std::end(other_barriers)[-1];
+    status = run(barrier, is_last ? options.max_iterations : patience);
+  }
+  return status;
+}
+
 ProblemSolution Problem::Parts::run(FlatProblem* flat, const SolverOptions& options,
                                     FunctionRef<bool(const Iteration&)> watch) {
   ProblemSolution solution;
@@ -265,14 +321,10 @@ ProblemSolution Problem::Parts::run(FlatProblem* flat, const SolverOptions& opti
     if (chosen.first_barrier <= 0.0 && p.stages() > 0 && !is_warm) {
       chosen.first_barrier = first_barrier_of_stages;
     }
-    status = general->run(chosen, watch);
-    if (is_warm && status != SolveStatus::solved && status != SolveStatus::stopped &&
-        status != SolveStatus::time_limit) {
-      general->start(p.start(graph.values));
-      status = general->run(chosen, watch);
-    }
+    status = solve_general(chosen, watch, begin);
     solution.method = "filter interior-point method";
     take(*general);
+    solution.counts = counts;
   }
   if (p.stages() > 0) {
     solution.method += fmt::format(" along {} stages", p.stages());

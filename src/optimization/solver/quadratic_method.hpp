@@ -36,6 +36,8 @@ class QuadraticMethod {
   [[nodiscard]] const SolverCounts& counts() const noexcept { return counts_; }
 
  private:
+  [[nodiscard]] bool take_constants();
+  [[nodiscard]] bool settle(const SolverOptions& options);
   [[nodiscard]] bool begin(bool warm);
   void residuals();
   void distances();
