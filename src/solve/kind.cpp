@@ -57,6 +57,7 @@ std::span<const Kind> kinds() {
     add("Interconnections", interconnection_kinds());
     add("Interconnections", diagram_kinds());
     add("Regulators", regulator_kinds());
+    add("Predictive control", predictive_control_kinds());
     add("Feedforward and delay", feedforward_kinds());
     add("Certificates", certificate_kinds());
     add("PID", pid_kinds());

@@ -201,6 +201,7 @@ template <class Function>
 [[nodiscard]] std::vector<Kind> diagram_kinds();
 [[nodiscard]] std::vector<Kind> certificate_kinds();
 [[nodiscard]] std::vector<Kind> regulator_kinds();
+[[nodiscard]] std::vector<Kind> predictive_control_kinds();
 [[nodiscard]] std::vector<Kind> feedforward_kinds();
 [[nodiscard]] std::vector<Kind> pid_kinds();
 [[nodiscard]] std::vector<Kind> compensator_kinds();
