@@ -19,6 +19,7 @@ void add_estimate_command(CLI::App& program, Invocation& invocation);
 void add_experiment_command(CLI::App& program, Invocation& invocation);
 void add_design_command(CLI::App& program, Invocation& invocation);
 void add_drive_command(CLI::App& program, Invocation& invocation);
+void add_optimize_command(CLI::App& program, Invocation& invocation);
 void add_size_command(CLI::App& program, Invocation& invocation);
 void add_simulate_command(CLI::App& program, Invocation& invocation);
 void add_tune_command(CLI::App& program, Invocation& invocation);

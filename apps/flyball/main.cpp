@@ -71,6 +71,7 @@ int run(int argc, char** argv) {
       "  flyball experiment elevator.toml           which tests tell the gains best\n"
       "  flyball size elevator.toml                 the best gear ratio, by simulated motions\n"
       "  flyball drive robot.toml                   a drivetrain that follows a trajectory\n"
+      "  flyball optimize robot.toml                its fastest trajectory; or Choreo's .traj\n"
       "  flyball motors krakenX60                   what the motor table knows\n"
       "  flyball motor-curves cim.csv               a motor's constants from a dynamometer\n"
       "  flyball units velocity                     the units that quantities are read in\n"
@@ -101,6 +102,7 @@ int run(int argc, char** argv) {
   flyball::app::add_simulate_command(program, invocation);
   flyball::app::add_size_command(program, invocation);
   flyball::app::add_drive_command(program, invocation);
+  flyball::app::add_optimize_command(program, invocation);
   flyball::app::add_tune_command(program, invocation);
   flyball::app::add_estimate_command(program, invocation);
   flyball::app::add_experiment_command(program, invocation);

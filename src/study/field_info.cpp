@@ -126,7 +126,11 @@ Names sections_of(JobKind job) {
                                                         "controller.max_voltage", "battery"};
   static constexpr std::array<std::string_view, 5> drive{
       "drive", "disturbance", "controller.period", "controller.max_voltage", "battery"};
+  static constexpr std::array<std::string_view, 3> optimize{"optimize", "drive",
+                                                            "controller.max_voltage"};
   switch (job) {
+    case JobKind::optimize:
+      return optimize;
     case JobKind::drive:
       return drive;
     case JobKind::size:

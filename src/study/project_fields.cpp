@@ -11,6 +11,7 @@
 #include "study/drive_fields.hpp"
 #include "study/field.hpp"
 #include "study/mechanism_parts.hpp"
+#include "study/optimize_fields.hpp"
 #include "study/size_fields.hpp"
 
 namespace flyball::study {
@@ -565,7 +566,10 @@ constexpr std::array sections{
             "A drivetrain, what it follows and how: what `flyball drive` simulates.",
             "every drivetrain", Subject::drive},
     Section{"disturbance", disturbance_fields, &within<&Project::disturbance>,
-            "What the drivetrain meets that its follower does not know.", "", Subject::drive}};
+            "What the drivetrain meets that its follower does not know.", "", Subject::drive},
+    Section{"optimize", optimize_fields, &within<&Project::optimize>,
+            "Where a drivetrain is to go as fast as it can: what `flyball optimize` finds.", "",
+            Subject::drive}};
 
 std::optional<SignalDimensions> signals(const void* document) {
   const auto& project = *static_cast<const Project*>(document);

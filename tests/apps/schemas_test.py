@@ -147,6 +147,8 @@ def check_answers(folder):
     check_answer(["drive", examples / "drive_differential.toml", "--path-velocity", "40m/s", "--path-acceleration",
                   "90m/s^2", "--path-centripetal", "90m/s^2"], 1, folder)
     check_answer(["drive", examples / "elevator.toml"], 2, folder)
+    check_answer(["optimize", examples / "drive_fastest.toml"], 0, folder)
+    check_answer(["optimize", examples / "drive_fastest.toml", "--attempts", "0"], 2, folder)
     for follower in ("ramsete", "ltv unicycle", "ltv drive"):
         check_answer(["design", examples / "drive_differential.toml", "--follower", follower], 0, folder, "design_drive")
     check_answer(["design", examples / "drive_swerve.toml"], 2, folder, "design_drive")
@@ -293,7 +295,7 @@ def check_reader_and_schema(folder):
         for key in told["properties"]:
             if key in ("type", "motor", "tolerance", "limit", "reference", "mechanism", "follower"):
                 continue
-            drives = section in ("drive", "disturbance")
+            drives = section in ("drive", "disturbance", "optimize")
             for text, value in values.items():
                 head = '[drive]\ntype = "swerve"\n' if drives else base
                 if section not in ("mechanism", "drive"):

@@ -9,6 +9,7 @@
 #include <flyball/study/drive_section.hpp>
 #include <flyball/study/experiment.hpp>
 #include <flyball/study/model_job.hpp>
+#include <flyball/study/optimize_section.hpp>
 #include <flyball/study/size_section.hpp>
 #include <flyball/study/tune.hpp>
 
@@ -79,6 +80,7 @@ struct Project {
   SizeSection size{};
   DriveSection drive{};
   DisturbanceSection disturbance{};
+  OptimizeSection optimize{};
   DesignJob job;  ///< Its plant comes from the parts and the gains.
   /// Why the file does not define a mechanism, if it does not: all that is missing.
   std::optional<Errors> plant_error{};
@@ -141,7 +143,18 @@ struct KeyComment {
                                                         std::span<const Override> overrides = {});
 
 /// The jobs whose fields a person may set.
-enum class JobKind { identify, design, tune, analyze, simulate, experiment, estimate, size, drive };
+enum class JobKind {
+  identify,
+  design,
+  tune,
+  analyze,
+  simulate,
+  experiment,
+  estimate,
+  size,
+  drive,
+  optimize
+};
 
 /// A field of a job, for whoever asks a person for it: a command line, a form, a binding.
 struct FieldInfo {

@@ -186,6 +186,7 @@ class Search {
     result_.elastic = true;
     result_.best = result_.attempts.back().name;
     take(layout, found);
+    result_.attempts.back().duration = result_.duration;  // without the price
     for (Eigen::Index i = 0; i < found.parameters.size(); ++i) {
       const double amount = found.parameters(i);
       if (amount <= 1e-4) {
