@@ -10,8 +10,12 @@
 
 #include <flyball/core/quantity.hpp>
 #include <flyball/io/csv.hpp>
+#include <flyball/io/motion/choreo.hpp>
+#include <flyball/io/motion/pathplanner.hpp>
+#include <flyball/io/motion/wpilib_trajectory.hpp>
 #include <flyball/io/sysid_json.hpp>
 #include <flyball/io/wpilog.hpp>
+#include <flyball/recording/motion_file.hpp>
 #include <flyball/solve/kind.hpp>
 #include <flyball/study/project.hpp>
 
@@ -178,6 +182,94 @@ void write_problems(const std::filesystem::path& corpus, const Folder& dictionar
   dictionaries.write("model.dict", dictionary(words));
 }
 
+/// A motion in all formats of planning tools.
+void write_motions(const std::filesystem::path& corpus, const Folder& dictionaries) {
+  RobotTrajectory motion;
+  for (int i = 0; i < 3; ++i) {
+    const double t = 0.5 * i;
+    MotionSample sample{.time = t, .pose = Pose2d(1.0 + t * t, 2.0, 0.25 * t)};
+    sample.velocity = {2.0 * t, 0.0};
+    sample.acceleration = {2.0, 0.0};
+    sample.omega = 0.25;
+    motion.samples.push_back(sample);
+  }
+  motion.holonomic = true;
+  const Folder folder(corpus / "motion");
+  ChoreoTrajectory choreo = to_choreo_trajectory(motion, "lob");
+  AutoCommand group{.type = "sequential"};
+  group.commands.push_back({.type = "named", .name = "spin"});
+  group.commands.push_back({.type = "wait", .wait = {0.5, "0.5 s", {}}});
+  choreo.events.push_back({.name = "spin", .target = 0, .target_timestamp = 0.0, .command = group});
+  choreo.params.constraints.push_back({.from = "first",
+                                       .to = "1",
+                                       .type = "MaxVelocity",
+                                       .props = {{"max", {3.0, "3 m / s", {}}}}});
+  folder.write("choreo", to_choreo(choreo).value());
+  folder.write("choreo_sides",
+               to_choreo(to_choreo_trajectory(motion, "s", ChoreoSides{0.6})).value());
+  folder.write("wpilib", to_wpilib(to_wpilib_trajectory(motion)).value());
+  WpilibTrajectory samples = to_wpilib_trajectory(motion);
+  samples.is_object = true;
+  folder.write("wpilib_2027", to_wpilib(samples).value());
+  PathPlannerPath path;
+  path.version = "2025.0";
+  path.waypoints.resize(2);
+  path.waypoints[0].next_control = PlannerPoint{1.0, 0.0};
+  path.waypoints[1].anchor = {3.0, 1.0};
+  path.waypoints[1].previous_control = PlannerPoint{2.0, 1.0};
+  path.rotation_targets.push_back({0.5, 90.0});
+  path.zones.push_back({.name = "slow", .from = 0.2, .to = 0.4});
+  path.markers.push_back({.name = "m", .position = 0.5, .command = group});
+  path.goal_end_state = PathPlannerState{};
+  folder.write("path", to_pathplanner(path).value());
+  folder.write("auto",
+               to_pathplanner(PathPlannerAuto{.version = "2025.0", .command = group}).value());
+  PathPlannerGrid grid;
+  grid.rows = {{true, false}, {false, true}};
+  folder.write("grid", to_pathplanner(grid).value());
+  std::vector<std::string> words = json_words;
+  for (const char* word : {"samples",
+                           "timestamp",
+                           "velocityX",
+                           "angularVelocity",
+                           "trajectory",
+                           "params",
+                           "waypoints",
+                           "constraints",
+                           "data",
+                           "type",
+                           "props",
+                           "exp",
+                           "val",
+                           "events",
+                           "from",
+                           "target",
+                           "version",
+                           "anchor",
+                           "anchorPoint",
+                           "nextControl",
+                           "prevControl",
+                           "globalConstraints",
+                           "command",
+                           "commands",
+                           "wait",
+                           "waitTime",
+                           "grid",
+                           "field_size",
+                           "pose",
+                           "translation",
+                           "rotation",
+                           "radians",
+                           "robotConfiguration",
+                           "paths",
+                           "config",
+                           "splits",
+                           "sampleType"}) {
+    words.push_back("\"" + std::string(word) + "\":");
+  }
+  dictionaries.write("motion.dict", dictionary(words));
+}
+
 void write_projects(const std::filesystem::path& corpus, const Folder& dictionaries) {
   const Folder projects(corpus / "project");
   projects.write("mechanism", R"([mechanism]
@@ -281,6 +373,7 @@ int main(int argc, char** argv) {
   const std::filesystem::path corpus = root / "corpus";
   write_logs(corpus, dictionaries);
   write_problems(corpus, dictionaries);
+  write_motions(corpus, dictionaries);
   write_projects(corpus, dictionaries);
   write_texts(corpus, dictionaries);
   return 0;

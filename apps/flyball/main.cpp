@@ -81,6 +81,7 @@ int run(int argc, char** argv) {
       "of it\n"
       "  flyball pidtune \"exp(-s)/(s+1)\" --form pi  PID gains of a plant, and their loop\n"
       "  flyball path Score.path                    a path of a planning tool, timed and shown\n"
+      "  flyball states machine.toml                can events lead mechanisms astray?\n"
       "  flyball profile --to 2m --kv 4 --ka 0.4    a motion from state to state, and its table\n"
       "  flyball plan space.toml                    a way through a configuration space, and its "
       "motion\n"
@@ -113,6 +114,7 @@ int run(int argc, char** argv) {
   flyball::app::add_analyze_command(program, invocation);
   flyball::app::add_loop_commands(program, invocation);
   flyball::app::add_path_command(program, invocation);
+  flyball::app::add_states_command(program, invocation);
   flyball::app::add_profile_command(program, invocation);
   flyball::app::add_plan_command(program, invocation);
   flyball::app::add_solve_command(program, invocation);

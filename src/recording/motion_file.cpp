@@ -242,7 +242,7 @@ Expected<RobotTrajectory> trajectory_of(const ChoreoPath2024& path, const std::s
 }
 
 Expected<RobotTrajectory> trajectory_of(const Log& table) {
-  RobotTrajectory result{.source = table.source};
+  RobotTrajectory result{.source = table.source, .diagnostics = table.diagnostics};
   using Column = std::optional<std::vector<double>>;
   FLYBALL_TRY(const Column x, column_of(table, "x", Dimension::length));
   FLYBALL_TRY(const Column y, column_of(table, "y", Dimension::length));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -230,6 +231,23 @@ Expected<void> recording::check_samples(const RobotTrajectory& trajectory) {
     return refusal(TrajectoryFileError::too_few, trajectory.source, "the trajectory")
         .got(fmt::format("of {} samples", trajectory.samples.size()))
         .expected("two samples or more");
+  }
+  constexpr double most = 1e6;  // in SI: far beyond any robot, and its squares are numbers
+  for (std::size_t i = 0; i < trajectory.samples.size(); ++i) {
+    const MotionSample& sample = trajectory.samples[i];
+    for (const auto& [value, name, unit] :
+         {std::tuple(sample.pose.translation().cwiseAbs().maxCoeff(), "place", "m"),
+          {sample.velocity.cwiseAbs().maxCoeff(), "velocity", "m/s"},
+          {std::abs(sample.omega), "turning rate", "rad/s"},
+          {std::abs(sample.time), "time", "s"}}) {
+      if (!(value <= most)) {
+        return refusal(TrajectoryFileError::wrong_sample, at(trajectory.source, sample.place),
+                       fmt::format("the {} of sample {}", name, i + 1))
+            .got(fmt::format("{} {}", format_number(value), unit))
+            .expected(fmt::format("at most 1e6 {}", unit))
+            .with("sample", static_cast<double>(i + 1));
+      }
+    }
   }
   return check_times(trajectory);
 }

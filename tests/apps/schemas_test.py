@@ -258,6 +258,25 @@ def check_profile(folder):
     check_answer(["profile", "--to", "1m"], 2, folder)
 
 
+def check_path(folder):
+    out = examples / "paths/out.path"
+    check_answer(["path", out], 0, folder)
+    check_answer(["path", examples / "drive_swerve.toml", out, "--velocity", "2m/s"], 0, folder)
+    check_answer(["path", examples / "paths/two_pieces.auto", "--mirror"], 0, folder)
+    check_answer(["path", examples / "elevator.toml", out], 2, folder)
+    check_answer(["path", "nowhere.traj"], 2, folder)
+
+
+def check_states(folder):
+    machine = (examples / "states.toml").read_text()
+    (folder / "safe.toml").write_text(machine)
+    check_answer(["states", "safe.toml"], 0, folder)
+    (folder / "unsafe.toml").write_text(machine.replace('to = "floor"\norder = ["height", "arm"]', 'to = "floor"'))
+    check_answer(["states", "unsafe.toml"], 1, folder)
+    (folder / "wrong.toml").write_text(machine.replace("height", "width", 1))
+    check_answer(["states", "wrong.toml"], 2, folder)
+
+
 def check_localize(folder):
     (folder / "odometry.csv").write_text(
         "time,v,w\n" + "\n".join(f"{0.1 * k:.2f},0.2,0.1" for k in range(100)))
@@ -362,6 +381,8 @@ with tempfile.TemporaryDirectory() as name:
     check_motors(pathlib.Path(name))
     check_units(pathlib.Path(name))
     check_profile(pathlib.Path(name))
+    check_path(pathlib.Path(name))
+    check_states(pathlib.Path(name))
     check_places(pathlib.Path(name))
     check_reader_and_schema(pathlib.Path(name))
 check_project_schema()

@@ -109,6 +109,12 @@ TEST(MotionFile, TellsWhatIsWrong) {
       refusal_of(trajectory_of(file, "a.traj")).find("the time of sample 5 is 0.15 s after 0.2 s"),
       std::string::npos)
       << refusal_of(trajectory_of(file, "a.traj"));
+  std::swap(file.trajectory.samples[3].time, file.trajectory.samples[4].time);
+  file.trajectory.samples[2].vx = 1e300;
+  EXPECT_NE(
+      refusal_of(trajectory_of(file, "a.traj")).find("the velocity of sample 3 is 1e+300 m/s"),
+      std::string::npos)
+      << refusal_of(trajectory_of(file, "a.traj"));
   file.trajectory.samples.clear();
   EXPECT_EQ(refusal_of(trajectory_of(file, "a.traj")),
             "a.traj: the trajectory is without samples; it must be generated; generate it in "

@@ -113,9 +113,9 @@ struct DescribeCommandData {
   template <class A, class C>
   void operator()(A& a, C& command) const {
     if (command.type == "path") {
-      a("pathName", command.name);
+      a.maybe("pathName", command.name);
     } else if (command.type == "named") {
-      a("name", command.name);
+      a.maybe("name", command.name);
     } else if (command.type == "wait") {
       a("waitTime", command.wait);
     } else if (command.type == "sequential" || command.type == "parallel" ||
@@ -487,13 +487,13 @@ void JsonMembersOut::id(std::string_view key, const std::string& value) {
 }
 
 void JsonMembersOut::id(std::string_view key, const std::optional<std::string>& value) {
-  value ? id(key, *value) : add(key, "null");
+  value ? id(key, *value) : nothing(key);
 }
 
 void JsonMembersOut::numbers(std::string_view key, const std::vector<NamedNumber>& values) {
   const JsonSpot spot = spot_.member(key);
-  if (values.empty() && spot.old == nullptr) {
-    add(key, "{}");
+  if (values.empty() && (spot.old == nullptr || spot.old->kind != JsonKind::object)) {
+    spot.old == nullptr&& spot_.old == nullptr ? add(key, "{}") : absent(key);
     return;
   }
   std::vector<JsonPiece> pieces;

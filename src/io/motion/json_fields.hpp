@@ -346,7 +346,7 @@ class JsonMembersOut {
   }
   template <class T>
   void nullable(std::string_view key, const std::optional<T>& value) {
-    value ? (*this)(key, *value) : add(key, "null");
+    value ? (*this)(key, *value) : nothing(key);
   }
   template <class T>
   void maybe(std::string_view key, const T& value) {
@@ -373,7 +373,7 @@ class JsonMembersOut {
   }
   template <class T, class Describe>
   void nullable(std::string_view key, const std::optional<T>& value, Describe describe) {
-    add(key, value ? text(spot_.member(key), *value, describe) : "null");
+    value ? add(key, text(spot_.member(key), *value, describe)) : nothing(key);
   }
   template <class T, class Describe>
   void part(std::string_view key, const T& value, Describe describe) {
@@ -432,6 +432,8 @@ class JsonMembersOut {
   void add(std::string_view key, std::string value) {
     pieces_.push_back({std::string(key), std::move(value)});
   }
+  /// Null in an object that no file had; else what stood there stays, or goes.
+  void nothing(std::string_view key) { spot_.old != nullptr ? absent(key) : add(key, "null"); }
   void absent(std::string_view key) { pieces_.push_back({std::string(key), {}, false}); }
 
   template <class T, class Describe>

@@ -110,7 +110,7 @@ struct DescribeMarker2023 {
   template <class A, class M>
   void operator()(A& a, M& m) const {
     a("position", m.position);
-    a("names", m.names);
+    a.maybe("names", m.names);
   }
 };
 
