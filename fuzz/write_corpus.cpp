@@ -142,6 +142,17 @@ void write_logs(const std::filesystem::path& corpus, const Folder& dictionaries)
   dictionaries.write("csv.dict", dictionary({"Timestamp", "Time", "time (s)", "(ms)", "[V]", ";",
                                              "\t", "\r\n", "\"\"", "\xef\xbb\xbf", "#", "nan",
                                              "inf", "true", "1e308", "Key", "Value", "1,5"}));
+
+  const Folder streams(corpus / "streams");
+  streams.write("series.csv", to_csv(series));
+  streams.write(
+      "rows.csv",
+      "# robot\ntime (ms),state,\"a, b\",x\r\n0,none,1,null\r\n5,\"dynamic-forward\",,2\n");
+  streams.write("mechanism.json", to_sysid_json(example_sysid(false)).value());
+  streams.write("all.wpilog", example_wpilog());
+  words.insert(words.end(), {"WPILOG", std::string("\0\1", 2), "double", "string", "int64",
+                             std::string("\0\0\0\0", 4), "time (ms)", "\r\n", "#", "\"\"", ";"});
+  dictionaries.write("streams.dict", dictionary(words));
 }
 
 void write_problems(const std::filesystem::path& corpus, const Folder& dictionaries) {

@@ -21,9 +21,9 @@ constexpr double widest_time_constant = 0.6;  // relative half-width beyond whic
 // What residuals cannot tell: measured voltages are half a millivolt off, clocks and encoders a
 // part in ten thousand, and the sensors are not quite what is supposed of them (simulated sessions
 // with such sensors are covered to 95 % with these).
-constexpr double voltage_allowance = 5e-4;  // V, standard error added to kS and kG
+constexpr double voltage_allowance = 7e-4;  // V, standard error added to kS and kG
 constexpr double speed_allowance = 1e-4;    // relative, added to kV
-constexpr double inertia_allowance = 1e-3;  // relative, added to kA
+constexpr double inertia_allowance = 2e-3;  // relative, added to kA
 constexpr double delay_allowance = 2e-4;    // s, added to delays
 constexpr double small_sample = 1.1;        // of all standard errors
 
@@ -299,10 +299,17 @@ void report_fit(const PreparedRecording& prepared, const FeedforwardFit& fit,
   }
   if (prepared.has_position && prepared.has_velocity &&
       std::abs(fit.velocity_delay - 0.5 * fit.averaging_width - fit.position_delay) > 0.015) {
+    const auto age = [](double delay) {
+      return detail::format("{:.0f} ms {}", 1e3 * std::abs(delay), delay < 0.0 ? "newer" : "older");
+    };
     note(diagnostics, "channel_skew",
-         "position is {:.0f} ms and velocity {:.0f} ms older than the voltage of the same row "
-         "(averaging taken off); the fit accounts for it",
-         1e3 * fit.position_delay, 1e3 * (fit.velocity_delay - 0.5 * fit.averaging_width));
+         "position is {} and velocity {} than the voltage of the same row (averaging taken off); "
+         "the fit accounts for it{}",
+         age(fit.position_delay), age(fit.velocity_delay - 0.5 * fit.averaging_width),
+         std::min(fit.position_delay, fit.velocity_delay) < -0.005
+             ? ". What is newer was read after the voltage was set, in a row that holds the "
+               "voltage of the period before"
+             : "");
   } else if (prepared.has_position && fit.position_delay > 0.015) {
     note(diagnostics, "channel_delay",
          "the encoder's values are {:.0f} ms older than the voltage of the same row; the fit "

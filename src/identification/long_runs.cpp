@@ -1,9 +1,12 @@
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <string>
 #include <utility>
 
 #include "core/diagnose.hpp"
+#include "core/format.hpp"
 #include "identification/long_runs.hpp"
 #include "identification/statistics.hpp"
 
@@ -14,6 +17,8 @@ constexpr double finest_row = 2.5e-3;  // s: a tenth of the delay of usual senso
 constexpr std::size_t stretches = 8;   // of a long run
 constexpr double before = 0.5;         // s, kept before a run's window: the fit looks back
 constexpr double beyond = 0.2;         // s, kept after a stretch, for values that come late
+constexpr std::size_t most_runs = 48;  // each has parameters of its own
+constexpr std::size_t most_of_a_kind = 8;
 
 /// s; 0 for rows that do not go on in time.
 double row_period(const TestRun& run) {
@@ -116,6 +121,26 @@ void add_stretches(const PreparedRun& whole, std::size_t share, std::vector<Prep
   }
 }
 
+/// Of more runs than a fit takes some of each kind, evenly spread over the log.
+std::vector<bool> chosen_runs(const PreparedRecording& prepared) {
+  std::map<TestKind, std::vector<std::size_t>> by_kind;
+  std::size_t moved = 0;
+  for (std::size_t i = 0; i < prepared.runs.size(); ++i) {
+    if (prepared.runs[i].moved) {
+      by_kind[prepared.runs[i].run.kind].push_back(i);
+      ++moved;
+    }
+  }
+  std::vector<bool> chosen(prepared.runs.size(), moved <= most_runs);
+  for (const auto& [kind, runs] : by_kind) {
+    const std::size_t count = std::min(most_of_a_kind, runs.size());
+    for (std::size_t k = 0; k < count; ++k) {
+      chosen[runs[count == 1 ? 0 : k * (runs.size() - 1) / (count - 1)]] = true;
+    }
+  }
+  return chosen;
+}
+
 template <class Value>
 void append(std::vector<Value>& values, const std::vector<Value>& more) {
   values.insert(values.end(), more.begin(), more.end());
@@ -161,17 +186,26 @@ std::optional<Recording> at_coarser_rows(const Recording& recording,
 
 std::optional<PreparedRecording> representative_part(const PreparedRecording& prepared,
                                                      std::vector<Diagnostic>& diagnostics) {
+  const std::vector<bool> chosen = chosen_runs(prepared);
   std::vector<std::size_t> lengths;
   std::size_t rows = 0;
-  for (const PreparedRun& run : prepared.runs) {
+  std::size_t chosen_rows = 0;
+  std::size_t moved = 0;
+  for (std::size_t i = 0; i < prepared.runs.size(); ++i) {
+    const PreparedRun& run = prepared.runs[i];
     if (run.moved) {
-      lengths.push_back(run.last - run.first);
-      rows += lengths.back();
+      ++moved;
+      rows += run.last - run.first;
+      if (chosen[i]) {
+        lengths.push_back(run.last - run.first);
+        chosen_rows += lengths.back();
+      }
     }
   }
-  if (rows <= most_fitted_rows) {
+  if (rows <= most_fitted_rows && moved == lengths.size()) {
     return std::nullopt;
   }
+  const std::size_t tests = lengths.size();
   const std::size_t share = fair_share(std::move(lengths));
   PreparedRecording part;
   part.mechanism = prepared.mechanism;
@@ -186,9 +220,13 @@ std::optional<PreparedRecording> representative_part(const PreparedRecording& pr
   part.top_speed = prepared.top_speed;
   part.velocity_scale = prepared.velocity_scale;
   std::size_t kept = 0;
-  for (const PreparedRun& run : prepared.runs) {
+  for (std::size_t i = 0; i < prepared.runs.size(); ++i) {
+    const PreparedRun& run = prepared.runs[i];
     const std::size_t before_it = part.runs.size();
-    if (run.moved && run.last - run.first > share) {
+    if (run.moved && !chosen[i]) {
+      part.runs.push_back(stretch(run, run.first, run.first, run.first, run.first));
+      part.runs.back().moved = false;
+    } else if (run.moved && run.last - run.first > share) {
       add_stretches(run, share, part.runs);
     } else {
       part.runs.push_back(run);
@@ -197,10 +235,16 @@ std::optional<PreparedRecording> representative_part(const PreparedRecording& pr
       kept += part.runs[k].moved ? part.runs[k].last - part.runs[k].first : 0;
     }
   }
-  note(diagnostics, "part_of_the_log",
-       "{} of the {} usable rows are fitted: of each run that is longer than {} rows, {} stretches "
-       "spread over it",
-       kept, rows, share, stretches);
+  const std::string of_tests =
+      tests == moved ? std::string()
+                     : detail::format("{} of {} tests, spread over the log", tests, moved);
+  const std::string of_rows =
+      chosen_rows <= most_fitted_rows
+          ? std::string()
+          : detail::format("of each run that is longer than {} rows, {} stretches spread over it",
+                           share, stretches);
+  note(diagnostics, "part_of_the_log", "{} of the {} usable rows are fitted: {}{}{}", kept, rows,
+       of_tests, of_tests.empty() || of_rows.empty() ? "" : ", and ", of_rows);
   return part;
 }
 

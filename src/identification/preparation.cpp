@@ -1,6 +1,7 @@
 #include <flyball/identification/preparation.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -123,6 +124,28 @@ void sort_rows(TestRun& run, RowDefects& defects) {
   }
 }
 
+/// Marks values that stand alone: far from the median of three on each side, beside what is usual
+/// and a share of the range. What steps and stays is none.
+void mark_spikes(const std::vector<double>& values, double share, std::vector<bool>& bad) {
+  constexpr std::size_t reach = 3;
+  constexpr double clear = 10.0;
+  if (values.size() < 20) {
+    return;
+  }
+  std::vector<double> off(values.size(), 0.0);
+  std::array<double, 2 * reach + 1> near{};
+  for (std::size_t i = reach; i + reach < values.size(); ++i) {
+    std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i - reach), near.size(), near.begin());
+    std::nth_element(near.begin(), near.begin() + reach, near.end());
+    off[i] = values[i] - near[reach];
+  }
+  const double range = quantile(values, 0.9) - quantile(values, 0.1);
+  const double limit = std::max(clear * mad_scale(off), share * range);
+  for (std::size_t i = 2 * reach; limit > 0.0 && i + reach < values.size(); ++i) {
+    bad[i] = bad[i] || std::abs(off[i]) > limit;
+  }
+}
+
 /// Rows whose value is far outside the run's range and not shared by the neighbours.
 void drop_outliers(TestRun& run, RowDefects& defects) {
   std::vector<bool> bad(run.time.size(), false);
@@ -139,6 +162,8 @@ void drop_outliers(TestRun& run, RowDefects& defects) {
       const double beyond = std::max(low - values[i], values[i] - high);
       bad[i] = bad[i] || beyond > 2.0 * spread;
     }
+    // A speed may leap where slack is taken up, a voltage at a step.
+    mark_spikes(values, column == &TestRun::position ? 0.5 : 1.0, bad);
   }
   // A hundredth of a very long test may be its start: what lasts is no outlier.
   constexpr std::ptrdiff_t longest = 20;
@@ -265,7 +290,7 @@ void report_rows(const RowDefects& defects, std::vector<Diagnostic>& diagnostics
   tell(defects.unsorted, "unsorted_time", "go back in time", "the rows were sorted");
   tell(defects.same_time, "duplicate_times", "repeat the time of the row before",
        "the later one was kept");
-  tell(defects.outliers, "outliers", "hold a value far outside the test's range",
+  tell(defects.outliers, "outliers", "hold a value far outside the test's range or its neighbours'",
        "they were dropped");
   tell(defects.stale, "stale_first_value",
        "at the start of a test hold a position of before it (another test's last, or zero)",
@@ -402,6 +427,7 @@ Expected<PreparedRecording> prepare(const Recording& recording, const Preparatio
   mend_slips(prepared);
   mend_signs(prepared);
   drop_coarse_velocity(prepared);
+  mend_saturation(prepared);
   trim_runs(prepared, options);
   report_travel(prepared);
   check_velocity_scale(prepared);

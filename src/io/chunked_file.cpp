@@ -12,24 +12,19 @@
 
 namespace flyball::io {
 
-namespace {
-
-constexpr std::size_t chunk = std::size_t{1} << 18;
-
-}  // namespace
-
-Expected<ChunkedFile> ChunkedFile::open(const std::string& path) {
+Expected<ChunkedFile> ChunkedFile::open(const std::string& path, std::size_t chunk) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY);
   if (fd < 0) {
     const int error = errno;
     return refusal(error == ENOENT ? FileError::not_found : FileError::not_readable, path)
         .with("system", std::generic_category().message(error));
   }
-  return ChunkedFile(fd);
+  return ChunkedFile(fd, chunk);
 }
 
 ChunkedFile::ChunkedFile(ChunkedFile&& other) noexcept
     : fd_(std::exchange(other.fd_, -1)),
+      chunk_(other.chunk_),
       buffer_(std::move(other.buffer_)),
       at_(other.at_),
       passed_(other.passed_),
@@ -49,10 +44,10 @@ bool ChunkedFile::more() {
   buffer_.erase(0, at_);
   at_ = 0;
   const std::size_t used = buffer_.size();
-  buffer_.resize(used + chunk);
+  buffer_.resize(used + chunk_);
   ssize_t got = 0;
   do {
-    got = ::read(fd_, buffer_.data() + used, chunk);
+    got = ::read(fd_, buffer_.data() + used, chunk_);
   } while (got < 0 && errno == EINTR);
   failed_ = failed_ || got < 0;
   ended_ = got <= 0;

@@ -11,8 +11,10 @@ namespace flyball::io {
 
 class ChunkedFile {
  public:
+  /// @param chunk  Bytes that are read at once.
   /// @errors FileError::not_found, not_readable.
-  [[nodiscard]] static Expected<ChunkedFile> open(const std::string& path);
+  [[nodiscard]] static Expected<ChunkedFile> open(const std::string& path,
+                                                  std::size_t chunk = std::size_t{1} << 18);
 
   ChunkedFile(ChunkedFile&& other) noexcept;
   ChunkedFile& operator=(ChunkedFile&&) = delete;
@@ -35,9 +37,10 @@ class ChunkedFile {
   [[nodiscard]] bool failed() const noexcept { return failed_; }
 
  private:
-  explicit ChunkedFile(int fd) : fd_(fd) {}
+  ChunkedFile(int fd, std::size_t chunk) : fd_(fd), chunk_(chunk) {}
 
   int fd_;
+  std::size_t chunk_;
   std::string buffer_;
   std::size_t at_ = 0;
   std::size_t passed_ = 0;

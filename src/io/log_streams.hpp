@@ -10,6 +10,10 @@
 /// One reader a format; private to io. Each as `stream_log`.
 namespace flyball::io {
 
+/// That of the format that the file's first bytes tell. @param source  Its name.
+[[nodiscard]] Expected<std::optional<StreamedLog>> stream_log(ChunkedFile& file,
+                                                              const std::string& source,
+                                                              LogSink& sink);
 [[nodiscard]] Expected<std::optional<StreamedLog>> stream_csv(ChunkedFile& file,
                                                               const std::string& source,
                                                               LogSink& sink);

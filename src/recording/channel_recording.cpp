@@ -11,6 +11,7 @@
 #include "recording/characterization_windows.hpp"
 #include "recording/drivetrain.hpp"
 #include "recording/recorded_motion.hpp"
+#include "recording/recorded_voltage.hpp"
 #include "recording/to_si.hpp"
 
 namespace flyball::recording {
@@ -59,6 +60,13 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
 
   FLYBALL_TRY_IN(log.source, auto channels,
                  find_channels(log, tests, selection, loaded.diagnostics));
+  Signal volts = *channels.voltage;
+  const double one = selection.voltage_scale != 1.0 ? selection.voltage_scale
+                                                    : volts_a_unit(volts.unit, volts.name);
+  for (double& value : volts.value) {
+    value *= one;
+  }
+  channels.voltage = &volts;
   if (tests.windows.empty()) {
     tests.windows = split_by_voltage(*channels.voltage);
     if (tests.windows.empty()) {
@@ -78,6 +86,10 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
          "\"{}\" is not driven in {} of {} tests: they are another mechanism's and left out",
          channels.voltage->name, others, all_tests);
     tests = std::move(driven);
+  }
+  if (one != selection.voltage_scale) {
+    note(loaded.diagnostics, "assumed", "voltages are in units of {:.3g} V, by the channel's {}",
+         one, volts.unit.empty() ? "name" : "unit");
   }
   note(loaded.diagnostics, "assumed", "voltage from \"{}\", position from {}, velocity from {}",
        channels.voltage->name,
@@ -105,6 +117,16 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
   const std::optional<double> ratio = velocity_ratio(loaded.recording.runs);
   RecordedUnits units;
   FLYBALL_TRY_IN(log.source, units, channel_units(selection, channels));
+  if (!units.position.known() && channels.position != nullptr &&
+      counts_ticks(channels.position->name, channels.position->unit)) {
+    return refusal(RecordingError::unit_unknown, log.source, "position unit")
+        .got(fmt::format("ticks of an encoder, by \"{}\"", channels.position->name))
+        .expected("an angle or a length")
+        .hint(
+            "say --unit rotations and with --scale the rotations (of an elevator the metres) that "
+            "one tick is, such as 0.000488 for 2048 a turn, and --no-velocity if velocities are "
+            "ticks each 100 ms");
+  }
   FLYBALL_TRY_IN(log.source, units, settle_units(units, ratio, loaded.diagnostics));
   if (said) {
     tell_said_kind(loaded.diagnostics, "the names in the log say", *said, selection.mechanism);
@@ -129,7 +151,7 @@ Expected<LoadedRecording> from_channels(const Log& log, const LogSelection& sele
   }
   FLYBALL_TRY_IN(log.source, auto output, output_scale(units.position, selection.scale, kind));
   loaded.recording.mechanism = kind;
-  return in_si(std::move(loaded), units, output, selection.voltage_scale);
+  return in_si(std::move(loaded), units, output, 1.0);
 }
 
 }  // namespace flyball::recording

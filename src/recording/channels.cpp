@@ -249,14 +249,21 @@ Expected<const Signal*> named_channel(const Log& log, const std::string& name, C
 
 std::string fullest_channels(const Log& log, const FoundTests& tests) {
   constexpr std::size_t shown = 12;
+  // What may be a motor's comes before pictures of a camera.
+  constexpr std::array<std::string_view, 11> motors{"volt",    "output", "applied", "duty",
+                                                    "percent", "posi",   "veloc",   "angle",
+                                                    "speed",   "encod",  "rpm"};
   std::vector<std::pair<std::size_t, const Signal*>> all;
   for (const Signal& signal : log.signals) {
     if (const std::size_t samples = samples_in(signal, tests.windows); samples >= 2) {
       all.emplace_back(samples, &signal);
     }
   }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::stable_sort(all.begin(), all.end(), [&](const auto& a, const auto& b) {
+    const bool first = contains_any(lower(a.second->name), motors);
+    const bool second = contains_any(lower(b.second->name), motors);
+    return first != second ? first : a.first > b.first;
+  });
   std::vector<std::string> names;
   for (std::size_t i = 0; i < std::min(shown, all.size()); ++i) {
     names.push_back("\"" + all[i].second->name + "\"");

@@ -252,6 +252,19 @@ RecordedUnit unit_in_name(std::string_view name, bool rate) {
   return found;
 }
 
+bool counts_ticks(std::string_view name, std::string_view unit) {
+  constexpr std::array<std::string_view, 6> ticks{"tick",   "ticks",  "count",
+                                                  "counts", "pulses", "cpr"};
+  for (const std::string_view text : {name, unit}) {
+    for (const std::string& word : words_of(text)) {
+      if (std::find(ticks.begin(), ticks.end(), word) != ticks.end()) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
 Expected<RecordedUnits> settle_units(RecordedUnits units, std::optional<double> ratio,
                                      std::vector<Diagnostic>& notes) {
   RecordedUnit& position = units.position;

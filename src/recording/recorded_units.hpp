@@ -31,6 +31,9 @@ struct RecordedUnit {
 /// "velocity_m_s". A rate without "per second" is one a second.
 [[nodiscard]] RecordedUnit unit_in_name(std::string_view name, bool rate);
 
+/// Whether a channel's name or unit says that it counts an encoder's ticks.
+[[nodiscard]] bool counts_ticks(std::string_view name, std::string_view unit);
+
 /// The unit of a text, of a position or of a rate ("Rotation" of a rate is one a second); unknown
 /// if it is of neither.
 [[nodiscard]] RecordedUnit unit_of_text(std::string_view text, bool rate, UnitSource source);

@@ -1,18 +1,34 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
 
 #include <flyball/core/argument.hpp>
+#include <flyball/core/quantity.hpp>
 #include <flyball/recording/load_recording.hpp>
 
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
+#include "recording/channel_names.hpp"
 #include "recording/recorded_voltage.hpp"
 
 namespace flyball::recording {
 
 using identification::TestRun;
+
+double volts_a_unit(std::string_view unit, std::string_view name) {
+  if (const auto parsed = parse_unit(unit);
+      !unit.empty() && parsed && parsed->dimension == Dimension::voltage) {
+    return parsed->factor;
+  }
+  const std::string text = lower(name);
+  const bool ends = text.size() > 2 && text.ends_with("mv") &&
+                    (name.ends_with("mV") || std::string_view("_ -./").find(
+                                                 text[text.size() - 3]) != std::string_view::npos);
+  constexpr std::array<std::string_view, 4> words{"millivolt", "(mv)", "[mv]", "in mv"};
+  return ends || contains_any(text, words) ? 1e-3 : 1.0;
+}
 
 Expected<void> check_voltage(const std::vector<TestRun>& runs, std::vector<Diagnostic>& notes) {
   constexpr double highest = 60.0;     // V, of any battery that a robot has

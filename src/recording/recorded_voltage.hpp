@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string_view>
 #include <vector>
 
 #include <flyball/core/diagnostic.hpp>
@@ -8,6 +9,10 @@
 
 /// Whether what was taken for the applied voltage can be one.
 namespace flyball::recording {
+
+/// Volts that one of a channel's unit, or of what its name ends in ("voltage_mV"), is; 1 if neither
+/// tells.
+[[nodiscard]] double volts_a_unit(std::string_view unit, std::string_view name);
 
 /// @param runs  In volts, as far as is known.
 /// @errors RecordingError::unit_mismatch for values beyond any battery of a robot (counts, percent)

@@ -118,6 +118,29 @@ TEST(ModelTerms, ATermInDoubtWidensTheIntervals) {
   EXPECT_GT(doubting.fit->kG->standard_error, 1.2 * sure.fit->kG->standard_error);
 }
 
+// A flywheel's steps of one height tell a sagging battery from more inertia by a hundredth of a
+// volt: where that leaves it open, kA's interval holds both, and it is told.
+TEST(ModelTerms, ABatteryThatMaySagIsInTheInertiasInterval) {
+  std::size_t told = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const scenarios::Truth& truth = scenarios::mechanisms.at(0);
+    CharacterizationOptions options = scenarios::session(truth, seed);
+    options.defects.sag = 0.2;
+    const FitReport report =
+        identify_feedforward(flyball::record_characterization(options).value());
+    ASSERT_TRUE(report.fit);
+    const auto* doubt = find(report.diagnostics, "term_in_doubt");
+    const bool sags = find(report.diagnostics, "sag") != nullptr ||
+                      (doubt != nullptr && doubt->message.find("sags") != std::string::npos);
+    told += sags ? 1 : 0;
+    if (sags) {
+      EXPECT_LE(report.fit->kA.interval[0], truth.kA) << seed;
+      EXPECT_GE(report.fit->kA.interval[1], truth.kA) << seed;
+    }
+  }
+  EXPECT_GE(told, 5U);
+}
+
 // What the step's encoder is ahead by is three quarters of half the gap: it starts in the middle,
 // and a quarter of the inertia is the motor's.
 TEST(Backlash, BeforeTheLoadFollowsIsTakenOutOfTheStep) {

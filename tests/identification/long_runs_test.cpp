@@ -165,4 +165,26 @@ TEST(LongRuns, OrdinaryRecordingsStayWhole) {
   EXPECT_EQ(recordings::find(report.diagnostics, "rows_put_together"), nullptr);
 }
 
+// A year of short tests: some of each kind, not the first rows of all.
+TEST(LongRuns, OfVeryManyTestsSomeAreFitted) {
+  const Recording one = long_recording(120, 0.01);
+  Recording many;
+  many.mechanism = one.mechanism;
+  for (int k = 0; k < 150; ++k) {
+    for (const TestRun& run : one.runs) {
+      many.runs.push_back(run);
+    }
+  }
+  const FitReport report = identify_feedforward(many);
+  ASSERT_TRUE(report.fit) << to_string(report.fit.error());
+  EXPECT_EQ(report.fit->runs.size(), many.runs.size());
+  const auto used = std::count_if(report.fit->runs.begin(), report.fit->runs.end(),
+                                  [](const FittedRun& run) { return run.used; });
+  EXPECT_EQ(used, 32);
+  EXPECT_NEAR(report.fit->kV.value, kV, 0.02 * kV);
+  const Diagnostic* told = recordings::find(report.diagnostics, "part_of_the_log");
+  ASSERT_NE(told, nullptr);
+  EXPECT_NE(told->message.find("32 of 600 tests"), std::string::npos) << told->message;
+}
+
 }  // namespace

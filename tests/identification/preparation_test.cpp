@@ -286,4 +286,86 @@ TEST(Prepare, SurvivesEmptyRecordings) {
   EXPECT_TRUE(prepare(empty_run));
 }
 
+// More spikes than a hundredth of the rows, which no quantile is deaf to.
+TEST(Prepare, DropsSpikesThatStandAlone) {
+  Recording recording = record(arm);
+  std::size_t spikes = 0;
+  for (TestRun& run : recording.runs) {
+    for (std::size_t i = 20; i + 10 < run.position.size(); i += 23, ++spikes) {
+      run.position[i] += i % 2 == 0 ? 30.0 : -30.0;
+    }
+  }
+  const auto prepared = prepare(recording);
+  const auto clean = prepare(record(arm));
+  ASSERT_TRUE(prepared && clean);
+  EXPECT_NE(find(prepared->diagnostics, "outliers"), nullptr);
+  std::size_t dropped = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const PreparedRun& run = prepared->runs[k];
+    dropped += clean->runs[k].run.time.size() - run.run.time.size();
+    EXPECT_TRUE(run.moved);
+    for (const double position : run.run.position) {
+      EXPECT_LT(std::abs(position), 10.0);
+    }
+  }
+  EXPECT_EQ(dropped, spikes);
+}
+
+// 5 V, at most, of a command that goes on to 8 V: the log holds the command.
+TEST(Prepare, VoltagesThatTheMotorsDoNotGetAreLimited) {
+  flyball::CharacterizationOptions options =
+      scenarios::session(scenarios::mechanisms.at(flywheel), 3);
+  options.ramp_rate = 0.5;
+  options.ramp_limit = 5.0;
+  options.step_voltage = 5.0;
+  options.step_duration = 3.0;
+  Recording recording = flyball::record_characterization(options).value();
+  for (TestRun& run : recording.runs) {
+    const double sign = is_forward(run.kind) ? 1.0 : -1.0;
+    // Held at 5 V for 6 s more, while the command rises.
+    std::size_t top = 0;
+    for (std::size_t i = 0; i < run.voltage.size(); ++i) {
+      top = sign * run.voltage[i] > 4.9 ? i : top;
+    }
+    if (is_quasistatic(run.kind)) {
+      run.time.resize(top);
+      run.voltage.resize(top);
+      run.position.resize(top);
+      run.velocity.resize(top);
+      const double time = run.time.back();
+      const double position = run.position.back();
+      const double velocity = run.velocity.back();
+      const auto& truth = scenarios::mechanisms.at(flywheel);
+      const double end = sign * (5.0 - truth.kS) / truth.kV;
+      const double tau = truth.kA / truth.kV;
+      for (int k = 1; k <= 1200; ++k) {
+        const double t = 5e-3 * k;
+        const double left = std::exp(-t / tau);
+        run.time.push_back(time + t);
+        run.voltage.push_back(sign * (5.0 + 0.5 * t));
+        run.velocity.push_back(end + (velocity - end) * left);
+        run.position.push_back(position + end * t + (velocity - end) * tau * (1.0 - left));
+      }
+    } else {
+      for (double& volts : run.voltage) {
+        volts *= sign * volts > 2.5 ? 1.6 : 1.0;
+      }
+    }
+  }
+  const auto prepared = prepare(recording);
+  ASSERT_TRUE(prepared);
+  ASSERT_NE(find(prepared->diagnostics, "saturated"), nullptr);
+  double largest = 0.0;
+  for (const PreparedRun& run : prepared->runs) {
+    for (const double volts : run.run.voltage) {
+      largest = std::max(largest, std::abs(volts));
+    }
+  }
+  EXPECT_NEAR(largest, 5.0, 0.1);
+  // A ramp that is followed to its end is not limited.
+  for (const std::size_t mechanism : {flywheel, elevator, arm}) {
+    EXPECT_EQ(find(prepare(record(mechanism))->diagnostics, "saturated"), nullptr);
+  }
+}
+
 }  // namespace

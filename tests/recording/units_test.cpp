@@ -203,6 +203,43 @@ TEST(Units, TheVoltageCanBeScaled) {
   EXPECT_NEAR(loaded->recording.runs.back().voltage.back(), -5.0, 1e-12);
 }
 
+TEST(Units, AVoltageMayBeInMillivolts) {
+  for (const auto& [name, unit] :
+       {std::pair{"voltage_mV", ""}, std::pair{"Voltage (mV)", ""},
+        std::pair{"appliedVoltageMillivolts", ""}, std::pair{"voltage", "mV"}}) {
+    Log log = log_of("positionRad", "velocity", 1.0, 1.0);
+    log.signals[0].name = name;
+    log.signals[0].unit = unit;
+    for (double& volts : log.signals[0].value) {
+      volts *= 1000.0;
+    }
+    const auto loaded = recording_from_log(log, {.mechanism = MechanismKind::arm});
+    ASSERT_TRUE(loaded) << name << to_string(loaded.error());
+    EXPECT_NEAR(loaded->recording.runs.back().voltage.back(), -5.0, 1e-12) << name;
+    // What is said overrules it.
+    const auto said =
+        recording_from_log(log, {.mechanism = MechanismKind::arm, .voltage_scale = 2e-3});
+    ASSERT_TRUE(said);
+    EXPECT_NEAR(said->recording.runs.back().voltage.back(), -10.0, 1e-12) << name;
+  }
+}
+
+TEST(Units, AnEncodersTicksAreAskedFor) {
+  const Log log = log_of("position (ticks)", "velocity", two_pi / 2048.0, two_pi / 204.8);
+  const auto refused = gain_of(log, {.mechanism = MechanismKind::flywheel});
+  ASSERT_FALSE(refused);
+  EXPECT_TRUE(refused.error().is(RecordingError::unit_unknown));
+  EXPECT_NE(to_string(refused.error()).find("ticks of an encoder"), std::string::npos);
+  LogSelection selection;
+  selection.mechanism = MechanismKind::flywheel;
+  selection.unit = "rotations";
+  selection.scale = 1.0 / 2048.0;
+  selection.no_velocity = true;
+  const auto said = gain_of(log, selection);
+  ASSERT_TRUE(said) << to_string(said.error());
+  EXPECT_NEAR(said->position, 1.0, 1e-9);
+}
+
 TEST(Units, WhatIsNoVoltageIsToldOrRefused) {
   const auto scaled = [](double factor, double offset) {
     Log log = log_of("positionRad", "velocity", 1.0, 1.0);

@@ -152,7 +152,8 @@ std::vector<Value> gain_row(const std::string& name, const GainEstimate& gain,
     row.emplace_back(interval_text(gain));
   } else {
     row.emplace_back("not determined", Tone::caution);
-    row.emplace_back("below " + number(gain.upper_bound, 3), Tone::caution);
+    row.emplace_back(std::isfinite(gain.upper_bound) ? "below " + number(gain.upper_bound, 3) : "",
+                     Tone::caution);
   }
   row.emplace_back(unit);
   row.emplace_back(has_one_step ? number(one_step, 4) : "", Tone::quiet);
