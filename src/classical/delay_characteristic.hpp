@@ -8,6 +8,10 @@
 /// The equation of which the poles of a system with dead time are the zeros.
 namespace flyball::classical::detail {
 
+/// A gain of jumps round a loop without a state, |L(∞)| behind dead time, from which on infinitely
+/// many poles lie right of the axis or come as near to it as one likes: 1 but for rounding.
+inline constexpr double endless_from = 1.0 - 1e-12;
+
 /// The characteristic matrix of the loops alone.
 class Characteristic {
  public:

@@ -33,6 +33,8 @@ constexpr double pi = std::numbers::pi;
 constexpr double closest = 1e-13;
 /// Of the disk's radius, how far the ends of an interval are from its middle.
 constexpr double share = 0.25;
+/// The same where L bends little enough that a larger disk tells more of its slope.
+constexpr double smaller_share = 1.0 / 256.0;
 
 struct Step {
   double from = 0.0;
@@ -51,6 +53,28 @@ struct Step {
 DelayBall around(const DelayBounds& bounds, const Step& step) {
   return bounds.around(step.middle(), step.half() / share);
 }
+
+/// L in the middle of a step, its slope along the axis, and what both move by on it.
+struct Moves {
+  Complex L;
+  Complex slope;
+  double off = infinity;
+  double bend = infinity;
+
+  Moves(const DelayBounds& bounds, const Step& step, double part) {
+    const DelayBall ball = bounds.around(step.middle(), step.half() / part);
+    L = ball.value(0, 0);
+    slope = ball.slope(0, 0) * Complex(0.0, 1.0);
+    off = ball.bound(0, 0) * part;
+    bend = off / step.half() * (1.0 / ((1.0 - part) * (1.0 - part)) - 1.0);
+  }
+  /// Whether a part of L' conj(L) keeps its sign.
+  [[nodiscard]] bool keeps(double (*of)(Complex)) const {
+    const double changed = bend * (std::abs(L) + off) + std::abs(slope) * off;
+    return std::isfinite(off) && off < 0.5 * std::abs(L) &&
+           std::abs(of(slope * std::conj(L))) > changed;
+  }
+};
 
 Expected<void> check_single(const DelaySystem& loop, std::string_view where) {
   if (loop.inputs() != 1 || loop.outputs() != 1) {
@@ -94,20 +118,15 @@ std::optional<std::vector<double>> zeros(const DelaySystem& loop, const DelayBou
     }
     const Step step = pending.back();
     pending.pop_back();
-    const DelayBall ball = around(bounds, step);
-    const Complex L = ball.value(0, 0);
-    const Complex slope = ball.slope(0, 0) * Complex(0.0, 1.0);
-    const double bound = ball.bound(0, 0);
-    const double off = bound * share;
-    if (std::isfinite(off) && !crossing.possible(L, off)) {
+    const Moves moves(bounds, step, share);
+    if (std::isfinite(moves.off) && !crossing.possible(moves.L, moves.off)) {
       continue;
     }
-    // Re or Im of L' conj(L), against what both can change by.
-    const double bend = bound * share / step.half() * (1.0 / ((1.0 - share) * (1.0 - share)) - 1.0);
-    const double changed = bend * (std::abs(L) + off) + std::abs(slope) * off;
-    const bool monotone = std::isfinite(off) && off < 0.5 * std::abs(L) &&
-                          std::abs(crossing.part(slope * std::conj(L))) > changed;
-    if (monotone) {
+    const auto keeps = [&](double part) { return Moves(bounds, step, part).keeps(crossing.part); };
+    // Of a step far below every root the disk may reach up to those.
+    const double least_share = step.half() / (0.1 * bounds.slowest());
+    if (moves.keeps(crossing.part) || keeps(smaller_share) ||
+        (least_share < smaller_share && keeps(least_share))) {
       const double at_start = value(step.from);
       const double at_end = value(step.to);
       if ((at_start > 0.0) != (at_end > 0.0)) {
@@ -119,7 +138,8 @@ std::optional<std::vector<double>> zeros(const DelaySystem& loop, const DelayBou
     }
     if (step.is_short()) {
       // It touches zero, or there is a pole or zero of L on the axis, which is no crossing.
-      if (std::isfinite(off) && off < 0.1 * std::abs(L) && std::abs(crossing.value(L)) < 1e-9) {
+      if (std::isfinite(moves.off) && moves.off < 0.1 * std::abs(moves.L) &&
+          std::abs(crossing.value(moves.L)) < 1e-9) {
         found.push_back(step.middle());
       }
       continue;
@@ -144,6 +164,11 @@ double lowest(const DelaySystem& loop, const DelayBounds& bounds) {
   if (std::isfinite(integrators) && integrators != 0.0 && here > 0.0 &&
       (here < 1.0) == (integrators > 0.0)) {
     from *= 0.1 * std::pow(here, 1.0 / integrators);
+  }
+  // What is 1 at rest leaves it as a square, which is rounding at first.
+  while (std::abs(std::log(std::abs(loop.response(from)(0, 0)))) < 1e-8 &&
+         from < 1e-3 * bounds.slowest()) {
+    from *= 2.0;
   }
   return std::max(from, 1e-290);
 }
@@ -277,7 +302,7 @@ Expected<LoopMargins> loop_margins(const DelaySystem& loop) {
   const auto places = zeros(loop, bounds, {from, fastest}, phase_crossing);
   if (!unit_gain || !places) {
     return refusal(SystemError::no_convergence, where,
-                   !unit_gain ? "gain crossings" : "phase crossings")
+                   !unit_gain ? "the list of gain crossings" : "the list of phase crossings")
         .got("without end: the loop stays where it crosses, or crosses very often");
   }
   double further = infinity;
@@ -346,7 +371,8 @@ Expected<std::optional<double>> bandwidth(const DelaySystem& system, double fact
       scaled, bounds, {lowest(scaled, bounds), std::isfinite(end) ? end : 10.0 * bounds.fastest()},
       gain_crossing);
   if (!crossings) {
-    return refusal(SystemError::no_convergence, where, "gain crossings").got("without end");
+    return refusal(SystemError::no_convergence, where, "the list of gain crossings")
+        .got("without end");
   }
   for (const double w : *crossings) {
     if (falls(w)) {

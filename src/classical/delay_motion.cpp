@@ -266,6 +266,11 @@ Expected<void> Motion::cross(double until, long& steps) {
       patience_ = std::min(2 * patience_, 64);
       accepted_ = 0;
       if (!(wanted_ > 1e-14 * (end_ + step_))) {
+        if (x_.allFinite() && (x_.size() == 0 || x_.cwiseAbs().maxCoeff() < 1e150)) {
+          return refusal(SystemError::no_convergence, "response", "the motion")
+              .got(flyball::detail::format("not resolved beyond {} s", t_))
+              .hint("ask for a shorter time");
+        }
         return refusal(ArgumentError::not_finite, "response", "the response")
             .got("beyond the largest double")
             .hint("ask for a shorter time");
@@ -306,12 +311,15 @@ bool Motion::take_step(double length, double end) {
       product(MatrixXd(drive.topRows(m).transpose()), form_.D21.transpose()) +
       product(MatrixXd(drive.bottomRows(k).transpose()), form_.D22.transpose());
   const MatrixXd z_modes = product(collocation_.modes, z);
-  // What rounding leaves of larger terms is no coefficient.
-  const auto resolved = [](const MatrixXd& modes, const MatrixXd& values, const VectorXd& largest,
-                           const VectorXd& terms) {
+  // What rounding leaves of larger terms is no coefficient, and what jumps round a loop without a
+  // state is rounded anew each time.
+  const bool jumps = k > 0 && !form_.D22.isZero(0.0);
+  const double bound = tolerance * (jumps ? 1.0 + t_ / shortest_ : 1.0);
+  const auto resolved = [bound](const MatrixXd& modes, const MatrixXd& values,
+                                const VectorXd& largest, const VectorXd& terms) {
     for (Index j = 0; j < modes.cols(); ++j) {
       const double size = std::max(largest(j), values.col(j).cwiseAbs().maxCoeff());
-      if (!(modes.col(j).tail(2).cwiseAbs().maxCoeff() <= tolerance * size + 1e-14 * terms(j))) {
+      if (!(modes.col(j).tail(2).cwiseAbs().maxCoeff() <= bound * size + 1e-14 * terms(j))) {
         return false;
       }
     }

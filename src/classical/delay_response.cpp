@@ -110,15 +110,22 @@ Expected<ResponseTimes> chosen(const DelaySystem& system,
         [&](const ModalAnalysis& modes) { return response_times(modes, states.period); });
   }
   const double late = system.has_delay() ? system.delays().sum() : 0.0;
-  FLYBALL_TRY(const auto rational,
-              system.has_delay_in_loop()
-                  ? system.pade(5)
-                  : Expected<ContinuousSystem<>>(ContinuousSystem<>{
-                        system.form().A, system.form().B1, system.form().C1, system.form().D11}));
+  auto rational =
+      system.has_delay_in_loop()
+          ? system.pade(5)
+          : Expected<ContinuousSystem<>>(ContinuousSystem<>{system.form().A, system.form().B1,
+                                                            system.form().C1, system.form().D11});
+  // It is -1 at infinity, one of even order 1: a loop of jumps may be singular with either.
+  if (auto even = system.pade(4); even && system.has_delay_in_loop() &&
+                                  (!rational || even->A.norm() < 0.01 * rational->A.norm())) {
+    rational = std::move(even);
+  }
   ResponseTimes found{Time(0.0), 601};
   double end = late > 0.0 ? late : 1.0;
-  if (rational.A.size() > 0) {
-    FLYBALL_TRY(const auto modes, analyze_modes(rational));
+  if (!rational) {
+    end = 20.0 * late;
+  } else if (rational->A.size() > 0) {
+    FLYBALL_TRY(const auto modes, analyze_modes(*rational));
     const ResponseTimes own = response_times(modes);
     end = own.step.si() * static_cast<double>(own.samples - 1) + late;
     found.samples = own.samples;

@@ -357,8 +357,8 @@ Expected<ContinuousSystem<>> DelaySystem::to_continuous() const {
         .expected("continuous");
   }
   if (has_delay()) {
-    return refusal(TransferError::delay_in_loop, noun, "the delays")
-        .got(flyball::detail::format("up to {} s", delays().maxCoeff()))
+    return refusal(TransferError::delay_in_loop, noun, "the longest delay")
+        .got(flyball::detail::format("{} s", delays().maxCoeff()))
         .expected("none, or a rational approximation of them (`pade`)");
   }
   return ContinuousSystem<>{form_.A, form_.B1, form_.C1, form_.D11};

@@ -296,8 +296,8 @@ Expected<FrequencyGrid> frequency_grid(const FrequencyResponse& response,
     std::vector<double> middles;
     for (const Interval& interval : intervals) {
       if (interval.middle < 0) {
-        middles.push_back(
-            std::sqrt(samples.frequency(interval.from) * samples.frequency(interval.to)));
+        middles.push_back(std::sqrt(samples.frequency(interval.from)) *
+                          std::sqrt(samples.frequency(interval.to)));
       }
     }
     if (middles.empty()) {

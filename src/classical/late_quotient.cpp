@@ -296,7 +296,7 @@ Expected<void> take_roots(const Polynomial& p, Index times,
                           std::vector<std::complex<double>>& all) {
   const auto found = roots(p);
   if (!found) {
-    return refusal(SystemError::no_convergence, where, "the poles").got("not found");
+    return refusal(SystemError::no_convergence, where, "a pole").got("not found");
   }
   for (const MultipleRoot& root : grouped(*found, p)) {
     all.insert(all.end(), static_cast<std::size_t>(root.times * times), root.at);

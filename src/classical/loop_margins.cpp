@@ -9,6 +9,7 @@
 #include <flyball/math/search/roots.hpp>
 #include <flyball/systems/system_error.hpp>
 
+#include "classical/delay_characteristic.hpp"
 #include "classical/factors.hpp"
 #include "classical/loop_peaks.hpp"
 #include "classical/polynomial.hpp"
@@ -32,7 +33,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double pi = std::numbers::pi;
 
 tl::unexpected<Error> no_convergence() {
-  return refusal(SystemError::no_convergence, "margins", "a polynomial's roots")
+  return refusal(SystemError::no_convergence, "margins", "a root of a polynomial")
       .got("not found: the iteration for the eigenvalues of its companion matrix did not end");
 }
 
@@ -78,9 +79,25 @@ class Border {
     num_ = detail::polynomial(loop.num());
     den_ = detail::polynomial(loop.den());
     if (!loop.period()) {
-      unit_ = detail::unit_of(loop.den());
-      detail::change_unit(num_, unit_);
-      detail::change_unit(den_, unit_);
+      use_unit(detail::unit_of(loop.den()));
+      // Where squares would leave the doubles' range: the closed loop's unit, in which what is too
+      // slow to be told from 0 is at 0.
+      constexpr double range = 1e140;
+      if (largest(num_) > range * largest(den_) || spread() > range) {
+        num_ = detail::polynomial(loop.num());
+        den_ = detail::polynomial(loop.den());
+        VectorXd sum = loop.den().cwiseAbs();
+        sum.tail(loop.num().size()) += loop.num().cwiseAbs();
+        use_unit(detail::unit_of(sum));
+        const double least = std::max(largest(num_), largest(den_)) / range;
+        for (Polynomial* p : {&num_, &den_}) {
+          for (Index i = 1; i < p->rows(); ++i) {
+            if (std::abs(p->hi(i, 0)) < least) {
+              p->hi(i, 0) = p->lo(i, 0) = 0.0;
+            }
+          }
+        }
+      }
     }
     // Squares of the coefficients are formed, of which none may leave the doubles' range.
     const int size = std::ilogb(den_.hi.cwiseAbs().maxCoeff());
@@ -98,6 +115,25 @@ class Border {
     }
     n_ = detail::on_the_axis(num_);
     d_ = detail::on_the_axis(den_);
+  }
+
+  void use_unit(int unit) {
+    unit_ = unit;
+    detail::change_unit(num_, unit);
+    detail::change_unit(den_, unit);
+  }
+  [[nodiscard]] static double largest(const Polynomial& p) { return p.hi.cwiseAbs().maxCoeff(); }
+  /// The largest coefficient over the smallest that is not zero.
+  [[nodiscard]] double spread() const {
+    double most = 1.0;
+    for (const Polynomial* p : {&num_, &den_}) {
+      for (Index i = 0; i < p->rows(); ++i) {
+        if (const double size = std::abs(p->hi(i, 0)); size > 0.0) {
+          most = std::max(most, largest(den_) / size);
+        }
+      }
+    }
+    return most;
   }
 
   [[nodiscard]] const Polynomial& num() const { return num_; }
@@ -391,8 +427,8 @@ Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
     further = std::min(further, ahead * pi / 180.0 / w);
   }
   const double last = std::abs(at_infinity(loop));
-  if (last >= 1.0 - 1e-14 && !loop.period()) {
-    // Behind a delay, |L(∞)| = e^{-σT} tells where infinitely many poles are.
+  if (last >= detail::endless_from && !loop.period()) {
+    // Behind a delay infinitely many poles are near σ, e^{σT} = |L(∞)|.
     unstable = border.delay() > 0.0 ? infinity : unstable;
     further = 0.0;
   } else if (last >= 1.0 - 1e-14) {
@@ -432,6 +468,9 @@ Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
     if (!margins.gain_margin || off(crossing.gain_margin) < off(*margins.gain_margin)) {
       margins.gain_margin = crossing.gain_margin;
     }
+  }
+  if (const double end = at_infinity(loop); end != 0.0 && !loop.period() && border.delay() > 0.0) {
+    detail::approach(1.0 / std::abs(end), margins);
   }
   for (const GainCrossing& crossing : margins.gain_crossings) {
     if (!margins.phase_margin ||

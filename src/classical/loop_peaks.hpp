@@ -16,6 +16,10 @@ struct LoopPeaks {
 /// @param response  L, whose factors are known. @errors As `frequency_grid`.
 [[nodiscard]] Expected<LoopPeaks> loop_peaks(const FrequencyResponse& response);
 
+/// Takes into account that L(jω) is near -1/factor for ever, as a direct path behind dead time is:
+/// the gain margin is the factor if none is nearer to one.
+void approach(double factor, LoopMargins& margins);
+
 /// `loop_margins` of a response, and where the disk margin is found.
 struct WholeMargins {
   LoopMargins margins;

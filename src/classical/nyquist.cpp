@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "classical/delay_characteristic.hpp"
 #include "classical/factors.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
@@ -112,7 +113,7 @@ class Contour {
     if (period_) {
       return true;
     }
-    if (factors_.delay > 0.0 && std::abs(direct) >= 1.0) {
+    if (factors_.delay > 0.0 && std::abs(direct) >= detail::endless_from) {
       return false;
     }
     double largest = 0.0;

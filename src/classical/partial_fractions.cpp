@@ -279,7 +279,7 @@ Expected<PartialFractions> partial_fractions(const VectorXd& num, const VectorXd
   const auto zeros = detail::roots(detail::polynomial(n));
   const auto poles = detail::roots(detail::polynomial(d));
   if (!zeros || !poles) {
-    return refusal(SystemError::no_convergence, where, zeros ? "the poles" : "the zeros")
+    return refusal(SystemError::no_convergence, where, zeros ? "a pole" : "a zero")
         .got("not found: the iteration for the eigenvalues of the companion matrix did not end");
   }
   PartialFractions found{quotient_of(n, d), {}};

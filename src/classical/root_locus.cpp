@@ -340,7 +340,7 @@ Expected<LocusLoop> loop_of(const ContinuousSystem<>& system, std::optional<Time
   const Eigen::MatrixXd closed = system.A - system.B * feed / gain;
   const VectorXcd all = flyball::detail::eigenvalues_of(closed);
   if (!all.allFinite()) {
-    return refusal(SystemError::no_convergence, where, "the zeros").got("not found");
+    return refusal(SystemError::no_convergence, where, "a zero").got("not found");
   }
   // `excess` of them are the integrators y … y^(excess - 1), at 0 with rounding: the ones whose
   // left vectors are C, CA, …: taken out by deflation on their complement.
@@ -359,7 +359,7 @@ Expected<LocusLoop> loop_of(const ContinuousSystem<>& system, std::optional<Time
   const VectorXcd zeros =
       n > excess ? flyball::detail::eigenvalues_of(inner) : VectorXcd(VectorXcd::Zero(0));
   if (!zeros.allFinite()) {
-    return refusal(SystemError::no_convergence, where, "the zeros").got("not found");
+    return refusal(SystemError::no_convergence, where, "a zero").got("not found");
   }
   return detail::locus_loop(zeros, poles, gain, period);
 }

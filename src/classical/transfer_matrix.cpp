@@ -83,7 +83,7 @@ Expected<ZeroPoleGain> channel(const ContinuousSystem<>& s, Index output, Index 
     // Nothing passes, or an iteration did not end.
     FLYBALL_TRY(const VectorXcd values, poles(part));
     if (!values.allFinite()) {
-      return refusal(SystemError::no_convergence, noun, "the poles").got("not found");
+      return refusal(SystemError::no_convergence, noun, "a pole").got("not found");
     }
     return ZeroPoleGain::create(VectorXcd(0), VectorXcd(0), 0.0, period);
   }

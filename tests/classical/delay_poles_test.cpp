@@ -5,8 +5,11 @@
 
 #include <gtest/gtest.h>
 
+#include <flyball/classical/delay_margins.hpp>
 #include <flyball/classical/delay_response.hpp>
 #include <flyball/classical/loop_margins.hpp>
+#include <flyball/classical/response_margins.hpp>
+#include <flyball/classical/step_metrics.hpp>
 #include <flyball/core/random.hpp>
 
 #include "classical/transfer_cases.hpp"
@@ -103,6 +106,68 @@ TEST(DelayPoles, NeutralLoops) {
     const auto L = transfer({gain, 3.0 * gain}, {1.0, 1.0}, 1.0);
     EXPECT_EQ(rightmost_poles(closed(L)).value().unstable, loop_margins(L).value().unstable_poles)
         << gain;
+  }
+}
+
+// A chain of poles that tends to the axis, from the left, on it or from the right, is no stability:
+// all ways of asking agree, and where the chain stays left of it, too.
+TEST(DelayPoles, DirectPathsBehindDeadTimeByAllWays) {
+  const auto endless = std::numeric_limits<int>::max();
+  struct Case {
+    VectorXd num;
+    VectorXd den;
+    int unstable;
+  };
+  const auto v = [](double a, double b) { return VectorXd(Eigen::Vector2d(a, b)); };
+  for (const Case& c :
+       {Case{v(1.0, 1.0), v(1.0, 2.0), endless}, Case{v(1.0, 1.0), v(1.0, 0.5), endless},
+        Case{v(1.0, 1.0), v(1.0, 1.0), endless}, Case{v(2.0, 1.0), v(1.0, 1.0), endless},
+        Case{v(-1.0, 1.0), v(1.0, 0.0), endless}, Case{v(0.99, 0.99), v(1.0, 0.5), 2},
+        Case{v(0.9, 0.9), v(1.0, 2.0), 0}, Case{v(-0.9, 0.9), v(1.0, 2.0), 0}}) {
+    const auto L = TransferFunction::create(c.num, c.den, std::nullopt, Time(1.0)).value();
+    const auto margins = loop_margins(L).value();
+    const auto found = rightmost_poles(closed(L)).value();
+    EXPECT_EQ(margins.unstable_poles, c.unstable);
+    EXPECT_EQ(found.unstable, c.unstable);
+    EXPECT_EQ(found.stable, c.unstable == 0);
+    EXPECT_EQ(margins.stable, c.unstable == 0);
+    // |L| = 1 at every frequency has no list of crossings.
+    const bool all_pass = c.num == c.den;
+    const auto by_system = loop_margins(system_of(L));
+    const auto by_factors = loop_margins(frequency_response(L).value());
+    ASSERT_TRUE(all_pass || (by_system && by_factors));
+    EXPECT_TRUE(all_pass || by_system->unstable_poles == c.unstable);
+    EXPECT_TRUE(all_pass || by_factors->stable == (c.unstable == 0));
+    const auto curve = nyquist(frequency_response(L).value()).value();
+    EXPECT_EQ(curve.closed_loop_unstable.value_or(endless), c.unstable);
+    const auto metrics = step_metrics(closed(L), 0, 0).value();
+    EXPECT_EQ(metrics.settling_time.has_value(), c.unstable == 0);
+    // |L| comes as near to |L(∞)| as one likes, with every phase.
+    const double last = std::abs(c.num(0) / c.den(0));
+    if (last == 1.0) {
+      EXPECT_TRUE(std::isinf(margins.sensitivity.value));
+      EXPECT_EQ(margins.gain_margin, 1.0);
+    } else {
+      EXPECT_GE(margins.sensitivity.value, 1.0 / std::abs(1.0 - last) * (1.0 - 1e-12));
+    }
+  }
+}
+
+// Long delays: hundreds of poles on the right, of which the rightmost are listed, and all counted.
+TEST(DelayPoles, HundredsOnTheRight) {
+  for (const auto& [gain, delay] :
+       {std::pair{100.0, 10.0}, {1000.0, 1.0}, {200.0, 1.0}, {60.0, 40.0}}) {
+    const auto L = transfer({gain}, {1.0, 1.0}, delay);
+    const auto found = rightmost_poles(closed(L)).value();
+    EXPECT_EQ(found.unstable, loop_margins(L).value().unstable_poles) << gain;
+    ASSERT_GE(found.poles.size(), 20);
+    for (const Complex& s : found.poles) {
+      EXPECT_LE(std::abs(1.0 + L.at(s).value()), 1e-9);
+    }
+    // s = W(gain e^τ τ e^{jπ})/τ - 1, of which the first is the rightmost.
+    const Complex w = (found.poles(0) + 1.0) * delay;
+    EXPECT_LE(std::abs(w * std::exp(w) + gain * delay * std::exp(delay)),
+              1e-9 * gain * delay * std::exp(delay));
   }
 }
 

@@ -32,12 +32,15 @@ struct LoopMargins {
   /// By frequency; of a loop with a delay those up to ten times its fastest pole or zero, the first
   /// thousand at most.
   std::vector<PhaseCrossing> phase_crossings{};
-  /// The gain margin nearest to one, as a ratio; none without a phase crossing.
+  /// The gain margin nearest to one, as a ratio, or 1/|L(∞)| that a direct path behind dead time
+  /// comes as near to as one likes; none without a phase crossing.
   std::optional<double> gain_margin{};
   /// deg, that nearest to zero; none without a gain crossing.
   std::optional<double> phase_margin{};
-  bool stable = false;  ///< The closed loop: no pole in the right half-plane or on its border.
-  int unstable_poles = 0;
+  /// The closed loop: no pole in the right half-plane or on its border, and no chain of them that
+  /// tends to it (`rightmost_poles`).
+  bool stable = false;
+  int unstable_poles = 0;  ///< The largest integer: infinitely many.
   /// s, further delay that a stable loop bears; ∞ if any, 0 of an unstable one.
   double delay_margin = 0.0;
   /// α = 2/‖S - T‖∞ of a stable loop; 0 of an unstable one. This and the peaks are NaN where the

@@ -59,7 +59,7 @@ Value stability_of(const LoopFindings& loop) {
     return {"stable", Tone::good};
   }
   if (loop.margins->unstable_poles == std::numeric_limits<int>::max()) {
-    return {"unstable, infinitely many poles not left of the axis", Tone::bad};
+    return {"unstable, infinitely many poles: |L(∞)| ≥ 1 behind dead time", Tone::bad};
   }
   return {fmt::format("unstable, {} {}",
                       text::count(static_cast<std::size_t>(loop.margins->unstable_poles), "pole"),
@@ -498,7 +498,11 @@ void write_margins(JsonWriter& json, const LoopFindings& loop) {
   const LoopMargins& m = *loop.margins;
   json.object("margins", [&] {
     json.add("stable", m.stable);
-    json.add("unstable_poles", m.unstable_poles);
+    if (m.unstable_poles == std::numeric_limits<int>::max()) {
+      json.add("unstable_poles", std::numeric_limits<double>::infinity());
+    } else {
+      json.add("unstable_poles", m.unstable_poles);
+    }
     json.add("gain_margin", m.gain_margin);
     json.add("phase_margin_deg", m.phase_margin);
     json.add({{"delay_margin", m.delay_margin}, {"disk_margin", m.disk_margin}});
