@@ -64,7 +64,7 @@ class JudgedPieces : public detail::OutputPieces {
       : output_(output), final_value_(final_value), judge_(band, rounding) {}
 
   void add(double begin, double length, const MatrixXd& modes) override {
-    const Piece y{modes.col(output_) / final_value_};
+    const Piece y{modes.col(output_) / (final_value_ == 0.0 ? 1.0 : final_value_)};
     // A polynomial that is resolved turns between neighbours of these places once at most.
     constexpr int parts = 24;
     double from = -1.0;
@@ -92,6 +92,9 @@ class JudgedPieces : public detail::OutputPieces {
     const double y1 = y(to);
     judge_.point(time(from), y0);
     judge_.point(time(to), y1);
+    if (final_value_ == 0.0) {
+      return;
+    }
     const auto place_of = [&](double level) {
       return time(crossing([&](double place) { return y(place) - level; }, from, to));
     };
@@ -121,7 +124,7 @@ Expected<StepMetrics> of_samples(const DelaySystem& system, Index output, Index 
   FLYBALL_TRY(const auto response, step_response(system, input, ResponseTimes{Time(T), samples}));
   Judge judge(band, rounding);
   for (Index k = 0; k < samples; ++k) {
-    const double y = response.y(k, output) / final_value;
+    const double y = response.y(k, output) / (final_value == 0.0 ? 1.0 : final_value);
     judge.point(response.time(k), y);
     for (const double level : {0.1, 0.9}) {
       if (y >= level && judge.waits_for(level)) {
@@ -131,6 +134,9 @@ Expected<StepMetrics> of_samples(const DelaySystem& system, Index output, Index 
     if (std::abs(y - 1.0) > band) {
       judge.outside_until(response.time(k) + T);
     }
+  }
+  if (final_value == 0.0) {
+    return judge.of_zero(0.0);
   }
   StepMetrics metrics = judge.metrics(final_value, 0.0);
   if (static_cast<double>(samples) * T < end) {
@@ -163,9 +169,6 @@ Expected<StepMetrics> step_metrics(const DelaySystem& system, Index output, Inde
                                           ? std::numeric_limits<double>::quiet_NaN()
                                           : final_value};
   }
-  if (final_value == 0.0) {
-    return StepMetrics{};
-  }
   constexpr double time_constants = 36.0;  // e⁻³⁶ is rounding
   const double late = system.has_delay() ? system.delays().sum() : 0.0;
   if (system.period()) {
@@ -186,7 +189,8 @@ Expected<StepMetrics> step_metrics(const DelaySystem& system, Index output, Inde
   JudgedPieces pieces(output, final_value, band);
   FLYBALL_CHECK(detail::Motion(system, detail::Drive{u}, end, 2, &pieces)
                     .run(VectorXd::Zero(system.states())));
-  return pieces.judge().metrics(final_value, 0.0);
+  return final_value == 0.0 ? pieces.judge().of_zero(0.0)
+                            : pieces.judge().metrics(final_value, 0.0);
 }
 
 }  // namespace flyball::classical

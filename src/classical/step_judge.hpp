@@ -19,7 +19,10 @@ class Judge {
       peak_ = y;
       peak_time_ = time;
     }
-    least_ = std::min(least_, y);
+    if (y < least_) {
+      least_ = y;
+      least_time_ = time;
+    }
   }
   void reaches(double level, double time) {
     double& first = level == 0.1 ? ten_ : ninety_;
@@ -30,6 +33,19 @@ class Judge {
     return std::isnan(level == 0.1 ? ten_ : ninety_);
   }
   [[nodiscard]] double band() const { return band_; }
+
+  /// Of y itself, where it ends at zero.
+  [[nodiscard]] StepMetrics of_zero(double delay) const {
+    StepMetrics m;
+    const bool above = std::abs(peak_) >= std::abs(least_);
+    if (std::max(peak_, -least_) > 0.0) {
+      m.peak = above ? peak_ : least_;
+      m.peak_time = (above ? peak_time_ : least_time_) + delay;
+    } else {
+      m.peak = 0.0;
+    }
+    return m;
+  }
 
   [[nodiscard]] StepMetrics metrics(double final_value, double delay) const {
     StepMetrics m{.final_value = final_value};
@@ -53,6 +69,7 @@ class Judge {
   double peak_ = -std::numeric_limits<double>::infinity();
   double peak_time_ = 0.0;
   double least_ = 0.0;
+  double least_time_ = 0.0;
   double ten_ = std::numeric_limits<double>::quiet_NaN();
   double ninety_ = std::numeric_limits<double>::quiet_NaN();
   double settled_ = 0.0;

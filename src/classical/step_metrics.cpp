@@ -185,6 +185,7 @@ double crossing(const F& f, double h) {
 
 StepMetrics sampled(const TransferFunction& transfer, double final_value, double band,
                     double slowest) {
+  const double unit = final_value == 0.0 ? 1.0 : final_value;
   const ContinuousSystem<> s = transfer.to_state_space();
   const double T = transfer.period()->si();
   VectorXd x = VectorXd::Zero(s.A.rows());
@@ -193,7 +194,7 @@ StepMetrics sampled(const TransferFunction& transfer, double final_value, double
   const auto steps =
       static_cast<long>(std::min(5e5, 10.0 + 1.2 * periods + 2.0 * static_cast<double>(x.size())));
   for (long k = 0; k <= steps; ++k) {
-    const double y = (s.C.row(0).dot(x) + s.D(0, 0)) / final_value;
+    const double y = (s.C.row(0).dot(x) + s.D(0, 0)) / unit;
     const double t = static_cast<double>(k) * T;
     judge.point(t, y);
     for (const double level : {0.1, 0.9}) {
@@ -206,7 +207,8 @@ StepMetrics sampled(const TransferFunction& transfer, double final_value, double
     }
     x = (s.A * x + s.B).eval();
   }
-  return judge.metrics(final_value, transfer.delay());
+  return final_value == 0.0 ? judge.of_zero(transfer.delay())
+                            : judge.metrics(final_value, transfer.delay());
 }
 
 }  // namespace
@@ -225,8 +227,8 @@ Expected<StepMetrics> step_metrics(const TransferFunction& transfer, double band
   if (!stable || !std::isfinite(dc)) {
     return StepMetrics{.final_value = std::isfinite(dc) ? nan : dc};
   }
-  if (dc == 0.0) {
-    return StepMetrics{};
+  if (transfer.is_zero()) {
+    return StepMetrics{.peak = 0.0};
   }
   if (discrete) {
     double slowest = 0.0;
@@ -249,10 +251,14 @@ Expected<StepMetrics> step_metrics(const TransferFunction& transfer, double band
     slowest = std::min(slowest, -pole.real());
   }
   const double end = 36.0 / slowest;
+  // In units of the final value, or as it is where that is zero.
+  const double unit = dc == 0.0 ? 1.0 : dc;
+  const double rest = dc == 0.0 ? 0.0 : 1.0;
+  const auto whole = [&] { return dc == 0.0 ? judge.of_zero(delay) : judge.metrics(dc, delay); };
   const auto now = [&] {
-    double y = 1.0;
+    double y = rest;
     for (const Part& part : parts) {
-      y += part.value() / dc;
+      y += part.value() / unit;
     }
     return y;
   };
@@ -272,8 +278,8 @@ Expected<StepMetrics> step_metrics(const TransferFunction& transfer, double band
   for (long point = 0; time < end; ++point) {
     if (point == most_points) {
       // What has stayed in the band for twelve of the slowest time constants does not leave it.
-      StepMetrics metrics = judge.metrics(dc, delay);
-      if (slowest * (time - (*metrics.settling_time - delay)) < 12.0) {
+      StepMetrics metrics = whole();
+      if (metrics.settling_time && slowest * (time - (*metrics.settling_time - delay)) < 12.0) {
         metrics.settling_time.reset();
       }
       return metrics;
@@ -299,12 +305,12 @@ Expected<StepMetrics> step_metrics(const TransferFunction& transfer, double band
       from[i] = parts[i].state();
     }
     const auto at = [&](double h) {
-      std::pair<double, double> y{1.0, 0.0};
+      std::pair<double, double> y{rest, 0.0};
       for (std::size_t i = 0; i < parts.size(); ++i) {
         if (!over[i]) {
           const auto [value, slope] = parts[i].after(from[i], h);
-          y.first += value / dc;
-          y.second += slope / dc;
+          y.first += value / unit;
+          y.second += slope / unit;
         }
       }
       return y;
@@ -328,6 +334,9 @@ Expected<StepMetrics> step_metrics(const TransferFunction& transfer, double band
     pieces[++last] = {step, after};
     judge.point(time + step, after);
     for (std::size_t i = 0; i < last; ++i) {
+      if (dc == 0.0) {
+        break;  // Nothing rises to it, and no band is a share of it.
+      }
       const auto [h0, y0] = pieces[i];
       const auto [h1, y1] = pieces[i + 1];
       const auto place = [&](double level) {
@@ -351,7 +360,7 @@ Expected<StepMetrics> step_metrics(const TransferFunction& transfer, double band
     before = after;
     time += step;
   }
-  return judge.metrics(dc, delay);
+  return whole();
 }
 
 }  // namespace flyball::classical

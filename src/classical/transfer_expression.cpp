@@ -90,6 +90,28 @@ Expected<Quotient> rational(const LateQuotient& value, std::string_view text) {
                                  whole));
 }
 
+/// The roots of factors, each on its own.
+Expected<Eigen::VectorXcd> roots_of(const Factors& factors, std::string_view name, bool discrete) {
+  std::vector<std::complex<double>> all;
+  for (const Factor& factor : factors) {
+    auto found = detail::roots(factor.p);
+    if (!found) {
+      return refusal(SystemError::no_convergence, where, name).got("not found");
+    }
+    detail::settle_on_border(*found, factor.p, discrete);
+    for (const detail::MultipleRoot& root : detail::grouped(*found, factor.p)) {
+      all.insert(all.end(), static_cast<std::size_t>(root.times * factor.times), root.at);
+    }
+  }
+  return Eigen::VectorXcd(
+      Eigen::Map<const Eigen::VectorXcd>(all.data(), static_cast<Index>(all.size())));
+}
+
+bool is_power(const Factors& factors) {
+  return std::any_of(factors.begin(), factors.end(),
+                     [](const Factor& factor) { return factor.times > 1; });
+}
+
 Expected<TransferFunction> finished(const LateQuotient& value, const std::optional<Time>& period,
                                     std::string_view text) {
   FLYBALL_TRY(const Quotient q, rational(value, text));
@@ -111,6 +133,14 @@ Expected<TransferFunction> finished(const LateQuotient& value, const std::option
   auto made = TransferFunction::create(num, den, period, Time(q.delay));
   if (!made) {
     return tl::unexpected(at_place(std::move(made).error(), whole));
+  }
+  // A factor that stands alone tells no more than its coefficients.
+  if (q.num.size() + q.den.size() > 2 || is_power(q.num) || is_power(q.den)) {
+    const auto zeros = roots_of(q.num, "a zero", period.has_value());
+    const auto poles = roots_of(q.den, "a pole", period.has_value());
+    if (zeros && poles) {
+      return made->with_roots(*zeros, *poles);
+    }
   }
   return made;
 }
@@ -181,22 +211,6 @@ Expected<LateQuotient> product_of(std::span<const std::string> texts,
   return whole;
 }
 
-/// The roots of factors, each on its own.
-Expected<Eigen::VectorXcd> roots_of(const Factors& factors, std::string_view name) {
-  std::vector<std::complex<double>> all;
-  for (const Factor& factor : factors) {
-    const auto found = detail::roots(factor.p);
-    if (!found) {
-      return refusal(SystemError::no_convergence, where, name).got("not found");
-    }
-    for (const detail::MultipleRoot& root : detail::grouped(*found, factor.p)) {
-      all.insert(all.end(), static_cast<std::size_t>(root.times * factor.times), root.at);
-    }
-  }
-  return Eigen::VectorXcd(
-      Eigen::Map<const Eigen::VectorXcd>(all.data(), static_cast<Index>(all.size())));
-}
-
 }  // namespace
 
 namespace {
@@ -225,8 +239,7 @@ Expected<TransferSystem> parse_transfer_system(std::span<const std::string> text
   const std::string text = written(texts);
   if (whole.is_rational()) {
     FLYBALL_TRY(const auto G, finished(whole, loop.period, text));
-    FLYBALL_TRY(auto made, TransferFunction::create(loop.gain * G.num(), G.den(), G.period(),
-                                                    Time(G.delay() + loop.delay.si())));
+    FLYBALL_TRY(auto made, G.scaled(loop.gain, loop.delay));
     return TransferSystem{std::move(made)};
   }
   auto made = detail::realised(whole, loop.gain, loop.delay.si());
@@ -240,8 +253,8 @@ Expected<ZeroPoleGain> parse_zero_pole_gain(std::span<const std::string> texts,
                                             std::optional<Time> period) {
   FLYBALL_TRY(const LateQuotient value, product_of(texts, period));
   FLYBALL_TRY(const Quotient whole, rational(value, written(texts)));
-  FLYBALL_TRY(const auto zeros, roots_of(whole.num, "the zeros"));
-  FLYBALL_TRY(const auto poles, roots_of(whole.den, "the poles"));
+  FLYBALL_TRY(const auto zeros, roots_of(whole.num, "a zero", period.has_value()));
+  FLYBALL_TRY(const auto poles, roots_of(whole.den, "a pole", period.has_value()));
   double gain = whole.value();
   for (const Factor& factor : whole.num) {
     gain *= std::pow(factor.p.hi(0, 0), static_cast<double>(factor.times));

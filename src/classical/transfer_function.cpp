@@ -161,14 +161,38 @@ Expected<TransferFunction> TransferFunction::from_zeros(const VectorXcd& zeros,
                                                         std::optional<Time> period, Time delay) {
   FLYBALL_TRY(const VectorXd num, from_roots(zeros, "zeros"));
   FLYBALL_TRY(const VectorXd den, from_roots(poles, "poles"));
-  return create(gain * num, den, period, delay);
+  return create(gain * num, den, period, delay).map([&](const TransferFunction& made) {
+    return made.with_roots(zeros, poles);
+  });
+}
+
+TransferFunction TransferFunction::with_roots(const VectorXcd& zeros,
+                                              const VectorXcd& poles) const {
+  TransferFunction same = *this;
+  if (!is_zero() && zeros.size() + 1 == num_.size() && poles.size() + 1 == den_.size()) {
+    same.zeros_ = zeros;
+    same.poles_ = poles;
+  }
+  return same;
+}
+
+Expected<TransferFunction> TransferFunction::scaled(double gain, Time further) const {
+  FLYBALL_CHECK(Checks("transfer function").finite(gain, "the gain"));
+  FLYBALL_TRY(const auto made, create(gain * num_, den_, period_, Time(delay_ + further.si())));
+  return zeros_ && poles_ ? made.with_roots(*zeros_, *poles_) : made;
 }
 
 Expected<VectorXcd> TransferFunction::zeros() const {
+  if (zeros_) {
+    return *zeros_;
+  }
   return is_zero() ? VectorXcd(0) : roots_of(num_, "zeros");
 }
 
 Expected<VectorXcd> TransferFunction::poles() const {
+  if (poles_) {
+    return *poles_;
+  }
   FLYBALL_TRY(VectorXcd found, roots_of(den_, "poles"));
   detail::settle_on_border(found, detail::polynomial(den_), period_.has_value());
   return found;
@@ -278,9 +302,23 @@ Expected<TransferFunction> series(const TransferFunction& first, const TransferF
   const auto multiply = [](const VectorXd& a, const VectorXd& b) {
     return VectorXd(detail::times(detail::polynomial(a), detail::polynomial(b)).rounded());
   };
-  return TransferFunction::create(multiply(first.num(), second.num()),
-                                  multiply(first.den(), second.den()), period,
-                                  Time(first.delay() + second.delay()));
+  FLYBALL_TRY(const auto product,
+              TransferFunction::create(multiply(first.num(), second.num()),
+                                       multiply(first.den(), second.den()), period,
+                                       Time(first.delay() + second.delay())));
+  if (!first.knows_roots() || !second.knows_roots()) {
+    return product;
+  }
+  FLYBALL_TRY(const VectorXcd first_zeros, first.zeros());
+  FLYBALL_TRY(const VectorXcd first_poles, first.poles());
+  FLYBALL_TRY(const VectorXcd second_zeros, second.zeros());
+  FLYBALL_TRY(const VectorXcd second_poles, second.poles());
+  const auto both = [](const VectorXcd& a, const VectorXcd& b) {
+    VectorXcd all(a.size() + b.size());
+    all << a, b;
+    return all;
+  };
+  return product.with_roots(both(first_zeros, second_zeros), both(first_poles, second_poles));
 }
 
 Expected<TransferFunction> parallel(const TransferFunction& first, const TransferFunction& second) {

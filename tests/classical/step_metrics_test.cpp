@@ -130,6 +130,8 @@ TEST(StepMetrics, WhatDoesNotSettle) {
   const StepMetrics washout = step_metrics(transfer({1.0, 0.0}, {1.0, 1.0})).value();
   EXPECT_EQ(washout.final_value, 0.0);
   EXPECT_FALSE(washout.overshoot.has_value());
+  EXPECT_NEAR(washout.peak.value(), 1.0, 1e-14);  // e^{-t}
+  EXPECT_EQ(washout.peak_time, 0.0);
   EXPECT_TRUE(
       step_metrics(transfer({1.0}, {1.0, 1.0}), 0.0).error().is(ArgumentError::out_of_range));
 }

@@ -17,8 +17,9 @@ struct StepMetrics {
   std::optional<double> settling_time{};
   std::optional<double> overshoot{};   ///< Share of the final value beyond it.
   std::optional<double> undershoot{};  ///< Share of the final value on the other side of zero.
-  std::optional<double> peak{};        ///< The value farthest in the final value's direction.
-  std::optional<double> peak_time{};   ///< s; absent where the final value is approached only.
+  /// The value farthest in the final value's direction; farthest from zero where that is zero.
+  std::optional<double> peak{};
+  std::optional<double> peak_time{};  ///< s; absent where the final value is approached only.
 };
 
 /// @param band  Half of it, as a share of the final value.

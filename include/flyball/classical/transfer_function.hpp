@@ -33,12 +33,20 @@ class TransferFunction {
                                                          std::optional<Time> period = std::nullopt,
                                                          Time delay = Time(0.0));
 
-  /// From zeros, poles and gain, k Π(s - zᵢ)/Π(s - pⱼ). @param zeros, poles  In pairs of
-  /// conjugates.
+  /// From zeros, poles and gain, k Π(s - zᵢ)/Π(s - pⱼ), which are kept as they are: `zeros` and
+  /// `poles` answer them. @param zeros, poles  In pairs of conjugates.
   /// @errors As `create`, and ArgumentError::malformed for one without its conjugate.
   [[nodiscard]] static Expected<TransferFunction> from_zeros(
       const Eigen::VectorXcd& zeros, const Eigen::VectorXcd& poles, double gain,
       std::optional<Time> period = std::nullopt, Time delay = Time(0.0));
+
+  /// The same, whose roots are known better than the coefficients tell: those of its factors.
+  /// @param zeros, poles  As many as the degrees, else they are not taken.
+  [[nodiscard]] TransferFunction with_roots(const Eigen::VectorXcd& zeros,
+                                            const Eigen::VectorXcd& poles) const;
+  /// The same times a gain and behind further dead time, of the same roots.
+  /// @errors ArgumentError::not_finite, out_of_range (a negative delay, one of no whole periods).
+  [[nodiscard]] Expected<TransferFunction> scaled(double gain, Time further = Time(0.0)) const;
 
   [[nodiscard]] const Eigen::VectorXd& num() const { return num_; }
   [[nodiscard]] const Eigen::VectorXd& den() const { return den_; }
@@ -51,10 +59,13 @@ class TransferFunction {
   /// Degree of the denominator less the numerator's.
   [[nodiscard]] Eigen::Index relative_degree() const { return den_.size() - num_.size(); }
 
-  /// In 31 digits, so that what is lost is what the coefficients do not tell. Those of a discrete
-  /// one are without the poles at z = 0 of its delay. @errors SystemError::no_convergence.
+  /// Those that it was made of, or of the coefficients in 31 digits, so that what is lost is what
+  /// those do not tell. Those of a discrete one are without the poles at z = 0 of its delay.
+  /// @errors SystemError::no_convergence.
   [[nodiscard]] Expected<Eigen::VectorXcd> zeros() const;
   [[nodiscard]] Expected<Eigen::VectorXcd> poles() const;
+  /// Whether they are those that it was made of.
+  [[nodiscard]] bool knows_roots() const { return poles_.has_value(); }
   /// Every pole left of the imaginary axis, or within the unit circle. @errors As `poles`.
   [[nodiscard]] Expected<bool> is_stable() const;
 
@@ -77,9 +88,13 @@ class TransferFunction {
   Eigen::VectorXd den_;
   std::optional<Time> period_;
   double delay_ = 0.0;
+  /// Where they are known.
+  std::optional<Eigen::VectorXcd> zeros_{};
+  std::optional<Eigen::VectorXcd> poles_{};
 };
 
-/// G₂G₁, nothing cancelled. @errors TransferError::period_mismatch. Source: book, section A.1.
+/// G₂G₁, nothing cancelled; roots that both know stay. @errors TransferError::period_mismatch.
+/// Source: book, section A.1.
 [[nodiscard]] Expected<TransferFunction> series(const TransferFunction& first,
                                                 const TransferFunction& second);
 /// G₁ + G₂. @errors As `series`, delay_in_loop for two of different delay. Source: section A.2.
