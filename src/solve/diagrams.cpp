@@ -16,7 +16,6 @@ namespace {
 
 using classical::Block;
 using classical::BlockDiagram;
-using classical::DelayForm;
 using classical::DelaySystem;
 using Eigen::MatrixXd;
 
@@ -92,16 +91,7 @@ Outcome solve_connect(const Problem& problem, JsonWriter& answer) {
     write_system(states, answer);
     answer.add("dt", system.period()->si());
   } else {
-    const DelayForm& f = system.form();
-    write_system(ContinuousSystem<>{f.A, f.B1, f.C1, f.D11}, answer);
-    if (system.has_delay()) {
-      answer.add("delays", f.delays);
-      answer.add("B_w", f.B2);
-      answer.add("C_z", f.C2);
-      answer.add("D_w", f.D12);
-      answer.add("D_z", f.D21);
-      answer.add("D_zw", f.D22);
-    }
+    write_delay_form(system, answer);
   }
   FLYBALL_TRY(const auto found, classical::rightmost_poles(system));
   answer.add("poles", found.poles);
@@ -136,16 +126,11 @@ std::vector<Kind> diagram_kinds() {
         texts("outputs", "p", "signals that are seen; \"-u\" turns the sign")},
        answered_system("n", "m", "p") +
            std::vector{
-               optional(number("dt", "s", "of a discrete one, whose dead times are states")),
-               optional(list("delays", "T", "s", "τ: w(t) = z(t - τ) beside x and u")),
-               optional(matrix("B_w", "n", "T", "dx/dt = A x + B u + B_w w")),
-               optional(matrix("C_z", "T", "n", "z = C_z x + D_z u + D_zw w")),
-               optional(matrix("D_w", "p", "T", "y = C x + D u + D_w w")),
-               optional(matrix("D_z", "T", "m", "how the inputs reach z")),
-               optional(matrix("D_zw", "T", "T", "how w reaches z")),
-               complex_list("poles", "s", "with dead time in a loop the rightmost"),
-               flag("stable", "whether all are where a stable system has them"),
-               texts("unused", "l", "signals that go nowhere")},
+               optional(number("dt", "s", "of a discrete one, whose dead times are states"))} +
+           delay_form_fields() +
+           std::vector{complex_list("poles", "s", "with dead time in a loop the rightmost"),
+                       flag("stable", "whether all are where a stable system has them"),
+                       texts("unused", "l", "signals that go nowhere")},
        R"({"blocks": [{"name": "C", "inputs": ["e"], "outputs": ["u"], "expr": "2 + 1/s"}, {"name": "G", "inputs": ["u"], "outputs": ["y"], "num": [1], "den": [1, 1]}], "sums": [{"output": "e", "terms": ["r", "-y"]}], "inputs": ["r"], "outputs": ["y", "u"]})",
        &solve_connect},
   };

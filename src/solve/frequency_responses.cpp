@@ -231,7 +231,7 @@ Outcome solve_sampled_margins(const Problem& problem, JsonWriter& answer) {
 
 /// What all loops have.
 void write_margins(const LoopMargins& margins, JsonWriter& answer) {
-  answer.add("unstable_poles", static_cast<double>(margins.unstable_poles));
+  answer.add("unstable_poles", count_of_poles(margins.unstable_poles));
   answer.list("gain_margins", margins.phase_crossings, [&](const classical::PhaseCrossing& at) {
     answer.object([&] { answer.add({{"w", at.frequency}, {"gm", at.gain_margin}}); });
   });
@@ -484,7 +484,7 @@ std::vector<Kind> frequency_response_kinds() {
         optional(number("full_disk_margin", "", "2/‖S - T‖∞, for factors that mix the channels")),
         optional(list("gain_crossovers", "g", "rad/s", "sampled: where the loop gain is 1")),
         optional(list("phase_crossovers", "f", "rad/s", "where it is real and negative")),
-        optional(number("unstable_poles", "", "of 1/(1 + L)")),
+        optional(unbounded(number("unstable_poles", "", "of 1/(1 + L)"))),
         optional(records("gain_margins", "w gm", "where L is negative: rad/s and 1/|L|")),
         optional(records("phase_margins", "w pm_deg", "where |L| = 1: rad/s, 180 + arg L")),
         optional(record("sensitivity_peak", "Ms w", "the largest ‖(I + L)⁻¹‖ and where, rad/s")),
@@ -495,7 +495,7 @@ std::vector<Kind> frequency_response_kinds() {
        &solve_margins},
       {"linf-norm",
        "the largest gain over all frequencies of a system that need not be stable",
-       {A, B, domain, C, D, any_period},
+       {A, B, or_first(domain), C, D, any_period},
        norm,
        R"({"A": [[1]], "B": [[2]], "C": [[1]], "domain": "continuous"})",
        &solve_l_infinity_norm},

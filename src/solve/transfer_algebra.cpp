@@ -1,6 +1,9 @@
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include <flyball/classical/delay_poles.hpp>
 #include <flyball/classical/partial_fractions.hpp>
@@ -21,6 +24,7 @@ using classical::DelaySystem;
 using classical::TransferFunction;
 using classical::ZeroPoleGain;
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
@@ -84,6 +88,35 @@ Outcome solve_ss2tf(const Problem& problem, JsonWriter& answer) {
   });
 }
 
+/// Every channel by itself, with its dead times.
+Outcome write_late_matrix(const std::vector<std::vector<DelaySystem>>& entries,
+                          JsonWriter& answer) {
+  constexpr std::string_view where = "tf2ss";
+  const auto p = static_cast<Index>(entries.size());
+  const auto m = static_cast<Index>(entries.front().size());
+  std::optional<DelaySystem> all;
+  classical::Wiring wiring{MatrixXd::Zero(p * m, p * m), MatrixXd::Zero(p * m, m),
+                           MatrixXd::Zero(p, p * m), MatrixXd::Zero(p, m)};
+  Index channel = 0;
+  for (Index i = 0; i < p; ++i) {
+    for (Index j = 0; j < m; ++j, ++channel) {
+      const DelaySystem& entry = entries[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+      if (!all) {
+        all = entry;
+      } else {
+        FLYBALL_TRY_IN(where, auto more, classical::append(*all, entry));
+        all = std::move(more);
+      }
+      wiring.E(channel, j) = 1.0;
+      wiring.H(i, channel) = 1.0;
+    }
+  }
+  FLYBALL_TRY_IN(where, const auto system, classical::rewired(*all, wiring));
+  write_delay_form(system, answer);
+  answer.add("delay", 0.0);
+  return {};
+}
+
 /// Of several channels, of as few states as needed.
 Outcome solve_matrix_tf2ss(const Problem& problem, JsonWriter& answer) {
   constexpr std::string_view where = "tf2ss";
@@ -97,20 +130,34 @@ Outcome solve_matrix_tf2ss(const Problem& problem, JsonWriter& answer) {
   const double dt = problem.number("dt");
   const double delay = problem.number("delay");
   std::vector<std::vector<TransferFunction>> entries;
+  bool several = false;
+  bool late = false;
+  std::vector<std::vector<DelaySystem>> systems;
   for (const auto& row : problem.transfers("G")) {
     entries.emplace_back();
+    systems.emplace_back();
     for (TransferCoefficients written : row) {
       written.dt = written.dt > 0.0 ? written.dt : dt;
       written.delay += delay;
-      FLYBALL_TRY(auto entry, transfer_of(written, where));
-      entries.back().push_back(std::move(entry));
+      FLYBALL_TRY(auto entry, transfer_system_of(written, where));
+      FLYBALL_TRY(auto system, delay_system_of(entry));
+      late = late || (!system.period() && system.has_delay());
+      systems.back().push_back(std::move(system));
+      if (auto* rational = std::get_if<TransferFunction>(&entry)) {
+        entries.back().push_back(std::move(*rational));
+      } else {
+        several = true;
+      }
     }
+  }
+  if (late || several) {
+    return write_late_matrix(systems, answer);
   }
   FLYBALL_TRY_IN(where, const auto G, classical::TransferMatrix::create(entries));
   if (G.period()) {
     // The dead times of a discrete one are states.
-    FLYBALL_TRY_IN(where, const auto late, G.to_delay_system());
-    FLYBALL_TRY_IN(where, const DiscreteSystem<> states, late.to_discrete());
+    FLYBALL_TRY_IN(where, const auto delayed, G.to_delay_system());
+    FLYBALL_TRY_IN(where, const DiscreteSystem<> states, delayed.to_discrete());
     FLYBALL_TRY_IN(where, const auto least, minimal_realization(states));
     write_system(least.system, answer);
   } else {
@@ -125,9 +172,14 @@ Outcome solve_tf2ss(const Problem& problem, JsonWriter& answer) {
   if (problem.has("G")) {
     return solve_matrix_tf2ss(problem, answer);
   }
-  FLYBALL_TRY(const TransferFunction G, transfer_of(problem, "tf2ss"));
-  FLYBALL_TRY(const DelaySystem late, DelaySystem::create(G));
-  if (G.period()) {
+  FLYBALL_TRY(const auto given, transfer_system_of(problem, "tf2ss"));
+  FLYBALL_TRY(const DelaySystem late, delay_system_of(given));
+  if (const auto* several = std::get_if<DelaySystem>(&given); several && !several->period()) {
+    write_delay_form(*several, answer);
+    answer.add("delay", 0.0);
+    return {};
+  }
+  if (late.period()) {
     // The dead time of a discrete one is states.
     FLYBALL_TRY(const DiscreteSystem<> s, late.to_discrete());
     write_system(s, answer);
@@ -138,7 +190,7 @@ Outcome solve_tf2ss(const Problem& problem, JsonWriter& answer) {
   const Eigen::MatrixXd& B = late.has_delay() ? form.B2 : form.B1;
   const Eigen::MatrixXd& D = late.has_delay() ? form.D12 : form.D11;
   write_system(ContinuousSystem<>{form.A, B, form.C1, D}, answer);
-  answer.add("delay", G.delay());
+  answer.add("delay", late.has_delay() ? late.delays()(0) : 0.0);
   return {};
 }
 
@@ -199,10 +251,62 @@ Outcome solve_residue(const Problem& problem, JsonWriter& answer) {
   return {};
 }
 
+/// With dead time: a rational function behind it where one is, or the delays drawn out.
+Outcome write_late_interconnections(const classical::TransferSystem& G_system,
+                                    const classical::TransferSystem& H_system, JsonWriter& answer) {
+  constexpr std::string_view where = "interconnect";
+  FLYBALL_TRY(const DelaySystem G, delay_system_of(G_system));
+  FLYBALL_TRY(const DelaySystem H, delay_system_of(H_system));
+  FLYBALL_TRY_IN(where, const auto cascade, classical::series(G, H));
+  FLYBALL_TRY_IN(where, const auto sum, classical::parallel(G, H));
+  FLYBALL_TRY_IN(where, const auto loop, classical::feedback(G, H));
+  const auto positive = classical::feedback(G, H, FeedbackSign::positive);
+  const auto* rational_G = std::get_if<TransferFunction>(&G_system);
+  const auto* rational_H = std::get_if<TransferFunction>(&H_system);
+  const bool rational = rational_G != nullptr && rational_H != nullptr;
+  const auto both =
+      rational ? std::optional(classical::series(*rational_G, *rational_H)) : std::nullopt;
+  const auto added =
+      rational ? std::optional(classical::parallel(*rational_G, *rational_H)) : std::nullopt;
+  if (both && *both) {
+    write_transfer("series", **both, answer);
+  }
+  if (added && *added) {
+    write_transfer("parallel", **added, answer);
+  }
+  std::vector<std::pair<std::string, DelaySystem>> delayed;
+  if (!both || !*both) {
+    delayed.emplace_back("series", cascade);
+  }
+  if (!added || !*added) {
+    delayed.emplace_back("parallel", sum);
+  }
+  delayed.emplace_back("feedback_neg", loop);
+  if (positive) {
+    delayed.emplace_back("feedback_pos", *positive);
+  }
+  answer.list("delayed", delayed, [&](const auto& one) {
+    answer.object([&] {
+      answer.add("name", one.first);
+      write_delay_form(one.second, answer);
+    });
+  });
+  return {};
+}
+
 Outcome solve_interconnect(const Problem& problem, JsonWriter& answer) {
   constexpr std::string_view where = "interconnect";
-  FLYBALL_TRY(const TransferFunction G, transfer_of(problem.transfer("G"), where));
-  FLYBALL_TRY(const TransferFunction H, transfer_of(problem.transfer("H"), where));
+  FLYBALL_TRY(const auto G_system, transfer_system_of(problem.transfer("G"), where));
+  FLYBALL_TRY(const auto H_system, transfer_system_of(problem.transfer("H"), where));
+  const auto* rational_G = std::get_if<TransferFunction>(&G_system);
+  const auto* rational_H = std::get_if<TransferFunction>(&H_system);
+  if (rational_G == nullptr || rational_H == nullptr ||
+      (!rational_G->period() && !rational_H->period() &&
+       (rational_G->delay() > 0.0 || rational_H->delay() > 0.0))) {
+    return write_late_interconnections(G_system, H_system, answer);
+  }
+  const TransferFunction& G = *rational_G;
+  const TransferFunction& H = *rational_H;
   FLYBALL_TRY(const auto cascade, classical::series(G, H));
   FLYBALL_TRY(const auto loop, classical::feedback(G, H, true));
   write_transfer("series", cascade, answer);
@@ -223,9 +327,7 @@ Outcome solve_closed_loop_poles(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const auto found, classical::rightmost_poles(loop));
   answer.add("poles", found.poles);
   answer.add("stable", found.stable);
-  answer.add("unstable", found.unstable == std::numeric_limits<int>::max()
-                             ? std::numeric_limits<double>::infinity()
-                             : static_cast<double>(found.unstable));
+  answer.add("unstable", count_of_poles(found.unstable));
   answer.add("high_frequency_abscissa", found.high_frequency_abscissa);
   return {};
 }
@@ -250,6 +352,8 @@ std::vector<Kind> transfer_algebra_kinds() {
   using namespace field;
   const std::vector<Field> given = transfer_fields();
   const std::vector<Field> any_system{A, B, C, D, or_first(domain), any_period};
+  static const std::vector<Field> delayed_system =
+      std::vector{text("name", "which")} + answered_system("n", "m", "p") + delay_form_fields();
   const Field tolerance =
       or_number(number("tolerance", "",
                        "zeros and poles nearer than that share of their size cancel; 0 cancels "
@@ -275,15 +379,15 @@ std::vector<Kind> transfer_algebra_kinds() {
        &solve_ss2tf},
       {"tf2ss",
        "a transfer function as a system, in sections of its roots, or a matrix of them as one of "
-       "as "
-       "few states as needed",
+       "as few states as needed; other dead times are drawn out of it",
        given + std::vector{optional(transfers(
                    "G", "p", "m",
                    "in place of one: rows of outputs, an entry an input; dt and delay are theirs "
                    "where an entry says none"))},
        answered_system("n", "m", "p") +
            std::vector{number("delay", "s",
-                              "dead time before its input; that of a discrete one is states")},
+                              "dead time before its input; that of a discrete one is states")} +
+           delay_form_fields(),
        R"({"num": [1, 3], "den": [1, 2, 5]})", &solve_tf2ss},
       {"zeros",
        "the transmission zeros of a system of any inputs and outputs, and the modes that are not "
@@ -312,10 +416,13 @@ std::vector<Kind> transfer_algebra_kinds() {
        "two transfer functions in series, in parallel and in a loop (A.1 to A.4)",
        {transfer("G", "a", "b", "on the way forward"),
         transfer("H", "c", "d", "behind it, beside it, or on the way back")},
-       {transfer("series", "e", "f", "G H"),
-        optional(transfer("parallel", "g", "h", "G + H, unless their dead times differ")),
-        transfer("feedback_neg", "i", "j", "G/(1 + G H)"),
-        optional(transfer("feedback_pos", "k", "l", "G/(1 - G H), unless that is algebraic"))},
+       {optional(transfer("series", "e", "f", "G H")),
+        optional(transfer("parallel", "g", "h", "G + H")),
+        optional(transfer("feedback_neg", "i", "j", "G/(1 + G H)")),
+        optional(transfer("feedback_pos", "k", "l", "G/(1 - G H), unless that is algebraic")),
+        optional(objects("delayed", delayed_system,
+                         "what is no rational function behind one dead time: the same names, each "
+                         "with its dead times drawn out of it"))},
        R"({"G": {"num": [1], "den": [1, 1]}, "H": {"num": [2], "den": [1, 3]}})",
        &solve_interconnect},
       {"closed-loop-poles",

@@ -1,3 +1,10 @@
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <variant>
+
+#include <flyball/classical/delay_margins.hpp>
+#include <flyball/classical/delay_poles.hpp>
 #include <flyball/classical/loop_margins.hpp>
 #include <flyball/classical/step_metrics.hpp>
 #include <flyball/classical/transfer_function.hpp>
@@ -10,18 +17,8 @@ namespace flyball::solve {
 
 namespace {
 
-Outcome solve_transfer_function(const Problem& problem, JsonWriter& answer) {
-  FLYBALL_TRY(const auto transfer, transfer_of(problem, "tf"));
-  FLYBALL_TRY(const auto zeros, transfer.zeros());
-  FLYBALL_TRY(const auto poles, transfer.poles());
-  FLYBALL_TRY(const bool stable, transfer.is_stable());
-  FLYBALL_TRY(const auto margins, classical::loop_margins(transfer));
-  FLYBALL_TRY(const auto width, classical::bandwidth(transfer));
-  FLYBALL_TRY(const auto step, classical::step_metrics(transfer));
-  answer.add("zeros", zeros);
-  answer.add("poles", poles);
-  answer.add("dcgain", transfer.dc_gain());
-  answer.add("stable", stable);
+void write_as_loop(const classical::LoopMargins& margins, const std::optional<double>& width,
+                   const classical::StepMetrics& step, JsonWriter& answer) {
   answer.list("gain_margins", margins.phase_crossings, [&](const classical::PhaseCrossing& at) {
     answer.object([&] { answer.add({{"w", at.frequency}, {"gm", at.gain_margin}}); });
   });
@@ -36,7 +33,40 @@ Outcome solve_transfer_function(const Problem& problem, JsonWriter& answer) {
     answer.add({{"Ms", margins.sensitivity.value}, {"w", margins.sensitivity.frequency}});
   });
   write_step_metrics("step", step, answer);
+}
+
+Outcome write_transfer_function(const classical::TransferFunction& transfer, JsonWriter& answer) {
+  FLYBALL_TRY(const auto zeros, transfer.zeros());
+  FLYBALL_TRY(const auto poles, transfer.poles());
+  FLYBALL_TRY(const bool stable, transfer.is_stable());
+  FLYBALL_TRY(const auto margins, classical::loop_margins(transfer));
+  FLYBALL_TRY(const auto width, classical::bandwidth(transfer));
+  FLYBALL_TRY(const auto step, classical::step_metrics(transfer));
+  answer.add("zeros", zeros);
+  answer.add("poles", poles);
+  answer.add("dcgain", transfer.dc_gain());
+  answer.add("stable", stable);
+  write_as_loop(margins, width, step, answer);
   return {};
+}
+
+/// Of several dead times, whose zeros are infinitely many.
+Outcome write_transfer_function(const classical::DelaySystem& system, JsonWriter& answer) {
+  FLYBALL_TRY(const auto found, classical::rightmost_poles(system));
+  FLYBALL_TRY(const auto margins, classical::loop_margins(system));
+  FLYBALL_TRY(const auto width, classical::bandwidth(system));
+  FLYBALL_TRY(const auto step, classical::step_metrics(system, 0, 0));
+  const double rest = system.dc_gain()(0, 0);
+  answer.add("poles", found.poles);
+  answer.add("dcgain", std::isfinite(rest) ? rest : std::numeric_limits<double>::infinity());
+  answer.add("stable", found.stable);
+  write_as_loop(margins, width, step, answer);
+  return {};
+}
+
+Outcome solve_transfer_function(const Problem& problem, JsonWriter& answer) {
+  FLYBALL_TRY(const auto system, transfer_system_of(problem, "tf"));
+  return std::visit([&](const auto& one) { return write_transfer_function(one, answer); }, system);
 }
 
 Outcome solve_pade(const Problem& problem, JsonWriter& answer) {
@@ -54,8 +84,8 @@ std::vector<Kind> transfer_function_kinds() {
       {"tf",
        "what a transfer function is like, alone and as an open loop L under negative feedback",
        transfer_fields(),
-       {complex_list("zeros", "z", "of the numerator"),
-        complex_list("poles", "s", "of the denominator"),
+       {optional(complex_list("zeros", "z", "of the numerator; left out of several dead times")),
+        complex_list("poles", "s", "of the denominator; with dead time in a loop the rightmost"),
         unbounded(number("dcgain", "", "G(0), or G(1) of a discrete one")),
         flag("stable", "whether all poles are where a stable system has them"),
         records("gain_margins", "w gm", "where L is negative: rad/s and 1/|L|"),

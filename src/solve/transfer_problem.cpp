@@ -66,7 +66,10 @@ Expected<TransferFunction> rational(Expected<TransferSystem> system, std::string
   return refusal(classical::TransferError::delay_in_loop, where, "expr")
       .got("made of parts of several dead times")
       .expected("a rational function behind one dead time")
-      .hint("bode, nyquist, margins, step, freqresp and closed-loop-poles take it as it is");
+      .hint(
+          "tf, tf2ss, bode, nyquist, margins, step, freqresp, interconnect and closed-loop-poles "
+          "take it "
+          "as it is");
 }
 
 }  // namespace
@@ -100,6 +103,28 @@ void write_transfer(std::string_view name, const TransferFunction& transfer, Jso
   });
 }
 
+std::vector<Field> delay_form_fields() {
+  return {optional(list("delays", "T", "s", "τ: w(t) = z(t - τ) beside x and u")),
+          optional(matrix("B_w", "n", "T", "dx/dt = A x + B u + B_w w")),
+          optional(matrix("C_z", "T", "n", "z = C_z x + D_z u + D_zw w")),
+          optional(matrix("D_w", "p", "T", "y = C x + D u + D_w w")),
+          optional(matrix("D_z", "T", "m", "how the inputs reach z")),
+          optional(matrix("D_zw", "T", "T", "how w reaches z"))};
+}
+
+void write_delay_form(const DelaySystem& system, JsonWriter& answer) {
+  const classical::DelayForm& f = system.form();
+  write_system(ContinuousSystem<>{f.A, f.B1, f.C1, f.D11}, answer);
+  if (system.has_delay()) {
+    answer.add("delays", f.delays);
+    answer.add("B_w", f.B2);
+    answer.add("C_z", f.C2);
+    answer.add("D_w", f.D12);
+    answer.add("D_z", f.D21);
+    answer.add("D_zw", f.D22);
+  }
+}
+
 Field step_metrics_field(std::string_view name, std::string_view help) {
   return record(name, "rise_time settling_time overshoot undershoot peak peak_time final_value",
                 help);
@@ -116,6 +141,11 @@ void write_step_metrics(std::string_view name, const classical::StepMetrics& met
                 {"peak_time", or_nan(metrics.peak_time)},
                 {"final_value", metrics.final_value}});
   });
+}
+
+double count_of_poles(int count) {
+  return count == std::numeric_limits<int>::max() ? std::numeric_limits<double>::infinity()
+                                                  : static_cast<double>(count);
 }
 
 double or_nan(const std::optional<double>& value) {

@@ -36,11 +36,19 @@ namespace flyball::solve {
 void write_transfer(std::string_view name, const classical::TransferFunction& transfer,
                     JsonWriter& answer);
 
+/// delays, B_w, C_z, D_w, D_z and D_zw of a continuous system with dead time, beside A to D.
+[[nodiscard]] std::vector<Field> delay_form_fields();
+/// A to D and, with dead time, those. @param system  Continuous.
+void write_delay_form(const classical::DelaySystem& system, JsonWriter& answer);
+
 /// The field of `write_step_metrics`.
 [[nodiscard]] Field step_metrics_field(std::string_view name, std::string_view help);
 /// Overshoot and undershoot in percent; null what there is not.
 void write_step_metrics(std::string_view name, const classical::StepMetrics& metrics,
                         JsonWriter& answer);
+
+/// A number of poles; infinity for the largest integer, which stands for infinitely many.
+[[nodiscard]] double count_of_poles(int count);
 
 /// NaN, which is null, where there is none.
 [[nodiscard]] double or_nan(const std::optional<double>& value);

@@ -1,4 +1,9 @@
 #include <cmath>
+#include <complex>
+#include <string>
+#include <vector>
+
+#include <Eigen/LU>
 
 #include "solve/answers.hpp"
 
@@ -25,9 +30,9 @@ TEST(SolveTransferProblem, WordsAndListsAreAnsweredAlike) {
                            {"pidtune", R"(, "form": "pi")"},
                            {"compensator", R"(, "crossover": 1.4, "phase_margin": 45)"},
                            {"limit-cycles", R"(, "nonlinearity": "relay")"}}) {
-    const Json words =
-        answer(told.kind, std::string(R"j({"expr": "4/(s+1)^3*exp(-0.1*s)", "delay": 0.1)j") +
-                              told.more + "}");
+    const Json words = answer(
+        told.kind, std::string(R"j({"expr": "4/(s^3+3s^2+3s+1)*exp(-0.1*s)", "delay": 0.1)j") +
+                       told.more + "}");
     const Json lists =
         answer(told.kind, std::string(R"j({"num": [4], "den": [1, 3, 3, 1], "delay": 0.2)j") +
                               told.more + "}");
@@ -59,9 +64,112 @@ TEST(SolveTransferProblem, SeveralDeadTimes) {
   EXPECT_TRUE(answer("closed-loop-poles", std::string(L) + "}").at("stable").get<bool>());
   const Json step = answer("step", std::string(L) + R"(, "duration": 4, "samples": 9})");
   EXPECT_NEAR(step.at("y").back().get<double>(), 0.5 * (3.0 + 1.0), 1e-10);
-  for (const char* kind : {"tf", "tf2ss", "rlocus", "pidtune", "steady-state-error"}) {
+  for (const char* kind : {"rlocus", "pidtune", "steady-state-error"}) {
     EXPECT_EQ(refusal(kind, std::string(L) + "}"), "delay_in_loop") << kind;
   }
+  const Json whole = answer("tf", std::string(L) + "}");
+  EXPECT_EQ(whole.at("gain_margins"), margins.at("gain_margins"));
+  EXPECT_EQ(number(whole, "delay_margin"), number(margins, "delay_margin"));
+  EXPECT_FALSE(whole.contains("zeros"));
+  EXPECT_FALSE(whole.at("stable").get<bool>());  // The integrator.
+  EXPECT_TRUE(whole.at("closed_loop_stable").get<bool>());
+}
+
+/// C (sI - A)⁻¹ B + D of a form whose dead times were drawn out of it, by its own equations.
+std::complex<double> response_of(const Json& form, double w) {
+  const auto n = form.at("A").size();
+  const auto k = form.at("delays").size();
+  const std::complex<double> s(0.0, w);
+  Eigen::MatrixXcd M = Eigen::MatrixXcd::Zero(static_cast<long>(n + k), static_cast<long>(n + k));
+  Eigen::VectorXcd right(static_cast<long>(n + k));
+  Eigen::RowVectorXcd seen(static_cast<long>(n + k));
+  const auto at = [](std::size_t i) { return static_cast<long>(i); };
+  std::vector<std::complex<double>> late;
+  for (const double delay : form.at("delays").get<std::vector<double>>()) {
+    late.push_back(std::exp(-s * delay));
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < n; ++j) {
+      M(at(i), at(j)) = (i == j ? s : 0.0) - entry(form, "A", i, j);
+    }
+    for (std::size_t j = 0; j < k; ++j) {
+      M(at(i), at(n + j)) = -entry(form, "B_w", i, j) * late[j];
+      M(at(n + j), at(i)) = -entry(form, "C_z", j, i);
+    }
+    right(at(i)) = entry(form, "B", i, 0);
+    seen(at(i)) = entry(form, "C", 0, i);
+  }
+  for (std::size_t i = 0; i < k; ++i) {
+    for (std::size_t j = 0; j < k; ++j) {
+      M(at(n + i), at(n + j)) = (i == j ? 1.0 : 0.0) - entry(form, "D_zw", i, j) * late[j];
+    }
+    right(at(n + i)) = entry(form, "D_z", i, 0);
+    seen(at(n + i)) = entry(form, "D_w", 0, i) * late[i];
+  }
+  return (seen * M.partialPivLu().solve(right))(0) + entry(form, "D");
+}
+
+// Loops with dead time are answered with the dead times drawn out of them: e^{-s}/(s + 1) in a loop
+// with 2/(s + 3).
+TEST(SolveTransferProblem, DeadTimesDrawnOut) {
+  const auto G = [](std::complex<double> s) { return std::exp(-s) / (s + 1.0); };
+  const auto H = [](std::complex<double> s) { return 2.0 / (s + 3.0); };
+  const Json pair = answer("interconnect", R"j({"G": "exp(-s)/(s+1)", "H": "2/(s+3)"})j");
+  EXPECT_EQ(number(pair.at("series"), "delay"), 1.0);
+  EXPECT_FALSE(pair.contains("feedback_neg"));
+  int compared = 0;
+  for (const Json& one : pair.at("delayed")) {
+    for (const double w : {0.0, 0.3, 2.0, 11.0}) {
+      const std::complex<double> s(0.0, w);
+      const std::string name = one.at("name");
+      const std::complex<double> want = name == "parallel"       ? G(s) + H(s)
+                                        : name == "feedback_neg" ? G(s) / (1.0 + G(s) * H(s))
+                                                                 : G(s) / (1.0 - G(s) * H(s));
+      EXPECT_LE(std::abs(response_of(one, w) - want), 1e-13) << name << ' ' << w;
+      ++compared;
+    }
+  }
+  EXPECT_EQ(compared, 12);
+  const Json system =
+      answer("tf2ss", R"j({"expr": "feedback(exp(-s)/(s+1), 2/(s+3)*exp(-0.3s))"})j");
+  for (const double w : {0.1, 1.0, 7.0}) {
+    const std::complex<double> s(0.0, w);
+    const auto want = G(s) / (1.0 + G(s) * H(s) * std::exp(-0.3 * s));
+    EXPECT_LE(std::abs(response_of(system, w) - want), 1e-13) << w;
+  }
+  const Json row = answer("tf2ss", R"j({"G": [["exp(-s)/(s+1)", "1/(s+2)"]]})j");
+  EXPECT_EQ(row.at("delays"), Json({1.0}));
+  EXPECT_LE(std::abs(response_of(row, 0.7) - G({0.0, 0.7})), 1e-14);
+}
+
+// What is written as factors keeps their roots: of (s + 1)^20 multiplied out they would be off by
+// 0.05.
+TEST(SolveTransferProblem, FactorsKeepTheirRoots) {
+  const Json many = answer("tf", R"j({"expr": "(s+3)^2/((s+1)^20*(s+0.1)^6)"})j");
+  ASSERT_EQ(many.at("poles").size(), 26U);
+  for (std::size_t i = 0; i < 26; ++i) {
+    EXPECT_NEAR(entry(many, "poles", i, 0), entry(many, "poles", i, 0) < -0.5 ? -1.0 : -0.1, 1e-15);
+    EXPECT_EQ(entry(many, "poles", i, 1), 0.0);
+  }
+  EXPECT_NEAR(entry(many, "zeros", 1, 0), -3.0, 1e-15);
+  const Json states = answer("tf2ss", R"j({"expr": "1/(s+1)^20"})j");
+  for (std::size_t i = 0; i < 20; ++i) {
+    EXPECT_EQ(entry(states, "A", i, i), -1.0);
+  }
+}
+
+// Numbers near the end of the doubles' range: 10^200/(s + 10^-100) crosses at 10^200 rad/s.
+TEST(SolveTransferProblem, ExtremeUnits) {
+  const Json huge = answer("margins", R"j({"expr": "1e200/(s+1e-100)"})j");
+  ASSERT_EQ(huge.at("phase_margins").size(), 1U);
+  EXPECT_NEAR(huge.at("phase_margins")[0].at("w").get<double>() / 1e200, 1.0, 1e-12);
+  EXPECT_NEAR(number(huge, "phase_margin"), 90.0, 1e-9);
+  EXPECT_TRUE(huge.at("stable").get<bool>());
+  const Json slow = answer("margins", R"j({"expr": "1/(s+1e-300)"})j");
+  EXPECT_NEAR(slow.at("phase_margins")[0].at("w").get<double>(), 1.0, 1e-12);
+  EXPECT_NEAR(number(slow, "phase_margin"), 90.0, 1e-9);
+  const Json loop = answer("margins", R"j({"expr": "1e-150/(s*(s+1e-150))"})j");
+  EXPECT_EQ(loop.at("phase_margins").size(), 1U);
 }
 
 TEST(SolveTransferProblem, Refusals) {
@@ -104,7 +212,7 @@ TEST(SolveTransferProblem, MatricesOfTransferFunctions) {
   EXPECT_EQ(refusal("tf2ss", R"({"G": [["1/s", "1"], ["1"]]})"), "malformed");
   EXPECT_EQ(refusal("tf2ss", R"({"G": []})"), "malformed");
   EXPECT_EQ(refusal("tf2ss", R"({"G": [["1/s"]], "num": [1]})"), "malformed");
-  EXPECT_EQ(refusal("tf2ss", R"j({"G": [["exp(-s)/s", "1/s"]]})j"), "delay_in_loop");
+  EXPECT_EQ(answer("tf2ss", R"j({"G": [["exp(-s)/s", "1/s"]]})j").at("delays"), Json({1.0}));
   EXPECT_EQ(refusal("tf2ss", R"({"G": [["s"]]})"), "improper");
 }
 
