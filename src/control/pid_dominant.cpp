@@ -132,7 +132,7 @@ Expected<PidLoop> tune_by_poles(const TransferFunction& plant, PidForm form,
     tau = settled ? tau : round < 20 ? next : 0.5 * (tau + next);
   }
   if (!settled) {
-    return refusal(PidDesignError::no_rule, where, "the gains")
+    return refusal(PidDesignError::no_rule, where, "a set of gains")
         .got("not found: the filter's time, a share of the derivative's, does not settle")
         .hint("a larger filter ratio, or other poles");
   }

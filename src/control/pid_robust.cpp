@@ -73,7 +73,8 @@ Expected<Span> span_of(const TransferFunction& plant, std::string_view where) {
   }
   if (!(span.fast > 0.0)) {
     return refusal(PidDesignError::unlimited, where, "the plant")
-        .got("of integrators alone, without lag or delay")
+        .got(span.integrators > 0 ? "of integrators alone, without lag or delay"
+                                  : "a gain alone, without lag or delay")
         .expected("of a lag or a delay that limits the gains")
         .hint("ask for a crossover and a phase margin instead");
   }
@@ -401,8 +402,8 @@ Expected<PidLoop> tune_by_robustness(const TransferFunction& plant, PidForm form
     const double half = 0.5 * best->ki;
     const double at_half = excess(half);
     if (at_half > 0.0) {
-      return refusal(PidDesignError::nothing_robust, where, "the gains")
-          .got("not as robust as on the grid of frequencies")
+      return refusal(PidDesignError::nothing_robust, where, "a set of gains")
+          .got("not found that is as robust as on the grid of frequencies")
           .hint("ask for a crossover and a phase margin instead");
     }
     const auto limit =

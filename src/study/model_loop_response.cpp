@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 
+#include <flyball/classical/frequency_response.hpp>
 #include <flyball/control/margins.hpp>
 
 #include "study/model_loop_response.hpp"
@@ -32,6 +33,34 @@ Controller controller_of(const ModelRegulator& regulator) {
   return {A_BK * I_KC, A_BK * K_e, K * I_KC, K * K_e};
 }
 
+/// Between a thousandth of Nyquist's frequency and it, every resonance of plant and controller met.
+std::vector<double> frequencies_of(const ModelRegulator& regulator, const Controller& controller,
+                                   double nyquist) {
+  const auto& [A, B, C, D, period] = regulator.plant;
+  // In series, from the plant's inputs to the controller's outputs.
+  const Index n = A.rows();
+  const Index q = controller.A_c.rows();
+  const MatrixXd seen = regulator.observer ? C : MatrixXd(MatrixXd::Identity(n, n));
+  DiscreteSystem<> both{MatrixXd::Zero(n + q, n + q), MatrixXd::Zero(n + q, B.cols()),
+                        MatrixXd::Zero(controller.C_c.rows(), n + q),
+                        MatrixXd::Zero(controller.C_c.rows(), B.cols()), period};
+  both.A.topLeftCorner(n, n) = A;
+  both.A.bottomLeftCorner(q, n) = controller.B_c * seen;
+  both.A.bottomRightCorner(q, q) = controller.A_c;
+  both.B.topRows(n) = B;
+  both.C << controller.D_c * seen, controller.C_c;
+  const double first = 1e-3 * nyquist;
+  if (const auto response = classical::frequency_response(both)) {
+    constexpr int most = 400;
+    if (const auto grid = classical::frequency_grid(
+            *response, {.low = first, .high = nyquist, .most_points = most})) {
+      return {grid->frequency.begin(), grid->frequency.end()};
+    }
+  }
+  constexpr int count = 300;
+  return frequencies_between(first, nyquist, count);
+}
+
 /// A square matrix without a row and its column.
 MatrixXcd without(const MatrixXcd& M, Index which) {
   const Index left = M.rows() - 1;
@@ -48,7 +77,6 @@ MatrixXcd without(const MatrixXcd& M, Index which) {
 
 std::vector<std::vector<FrequencyPoint>> loop_responses(const ModelRegulator& regulator,
                                                         Time delay) {
-  constexpr int count = 300;
   constexpr Index most_states = 30;
   constexpr Index most_inputs = 4;
   const ContinuousSystem<>& open = regulator.linear;
@@ -69,7 +97,7 @@ std::vector<std::vector<FrequencyPoint>> loop_responses(const ModelRegulator& re
   }
   const double nyquist = std::numbers::pi / regulator.plant.period.si();
   std::vector<std::vector<FrequencyPoint>> responses(static_cast<std::size_t>(m));
-  for (const double frequency : frequencies_between(1e-3 * nyquist, nyquist, count)) {
+  for (const double frequency : frequencies_of(regulator, controller, nyquist)) {
     MatrixXcd L(m, m);
     for (Index i = 0; i < m; ++i) {
       for (Index j = 0; j < m; ++j) {

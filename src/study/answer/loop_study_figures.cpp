@@ -271,8 +271,13 @@ Figure nichols_figure(const LoopResult& result) {
       }
       if (center + 360.0 > high + 1.0) {
         // Above or below the cross, where the curves are apart.
-        const double at = M > 1.0 ? M / (M - 1.0) : M / (1.0 + M);
-        panel.notes.push_back({center, decibels(at), fmt::format("{} dB", closed)});
+        const bool beside = closed == -3.0;  // Those of -3 and -6 dB would touch.
+        const double at =
+            M > 1.0  ? M / (M - 1.0)
+            : beside ? M * (std::sqrt(1.0 - 0.5 * M * M) - M * std::sqrt(0.5)) / (1.0 - M * M)
+                     : M / (1.0 + M);
+        panel.notes.push_back(
+            {center + (beside ? 45.0 : 0.0), decibels(at), fmt::format("{} dB", closed)});
       }
       panel.lines.push_back(std::move(guide));
     }
