@@ -15,6 +15,7 @@
 #include "io/examples.hpp"
 #include "io/plot_data.hpp"
 #include "io/plot_labels.hpp"
+#include "io/plot_script.hpp"
 #include "io/temporary_folder.hpp"
 
 namespace flyball {
@@ -434,6 +435,22 @@ TEST(Plot, WhatIsNoPictureIsNotTaken) {
   EXPECT_TRUE(drawn_by("yes").error().is(PlotError::not_a_picture));
   EXPECT_TRUE(drawn_by("echo hello", true).error().is(PlotError::not_a_picture));
   EXPECT_EQ(drawn_by("echo '<svg></svg>'").value(), "<svg></svg>\n");
+}
+
+// A decade and a bit has 1, 2 and 5 of it as numbers, the digits between without; less than a
+// decade even steps; more the decades.
+TEST(Ticks, OfALogarithmicAxis) {
+  const auto between = [](double low, double high) {
+    io::Range range(true);
+    range.include(low);
+    range.include(high);
+    return io::ticks('x', range, 8, true);
+  };
+  EXPECT_EQ(between(3.0, 30.0),
+            "set xtics ('' 3 1, '' 4 1, 5, '' 6 1, '' 7 1, '' 8 1, '' 9 1, 10, 20, '' 30 1)\n");
+  EXPECT_EQ(between(2.0, 5.0), "set xtics (2, 2.5, 3, 3.5, 4, 4.5, 5)\n");
+  EXPECT_EQ(between(0.001, 1000.0), "set xtics autofreq\n");
+  EXPECT_EQ(between(1.0, 1.0), "set xtics autofreq\n");
 }
 
 }  // namespace
