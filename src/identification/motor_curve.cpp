@@ -72,11 +72,25 @@ Index steady_rows(const VectorXd& current) {
   return rows;
 }
 
+/// Which of the first rows has the most current: before it the voltage is still being switched on,
+/// or a sample is torn between before and after.
+Index first_whole_row(const VectorXd& current) {
+  Index row = 0;
+  current.head(std::min<Index>(current.size(), 5)).maxCoeff(&row);
+  return row;
+}
+
 /// C of V/I = R_0 (1 + α E/C), E the energy until then, J.
 Expected<GainEstimate> heat_capacity(const VectorXd& time, const VectorXd& voltage,
                                      const VectorXd& current) {
   constexpr double copper = 0.00393;  // 1/K
   const Index rows = time.size();
+  constexpr Index least = 4;
+  if (rows < least) {
+    GainEstimate unknown;
+    unknown.determined = false;
+    return unknown;
+  }
   const VectorXd power = voltage.cwiseProduct(current);
   MatrixXd X(rows, 2);
   X.col(0).setOnes();
@@ -192,7 +206,10 @@ Expected<LockedRotorConstants> fit_locked_rotor(const LockedRotor& run) {
   found.Kt = symmetric_estimate(torque.coefficients(0), torque.standard_errors(0));
   found.R = symmetric_estimate(resistance.coefficients(0), resistance.standard_errors(0));
   found.R_rise = resistance.coefficients(1) * time(used - 1) / resistance.coefficients(0);
-  FLYBALL_TRY(found.heat_capacity, heat_capacity(time, run.voltage.head(used), current));
+  const Index whole = used - first_whole_row(current);
+  FLYBALL_TRY(found.heat_capacity,
+              heat_capacity(time.tail(whole), run.voltage.segment(used - whole, whole),
+                            current.tail(whole)));
   return found;
 }
 

@@ -114,6 +114,13 @@ TEST(MotorCurve, ALockedRotorTellsTheHeatOfItsWindings) {
   const auto found = fit_locked_rotor(run).value();
   ASSERT_TRUE(found.heat_capacity.determined);
   EXPECT_NEAR(found.heat_capacity.value, C, 1e-9 * C);
+  // A first sample that is torn between before and after: R_0 is then the next row's, 0.13 % up.
+  const double whole = run.current(0);
+  run.current(0) *= 0.6;
+  const auto torn = fit_locked_rotor(run).value();
+  ASSERT_TRUE(torn.heat_capacity.determined);
+  EXPECT_NEAR(torn.heat_capacity.value, C, 3e-3 * C);
+  run.current(0) = whole;
   // What does not warm tells nothing.
   run.current.setConstant(40.0);
   EXPECT_FALSE(fit_locked_rotor(run)->heat_capacity.determined);
