@@ -84,6 +84,17 @@ Expected<void> read_modules(const json& file, const std::string& source,
     FLYBALL_TRY(place(1), recording::number_of(file, y.c_str(), y, source));
     settings.modules[i] = place;
   }
+  if (std::all_of(settings.modules.begin(), settings.modules.end(),
+                  [](const auto& place) { return place.has_value(); })) {
+    const auto wrong = misplaced_module(
+        {*settings.modules[0], *settings.modules[1], *settings.modules[2], *settings.modules[3]});
+    if (wrong) {
+      return refusal(TrajectoryFileError::wrong_sample, source, "the modules")
+          .got(*wrong)
+          .expected("x ahead and y to the left of the robot's middle, in metres")
+          .hint("two of flModuleX, frModuleX, … or their signs are exchanged");
+    }
+  }
   return {};
 }
 
@@ -108,6 +119,30 @@ void tell_unknown(const json& file, PathPlannerSettings& settings) {
 }
 
 }  // namespace
+
+std::optional<std::string> misplaced_module(const std::array<Eigen::Vector2d, 4>& modules) {
+  constexpr std::array<const char*, 4> names{"front left", "front right", "back left",
+                                             "back right"};
+  const auto shown = [&](std::size_t i) {
+    return fmt::format("({}, {}) m", format_number(modules[i](0), 4),
+                       format_number(modules[i](1), 4));
+  };
+  const auto told = [&](std::size_t a, const char* not_so, std::size_t b) {
+    return fmt::format("the {} module, {}, is not {} the {} one, {}", names[a], shown(a), not_so,
+                       names[b], shown(b));
+  };
+  for (const auto& [front, back] : {std::pair{0U, 2U}, std::pair{1U, 3U}}) {
+    if (!(modules[front](0) > modules[back](0))) {
+      return told(front, "ahead of", back);
+    }
+  }
+  for (const auto& [left, right] : {std::pair{0U, 1U}, std::pair{2U, 3U}}) {
+    if (!(modules[left](1) > modules[right](1))) {
+      return told(left, "to the left of", right);
+    }
+  }
+  return std::nullopt;
+}
 
 Expected<PathPlannerSettings> parse_pathplanner_settings(std::string_view text,
                                                          const std::string& source) {

@@ -249,5 +249,23 @@ TEST(PathPlannerSettings, WhatCannotBeIsRefused) {
   EXPECT_NE(refusal("{").find("cut off"), std::string::npos);
 }
 
+// Modules that are not where their names say.
+TEST(PathPlannerSettings, ExchangedModulesAreRefused) {
+  const auto settings = [](double fl, double br) {
+    return parse_pathplanner_settings(
+        R"({"robotMass": 60, "frModuleX": 0.27, "frModuleY": -0.28, "blModuleX": -0.27,
+            "blModuleY": 0.28, "flModuleY": 0.28, "brModuleY": -0.28, "flModuleX": )" +
+            std::to_string(fl) + R"(, "brModuleX": )" + std::to_string(br) + "}",
+        "settings.json");
+  };
+  EXPECT_TRUE(settings(0.27, -0.27));
+  const auto wrong = settings(-0.27, 0.27);
+  ASSERT_FALSE(wrong);
+  EXPECT_NE(
+      to_string(wrong.error()).find("the front left module, (-0.27, 0.28) m, is not ahead of"),
+      std::string::npos)
+      << to_string(wrong.error());
+}
+
 }  // namespace
 }  // namespace flyball

@@ -97,9 +97,16 @@ struct PathPlannerSettings {
   std::vector<Diagnostic> diagnostics{};                    ///< Keys that are not known.
 };
 
+/// Whether four modules are where their names say: the front ones ahead of the back ones, the left
+/// ones left of the right ones. @return Nothing, or what is not so, such as "the front left module,
+/// (-0.27, 0.27) m, is not ahead of the back left one, (0.27, 0.27) m".
+/// @param modules  m, in the robot's frame (x ahead, y left): FL, FR, BL, BR.
+[[nodiscard]] std::optional<std::string> misplaced_module(
+    const std::array<Eigen::Vector2d, 4>& modules);
+
 /// Reads PathPlanner's settings.json (2025). @errors TrajectoryFileError::not_json,
 /// not_a_trajectory (JSON of something else), wrong_sample (a field of another type, or that cannot
-/// be: a negative mass). Cost: O(size).
+/// be: a negative mass, modules that are not where their names say). Cost: O(size).
 [[nodiscard]] Expected<PathPlannerSettings> parse_pathplanner_settings(std::string_view text,
                                                                        const std::string& source);
 /// The same of a file. @errors FileError, too.
