@@ -59,6 +59,7 @@ std::span<const Kind> kinds() {
     add("Regulators", regulator_kinds());
     add("Predictive control", predictive_control_kinds());
     add("Feedforward and delay", feedforward_kinds());
+    add("Followers", follower_kinds());
     add("Certificates", certificate_kinds());
     add("PID", pid_kinds());
     add("Compensators and robust synthesis", compensator_kinds());

@@ -203,6 +203,7 @@ template <class Function>
 [[nodiscard]] std::vector<Kind> regulator_kinds();
 [[nodiscard]] std::vector<Kind> predictive_control_kinds();
 [[nodiscard]] std::vector<Kind> feedforward_kinds();
+[[nodiscard]] std::vector<Kind> follower_kinds();
 [[nodiscard]] std::vector<Kind> pid_kinds();
 [[nodiscard]] std::vector<Kind> compensator_kinds();
 [[nodiscard]] std::vector<Kind> estimator_kinds();

@@ -43,7 +43,8 @@ constexpr std::array letters{Letter{'n', "states"},
                              Letter{'G', "coefficients of W3's denominator"},
                              Letter{'K', "blocks"},
                              Letter{'l', "numbers"},
-                             Letter{'w', "frequencies"}};
+                             Letter{'w', "frequencies"},
+                             Letter{'P', "points"}};
 
 /// "states x inputs"; "states + outputs".
 std::string words_of(std::string_view size) {

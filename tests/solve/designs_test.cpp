@@ -293,5 +293,55 @@ TEST(SolveDesigns, MarginsOfASubnormalPeriod) {
   EXPECT_EQ(margins.at("gain_crossovers").size(), 0u);
 }
 
+// On its reference Ramsete asks for the reference's own speeds; 0.2 m to the left of a straight
+// path V = b e_y²/2 and ω = -b v 0.2.
+TEST(SolveDesigns, Ramsete) {
+  const Json there =
+      answer("ramsete", R"({"pose":[1,2,0.5],"reference":[1,2,0.5],"v":1.5,"omega":0.3})");
+  EXPECT_EQ(there.at("v"), 1.5);
+  EXPECT_EQ(there.at("omega"), 0.3);
+  EXPECT_EQ(there.at("V"), 0.0);
+  const Json off = answer("ramsete", R"({"pose":[0,0.2,0],"reference":[0,0,0],"v":1.5,"omega":0})");
+  EXPECT_NEAR(off.at("omega").get<double>(), -2.0 * 1.5 * 0.2, 1e-15);
+  EXPECT_NEAR(off.at("V").get<double>(), 0.04, 1e-15);
+  EXPECT_EQ(refusal("ramsete", R"({"pose":[0,0],"reference":[0,0,0],"v":1,"omega":0})"),
+            "wrong_shape");
+  EXPECT_EQ(refusal("ramsete", R"({"pose":[0,0,0],"reference":[0,0,0],"v":1,"omega":0,"b":-1})"),
+            "not_positive");
+}
+
+// Each gain is the discrete LQR's of what it is of: an integrator's by the root of its equation,
+// (k T)² / (1 - k T) = T² u²/x².
+TEST(SolveDesigns, FollowersGains) {
+  const Json holonomic = answer(
+      "holonomic-follower", R"({"pose":[0,0.2,0],"reference":[0,0,0],"v":1,"omega":0,"T":0.02})");
+  const double kT = 0.02 * holonomic.at("gains").at(1).get<double>();
+  EXPECT_NEAR(kT * kT / (1.0 - kT), 0.02 * 0.02 * 10.0 * 10.0, 1e-12);
+  EXPECT_NEAR(holonomic.at("vy").get<double>(), -0.2 * kT / 0.02, 1e-12);
+  const Json unicycle = answer("ltv-unicycle", R"({"v":1.5})");
+  EXPECT_EQ(unicycle.at("K").at(0).at(1), 0.0);
+  const Json drive = answer(
+      "ltv-differential-drive",
+      R"({"kV":3.02,"kA":0.642,"kV_angular":1.382,"kA_angular":0.08495,"trackwidth":0.9,"v":1.5})");
+  ASSERT_EQ(drive.at("K").size(), 2U);
+  ASSERT_EQ(drive.at("K").at(0).size(), 5U);
+  // The right side's is the left one's mirror image.
+  EXPECT_NEAR(drive.at("K").at(0).at(1).get<double>(), -drive.at("K").at(1).at(1).get<double>(),
+              1e-8);
+  EXPECT_NEAR(drive.at("A").at(1).at(2).get<double>(), 1.5, 1e-15);
+}
+
+// κ = 2 y/d² of the point that is pursued, in the robot's frame.
+TEST(SolveDesigns, PurePursuit) {
+  const Json at = answer("pure-pursuit",
+                         R"({"pose":[0,0.3,0],"path":[[0,0,0],[2,0,0]],"lookahead":0.4,"v":2})");
+  EXPECT_NEAR(at.at("target").at(0).get<double>(), 0.4, 1e-15);
+  EXPECT_NEAR(at.at("curvature").get<double>(), 2.0 * -0.3 / 0.25, 1e-12);
+  EXPECT_NEAR(at.at("cross_track").get<double>(), 0.3, 1e-15);
+  EXPECT_EQ(at.at("arrived"), false);
+  EXPECT_EQ(refusal("pure-pursuit", R"({"pose":[0,0,0],"path":[[0,0,0]],"lookahead":0.4,"v":2})"),
+            "empty");
+}
+
 }  // namespace
 }  // namespace flyball::solve
