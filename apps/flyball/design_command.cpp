@@ -1,5 +1,6 @@
 #include <flyball/study/answer.hpp>
 #include <flyball/study/design_drive.hpp>
+#include <flyball/study/design_holonomic.hpp>
 #include <flyball/study/simulate.hpp>
 
 #include "job_command.hpp"
@@ -24,6 +25,11 @@ ExpectedAll<Answer> run(JobInput& input) {
     const auto job = study::drive_design_job(input.path, input.given);
     if (!job) {
       return tl::unexpected(job.error());
+    }
+    if (job->robot.kind != study::DriveKind::differential) {
+      input.schema = "flyball.design_holonomic/1";
+      return ExpectedAll<study::HolonomicDesign>(study::design_holonomic(*job))
+          .map([](const auto& result) { return study::answer_of(result); });
     }
     return ExpectedAll<study::FollowerDesign>(study::design_follower(*job))
         .map([](const auto& result) { return study::answer_of(result); });

@@ -146,6 +146,7 @@ Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
   FLYBALL_CHECK(check_ranges(project_of(requested), where));
   result.job = requested;
   DesignJob& job = result.job;
+  result.diagnostics = job.plant.doubts;
   fill_defaults(job, result.diagnostics);
   FLYBALL_CHECK(check_delay(*job.controller.delay, job.controller.period, where));
   FLYBALL_CHECK(check_prediction(job));

@@ -65,15 +65,22 @@ Expected<void> add_ltv_drive(FollowerDesign& design) {
 }  // namespace
 
 Expected<FollowerDesign> design_follower(const DriveJob& job) {
-  if (job.robot.kind != DriveKind::differential) {
+  if (job.follower == DriveFollower::pure_pursuit) {
     return tl::unexpected(
         Error(ProjectError::wrong_value)
             .in(job.path)
-            .about("drive.type")
-            .got(fmt::format("\"{}\"", to_string(job.robot.kind)))
-            .expected("\"differential\" for a follower of its own")
-            .hint("`flyball drive` designs the holonomic follower and its loops as it simulates "
-                  "them"));
+            .about("drive.follower")
+            .got("\"pure pursuit\"")
+            .expected("a follower with gains: ramsete, ltv unicycle, ltv drive")
+            .hint("pure pursuit has a lookahead and no gains; `flyball drive` simulates it"));
+  }
+  if (job.robot.kind != DriveKind::differential) {
+    return tl::unexpected(Error(ProjectError::wrong_value)
+                              .in(job.path)
+                              .about("drive.type")
+                              .got(fmt::format("\"{}\"", to_string(job.robot.kind)))
+                              .expected("\"differential\"")
+                              .hint("what moves in any direction has design_holonomic"));
   }
   FollowerDesign design{.job = job, .diagnostics = job.diagnostics};
   FLYBALL_TRY(design.model, differential_model(job.robot));
@@ -99,6 +106,7 @@ Expected<FollowerDesign> design_follower(const DriveJob& job) {
       break;
     case DriveFollower::ltv_unicycle:
     case DriveFollower::holonomic:
+    case DriveFollower::pure_pursuit:
       FLYBALL_CHECK(add_unicycle(design, tracker));
       break;
   }

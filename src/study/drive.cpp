@@ -13,12 +13,14 @@
 #include <flyball/core/progress.hpp>
 #include <flyball/core/random.hpp>
 #include <flyball/math/integration/adaptive.hpp>
+#include <flyball/mechanisms/gravity.hpp>
 
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "core/wording.hpp"
 #include "study/drive_law.hpp"
 #include "study/drive_plant.hpp"
+#include "study/drive_wheel.hpp"
 
 namespace flyball::study {
 
@@ -215,6 +217,95 @@ void take_errors(TrackingErrors& errors, const Eigen::Vector3d& e) {
   errors.final_heading = e(2);
 }
 
+/// m, the trackwidth, or twice the farthest module's distance from the middle.
+double reach_of(const DriveRobot& robot) {
+  if (robot.kind == DriveKind::differential) {
+    return robot.trackwidth;
+  }
+  double reach = 0.0;
+  for (const Vector2d& module : robot.modules) {
+    reach = std::max(reach, 2.0 * module.norm());
+  }
+  return reach;
+}
+
+/// m/s², that the motors give a robot at a speed, straight on.
+double motor_acceleration(const DriveJob& job, double v) {
+  const DriveRobot& robot = job.robot;
+  const mechanisms::DcMotor& motor = robot.motor;
+  const int shafts = robot.kind == DriveKind::differential ? 2 : 4;
+  const double back_emf = robot.gearing * v / (motor.Kv * robot.wheel_radius);
+  const double current =
+      std::min({robot.stator_limit, (job.max_voltage - back_emf) / motor.R,
+                robot.supply_limit * job.max_voltage / std::max(back_emf, 1e-3 * job.max_voltage)});
+  return shafts * robot.gearing * motor.Kt * (current - motor.free_current) /
+         (robot.wheel_radius * rolling_mass(robot, shafts));
+}
+
+/// What the trajectory leaves of the drivetrain, where that is little.
+void tell_reserve(const DriveJob& job, std::vector<Diagnostic>& diagnostics) {
+  const auto& samples = job.trajectory.samples;
+  const double top = job.robot.free_speed(job.max_voltage);
+  const double reach = reach_of(job.robot);
+  double share = 0.0;
+  double share_at = 0.0;
+  double asked = 0.0;
+  double given = 0.0;
+  double asked_at = 0.0;
+  double sideways = 0.0;
+  double sideways_at = 0.0;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const double v = samples[i].velocity.norm();
+    const double fastest = (v + 0.5 * reach * std::abs(samples[i].omega)) / top;
+    if (fastest > share) {
+      share = fastest;
+      share_at = samples[i].time;
+    }
+    if (i == 0) {
+      continue;
+    }
+    const double dt = samples[i].time - samples[i - 1].time;
+    const double before = samples[i - 1].velocity.norm();
+    const double gain = (v - before) / dt;
+    const double most = motor_acceleration(job, 0.5 * (v + before));
+    if (gain > 0.0 && gain * std::max(given, 0.0) >= asked * std::max(most, 0.0)) {
+      asked = gain;
+      given = most;
+      asked_at = samples[i].time;
+    }
+    const double all = (samples[i].velocity - samples[i - 1].velocity).norm() / dt;
+    if (all > sideways) {
+      sideways = all;
+      sideways_at = samples[i].time;
+    }
+  }
+  constexpr double hardly = 0.9;
+  if (share > hardly) {
+    warn(
+        diagnostics, "no_reserve",
+        "at {} s the trajectory takes a wheel to {} of the {} m/s that it turns without load: "
+        "hardly a volt is left to accelerate and to correct; a velocity of {} there leaves a fifth",
+        format_number(share_at, 4), text::percent(share, 3), format_number(top, 3),
+        text::percent(0.8 / share, 2));
+  }
+  constexpr double more = 1.02;
+  if (asked > more * given) {
+    warn(diagnostics, "weak_motors",
+         "at {} s the trajectory gains {} m/s², and the motors within their limits give {} m/s² at "
+         "that speed: the robot falls behind; drive.max_acceleration makes it gain less",
+         format_number(asked_at, 4), format_number(asked, 3),
+         format_number(std::max(given, 0.0), 3));
+  }
+  const double held = job.robot.grip * mechanisms::standard_gravity;
+  if (sideways > more * held) {
+    warn(diagnostics, "little_grip",
+         "at {} s the trajectory asks for {} m/s², and wheels of a grip of {} hold {} m/s²: they "
+         "slip; lower drive.max_acceleration and drive.max_centripetal",
+         format_number(sideways_at, 4), format_number(sideways, 3),
+         format_number(job.robot.grip, 3), format_number(held, 3));
+  }
+}
+
 Expected<void> check_job(const DriveJob& job) {
   const DisturbanceSection& off = job.disturbance;
   FLYBALL_CHECK(Checks(where)
@@ -241,14 +332,8 @@ Expected<void> check_job(const DriveJob& job) {
         .got(fmt::format("{} s long", format_number(duration)))
         .expected("at most 600 s, and a million periods");
   }
-  double reach = job.robot.trackwidth;
-  if (job.robot.kind != DriveKind::differential) {
-    for (const Vector2d& module : job.robot.modules) {
-      reach = std::max(reach, 2.0 * module.norm());
-    }
-  }
   return check_reach(job.trajectory, {.wheel_speed = job.robot.free_speed(job.max_voltage),
-                                      .trackwidth = reach,
+                                      .trackwidth = reach_of(job.robot),
                                       .sideways = job.robot.kind != DriveKind::differential});
 }
 
@@ -276,6 +361,8 @@ std::string_view to_string(DriveFollower follower) {
       return "ltv drive";
     case DriveFollower::holonomic:
       return "holonomic";
+    case DriveFollower::pure_pursuit:
+      return "pure pursuit";
   }
   return "";
 }
@@ -293,10 +380,14 @@ Expected<DriveResult> drive(const DriveJob& job) {
   FLYBALL_TRY(const auto plant, make_drive_plant(true_robot(job), job.battery));
   FLYBALL_TRY(const auto law, make_drive_law(job));
   DriveResult result{.job = job, .diagnostics = job.diagnostics};
+  tell_reserve(job, result.diagnostics);
   result.duration = job.trajectory.duration();
   result.least_rail = std::numeric_limits<double>::infinity();
   const double T = job.period;
-  const auto periods = static_cast<int>(std::ceil((result.duration + job.settle) / T - 1e-9));
+  const bool keeps_time = job.follower != DriveFollower::pure_pursuit;
+  const double longest = (keeps_time ? 1.0 : 2.0) * result.duration + job.settle;
+  const auto planned = static_cast<int>(std::ceil(longest / T - 1e-9));
+  int periods = planned;
   const Index n = plant->states();
   VectorXd x(n + 1);
   x << first_state(job, *plant), 0.0;
@@ -326,10 +417,15 @@ Expected<DriveResult> drive(const DriveJob& job) {
         .wheels = plant->wheel_speeds(state),
         .module_angles = plant->module_angles(state),
         .module_rates = plant->module_rates(state)};
-    const MotionSample now = job.trajectory.at(t);
+    MotionSample now = job.trajectory.at(t);
     const DriveOrder order = law->step(reading, now, job.trajectory.at(t + T));
+    if (order.arrived && !result.arrival) {
+      result.arrival = t;
+      periods = std::min(planned, static_cast<int>(std::ceil((t + job.settle) / T - 1e-9)));
+    }
     const VectorXd asked = disturbed(job, order.volts);
     const DriveFlow flow = plant->flow(state, asked);
+    now = order.clock ? job.trajectory.at(*order.clock) : now;
     const Eigen::Vector3d e = error_of(pose, now);
     const double slip = plant->slip(state);
     take_errors(result.errors, e);
@@ -381,6 +477,12 @@ Expected<DriveResult> drive(const DriveJob& job) {
   result.saturated_share = static_cast<double>(saturated) / (periods + 1);
   result.errors.rms = std::sqrt(square / (periods + 1));
   FLYBALL_TRY(result.series, std::move(record).series());
+  if (!keeps_time && !result.arrival) {
+    warn(result.diagnostics, "not_arrived",
+         "pure pursuit is not at the path's end after {} s, twice the trajectory's time and a "
+         "second",
+         format_number(longest, 4));
+  }
   if (result.lost) {
     warn(result.diagnostics, "lost",
          "the robot was more than a metre from its reference; followers come back from errors of "

@@ -9,6 +9,22 @@
 /// The keys of [drive] and [disturbance].
 namespace flyball::study {
 
+struct Project;
+class TomlDocument;
+
+/// What in [drive] cannot be, with its place: names and texts that mean nothing, parts that do not
+/// go together, sizes that no drivetrain has.
+void check_drive(TomlDocument& document, const Project& project);
+/// "0.27 m, 0.27 m" as quantities. @param dimensions  Of each, the last ones optional.
+/// @errors ArgumentError::malformed; those of `parse_quantity`.
+[[nodiscard]] Expected<std::vector<double>> quantities_of(
+    const std::string& text, std::initializer_list<Dimension> dimensions, std::size_t least,
+    const std::string& name);
+/// Whether a number of a drivetrain is one that a drivetrain can have. @param key  "trackwidth".
+/// @errors ProjectError::wrong_value about drive.KEY.
+[[nodiscard]] Expected<void> check_drive_size(std::string_view key, double value);
+
+[[nodiscard]] Expected<void> check_drive_motor(const std::string& text);
 /// @errors ArgumentError::unknown_name.
 [[nodiscard]] Expected<void> check_drive_type(const std::string& text);
 [[nodiscard]] Expected<void> check_drive_follower(const std::string& text);
@@ -25,6 +41,7 @@ inline constexpr std::array drive_fields{
         .takes("FILE")
         .without("none"),
     text("motor", at<&DriveSection::motor>(), "\"NEO\"", "A motor's name, see `flyball motors`")
+        .checked(check_drive_motor)
         .no_option()
         .without("needed, here or in the settings"),
     whole("motor_count", at<&DriveSection::motor_count>(), 1, 100, "2",
@@ -82,6 +99,7 @@ inline constexpr std::array drive_fields{
         .without("none"),
     text("steer_motor", at<&DriveSection::steer_motor>(), "\"NEO\"",
          "Of a swerve module: what turns it")
+        .checked(check_drive_motor)
         .no_option()
         .without("the motor that drives it"),
     quantity("steer_gearing", at<&DriveSection::steer_gearing>(), Dimension::dimensionless,
@@ -128,7 +146,7 @@ inline constexpr std::array drive_fields{
         .called("path-centripetal")
         .without("2 m/s²"),
     text("follower", at<&DriveSection::follower>(), "\"ramsete\"", "What follows the trajectory")
-        .one_of("ramsete, ltv unicycle, ltv drive, holonomic")
+        .one_of("ramsete, ltv unicycle, ltv drive, holonomic, pure pursuit")
         .checked(check_drive_follower)
         .takes("NAME")
         .without("ltv unicycle; of what moves sideways holonomic"),
@@ -153,7 +171,14 @@ inline constexpr std::array drive_fields{
     quantity("velocity_tolerance", at<&DriveSection::velocity_tolerance>(), Dimension::velocity,
              Range::positive, "\"0.95 m/s\"", "Largest acceptable error of a wheel's speed")
         .no_option()
-        .without("0.95 m/s")};
+        .without("0.95 m/s, or as loose as keeps a wheel calm that loses the floor"),
+    quantity("least_lookahead", at<&DriveSection::least_lookahead>(), Dimension::length,
+             Range::positive, "\"0.3 m\"", "Of pure pursuit: how far it looks ahead at least")
+        .no_option(),
+    quantity("lookahead_time", at<&DriveSection::lookahead_time>(), Dimension::time,
+             Range::not_negative, "\"0.5 s\"",
+             "Of pure pursuit: how far it looks ahead, times its speed")
+        .no_option()};
 
 inline constexpr std::array disturbance_fields{
     quantity("ahead", at<&DisturbanceSection::ahead>(), Dimension::length, Range::any, "\"10 cm\"",

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include <Eigen/Core>
 
@@ -25,6 +26,8 @@ struct DriveOrder {
   Eigen::VectorXd volts{};             ///< One a motor, within the limit.
   mechanisms::ChassisSpeeds speeds{};  ///< That it wants, in the robot's frame.
   bool saturated = false;              ///< Whether it wanted more.
+  std::optional<double> clock{};       ///< s, of the trajectory, of what follows its path alone.
+  bool arrived = false;                ///< Of the same: at the path's end.
 };
 
 class DriveLaw {

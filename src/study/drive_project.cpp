@@ -17,6 +17,8 @@
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "core/wording.hpp"
+#include "study/drive_fields.hpp"
+#include "study/drive_wheel.hpp"
 #include "study/field.hpp"
 #include "study/path_route.hpp"
 
@@ -55,26 +57,6 @@ Expected<DriveKind> kind_of(const Project& project, const PathPlannerSettings& s
   return kind;
 }
 
-/// "0.27 m, 0.27 m" as quantities. @param dimensions  Of each, the last ones optional.
-Expected<std::vector<double>> quantities_of(const std::string& text,
-                                            std::initializer_list<Dimension> dimensions,
-                                            std::size_t least, const std::string& name) {
-  const auto parts = text::split(text, ",");
-  if (parts.size() < least || parts.size() > dimensions.size()) {
-    return refusal(ArgumentError::malformed, {}, name)
-        .got(fmt::format("\"{}\", {} values", shortened(text), parts.size()))
-        .expected(least == dimensions.size() ? fmt::format("{} values, separated by commas", least)
-                                             : fmt::format("{} to {} values, separated by commas",
-                                                           least, dimensions.size()));
-  }
-  std::vector<double> values;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    FLYBALL_TRY(const double value, parse_quantity(parts[i], *(dimensions.begin() + i), name));
-    values.push_back(value);
-  }
-  return values;
-}
-
 /// Everything that is missing at once.
 class Parts {
  public:
@@ -93,6 +75,8 @@ class Parts {
     }
     if (!by_settings) {
       miss(key, example);
+    } else if (auto fits = check_drive_size(key, *by_settings); !fits) {
+      missing_.push_back({std::move(fits).error().in(settings_path_), {}, {}});
     }
     return by_settings.value_or(1.0);
   }
@@ -116,6 +100,7 @@ class Parts {
  private:
   const Project& project_;
   std::string_view settings_;
+  std::string settings_path_ = beside(project_.path, std::string(settings_));
   std::vector<QuotedError> missing_;
 };
 
@@ -354,20 +339,52 @@ Expected<DriveFollower> follower_of(const Project& project, DriveKind kind) {
   if (said.empty()) {
     return sides ? DriveFollower::ltv_unicycle : DriveFollower::holonomic;
   }
-  for (const DriveFollower follower : {DriveFollower::ramsete, DriveFollower::ltv_unicycle,
-                                       DriveFollower::ltv_drive, DriveFollower::holonomic}) {
+  for (const DriveFollower follower :
+       {DriveFollower::ramsete, DriveFollower::ltv_unicycle, DriveFollower::ltv_drive,
+        DriveFollower::holonomic, DriveFollower::pure_pursuit}) {
     if (said == to_string(follower)) {
-      if ((follower == DriveFollower::holonomic) == sides) {
+      if (follower != DriveFollower::pure_pursuit &&
+          (follower == DriveFollower::holonomic) == sides) {
         return tl::unexpected(
             wrong(project, "follower", fmt::format("\"{}\"", said))
-                .expected(sides ? "one of a differential drive: ramsete, ltv unicycle, ltv drive"
-                                : fmt::format("holonomic, for a {} drive", to_string(kind))));
+                .expected(sides ? "one of a differential drive: ramsete, ltv unicycle, ltv drive, "
+                                  "pure pursuit"
+                                : fmt::format("holonomic or pure pursuit, for a {} drive",
+                                              to_string(kind))));
       }
       return follower;
     }
   }
-  return tl::unexpected(wrong(project, "follower", fmt::format("\"{}\"", shortened(said)))
-                            .expected("ramsete, ltv unicycle, ltv drive or holonomic"));
+  return tl::unexpected(
+      wrong(project, "follower", fmt::format("\"{}\"", shortened(said)))
+          .expected("ramsete, ltv unicycle, ltv drive, holonomic or pure pursuit"));
+}
+
+/// That of the file, or one with which wheels that lose the floor do not oscillate.
+Expected<void> take_velocity_tolerance(const DriveSection& said, DriveJob& job) {
+  const double usual = job.velocity_tolerance;
+  const double asked = said.velocity_tolerance.value_or(Velocity(usual)).si();
+  auto calm = calm_velocity_tolerance(job, asked);
+  if (!calm) {
+    return {};  // whoever designs the loop says why there is none
+  }
+  job.velocity_tolerance = said.velocity_tolerance ? asked : *calm;
+  const SpinningWheel wheel = SpinningWheel::of(job.robot, job.period);
+  const double pole =
+      wheel_gain(job).map([&](double gain) { return wheel.pole(gain); }).value_or(0);
+  if (said.velocity_tolerance && pole <= -1.0) {
+    warn(job.diagnostics, "spinning_wheels",
+         "the speed of a wheel that loses the floor oscillates: its loop's pole is {} there, and "
+         "the wheel is not the robot's share any more; drive.velocity_tolerance of {} m/s or more "
+         "keeps it calm",
+         format_number(pole, 3), format_number(*calm, 3));
+  } else if (!said.velocity_tolerance && *calm > usual) {
+    note(job.diagnostics, "assumed",
+         "drive.velocity_tolerance is taken as {} m/s: with {} m/s the speed of a wheel that loses "
+         "the floor would oscillate",
+         format_number(*calm, 3), format_number(usual, 3));
+  }
+  return {};
 }
 
 /// All but the trajectory. @param settings  Set to what the project file refers to.
@@ -398,13 +415,15 @@ ExpectedAll<DriveJob> drive_job_of(const Project& project, PathPlannerSettings& 
   job.x_tolerance = said.x_tolerance.value_or(Length(job.x_tolerance)).si();
   job.y_tolerance = said.y_tolerance.value_or(Length(job.y_tolerance)).si();
   job.heading_tolerance = said.heading_tolerance.value_or(Angle(job.heading_tolerance)).si();
-  job.velocity_tolerance = said.velocity_tolerance.value_or(Velocity(job.velocity_tolerance)).si();
+  job.least_lookahead = said.least_lookahead.si();
+  job.lookahead_time = said.lookahead_time.si();
   job.period = project.job.controller.period;
   job.max_voltage = project.job.controller.max_voltage;
   job.battery = {.open_circuit_voltage = project.job.battery.open_circuit_voltage,
                  .resistance = project.job.battery.resistance};
   job.disturbance = project.disturbance;
   job.seed = project.job.seed;
+  FLYBALL_CHECK(take_velocity_tolerance(said, job));
   return job;
 }
 

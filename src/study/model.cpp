@@ -196,6 +196,7 @@ ExpectedAll<ModelFile> model_of(const Project& project) {
   model.inputs = {{"voltage", "V"}};
   model.outputs = {model.states.front()};
   model.plant = plant;
+  model.notes = plant.doubts;
   const DiscreteSystem<>& discrete = linear.discrete;
   if (plant.kA_determined || !controls_velocity(plant.kind)) {
     model.system = {linear.A, linear.B, linear.C, discrete.D};

@@ -25,6 +25,14 @@ constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 using Coordinates = std::vector<Coordinate>;
 using Index = Eigen::Index;
 
+/// Whether it is the unit of a mass or of a moment of inertia.
+bool is_never_negative(const SiUnit& unit) {
+  static const SiUnit mass = parse_si_unit("kg").value();
+  static const SiUnit inertia = parse_si_unit("kg m^2").value();
+  return unit.dimension.exponents == mass.dimension.exponents ||
+         unit.dimension.exponents == inertia.dimension.exponents;
+}
+
 /// Reads a document's model, section by section; every error goes to the document.
 class ModelReader : private NamedValues {
  public:
@@ -149,6 +157,14 @@ class ModelReader : private NamedValues {
       } else if (document_.is_new("model.parameters", name)) {
         document_.refuse("model.parameters", name,
                          unknown(name, {&known}, "a parameter of the model"));
+      }
+      if (parts && unit && parts->number < 0.0 && is_never_negative(*unit)) {
+        document_.refuse("model.parameters", name,
+                         Error(ArgumentError::out_of_range)
+                             .about(called)
+                             .got(fmt::format("\"{}\"", text))
+                             .expected("zero or more: a mass and a moment of inertia are never "
+                                       "negative"));
       }
       formulas.parameters.push_back({name,
                                      !parts || !unit       ? ""

@@ -5,9 +5,11 @@
 
 #include <fmt/format.h>
 
+#include <flyball/core/random.hpp>
 #include <flyball/math/expression/differentiate.hpp>
 #include <flyball/math/expression/tape_builder.hpp>
 
+#include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "study/model_swing_up.hpp"
@@ -225,6 +227,90 @@ Expected<ModelRegion> region_of(const ModelJob& job, const ModelRegulator& regul
                                              .count = count,
                                              .plane = {region.first, region.second}}));
   return region;
+}
+
+void doubt_energy(const ModelJob& job, const ModelRegulator& regulator,
+                  std::vector<Diagnostic>& doubts) {
+  const expression::Derivatives all = expression::differentiate(job.equations.tape);
+  const auto n = static_cast<std::size_t>(job.model.states());
+  std::vector<double> values(all.workspace_size());
+  all.tape.prepare<double>(job.equations.parameters, values);
+  std::vector<double> y(all.rows);
+  Eigen::MatrixXd J(static_cast<Index>(all.rows), static_cast<Index>(all.columns));
+  std::vector<double> in(n + 1);
+  const auto row = static_cast<Index>(n);
+  // dE/dt of all that moves it, and the sum of its parts' sizes: cancelling is what keeps energy.
+  const auto rate_of = [&](const VectorXd& x, double u) {
+    std::copy(x.begin(), x.end(), in.begin());
+    in[n] = u;
+    all.evaluate(in, y, J, values);
+    double rate = 0.0;
+    double size = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const double part = J(row, static_cast<Index>(i)) * y[i];
+      rate += part;
+      size += std::abs(part);
+    }
+    return std::pair(rate, size);
+  };
+  constexpr int samples = 64;
+  constexpr double rounding = 1e-6;
+  constexpr double wide = 2.0;  // in SI, of what is no angle
+  Random random(7);
+  const VectorXd& point = regulator.point.x;
+  const double rests = regulator.point.u(0);
+  const std::vector<Index> angles = angles_of(job);
+  double worst_rest = 0.0;
+  double worst_held = 0.0;
+  bool pushed = false;
+  bool holds = false;
+  VectorXd worst = point;
+  double worst_rate = 0.0;
+  for (int k = 0; k < samples; ++k) {
+    VectorXd x = point;
+    for (Index i = 0; i < x.size(); ++i) {
+      const bool turns = std::find(angles.begin(), angles.end(), i) != angles.end();
+      x(i) += (turns ? std::numbers::pi : wide) * random.uniform(-1.0, 1.0);
+    }
+    const auto [rate, size] = rate_of(x, rests);
+    double power = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      power += J(row, static_cast<Index>(i)) * J(static_cast<Index>(i), row);
+    }
+    pushed = pushed || std::abs(power) > 0.0;
+    if (!std::isfinite(rate) || !(size > 0.0)) {
+      continue;
+    }
+    if (rate / size > worst_rest) {
+      worst_rest = rate / size;
+      worst = x;
+      worst_rate = rate;
+    }
+    for (std::size_t i = 0; i < n; ++i) {  // the input that keeps a held state's rate zero
+      const auto at = static_cast<Index>(i);
+      if (job.swing_up.hold(at) != 0.0 && J(at, row) != 0.0) {
+        const auto [held, held_size] = rate_of(x, rests - y[i] / J(at, row));
+        holds = true;
+        worst_held = std::max(worst_held, held_size > 0.0 ? held / held_size : 0.0);
+        break;
+      }
+    }
+  }
+  if (!pushed) {
+    warn(doubts, "energy_not_pushed",
+         "the input does not change swing_up.energy anywhere: it swings nothing");
+  } else if (worst_rest > rounding && !(holds && worst_held <= rounding)) {
+    std::string place;
+    const auto& states = job.model.names().states;
+    for (std::size_t i = 0; i < n; ++i) {
+      place += fmt::format("{}{} = {}", i == 0 ? "" : ", ", states[i].name,
+                           format_number(worst(static_cast<Index>(i)), 3));
+    }
+    warn(doubts, "energy_not_kept",
+         "swing_up.energy is no energy of this model: with the input at rest it grows, at {} by {} "
+         "a second; look at its formula against the model's (½ J ω² and a potential)",
+         place, format_number(worst_rate, 3));
+  }
 }
 
 Expected<SwingUpRunResult> swing_up(const ModelJob& job, const ModelRegulator& regulator,

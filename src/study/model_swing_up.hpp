@@ -18,6 +18,11 @@ namespace flyball::study {
 /// @errors As `certify_region`; ArgumentError for inputs without limits.
 [[nodiscard]] Expected<ModelRegion> region_of(const ModelJob& job, const ModelRegulator& regulator);
 
+/// Tells of an energy that is none: while the input rests, or holds what [swing_up] holds, it
+/// comes and goes; or the input does not change it. At 64 random states. Losses are none of it.
+void doubt_energy(const ModelJob& job, const ModelRegulator& regulator,
+                  std::vector<Diagnostic>& doubts);
+
 /// The swing-up by [swing_up]'s energy, simulated. @errors ArgumentError for an energy that the
 /// angles do not change; as `simulate_with`.
 [[nodiscard]] Expected<SwingUpRunResult> swing_up(const ModelJob& job,

@@ -11,8 +11,10 @@
 
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
+#include "study/drive_fields.hpp"
 #include "study/mechanism_parts.hpp"
 #include "study/model_project.hpp"
+#include "study/size_fields.hpp"
 #include "study/toml_document.hpp"
 
 namespace flyball::study {
@@ -124,6 +126,9 @@ void make_plant(TomlDocument& document, Project& project) {
       document.refuse(part_section, given(part) ? part : "type", std::move(made).error());
     }
   }
+  if (!document.has("gains", "kV")) {
+    doubt_arm(project.parts, plant.doubts);
+  }
   take_gains(project.gains, plant);
   project.mechanism_run = mechanism_run(document, project);
 }
@@ -141,7 +146,8 @@ void refuse_other_kinds(TomlDocument& document, const MechanismRow& row) {
     }
   };
   const auto needs = [](const MechanismRow& one, std::string_view key) {
-    return std::find(one.needs.begin(), one.needs.end(), key) != one.needs.end();
+    return std::find(one.needs.begin(), one.needs.end(), key) != one.needs.end() ||
+           std::find(one.may.begin(), one.may.end(), key) != one.may.end();
   };
   for (const Field& field : section_of(part_section).fields) {
     if (!needs(row, field.key) &&
@@ -205,6 +211,12 @@ ExpectedAll<Project> read(std::string_view text, const std::string& name,
   }
   if (type) {
     refuse_other_kinds(document, mechanism_row(*type));
+  }
+  if (type && !formulas && !drives) {
+    check_size(document, project);
+  }
+  if (drives) {
+    check_drive(document, project);
   }
   if (!document.errors()) {
     take_parts(document, project);

@@ -362,7 +362,8 @@ ExpectedAll<Simulation> simulate(const Project& project) {
     FLYBALL_TRY(const auto regulator, regulate(job));
     if (job.swing_up.has_energy) {
       FLYBALL_TRY(const auto region, region_of(job, regulator));
-      return swing_up(job, regulator, region).map([](SwingUpRunResult result) {
+      return swing_up(job, regulator, region).map([&](SwingUpRunResult result) {
+        doubt_energy(job, regulator, result.simulation.diagnostics);
         return std::move(result.simulation);
       });
     }
@@ -417,6 +418,7 @@ ExpectedAll<ModelDesign> design_model(const ModelJob& job) {
       return refused(where, std::move(swung).error(), made.diagnostics);
     }
     result.swing_up = *std::move(swung);
+    doubt_energy(job, made, result.regulator.diagnostics);
   }
   result.simulation.diagnostics = result.regulator.diagnostics;
   return result;

@@ -289,19 +289,20 @@ std::vector<SizeSweep> sweeps_of(const SizeJob& job, double gearing, double best
   tell_progress("varies the load");
   constexpr double reach = 4.0;
   const double inertia = load.inertia;
-  all.push_back(sweep(job,
-                      {.name = "load",
-                       .title = turns ? "Moment of inertia" : "Mass",
-                       .unit = turns ? "kg·m²" : "kg",
-                       .here = inertia},
-                      inertia / reach, inertia * reach, gearing, best,
-                      [&](TravelJob& travel, double value) {
-                        // An arm that is heavier is heavier throughout: gravity and grip grow with
-                        // it.
-                        travel.load.inertia = value;
-                        travel.load.gravity = load.gravity * value / inertia;
-                        travel.load.grip = load.grip * value / inertia;
-                      }));
+  all.push_back(
+      sweep(job,
+            {.name = "load",
+             .title = turns ? "Moment of inertia" : "Mass",
+             .unit = turns ? "kg·m²" : "kg",
+             .here = inertia},
+            inertia / reach, inertia * reach, gearing, best, [&](TravelJob& travel, double value) {
+              // An arm that is heavier is heavier throughout: gravity and grip grow with
+              // it.
+              travel.load.inertia = value;
+              travel.load.gravity =
+                  (load.gravity + job.counterbalance) * value / inertia - job.counterbalance;
+              travel.load.grip = load.grip * value / inertia;
+            }));
   tell_progress("varies the current limits");
   const double least = 10.0;  // A, of one motor
   const double most = std::max(load.motor.stall_current / n, 2.0 * least);

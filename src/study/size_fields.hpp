@@ -9,6 +9,12 @@
 /// The keys of [size].
 namespace flyball::study {
 
+struct Project;
+class TomlDocument;
+
+/// What in [size] would be without effect, or cannot be, with its place.
+void check_size(TomlDocument& document, const Project& project);
+
 inline constexpr std::array size_fields{
     quantity("start", at<&SizeSection::start>(), FieldDimension::output, Range::any, "\"0.1 m\"",
              "Where the motion begins, at rest; of what is controlled by its speed, that speed")

@@ -13,6 +13,7 @@
 
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
+#include "core/wording.hpp"
 #include "study/mechanism_parts.hpp"
 
 namespace flyball::study {
@@ -75,9 +76,11 @@ GearedLoad load_of(const Project& project) {
   load.gearing = parts.gearing.value_or(1.0);
   switch (*parts.type) {
     case MechanismKind::elevator:
-      load.radius = parts.drum_radius->si();
-      load.inertia = parts.mass->si();
-      load.gravity = load.inertia * mechanisms::standard_gravity;
+      if (const auto lift = elevator_lift(parts)) {  // else the file would not have been read
+        load.radius = lift->rise;
+        load.inertia = lift->inertia;
+        load.gravity = lift->weight;
+      }
       break;
     case MechanismKind::swerve_drive:
       load.radius = parts.wheel_radius->si();
@@ -104,47 +107,6 @@ GearedLoad load_of(const Project& project) {
     load.grip = *said.grip * load.inertia * mechanisms::standard_gravity;
   }
   return load;
-}
-
-/// What would be silently without effect.
-ExpectedAll<void> refuse_meaningless(const Project& project) {
-  const SizeSection& said = project.size;
-  const MechanismKind kind = *project.parts.type;
-  const bool drives = kind == MechanismKind::swerve_drive;
-  const std::string of(to_string(kind));
-  std::vector<QuotedError> all;
-  const auto refuse = [&](std::string_view key, std::string got, std::string hint) {
-    all.push_back({wrong(project, key, std::move(got)).hint(std::move(hint)), {}, {}});
-  };
-  if (!drives && said.distance) {
-    refuse("distance", fmt::format("without meaning for this {}", of),
-           "say where its motion begins and ends: start and end");
-  }
-  if (!drives && said.grip) {
-    refuse("grip", fmt::format("without meaning for this {}", of), "it is of wheels on a floor");
-  }
-  if (said.distance && (said.start || said.end)) {
-    refuse("distance", "beside a start or an end, which are speeds",
-           "ask for a distance or for a speed, not for both");
-  }
-  if (said.stop && !said.distance) {
-    refuse("stop", "without a distance",
-           drives ? "say size.distance" : "this motion ends at rest, or at its speed");
-  }
-  if (!said.locked_rotor.empty() && said.winding_heat_capacity) {
-    refuse("locked_rotor", "beside winding_heat_capacity", "say one of them");
-  }
-  if (said.winding_thermal_resistance && !said.winding_heat_capacity && said.locked_rotor.empty()) {
-    refuse("winding_thermal_resistance", "without a heat capacity",
-           "say winding_heat_capacity, in J/K, or locked_rotor, a file of flyball motor-curves");
-  }
-  if (!(said.efficiency <= 1.0)) {
-    refuse("efficiency", format_number(said.efficiency), "90 % is 0.9; gears lose power");
-  }
-  if (!all.empty()) {
-    return tl::unexpected(Errors(std::move(all)));
-  }
-  return {};
 }
 
 /// From where to where, or which speed.
@@ -202,8 +164,12 @@ Expected<Winding> winding_of(const Project& project, std::vector<Diagnostic>& di
   if (!file.locked || !file.locked->heat_capacity.determined) {
     return tl::unexpected(
         wrong(project, "locked_rotor",
-              file.locked ? "a run in which the resistance does not rise beyond its scatter"
-                          : "a motor curve, in which the motor turns")
+              file.locked
+                  ? fmt::format("a run in which the resistance does not rise beyond its scatter "
+                                "({} over {})",
+                                text::percent(file.locked->R_rise, 2),
+                                text::count(static_cast<std::size_t>(file.locked->rows), "row"))
+                  : "a motor curve, in which the motor turns")
             .expected("a locked rotor whose windings warm")
             .hint("say winding_heat_capacity in place of it, in J/K"));
   }
@@ -224,7 +190,6 @@ ExpectedAll<SizeJob> size_job(const std::string& path, std::span<const Override>
     return tl::unexpected(*project.plant_error);
   }
   FLYBALL_CHECK(check_parts(project));
-  FLYBALL_CHECK(refuse_meaningless(project));
   const SizeSection& said = project.size;
   SizeJob job{.path = path,
               .gearing = project.parts.gearing,
@@ -232,7 +197,8 @@ ExpectedAll<SizeJob> size_job(const std::string& path, std::span<const Override>
               .temperature_limit = said.temperature_limit,
               .gearing_low = said.gearing_low,
               .gearing_high = said.gearing_high,
-              .compare_motors = said.compare_motors};
+              .compare_motors = said.compare_motors,
+              .counterbalance = project.parts.counterbalance.value_or(Force(0.0)).si()};
   job.travel.load = load_of(project);
   const double n = job.travel.load.motor.count;
   const double none = job.travel.limits.stator_current;
@@ -245,19 +211,8 @@ ExpectedAll<SizeJob> size_job(const std::string& path, std::span<const Override>
   job.travel.longest = said.longest.si();
   take_motion(project, job.travel, job.diagnostics);
   FLYBALL_TRY(job.travel.winding, winding_of(project, job.diagnostics));
-  if (*project.parts.type == MechanismKind::arm) {
-    // About the joint it is that of a point mass there, at least; a twentieth for what is rounded.
-    constexpr double rounded = 0.95;
-    const double l = project.parts.center_of_mass->si();
-    const double least = project.parts.mass->si() * l * l;
-    if (job.travel.load.inertia < rounded * least) {
-      warn(job.diagnostics, "light_arm",
-           "an arm of this mass and centre of mass has at least {:.4g} kg m² about its joint, and "
-           "mechanism.moment_of_inertia is {:.4g} kg m²: times come out too short; give it about "
-           "the joint, which is that about the centre of mass and {:.4g} kg m² more",
-           least, job.travel.load.inertia, least);
-    }
-  }
+  job.diagnostics.insert(job.diagnostics.end(), project.job.plant.doubts.begin(),
+                         project.job.plant.doubts.end());
   if (job.travel.load.rotor_inertia == 0.0) {
     note(job.diagnostics, "no_rotor",
          "the motors' rotors are taken to have no inertia: with size.rotor_inertia high gearings "

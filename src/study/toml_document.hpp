@@ -51,6 +51,8 @@ class TomlDocument {
   /// Keeps an error with the place of what is wrong in the file, or its option.
   void refuse(std::string_view section, std::string_view key, Error error,
               Fault fault = Fault::value);
+  /// The same of one of a list. @param index  From 0.
+  void refuse_item(std::string_view section, std::string_view key, std::size_t index, Error error);
   /// The same of a part of a text: evidence `offset` and `length`, in bytes, say which.
   void refuse_part(std::string_view section, std::string_view key, Error error);
   /// An error about a key that should be there, with the section's place.

@@ -51,6 +51,19 @@ void TomlDocument::refuse(std::string_view section, std::string_view key, Error 
   found_.push_back({source, std::move(error).in(place(source)), true, {}});
 }
 
+void TomlDocument::refuse_item(std::string_view section, std::string_view key, std::size_t index,
+                               Error error) {
+  const toml::node* value = node(section, key);
+  const toml::array* list = value != nullptr ? value->as_array() : nullptr;
+  const toml::node* item = list != nullptr ? list->get(index) : nullptr;
+  if (item == nullptr || options_.find(name_of(section, key)) != options_.end()) {
+    refuse(section, key, std::move(error));
+    return;
+  }
+  const toml::source_region source = item->source();
+  found_.push_back({source, std::move(error).in(place(source)), true, {}});
+}
+
 void TomlDocument::refuse_part(std::string_view section, std::string_view key, Error error) {
   const toml::node* value = node(section, key);
   const auto evidence = [&](std::string_view of) {

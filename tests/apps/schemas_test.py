@@ -151,7 +151,9 @@ def check_answers(folder):
     check_answer(["optimize", examples / "drive_fastest.toml", "--attempts", "0"], 2, folder)
     for follower in ("ramsete", "ltv unicycle", "ltv drive"):
         check_answer(["design", examples / "drive_differential.toml", "--follower", follower], 0, folder, "design_drive")
-    check_answer(["design", examples / "drive_swerve.toml"], 2, folder, "design_drive")
+    check_answer(["design", examples / "drive_swerve.toml"], 0, folder, "design_holonomic")
+    check_answer(["design", examples / "drive_swerve.toml", "--follower", "pure pursuit"], 2, folder, "design_holonomic")
+    check_answer(["drive", examples / "drive_differential.toml", "--follower", "pure pursuit"], 0, folder)
     check_model_fit(folder)
     (folder / "discrete.json").write_text('{"A":[[0.5]],"B":[[1]],"domain":"discrete","T":0.02}')
     check_answer(["analyze", "discrete.json"], 0, folder)

@@ -133,6 +133,9 @@ TEST(DesignDrive, WhatIsNoDifferentialDriveIsRefused) {
   const auto design = design_follower(*job);
   ASSERT_FALSE(design);
   EXPECT_NE(to_string(design.error()).find("drive.type"), std::string::npos);
+  const auto pursuit = job_of(robot + "follower = \"pure pursuit\"\n");
+  ASSERT_TRUE(pursuit);
+  EXPECT_NE(to_string(design_follower(*pursuit).error()).find("no gains"), std::string::npos);
   const auto incomplete = job_of("[drive]\ntype = \"differential\"\n");
   ASSERT_FALSE(incomplete);
   EXPECT_NE(to_string(incomplete.error()).find("drive.mass"), std::string::npos);

@@ -1,10 +1,14 @@
 #include <flyball/study/drive.hpp>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <numbers>
 #include <string>
+#include <tuple>
 
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -185,6 +189,198 @@ TEST(Drive, ThePlantAgreesWithAnIndependentIntegration) {
   EXPECT_LT((ours->final_state() - expected).norm(), 1e-8 * expected.norm());
 }
 
+/// A swerve or a mecanum drive written out anew, as above; every wheel carries a quarter.
+struct IndependentHolonomic {
+  const DriveRobot& robot;
+  const mechanisms::Battery& battery;
+  VectorXd volts;
+
+  [[nodiscard]] bool swerves() const { return robot.kind == DriveKind::swerve; }
+  [[nodiscard]] int place(int wheel) const { return swerves() ? 6 + 3 * wheel : 6 + wheel; }
+  /// (motor, its speed in rad/s, its limit in A)
+  [[nodiscard]] std::tuple<const mechanisms::DcMotor&, double, double> motor(const VectorXd& s,
+                                                                             int k) const {
+    if (k < 4) {
+      return {robot.motor, robot.gearing * s(place(k) + (swerves() ? 2 : 0)), robot.stator_limit};
+    }
+    return {robot.steer_motor, robot.steer_gearing * s(place(k - 4) + 1), 40.0};
+  }
+  [[nodiscard]] double current(const VectorXd& s, int k, double rail) const {
+    const auto [of, speed, limit] = motor(s, k);
+    const double e = speed / of.Kv;
+    double V = std::clamp(volts(k), e - limit * of.R, e + limit * of.R);
+    V = std::clamp(V, -rail, rail);
+    return (V - e) / of.R;
+  }
+  VectorXd operator()(double, const VectorXd& s) const {
+    const int motors = swerves() ? 8 : 4;
+    double rail = battery.open_circuit_voltage;
+    for (int i = 0; i < 200; ++i) {
+      double supply = 0.0;
+      for (int k = 0; k < motors; ++k) {
+        const auto [of, speed, limit] = motor(s, k);
+        const double I = current(s, k, rail);
+        supply += (speed / of.Kv + of.R * I) * I / rail;
+      }
+      rail = battery.open_circuit_voltage - battery.resistance * supply;
+    }
+    VectorXd ds = VectorXd::Zero(s.size());
+    ds.head<3>() << s(3), s(4), s(5);
+    const Eigen::Rotation2Dd turned(s(2));
+    const double load = 0.25 * robot.mass * mechanisms::standard_gravity;
+    const auto torque = [&](int k, double Omega) {
+      const auto [of, speed, limit] = motor(s, k);
+      const double G = k < 4 ? robot.gearing : robot.steer_gearing;
+      return G * of.Kt * (current(s, k, rail) - of.free_current * std::tanh(Omega / 0.5));
+    };
+    double moment = 0.0;
+    std::array<double, 4> steering{};
+    for (int k = 0; k < 4; ++k) {
+      const Eigen::Vector2d r = turned * robot.modules[static_cast<std::size_t>(k)];
+      const int at = place(k);
+      const double angle = swerves() ? s(at) : 0.0;
+      const double Omega = s(swerves() ? at + 2 : at);
+      const Eigen::Vector2d d = turned * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+      const double rolling = robot.wheel_radius * Omega;
+      Eigen::Vector2d sliding = s.segment<2>(3) + s(5) * Eigen::Vector2d(-r(1), r(0)) - rolling * d;
+      if (!swerves()) {  // along the rollers' axes alone, which form an X
+        const double way = (k == 0 || k == 3 ? -1.0 : 1.0) * 0.78539816339744831;
+        const Eigen::Vector2d axis = turned * Eigen::Vector2d(std::cos(way), std::sin(way));
+        sliding = Eigen::Vector2d(sliding.dot(axis) * axis);
+      }
+      const double reference = std::hypot(rolling, 0.05);
+      const double slip = sliding.norm() / reference;
+      const double B = 20.0 / (robot.grip * 1.3);
+      const double share =
+          slip > 1e-14 ? robot.grip * std::sin(1.3 * std::atan(B * slip)) / slip : 20.0;
+      const Eigen::Vector2d F = -load * share / reference * sliding;
+      ds.segment<2>(3) += F / robot.mass;
+      moment += r(0) * F(1) - r(1) * F(0);
+      ds(swerves() ? at + 2 : at) =
+          (torque(k, Omega) - robot.wheel_radius * F.dot(d)) / robot.wheel_inertia;
+      if (swerves()) {
+        steering[static_cast<std::size_t>(k)] = torque(4 + k, s(at + 1));
+        moment -= steering[static_cast<std::size_t>(k)];
+        ds(at) = s(at + 1);
+      }
+    }
+    ds(5) = moment / robot.moment_of_inertia;
+    for (int k = 0; swerves() && k < 4; ++k) {
+      ds(place(k) + 1) = steering[static_cast<std::size_t>(k)] / robot.steer_inertia - ds(5);
+    }
+    return ds;
+  }
+};
+
+TEST(Drive, SwerveAndMecanumAgreeWithAnIndependentIntegration) {
+  for (const char* type : {"swerve", "mecanum"}) {
+    const auto job = job_of(robot(type) + bend + "stator_limit = \"50 A\"\n");
+    ASSERT_TRUE(job);
+    const auto plant = make_drive_plant(job->robot, job->battery);
+    ASSERT_TRUE(plant) << to_string(plant.error());
+    const VectorXd x =
+        (*plant)->state_of(Pose2d(1.0, 2.0, 0.4), {1.0, 0.3, 0.5}, {0.3, -0.2, 0.1, 0.6});
+    VectorXd s = x;
+    s(3) = std::cos(0.4) * x(3) - std::sin(0.4) * x(4);
+    s(4) = std::sin(0.4) * x(3) + std::cos(0.4) * x(4);
+    VectorXd volts(job->robot.motors());
+    volts.head<4>() << 11.0, 4.0, 7.0, -3.0;
+    volts.tail(volts.size() - 4).setLinSpaced(-1.0, 2.0);
+    constexpr double duration = 0.2;
+    const auto ours = integrate(
+        [&](double, const VectorXd& at) {
+          VectorXd dx(at.size());
+          (*plant)->derivative(at, volts, {}, dx);
+          return dx;
+        },
+        0.0, x, duration,
+        {.relative_tolerance = job->accuracy,
+         .absolute_tolerance = job->accuracy,
+         .max_steps = 200'000});
+    ASSERT_TRUE(ours) << to_string(ours.error());
+    const auto theirs =
+        integrate(IndependentHolonomic{job->robot, job->battery, volts}, 0.0, s, duration,
+                  {.method = IntegrationMethod::radau,
+                   .relative_tolerance = 1e-11,
+                   .absolute_tolerance = 1e-11,
+                   .max_steps = 200'000});
+    ASSERT_TRUE(theirs) << to_string(theirs.error());
+    VectorXd expected = theirs->final_state();
+    const double c = std::cos(expected(2));
+    const double sine = std::sin(expected(2));
+    const double vx = expected(3);
+    const double vy = expected(4);
+    expected(3) = c * vx + sine * vy;
+    expected(4) = c * vy - sine * vx;
+    EXPECT_GT((expected - x).norm(), 1.0) << type;
+    EXPECT_LT((ours->final_state() - expected).norm(), 1e-8 * expected.norm()) << type;
+  }
+}
+
+// A robot that starts beside its path comes to its end by the path alone: backwards, too, and
+// sideways; it says when it arrived.
+TEST(Drive, PurePursuitComesToTheEnd) {
+  for (const char* more : {"", "reversed = true\n", "type = swerve", "type = mecanum"}) {
+    const std::string text(more);
+    const bool sides = text.find("type") == std::string::npos;
+    const DriveResult result = driven(robot(sides ? "differential" : text.substr(7)) + bend +
+                                      "follower = \"pure pursuit\"\n" + (sides ? text : "") +
+                                      "[disturbance]\nleft = \"20 cm\"\nlatency = \"20 ms\"\n");
+    ASSERT_TRUE(result.arrival) << more;
+    EXPECT_LT(*result.arrival, 1.5 * result.duration) << more;
+    EXPECT_LT(std::hypot(result.errors.final_across, result.errors.final_along), 0.08) << more;
+    EXPECT_LT(result.errors.largest_across, 0.3) << more;
+    EXPECT_FALSE(result.lost) << more;
+  }
+  EXPECT_FALSE(driven(robot("swerve") + bend).arrival);
+}
+
+// Wheels that lose the floor: with a loop that is too tight for them they go back and forth each
+// period at their current limit, with the one that is taken they do not.
+TEST(Drive, WheelsThatLoseTheFloorDoNotOscillate) {
+  const std::string smooth =
+      "stator_limit = \"80 A\"\n[disturbance]\nslip_grip = 0.1\nslip_from = \"0.4 s\"\n"
+      "slip_for = \"0.5 s\"\n";
+  const auto swings = [](const DriveResult& result) {
+    const std::vector<double>& volts = *result.series.find("front_left_voltage");
+    double most = 0.0;
+    for (std::size_t k = 22; k < 45; ++k) {  // on the smooth spot
+      most = std::max(most, std::abs(volts[k - 1] - 0.5 * (volts[k - 2] + volts[k])));
+    }
+    return most;
+  };
+  const DriveResult calm = driven(robot("swerve") + bend + smooth);
+  const DriveResult tight =
+      driven(robot("swerve") + bend + "velocity_tolerance = \"0.95 m/s\"\n" + smooth);
+  EXPECT_LT(swings(calm), 1.5);
+  EXPECT_GT(swings(tight), 4.0);
+  EXPECT_TRUE(std::any_of(tight.diagnostics.begin(), tight.diagnostics.end(),
+                          [](const Diagnostic& d) { return d.code == "spinning_wheels"; }));
+}
+
+// What is little is told: motors that do not give the acceleration, wheels at their own speed,
+// wheels that cannot hold.
+TEST(Drive, WhatATrajectoryLeavesIsTold) {
+  const auto told = [](const DriveResult& result, const char* code) {
+    return std::any_of(result.diagnostics.begin(), result.diagnostics.end(),
+                       [&](const Diagnostic& d) { return d.code == code; });
+  };
+  const std::string straight = "waypoints = [\"1 m, 1 m, 0 deg\", \"7 m, 1 m, 0 deg\"]\n";
+  const DriveResult weak = driven(robot("differential") + straight +
+                                  "stator_limit = \"20 A\"\nmax_acceleration = \"6 m/s^2\"\n");
+  EXPECT_TRUE(told(weak, "weak_motors"));
+  EXPECT_FALSE(told(weak, "little_grip"));
+  const DriveResult fast = driven(
+      robot("differential") +
+      "waypoints = [\"1 m, 1 m, 0 deg\", \"17 m, 1 m, 0 deg\"]\nmax_velocity = \"5.3 m/s\"\n");
+  EXPECT_TRUE(told(fast, "no_reserve"));
+  const DriveResult slips =
+      driven(robot("differential") + straight + "grip = 0.4\nmax_acceleration = \"6 m/s^2\"\n");
+  EXPECT_TRUE(told(slips, "little_grip"));
+  const DriveResult calm = driven(robot("differential") + straight);
+  EXPECT_FALSE(told(calm, "weak_motors") || told(calm, "no_reserve") || told(calm, "little_grip"));
+}
+
 TEST(Drive, TheAnswerHasItsPicturesAndALogThatReadsBack) {
   const DriveResult result = driven(robot("swerve") + bend);
   const Answer answer = answer_of(result);
@@ -260,7 +456,6 @@ TEST(DriveJob, WhatIsMissingOrCannotBeIsToldWithTheMend) {
       << refused(robot("tank") + bend);
   std::string unknown = robot("differential") + bend;
   unknown.replace(unknown.find("NEO"), 3, "Neeo");
-  EXPECT_NE(refused(unknown).find("drive.motor"), std::string::npos) << refused(unknown);
   std::string none = robot("differential") + bend;
   none.replace(none.find("0.6 m"), 5, "0 m");
   EXPECT_NE(refused(none).find("greater than zero"), std::string::npos) << refused(none);
@@ -269,6 +464,29 @@ TEST(DriveJob, WhatIsMissingOrCannotBeIsToldWithTheMend) {
                     "\"9 m/s\"\nmax_acceleration = \"90 m/s^2\"\nmax_centripetal = \"90 m/s^2\"\n")
                 .find("lower the velocity there"),
             std::string::npos);
+  // Each with its line and column.
+  const auto quoted = [&](const std::string& text, const std::string& part) {
+    const std::string said = refused(text);
+    EXPECT_NE(said.find(part), std::string::npos) << said;
+    EXPECT_NE(said.find("drive_test.toml:"), std::string::npos) << said;
+  };
+  quoted(unknown, "did you mean \"NEO\"?");
+  quoted(robot("differential") + bend + "follower = \"holonomic\"\n", "ltv drive");
+  quoted(robot("swerve") + bend + "follower = \"ramsete\"\n", "holonomic or pure pursuit");
+  std::string narrow = robot("differential") + bend;
+  narrow.replace(narrow.find("0.6 m"), 5, "1e-9 m");
+  quoted(narrow, "drive.trackwidth is 1e-09 m; it must be 0.01 m to 100 m");
+  std::string heavy = robot("differential") + bend;
+  heavy.replace(heavy.find("54 kg"), 5, "1e12 kg");
+  quoted(heavy, "drive.mass");
+  const std::string corners = "\"0.2 m, 0.2 m\", \"0.2 m, -0.2 m\", \"-0.2 m, 0.2 m\"";
+  quoted(robot("swerve") + bend + "modules = [" + corners + "]\n", "3 places");
+  quoted(robot("swerve") + bend + "modules = [" + corners + ", \"-0.2 m, 0.2 m\"]\n",
+         "where modules[2] is");
+  quoted(robot("swerve") + bend + "modules = [\"-0.2 m, -0.2 m\", " + corners + "]\n",
+         "is not ahead of");
+  quoted(robot("differential") + "waypoints = [\"1 m, 1 m, 0 deg\",\n\"2 kg, 1 m, 0 deg\"]\n",
+         "drive.waypoints[1]");
   EXPECT_NE(refused("[drive]\ntype = \"swerve\"\n[mechanism]\ntype = \"arm\"\n").find("one of"),
             std::string::npos);
 }

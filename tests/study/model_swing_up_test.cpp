@@ -1,13 +1,18 @@
 // Swing-up and region of attraction of models by formula, from a project file alone.
+#include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <numbers>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <flyball/core/random.hpp>
 #include <flyball/export/swing_up.hpp>
 #include <flyball/study/project.hpp>
 #include <flyball/study/simulate.hpp>
+
+#include "compiled.hpp"
 
 namespace flyball::study {
 namespace {
@@ -103,6 +108,70 @@ TEST(ModelSwingUp, AnswerShowsIt) {
   std::string hanging = pendulum;
   hanging.replace(hanging.find("180 deg"), 7, "0 deg");
   EXPECT_FALSE(design_model(*read(hanging).model_job).value().region);
+}
+
+// The header, compiled, asks for what the law does: the energy's push, or K e within the region.
+TEST(ModelSwingUp, TheHeaderRuns) {
+  const auto design = design_model(*read(pendulum + swing_up).model_job).value();
+  const Answer answer = answer_of(design);
+  const auto file = std::find_if(answer.files.begin(), answer.files.end(),
+                                 [](const AnswerFile& f) { return f.name == "swing_up.hpp"; });
+  ASSERT_NE(file, answer.files.end());
+  Random random(5);
+  std::vector<Eigen::Vector2d> states;
+  std::string input;
+  for (int k = 0; k < 400; ++k) {
+    states.emplace_back(k % 2 == 0 ? pi + random.uniform(-0.2, 0.2) : random.uniform(-4.0, 4.0),
+                        (k % 2 == 0 ? 0.3 : 6.0) * random.normal());
+    input += test::bits({states.back()(0), states.back()(1)});
+  }
+  const std::vector<double> out =
+      test::run_compiled("swing_up.hpp", file->contents, 2,
+                         "    swing_up::Controller law;\n    const double x[2] = {n[0], n[1]};\n"
+                         "    const double u = law.calculate(x);\n"
+                         "    std::printf(\"%a %d\\n\", u, law.balances() ? 1 : 0);\n",
+                         input);
+  ASSERT_EQ(out.size(), 2 * states.size());
+  const CertifiedRegion& region = design.region->certified;
+  int balanced = 0;
+  for (std::size_t k = 0; k < states.size(); ++k) {
+    const Eigen::VectorXd x = states[k];
+    const bool balances = region.value(x) <= region.level;
+    const Eigen::Vector2d e(std::remainder(pi - x(0), 2.0 * pi), -x(1));
+    const double E = 0.25 * x(1) * x(1) - 9.81 * std::cos(x(0));
+    const double missing = std::clamp(10.0 * (9.81 - E) / 9.81, -1.0, 1.0);
+    const double wanted =
+        balances ? design.regulator.K.row(0).dot(e) : 3.9 * missing * (x(1) < 0.0 ? -1.0 : 1.0);
+    EXPECT_NEAR(out[2 * k], std::clamp(wanted, -3.9, 3.9), 1e-9) << k;
+    EXPECT_EQ(out[2 * k + 1], balances ? 1.0 : 0.0) << k;
+    balanced += balances ? 1 : 0;
+  }
+  EXPECT_GT(balanced, 50);
+  EXPECT_LT(balanced, 350);
+}
+
+// What is no energy is told: ω² has no half. Friction is a loss, no lie; a pole's energy is kept
+// while its cart is held.
+TEST(ModelSwingUp, AnEnergyThatIsNoneIsTold) {
+  const auto doubted = [](const std::string& text) {
+    const auto design = design_model(*read(text).model_job).value();
+    return std::any_of(design.regulator.diagnostics.begin(), design.regulator.diagnostics.end(),
+                       [](const Diagnostic& d) { return d.code.starts_with("energy_not"); });
+  };
+  EXPECT_FALSE(doubted(pendulum + swing_up));
+  EXPECT_TRUE(doubted(pendulum + "[swing_up]\nenergy = \"J*omega^2 - m*g*l*cos(theta)\"\n"));
+  std::string rubbing = pendulum;
+  rubbing.replace(rubbing.find("+ u/J"), 5, "- 0.1*omega/1.0 + u/J");
+  rubbing.replace(rubbing.find("0.1*omega/1.0"), 13, "b*omega");
+  rubbing.replace(rubbing.find("m = \"2 kg\""), 10, "m = \"2 kg\", b = \"0.05 1/s\"");
+  EXPECT_FALSE(doubted(rubbing + swing_up));
+  std::ifstream file(std::string(FLYBALL_EXAMPLES) + "/cart_pole_swing_up.toml");
+  const std::string cart{std::istreambuf_iterator<char>(file), {}};
+  EXPECT_FALSE(doubted(cart));
+  EXPECT_NE(complaint("[model]\nstates = { x = \"m\" }\nparameters = { m = \"-2 kg\" }\n"
+                      "[model.derivative]\nx = \"-x/m*m/1\"\n")
+                .find("never negative"),
+            std::string::npos);
 }
 
 // `simulate` with closed_loop runs the swing-up from simulation.initial.

@@ -8,7 +8,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <flyball/core/random.hpp>
 #include <flyball/mechanisms/gravity.hpp>
+#include <flyball/mechanisms/lift/elevator_arm.hpp>
 #include <flyball/study/project.hpp>
 
 namespace flyball::study {
@@ -135,6 +137,65 @@ TEST(SizeJob, APartOfAFileIsItsPartInSi) {
   EXPECT_FALSE(travel.speed);
 }
 
+// Two stages below the carriage: it goes three times as far as the rope, stage k counts by k/3 in
+// weight and by (k/3)² in inertia; the spring lifts.
+TEST(SizeJob, AnElevatorOfStages) {
+  const std::string parts = "stages = [\"3 kg\", \"2 kg\"]\ncounterbalance = \"40 N\"\n";
+  const auto job = job_of(project("gearing = 10\n" + parts, "end = \"1.2 m\"\n"));
+  ASSERT_TRUE(job) << to_string(job.error());
+  const auto& load = job->travel.load;
+  EXPECT_NEAR(load.radius, 3.0 * 0.0254, 1e-15);
+  EXPECT_NEAR(load.inertia, 8.0 + 3.0 / 9.0 + 2.0 * 4.0 / 9.0, 1e-12);
+  EXPECT_NEAR(load.gravity, (8.0 + 1.0 + 4.0 / 3.0) * mechanisms::standard_gravity - 40.0, 1e-12);
+  // The same plant where it is designed.
+  const auto plant = parse_project(project("gearing = 10\n" + parts, ""), "p.toml");
+  ASSERT_TRUE(plant) << to_string(plant.error());
+  const auto& motor = *plant->job.plant.motor;
+  const double volts = motor.R * load.radius / (10.0 * motor.Kt);  // per newton
+  EXPECT_NEAR(plant->job.plant.gains.kG, volts * load.gravity, 1e-12);
+  EXPECT_NEAR(plant->job.plant.gains.kA, volts * load.inertia, 1e-12);
+  EXPECT_NEAR(plant->job.plant.gains.kV, 10.0 / (motor.Kv * load.radius), 1e-12);
+  const auto sized = size(*job);
+  ASSERT_TRUE(sized) << to_string(sized.error());
+  EXPECT_GT(sized->best.travel.time, 0.0);
+  const std::string wrong = refused(project("stages = [\"3 m\"]\ngearing = 10\n", ""));
+  EXPECT_NE(wrong.find("stages"), std::string::npos) << wrong;
+  const std::string other = refused(
+      "[mechanism]\ntype = \"turret\"\nmotor = \"NEO\"\ngearing = 9\n"
+      "moment_of_inertia = \"1 kg m^2\"\ncounterbalance = \"3 N\"\n");
+  EXPECT_NE(other.find("without meaning for this turret"), std::string::npos) << other;
+}
+
+// The example by formula moves as the compiled model of the same numbers does.
+TEST(SizeJob, AnArmOnAnElevatorByFormula) {
+  const auto project = read_project(std::string(FLYBALL_EXAMPLES) + "/elevator_arm.toml");
+  ASSERT_TRUE(project) << to_string(project.error());
+  ASSERT_TRUE(project->model_job);
+  mechanisms::DcMotor lift{.R = 0.05715, .Kt = 0.02476, .Kv = 50.4};
+  mechanisms::DcMotor joint{.R = 0.1143, .Kt = 0.02476, .Kv = 50.4};
+  lift.count = joint.count = 1;
+  const auto made =
+      mechanisms::elevator_arm({.elevator = {.shaft = {.motor = lift, .gearing = 10.0},
+                                             .drum_radius = Length(0.0254),
+                                             .carriage = Mass(4.0),
+                                             .stages = {Mass(3.0)},
+                                             .counterbalance = {.force = Force(40.0)}},
+                                .joint = {.motor = joint, .gearing = 60.0},
+                                .moment_of_inertia = MomentOfInertia(0.45),
+                                .mass = Mass(3.0),
+                                .center_of_mass = Length(0.35)});
+  ASSERT_TRUE(made) << to_string(made.error());
+  Random random(3);
+  for (int k = 0; k < 50; ++k) {
+    const Eigen::Vector4d x = Eigen::Vector4d::NullaryExpr([&] { return random.normal(); });
+    const Eigen::Vector2d u = 5.0 * Eigen::Vector2d::NullaryExpr([&] { return random.normal(); });
+    const Eigen::VectorXd ours =
+        project->model_job->model.derivative(Eigen::VectorXd(x), Eigen::VectorXd(u));
+    const Eigen::Vector4d theirs = made->derivative(x, u);
+    EXPECT_LT((ours - theirs).norm(), 1e-12 * theirs.norm()) << k;
+  }
+}
+
 TEST(SizeJob, AGearingNeedNotBeThere) {
   const auto job = job_of(project("", "end = \"1 m\"\n"));
   ASSERT_TRUE(job) << to_string(job.error());
@@ -164,6 +225,10 @@ TEST(SizeJob, AnArmLighterThanItsMassesPlaceIsToldOf) {
 TEST(SizeJob, WhatHasNoMeaningOrCannotBeIsRefusedWithTheMend) {
   EXPECT_NE(refused(project("", "distance = \"5 m\"\n")).find("without meaning for this elevator"),
             std::string::npos);
+  // With its line and column.
+  const std::string light = refused(project("", "winding_heat_capacity = 1e-9\n"));
+  EXPECT_NE(light.find("size.winding_heat_capacity is 1e-09 J/K"), std::string::npos) << light;
+  EXPECT_NE(light.find("size_test.toml:8:25"), std::string::npos) << light;
   EXPECT_NE(refused(project("", "grip = 1.1\n")).find("wheels on a floor"), std::string::npos);
   EXPECT_NE(refused(project("", "efficiency = 90\n")).find("90 % is 0.9"), std::string::npos);
   EXPECT_NE(refused(project("", "end = \"90 deg\"\n")).find("it must be a length"),

@@ -37,8 +37,9 @@ struct PlantDescription {
   std::optional<PlantSpread> spread{};         ///< Of identified gains.
   std::optional<mechanisms::DcMotor> motor{};  ///< If known: current and battery sag are simulated.
   double gearing = 1.0;                        ///< Motor turns per output turn.
-  double drum_radius = 0.0;       ///< m, of a known drum (of a swerve drive: wheel), else 0.
-  double nominal_voltage = 12.0;  ///< V
+  double drum_radius = 0.0;          ///< m, of a known drum (of a swerve drive: wheel), else 0.
+  double nominal_voltage = 12.0;     ///< V
+  std::vector<Diagnostic> doubts{};  ///< Of parts that contradict each other.
 };
 
 /// What the controller has to do and what it works with. Empty optionals get a default that the

@@ -34,8 +34,9 @@ enum class DriveFollower {
   ltv_unicycle,  ///< Section 8.9, with the same tracker.
   ltv_drive,     ///< Section 8.7: voltages of the whole state.
   holonomic,     ///< Section 8.6.
+  pure_pursuit,  ///< The path, whatever the times; of any drivetrain.
 };
-/// "ramsete", "ltv unicycle", "ltv drive", "holonomic".
+/// "ramsete", "ltv unicycle", "ltv drive", "holonomic", "pure pursuit".
 [[nodiscard]] std::string_view to_string(DriveFollower follower);
 
 /// A drivetrain in SI.
@@ -74,6 +75,8 @@ struct DriveJob {
   double b = 2.0, zeta = 0.7;
   double x_tolerance = 0.0625, y_tolerance = 0.125, heading_tolerance = 2.5;  ///< m, m, rad
   double velocity_tolerance = 0.95;                                           ///< m/s
+  double least_lookahead = 0.3;  ///< m, of pure pursuit.
+  double lookahead_time = 0.5;   ///< s, of pure pursuit.
   double period = 0.020;
   double max_voltage = 12.0;
   mechanisms::Battery battery{};
@@ -97,13 +100,14 @@ struct DriveResult {
   DriveJob job{};
   TimeSeries series{};  ///< A row a period: pose, reference, errors, speeds, voltages, battery.
   TrackingErrors errors{};
-  double duration = 0.0;         ///< s, of the trajectory.
-  double saturated_share = 0.0;  ///< Of the periods, in which more was asked for than there is.
-  double largest_slip = 0.0;     ///< m/s, of a wheel over the floor.
-  double least_rail = 0.0;       ///< V
-  double peak_current = 0.0;     ///< A, of the battery.
-  double energy = 0.0;           ///< J, from the battery.
-  bool lost = false;             ///< Whether it was ever farther than a metre from its reference.
+  double duration = 0.0;            ///< s, of the trajectory.
+  std::optional<double> arrival{};  ///< s, of pure pursuit: when it came to the path's end.
+  double saturated_share = 0.0;     ///< Of the periods, in which more was asked for than there is.
+  double largest_slip = 0.0;        ///< m/s, of a wheel over the floor.
+  double least_rail = 0.0;          ///< V
+  double peak_current = 0.0;        ///< A, of the battery.
+  double energy = 0.0;              ///< J, from the battery.
+  bool lost = false;  ///< Whether it was ever farther than a metre from its reference.
   std::vector<Diagnostic> diagnostics{};
 };
 
@@ -119,7 +123,8 @@ struct DriveResult {
 /// Simulates it: each period the follower gets a pose (as old and as noisy as the disturbance says)
 /// and what its wheels do, and answers voltages, which motors get within current limits from a
 /// battery that sags; the robot, its wheels that slip and its modules are integrated to the job's
-/// accuracy between.
+/// accuracy between. Pure pursuit follows a path and not its times: its errors are from where the
+/// path is beside the robot, and it has twice the trajectory's time to arrive.
 /// @errors ArgumentError, those of the models and followers; TrajectoryFileError::too_tight;
 /// IntegrationError. Cost: some milliseconds a second of the trajectory.
 [[nodiscard]] Expected<DriveResult> drive(const DriveJob& job);

@@ -40,6 +40,8 @@ struct DriveSection {
   std::optional<Length> x_tolerance{}, y_tolerance{};
   std::optional<Angle> heading_tolerance{};
   std::optional<Velocity> velocity_tolerance{};
+  Length least_lookahead{0.3};  ///< Of pure pursuit.
+  Time lookahead_time{0.5};     ///< Of pure pursuit.
 };
 
 /// [disturbance]: what the follower does not know.

@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <flyball/core/errors.hpp>
 #include <flyball/study/drive_section.hpp>
@@ -48,6 +49,8 @@ struct MechanismParts {
   std::optional<Length> wheel_radius{};
   std::optional<MomentOfInertia> moment_of_inertia{};
   std::optional<Length> center_of_mass{};
+  std::vector<std::string> stages{};      ///< Masses of an elevator's stages, the drum's first.
+  std::optional<Force> counterbalance{};  ///< Constant, on an elevator's carriage, upward.
 };
 
 /// [gains]: feedforward gains that stand in place of those of the parts.

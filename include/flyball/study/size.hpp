@@ -27,6 +27,7 @@ struct SizeJob {
   std::optional<double> gearing_low{},
       gearing_high{};  ///< Of the sweep; around the best if absent.
   bool compare_motors = true;
+  double counterbalance = 0.0;  ///< N, of the load's gravity: does not grow with the mass.
   std::vector<Diagnostic> diagnostics{};  ///< What was noticed while the file was read.
 };
 

@@ -128,6 +128,9 @@ Verdict verdict_of(const DriveResult& result) {
                              text::capitalized(std::string(to_string(result.job.follower))),
                              seconds(result.duration), centimetres(e.largest_across),
                              centimetres(e.largest_along));
+  if (result.arrival) {
+    verdict.line += fmt::format(" It arrived after {}.", seconds(*result.arrival));
+  }
   if (result.lost) {
     verdict.line = fmt::format("{} lost the trajectory: {} across it, {} along it.",
                                text::capitalized(std::string(to_string(result.job.follower))),
@@ -184,6 +187,9 @@ std::string to_json(const DriveResult& result) {
               {"least_rail", result.least_rail},
               {"peak_current", result.peak_current},
               {"energy", result.energy}});
+    if (result.job.follower == DriveFollower::pure_pursuit) {
+      json.add("arrival", result.arrival);
+    }
     json.add("lost", result.lost);
     json.add("seed", result.job.seed);
     json.object("series", [&] {

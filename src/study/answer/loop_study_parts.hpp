@@ -8,6 +8,10 @@
 /// Pieces of the answer about loops.
 namespace flyball::study {
 
+/// Of the answer's JSON.
+inline constexpr const char* loop_schema = "flyball.loop/1";
+[[nodiscard]] std::string to_json(const LoopResult& result);
+
 /// The pictures of a view, in the order in which they are looked at.
 [[nodiscard]] std::vector<Figure> figures_of(const LoopResult& result);
 /// The same as CSV.
