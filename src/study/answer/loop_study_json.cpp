@@ -1,6 +1,6 @@
-#include <limits>
 // A loop's answer for programs.
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include <flyball/io/json_writer.hpp>
