@@ -324,6 +324,62 @@ TEST(Problem, ParametersChangeBetweenSolves) {
   EXPECT_LE(second.counts.iterations, first.counts.iterations + 8);
 }
 
+// A quadratic program whose numbers change a little begins with the bounds that were active: fewer
+// steps, and the solution that it has from nothing.
+TEST(Problem, SolvedAgainFromItsActiveBounds) {
+  const int N = 100;
+  const auto state = [N](Problem& problem, const Expression& r, const Expression& x_0) {
+    const ExpressionMatrix X = problem.decision_variable(1, N + 1);
+    const ExpressionMatrix U = problem.decision_variable(1, N);
+    const double a = std::exp(-5.0 / N);
+    for (int k = 0; k < N; ++k) {
+      problem.subject_to(X(0, k + 1) == a * X(0, k) + (1.0 - a) * U(0, k));
+    }
+    problem.subject_to(X(0, 0) == x_0);
+    problem.subject_to(-12.0 <= U);
+    problem.subject_to(U <= 12.0);
+    Expression J = 0.0;
+    for (int k = 0; k <= N; ++k) {
+      J += pow(r - X(0, k), 2);
+    }
+    problem.minimize(J);
+  };
+  Problem problem;
+  Expression r = problem.parameter(10.0);
+  Expression x_0 = problem.parameter(0.0);
+  state(problem, r, x_0);
+  const int first = problem.solve().value().counts.iterations;
+  for (const auto& [to, from] : {std::pair{10.1, 0.1}, {10.2, 0.3}, {9.0, -2.0}, {3.0, 5.0}}) {
+    r.set_value(to);
+    x_0.set_value(from);
+    const ProblemSolution again = problem.solve().value();
+    ASSERT_EQ(again.status, SolveStatus::solved) << to;
+    Problem fresh;
+    state(fresh, fresh.parameter(to), fresh.parameter(from));
+    EXPECT_NEAR(again.cost, fresh.solve().value().cost, 1e-7 * again.cost) << to;
+    if (to > 10.0) {
+      EXPECT_LE(again.counts.iterations, first / 2) << to;
+    }
+  }
+}
+
+// Rows that say the same twice have multipliers that are not unique, and one solution.
+TEST(Problem, DependentConstraints) {
+  Problem problem;
+  const Expression x = problem.decision_variable();
+  const Expression y = problem.decision_variable();
+  problem.subject_to(x + y == 1.0);
+  problem.subject_to(2.0 * x + 2.0 * y == 2.0);
+  problem.subject_to(x * x + y <= 3.0);
+  problem.minimize(pow(x - 2.0, 2) + pow(y, 4));
+  const ProblemSolution solution = problem.solve().value();
+  EXPECT_EQ(solution.status, SolveStatus::solved) << solution.message;
+  // 2(x - 2) - 4(1 - x)³ = 0: x = 1.5897545...
+  const double left = 2.0 * (x.value() - 2.0) - 4.0 * std::pow(1.0 - x.value(), 3);
+  EXPECT_NEAR(left, 0.0, 1e-6);
+  EXPECT_NEAR(x.value() + y.value(), 1.0, 1e-8);
+}
+
 TEST(Problem, NotFiniteIsNamed) {
   Problem problem;
   ExpressionMatrix x = problem.decision_variable(2);

@@ -1,0 +1,101 @@
+// Quadratic programs from the active bounds of their last solution.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "optimization/solver/quadratic_method.hpp"
+
+namespace flyball::optimization::detail {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+double largest(const VectorXd& v) {
+  return v.size() > 0 ? v.lpNorm<Eigen::Infinity>() : 0.0;
+}
+
+}  // namespace
+
+/// From the active bounds of the last solution: equality-constrained programs, each of one
+/// factorisation, until no bound is crossed and no multiplier has the wrong sign.
+/// Source: Bergounioux, Ito, Kunisch (1999).
+bool QuadraticMethod::settle(const SolverOptions& options) {
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  constexpr int most_rounds = 6;  // farther away an interior point goes faster
+  const VectorXd& lower = program_.lower;
+  const VectorXd& upper = program_.upper;
+  if (!has_curvature_) {
+    return false;
+  }
+  VectorXd& side = low_target_;  // -1: at its lower bound, 1: at its upper, 0: inactive
+  for (Index i = 0; i < w_.size(); ++i) {
+    const double low = w_(i) - lower(i);
+    const double high = upper(i) - w_(i);
+    side(i) = free_(i) == 0.0 ? 0.0 : zl_(i) > low ? -1.0 : zu_(i) > high ? 1.0 : 0.0;
+    w_(i) = free_(i) == 0.0 || side(i) < 0.0 ? lower(i) : side(i) > 0.0 ? upper(i) : w_(i);
+  }
+  zl_.setZero();
+  zu_.setZero();
+  D_.setZero();
+  const double held = 1e12 * size_;
+  for (int round = 0; round < most_rounds && round < options.max_iterations; ++round) {
+    for (Index i = 0; i < w_.size(); ++i) {
+      diagonal_(i) = side(i) != 0.0 ? held : 1e-12 * size_;
+    }
+    if (std::chrono::duration<double>(Clock::now() - start).count() > options.time_limit) {
+      return false;
+    }
+    ++counts_.factorizations;
+    ++last_.number;
+    counts_.iterations = last_.number;
+    if (!program_.factor(diagonal_, D_, true)) {
+      return false;
+    }
+    for (int correction = 0; correction < 4; ++correction) {
+      residuals();
+      for (Index i = 0; i < w_.size(); ++i) {
+        rw_(i) = side(i) != 0.0 ? 0.0 : rd_(i);
+      }
+      if (std::max(largest(rw_), largest(c_)) <= 1e-2 * options.tolerance) {
+        break;
+      }
+      program_.solve(rw_, c_, dw_, dl_);
+      w_ += dw_;
+      lambda_ += dl_;
+    }
+    residuals();
+    bool changed = false;
+    for (Index i = 0; i < w_.size(); ++i) {
+      if (free_(i) == 0.0) {
+        continue;
+      }
+      double wanted = side(i);
+      if (wanted == 0.0) {
+        wanted = w_(i) < lower(i) - 1e-2 * options.tolerance   ? -1.0
+                 : w_(i) > upper(i) + 1e-2 * options.tolerance ? 1.0
+                                                               : 0.0;
+      } else if (wanted * rd_(i) > 1e-2 * options.tolerance) {
+        wanted = 0.0;
+      }
+      if (wanted != side(i)) {
+        side(i) = wanted;
+        changed = true;
+      }
+      w_(i) = wanted < 0.0 ? lower(i) : wanted > 0.0 ? upper(i) : w_(i);
+    }
+    if (!changed) {
+      for (Index i = 0; i < w_.size(); ++i) {
+        zl_(i) = side(i) < 0.0 ? std::max(0.0, rd_(i)) : 0.0;
+        zu_(i) = side(i) > 0.0 ? std::max(0.0, -rd_(i)) : 0.0;
+      }
+      distances();
+      return converged(options.tolerance);
+    }
+  }
+  return false;
+}
+
+}  // namespace flyball::optimization::detail

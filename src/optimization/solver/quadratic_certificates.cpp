@@ -1,0 +1,80 @@
+// Proofs that a quadratic program has no solution (Farkas's lemma).
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "optimization/solver/quadratic_method.hpp"
+
+namespace flyball::optimization::detail {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+double largest(const VectorXd& v) {
+  return v.size() > 0 ? v.lpNorm<Eigen::Infinity>() : 0.0;
+}
+
+}  // namespace
+
+bool QuadraticMethod::proves_infeasible() {
+  const double size = largest(lambda_);
+  if (!(size > 1e3) || last_.infeasibility < 1e-6) {
+    return false;
+  }
+  program_.transpose_multiply(lambda_, residual_w_);
+  double gap = c0_.dot(lambda_);
+  double left = 0.0;
+  for (Index i = 0; i < w_.size(); ++i) {
+    const double v = residual_w_(i);
+    if (v > 0.0) {
+      if (program_.lower(i) > -infinity) {
+        gap += program_.lower(i) * v;
+      } else {
+        left = std::max(left, v);
+      }
+    } else if (program_.upper(i) < infinity) {
+      gap += program_.upper(i) * v;
+    } else {
+      left = std::max(left, -v);
+    }
+  }
+  if (gap > 1e-7 * size && left <= 1e-7 * gap) {
+    certificate_.head(lambda_.size()) = lambda_ / size;
+    return true;
+  }
+  return false;
+}
+
+bool QuadraticMethod::proves_unbounded() {
+  const double size = largest(w_);
+  if (!(size > 1e4)) {
+    return false;
+  }
+  for (const VectorXd* direction : {&w_, &affine_w_}) {
+    const double length = largest(*direction);
+    if (!(length > 0.0)) {
+      continue;
+    }
+    fix_w_ = *direction / length;
+    fix_c_.setZero();
+    program_.multiply(fix_w_, fix_c_, residual_w_, residual_c_);
+    const double slope = g_.dot(fix_w_);
+    double left = largest(residual_c_);
+    for (Index i = 0; i < w_.size(); ++i) {
+      left = std::max(left, std::abs(residual_w_(i)));
+      left = std::max(left, program_.lower(i) > -infinity ? -fix_w_(i) : 0.0);
+      left = std::max(left, program_.upper(i) < infinity ? fix_w_(i) : 0.0);
+    }
+    if (slope < -1e-6 && left <= 1e-4 * -slope / std::max(1.0, largest(g_)) && left < 1e-6) {
+      certificate_.head(w_.size()) = fix_w_;
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace flyball::optimization::detail
