@@ -126,7 +126,7 @@ Expected<void> append(LoadedMotion& motion, const LoadedMotion& next, double wai
   constexpr double turned = 0.175;  // rad
   constexpr double faster = 0.1;    // m/s
   RobotTrajectory& whole = motion.trajectory;
-  const MotionSample& end = whole.samples.back();
+  const MotionSample end = whole.samples.back();
   const MotionSample& start = next.trajectory.samples.front();
   const double gap = (end.pose.translation() - start.pose.translation()).norm();
   if (!(gap <= most)) {
@@ -149,6 +149,13 @@ Expected<void> append(LoadedMotion& motion, const LoadedMotion& next, double wai
   }
   const double begin = end.time + wait;
   const bool again = wait > 0.0;
+  constexpr double shift = 1e-3;  // s, in which it comes to rest and leaves it
+  if (wait > 3.0 * shift) {
+    for (const double t : {end.time + shift, begin - shift}) {
+      MotionSample rest{.time = t, .pose = whole.samples.back().pose};
+      whole.samples.push_back(rest);
+    }
+  }
   for (std::size_t i = again ? 0 : 1; i < next.trajectory.samples.size(); ++i) {
     MotionSample sample = next.trajectory.samples[i];
     sample.time += begin;

@@ -153,19 +153,26 @@ double smooth(double s) {
   return s * s * (3.0 - 2.0 * s);
 }
 
-/// Running means of a width, twice, the ends kept.
+/// Running means of a width, twice; past the ends the values go on as on the other side of them, so
+/// that the ends stay.
 void soften(std::vector<double>& values, std::size_t width) {
+  const std::size_t n = values.size();
+  width = std::min(width, (n - 1) / 2);
   for (int pass = 0; pass < 2; ++pass) {
-    std::vector<double> sums(values.size() + 1, 0.0);
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      sums[i + 1] = sums[i] + values[i];
+    std::vector<double> sums{0.0};
+    sums.reserve(n + 2 * width + 1);
+    for (std::size_t k = width; k > 0; --k) {
+      sums.push_back(sums.back() + 2.0 * values.front() - values[k]);
     }
-    std::vector<double> soft = values;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      const std::size_t half = std::min({width, i, values.size() - 1 - i});
-      soft[i] = (sums[i + half + 1] - sums[i - half]) / static_cast<double>(2 * half + 1);
+    for (const double value : values) {
+      sums.push_back(sums.back() + value);
     }
-    values = std::move(soft);
+    for (std::size_t k = 1; k <= width; ++k) {
+      sums.push_back(sums.back() + 2.0 * values.back() - values[n - 1 - k]);
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      values[i] = (sums[i + 2 * width + 1] - sums[i]) / static_cast<double>(2 * width + 1);
+    }
   }
 }
 

@@ -454,7 +454,7 @@ void explore(const StatesJob& job, const Machine& machine, StatesResult& result)
   std::set<std::vector<long long>> known{key_of(nodes.front().state, nodes.front().at)};
   std::set<std::size_t> reached{nodes.front().state};
   std::set<std::string> ignored;
-  constexpr std::size_t most_ways = 400;  // drawn
+  constexpr std::size_t most_ways = 60;  // drawn
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     if (nodes[n].depth >= job.depth) {
       break;

@@ -466,7 +466,10 @@ std::string written(const JsonSpot& spot, const AutoCommand& value) {
   const JsonSpot here = spot.of(value.origin);
   std::vector<JsonPiece> pieces{{"type", written(here.member("type"), value.type)}};
   const JsonSpot data = here.member("data");
-  if (data.old == nullptr || data.old->kind == JsonKind::object) {
+  // One that its file had without data, and that says no more, stays so.
+  const bool bare = here.old != nullptr && data.old == nullptr && value.name.empty() &&
+                    value.commands.empty() && value.wait.value == 0.0;
+  if (!bare && (data.old == nullptr || data.old->kind == JsonKind::object)) {
     pieces.push_back({"data", JsonMembersOut::members(data, value, DescribeCommandData{})});
   }
   return compose_object(here, std::move(pieces));

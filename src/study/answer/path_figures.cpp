@@ -111,7 +111,7 @@ Figure field_figure(const PathResult& result) {
 Figure motion_figure(const PathResult& result) {
   Figure figure = over_time("motion", "motion", "Speed, turning and bend",
                             "The speed along the path, how fast the robot turns, and how the path "
-                            "bends; shaded where braking or a limit of the bend holds it back.");
+                            "bends.");
   figure.plot.clock = clock_name;
   const std::vector<double> time = times_of(result);
   PlotPanel speed = panel(

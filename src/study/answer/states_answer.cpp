@@ -135,7 +135,7 @@ Figure space_figure(const StatesResult& result, std::size_t i, std::size_t j) {
   if (!forbidden.x.empty()) {
     panel.lines.push_back(std::move(forbidden));
   }
-  PlotLine ways{.label = "moves", .color = measured_color};
+  PlotLine ways{.label = "moves", .style = LineStyle::guide, .color = measured_color};
   for (const std::vector<Place>& way : result.ways) {
     for (const Place& corner : way) {
       ways.x.push_back(corner[i]);
@@ -147,6 +147,10 @@ Figure space_figure(const StatesResult& result, std::size_t i, std::size_t j) {
   if (!ways.x.empty()) {
     panel.lines.push_back(std::move(ways));
   }
+  panel.lines.push_back({.label = "stops",
+                         .x = {across.low, across.high, across.high, across.low, across.low},
+                         .y = {up.low, up.low, up.high, up.high, up.low},
+                         .color = simulated_color});
   PlotLine states{.label = "states", .style = LineStyle::circles, .color = quiet_color};
   for (const MachineState& state : result.job.states) {
     states.x.push_back(state.at[i]);

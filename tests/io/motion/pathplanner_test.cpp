@@ -124,6 +124,25 @@ TEST(PathPlanner, WritingWhatWasReadIsTheSameBytes) {
   EXPECT_EQ(to_pathplanner(*grid).value(), grid_text);
 }
 
+TEST(PathPlanner, WhatIsNotThereIsNotWritten) {
+  // No folder, no data of a command, null for a name, commands of no kind that is known.
+  for (const std::string& text :
+       {std::string(R"({"version": 1.0, "command": {"type": "sequential"}})"),
+        std::string(
+            R"({"version": "2025.0", "command": {"type": "named", "data": {"name": null}}})"),
+        std::string(R"({"version": "2025.0", "command": {"type": "conditional"}, "later": {}})")}) {
+    const auto routine = parse_pathplanner_auto(text, "a.auto");
+    ASSERT_TRUE(routine) << to_string(routine.error());
+    EXPECT_EQ(to_pathplanner(*routine).value(), text);
+  }
+  std::string text = path_2025;
+  text = with(text, ",\n  \"folder\": null", "");
+  text = with(text, ",\n      \"linkedName\": null", "");
+  const auto path = parse_pathplanner_path(text, "a.path");
+  ASSERT_TRUE(path) << to_string(path.error());
+  EXPECT_EQ(to_pathplanner(*path).value(), text);
+}
+
 TEST(PathPlanner, SaysWhatTheFileSays) {
   const auto path = parse_pathplanner_path(path_2025, "a.path").value();
   EXPECT_EQ(path.version, "2025.0");
