@@ -10,8 +10,6 @@
 namespace flyball::identification {
 namespace {
 
-constexpr double smoothing_half_width = 0.035;  // s
-
 std::vector<double> smooth_velocity(const PreparedRun& prepared, bool has_position) {
   const TestRun& run = prepared.run;
   std::vector<double> smoothed(run.time.size(), 0.0);

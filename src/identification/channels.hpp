@@ -25,6 +25,9 @@ namespace flyball::identification {
 /// Share of the rows that repeat both position and velocity of the row before.
 [[nodiscard]] double repeated_share(const std::vector<PreparedRun>& runs);
 
+/// s, on each side, over which a velocity is derived from the position.
+inline constexpr double smoothing_half_width = 0.035;
+
 /// Fills `fresh_position`, `fresh_velocity` and `smoothed_velocity` of every run.
 void refresh_derived_columns(PreparedRecording& prepared);
 

@@ -11,6 +11,7 @@
 #include "core/diagnose.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
+#include "identification/channels.hpp"
 #include "identification/cross_checks.hpp"
 #include "identification/estimates.hpp"
 #include "identification/gain_fit.hpp"
@@ -66,7 +67,16 @@ void add_runs(OutputErrorProblem& problem, const Eigen::VectorXd& x, Feedforward
       fitted.voltage.push_back(prepared.run.voltage[row]);
       fitted.velocity.push_back(recording.has_velocity ? prepared.run.velocity[row]
                                                        : prepared.smoothed_velocity[row]);
-      fitted.velocity_hat.push_back(problem.velocity_shown(index, x, time));
+      if (recording.has_velocity) {
+        fitted.velocity_hat.push_back(problem.velocity_shown(index, x, time));
+      } else {
+        // As the measured one is derived: over the same time, as far as rows reach.
+        const double from = std::max(time - smoothing_half_width, prepared.run.time.front());
+        const double to = std::min(time + smoothing_half_width, prepared.run.time.back());
+        fitted.velocity_hat.push_back(
+            (problem.position_shown(index, x, to) - problem.position_shown(index, x, from)) /
+            std::max(1e-3, to - from));
+      }
       fitted.velocity_residual.push_back(fitted.velocity.back() - fitted.velocity_hat.back());
       if (recording.has_position) {
         fitted.position.push_back(prepared.run.position[row]);
