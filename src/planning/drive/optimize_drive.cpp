@@ -223,6 +223,10 @@ class Search {
               [](const DriveViolation& a, const DriveViolation& b) { return a.share > b.share; });
     if (!found.solved()) {
       result_.message = fmt::format("no trajectory was found: {}", found.message);
+      if (!result_.relaxed.empty()) {
+        result_.message = fmt::format("no trajectory was found; farthest from being kept is {}: {}",
+                                      result_.relaxed.front().name, found.message);
+      }
     } else if (result_.relaxed.empty()) {
       // What gives way by nothing holds: a start that the others did not have.
       result_.solved = true;

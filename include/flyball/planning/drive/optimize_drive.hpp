@@ -91,29 +91,28 @@ struct DriveProgress {
 /// tried, the fastest end counts. Constraints that bend between points are drawn tighter by what
 /// a dense simulation finds and the trajectory is solved again. Where no attempt succeeds, the
 /// problem is solved with constraints that give way at a price on their sum, so that few do.
-/// @param watch  Called each iteration; true stops.
 /// @errors ArgumentError: not_positive, not_finite, out_of_range for the model, a waypoint, a
 ///         constraint, each by name; empty for less than two waypoints.
 /// Cost: some milliseconds a second of motion and attempt.
 /// Source: Verschueren et al., "Towards time-optimal race car driving" (2014) for free time in a
 /// direct method; constraints as Choreo has them.
-///@{
 [[nodiscard]] Expected<DriveSolution> optimize_drive(const DriveProblem& problem,
                                                      const DriveOptions& options = {});
+/// The same. @param watch  Called each iteration; true stops.
 [[nodiscard]] Expected<DriveSolution> optimize_drive(const DriveProblem& problem,
                                                      const DriveOptions& options,
                                                      FunctionRef<bool(const DriveProgress&)> watch);
-///@}
 
-/// Simulates a trajectory's forces from its first sample and measures limits and constraints at
-/// several instants of each interval: what `DriveSolution` carries.
-/// @param samples  Of the solution. @param waypoint_samples  Likewise.
-/// @return the largest first.
+/// What an independent simulation says.
 struct DriveCheck {
-  double waypoint_error = 0.0;
-  double heading_error = 0.0;
-  std::vector<DriveViolation> violations{};
+  double waypoint_error = 0.0;               ///< m
+  double heading_error = 0.0;                ///< rad
+  std::vector<DriveViolation> violations{};  ///< The largest share first, to 10.
 };
+/// Simulates a trajectory's forces from its first sample and measures limits and constraints at
+/// eight instants of each interval: what `DriveSolution` carries.
+/// @param samples, waypoint_samples  Of the solution; others than the problem's are not looked at.
+/// Cost: an integration of each interval to 1e-10.
 [[nodiscard]] DriveCheck check_drive(const DriveProblem& problem,
                                      const std::vector<DriveSample>& samples,
                                      const std::vector<int>& waypoint_samples);
