@@ -2,7 +2,6 @@
 
 #include <memory>
 #include <span>
-#include <string>
 #include <vector>
 
 #include <flyball/planning/path/path.hpp>
@@ -18,24 +17,24 @@ namespace flyball::detail {
 class CellRows {
  public:
   virtual ~CellRows() = default;
-  /// Rows and caps of the intervals.
-  virtual void fill(const std::vector<TimingCell>& cells, TimingRows& rows) = 0;
-  /// How far the limits are from their polynomials in each interval of a motion, of the limits;
-  /// margins are made of it. @return Whether the motion keeps within the limits.
+  /// Rows and caps of the intervals. @param about  A motion, one an interval, about which is put
+  /// what is not linear; or empty.
+  virtual void fill(const std::vector<TimingCell>& cells, const std::vector<Bezier2>& about,
+                    TimingRows& rows) = 0;
+  /// Holds a motion against the limits themselves, and rows that it breaks to what they were off.
+  /// @param off  How far the limits are from their polynomials in each interval, of the limits.
+  /// @return Whether it keeps to all of them.
   virtual bool verify(const std::vector<TimingCell>& /*cells*/, const std::vector<Bezier2>& /*b*/,
-                      TimingRows& /*rows*/) {
+                      TimingRows& /*rows*/, std::vector<double>& off) {
+    off.clear();
     return true;
   }
-  /// Use of the limits at τ = 0, 1/3, 2/3, 1 of an interval, 1 where one binds, and which one is
-  /// used most on the average.
-  struct Use {
-    std::array<double, 4> at{};
-    int limit = 0;
-    double mean = 0.0;  ///< Of that one.
-  };
-  [[nodiscard]] virtual Use use(const std::vector<TimingCell>& cells, std::size_t cell,
-                                const Bezier2& b, const TimingRows& rows) const = 0;
-  [[nodiscard]] virtual std::string name(int limit) const = 0;
+  /// How much of the limits an interval leaves: 0 where one is used up all over it.
+  [[nodiscard]] virtual double left(const std::vector<TimingCell>& cells, std::size_t cell,
+                                    const Bezier2& b, const TimingRows& rows) const = 0;
+
+  /// Whether `fill` looks at a motion.
+  [[nodiscard]] virtual bool is_put_about() const { return false; }
 
  protected:
   CellRows() = default;

@@ -45,117 +45,82 @@ class CollocatedRows final : public CellRows {
     }
   }
 
-  void fill(const std::vector<TimingCell>& cells, TimingRows& rows) override {
+  void fill(const std::vector<TimingCell>& cells, const std::vector<Bezier2>& about,
+            TimingRows& rows) override {
     const std::size_t n = cells.size();
     rows.resize(n, static_cast<int>(4 * row_count_), static_cast<int>(4 * cap_count_));
     rows.delta.assign(4 * row_count_ * n, 0.0);
-    rows.margin.assign(n, 1.0);
+    room_.assign(n * row_count_, 1.0);
     at_.resize(n * points * row_count_);
     w_.resize(n * points * cap_count_);
     for (std::size_t i = 0; i < n; ++i) {
       evaluate(cells[i], i);
       fill_caps(i, rows);
-    }
-    // First about half the highest speed; then about what came of it.
-    for (std::size_t i = 0; i < n; ++i) {
-      const Bezier2& cap = rows.cap[i];
-      Bezier2 about{0.25 * cap[0], 0.0, 0.25 * cap[2]};
-      about[1] = 0.5 * (about[0] + about[2]);
-      fill_rows(cells[i], i, about, rows);
+      Bezier2 motion{};
+      if (about.empty()) {  // half the highest speed
+        motion = {0.25 * rows.cap[i][0], 0.0, 0.25 * rows.cap[i][2]};
+        motion[1] = 0.5 * (motion[0] + motion[2]);
+      } else {
+        motion = about[i];
+      }
+      fill_rows(cells[i], i, motion, rows);
     }
   }
 
-  bool verify(const std::vector<TimingCell>& cells, const std::vector<Bezier2>& b,
-              TimingRows& rows) override {
+  bool verify(const std::vector<TimingCell>& cells, const std::vector<Bezier2>& b, TimingRows& rows,
+              std::vector<double>& off) override {
+    constexpr double allowed = 1e-10;
+    off.assign(cells.size(), 0.0);
     bool within = true;
     for (std::size_t i = 0; i < cells.size(); ++i) {
       const IntervalProgram program = rows.program(i);
-      double off = 0.0;
-      double broken = 0.0;
+      bool refill = has_speeds_;
       for (std::size_t r = 0; r < row_count_; ++r) {
+        double& room = room_[i * row_count_ + r];
         std::array<double, 4> c{};
         double hull = 0.0;
         for (std::size_t k = 0; k < 4; ++k) {
-          c[k] = program.row(static_cast<int>(k * row_count_ + r), b[i]);
+          c[k] = room * program.row(static_cast<int>(k * row_count_ + r), b[i]);
           hull = std::max(hull, std::abs(c[k]));
         }
         double apart = 0.0;
-        double largest = 0.0;
         for (std::size_t k = 0; k < points; ++k) {
-          const double tau = static_cast<double>(k) / 6.0;
           const double exact = value(cells[i], i, r, k, b[i]);
-          apart = std::max(apart, std::abs(exact - cubic(c, tau)));
-          largest = std::max(largest, std::abs(exact));
+          apart = std::max(apart, std::abs(exact - cubic(c, static_cast<double>(k) / 6.0)));
         }
-        off = std::max(off, apart);
-        broken = std::max({broken, largest - 1.0, std::min(1.0, hull) + apart - 1.0});
+        const double broken = hull + apart - 1.0;
+        if (broken > allowed) {
+          within = false;
+          refill = true;
+          off[i] = std::max(off[i], apart);
+          room = std::max(0.3, std::min(1.0 - caution * apart, room - 0.2 * broken));
+        }
       }
-      const double margin = 1.0 - caution * off;
-      if (broken > 1e-10) {
-        within = false;
-        rows.margin[i] = std::clamp(std::min(margin, rows.margin[i] - 0.25 * broken), 0.05, 1.0);
-      } else if (margin > rows.margin[i]) {
-        rows.margin[i] = std::max(rows.margin[i], 0.5);
-      }
-    }
-    if (!within && has_speeds_) {
-      for (std::size_t i = 0; i < cells.size(); ++i) {
+      if (refill) {
         fill_rows(cells[i], i, b[i], rows);
       }
     }
     return within;
   }
 
-  [[nodiscard]] Use use(const std::vector<TimingCell>& cells, std::size_t cell, const Bezier2& b,
-                        const TimingRows& rows) const override {
-    static_cast<void>(rows);
-    Use most;
-    double best = -1.0;
-    for (std::size_t c = 0; c < cap_count_; ++c) {
-      double sum = 0.0;
-      for (std::size_t k = 0; k < 4; ++k) {
-        const double x = parabola(b, static_cast<double>(k) / 3.0);
-        const double used = w_[(cell * points + 2 * k) * cap_count_ + c] * x;
-        most.at[k] = std::max(most.at[k], used);
-        sum += used;
+  [[nodiscard]] double left(const std::vector<TimingCell>& cells, std::size_t cell,
+                            const Bezier2& b, const TimingRows& /*rows*/) const override {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < points; k += 2) {
+      const double x = parabola(b, static_cast<double>(k) / 6.0);
+      double most = 0.0;
+      for (std::size_t c = 0; c < cap_count_; ++c) {
+        most = std::max(most, w_[(cell * points + k) * cap_count_ + c] * x);
       }
-      if (sum > best) {
-        best = sum;
-        most.limit = static_cast<int>(c);
+      for (std::size_t r = 0; r < row_count_; ++r) {
+        most = std::max(most, std::abs(value(cells[cell], cell, r, k, b)));
       }
+      sum += std::min(most, 1.0);
     }
-    for (std::size_t r = 0; r < row_count_; ++r) {
-      double sum = 0.0;
-      for (std::size_t k = 0; k < 4; ++k) {
-        const double used = std::abs(value(cells[cell], cell, r, 2 * k, b));
-        most.at[k] = std::max(most.at[k], used);
-        sum += used;
-      }
-      if (sum > best) {
-        best = sum;
-        most.limit = static_cast<int>(cap_count_ + r);
-      }
-    }
-    most.mean = 0.25 * best;
-    return most;
+    return 1.0 - 0.25 * sum;
   }
 
-  [[nodiscard]] std::string name(int limit) const override {
-    auto left = static_cast<std::size_t>(limit);
-    for (const auto& of : limits_) {
-      if (left < of->cap_names.size()) {
-        return of->cap_names[left];
-      }
-      left -= of->cap_names.size();
-    }
-    for (const auto& of : limits_) {
-      if (left < of->row_names.size()) {
-        return of->row_names[left];
-      }
-      left -= of->row_names.size();
-    }
-    return {};
-  }
+  [[nodiscard]] bool is_put_about() const override { return has_speeds_; }
 
  private:
   void evaluate(const TimingCell& cell, std::size_t i) {
@@ -182,7 +147,7 @@ class CollocatedRows final : public CellRows {
     double first = 0.0;
     double last = 0.0;
     double all = 0.0;
-    double* row = rows.upper.data() + 12 * i * cap_count_;
+    const std::size_t upper_from = 4 * i * cap_count_;
     for (std::size_t c = 0; c < cap_count_; ++c) {
       const auto w = [&](std::size_t k) { return w_[(i * points + k) * cap_count_ + c]; };
       std::array<double, 4> f = through(w(0), w(2), w(4), w(6));
@@ -196,10 +161,15 @@ class CollocatedRows final : public CellRows {
       first = std::max(first, f[0]);
       last = std::max(last, f[3]);
       all = std::max({all, f[0], f[1], f[2], f[3]});
-      const double entries[12] = {0.6 * f[1], 0.4 * f[0], 0.0,        0.3 * f[2],
-                                  0.6 * f[1], 0.1 * f[0], 0.1 * f[3], 0.6 * f[2],
-                                  0.3 * f[1], 0.0,        0.4 * f[3], 0.6 * f[2]};
-      row = std::copy(entries, entries + 12, row);
+      const double entries[4][3] = {{0.6 * f[1], 0.4 * f[0], 0.0},
+                                    {0.3 * f[2], 0.6 * f[1], 0.1 * f[0]},
+                                    {0.1 * f[3], 0.6 * f[2], 0.3 * f[1]},
+                                    {0.0, 0.4 * f[3], 0.6 * f[2]}};
+      for (std::size_t k = 0; k < 4; ++k) {
+        rows.upper_alpha[upper_from + 4 * c + k] = entries[k][0];
+        rows.upper_beta[upper_from + 4 * c + k] = entries[k][1];
+        rows.upper_gamma[upper_from + 4 * c + k] = entries[k][2];
+      }
     }
     const double floor = std::max(0.02 * all, 1e-300);
     rows.cap[i] = {1.0 / std::max(first, floor), 4.0 / std::max(all, floor),
@@ -211,6 +181,7 @@ class CollocatedRows final : public CellRows {
   void fill_rows(const TimingCell& cell, std::size_t i, const Bezier2& about, TimingRows& rows) {
     const double inverse = 1.0 / cell.width;
     for (std::size_t r = 0; r < row_count_; ++r) {
+      const double scale = 1.0 / room_[i * row_count_ + r];
       std::array<std::array<double, 4>, 4> entries{};
       for (std::size_t k = 0; k < 4; ++k) {
         const MotionRow& row = at_[(i * points + 2 * k) * row_count_ + r];
@@ -232,14 +203,11 @@ class CollocatedRows final : public CellRows {
       for (std::size_t e = 0; e < 4; ++e) {
         const std::array<double, 4> c =
             through(entries[0][e], entries[1][e], entries[2][e], entries[3][e]);
-        double* into = (e == 0   ? rows.alpha
-                        : e == 1 ? rows.beta
-                        : e == 2 ? rows.gamma
-                                 : rows.delta)
-                           .data() +
-                       4 * row_count_ * i + r;
+        double* const all[4] = {rows.alpha.data(), rows.beta.data(), rows.gamma.data(),
+                                rows.delta.data()};
+        double* into = all[e] + 4 * row_count_ * i + r;
         for (std::size_t k = 0; k < 4; ++k) {
-          into[k * row_count_] = c[k];
+          into[k * row_count_] = scale * c[k];
         }
       }
     }
@@ -261,6 +229,7 @@ class CollocatedRows final : public CellRows {
   std::size_t cap_count_ = 0;
   std::vector<MotionRow> at_;  ///< Of interval, point, row.
   std::vector<double> w_;      ///< Of interval, point, cap.
+  std::vector<double> room_;   ///< Of interval, row: what of the limit its polynomial may use.
   bool has_speeds_ = false;
 };
 

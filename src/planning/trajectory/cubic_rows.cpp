@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/format.hpp"
 #include "planning/trajectory/cell_rows.hpp"
 
 namespace flyball::detail {
@@ -54,57 +53,42 @@ class CubicRows final : public CellRows {
     }
   }
 
-  void fill(const std::vector<TimingCell>& cells, TimingRows& rows) override {
-    rows.resize(cells.size(), static_cast<int>(4 * n_), static_cast<int>(5 * n_));
+  void fill(const std::vector<TimingCell>& cells, const std::vector<Bezier2>& /*about*/,
+            TimingRows& rows) override {
+    rows.resize(cells.size(), static_cast<int>(4 * n_), static_cast<int>(uppers_));
     for (std::size_t i = 0; i < cells.size(); ++i) {
       fill_cell(cells[i], i, rows);
     }
   }
 
-  [[nodiscard]] Use use(const std::vector<TimingCell>& cells, std::size_t cell, const Bezier2& b,
-                        const TimingRows& rows) const override {
+  [[nodiscard]] double left(const std::vector<TimingCell>& cells, std::size_t cell,
+                            const Bezier2& b, const TimingRows& rows) const override {
     const IntervalProgram program = rows.program(cell);
     const TimingCell& at = cells[cell];
+    // At τ = 0, 1/3, 2/3, 1.
     const double x[4] = {b[0], (4.0 * (b[0] + b[1]) + b[2]) / 9.0,
                          (b[0] + 4.0 * (b[1] + b[2])) / 9.0, b[2]};
-    Use most;
-    double best = -1.0;
+    double most[4] = {0.0, 0.0, 0.0, 0.0};
     const double* c = &coefficients_[at.piece * 4 * n_];
     for (std::size_t j = 0; j < n_; ++j) {
       const auto row = [&](std::size_t k) { return program.row(static_cast<int>(k * n_ + j), b); };
       const double r[4] = {row(0), row(1), row(2), row(3)};
-      const Rates of = rates(c + j, n_, inverse_span_[at.piece], at);
       const double acceleration[4] = {
           std::abs(r[0]), std::abs(8.0 * r[0] + 12.0 * r[1] + 6.0 * r[2] + r[3]) / 27.0,
           std::abs(r[0] + 6.0 * r[1] + 12.0 * r[2] + 8.0 * r[3]) / 27.0, std::abs(r[3])};
+      const Rates of = rates(c + j, n_, inverse_span_[at.piece], at);
       const double e[4] = {of.d[0], (4.0 * (of.d[0] + of.d[1]) + of.d[2]) / 9.0,
                            (of.d[0] + 4.0 * (of.d[1] + of.d[2])) / 9.0, of.d[2]};
-      double sum_acceleration = 0.0;
-      double sum_velocity = 0.0;
       for (std::size_t k = 0; k < 4; ++k) {
         const double v = e[k] * inverse_velocity_[j];
-        const double velocity = v * v * x[k];
-        most.at[k] = std::max({most.at[k], acceleration[k], velocity});
-        sum_acceleration += acceleration[k];
-        sum_velocity += velocity;
-      }
-      if (sum_acceleration > best) {
-        best = sum_acceleration;
-        most.limit = static_cast<int>(n_ + j);
-      }
-      if (sum_velocity > best) {
-        best = sum_velocity;
-        most.limit = static_cast<int>(j);
+        most[k] = std::max({most[k], acceleration[k], v * v * x[k]});
       }
     }
-    most.mean = 0.25 * best;
-    return most;
-  }
-
-  [[nodiscard]] std::string name(int limit) const override {
-    const int n = static_cast<int>(n_);
-    return limit < n ? format("coordinate {}: velocity", limit + 1)
-                     : format("coordinate {}: acceleration", limit - n + 1);
+    double sum = 0.0;
+    for (const double used : most) {
+      sum += std::min(used, 1.0);
+    }
+    return 1.0 - 0.25 * sum;
   }
 
  private:
@@ -112,7 +96,9 @@ class CubicRows final : public CellRows {
     double* alpha = &rows.alpha[i * 4 * n_];
     double* beta = &rows.beta[i * 4 * n_];
     double* gamma = &rows.gamma[i * 4 * n_];
-    double* upper = &rows.upper[i * 15 * n_];
+    double* upper_alpha = &rows.upper_alpha[i * uppers_];
+    double* upper_beta = &rows.upper_beta[i * uppers_];
+    double* upper_gamma = &rows.upper_gamma[i * uppers_];
     const double* c = &coefficients_[cell.piece * 4 * n_];
     const double inverse_width = 1.0 / cell.width;
     // Of 1/cap the largest.
@@ -130,22 +116,21 @@ class CubicRows final : public CellRows {
       first = std::max(first, w[0]);
       last = std::max(last, w[4]);
       all = std::max(all, most);
-      double* row = upper + 15 * j;
-      row[0] = w[1] * (4.0 / 6.0);
-      row[1] = w[0] * (2.0 / 6.0);
-      row[2] = 0.0;
-      row[3] = w[2] * (6.0 / 15.0);
-      row[4] = w[1] * (8.0 / 15.0);
-      row[5] = w[0] * (1.0 / 15.0);
-      row[6] = w[3] * (4.0 / 20.0);
-      row[7] = w[2] * (12.0 / 20.0);
-      row[8] = w[1] * (4.0 / 20.0);
-      row[9] = w[4] * (1.0 / 15.0);
-      row[10] = w[3] * (8.0 / 15.0);
-      row[11] = w[2] * (6.0 / 15.0);
-      row[12] = 0.0;
-      row[13] = w[4] * (2.0 / 6.0);
-      row[14] = w[3] * (4.0 / 6.0);
+      upper_alpha[j] = w[1] * (4.0 / 6.0);
+      upper_beta[j] = w[0] * (2.0 / 6.0);
+      upper_gamma[j] = 0.0;
+      upper_alpha[n_ + j] = w[2] * (6.0 / 15.0);
+      upper_beta[n_ + j] = w[1] * (8.0 / 15.0);
+      upper_gamma[n_ + j] = w[0] * (1.0 / 15.0);
+      upper_alpha[2 * n_ + j] = w[3] * (4.0 / 20.0);
+      upper_beta[2 * n_ + j] = w[2] * (12.0 / 20.0);
+      upper_gamma[2 * n_ + j] = w[1] * (4.0 / 20.0);
+      upper_alpha[3 * n_ + j] = w[4] * (1.0 / 15.0);
+      upper_beta[3 * n_ + j] = w[3] * (8.0 / 15.0);
+      upper_gamma[3 * n_ + j] = w[2] * (6.0 / 15.0);
+      upper_alpha[4 * n_ + j] = 0.0;
+      upper_beta[4 * n_ + j] = w[4] * (2.0 / 6.0);
+      upper_gamma[4 * n_ + j] = w[3] * (4.0 / 6.0);
       // q' u + q'' x of degree 3, u = [(b_1 - b_0), (b_2 - b_1)]/width.
       const double to_rate = inverse_acceleration_[j] * inverse_width;
       const double d0 = of.d[0] * to_rate;
@@ -166,6 +151,9 @@ class CubicRows final : public CellRows {
       beta[3 * n_ + j] = -d2;
       gamma[3 * n_ + j] = p1 + d2;
     }
+    for (std::size_t r = 5 * n_; r < uppers_; ++r) {
+      upper_alpha[r] = upper_beta[r] = upper_gamma[r] = 0.0;
+    }
     const double floor = std::max(0.02 * all, 1e-300);
     rows.cap[i] = {1.0 / std::max(first, floor), 4.0 / std::max(all, floor),
                    1.0 / std::max(last, floor)};
@@ -173,6 +161,7 @@ class CubicRows final : public CellRows {
   }
 
   std::size_t n_;
+  std::size_t uppers_ = 5 * n_ + n_ % 2;  ///< An even number.
   std::vector<double> inverse_velocity_;
   std::vector<double> inverse_acceleration_;
   std::vector<double> coefficients_;

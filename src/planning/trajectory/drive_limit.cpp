@@ -45,6 +45,11 @@ class Shafts {
     made.shaft_ = shaft;
     made.limits_ = limits;
     made.radius_ = limits.wheel_radius.si();
+    constexpr double step = std::numbers::pi / grip_directions;
+    for (std::size_t i = 0; i < grip_directions; ++i) {
+      const double angle = step * static_cast<double>(i);
+      made.grip_[i] = Vector2d(std::cos(angle), std::sin(angle)) / std::cos(0.5 * step);
+    }
     const double per_current = shaft.gearing * shaft.Kt;
     const double friction = shaft.friction / per_current;
     if (friction >= limits.current || friction * shaft.R >= limits.voltage) {
@@ -110,11 +115,9 @@ class Shafts {
     if (!std::isfinite(limits_.grip)) {
       return;
     }
-    constexpr double step = std::numbers::pi / grip_directions;
-    const double inverse = 1.0 / (limits_.grip * load * std::cos(0.5 * step));
-    for (int i = 0; i < grip_directions; ++i) {
-      const Vector2d d(inverse * std::cos(step * i), inverse * std::sin(step * i));
-      *rows++ = {d.dot(F.u), d.dot(F.x), 0.0, 0.0};
+    const double inverse = 1.0 / (limits_.grip * load);
+    for (const Vector2d& direction : grip_) {
+      *rows++ = {inverse * direction.dot(F.u), inverse * direction.dot(F.x), 0.0, 0.0};
     }
   }
   [[nodiscard]] double weight() const noexcept {
@@ -136,6 +139,7 @@ class Shafts {
  private:
   mechanisms::detail::Shaft shaft_{};
   DriveLimits limits_{};
+  std::array<Vector2d, grip_directions> grip_{};
   double radius_ = 1.0;
 };
 

@@ -10,17 +10,18 @@ namespace flyball::detail {
 /// b_0, b_1, b_2.
 using Bezier2 = std::array<double, 3>;
 
-/// 0 <= b <= cap and |α b_0 + β b_1 + γ b_2 + δ| <= margin for each row.
+/// Rows come in even numbers. 0 <= b <= cap and |α b_0 + β b_1 + γ b_2 + δ| <= 1 for each row.
 struct IntervalProgram {
   const double* alpha = nullptr;
   const double* beta = nullptr;
   const double* gamma = nullptr;
   const double* delta = nullptr;  ///< Null where all are zero.
   int rows = 0;
-  double margin = 1.0;
   Bezier2 cap{};
-  /// Rows of one side, α b_0 + β b_1 + γ b_2 <= 1, three numbers each.
-  const double* upper = nullptr;
+  /// Rows of one side, α b_0 + β b_1 + γ b_2 <= 1.
+  const double* upper_alpha = nullptr;
+  const double* upper_beta = nullptr;
+  const double* upper_gamma = nullptr;
   int uppers = 0;
   double idle = 0.0;  ///< Where no b is larger than this, none of those is broken.
 
@@ -30,22 +31,27 @@ struct IntervalProgram {
     return delta != nullptr ? value + delta[k] : value;
   }
   [[nodiscard]] double upper_row(int r, const Bezier2& b) const noexcept {
-    const double* row = upper + 3 * r;
-    return row[0] * b[0] + row[1] * b[1] + row[2] * b[2];
+    const auto k = static_cast<std::size_t>(r);
+    return upper_alpha[k] * b[0] + upper_beta[k] * b[1] + upper_gamma[k] * b[2];
   }
-  /// The largest |row|, and which it is.
+  /// The largest |row| and, if it is more than 1, which it is.
   [[nodiscard]] double largest(const Bezier2& b, int& which) const noexcept;
-  /// The largest row of one side, and which it is; 0 where all are idle.
+  /// The same of the rows of one side; 0 where all are idle.
   [[nodiscard]] double largest_upper(const Bezier2& b, int& which) const noexcept;
 };
 
+/// Which three inequalities met at the optimum: where the next interval's program looks first.
+struct IntervalBasis {
+  std::array<int, 3> active{};
+  bool known = false;
+};
+
 /// The point of largest b_0, nearly: 0 is a point, so that a point outside is scaled to the inside.
-/// @param last  Of b_2, the largest.
-[[nodiscard]] Bezier2 largest_first(const IntervalProgram& program, double last) noexcept;
+[[nodiscard]] Bezier2 largest_first(const IntervalProgram& program, IntervalBasis& basis) noexcept;
 
 /// With b_0 given the point of largest b_2, nearly. @param inside  A point with that b_0, kept to
 /// where the program ends short of its optimum.
-[[nodiscard]] Bezier2 largest_last(const IntervalProgram& program, double last,
-                                   const Bezier2& inside) noexcept;
+[[nodiscard]] Bezier2 largest_last(const IntervalProgram& program, const Bezier2& inside,
+                                   IntervalBasis& basis) noexcept;
 
 }  // namespace flyball::detail

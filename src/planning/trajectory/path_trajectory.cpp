@@ -8,6 +8,7 @@
 
 #include "core/format.hpp"
 #include "core/try.hpp"
+#include "planning/trajectory/motion_limit.hpp"
 
 namespace flyball {
 
@@ -51,8 +52,8 @@ Growth growth(double c, double t) noexcept {
 }  // namespace
 
 PathTrajectory::PathTrajectory(Path path, std::vector<Span> spans,
-                               std::vector<BindingLimit> binding)
-    : path_(std::move(path)), spans_(std::move(spans)), binding_(std::move(binding)) {
+                               std::vector<PathConstraint> constraints)
+    : path_(std::move(path)), spans_(std::move(spans)), constraints_(std::move(constraints)) {
   total_time_ = spans_.back().start + spans_.back().duration;
   const std::size_t count = 2 * spans_.size();
   buckets_per_second_ = total_time_ > 0.0 ? static_cast<double>(count) / total_time_ : 0.0;
@@ -98,7 +99,7 @@ PathSample PathTrajectory::sample(double t) const noexcept {
   const Eigen::Index n = path_.coordinates();
   const Eigen::Index columns = piece.coefficients.cols();
   const double* c = piece.coefficients.data();
-  const double per_span = 1.0 / piece.span;
+  const double per_span = span.scale;
   const double at = std::min(1.0, (span.parameter + s) * per_span);
   PathSample sample;
   sample.time = t;
@@ -122,6 +123,64 @@ PathSample PathTrajectory::sample(double t) const noexcept {
     sample.acceleration(j) = 2.0 * second * per_time * per_time + first * per_span * u;
   }
   return sample;
+}
+
+std::vector<BindingLimit> PathTrajectory::binding() const {
+  const auto limits = detail::motion_limits(path_, constraints_, "binding");
+  std::vector<BindingLimit> all;
+  if (!limits) {
+    return all;
+  }
+  std::vector<std::string> names;
+  std::size_t caps = 0;
+  for (const auto& limit : *limits) {
+    names.insert(names.end(), limit->cap_names.begin(), limit->cap_names.end());
+  }
+  caps = names.size();
+  for (const auto& limit : *limits) {
+    names.insert(names.end(), limit->row_names.begin(), limit->row_names.end());
+  }
+  std::vector<detail::MotionRow> rows(names.size() - caps);
+  std::vector<double> cap(caps);
+  std::vector<double> use(names.size());
+  std::size_t before = names.size();
+  for (const Span& span : spans_) {
+    std::fill(use.begin(), use.end(), 0.0);
+    for (const double share : {0.1, 0.5, 0.9}) {
+      const double s = share * span.width;
+      const double u = span.u + span.c * s;
+      const double x = std::max(0.0, span.rate * span.rate + 2.0 * span.u * s + span.c * s * s);
+      const PathState state = path_.at(span.piece, (span.parameter + s) * span.scale);
+      detail::MotionRow* row = rows.data();
+      double* w = cap.data();
+      for (const auto& limit : *limits) {
+        limit->evaluate(state, row, w);
+        row += limit->row_names.size();
+        w += limit->cap_names.size();
+      }
+      for (std::size_t i = 0; i < caps; ++i) {
+        use[i] += cap[i] * x / 3.0;
+      }
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        const detail::MotionRow& r = rows[i];
+        use[caps + i] += std::abs(r.a * u + r.b * x + r.k * std::sqrt(x) + r.c) / 3.0;
+      }
+    }
+    const auto most = std::max_element(use.begin(), use.end());
+    const auto which = static_cast<std::size_t>(most - use.begin());
+    const double from = path_.breaks()[span.piece] + span.parameter;
+    if (before == names.size() || names[which] != names[before]) {
+      all.push_back({from, from, span.start, span.start, names[which], 0.0});
+    }
+    before = which;
+    all.back().to = from + span.width;
+    all.back().end = span.start + span.duration;
+    all.back().use += span.duration * *most;
+  }
+  for (BindingLimit& limit : all) {
+    limit.use /= limit.end - limit.start;
+  }
+  return all;
 }
 
 std::vector<double> PathTrajectory::parameters() const {

@@ -106,9 +106,8 @@ void polynomial_roots(const VectorXd& c, std::vector<double>& t) {
   };
   std::vector<Part> open{{std::move(b), 0.0, 1.0}};
   // Two roots nearer than this are told apart no more.
-  constexpr double least = 1e-14;
-  std::size_t halvings = 0;
-  while (!open.empty() && ++halvings < 20000) {
+  constexpr double least = 1e-7;
+  while (!open.empty()) {
     Part part = std::move(open.back());
     open.pop_back();
     int changes = 0;
@@ -125,8 +124,20 @@ void polynomial_roots(const VectorXd& c, std::vector<double>& t) {
       }
       continue;
     }
-    if (part.width < least) {
-      t.push_back(part.from + 0.5 * part.width);
+    if (changes == 1 || part.width < least) {
+      // One root: by halves of its polynomial's own values.
+      double low = part.from;
+      double high = part.from + part.width;
+      const bool rises = part.b(d) > 0.0;
+      for (int step = 0; step < 60 && high - low > 1e-16; ++step) {
+        const double middle = 0.5 * (low + high);
+        double value = c(d);
+        for (Index k = d; k-- > 0;) {
+          value = value * middle + c(k);
+        }
+        ((value > 0.0) == rises ? high : low) = middle;
+      }
+      t.push_back(0.5 * (low + high));
       continue;
     }
     VectorXd left = part.b;

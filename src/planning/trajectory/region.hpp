@@ -23,8 +23,8 @@ namespace flyball::detail {
 /// region.
 void border_crossings(const RegionLimit& limit, const PathPiece& piece, std::vector<double>& t);
 
-/// The roots in (0, 1) of Σ c_k t^k to 1e-14, each once; a root of even order may be left out.
-/// By halving until the Bézier coefficients change their sign once at most.
+/// The roots in (0, 1) of Σ c_k t^k where it changes its sign, to rounding; of two nearer than 1e-7
+/// one place. By halving until the Bézier coefficients change their sign once at most.
 void polynomial_roots(const Eigen::VectorXd& c, std::vector<double>& t);
 
 }  // namespace flyball::detail

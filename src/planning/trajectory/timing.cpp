@@ -10,26 +10,30 @@ namespace flyball::detail {
 void TimingRows::resize(std::size_t cells, int rows_of_cell, int uppers_of_cell) {
   count = rows_of_cell;
   uppers = uppers_of_cell;
-  upper.resize(3 * cells * static_cast<std::size_t>(uppers));
+  const std::size_t all_uppers = cells * static_cast<std::size_t>(uppers);
+  upper_alpha.resize(all_uppers);
+  upper_beta.resize(all_uppers);
+  upper_gamma.resize(all_uppers);
   idle.resize(cells);
   const std::size_t all = cells * static_cast<std::size_t>(count);
   alpha.resize(all);
   beta.resize(all);
   gamma.resize(all);
   cap.resize(cells);
-  capped_by.resize(cells);
 }
 
 IntervalProgram TimingRows::program(std::size_t cell) const noexcept {
   const std::size_t from = cell * static_cast<std::size_t>(count);
+  const std::size_t from_upper = cell * static_cast<std::size_t>(uppers);
   return {alpha.data() + from,
           beta.data() + from,
           gamma.data() + from,
           delta.empty() ? nullptr : delta.data() + from,
           count,
-          margin.empty() ? 1.0 : margin[cell],
           cap[cell],
-          upper.data() + 3 * cell * static_cast<std::size_t>(uppers),
+          upper_alpha.data() + from_upper,
+          upper_beta.data() + from_upper,
+          upper_gamma.data() + from_upper,
           uppers,
           idle[cell]};
 }
@@ -40,12 +44,15 @@ void pass_back(const std::vector<TimingCell>& cells, const TimingRows& rows, dou
   passes.highest.resize(n + 1);
   passes.witness.resize(n);
   passes.highest[n] = last;
+  IntervalBasis basis;
   for (std::size_t i = n; i-- > 0;) {
     double most = last;
     if (i + 1 < n) {
       most = cells[i].join > 0.0 ? passes.highest[i + 1] / cells[i].join : 0.0;
     }
-    passes.witness[i] = largest_first(rows.program(i), most);
+    IntervalProgram program = rows.program(i);
+    program.cap[2] = std::min(program.cap[2], most);
+    passes.witness[i] = largest_first(program, basis);
     passes.highest[i] = passes.witness[i][0];
   }
 }
@@ -54,7 +61,8 @@ void pass_forward(const std::vector<TimingCell>& cells, const TimingRows& rows, 
                   TimingPasses& passes) {
   const std::size_t n = cells.size();
   passes.b.resize(n);
-  double x = first;
+  IntervalBasis basis;
+  double x = std::min(first, passes.highest[0]);
   for (std::size_t i = 0; i < n; ++i) {
     const Bezier2& from = passes.witness[i];
     Bezier2 inside = from;
@@ -66,8 +74,19 @@ void pass_forward(const std::vector<TimingCell>& cells, const TimingRows& rows, 
     if (i + 1 < n) {
       most = cells[i].join > 0.0 ? passes.highest[i + 1] / cells[i].join : 0.0;
     }
-    passes.b[i] = largest_last(rows.program(i), most, inside);
+    // On the way that was found back from the end there is nothing to look for.
+    const bool found = x >= from[0] && inside[2] >= most * (1.0 - 1e-12);
+    if (found) {
+      passes.b[i] = inside;
+    } else {
+      IntervalProgram program = rows.program(i);
+      program.cap[2] = std::min(program.cap[2], most);
+      passes.b[i] = largest_last(program, inside, basis);
+    }
     x = passes.b[i][2] * cells[i].join;
+    if (i + 1 < n) {
+      x = std::min(x, passes.highest[i + 1]);
+    }
   }
 }
 

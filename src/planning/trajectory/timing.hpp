@@ -1,7 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
-#include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -21,17 +22,33 @@ struct TimingCell {
   double join = 1.0;   ///< The next interval's b_0 over this one's b_2; 0 where it is a stop.
 };
 
+/// Numbers that nothing is put into before they are.
+class Numbers {
+ public:
+  void resize(std::size_t size) {
+    if (size > size_) {
+      values_ = std::make_unique_for_overwrite<double[]>(size);
+      size_ = size;
+    }
+  }
+  [[nodiscard]] double* data() noexcept { return values_.get(); }
+  [[nodiscard]] const double* data() const noexcept { return values_.get(); }
+  [[nodiscard]] double& operator[](std::size_t i) noexcept { return values_[i]; }
+
+ private:
+  std::unique_ptr<double[]> values_;
+  std::size_t size_ = 0;
+};
+
 /// The rows and caps of all intervals, one after the other.
 struct TimingRows {
-  int count = 0;                                        ///< Of an interval.
-  std::vector<double> alpha, beta, gamma;               ///< count an interval.
-  std::vector<double> delta;                            ///< The same, or empty.
-  std::vector<double> margin;                           ///< One an interval, or empty for 1.
-  std::vector<Bezier2> cap;                             ///< One an interval.
-  int uppers = 0;                                       ///< Rows of one side of an interval.
-  std::vector<double> upper;                            ///< Three times uppers an interval.
-  std::vector<double> idle;                             ///< One an interval.
-  std::vector<std::array<std::uint16_t, 3>> capped_by;  ///< Index of the limit of each cap.
+  int count = 0;                                 ///< Of an interval.
+  Numbers alpha, beta, gamma;                    ///< count an interval.
+  std::vector<double> delta;                     ///< The same, or empty.
+  std::vector<Bezier2> cap;                      ///< One an interval.
+  int uppers = 0;                                ///< Rows of one side of an interval.
+  Numbers upper_alpha, upper_beta, upper_gamma;  ///< uppers an interval.
+  std::vector<double> idle;                      ///< One an interval.
   void resize(std::size_t cells, int rows_of_cell, int uppers_of_cell);
   [[nodiscard]] IntervalProgram program(std::size_t cell) const noexcept;
 };

@@ -29,7 +29,8 @@ struct BindingLimit {
   double start = 0.0;  ///< s, the time at `from`.
   double end = 0.0;    ///< s, the time at `to`.
   std::string limit;   ///< "coordinate 2: acceleration", "left side: voltage", …
-  double use = 0.0;    ///< Of the limit, on the average over the stretch: 1 is all of it.
+  double use = 0.0;    ///< Of the limit, on the average over the stretch: 1 is all of it. Of a
+                       ///< velocity it is the square.
 };
 
 /// A path with its timing: over intervals of the parameter (ds/dt)² is a parabola,
@@ -45,8 +46,9 @@ class PathTrajectory {
   /// At a time, held to [0, total time] (NaN is the start). Cost: O(1) and a polynomial a
   /// coordinate; noexcept, allocation-free.
   [[nodiscard]] PathSample sample(double t) const noexcept;
-  /// What bound, neighbouring intervals of one limit together.
-  [[nodiscard]] const std::vector<BindingLimit>& binding() const noexcept { return binding_; }
+  /// What binds, neighbouring intervals of one limit together. Cost: O(intervals · limits),
+  /// allocates.
+  [[nodiscard]] std::vector<BindingLimit> binding() const;
   /// Between how many values of the parameter x(s) is one parabola.
   [[nodiscard]] std::size_t intervals() const noexcept { return spans_.size(); }
   /// The parameters between the intervals, both ends among them.
@@ -64,18 +66,22 @@ class PathTrajectory {
     double u = 0.0;          ///< d²s/dt² there.
     double c = 0.0;          ///< 1/s², by how much that rises with s.
     std::size_t piece = 0;   ///< Of the path.
+    double scale = 1.0;      ///< 1 over the piece's span.
   };
-  /// @param spans  One or more, one after the other. @param binding  As `binding` gives it.
-  PathTrajectory(Path path, std::vector<Span> spans, std::vector<BindingLimit> binding);
+  /// @param spans  One or more, one after the other. @param constraints  That it keeps to.
+  PathTrajectory(Path path, std::vector<Span> spans, std::vector<PathConstraint> constraints);
 
   [[nodiscard]] const std::vector<Span>& spans() const noexcept { return spans_; }
+  [[nodiscard]] const std::vector<PathConstraint>& constraints() const noexcept {
+    return constraints_;
+  }
 
  private:
   [[nodiscard]] std::size_t span_at(double t) const noexcept;
 
   Path path_;
   std::vector<Span> spans_;
-  std::vector<BindingLimit> binding_;
+  std::vector<PathConstraint> constraints_;
   std::vector<std::size_t> buckets_;  ///< The span at each of equal parts of the total time.
   double total_time_ = 0.0;
   double buckets_per_second_ = 0.0;
@@ -85,9 +91,9 @@ class PathTrajectory {
 struct TimingOptions {
   double start_velocity = 0.0;  ///< |dq/dt| at the start, >= 0, in the coordinates' unit a second.
   double end_velocity = 0.0;    ///< |dq/dt| at the end, >= 0.
-  /// How far the time may be from the fastest, relative: halving it takes about 1.4 times as long.
-  /// In [1e-6, 0.1].
-  double tolerance = 2e-3;
+  /// How far the time is from the fastest, relative and on the average of many paths; the limits
+  /// hold in any case. Half of it takes about 1.4 times as long. In [1e-6, 0.1].
+  double tolerance = 1.5e-3;
 };
 
 /// The fastest motion along a path under limits that hold at every point of it, not only at a
