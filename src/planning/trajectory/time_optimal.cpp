@@ -246,7 +246,7 @@ class Timing {
   static constexpr int most_refinements = 8;
   /// The sum of the losses before the last cut over how far the time is from the fastest after it,
   /// as 200 paths of two and of seven coordinates have it on the average.
-  static constexpr double loss_of_gap = 3.7;
+  static constexpr double loss_of_gap = 3.5;
   /// The tolerance that one cut meets.
   static constexpr double one_round = 1e-3;
   /// Of a limit.
