@@ -9,6 +9,7 @@
 #include <flyball/core/text.hpp>
 
 #include "core/try.hpp"
+#include "solve/configurations.hpp"
 #include "solve/row.hpp"
 
 namespace flyball::solve {
@@ -68,6 +69,7 @@ std::span<const Kind> kinds() {
     add("Spectra and frequency responses", spectrum_kinds());
     add("Filters and signals", filter_kinds());
     add("Models from records", identification_kinds());
+    add("Configuration spaces", configuration_kinds());
     return table;
   }();
   return all;

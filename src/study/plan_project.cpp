@@ -50,12 +50,15 @@ class PlanReader {
                                        "deg\", high = \"90 deg\""));
     }
     axes_ = axes;
-    if (!errors_.empty()) {
+    if (axes.empty()) {
       return tl::unexpected(Errors(std::move(errors_)));
     }
     auto space = ConfigurationSpace::create(std::move(axes));
     if (!space) {
-      return tl::unexpected(Errors(std::move(space).error().in(path_)));
+      if (errors_.empty()) {
+        refuse({}, std::move(space).error());
+      }
+      return tl::unexpected(Errors(std::move(errors_)));
     }
     each("region", [&](const toml::table& table) { add_region(*space, table); });
     add_mechanism(*space);
@@ -271,6 +274,7 @@ class PlanReader {
     to.high =
         to.wraps ? to.low + 2.0 * pi : needed(table, "high", place, to.name + ", its upper stop");
     to.scale = optional_quantity(table, "scale", place).value_or(1.0);
+    const std::size_t before = errors_.size();
     MotionLimits limits{
         .velocity = optional_quantity(table, "velocity", rate).value_or(0.0),
         .acceleration = optional_quantity(table, "acceleration", change).value_or(0.0)};
@@ -297,7 +301,7 @@ class PlanReader {
          {std::pair("velocity", limits.velocity), std::pair("acceleration", limits.acceleration),
           std::pair("deceleration", limits.deceleration),
           std::pair("reverse_velocity", limits.reverse_velocity)}) {
-      if (table.contains(key) && !(value > 0.0)) {
+      if (table.contains(key) && !(value > 0.0) && errors_.size() == before) {
         refuse(table.get(key)->source(), Error(ArgumentError::not_positive)
                                              .about(to.name + ": " + key)
                                              .got(fmt::format("{}", value))

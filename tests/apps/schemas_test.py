@@ -251,6 +251,14 @@ def check_motors(folder):
     check_answer(["motor-curves", "cim.csv", "--motor", "nothing"], 2, folder)
 
 
+def check_plan(folder):
+    for space in ("space_elevator_arm.toml", "space_scoring_arm.toml"):
+        check_answer(["plan", str(examples / space)], 0, folder)
+        check_answer(["plan", str(examples / space), "--traversal", "sequential"], 0, folder)
+    check_answer(["plan", str(examples / "space_elevator_arm.toml"), "--goal", "0 deg, 1 m"], 1, folder)
+    check_answer(["plan", str(examples / "space_elevator_arm.toml"), "--method", "teleport"], 2, folder)
+
+
 def check_profile(folder):
     limits = ["profile", "--to", "1.2m", "--velocity", "1.5m/s", "--acceleration", "3m/s^2"]
     check_answer(limits, 0, folder)
@@ -385,6 +393,7 @@ with tempfile.TemporaryDirectory() as name:
     check_profile(pathlib.Path(name))
     check_path(pathlib.Path(name))
     check_states(pathlib.Path(name))
+    check_plan(pathlib.Path(name))
     check_places(pathlib.Path(name))
     check_reader_and_schema(pathlib.Path(name))
 check_project_schema()

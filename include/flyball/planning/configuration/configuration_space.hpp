@@ -90,18 +90,21 @@ class ConfigurationSpace {
   /// leave no room).
   [[nodiscard]] Expected<ConfigurationSpace> with_buffer(std::span<const double> error) const;
 
+  /// How many axes there are.
   [[nodiscard]] int dimension() const noexcept;
+  /// The axes; with a buffer their stops are nearer by it.
   [[nodiscard]] const std::vector<SpaceAxis>& axes() const noexcept;
   /// Names of all constraints, the stops of the axes first.
   [[nodiscard]] std::vector<std::string> constraints() const;
   /// The mechanism, if there is one.
   [[nodiscard]] const PlanarMechanism* mechanism() const noexcept;
-  /// The region of each constraint that is one, and whether it is forbidden; for pictures.
+  /// A constraint that is a region.
   struct NamedRegion {
     std::string name{};
     Region region{};
     bool forbidden = false;
   };
+  /// All of them, as they were given; for pictures.
   [[nodiscard]] const std::vector<NamedRegion>& regions() const noexcept;
 
   /// Whether no constraint is broken. @param q  An entry an axis; others are not valid, nor is what

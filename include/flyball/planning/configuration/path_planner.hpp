@@ -22,8 +22,9 @@ enum class PathMethod {
   roadmap,        ///< A random graph.
   decomposition,  ///< Boxes proven free or blocked: finds a path, or that there is none.
 };
+/// Its name, as `parse_path_method` takes it: "rrt-connect".
 [[nodiscard]] const char* to_string(PathMethod method) noexcept;
-/// @errors ArgumentError::unknown_name with the names that there are.
+/// A method by its name. @errors ArgumentError::unknown_name with the names that there are.
 [[nodiscard]] Expected<PathMethod> parse_path_method(std::string_view name);
 
 /// What is asked of a search.
@@ -80,6 +81,7 @@ class PathPlanner {
                                                  std::span<const double> goal,
                                                  const PathSearch& search = {});
 
+  /// Where it plans.
   [[nodiscard]] const ConfigurationSpace& space() const noexcept;
 
  private:

@@ -56,15 +56,19 @@ struct PlanarObstacle {
   /// Names of bodies that may touch it; the others may not.
   std::vector<std::string> spares{};
 
+  /// @param at, radius  m.
   [[nodiscard]] static PlanarObstacle disc(std::string name, std::array<double, 2> at,
                                            double radius);
+  /// @param at  On its border, m. @param normal  Out of it; any length but 0.
   [[nodiscard]] static PlanarObstacle half_plane(std::string name, std::array<double, 2> at,
                                                  std::array<double, 2> normal);
+  /// @param vertices  m, in either sense, without crossing edges; 3 to 1000.
   [[nodiscard]] static PlanarObstacle polygon(std::string name,
                                               std::vector<std::array<double, 2>> vertices);
-  /// @param low, high  Opposite corners.
+  /// @param low, high  Opposite corners, m.
   [[nodiscard]] static PlanarObstacle box(std::string name, std::array<double, 2> low,
                                           std::array<double, 2> high);
+  /// @param vertices  m, of a convex polygon.
   [[nodiscard]] static PlanarObstacle frame(std::string name,
                                             std::vector<std::array<double, 2>> vertices);
 };

@@ -1,0 +1,81 @@
+#include <fstream>
+
+#include <nlohmann/json.hpp>
+
+#include "run.hpp"
+
+namespace flyball::test {
+namespace {
+
+using Json = nlohmann::json;
+
+class PlanCommand : public Command {
+ protected:
+  [[nodiscard]] std::string space() const {
+    return std::string(FLYBALL_EXAMPLES) + "/space_elevator_arm.toml";
+  }
+  /// A file of one axis and whatever else.
+  [[nodiscard]] std::string file(const std::string& rest) const {
+    const auto path = work() / "space.toml";
+    std::ofstream(path) << "[[axis]]\nname = \"arm\"\nlow = \"-90 deg\"\nhigh = \"90 deg\"\n"
+                        << rest;
+    return path.string();
+  }
+};
+
+// Around the chassis, with its errors: the corners move out by 2° and 2 cm.
+TEST_F(PlanCommand, FindsAndTimesTheWay) {
+  const Answer told = run("plan " + space() + " --json");
+  ASSERT_EQ(told.status, 0) << told.err;
+  const Json json = Json::parse(told.out);
+  ASSERT_EQ(json.at("waypoints").size(), 4U);
+  EXPECT_NEAR(json.at("waypoints").at(1).at(1).get<double>(), 2.02, 1e-9);
+  EXPECT_EQ(json.at("method"), "corners");
+  EXPECT_GT(json.at("duration").get<double>(), 1.0);
+  const Json other = Json::parse(run("plan " + space() + " --traversal sequential --json").out);
+  EXPECT_NEAR(other.at("other_duration").get<double>(), json.at("duration").get<double>(), 1e-12);
+  EXPECT_LE(other.at("duration").get<double>(), json.at("duration").get<double>());
+}
+
+TEST_F(PlanCommand, WritesPicturesAndTables) {
+  const Answer told =
+      run("plan " + std::string(FLYBALL_EXAMPLES) + "/space_scoring_arm.toml --out plan");
+  ASSERT_EQ(told.status, 0) << told.err;
+  EXPECT_TRUE(holds(contents(work() / "plan/data/motion.csv"), "shoulder velocity (rad/s)"));
+  EXPECT_TRUE(holds(contents(work() / "plan/data/waypoints.csv"), "elevator (m),shoulder (rad)"));
+  EXPECT_TRUE(
+      holds(contents(work() / "plan/plan.hpp"), "inline constexpr std::array<Configuration"));
+  EXPECT_TRUE(std::filesystem::exists(work() / "plan/index.html"));
+}
+
+TEST_F(PlanCommand, SaysWhyThereIsNoWay) {
+  const Answer inside = run("plan " + space() + " --goal '0 deg, 1 m'");
+  EXPECT_EQ(inside.status, 1);
+  EXPECT_TRUE(holds(inside.err, "the goal is chassis by")) << inside.err;
+  const Answer near = run("plan " + space() + " --goal '46 deg, 1 m'");
+  EXPECT_EQ(near.status, 1);
+  EXPECT_TRUE(holds(near.err, "the goal, with the tracking error, is chassis")) << near.err;
+  const Answer none = run("plan " + file("[[region]]\nname = \"post\"\nbox = { arm = [\"0 deg\", "
+                                         "\"1 deg\"] }\n[plan]\nstart = [\"-10 deg\"]\ngoal = "
+                                         "[\"10 deg\"]\n"));
+  EXPECT_EQ(none.status, 1);
+  EXPECT_TRUE(holds(none.err, "boxes prove it")) << none.err;
+}
+
+TEST_F(PlanCommand, TellsWhatIsWrongWithAFile) {
+  const Answer wrong =
+      run("plan " + file("velocity = \"3 m\"\n[[region]]\nbox = { leg = [0, 1] "
+                         "}\n[[obstacle]]\nshape = \"cone\"\n[plan]\nstrat = 3\n"));
+  EXPECT_EQ(wrong.status, 2);
+  for (const char* part : {"space.toml:5:12", "velocity", "\"leg\"", "one of the axes arm", "cone",
+                           "disc, box, polygon, half_plane or frame", "did you mean \"start\"?"}) {
+    EXPECT_TRUE(holds(wrong.err, part)) << part << "\n" << wrong.err;
+  }
+  EXPECT_EQ(run("plan nothing.toml").status, 2);
+  EXPECT_EQ(run("plan " + space() + " --method teleport").status, 2);
+  EXPECT_EQ(run("plan " + space() + " --start '1 rad'").status, 2);
+  EXPECT_EQ(run("plan " + space() + " --seconds '-1 s'").status, 2);
+}
+
+}  // namespace
+}  // namespace flyball::test
