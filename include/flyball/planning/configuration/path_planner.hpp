@@ -67,6 +67,7 @@ class PathPlanner {
  public:
   /// @param space  Where to plan; shared, not copied.
   explicit PathPlanner(ConfigurationSpace space);
+  /// Takes over what the other has learnt; that one must not be asked again.
   PathPlanner(PathPlanner&&) noexcept;
   PathPlanner& operator=(PathPlanner&&) noexcept;
   ~PathPlanner();
