@@ -74,7 +74,7 @@ TEST_F(PlanCommand, TellsWhatIsWrongWithAFile) {
   EXPECT_EQ(run("plan nothing.toml").status, 2);
   EXPECT_EQ(run("plan " + space() + " --method teleport").status, 2);
   EXPECT_EQ(run("plan " + space() + " --start '1 rad'").status, 2);
-  EXPECT_EQ(run("plan " + space() + " --seconds '-1 s'").status, 2);
+  EXPECT_EQ(run("plan " + space() + " --seconds '0 s'").status, 2);
 }
 
 }  // namespace
