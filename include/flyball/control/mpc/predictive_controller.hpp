@@ -139,10 +139,11 @@ class PredictiveController {
   void reset() noexcept { core_.reset(); }
 
   [[nodiscard]] MpcStatus status() const noexcept { return status_; }
-  /// x_k and u_k of the last solution. @param k  0 to N, 0 to N - 1.
+  /// x_k of the last solution. @param k  0 to N.
   [[nodiscard]] Eigen::Map<const StateVector> predicted_state(int k) const noexcept {
     return Eigen::Map<const StateVector>(core_.state(k), core_.states());
   }
+  /// u_k of the last solution. @param k  0 to N - 1.
   [[nodiscard]] Eigen::Map<const InputVector> predicted_input(int k) const noexcept {
     return Eigen::Map<const InputVector>(core_.input(k), core_.inputs());
   }
@@ -158,6 +159,7 @@ class PredictiveController {
   [[nodiscard]] const detail::MpcCore& core() const noexcept { return core_; }
 
  protected:
+  /// What a factory made.
   explicit PredictiveController(detail::MpcCore&& core)
       : core_(std::move(core)), u_(InputVector::Zero(core_.inputs())) {}
 
