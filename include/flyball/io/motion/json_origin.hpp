@@ -22,7 +22,9 @@ enum class MotionFileError {
 [[nodiscard]] ErrorInfo error_info(MotionFileError code);
 
 namespace io {
+/// A value of a text.
 struct JsonNode;
+/// A text and its values.
 struct JsonTree;
 }  // namespace io
 
@@ -32,7 +34,9 @@ struct JsonTree;
 /// written as its tool would.
 class JsonOrigin {
  public:
+  /// Of what no file had.
   JsonOrigin() = default;
+  /// @param node  Of the tree.
   JsonOrigin(std::shared_ptr<const io::JsonTree> tree, const io::JsonNode& node) noexcept
       : tree_(std::move(tree)), node_(&node) {}
 
