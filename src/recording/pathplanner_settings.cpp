@@ -89,8 +89,8 @@ Expected<void> read_modules(const json& file, const std::string& source,
     const auto wrong = misplaced_module(
         {*settings.modules[0], *settings.modules[1], *settings.modules[2], *settings.modules[3]});
     if (wrong) {
-      return refusal(TrajectoryFileError::wrong_sample, source, "the modules")
-          .got(*wrong)
+      return refusal(TrajectoryFileError::wrong_sample, source, "the order of the modules")
+          .got("another: " + *wrong)
           .expected("x ahead and y to the left of the robot's middle, in metres")
           .hint("two of flModuleX, frModuleX, … or their signs are exchanged");
     }

@@ -39,7 +39,8 @@ struct Read {
 
 /// "trajectory.json:3:17".
 std::string at(const std::string& source, const Place& place) {
-  return fmt::format("{}:{}:{}", source, place.line, place.column);
+  // Samples of waypoints stand in no line.
+  return place.line == 0 ? source : fmt::format("{}:{}:{}", source, place.line, place.column);
 }
 
 Expected<Pose2d> pose_of(const json& sample, const std::string& where) {

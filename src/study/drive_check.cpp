@@ -1,6 +1,7 @@
 // What in [drive] cannot be.
 #include <algorithm>
 #include <array>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -49,6 +50,9 @@ class Check {
     check_follower();
     check_modules();
     check_waypoints();
+    if (said_.zeta > 1.0 && document_.has("drive", "zeta")) {
+      refuse("zeta", format_number(said_.zeta), "it is above 0 and at most 1, in 1/rad");
+    }
     if (!said_.trajectory.empty() && !said_.waypoints.empty()) {
       refuse("trajectory", "there beside waypoints", "leave one of them out");
     }
@@ -147,15 +151,16 @@ class Check {
       }
     }
     if (const auto wrong = misplaced_module(places)) {
-      refuse("modules", *wrong,
+      refuse("modules", "in another order: " + *wrong,
              "the order is front left, front right, back left, back right; x is ahead, y to the "
              "left");
     }
   }
   void check_waypoints() {
     if (said_.waypoints.size() == 1) {
-      refuse("waypoints", "one", "a path goes from one to another: give two or more");
+      refuse("waypoints", "one place", "a path goes from one to another: give two or more");
     }
+    std::optional<Vector2d> before;
     for (std::size_t i = 0; i < said_.waypoints.size(); ++i) {
       const std::string name = fmt::format("{}[{}]", document_.name("drive", "waypoints"), i);
       auto values = quantities_of(
@@ -170,6 +175,14 @@ class Check {
                                   .got("of four values")
                                   .hint("a differential drive looks where it goes: leave the "
                                         "fourth out"));
+      } else if (const Vector2d place((*values)[0], (*values)[1]); before && *before == place) {
+        document_.refuse_item("drive", "waypoints", i,
+                              Error(ProjectError::wrong_value)
+                                  .about(name)
+                                  .got("where the one before it is")
+                                  .expected("somewhere else"));
+      } else {
+        before = place;
       }
     }
   }

@@ -171,7 +171,8 @@ inline constexpr std::array drive_fields{
     quantity("velocity_tolerance", at<&DriveSection::velocity_tolerance>(), Dimension::velocity,
              Range::positive, "\"0.95 m/s\"", "Largest acceptable error of a wheel's speed")
         .no_option()
-        .without("0.95 m/s, or as loose as keeps a wheel calm that loses the floor"),
+        .without(
+            "0.95 m/s; of swerve and mecanum as loose as keeps a wheel calm that loses the floor"),
     quantity("least_lookahead", at<&DriveSection::least_lookahead>(), Dimension::length,
              Range::positive, "\"0.3 m\"", "Of pure pursuit: how far it looks ahead at least")
         .no_option(),

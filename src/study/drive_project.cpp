@@ -284,7 +284,7 @@ Expected<RobotTrajectory> trajectory_of(const Project& project, const DriveJob& 
   for (std::size_t i = 0; i < points.size(); ++i) {
     const TrajectoryPoint& point = points[i];
     const double sign = said.reversed && sides ? -1.0 : 1.0;
-    MotionSample sample{.time = point.time, .pose = point.pose};
+    MotionSample sample{.time = point.time, .pose = point.pose, .place = {0, 0}};
     const Vector2d way(point.pose.rotation().cos(), point.pose.rotation().sin());
     sample.velocity = point.velocity * way;
     sample.acceleration = point.acceleration * way;
@@ -360,25 +360,32 @@ Expected<DriveFollower> follower_of(const Project& project, DriveKind kind) {
           .expected("ramsete, ltv unicycle, ltv drive, holonomic or pure pursuit"));
 }
 
-/// That of the file, or one with which wheels that lose the floor do not oscillate.
+/// That of the file; of what moves sideways, where it says nothing, one with which wheels that lose
+/// the floor do not oscillate. The followers of a differential drive need the tight one.
 Expected<void> take_velocity_tolerance(const DriveSection& said, DriveJob& job) {
   const double usual = job.velocity_tolerance;
   const double asked = said.velocity_tolerance.value_or(Velocity(usual)).si();
-  auto calm = calm_velocity_tolerance(job, asked);
+  const bool sides = job.robot.kind == DriveKind::differential;
+  const auto calm = calm_velocity_tolerance(job, asked);
   if (!calm) {
     return {};  // whoever designs the loop says why there is none
   }
-  job.velocity_tolerance = said.velocity_tolerance ? asked : *calm;
+  job.velocity_tolerance = said.velocity_tolerance || sides ? asked : *calm;
   const SpinningWheel wheel = SpinningWheel::of(job.robot, job.period);
-  const double pole =
-      wheel_gain(job).map([&](double gain) { return wheel.pole(gain); }).value_or(0);
-  if (said.velocity_tolerance && pole <= -1.0) {
+  const auto gain = wheel_gain(job);
+  const double pole = gain ? wheel.pole(*gain) : 0.0;
+  const DisturbanceSection& off = job.disturbance;
+  const bool slips = off.slip_grip != 1.0 && off.slip_for.si() > 0.0;
+  if (pole <= -1.0 && (said.velocity_tolerance || slips)) {
+    const std::string mend =
+        sides ? "a shorter controller.period keeps it calm"
+              : fmt::format("drive.velocity_tolerance of {} m/s or more keeps it calm",
+                            format_number(*calm, 3));
     warn(job.diagnostics, "spinning_wheels",
-         "the speed of a wheel that loses the floor oscillates: its loop's pole is {} there, and "
-         "the wheel is not the robot's share any more; drive.velocity_tolerance of {} m/s or more "
-         "keeps it calm",
-         format_number(pole, 3), format_number(*calm, 3));
-  } else if (!said.velocity_tolerance && *calm > usual) {
+         "the speed of a wheel that loses the floor oscillates: without the robot's share its loop "
+         "has a pole of {}; {}",
+         format_number(pole, 3), mend);
+  } else if (job.velocity_tolerance > asked) {
     note(job.diagnostics, "assumed",
          "drive.velocity_tolerance is taken as {} m/s: with {} m/s the speed of a wheel that loses "
          "the floor would oscillate",

@@ -33,7 +33,7 @@ struct MotionSample {
   Eigen::Vector2d velocity = Eigen::Vector2d::Zero();      ///< m/s, in the field.
   double omega = 0.0;                                      ///< rad/s
   Eigen::Vector2d acceleration = Eigen::Vector2d::Zero();  ///< m/s², in the field.
-  Place place{};  ///< Where the sample stands in its file; 1, 1 of one that has none.
+  Place place{};  ///< Where the sample stands in its file; line 0: nowhere.
 
   /// m/s along the robot's forward axis: negative where it backs.
   [[nodiscard]] double forward() const noexcept {
