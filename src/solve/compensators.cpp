@@ -361,11 +361,12 @@ std::vector<Kind> synthesis_kinds() {
                                            "weak states left out, or at rest so that the gain at "
                                            "rest stays, or of the coprime factors"))},
        answered_system("r", "m", "p") +
-           std::vector{
-               list("hankel_singular_values", "l", "", "of what was reduced, decreasing"),
-               integer("unstable", "states of the unstable part, kept"),
-               number("error_bound", "", "2 Σ of those left out"),
-               number("achieved_error", "", "the largest gain of the difference, computed")},
+           std::vector{list("hankel_singular_values", "l", "", "of what was reduced, decreasing"),
+                       integer("unstable", "states of the unstable part, kept"),
+                       number("error_bound", "", "2 Σ of those left out"),
+                       number("achieved_error", "",
+                              "the largest gain of the difference, of coprime that of the factors "
+                              "[M; N]; computed")},
        R"({"A": [[-1, 0, 0], [0, -20, 0], [0, 0, 0.5]], "B": [[1], [1], [1]], "C": [[1, 1, 1]], "order": 2})",
        &solve_reduce},
   };
