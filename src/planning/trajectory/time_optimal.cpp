@@ -203,7 +203,11 @@ class Timing {
       pass();
       limits_.verify(cells, passes.b, rows, off_);
     }
+    bool again = true;  // a cut was not as fine as asked for
     for (int round = 0; round < most_refinements && cells.size() < most_cells; ++round) {
+      if (round > 0 && !again && tolerance_ >= one_round) {
+        break;
+      }
       const std::vector<double> loss = losses(cells, passes.b, limits_, rows);
       const double time = total_time(cells, passes.b);
       double sum = 0.0;
@@ -211,11 +215,11 @@ class Timing {
         sum += one;
       }
       const double allowed = loss_of_gap * tolerance_ * time;
-      if (round > 0 && (sum <= allowed || tolerance_ >= one_round)) {
+      if (round > 0 && sum <= allowed) {
         break;
       }
       const double of_each = allowed / static_cast<double>(cells.size());
-      cut([&](std::size_t i) { return std::sqrt(loss[i] / of_each); });
+      again = cut([&](std::size_t i) { return std::sqrt(loss[i] / of_each); }) > 2 * most_parts;
       pass();
       if (tolerance_ < one_round) {
         limits_.verify(cells, passes.b, rows, off_);
@@ -256,12 +260,16 @@ class Timing {
     detail::pass_back(cells, rows, last_, passes);
     detail::pass_forward(cells, rows, first_, passes);
   }
-  /// Each interval into one part and as many more as `more` says.
+  /// Each interval into one part and as many more as `more` says, up to `most_parts`.
+  /// @return The most that it says.
   template <class More>
-  void cut(const More& more) {
+  double cut(const More& more) {
+    double most = 0.0;
     std::vector<int> parts(cells.size());
     for (std::size_t i = 0; i < cells.size(); ++i) {
-      parts[i] = 1 + static_cast<int>(std::min<double>(most_parts - 1, more(i)));
+      const double wanted = more(i);
+      most = std::max(most, wanted);
+      parts[i] = 1 + static_cast<int>(std::min<double>(most_parts - 1, wanted));
     }
     std::vector<Bezier2> motion;
     if (limits_.is_put_about()) {
@@ -269,6 +277,7 @@ class Timing {
     }
     refine(cells, motion, parts);
     limits_.fill(cells, motion, rows);
+    return most;
   }
 
   const Path& path_;
