@@ -149,7 +149,10 @@ double largest_radius(const MatrixXd& D) {
         .maxCoeff();
   };
   double best = 0.0;
-  for (int start = 0; start < (k == 1 ? 1 : 12); ++start) {
+  const int starts = k == 1 ? 1 : 12;
+  constexpr int most_each = 400;  // of all angles a radius is a bound from below
+  for (int start = 0; start < starts; ++start) {
+    int looked = 0;
     VectorXd angles(k);
     for (Index i = 0; i < k; ++i) {
       // Spread evenly enough, the same each time.
@@ -159,9 +162,9 @@ double largest_radius(const MatrixXd& D) {
     }
     double here = radius(angles);
     for (double step = 1.0; step > 1e-6; step *= 0.5) {
-      for (bool better = true; better;) {
+      for (bool better = true; better && looked < most_each;) {
         better = false;
-        for (Index i = 0; i < k; ++i) {
+        for (Index i = 0; i < k; ++i, ++looked) {
           for (const double sign : {1.0, -1.0}) {
             VectorXd moved = angles;
             moved(i) += sign * step;

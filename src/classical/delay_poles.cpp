@@ -52,8 +52,9 @@ double highest_frequency(const Characteristic& f) {
   }
   const double jumps = radius_of(f.jumps().cwiseAbs());
   const double threshold = jumps + 0.45 * (1.0 - jumps);
-  double top = 2.0 * fastest;
-  for (int i = 0; i < 200 && f.gain(top) > threshold; ++i) {
+  constexpr double most = 1e300;
+  double top = std::min(2.0 * fastest, most);
+  for (int i = 0; i < 200 && top < most && f.gain(top) > threshold; ++i) {
     top *= 2.0;
   }
   double highest = 1.0 / f.delays().maxCoeff();

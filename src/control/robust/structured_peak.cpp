@@ -171,17 +171,21 @@ class PeakSearch {
     }
     constexpr int most_visits = 150;
     int since = 0;
+    double raise = 1.1;
+    const auto gain = h_infinity_norm(system_);
+    const double norm = gain ? gain->upper_bound : 1e6 * level_;
     while (auto open = gap()) {
       if (++since > most_visits) {
         // Whatever resists is given a higher level, at which all that holds still does.
-        level_ *= 1.1;
-        since = most_visits - 20;
-        for (Visit& made : visits_) {
-          lay(made);
-        }
-        if (++raised_ > 30) {
+        level_ *= raise;
+        raise *= raise;
+        if (!(level_ < norm)) {
           give_up();
           return;
+        }
+        since = most_visits - 8;
+        for (Visit& made : visits_) {
+          lay(made);
         }
         continue;
       }
@@ -359,7 +363,6 @@ class PeakSearch {
   double slowest_ = 0.0;
   double fastest_ = 0.0;
   double level_ = 0.0;
-  int raised_ = 0;
   std::vector<double> first_;
   std::vector<Visit> visits_;
   std::optional<SingularMember> best_;
