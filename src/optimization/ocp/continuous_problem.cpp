@@ -35,24 +35,26 @@ bool has_size(ContinuousData& data, Index got, Index wanted, std::string_view wh
   if (got != wanted) {
     refuse(data, Error(ArgumentError::wrong_shape)
                      .about(std::string(what))
-                     .expected(fmt::format("{} entries", wanted))
-                     .got(fmt::format("{} entries", got)));
+                     .expected(flyball::detail::format("{} entries", wanted))
+                     .got(flyball::detail::format("{} entries", got)));
   }
   return got == wanted;
 }
 
 bool are_bounds(ContinuousData& data, const VectorRef& lower, const VectorRef& upper, Index count,
                 std::string_view what) {
-  if (!has_size(data, lower.size(), count, fmt::format("the lower bound of {}", what)) ||
-      !has_size(data, upper.size(), count, fmt::format("the upper bound of {}", what))) {
+  if (!has_size(data, lower.size(), count,
+                flyball::detail::format("the lower bound of {}", what)) ||
+      !has_size(data, upper.size(), count,
+                flyball::detail::format("the upper bound of {}", what))) {
     return false;
   }
   for (Index i = 0; i < count; ++i) {
     if (!(lower(i) <= upper(i)) || lower(i) == infinity || upper(i) == -infinity) {
       refuse(data, Error(ArgumentError::out_of_range)
-                       .about(fmt::format("the bounds of {}, entry {}", what, i))
+                       .about(flyball::detail::format("the bounds of {}, entry {}", what, i))
                        .expected("a lower bound that is not above the upper one")
-                       .got(fmt::format("{} to {}", lower(i), upper(i))));
+                       .got(flyball::detail::format("{} to {}", lower(i), upper(i))));
       return false;
     }
   }
@@ -137,9 +139,9 @@ ContinuousProblem::ContinuousProblem(int states, int inputs, int phases)
                                                  std::tuple{phases, "phases", 1, most_phases}}) {
     if (value < least || value > most) {
       refuse(d, Error(ArgumentError::out_of_range)
-                    .about(fmt::format("the number of {}", name))
-                    .expected(fmt::format("{} to {}", least, most))
-                    .got(fmt::format("{}", value)));
+                    .about(flyball::detail::format("the number of {}", name))
+                    .expected(flyball::detail::format("{} to {}", least, most))
+                    .got(flyball::detail::format("{}", value)));
       return;
     }
   }
@@ -183,9 +185,9 @@ std::pair<int, int> ContinuousProblem::range(int phase, std::string_view what) {
   }
   if (phase < -1 || phase >= phases()) {
     refuse(*data_, Error(ArgumentError::out_of_range)
-                       .about(fmt::format("the phase of {}", what))
-                       .expected(fmt::format("0 to {}, or -1 for all", phases() - 1))
-                       .got(fmt::format("{}", phase)));
+                       .about(flyball::detail::format("the phase of {}", what))
+                       .expected(flyball::detail::format("0 to {}, or -1 for all", phases() - 1))
+                       .got(flyball::detail::format("{}", phase)));
     return {0, 0};
   }
   return phase < 0 ? std::pair{0, phases()} : std::pair{phase, phase + 1};
@@ -219,11 +221,11 @@ void ContinuousProblem::take_derivative(const expression::Tape& f, int phase) {
     return;
   }
   if (f.parameters() != 0 || f.inputs() > static_cast<std::size_t>(data_->states + data_->inputs)) {
-    refuse(*data_,
-           Error(ArgumentError::wrong_shape)
-               .about("the derivative's tape")
-               .expected("one of the states and inputs alone, its parameters made numbers")
-               .got(fmt::format("one of {} inputs and {} parameters", f.inputs(), f.parameters())));
+    refuse(*data_, Error(ArgumentError::wrong_shape)
+                       .about("the derivative's tape")
+                       .expected("one of the states and inputs alone, its parameters made numbers")
+                       .got(flyball::detail::format("one of {} inputs and {} parameters",
+                                                    f.inputs(), f.parameters())));
     return;
   }
   for (int i = first; i < end; ++i) {
@@ -286,8 +288,8 @@ void ContinuousProblem::record_jump(detail::StageFunction j, int phase) {
   if (phase < 1 || phase >= phases()) {
     refuse(*data_, Error(ArgumentError::out_of_range)
                        .about("the phase of a jump")
-                       .expected(fmt::format("1 to {}", phases() - 1))
-                       .got(fmt::format("{}", phase)));
+                       .expected(flyball::detail::format("1 to {}", phases() - 1))
+                       .got(flyball::detail::format("{}", phase)));
     return;
   }
   data_->phases[static_cast<std::size_t>(phase)].jump =
@@ -299,15 +301,15 @@ void ContinuousProblem::keep_out(int i, int j, const Eigen::Vector2d& center, do
   if (i < 0 || j < 0 || i >= states() || j >= states()) {
     refuse(*data_, Error(ArgumentError::out_of_range)
                        .about("the states that an obstacle keeps out")
-                       .expected(fmt::format("0 to {}", states() - 1))
-                       .got(fmt::format("{} and {}", i, j)));
+                       .expected(flyball::detail::format("0 to {}", states() - 1))
+                       .got(flyball::detail::format("{} and {}", i, j)));
     return;
   }
   if (!(radius > 0.0) || !std::isfinite(radius) || !center.allFinite()) {
     refuse(*data_, Error(ArgumentError::out_of_range)
                        .about("an obstacle")
                        .expected("a finite centre and a positive radius")
-                       .got(fmt::format("({}, {}), {}", center(0), center(1), radius)));
+                       .got(flyball::detail::format("({}, {}), {}", center(0), center(1), radius)));
     return;
   }
   add_path_constraint(
@@ -369,7 +371,7 @@ void ContinuousProblem::free_duration(double least, double most, double guess, i
     refuse(*data_, Error(ArgumentError::out_of_range)
                        .about("a phase's duration")
                        .expected("bounds that are positive, finite and in order, in seconds")
-                       .got(fmt::format("{} to {}", least, most)));
+                       .got(flyball::detail::format("{} to {}", least, most)));
     return;
   }
   for (int i = first; i < end; ++i) {
@@ -386,7 +388,7 @@ void ContinuousProblem::share_duration(int phase, int other) {
     refuse(*data_, Error(ArgumentError::out_of_range)
                        .about("the phases that share a duration")
                        .expected("a phase, and one before it")
-                       .got(fmt::format("{} and {}", phase, other)));
+                       .got(flyball::detail::format("{} and {}", phase, other)));
     return;
   }
   const int root = data_->phases[static_cast<std::size_t>(other)].shared_with;
@@ -398,7 +400,7 @@ void ContinuousProblem::minimize_time(double weight) {
     refuse(*data_, Error(ArgumentError::out_of_range)
                        .about("the weight of time")
                        .expected("a finite number that is not negative")
-                       .got(fmt::format("{}", weight)));
+                       .got(flyball::detail::format("{}", weight)));
     return;
   }
   data_->time_weight = weight;
@@ -420,14 +422,15 @@ void ContinuousProblem::set_guess(const VectorRef& shares, const Eigen::Ref<cons
       (with_inputs && !inputs.allFinite()) || states.rows() != data_->states ||
       states.cols() != shares.size() ||
       (with_inputs && (inputs.rows() != data_->inputs || inputs.cols() != shares.size()))) {
-    refuse(*data_,
-           Error(ArgumentError::wrong_shape)
-               .about("a guess")
-               .expected(fmt::format("two or more rising shares, finite states {} x shares "
-                                     "and inputs {} x shares",
-                                     data_->states, data_->inputs))
-               .got(fmt::format("{} shares, states {} x {}, inputs {} x {}", shares.size(),
-                                states.rows(), states.cols(), inputs.rows(), inputs.cols())));
+    refuse(*data_, Error(ArgumentError::wrong_shape)
+                       .about("a guess")
+                       .expected(flyball::detail::format(
+                           "two or more rising shares, finite states {} x shares "
+                           "and inputs {} x shares",
+                           data_->states, data_->inputs))
+                       .got(flyball::detail::format("{} shares, states {} x {}, inputs {} x {}",
+                                                    shares.size(), states.rows(), states.cols(),
+                                                    inputs.rows(), inputs.cols())));
     return;
   }
   for (int i = first; i < end; ++i) {

@@ -164,8 +164,8 @@ std::string place_of(const TranscriptionLayout& layout, const std::vector<PhaseT
   }
   const VectorXd& times = phases[i].times;
   const double t = times(std::clamp<Index>(stage - layout.first[i], 0, times.size() - 1));
-  return phases.size() > 1 ? fmt::format(" (phase {}, {} s)", i, format_number(t, 4))
-                           : fmt::format(" ({} s)", format_number(t, 4));
+  return phases.size() > 1 ? flyball::detail::format(" (phase {}, {} s)", i, format_number(t, 4))
+                           : flyball::detail::format(" ({} s)", format_number(t, 4));
 }
 
 Expected<void> check(const ContinuousData& data, const TranscriptionOptions& options) {
@@ -177,13 +177,13 @@ Expected<void> check(const ContinuousData& data, const TranscriptionOptions& opt
     if (!phase.derivative) {
       return tl::unexpected(Error(ArgumentError::empty)
                                 .in(std::string(where))
-                                .about(fmt::format("the derivative of phase {}", i))
+                                .about(flyball::detail::format("the derivative of phase {}", i))
                                 .hint("call set_derivative"));
     }
     if (phase.shared_with < 0 && !(phase.most > 0.0)) {
       return tl::unexpected(Error(ArgumentError::empty)
                                 .in(std::string(where))
-                                .about(fmt::format("the duration of phase {}", i))
+                                .about(flyball::detail::format("the duration of phase {}", i))
                                 .hint("call set_duration or free_duration"));
     }
   }
@@ -344,8 +344,8 @@ Expected<ContinuousSolution> solve(const ContinuousProblem& problem,
   }
   if (result.solved() && !result.accurate) {
     result.message =
-        fmt::format("the mesh's error is {:.2g} after {} refinements, more than {:.2g}",
-                    result.largest_error, result.refinements, options.error_tolerance);
+        flyball::detail::format("the mesh's error is {:.2g} after {} refinements, more than {:.2g}",
+                                result.largest_error, result.refinements, options.error_tolerance);
   }
   result.seconds = elapsed();
   return result;

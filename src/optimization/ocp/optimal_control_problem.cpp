@@ -71,8 +71,8 @@ bool has_size(OptimalControlData& data, std::size_t got, std::size_t wanted,
   }
   refuse(data, Error(ArgumentError::wrong_shape)
                    .about(std::string(name))
-                   .expected(fmt::format("{} entries", wanted))
-                   .got(fmt::format("{} entries", got)));
+                   .expected(flyball::detail::format("{} entries", wanted))
+                   .got(flyball::detail::format("{} entries", got)));
   return false;
 }
 
@@ -88,17 +88,17 @@ void set_bounds(OptimalControlData& data, Index first, Index count, int stage,
   }
   if (stage < -1 || stage > data.intervals) {
     refuse(data, Error(ArgumentError::out_of_range)
-                     .about(fmt::format("the stage of the bounds of the {}", name))
-                     .expected(fmt::format("0 to {}", data.intervals))
-                     .got(fmt::format("{}", stage)));
+                     .about(flyball::detail::format("the stage of the bounds of the {}", name))
+                     .expected(flyball::detail::format("0 to {}", data.intervals))
+                     .got(flyball::detail::format("{}", stage)));
     return;
   }
   for (Index i = 0; i < count; ++i) {
     if (!(lower(i) <= upper(i)) || lower(i) == infinity || upper(i) == -infinity) {
       refuse(data, Error(ArgumentError::out_of_range)
-                       .about(fmt::format("the bounds of {} {}", name, i))
+                       .about(flyball::detail::format("the bounds of {} {}", name, i))
                        .expected("a lower bound that is not above the upper one")
-                       .got(fmt::format("{} to {}", lower(i), upper(i))));
+                       .got(flyball::detail::format("{} to {}", lower(i), upper(i))));
       return;
     }
   }
@@ -114,8 +114,8 @@ void take_piece(OptimalControlData& data, std::optional<Lagrangian>& recorded,
   if (first < 0 || last < first || last >= data.intervals) {
     refuse(data, Error(ArgumentError::out_of_range)
                      .about("the stages of a function")
-                     .expected(fmt::format("within 0 to {}", data.intervals - 1))
-                     .got(fmt::format("{} to {}", first, last)));
+                     .expected(flyball::detail::format("within 0 to {}", data.intervals - 1))
+                     .got(flyball::detail::format("{} to {}", first, last)));
   } else if (recorded) {
     pieces.push_back({std::move(*recorded), first, last});
   }
@@ -135,9 +135,9 @@ OptimalControlProblem::OptimalControlProblem(int states, int inputs, int interva
         std::tuple{data, "data", 0, largest_size}}) {
     if (value < least || value > most) {
       refuse(d, Error(ArgumentError::out_of_range)
-                    .about(fmt::format("the number of {}", name))
-                    .expected(fmt::format("{} to {}", least, most))
-                    .got(fmt::format("{}", value)));
+                    .about(flyball::detail::format("the number of {}", name))
+                    .expected(flyball::detail::format("{} to {}", least, most))
+                    .got(flyball::detail::format("{}", value)));
       return;
     }
   }
@@ -200,8 +200,8 @@ void OptimalControlProblem::record_derivative(detail::StageFunction f, double du
     refuse(*data_, Error(ArgumentError::out_of_range)
                        .about("the duration")
                        .expected("a positive number, or an entry of the parameters")
-                       .got(free_duration >= 0 ? fmt::format("entry {}", free_duration)
-                                               : fmt::format("{}", duration)));
+                       .got(free_duration >= 0 ? flyball::detail::format("entry {}", free_duration)
+                                               : flyball::detail::format("{}", duration)));
     return;
   }
   Recording recording(*data_);
@@ -265,7 +265,7 @@ void OptimalControlProblem::record_constraint(detail::StageFunction f, const Vec
   Recording recording(*data_);
   f(recording.x, recording.u, recording.p, recording.d, recording.out);
   if (name.empty()) {
-    name = fmt::format("constraint {}", data_->rows.size());
+    name = flyball::detail::format("constraint {}", data_->rows.size());
   }
   if (!has_size(*data_, static_cast<std::size_t>(lower.size()), recording.out.size(),
                 "the lower bound of " + name) ||
@@ -276,16 +276,16 @@ void OptimalControlProblem::record_constraint(detail::StageFunction f, const Vec
   if (first < 0 || last < first || last > data_->intervals) {
     refuse(*data_, Error(ArgumentError::out_of_range)
                        .about("the stages of " + name)
-                       .expected(fmt::format("within 0 to {}", data_->intervals))
-                       .got(fmt::format("{} to {}", first, last)));
+                       .expected(flyball::detail::format("within 0 to {}", data_->intervals))
+                       .got(flyball::detail::format("{} to {}", first, last)));
     return;
   }
   for (Index i = 0; i < lower.size(); ++i) {
     if (!(lower(i) <= upper(i)) || lower(i) == infinity || upper(i) == -infinity) {
       refuse(*data_, Error(ArgumentError::out_of_range)
-                         .about(fmt::format("the bounds of {}, entry {}", name, i))
+                         .about(flyball::detail::format("the bounds of {}, entry {}", name, i))
                          .expected("a lower bound that is not above the upper one")
-                         .got(fmt::format("{} to {}", lower(i), upper(i))));
+                         .got(flyball::detail::format("{} to {}", lower(i), upper(i))));
       return;
     }
   }
@@ -323,7 +323,8 @@ void OptimalControlProblem::fix_state(int stage, const VectorRef& state) {
   }
   for (Index i = 0; i < state.size(); ++i) {
     if (std::isinf(state(i))) {
-      refuse(*data_, Error(ArgumentError::not_finite).about(fmt::format("state {} to fix", i)));
+      refuse(*data_,
+             Error(ArgumentError::not_finite).about(flyball::detail::format("state {} to fix", i)));
       return;
     }
     if (!std::isnan(state(i))) {

@@ -150,8 +150,9 @@ std::string OptimalControlSolver::Parts::name_of_output(std::size_t stage,
   const std::size_t before = problem.kinds[problem.kind[stage]].has_dynamics ? problem.states : 0;
   if (output < before) {
     return output < static_cast<std::size_t>(data.states)
-               ? fmt::format("dynamics of state {}", output)
-               : fmt::format("parameter {}", output - static_cast<std::size_t>(data.states));
+               ? flyball::detail::format("dynamics of state {}", output)
+               : flyball::detail::format("parameter {}",
+                                         output - static_cast<std::size_t>(data.states));
   }
   if (output == before) {
     return stage + 1 < problem.stages ? "stage cost" : "terminal cost";
@@ -160,7 +161,8 @@ std::string OptimalControlSolver::Parts::name_of_output(std::size_t stage,
   for (const OptimalControlData::Row& rows : data.rows) {
     if (rows.first <= static_cast<int>(stage) && static_cast<int>(stage) <= rows.last) {
       if (row < static_cast<std::size_t>(rows.lower.size())) {
-        return rows.lower.size() > 1 ? fmt::format("{}, entry {}", rows.name, row) : rows.name;
+        return rows.lower.size() > 1 ? flyball::detail::format("{}, entry {}", rows.name, row)
+                                     : rows.name;
       }
       row -= static_cast<std::size_t>(rows.lower.size());
     }
@@ -217,10 +219,10 @@ OptimalControlSolution OptimalControlSolver::Parts::solution(SolveStatus status)
   has_solution = result.solved();
   if (status == SolveStatus::not_finite) {
     const StageProgram::Fault fault = program.find_fault(solver.w());
-    result.message = fault.found
-                         ? fmt::format("{} is not finite at stage {}",
+    result.message = fault.found ? flyball::detail::format(
+                                       "{} is not finite at stage {}",
                                        name_of_output(fault.stage, fault.output), fault.stage)
-                         : std::string("a derivative is not finite");
+                                 : std::string("a derivative is not finite");
     return result;
   }
   if (!result.solved()) {
@@ -228,8 +230,8 @@ OptimalControlSolution OptimalControlSolver::Parts::solution(SolveStatus status)
     result.message = std::string(to_string(status));
     if (!result.violations.empty()) {
       const Violation& worst = result.violations.front();
-      result.message += fmt::format(": {} at stage {} is violated by {:.3g}", worst.name,
-                                    worst.stage, worst.amount);
+      result.message += flyball::detail::format(": {} at stage {} is violated by {:.3g}",
+                                                worst.name, worst.stage, worst.amount);
     }
   }
   return result;
@@ -277,7 +279,7 @@ Expected<void> OptimalControlSolver::fix_initial_state(const Eigen::Ref<const Ve
     if (problem.lower(i, 0) != problem.upper(i, 0)) {
       return tl::unexpected(Error(ArgumentError::out_of_range)
                                 .in("fix_initial_state")
-                                .about(fmt::format("state {}", i))
+                                .about(flyball::detail::format("state {}", i))
                                 .expected("one that the problem fixed")
                                 .got("free at the first stage"));
     }

@@ -185,7 +185,7 @@ class Transcriber {
   using Vector = ExpressionVector;
 
   [[nodiscard]] std::string named(std::size_t i, const std::string& name) const {
-    return data_.phases.size() > 1 ? fmt::format("phase {}: {}", i, name) : name;
+    return data_.phases.size() > 1 ? flyball::detail::format("phase {}: {}", i, name) : name;
   }
 
   void shoot(const PhaseStages& stages, int a, int b, bool at_first) {

@@ -159,12 +159,13 @@ std::string Problem::Parts::name_of(std::size_t constraint) const {
       std::upper_bound(names.begin(), names.end(), constraint,
                        [](std::size_t c, const Named& named) { return c < named.first; });
   if (after == names.begin() || std::prev(after)->name.empty()) {
-    return fmt::format("constraint {}", constraint);
+    return flyball::detail::format("constraint {}", constraint);
   }
   const Named& named = *std::prev(after);
   const std::size_t end = after == names.end() ? constraints.size() : after->first;
-  return end - named.first > 1 ? fmt::format("{}, entry {}", named.name, constraint - named.first)
-                               : named.name;
+  return end - named.first > 1
+             ? flyball::detail::format("{}, entry {}", named.name, constraint - named.first)
+             : named.name;
 }
 
 /// The constraints that the variables' values do not satisfy.
@@ -201,8 +202,9 @@ void Problem::Parts::report(ProblemSolution& solution, const FlatProblem& flat) 
   }
   solution.message = std::string(to_string(solution.status));
   if (!solution.violations.empty()) {
-    solution.message += fmt::format(": {} is violated by {:.3g}", solution.violations.front().name,
-                                    solution.violations.front().amount);
+    solution.message +=
+        flyball::detail::format(": {} is violated by {:.3g}", solution.violations.front().name,
+                                solution.violations.front().amount);
   }
 }
 
@@ -327,7 +329,7 @@ ProblemSolution Problem::Parts::run(FlatProblem* flat, const SolverOptions& opti
     solution.counts = counts;
   }
   if (p.stages() > 0) {
-    solution.method += fmt::format(" along {} stages", p.stages());
+    solution.method += flyball::detail::format(" along {} stages", p.stages());
   }
   solution.status = status;
   if (status == SolveStatus::not_finite) {

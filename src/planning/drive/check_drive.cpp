@@ -114,20 +114,20 @@ void check_wheels(const DriveModel& model, const VectorXd& x, const VectorXd& u,
     const auto f = drive_body::wheel_force<double>(model, u, i);
     const double speed = std::hypot(v[0], v[1]);
     const double force = std::hypot(f[0], f[1]) * model.force();
-    worst.add(fmt::format("speed of the {} wheel", which), "m/s", speed - model.max_speed,
-              model.max_speed, t, -1);
-    worst.add(fmt::format("force of the {} wheel", which), "N", force - model.force(),
+    worst.add(flyball::detail::format("speed of the {} wheel", which), "m/s",
+              speed - model.max_speed, model.max_speed, t, -1);
+    worst.add(flyball::detail::format("force of the {} wheel", which), "N", force - model.force(),
               model.force(), t, -1);
     if (model.free_speed > 0.0 && speed > 1e-3 * model.max_speed) {
       const double along = (f[0] * v[0] + f[1] * v[1]) / speed * model.force();
       const double most = model.stall_force * (1.0 - speed / model.free_speed);
-      worst.add(fmt::format("torque of the {} motor at its speed", which), "N", along - most,
-                model.stall_force, t, -1);
+      worst.add(flyball::detail::format("torque of the {} motor at its speed", which), "N",
+                along - most, model.stall_force, t, -1);
     }
     if (model.drivetrain == Drivetrain::differential && model.friction > 0.0) {
       const auto at = drive_body::motion<double>(model, x, u);
       const double across = 0.25 * model.mass * (x(3) + x(4)) * at.omega;
-      worst.add(fmt::format("grip of the {} side", which), "N",
+      worst.add(flyball::detail::format("grip of the {} side", which), "N",
                 std::hypot(force, across) - model.friction, model.friction, t, -1);
     }
   }

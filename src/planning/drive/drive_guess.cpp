@@ -337,13 +337,13 @@ Guess guess(const DriveProblem& problem, const Choice& choice, std::vector<int>&
   // Its name.
   for (std::size_t c = 0; c < choice.sides.size(); ++c) {
     if (choice.sides[c] != 0) {
-      result.name +=
-          fmt::format("{}{} of {}", result.name.empty() ? "" : ", ",
-                      choice.sides[c] > 0 ? "left" : "right", drive_rules::name_of(problem, c));
+      result.name += flyball::detail::format("{}{} of {}", result.name.empty() ? "" : ", ",
+                                             choice.sides[c] > 0 ? "left" : "right",
+                                             drive_rules::name_of(problem, c));
     }
   }
   if (choice.as_typed) {
-    result.name += fmt::format("{}turning as typed", result.name.empty() ? "" : ", ");
+    result.name += flyball::detail::format("{}turning as typed", result.name.empty() ? "" : ", ");
   }
   if (result.name.empty()) {
     result.name = steers && choice.curved ? "curved" : "straight";

@@ -124,10 +124,10 @@ Expected<void> check_polygon(const std::vector<Vector2d>& polygon, const std::st
   if (!convex || !(area_of(polygon) > 1e-6)) {
     return tl::unexpected(Error(ArgumentError::out_of_range)
                               .in(std::string(where))
-                              .about(fmt::format("the polygon of {}", name))
+                              .about(flyball::detail::format("the polygon of {}", name))
                               .expected("3 to 20 corners, convex and counter-clockwise")
-                              .got(fmt::format("{} corners, area {}", polygon.size(),
-                                               format_number(area_of(polygon)))));
+                              .got(flyball::detail::format("{} corners, area {}", polygon.size(),
+                                                           format_number(area_of(polygon)))));
   }
   return {};
 }
@@ -172,11 +172,14 @@ Expected<void> check_constraint(const DriveProblem& problem, std::size_t number)
     return tl::unexpected(
         Error(ArgumentError::out_of_range)
             .in(std::string(where))
-            .about(fmt::format("the waypoints of {}", name))
-            .expected(fmt::format("from 0 to {}, or -1 for the last, in order", last))
-            .got(fmt::format("{}{}", c.from, c.to ? fmt::format(" to {}", *c.to) : "")));
+            .about(flyball::detail::format("the waypoints of {}", name))
+            .expected(flyball::detail::format("from 0 to {}, or -1 for the last, in order", last))
+            .got(flyball::detail::format("{}{}", c.from,
+                                         c.to ? flyball::detail::format(" to {}", *c.to) : "")));
   }
-  const auto of = [&](std::string_view what) { return fmt::format("{} of {}", what, name); };
+  const auto of = [&](std::string_view what) {
+    return flyball::detail::format("{} of {}", what, name);
+  };
   Checks checks(where);
   const std::string x = of("x"), y = of("y"), limit = of("the limit"), radius = of("the radius"),
                     tolerance = of("the tolerance"), width = of("the width"),
@@ -237,7 +240,8 @@ std::string name_of(const DriveProblem& problem, std::size_t constraint) {
       before += i <= constraint ? 1 : 0;
     }
   }
-  return all > 1 ? fmt::format("{} {}", to_string(c.kind), before) : std::string(to_string(c.kind));
+  return all > 1 ? flyball::detail::format("{} {}", to_string(c.kind), before)
+                 : std::string(to_string(c.kind));
 }
 
 bool stops_at(const DriveProblem& problem, int waypoint) {
@@ -414,15 +418,15 @@ Expected<void> check(const DriveProblem& problem) {
     return tl::unexpected(Error(ArgumentError::empty)
                               .in(std::string(where))
                               .about("the waypoints")
-                              .expected(fmt::format("2 to {}", most_waypoints))
-                              .got(fmt::format("{}", problem.waypoints.size())));
+                              .expected(flyball::detail::format("2 to {}", most_waypoints))
+                              .got(flyball::detail::format("{}", problem.waypoints.size())));
   }
   for (std::size_t i = 0; i < problem.waypoints.size(); ++i) {
     const DriveWaypoint& w = problem.waypoints[i];
-    const std::string x = fmt::format("x of waypoint {}", i);
-    const std::string y = fmt::format("y of waypoint {}", i);
-    const std::string heading = fmt::format("the heading of waypoint {}", i);
-    const std::string intervals = fmt::format("the intervals of waypoint {}", i);
+    const std::string x = flyball::detail::format("x of waypoint {}", i);
+    const std::string y = flyball::detail::format("y of waypoint {}", i);
+    const std::string heading = flyball::detail::format("the heading of waypoint {}", i);
+    const std::string intervals = flyball::detail::format("the intervals of waypoint {}", i);
     FLYBALL_CHECK(Checks(where)
                       .within(w.x, -farthest, farthest, x, "m")
                       .within(w.y, -farthest, farthest, y, "m")

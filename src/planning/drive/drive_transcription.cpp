@@ -295,7 +295,8 @@ class Writer {
             return std::array<Expression, 2>{x(state) - value - p(give),
                                              value - x(state) - p(give)};
           },
-          VectorXd::Constant(2, -infinity), VectorXd::Zero(2), k, k, fmt::format("waypoint {}", i));
+          VectorXd::Constant(2, -infinity), VectorXd::Zero(2), k, k,
+          flyball::detail::format("waypoint {}", i));
     };
     if (w.fix_translation) {
       within(0, w.x);

@@ -196,7 +196,7 @@ class Search {
       const int number = static_cast<int>(is_waypoint ? i - layout.constraints : i);
       DriveViolation v{.amount = amount, .share = amount};
       if (is_waypoint) {
-        v.name = fmt::format("waypoint {}", number);
+        v.name = flyball::detail::format("waypoint {}", number);
         v.unit = "m";
         v.segment = number;
         v.time = result_.waypoint_times[static_cast<std::size_t>(number)];
@@ -222,10 +222,11 @@ class Search {
     std::sort(result_.relaxed.begin(), result_.relaxed.end(),
               [](const DriveViolation& a, const DriveViolation& b) { return a.share > b.share; });
     if (!found.solved()) {
-      result_.message = fmt::format("no trajectory was found: {}", found.message);
+      result_.message = flyball::detail::format("no trajectory was found: {}", found.message);
       if (!result_.relaxed.empty()) {
-        result_.message = fmt::format("no trajectory was found; farthest from being kept is {}: {}",
-                                      result_.relaxed.front().name, found.message);
+        result_.message =
+            flyball::detail::format("no trajectory was found; farthest from being kept is {}: {}",
+                                    result_.relaxed.front().name, found.message);
       }
     } else if (result_.relaxed.empty()) {
       // What gives way by nothing holds: a start that the others did not have.
@@ -233,13 +234,13 @@ class Search {
       result_.elastic = false;
     } else {
       const DriveViolation& v = result_.relaxed.front();
-      result_.message = fmt::format(
+      result_.message = flyball::detail::format(
           "the constraints contradict each other: {} cannot be kept; the nearest trajectory "
           "exceeds it by {} {} {}, at {} s",
           v.name, format_number(v.amount, 3), v.unit,
           v.segment + 1 < static_cast<int>(problem_.waypoints.size())
-              ? fmt::format("between waypoints {} and {}", v.segment, v.segment + 1)
-              : fmt::format("at waypoint {}", v.segment),
+              ? flyball::detail::format("between waypoints {} and {}", v.segment, v.segment + 1)
+              : flyball::detail::format("at waypoint {}", v.segment),
           format_number(v.time, 4));
     }
     return finish();
