@@ -13,7 +13,9 @@
 #include <flyball/optimization/problem/problem.hpp>
 
 // Problems of Hock and Schittkowski, "Test examples for nonlinear programming codes" (1981), from
-// the standard starts to the published optima: hock_schittkowski.txt.
+// the standard starts to the published optima: hock_schittkowski.txt. Where the published value is
+// not the optimum of the formulas to six digits (59, 105, 106, 112, 116), the file has the optimum,
+// and the published value in a comment.
 //
 // Of the book's 115 (58, 82, 94 and 115 are not in it) these are left out: 67 and 85, whose
 // functions are programs with iterations and hundreds of lines; 68 and 69, which need the normal
@@ -22,8 +24,8 @@
 //
 // One of those that are here has no solution that a method of first-order conditions could find: at
 // the optimum of 13 the constraints' gradients leave no multipliers. Where the file names a second
-// value, it is a local minimum (2, 16, 25, 55, 56, 59, 70, 97, 98, 108), a lower one than the
-// published (105, 116), or the published of a later edition of the data (109).
+// value, it is a local minimum (2, 16, 20, 44, 55, 59, 97, 98, 108), or the cost at a start where
+// all derivatives vanish (25).
 
 namespace {
 
@@ -33,7 +35,7 @@ using namespace flyball::optimization;
 struct Case {
   std::vector<double> start{};
   double optimum = 0.0;
-  double other_optimum = std::nan("");  // a local minimum that is as good an answer
+  double other_optimum = std::nan("");  // at a local minimum, or where the cost is flat
   std::string cost{};
   std::vector<std::string> constraints{};
   std::vector<bool> equality{};
