@@ -39,7 +39,7 @@ Outcome solve_ramsete(const Problem& problem, JsonWriter& answer) {
   const Eigen::Vector3d error = tracking_error(pose, r.pose);
   answer.add("v", command.speeds.vx);
   answer.add("omega", command.speeds.omega);
-  answer.add("error", VectorXd(error));
+  answer.add("pose_error", VectorXd(error));
   answer.add("V", follower.lyapunov(error));
   answer.add("V_rate", follower.lyapunov_rate(error, r));
   return {};
@@ -151,7 +151,7 @@ std::vector<Kind> follower_kinds() {
        {pose, reference, v, omega, or_number(number("b", "rad²/m²", "how hard it converges"), 2.0),
         or_number(number("zeta", "1/rad", "how much it damps"), 0.7)},
        {number("v", "m/s", "ahead"), number("omega", "rad/s", "turning"),
-        list("error", "3", "", "in the robot's frame: ahead (m), left (m), heading (rad)"),
+        list("pose_error", "3", "", "in the robot's frame: ahead (m), left (m), heading (rad)"),
         number("V", "rad²", "b(e_x² + e_y²)/2 + e_θ²/2"), number("V_rate", "rad²/s", "dV/dt")},
        R"({"pose": [0, 0.2, 0], "reference": [0.1, 0, 0.1], "v": 1.5, "omega": 0.3})",
        &solve_ramsete},

@@ -321,11 +321,18 @@ TEST(Figures, AModelsLoopIsDrawnOverFrequency) {
   ASSERT_EQ(two->regulator.frequency_responses.size(), 2U);
   for (const auto& response : two->regulator.frequency_responses) {
     const auto& alone = one->regulator.frequency_responses.at(0);
-    ASSERT_EQ(response.size(), alone.size());
-    for (std::size_t k = 0; k < alone.size(); ++k) {
-      EXPECT_NEAR(response[k].gain, alone[k].gain, 1e-6 * alone[k].gain);
-      EXPECT_NEAR(response[k].phase, alone[k].phase, 1e-6);
+    int compared = 0;  // each has frequencies of its own, and some in common
+    for (const auto& at : response) {
+      const auto same = std::find_if(alone.begin(), alone.end(), [&](const auto& other) {
+        return std::abs(other.frequency - at.frequency) <= 1e-12 * at.frequency;
+      });
+      if (same != alone.end()) {
+        EXPECT_NEAR(at.gain, same->gain, 1e-6 * same->gain);
+        EXPECT_NEAR(at.phase, same->phase, 1e-6);
+        ++compared;
+      }
     }
+    EXPECT_GE(compared, 10);
   }
   EXPECT_TRUE(named(study::answer_of(*two), "bode_G").title.ends_with("at G, the others closed"));
 }

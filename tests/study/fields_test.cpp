@@ -64,6 +64,9 @@ bool is_of(const MechanismRow& row, const Section& section, const Field& field) 
   const auto needs = [&](const MechanismRow& one) {
     return std::find(one.needs.begin(), one.needs.end(), field.key) != one.needs.end();
   };
+  if (field.key == "stages" || field.key == "counterbalance") {
+    return row.kind == mechanisms::MechanismKind::elevator;
+  }
   if (section.name == "mechanism") {
     return needs(row) || std::none_of(mechanism_rows().begin(), mechanism_rows().end(), needs);
   }
@@ -101,6 +104,18 @@ Project any_project(mechanisms::MechanismKind kind) {
   }
   if (project.parts.mass == Mass(0.0)) {
     project.parts.mass.reset();  // of an arm alone
+  }
+  // What means something beside others only.
+  study::SizeSection& size = project.size;
+  size.distance.reset();
+  size.stop.reset();
+  size.grip.reset();
+  size.efficiency = std::min(size.efficiency, 1.0);
+  if (size.winding_heat_capacity) {
+    size.winding_heat_capacity = *rc::gen::inRange(20, 200);  // J/K that copper has
+    size.locked_rotor.clear();
+  } else if (size.locked_rotor.empty()) {
+    size.winding_thermal_resistance.reset();
   }
   if (custom) {
     project.parts.custom_motor->free_current =

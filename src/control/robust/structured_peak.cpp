@@ -197,7 +197,8 @@ class PeakSearch {
   /// The H∞ norm is a bound too, with no scaling.
   void give_up() {
     const auto norm = h_infinity_norm(system_);
-    level_ = norm ? std::max(level_, norm->upper_bound) : infinity;
+    level_ =
+        norm ? std::max(above_all * visits_[highest()].point.beta, norm->upper_bound) : infinity;
     for (Visit& made : visits_) {
       made.covers = {made.frequency, made.frequency};
     }
