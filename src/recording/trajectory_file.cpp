@@ -370,7 +370,8 @@ Expected<void> check_reach(const RobotTrajectory& trajectory, const DrivetrainRe
               "drive")
           .with("sample", static_cast<double>(i + 1));
     }
-    if (fastest > reach.wheel_speed) {
+    constexpr double rounding = 1e-3;  // of what planned it, and of modules that turn
+    if (fastest > (1.0 + rounding) * reach.wheel_speed) {
       const double curvature = v > 1e-9 ? std::abs(sample.omega) / v : 0.0;
       const double possible = reach.wheel_speed / (1.0 + half * curvature);
       return refusal(TrajectoryFileError::too_tight, where, which)

@@ -152,7 +152,7 @@ ExpectedAll<DriveRobot> robot_of(const Project& project, const PathPlannerSettin
   const bool has_modules = !said.modules.empty() || (settings.modules[0] && settings.modules[1] &&
                                                      settings.modules[2] && settings.modules[3]);
   const bool is_track_known = said.trackwidth || settings.trackwidth;
-  if (sides || !has_modules) {
+  if (sides || !has_modules || said.trackwidth || said.wheelbase) {
     robot.trackwidth =
         parts.number("trackwidth", said.trackwidth, settings.trackwidth, "\"0.6 m\"");
   }

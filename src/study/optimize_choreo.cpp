@@ -464,6 +464,13 @@ ChoreoTrajectory choreo_of(const OptimizeTask& task, const DriveSolution& soluti
       waypoint.fix_heading = w.fix_heading;
       file.params.waypoints.push_back(std::move(waypoint));
     }
+    // What a project's trajectory does without saying so: it is at rest at both ends.
+    for (const char* const end : {"first", "last"}) {
+      ChoreoConstraint rest;
+      rest.type = "StopPoint";
+      rest.from = end;
+      file.params.constraints.push_back(std::move(rest));
+    }
     for (const DriveConstraint& c : problem.constraints) {
       const auto* const row = std::find_if(kinds.begin(), kinds.end(),
                                            [&](const KindName& k) { return k.kind == c.kind; });

@@ -75,6 +75,11 @@ std::optional<ChoreoSides> sides_of(const PathResult& result) {
                       : std::nullopt;
 }
 
+/// Of what was read, without folder and ending.
+std::string name_of(const PathJob& job) {
+  return stem(job.files.empty() ? job.project : job.files.front());
+}
+
 /// What `to` asks for.
 ExpectedAll<std::string> written(PathResult& result) {
   const PathJob& job = result.job;
@@ -97,7 +102,7 @@ ExpectedAll<std::string> written(PathResult& result) {
     if (sides && result.trajectory.holonomic) {
       return cannot_write(job, "of a robot that moves sideways", "one that looks where it goes");
     }
-    return to_choreo(to_choreo_trajectory(result.trajectory, stem(job.files.front()), sides));
+    return to_choreo(to_choreo_trajectory(result.trajectory, name_of(job), sides));
   }
   if (job.to == "wpilib") {
     return to_wpilib(to_wpilib_trajectory(result.trajectory));
@@ -106,7 +111,7 @@ ExpectedAll<std::string> written(PathResult& result) {
   if (job.to == "csv") {
     return to_csv(table);
   }
-  return exports::motion_table(table, "path", "A trajectory of " + stem(job.files.front()));
+  return exports::motion_table(table, "path", "A trajectory of " + name_of(job));
 }
 
 Expected<void> check_job(const PathJob& job) {

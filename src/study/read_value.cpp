@@ -159,7 +159,9 @@ ExpectedAll<FieldValue> read_value(const Field& field, const toml::node& node,
           Error(value ? ProjectError::wrong_value : ProjectError::wrong_type)
               .about(name)
               .got(description(node))
-              .expected(fmt::format("a whole number, {} or greater", field.least)));
+              .expected(field.most < largest_whole
+                            ? fmt::format("a whole number from {} to {}", field.least, field.most)
+                            : fmt::format("a whole number, {} or greater", field.least)));
     }
     case FieldType::flag: {
       const auto value = node.value_exact<bool>();

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "control/robust/structured_bound.hpp"
 #include "math/dense/dense.hpp"
@@ -55,6 +56,49 @@ std::vector<MatrixXcd> hermitian_basis(Index k, bool diagonal) {
     }
   }
   return basis;
+}
+
+/// Of Z = R E Rᴴ, R lower triangular, E Hermitian: its diagonal and √2 times the parts of what is
+/// below, so that the product of two such columns is tr Z₁Z₂. By parts, as a product of complex
+/// numbers looks for NaN. @return The trace of Z.
+double sandwich(const MatrixXd& re, const MatrixXd& im, const MatrixXcd& E, MatrixXd& T_re,
+                MatrixXd& T_im, double* column) {
+  const Index n = re.rows();
+  T_re.setZero();
+  T_im.setZero();
+  for (Index c = 0; c < n; ++c) {
+    for (Index k = 0; k < n; ++k) {
+      const double e = E(k, c).real();
+      const double f = E(k, c).imag();
+      if (e == 0.0 && f == 0.0) {
+        continue;
+      }
+      for (Index i = k; i < n; ++i) {
+        T_re(i, c) += re(i, k) * e - im(i, k) * f;
+        T_im(i, c) += re(i, k) * f + im(i, k) * e;
+      }
+    }
+  }
+  constexpr double root = std::numbers::sqrt2;
+  double trace = 0.0;
+  for (Index c = 0; c < n; ++c) {
+    for (Index i = c; i < n; ++i) {
+      double z_re = 0.0;
+      double z_im = 0.0;
+      for (Index k = 0; k <= c; ++k) {
+        z_re += T_re(i, k) * re(c, k) + T_im(i, k) * im(c, k);
+        z_im += T_im(i, k) * re(c, k) - T_re(i, k) * im(c, k);
+      }
+      if (i == c) {
+        trace += z_re;
+        *column++ = z_re;
+      } else {
+        *column++ = root * z_re;
+        *column++ = root * z_im;
+      }
+    }
+  }
+  return trace;
 }
 
 class ScalingSearch {
@@ -253,14 +297,16 @@ class ScalingSearch {
     }
     const MatrixXcd R = inverse_of_lower(S);
     const Index n = R.rows();
+    const MatrixXd re = R.real();
+    const MatrixXd im = R.imag();
     const auto count = static_cast<Index>(inequality.of.size());
-    MatrixXd Y(2 * n * n, count);
+    MatrixXd Y(n * n, count);
+    MatrixXd T_re(n, n);
+    MatrixXd T_im(n, n);
     for (Index i = 0; i < count; ++i) {
-      const MatrixXcd RS = R.lazyProduct(inequality.slope[static_cast<std::size_t>(i)]);
-      const MatrixXcd Z = RS.lazyProduct(R.adjoint());
-      Y.col(i).head(n * n) = Z.real().reshaped();
-      Y.col(i).tail(n * n) = Z.imag().reshaped();
-      g(inequality.of[static_cast<std::size_t>(i)]) += Z.real().trace();
+      const MatrixXcd& slope = inequality.slope[static_cast<std::size_t>(i)];
+      const double trace = sandwich(re, im, slope, T_re, T_im, Y.col(i).data());
+      g(inequality.of[static_cast<std::size_t>(i)]) += trace;
     }
     const MatrixXd YY = transposed_product(Y, Y);
     for (Index a = 0; a < count; ++a) {

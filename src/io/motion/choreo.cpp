@@ -215,7 +215,7 @@ struct DescribeTrajectory {
     a.object("snapshot", t.snapshot, DescribeParameters{});
     a.object("params", t.params, DescribeParameters{});
     a.object("trajectory", t.trajectory, DescribeGenerated{});
-    a.list("events", t.events, DescribeEvent{}, false);
+    a.usual_list("events", t.events, DescribeEvent{});
   }
 };
 

@@ -126,6 +126,15 @@ class JsonMembersIn {
       in(key, [&] { return read_value(reading_, *node, value); });
     }
   }
+  /// What need not be there, but is written into what is new: other programs ask for it.
+  template <class T>
+  void usual(std::string_view key, T& value) {
+    maybe(key, value);
+  }
+  template <class T, class Describe>
+  void usual_list(std::string_view key, std::vector<T>& values, Describe describe) {
+    list(key, values, describe, false);
+  }
   /// An object. @param must  Whether it must be there.
   template <class T, class Describe>
   void object(std::string_view key, T& value, Describe describe, bool must = true) {
@@ -356,6 +365,18 @@ class JsonMembersOut {
     } else {
       (*this)(key, value);
     }
+  }
+  template <class T>
+  void usual(std::string_view key, const T& value) {
+    if (spot_.old == nullptr) {
+      (*this)(key, value);
+    } else {
+      maybe(key, value);
+    }
+  }
+  template <class T, class Describe>
+  void usual_list(std::string_view key, const std::vector<T>& values, Describe describe) {
+    list(key, values, describe, spot_.old == nullptr);
   }
   template <class T, class Describe>
   void object(std::string_view key, const T& value, Describe describe, bool must = true) {

@@ -71,8 +71,8 @@ struct DescribeState {
       return;
     }
     a("velocity", s.velocity);
-    a.maybe("acceleration", s.acceleration);
-    a.maybe("curvature", s.curvature);
+    a.usual("acceleration", s.acceleration);
+    a.usual("curvature", s.curvature);
     a("holonomicRotation", s.holonomic_rotation);
     a("holonomicAngularVelocity", s.holonomic_angular_velocity);
   }

@@ -137,6 +137,13 @@ Verdict verdict_of(const DriveResult& result) {
                                centimetres(e.largest_across), centimetres(e.largest_along));
     verdict.add(Tone::bad, "the robot was more than a metre from where it should be");
   }
+  if (result.job.follower == DriveFollower::pure_pursuit && !result.arrival && !result.lost) {
+    verdict.line =
+        fmt::format("{} did not arrive: it is within {} of the path, but not at its end.",
+                    text::capitalized(std::string(to_string(result.job.follower))),
+                    centimetres(e.largest_across));
+    verdict.add(Tone::bad, "the end was not reached in the time that it had");
+  }
   constexpr double near = 0.1;  // m
   if (const double last = std::hypot(e.final_along, e.final_across); last > near) {
     verdict.add(Tone::caution, fmt::format("{} after the end it is still {} from it",
