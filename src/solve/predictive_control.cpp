@@ -61,6 +61,11 @@ Outcome solve_mpc(const Problem& problem, JsonWriter& answer) {
     mpc.set_last_input(given("u_last"));
   }
   const VectorXd u = mpc.calculate(VectorXd(problem.matrix("x")));
+  if (mpc.status() == MpcStatus::held) {
+    return refusal(ArgumentError::out_of_range, "mpc", "the program")
+        .got("of numbers beyond what a controller takes for signals")
+        .expected("states and references within 1e100");
+  }
   MatrixXd states(n, mpc.horizon() + 1);
   MatrixXd inputs(m, mpc.horizon());
   for (int k = 0; k <= mpc.horizon(); ++k) {

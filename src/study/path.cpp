@@ -136,6 +136,16 @@ ExpectedAll<PathResult> plan_path(const PathJob& job) {
   LoadedMotion motion;
   if (!job.project.empty()) {
     if (job.files.empty()) {
+      if (job.retime || job.velocity || job.acceleration || job.centripetal ||
+          job.angular_velocity || job.angular_acceleration) {
+        return tl::unexpected(Errors(
+            Error(ArgumentError::malformed)
+                .in("path")
+                .about("the trajectory of " + job.project)
+                .got("asked for other times")
+                .expected("as its [drive] has them: the limits of a command line are of files")
+                .hint("change max_velocity and max_acceleration in [drive]")));
+      }
       FLYBALL_TRY(const DriveJob drive, drive_job(job.project));
       result.robot = drive.robot;
       voltage = drive.max_voltage;
