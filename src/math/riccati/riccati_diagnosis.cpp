@@ -97,6 +97,34 @@ bool is_unreached(const RiccatiProblem& p, std::complex<double> lambda) {
          1e-12 * static_cast<double>(n) * (p.continuous ? size_A : std::max(1.0, size_A));
 }
 
+/// The states that an input acts on, or one of them does: by entries that are not zero.
+std::vector<bool> driven_states(const RiccatiProblem& p) {
+  const Index n = p.A.rows();
+  std::vector<bool> driven(static_cast<std::size_t>(n));
+  std::vector<Index> next;
+  const auto add = [&](Index i) {
+    if (!driven[static_cast<std::size_t>(i)]) {
+      driven[static_cast<std::size_t>(i)] = true;
+      next.push_back(i);
+    }
+  };
+  for (Index i = 0; i < n; ++i) {
+    if (!p.B.row(i).isZero(0.0)) {
+      add(i);
+    }
+  }
+  while (!next.empty()) {
+    const Index from = next.back();
+    next.pop_back();
+    for (Index i = 0; i < n; ++i) {
+      if (p.A(i, from) != 0.0) {
+        add(i);
+      }
+    }
+  }
+  return driven;
+}
+
 Error not_stabilizable(const RiccatiProblem& p, std::complex<double> lambda) {
   return refusal(RiccatiError::not_stabilizable, p.continuous ? "care" : "dare", "(A, B)")
       .hint("give this mode an input, or take it out of the model")
@@ -125,11 +153,24 @@ std::optional<Error> unreached_at_sight(const RiccatiProblem& p) {
   }
   const Eigen::MatrixXcd reached = complex_product(left, p.B.cast<std::complex<double>>());
   const MatrixXd terms = product(left.cwiseAbs(), p.B.cwiseAbs());
-  const double rounding = 32.0 * static_cast<double>(n) * epsilon;
+  const double rounding = 4.0 * static_cast<double>(n) * epsilon;
+  const auto driven = driven_states(p);
+  const auto cancels = [&](Index k) {
+    const double size = left.row(k).norm();
+    if (terms.row(k).norm() > rounding * size * p.B.norm()) {
+      return reached.row(k).norm() <= rounding * terms.row(k).norm();
+    }
+    // What the mode hangs on the inputs by, these digits do not show: whether it is anything.
+    for (Index i = 0; i < n; ++i) {
+      if (driven[static_cast<std::size_t>(i)] && std::abs(left(k, i)) > rounding * size) {
+        return false;
+      }
+    }
+    return true;
+  };
   for (Index k = 0; k < n; ++k) {
     const std::complex<double> lambda = system.values(k);
-    if (may_be_unstable(p, lambda) && reached.row(k).norm() <= rounding * terms.row(k).norm() &&
-        is_unreached(p, lambda)) {
+    if (may_be_unstable(p, lambda) && cancels(k) && is_unreached(p, lambda)) {
       return not_stabilizable(p, lambda);
     }
   }

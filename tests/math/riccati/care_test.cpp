@@ -134,6 +134,23 @@ TEST(Care, SaysWhyThereIsNone) {
   EXPECT_TRUE(singular.error().is(RiccatiError::singular));
 }
 
+// A mode that hangs on its input by 1e-10 to 1e-16 is reached all the same: X grows by the fourth
+// power of each of the two couplings.
+TEST(Care, AModeThatHangsOnItsInputByLittleIsReached) {
+  double before = 0.0;
+  for (const double c : {1e-5, 1e-6, 1e-7, 1e-8}) {
+    const MatrixXd A = (MatrixXd(3, 3) << 0.1, c, 0.0, 0.0, -1.0, c, 0.0, 0.0, -1.0).finished();
+    const MatrixXd B = (MatrixXd(3, 1) << 0.0, 0.0, 1.0).finished();
+    const auto solution = care(A, B, MatrixXd::Identity(3, 3), MatrixXd::Identity(1, 1));
+    ASSERT_TRUE(solution) << c;
+    EXPECT_LT(solution->poles.real().maxCoeff(), 0.0);
+    if (before > 0.0) {
+      EXPECT_NEAR(solution->X(0, 0) / before, 1e4, 1.0);
+    }
+    before = solution->X(0, 0);
+  }
+}
+
 TEST(Care, RefusesMisuse) {
   const MatrixXd A = MatrixXd::Identity(2, 2);
   const MatrixXd B = MatrixXd::Ones(2, 1);

@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
@@ -76,6 +78,34 @@ TEST(ShortWay, SylvesterAndLyapunovEquations) {
       }
     }
   }
+}
+
+// Poles of a sampled heat equation are rounding beside the slow ones, which ends no iteration by
+// itself.
+TEST(ShortWay, HeatThatHasGone) {
+  constexpr int n = 100;
+  const double pi = std::acos(-1.0);
+  MatrixXd A(n, n);  // Σ v vᵀ e^{-λT} of the rod's modes
+  MatrixXd V(n, n);
+  Eigen::VectorXd decay(n);
+  for (int k = 0; k < n; ++k) {
+    const double s = std::sin(0.5 * pi * (k + 1) / (n + 1));
+    decay(k) = std::exp(-0.4 * 1.02 * (n + 1) * s * s);
+    for (int i = 0; i < n; ++i) {
+      V(i, k) = std::sqrt(2.0 / (n + 1)) * std::sin(pi * (k + 1) * (i + 1) / (n + 1));
+    }
+  }
+  A = V * decay.asDiagonal() * V.transpose();
+  const MatrixXd B = A.col(0);
+  MatrixXd Q = MatrixXd::Zero(n, n);
+  Q.diagonal().tail(n / 4).setOnes();
+  const MatrixXd R = MatrixXd::Identity(1, 1);
+  MatrixXd X(n, n);
+  MatrixXd K(1, n);
+  Eigen::VectorXcd poles(n);
+  detail::RiccatiAnswer answer{X.data(), K.data(), poles.data()};
+  EXPECT_TRUE(detail::solve_riccati_quickly(
+      {n, 1, A.data(), B.data(), Q.data(), R.data(), nullptr, false}, answer));
 }
 
 }  // namespace
