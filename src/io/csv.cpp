@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
@@ -36,7 +38,17 @@ bool is_blank_cell(std::string_view cell) {
   return cell.size() <= 9 && std::find(words.begin(), words.end(), lower(cell)) != words.end();
 }
 
+std::optional<double> plain_number(std::string_view cell) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  const bool whole = error == std::errc{} && end == cell.data() + cell.size();
+  return whole ? std::optional(value) : std::nullopt;
+}
+
 std::optional<double> cell_number(std::string_view cell) {
+  if (const std::optional<double> plain = plain_number(cell)) {
+    return plain;
+  }
   const std::string word = lower(trim(cell));
   if (word == "true" || word == "false") {
     return word == "true" ? 1.0 : 0.0;
@@ -121,29 +133,26 @@ class Reader {
   /// Of a table whose first lines these are.
   Expected<std::optional<io::CsvLayout>> layout() {
     FLYBALL_CHECK(read_header());
-    if (is_list() || table_.rows.size() <= first_row_) {
+    if (is_list() || table_.rows() <= first_row_) {
       return std::optional<io::CsvLayout>();
     }
     FLYBALL_TRY(const std::size_t clock, time_column());
     const double scale = time_scale(clock);
-    std::vector<std::optional<double>> time(table_.rows.size());
-    std::optional<double> last;
-    for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
+    std::vector<double> time(table_.rows(), not_a_number);
+    double last = -std::numeric_limits<double>::infinity();
+    for (std::size_t row = first_row_; row < table_.rows(); ++row) {
       const std::optional<double> value = number(cell(row, clock));
       // Dates, and rows that are out of order or of another clock, are for who sees them all.
-      if (!value || !std::isfinite(*value) || (last && *value < *last)) {
+      if (!value || !std::isfinite(*value) || *value < last) {
         return std::optional<io::CsvLayout>();
       }
-      last = value;
+      last = *value;
       time[row] = *value * scale;
     }
-    io::CsvLayout layout{table_.delimiter, clock, scale, {}, {}};
+    io::CsvLayout layout{table_.delimiter(), clock, scale, {}, {}};
+    const std::vector<bool> words = read_columns(clock, time);
     for (std::size_t c = 0; c < headers_.size(); ++c) {
-      const std::size_t texts = log_.texts.size();
-      if (c != clock) {
-        read_column(c, time);
-      }
-      layout.columns.push_back({headers_[c].name, headers_[c].unit, log_.texts.size() > texts});
+      layout.columns.push_back({headers_[c].name, headers_[c].unit, words[c]});
     }
     layout.diagnostics = log_.diagnostics;
     return std::optional(std::move(layout));
@@ -155,44 +164,55 @@ class Reader {
   /// Lines before the header: a program's name, a date, a line without two cells.
   void skip_titles() {
     constexpr std::size_t most = 20;
-    const auto is_header = [](const std::vector<std::string>& cells) {
-      return cells.size() >= 2 && std::any_of(cells.begin(), cells.end(), [](const auto& cell) {
-               return is_time_name(split_header(cell).name);
-             });
+    const std::size_t end = std::min(most, table_.rows());
+    const auto first_with = [&](auto holds) {
+      std::size_t row = 0;
+      for (; row < end; ++row) {
+        table_.read(row, cells_);
+        if (cells_.size() >= 2 && holds()) {
+          break;
+        }
+      }
+      return row;
     };
-    const std::size_t end = std::min(most, table_.rows.size());
-    const auto begin = table_.rows.begin();
-    auto header = std::find_if(begin, begin + static_cast<std::ptrdiff_t>(end), is_header);
-    if (header == begin + static_cast<std::ptrdiff_t>(end)) {
-      header = std::find_if(begin, begin + static_cast<std::ptrdiff_t>(end),
-                            [](const auto& cells) { return cells.size() >= 2; });
+    const auto has_time = [&] {
+      for (std::size_t c = 0; c < cells_.size(); ++c) {
+        if (is_time_name(split_header(cells_[c]).name)) {
+          return true;
+        }
+      }
+      return false;
+    };
+    std::size_t header = first_with(has_time);
+    if (header == end) {
+      header = first_with([] { return true; });
     }
-    const auto titles = header - begin;
-    const bool words = std::none_of(begin, header, [](const std::vector<std::string>& cells) {
-      return cells.size() >= 2 && number(cells[0]) && number(cells[1]);
-    });
-    if (titles > 0 && header != begin + static_cast<std::ptrdiff_t>(end) && words) {
+    const std::size_t numbers = first_with([&] { return number(cells_[0]) && number(cells_[1]); });
+    if (header > 0 && header < end && numbers >= header) {
       note(log_.diagnostics, "title_lines", "{} before the header passed over",
-           io::counted(static_cast<std::size_t>(titles), "line"));
-      table_.rows.erase(begin, header);
-      table_.lines.erase(table_.lines.begin(), table_.lines.begin() + titles);
+           io::counted(header, "line"));
+      table_.drop(header);
     }
   }
 
   Expected<void> read_header() {
     skip_titles();
-    if (table_.rows.empty() || table_.rows.front().size() < 2) {
+    cells_ = {};
+    if (table_.rows() > 0) {
+      table_.read(0, cells_);
+    }
+    if (cells_.size() < 2) {
       return refusal(LogError::not_a_log, source_, "the file")
           .got("text without a table")
           .expected("a CSV with a header and at least two columns, a SysId JSON or a WPILOG");
     }
-    const std::vector<std::string>& first = table_.rows.front();
-    const bool headless = std::all_of(first.begin(), first.end(), [&](const std::string& cell) {
-      return io::is_blank_cell(io::trim(cell)) || number(cell).has_value();
-    });
-    for (std::size_t c = 0; c < first.size(); ++c) {
+    bool headless = true;
+    for (std::size_t c = 0; c < cells_.size(); ++c) {
+      headless = headless && (io::is_blank_cell(cells_[c]) || number(cells_[c]));
+    }
+    for (std::size_t c = 0; c < cells_.size(); ++c) {
       headers_.push_back(headless ? Header{fmt::format("column {}", c + 1), {}}
-                                  : split_header(first[c]));
+                                  : split_header(cells_[c]));
     }
     first_row_ = headless ? 0 : 1;
     if (headless) {
@@ -206,9 +226,10 @@ class Reader {
            io::lower(headers_[1].name) == "key" && io::lower(headers_[2].name) == "value";
   }
 
-  std::string_view cell(std::size_t row, std::size_t column) const {
-    const std::vector<std::string>& cells = table_.rows[row];
-    return column < cells.size() ? io::trim(cells[column]) : std::string_view();
+  /// Lives until another is asked for.
+  std::string_view cell(std::size_t row, std::size_t column) {
+    table_.read(row, cells_, column + 1);
+    return cells_[column];
   }
 
   /// The time column: by name, or the first, if its numbers ascend and its unit does not deny it.
@@ -221,11 +242,11 @@ class Reader {
     const Expected<Unit> unit = parse_unit(headers_[0].unit);
     const bool other_unit = !headers_[0].unit.empty() && unit && unit->dimension != Dimension::time;
     std::optional<double> last;
-    for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
+    for (std::size_t row = first_row_; row < table_.rows(); ++row) {
       const std::optional<double> value = number(cell(row, 0));
       if (other_unit || !value || (last && !(*value >= *last))) {
         return refusal(LogError::no_time,
-                       fmt::format("{}:{}", source_, table_.lines[other_unit ? 0 : row]),
+                       fmt::format("{}:{}", source_, table_.line(other_unit ? 0 : row)),
                        "the table")
             .got("without a column of time")
             .expected(
@@ -238,7 +259,7 @@ class Reader {
     warn(log_.diagnostics, "assumed_time_column",
          "no column is named Timestamp, Time or t; the first, \"{}\", is taken for time",
          io::printable(headers_[0].name, 40));
-    log_.diagnostics.back().place = Place{table_.lines[0], 1};
+    log_.diagnostics.back().place = Place{table_.line(0), 1};
     return std::size_t{0};
   }
 
@@ -254,7 +275,7 @@ class Reader {
         {{1e6, 1e-9, "nanoseconds"}, {1e3, 1e-6, "microseconds"}, {5.0, 1e-3, "milliseconds"}}};
     std::vector<double> steps;
     std::optional<double> last;
-    for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
+    for (std::size_t row = first_row_; row < table_.rows(); ++row) {
       const std::optional<double> value = number(cell(row, column));
       if (value && std::isfinite(*value)) {
         if (last && *value > *last) {
@@ -274,7 +295,7 @@ class Reader {
              "the time column \"{}\" names no unit and goes in steps of {}; they are taken for {} "
              "(write \"time (s)\" or \"time (us)\" in the header to say what they are)",
              io::printable(headers_[column].name, 40), *middle, row.unit);
-        log_.diagnostics.back().place = Place{table_.lines[0], 1};
+        log_.diagnostics.back().place = Place{table_.line(0), 1};
         return row.scale;
       }
     }
@@ -295,28 +316,28 @@ class Reader {
     warn(log_.diagnostics, "unknown_time_unit",
          "the time column's unit \"{}\" is not a unit of time; seconds are assumed",
          io::printable(header.unit, 20));
-    log_.diagnostics.back().place = Place{table_.lines[0], 1};
+    log_.diagnostics.back().place = Place{table_.line(0), 1};
     return 1.0;
   }
 
   Expected<void> read_table() {
     FLYBALL_TRY(const std::size_t clock, time_column());
     const double scale = time_scale(clock);
-    std::vector<std::optional<double>> time(table_.rows.size());
+    std::vector<double> time(table_.rows(), not_a_number);
     std::optional<double> first_date;
-    for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
-      time[row] = number(cell(row, clock));
-      if (!time[row]) {
+    for (std::size_t row = first_row_; row < table_.rows(); ++row) {
+      const std::string_view text = cell(row, clock);
+      std::optional<double> value = number(text);
+      if (!value) {
         // Dates and times of day, counted from the first.
-        time[row] = io::clock_time(cell(row, clock));
-        first_date = time[row] && !first_date ? time[row] : first_date;
-        time[row] = time[row] ? std::optional((*time[row] - *first_date) / scale) : std::nullopt;
+        value = io::clock_time(text);
+        first_date = value && !first_date ? value : first_date;
+        value = value ? std::optional((*value - *first_date) / scale) : std::nullopt;
       }
-      if (!time[row] || !std::isfinite(*time[row])) {
-        time[row].reset();
+      if (!value || !std::isfinite(*value)) {
         ++bad_times_;
       } else {
-        *time[row] *= scale;
+        time[row] = *value * scale;
       }
     }
     if (first_date) {
@@ -330,98 +351,163 @@ class Reader {
            "other",
            restarts == 1 ? "once" : fmt::format("{} times", restarts));
     }
-    for (std::size_t c = 0; c < headers_.size(); ++c) {
-      if (c != clock) {
-        read_column(c, time);
-      }
-    }
+    read_columns(clock, time);
     return {};
   }
 
   /// The rows are the clock.
   void read_rows(double period) {
-    std::vector<std::optional<double>> time(table_.rows.size());
-    for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
+    std::vector<double> time(table_.rows(), not_a_number);
+    for (std::size_t row = first_row_; row < table_.rows(); ++row) {
       time[row] = static_cast<double>(row - first_row_) * period;
     }
-    for (std::size_t c = 0; c < headers_.size(); ++c) {
-      read_column(c, time);
-    }
+    read_columns(headers_.size(), time);
   }
 
-  void read_column(std::size_t column, const std::vector<std::optional<double>>& time) {
-    Signal signal{headers_[column].name, headers_[column].unit, {}, {}};
-    TextSignal text{headers_[column].name, {}, {}};
-    for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
-      const std::string_view value = cell(row, column);
-      if (io::is_blank_cell(value) || !time[row]) {
+  /// All columns but that of time. @param time  NaN of a row without one.
+  /// @return Which are of words. A few words in a column of numbers are a logger's hiccup; more,
+  /// and it is a column of words.
+  std::vector<bool> read_columns(std::size_t clock, const std::vector<double>& time) {
+    const std::size_t columns = headers_.size();
+    std::vector<Signal> signals(columns);
+    std::vector<std::size_t> words(columns, 0);
+    std::vector<std::size_t> wanted;
+    for (std::size_t c = 0; c < columns; ++c) {
+      if (c != clock) {
+        wanted.push_back(c);
+      }
+    }
+    const std::size_t looked_at = std::min(first_row_ + 1000, table_.rows());
+    for (std::size_t row = first_row_; row < table_.rows(); ++row) {
+      if (row == looked_at) {  // full columns will stay so, and need not grow step by step
+        for (Signal& signal : signals) {
+          if (signal.time.size() == looked_at - first_row_) {
+            signal.time.reserve(table_.rows());
+            signal.value.reserve(table_.rows());
+          }
+        }
+      }
+      if (std::isnan(time[row])) {
         continue;
       }
-      text.time.push_back(*time[row]);
-      text.value.emplace_back(value);
-      if (const std::optional<double> parsed = number(value)) {
-        signal.time.push_back(*time[row]);
-        signal.value.push_back(*parsed);
+      table_.read(row, cells_, columns);
+      for (const std::size_t c : wanted) {
+        if (const std::string_view raw = cells_.raw(c); !raw.empty()) {
+          std::optional<double> value = io::plain_number(raw);
+          if (!value) {
+            const std::string_view text = io::trim(raw);
+            if (io::is_blank_cell(text)) {
+              continue;
+            }
+            value = number(text);
+          }
+          if (value) {
+            signals[c].time.push_back(time[row]);
+            signals[c].value.push_back(*value);
+          } else {
+            ++words[c];
+          }
+        }
       }
     }
-    // A few words in a column of numbers are a logger's hiccup; more, and it is a column of words.
-    if (2 * signal.time.size() >= text.time.size()) {
-      bad_cells_ += text.time.size() - signal.time.size();
-      log_.signals.push_back(std::move(signal));
-    } else {
-      log_.texts.push_back(std::move(text));
+    std::vector<bool> of_words(columns, false);
+    for (const std::size_t c : wanted) {
+      of_words[c] = signals[c].time.size() < words[c];
+      if (of_words[c]) {
+        signals[c] = {};
+      } else {
+        bad_cells_ += words[c];
+        signals[c].name = headers_[c].name;
+        signals[c].unit = headers_[c].unit;
+        log_.signals.push_back(std::move(signals[c]));
+      }
+    }
+    read_words(of_words, time);
+    return of_words;
+  }
+
+  void read_words(const std::vector<bool>& of_words, const std::vector<double>& time) {
+    const std::size_t first = log_.texts.size();
+    std::vector<std::size_t> wanted;
+    for (std::size_t c = 0; c < of_words.size(); ++c) {
+      if (of_words[c]) {
+        wanted.push_back(c);
+        log_.texts.push_back({headers_[c].name, {}, {}});
+      }
+    }
+    for (std::size_t row = first_row_; row < table_.rows() && !wanted.empty(); ++row) {
+      if (std::isnan(time[row])) {
+        continue;
+      }
+      table_.read(row, cells_, wanted.back() + 1);
+      for (std::size_t k = 0; k < wanted.size(); ++k) {
+        if (const std::string_view value = cells_[wanted[k]]; !io::is_blank_cell(value)) {
+          log_.texts[first + k].time.push_back(time[row]);
+          log_.texts[first + k].value.emplace_back(value);
+        }
+      }
     }
   }
 
+  /// Rows of a time, a key and a value: first the keys and their numbers, then what is words.
   void read_list() {
     const double scale = time_scale(0);
-    struct Samples {
-      std::vector<double> time;
-      std::vector<std::string_view> value;
-    };
-    std::vector<Samples> samples;
-    std::vector<std::string> keys;
+    std::vector<Signal> signals;
+    std::vector<bool> of_words;
     std::map<std::string, std::size_t, std::less<>> index;
-    for (std::size_t row = first_row_; row < table_.rows.size(); ++row) {
-      const std::optional<double> time = number(cell(row, 0));
+    for (std::size_t row = first_row_; row < table_.rows(); ++row) {
+      table_.read(row, cells_, 3);
+      const std::optional<double> time = number(cells_[0]);
       if (!time || !std::isfinite(*time)) {
         ++bad_times_;
         continue;
       }
-      if (io::is_blank_cell(cell(row, 2))) {
+      if (io::is_blank_cell(cells_[2])) {
         continue;
       }
-      const std::string_view key = cell(row, 1);
-      const auto [found, added] = index.try_emplace(std::string(key), keys.size());
-      if (added) {
-        keys.emplace_back(key);
-        samples.emplace_back();
+      auto found = index.find(cells_[1]);
+      if (found == index.end()) {
+        found = index.emplace(cells_[1], signals.size()).first;
+        signals.push_back({found->first, {}, {}, {}});
+        of_words.push_back(false);
       }
-      samples[found->second].time.push_back(*time * scale);
-      samples[found->second].value.push_back(cell(row, 2));
-    }
-    for (std::size_t k = 0; k < keys.size(); ++k) {
-      Signal signal{keys[k], {}, {}, {}};
-      bool all_numbers = true;
-      for (std::size_t i = 0; i < samples[k].time.size() && all_numbers; ++i) {
-        const std::optional<double> value = number(samples[k].value[i]);
-        all_numbers = value.has_value();
-        if (value) {
-          signal.time.push_back(samples[k].time[i]);
-          signal.value.push_back(*value);
+      const std::size_t key = found->second;
+      if (!of_words[key]) {
+        if (const std::optional<double> value = number(cells_[2])) {
+          signals[key].time.push_back(*time * scale);
+          signals[key].value.push_back(*value);
+        } else {
+          of_words[key] = true;
         }
       }
-      if (all_numbers) {
-        log_.signals.push_back(std::move(signal));
+    }
+    std::vector<std::size_t> place(signals.size(), 0);
+    for (std::size_t k = 0; k < signals.size(); ++k) {
+      if (of_words[k]) {
+        place[k] = log_.texts.size();
+        log_.texts.push_back({std::move(signals[k].name), {}, {}});
       } else {
-        log_.texts.push_back({keys[k],
-                              std::move(samples[k].time),
-                              {samples[k].value.begin(), samples[k].value.end()}});
+        log_.signals.push_back(std::move(signals[k]));
+      }
+    }
+    const bool any = std::find(of_words.begin(), of_words.end(), true) != of_words.end();
+    for (std::size_t row = first_row_; any && row < table_.rows(); ++row) {
+      table_.read(row, cells_, 3);
+      const std::optional<double> time = number(cells_[0]);
+      const auto found = index.find(cells_[1]);
+      if (time && std::isfinite(*time) && !io::is_blank_cell(cells_[2]) &&
+          of_words[found->second]) {
+        TextSignal& text = log_.texts[place[found->second]];
+        text.time.push_back(*time * scale);
+        text.value.emplace_back(cells_[2]);
       }
     }
   }
 
+  static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+
   CsvTable table_;
+  CsvTable::Cells cells_;
   const std::string& source_;
   std::optional<double> period_;
   Log log_;

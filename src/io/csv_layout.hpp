@@ -30,6 +30,8 @@ struct CsvLayout {
 [[nodiscard]] Expected<std::optional<CsvLayout>> csv_layout(std::string_view head,
                                                             const std::string& source);
 
+/// A number as most tables have them, without blank space; nothing for all else.
+[[nodiscard]] std::optional<double> plain_number(std::string_view cell);
 /// A cell's value: a number, or true and false as 1 and 0.
 [[nodiscard]] std::optional<double> cell_number(std::string_view cell);
 /// Whether a cell is one in which loggers write that there is no value.

@@ -1,5 +1,4 @@
 // A table of text, row by row.
-#include <charconv>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -17,16 +16,6 @@ namespace {
 
 constexpr std::size_t head_bytes = std::size_t{1} << 20;
 constexpr std::size_t longest_line = std::size_t{1} << 22;
-
-/// A number as most tables have them, without a copy; the rest as `cell_number`.
-std::optional<double> fast_number(std::string_view cell) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (error == std::errc{} && end == cell.data() + cell.size()) {
-    return value;
-  }
-  return cell_number(cell);
-}
 
 class Rows {
  public:
@@ -64,19 +53,20 @@ class Rows {
     // The delimiter is told from a first line, which this is not.
     const std::string said = std::string("sep=") + layout_.delimiter + "\n" + std::string(line);
     const auto table = split_csv(said, "");
-    if (!table || table->rows.empty()) {
+    if (!table || table->rows() == 0) {
       ++without_time;
       return true;
     }
-    for (const std::string& cell : table->rows.front()) {
-      cells_.push_back(trim(cell));
+    table->read(0, quoted_);
+    for (std::size_t c = 0; c < quoted_.size(); ++c) {
+      cells_.push_back(quoted_[c]);
     }
     return take_cells();
   }
 
   bool take_cells() {
     const auto time =
-        layout_.clock < cells_.size() ? fast_number(cells_[layout_.clock]) : std::nullopt;
+        layout_.clock < cells_.size() ? cell_number(cells_[layout_.clock]) : std::nullopt;
     if (!time || !std::isfinite(*time)) {
       without_time += rows > 0 ? 1 : 0;  // the header has none, either
       return true;
@@ -94,7 +84,7 @@ class Rows {
       if (c < cells_.size() && !is_blank_cell(cells_[c])) {
         if (layout_.columns[c].text) {
           sink_.text(id, seconds, cells_[c]);
-        } else if (const auto value = fast_number(cells_[c])) {
+        } else if (const auto value = cell_number(cells_[c])) {
           if (std::isfinite(*value)) {
             sink_.number(id, seconds, *value);
           }
@@ -110,6 +100,7 @@ class Rows {
   CsvLayout layout_;
   LogSink& sink_;
   std::vector<std::string_view> cells_;
+  CsvTable::Cells quoted_;
   double last_ = 0.0;
 };
 

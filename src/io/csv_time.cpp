@@ -153,40 +153,40 @@ std::optional<double> clock_time(std::string_view cell) {
   return time_of_day(text);
 }
 
-std::size_t join_restarts(std::vector<std::optional<double>>& time) {
+std::size_t join_restarts(std::vector<double>& time) {
   constexpr std::size_t shortest = 10;  // rows
   constexpr double apart = 2.0;         // s
   std::vector<std::size_t> rows;
   for (std::size_t row = 0; row < time.size(); ++row) {
-    if (time[row]) {
+    if (!std::isnan(time[row])) {
       rows.push_back(row);
     }
   }
   std::vector<std::size_t> begins{0};
   double longest = 0.0;
   for (std::size_t i = 1; i < rows.size(); ++i) {
-    if (*time[rows[i]] < *time[rows[i - 1]]) {
+    if (time[rows[i]] < time[rows[i - 1]]) {
       begins.push_back(i);
     }
-    longest = std::max(longest, *time[rows[i]] - *time[rows[begins.back()]]);
+    longest = std::max(longest, time[rows[i]] - time[rows[begins.back()]]);
   }
   if (begins.size() == 1 || begins.size() * 2 * shortest > rows.size()) {
     return 0;
   }
-  const double first = *time[rows.front()];
+  const double first = time[rows.front()];
   for (std::size_t k = 1; k < begins.size(); ++k) {
     const std::size_t end = k + 1 < begins.size() ? begins[k + 1] : rows.size();
     if (end - begins[k] < shortest ||
-        std::abs(*time[rows[begins[k]]] - first) > 0.05 * longest + 0.1) {
+        std::abs(time[rows[begins[k]]] - first) > 0.05 * longest + 0.1) {
       return 0;
     }
   }
   double offset = 0.0;
   for (std::size_t k = 1; k < begins.size(); ++k) {
-    offset = *time[rows[begins[k] - 1]] + apart - *time[rows[begins[k]]];
+    offset = time[rows[begins[k] - 1]] + apart - time[rows[begins[k]]];
     const std::size_t end = k + 1 < begins.size() ? begins[k + 1] : rows.size();
     for (std::size_t i = begins[k]; i < end; ++i) {
-      *time[rows[i]] += offset;
+      time[rows[i]] += offset;
     }
   }
   return begins.size() - 1;

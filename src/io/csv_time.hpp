@@ -23,7 +23,7 @@ struct TimeName {
 /// Where time begins anew, as when each test has a clock of its own: the parts are put one after
 /// the other, two seconds apart. Rows out of order are left alone: a part is at least ten rows,
 /// begins near where the first did, and there is at most one part in twenty rows.
-/// @return  How often it began anew.
-std::size_t join_restarts(std::vector<std::optional<double>>& time);
+/// @param time  NaN of a row without one. @return  How often it began anew.
+std::size_t join_restarts(std::vector<double>& time);
 
 }  // namespace flyball::io

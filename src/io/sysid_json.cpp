@@ -16,6 +16,7 @@
 
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
+#include "io/json_walk.hpp"
 #include "io/signals.hpp"
 #include "io/sysid_columns.hpp"
 #include "io/sysid_rows.hpp"
@@ -165,7 +166,13 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
         .hint("record it again, or copy it again");
   }
   SysIdRows handler;
-  bool complete = nlohmann::json::sax_parse(text.begin(), text.end(), &handler);
+  io::WholeText whole(text);
+  bool complete = io::JsonWalk(whole, handler).walk() == io::JsonEnd::complete;
+  const bool ordinary = complete;
+  if (!complete) {  // nlohmann's parser says what is wrong, and where
+    handler = SysIdRows();
+    complete = nlohmann::json::sax_parse(text.begin(), text.end(), &handler);
+  }
   if (!complete) {
     const std::string replaced = io::without_nan_words(text);
     if (replaced != text) {
@@ -189,7 +196,7 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
                                           : std::string_view(handler.error_text).substr(detail + 2),
                                       120));
   }
-  if (const auto repeated = repeated_key(text)) {
+  if (const auto repeated = ordinary ? std::nullopt : repeated_key(text)) {
     return refusal(LogError::malformed, io::place(source, text, repeated->at), "the JSON")
         .got(fmt::format("an object with the key \"{}\" twice", io::printable(repeated->key)))
         .expected("an object with each key once")

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -12,6 +11,7 @@
 
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
+#include "io/json_walk.hpp"
 #include "io/log_streams.hpp"
 #include "io/sysid_rows.hpp"
 #include "io/text.hpp"
@@ -20,48 +20,8 @@ namespace flyball::io {
 
 namespace {
 
-/// The file's bytes for the parser.
-class Bytes {
- public:
-  using iterator_category = std::input_iterator_tag;
-  using value_type = char;
-  using difference_type = std::ptrdiff_t;
-  using pointer = const char*;
-  using reference = char;
-
-  Bytes() = default;
-  explicit Bytes(ChunkedFile& file) : file_(&file) { look(); }
-
-  char operator*() const { return *at_; }
-  Bytes& operator++() {
-    if (++at_ == end_) {
-      file_->pass(file_->rest().size());
-      look();
-    }
-    return *this;
-  }
-  Bytes operator++(int) {
-    Bytes before = *this;
-    ++*this;
-    return before;
-  }
-  bool operator==(const Bytes& other) const { return at_ == other.at_; }
-  bool operator!=(const Bytes& other) const { return at_ != other.at_; }
-
- private:
-  void look() {
-    const bool any = !file_->rest().empty() || file_->more();
-    at_ = any ? file_->rest().data() : nullptr;
-    end_ = any ? at_ + file_->rest().size() : nullptr;
-  }
-
-  ChunkedFile* file_ = nullptr;
-  const char* at_ = nullptr;
-  const char* end_ = nullptr;
-};
-
 /// Hands each row on and forgets it.
-class Rows : public SysIdRows {
+class Rows final : public SysIdRows {
  public:
   explicit Rows(LogSink& sink) : sink_(sink) {}
 
@@ -115,20 +75,13 @@ class Rows : public SysIdRows {
   double last_ = 0.0;
 };
 
-/// Whether the parser stopped where the file ends, apart from blanks and zeros of a tail that was
-/// never filled. @param error_at  From 1; past the end for an end.
-bool ends_there(ChunkedFile& file, std::size_t error_at) {
-  if (error_at < file.position() + 1) {
-    return false;
-  }
-  std::size_t skip = error_at - 1 - file.position();
+/// Whether nothing but blanks and the zeros of a tail that was never filled is left.
+bool ends_here(ChunkedFile& file) {
   do {
     const std::string_view rest = file.rest();
-    const std::string_view after = rest.substr(std::min(skip, rest.size()));
-    if (after.find_first_not_of(std::string_view(" \t\r\n\0", 5)) != std::string_view::npos) {
+    if (rest.find_first_not_of(std::string_view(" \t\r\n\0", 5)) != std::string_view::npos) {
       return false;
     }
-    skip -= std::min(skip, rest.size());
     file.pass(rest.size());
   } while (file.more());
   return true;
@@ -142,9 +95,10 @@ Expected<std::optional<StreamedLog>> stream_sysid_json(ChunkedFile& file, const 
   sink.channel(1, "position", "");
   sink.channel(2, "velocity", "");
   Rows rows(sink);
-  const bool complete = nlohmann::json::sax_parse(Bytes(file), Bytes(), &rows);
+  const JsonEnd end = JsonWalk(file, rows).walk();
+  const bool complete = end == JsonEnd::complete;
   const bool truncated =
-      !complete && !rows.drive && rows.rows > 0 && ends_there(file, rows.error_at);
+      rows.rows > 0 && (end == JsonEnd::cut || (end == JsonEnd::broken && ends_here(file)));
   if (rows.drive || rows.unsorted || (!complete && !truncated) || !rows.top_is_object) {
     return std::optional<StreamedLog>();  // Whoever reads it whole tells what is wrong.
   }

@@ -2,6 +2,7 @@
 #include <array>
 #include <charconv>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 
 #include <fmt/format.h>
@@ -125,6 +126,17 @@ std::string printable(std::string_view text, std::size_t max_bytes) {
 
 bool is_utf8(std::string_view text) {
   while (!text.empty()) {
+    std::uint64_t word = 0;
+    while (text.size() >= sizeof word) {  // ASCII, eight at a time
+      std::memcpy(&word, text.data(), sizeof word);
+      if ((word & 0x8080808080808080U) != 0) {
+        break;
+      }
+      text.remove_prefix(sizeof word);
+    }
+    if (text.empty()) {
+      break;
+    }
     const std::size_t length = utf8_length(text);
     if (length == 0) {
       return false;
