@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstddef>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -12,7 +13,7 @@
 
 #include <nlohmann/json.hpp>
 
-/// JSON without a tree, for files whose bytes are numbers; private to io.
+/// JSON without a tree, for texts whose bytes are numbers.
 ///
 /// nlohmann's SAX parser copies each number to a buffer and calls strtod; here numbers are read
 /// where they stand, by `std::from_chars`. Strings with escapes or beyond ASCII are taken apart by
@@ -43,7 +44,11 @@ class WholeText {
 template <class Source, class Handler>
 class JsonWalk {
  public:
-  JsonWalk(Source& source, Handler& handler) : source_(source), handler_(handler) { look(); }
+  JsonWalk(Source& source, Handler& handler) : source_(source), handler_(handler) {
+    open_.reserve(8);
+    keys_.reserve(8);
+    look();
+  }
 
   /// On return the source has passed all but what was not understood.
   JsonEnd walk() {
@@ -57,7 +62,8 @@ class JsonWalk {
 
   struct Open {
     bool object = false;
-    std::unordered_set<std::string> keys{};
+    std::size_t first_key = 0;  ///< Of keys_.
+    std::unique_ptr<std::unordered_set<std::string>> more_keys{};
   };
 
   [[nodiscard]] std::size_t passed() const {
@@ -124,7 +130,7 @@ class JsonWalk {
       case '{':
       case '[':
         ++at_;
-        open_.push_back({c == '{', {}});
+        open_.push_back({c == '{', keys_.size(), nullptr});
         expect_ = c == '{' ? Expect::key_or_end : Expect::value_or_end;
         return go_on_if(c == '{' ? handler_.Handler::start_object(none)
                                  : handler_.Handler::start_array(none));
@@ -158,6 +164,7 @@ class JsonWalk {
     }
     ++at_;
     const bool object = open_.back().object;
+    keys_.resize(open_.back().first_key);
     open_.pop_back();
     return after(object ? handler_.Handler::end_object() : handler_.Handler::end_array());
   }
@@ -289,12 +296,30 @@ class JsonWalk {
     if (!skip_blanks()) {
       return JsonEnd::cut;
     }
-    if (*at_ != ':' || !open_.back().keys.insert(name).second) {
+    if (*at_ != ':' || !is_new(name)) {
       return JsonEnd::broken;
     }
     ++at_;
     expect_ = Expect::value;
     return go_on_if(handler_.Handler::key(name));
+  }
+
+  /// Whether the object that is open has no such key; it has from now on.
+  bool is_new(const std::string& name) {
+    constexpr std::size_t few = 16;
+    Open& object = open_.back();
+    const auto begin = keys_.begin() + static_cast<std::ptrdiff_t>(object.first_key);
+    if (std::find(begin, keys_.end(), name) != keys_.end()) {
+      return false;
+    }
+    if (keys_.size() - object.first_key == few) {
+      if (!object.more_keys) {
+        object.more_keys = std::make_unique<std::unordered_set<std::string>>();
+      }
+      return object.more_keys->insert(name).second;
+    }
+    keys_.push_back(name);
+    return true;
   }
 
   static constexpr std::size_t none = static_cast<std::size_t>(-1);
@@ -306,6 +331,7 @@ class JsonWalk {
   const char* end_ = nullptr;
   Expect expect_ = Expect::value;
   std::vector<Open> open_;
+  std::vector<std::string> keys_;  ///< The first of each object that is open.
 };
 
 }  // namespace flyball::io

@@ -1,6 +1,7 @@
 #include <flyball/io/json_writer.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <iterator>
@@ -13,9 +14,11 @@ namespace flyball {
 namespace {
 
 void append_number(std::string& text, double value) {
-  const std::size_t from = text.size();
-  fmt::format_to(std::back_inserter(text), "{}", value);
-  if (text.find_first_of(".e", from) == std::string::npos) {
+  std::array<char, 32> digits;  // at most 24: "-2.2250738585072014e-308"
+  const char* const end = fmt::format_to(digits.data(), "{}", value);
+  text.append(static_cast<const char*>(digits.data()), end);
+  const auto is_mark = [](char c) { return c == '.' || c == 'e'; };
+  if (std::none_of(static_cast<const char*>(digits.data()), end, is_mark)) {
     text += ".0";
   }
 }

@@ -1,13 +1,14 @@
 #include <algorithm>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <flyball/io/json_text.hpp>
 
 #include "core/try.hpp"
+#include "io/json_walk.hpp"
 #include "solve/json_object.hpp"
 #include "solve/json_value.hpp"
 
@@ -16,6 +17,8 @@ namespace flyball::solve {
 using Json = nlohmann::json;
 
 namespace {
+
+constexpr const char* example = "one JSON object, such as {\"A\": [[0, 1], [0, -2]], …}";
 
 /// Brackets of a text that are open at once, strings left out. Writing a value (an id) recurses.
 int depth_of(std::string_view text) {
@@ -60,34 +63,35 @@ std::string complaint(std::string_view text, std::size_t byte) {
   return "not JSON";
 }
 
-/// Empties a value from its leaves, so that no destructor meets one that holds something.
-void empty(Json& value) noexcept {
-  if (value.is_structured()) {
-    for (Json& element : value) {
-      empty(element);
-    }
-    value.clear();
-  }
-}
+constexpr int deepest = 64;
 
-/// Builds a value where it will stay.
+/// Builds a tree of what a parser tells.
 class Builder : public nlohmann::json_sax<Json> {
  public:
-  explicit Builder(Json& root) : root_(root) {}
+  explicit Builder(JsonTree& tree) : tree_(tree) {}
 
-  bool null() override { return put(nullptr); }
-  bool boolean(bool value) override { return put(value); }
-  bool number_integer(number_integer_t value) override { return put(value); }
-  bool number_unsigned(number_unsigned_t value) override { return put(value); }
-  bool number_float(number_float_t value, const string_t& /*text*/) override { return put(value); }
-  bool string(string_t& value) override { return put(std::move(value)); }
+  bool null() override { return put(JsonType::null, 0.0); }
+  bool boolean(bool value) override { return put(JsonType::boolean, value ? 1.0 : 0.0); }
+  bool number_integer(number_integer_t value) override {
+    return put(JsonType::number, static_cast<double>(value));
+  }
+  bool number_unsigned(number_unsigned_t value) override {
+    return put(JsonType::number, static_cast<double>(value));
+  }
+  bool number_float(number_float_t value, const string_t& /*text*/) override {
+    return put(JsonType::number, value);
+  }
+  bool string(string_t& value) override {
+    tree_.put_text(value);
+    return true;
+  }
   bool binary(binary_t& /*value*/) override { return false; }
-  bool start_object(std::size_t /*size*/) override { return start(Json::value_t::object); }
-  bool start_array(std::size_t /*size*/) override { return start(Json::value_t::array); }
-  bool end_object() override { return end(); }
-  bool end_array() override { return end(); }
+  bool start_object(std::size_t /*size*/) override { return open(JsonType::object); }
+  bool start_array(std::size_t /*size*/) override { return open(JsonType::array); }
+  bool end_object() override { return close(); }
+  bool end_array() override { return close(); }
   bool key(string_t& name) override {
-    key_ = std::move(name);
+    tree_.put_text(name, true);
     return true;
   }
   bool parse_error(std::size_t byte, const std::string& /*token*/,
@@ -101,48 +105,28 @@ class Builder : public nlohmann::json_sax<Json> {
   [[nodiscard]] bool out_of_range() const { return out_of_range_; }
 
  private:
-  template <class Value>
-  Json& add(Value&& value) {
-    if (open_.empty()) {
-      return root_ = std::forward<Value>(value);
-    }
-    Json& parent = *open_.back();
-    if (parent.is_array()) {
-      parent.push_back(std::forward<Value>(value));
-      return parent.back();
-    }
-    return parent[key_] = std::forward<Value>(value);
-  }
-  template <class Value>
-  bool put(Value&& value) {
-    add(std::forward<Value>(value));
+  bool put(JsonType type, double value) {
+    tree_.put(type, value);
     return true;
   }
-  bool start(Json::value_t type) {
-    open_.push_back(&add(Json(type)));
-    return true;
+  bool open(JsonType type) {
+    tree_.open(type);
+    return tree_.depth() <= static_cast<std::size_t>(deepest);
   }
-  bool end() {
-    open_.pop_back();
+  bool close() {
+    tree_.close();
     return true;
   }
 
-  Json& root_;
-  std::vector<Json*> open_;  ///< A value does not move while something in it is open.
-  std::string key_;
+  JsonTree& tree_;
   std::size_t byte_ = 0;
   bool out_of_range_ = false;
 };
 
-}  // namespace
-
-JsonObject::~JsonObject() {
-  empty(value_);
-}
-
-Expected<JsonObject> parse_object(std::string_view text, std::string_view where,
-                                  std::string_view what) {
-  constexpr int deepest = 64;
+/// The same of a text that `JsonWalk` does not take: what is wrong with it, in nlohmann's parser's
+/// words.
+Expected<JsonTree> parse_slowly(std::string_view text, std::string_view where,
+                                std::string_view what) {
   if (const int depth = depth_of(text); depth > deepest) {
     return malformed(where, what, fmt::format("{} brackets within each other", depth),
                      fmt::format("at most {}", deepest));
@@ -150,9 +134,8 @@ Expected<JsonObject> parse_object(std::string_view text, std::string_view where,
   if (const std::size_t nul = text.find('\0'); nul != text.npos) {  // which would end it silently
     return malformed(where, what, "with a NUL in it", "JSON, which has none", place_of(text, nul));
   }
-  constexpr const char* example = "one JSON object, such as {\"A\": [[0, 1], [0, -2]], …}";
-  JsonObject object;
-  Builder builder(object.json());
+  JsonTree tree;
+  Builder builder(tree);
   if (!Json::sax_parse(text, &builder)) {
     if (builder.out_of_range()) {
       return malformed(where, what, "not to be read: a number is beyond 1.8e308",
@@ -161,14 +144,29 @@ Expected<JsonObject> parse_object(std::string_view text, std::string_view where,
     return malformed(where, what, complaint(text, builder.byte()), example,
                      place_of(text, builder.byte() - 1));
   }
-  if (!object.json().is_object()) {
-    return malformed(where, what, kind_of(object.json()), example);
+  return tree;
+}
+
+}  // namespace
+
+Expected<JsonTree> parse_object(std::string_view text, std::string_view where,
+                                std::string_view what) {
+  JsonTree tree;
+  tree.expect(text.size());
+  Builder builder(tree);
+  io::WholeText whole(text);
+  const bool plain = io::JsonWalk(whole, builder).walk() == io::JsonEnd::complete;
+  if (!plain) {
+    FLYBALL_TRY(tree, parse_slowly(text, where, what));
   }
-  if (const auto repeated = repeated_key(text)) {
+  if (!tree.root().is_object()) {
+    return malformed(where, what, kind_of(tree.root()), example);
+  }
+  if (const auto repeated = plain ? std::nullopt : repeated_key(text)) {
     return malformed(where, what, fmt::format("an object with the key \"{}\" twice", repeated->key),
                      "an object with each key once", place_of(text, repeated->at));
   }
-  return object;
+  return tree;
 }
 
 }  // namespace flyball::solve

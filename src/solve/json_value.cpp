@@ -1,33 +1,54 @@
-#include <algorithm>
 #include <limits>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include <flyball/core/text.hpp>
+#include <flyball/io/json_writer.hpp>
 
 #include "solve/json_value.hpp"
 
 namespace flyball::solve {
 
 using Eigen::Index;
-using Json = nlohmann::json;
 
 namespace {
 
+/// A number, text or word as JSON has it.
+std::string written(JsonValue value) {
+  switch (value.type()) {
+    case JsonType::number:
+      return fmt::format("{}", value.number());
+    case JsonType::string:
+      return json_quoted(value.text());
+    case JsonType::boolean:
+      return value.number() != 0.0 ? "true" : "false";
+    default:
+      return "null";
+  }
+}
+
+std::string_view name_of(JsonType type) {
+  return type == JsonType::number    ? "number"
+         : type == JsonType::string  ? "string"
+         : type == JsonType::boolean ? "boolean"
+                                     : "null";
+}
+
 /// "[0, 1]" and "[[0], [1]]" for a message, of long lists the first numbers.
-std::pair<std::string, std::string> flat_and_column(const Json& list) {
+std::pair<std::string, std::string> flat_and_column(JsonValue list) {
   constexpr std::size_t most = 4;
   std::string flat;
   std::string column;
-  for (std::size_t i = 0; i < list.size(); ++i) {
+  std::size_t i = 0;
+  for (const JsonValue value : list) {
     const std::string separator = i == 0 ? "" : ", ";
-    if (i == most) {
+    if (i++ == most) {
       flat += ", ...";
       column += ", ...";
       break;
     }
-    const std::string entry = list[i].is_structured() ? kind_of(list[i]) : list[i].dump();
+    const std::string entry = value.is_structured() ? kind_of(value) : written(value);
     flat += separator + entry;
     column += fmt::format("{}[{}]", separator, entry);
   }
@@ -36,21 +57,20 @@ std::pair<std::string, std::string> flat_and_column(const Json& list) {
 
 }  // namespace
 
-std::string kind_of(const Json& value) {
+std::string kind_of(JsonValue value) {
   if (value.is_structured()) {
     return value.is_array() ? fmt::format("a list of {}", value.size()) : "an object";
   }
-  const std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
-  return fmt::format("{} ({})", value.type_name(), cut(text, 40));
+  return fmt::format("{} ({})", name_of(value.type()), cut(written(value), 40));
 }
 
-bool read_number(const Json& value, double& number) {
+bool read_number(JsonValue value, double& number) {
   if (value.is_number()) {
-    number = value.get<double>();
+    number = value.number();
     return true;
   }
   if (value.is_string()) {
-    const std::string& text = value.get_ref<const std::string&>();
+    const std::string_view text = value.text();
     constexpr double infinity = std::numeric_limits<double>::infinity();
     if (text == "inf" || text == "-inf") {
       number = text[0] == '-' ? -infinity : infinity;
@@ -64,7 +84,7 @@ bool read_number(const Json& value, double& number) {
   return false;
 }
 
-Verdict read_rows(const Json& value, Eigen::MatrixXd& M) {
+Verdict read_rows(JsonValue value, Eigen::MatrixXd& M) {
   constexpr const char* expected = "a list of rows of numbers, such as [[1, 0], [0, 1]]";
   double scalar = 0.0;
   if (read_number(value, scalar)) {
@@ -75,8 +95,8 @@ Verdict read_rows(const Json& value, Eigen::MatrixXd& M) {
     return Complaint{kind_of(value), expected};
   }
   const auto rows = static_cast<Index>(value.size());
-  for (Index i = 0; i < rows; ++i) {
-    const Json& row = value[static_cast<std::size_t>(i)];
+  Index i = 0;
+  for (const JsonValue row : value) {
     if (!row.is_array()) {
       double entry = 0.0;
       if (i == 0 && read_number(row, entry)) {
@@ -93,55 +113,63 @@ Verdict read_rows(const Json& value, Eigen::MatrixXd& M) {
       return Complaint{fmt::format("{} numbers in row 0 and {} in row {}", M.cols(), columns, i),
                        "rows of one length"};
     }
-    for (Index j = 0; j < columns; ++j) {
-      const Json& entry = row[static_cast<std::size_t>(j)];
+    Index j = 0;
+    for (const JsonValue entry : row) {
       if (!read_number(entry, M(i, j))) {
         return Complaint{fmt::format("{} as entry ({}, {})", kind_of(entry), i, j), "a number"};
       }
+      ++j;
     }
+    ++i;
   }
   return {};
 }
 
-Verdict read_column(const Json& value, Eigen::MatrixXd& column) {
+Verdict read_column(JsonValue value, Eigen::MatrixXd& column) {
   if (!value.is_array()) {
     return Complaint{kind_of(value), "a list of numbers"};
   }
   column.resize(static_cast<Index>(value.size()), 1);
-  for (Index i = 0; i < column.rows(); ++i) {
-    const Json& entry = value[static_cast<std::size_t>(i)];
+  Index i = 0;
+  for (const JsonValue entry : value) {
     if (!read_number(entry, column(i, 0))) {
       return Complaint{fmt::format("{} as entry {}", kind_of(entry), i), "a number"};
     }
+    ++i;
   }
   return {};
 }
 
-Verdict read_complex_list(const Json& value, Eigen::VectorXcd& list) {
+Verdict read_complex_list(JsonValue value, Eigen::VectorXcd& list) {
   constexpr const char* expected = "a list of numbers or of [re, im]";
   if (!value.is_array()) {
     return Complaint{kind_of(value), expected};
   }
   list.resize(static_cast<Index>(value.size()));
-  for (Index i = 0; i < list.size(); ++i) {
-    const Json& entry = value[static_cast<std::size_t>(i)];
+  Index i = 0;
+  for (const JsonValue entry : value) {
     double re = 0.0;
     double im = 0.0;
     const bool pair = entry.is_array() && entry.size() == 2;
-    if (!(pair ? read_number(entry[0], re) && read_number(entry[1], im) : read_number(entry, re))) {
+    const auto imaginary = [&] { return *++entry.begin(); };
+    if (!(pair ? read_number(entry.front(), re) && read_number(imaginary(), im)
+               : read_number(entry, re))) {
       return Complaint{fmt::format("{} as entry {}", kind_of(entry), i), expected};
     }
-    list(i) = {re, im};
+    list(i++) = {re, im};
   }
   return {};
 }
 
-Verdict read_texts(const Json& value, std::vector<std::string>& texts) {
-  if (!value.is_array() || !std::all_of(value.begin(), value.end(),
-                                        [](const Json& entry) { return entry.is_string(); })) {
+Verdict read_texts(JsonValue value, std::vector<std::string>& texts) {
+  bool all = value.is_array();
+  for (const JsonValue entry : value) {
+    all = all && entry.is_string();
+    texts.emplace_back(all ? entry.text() : std::string_view());
+  }
+  if (!all) {
     return Complaint{kind_of(value), "a list of texts, such as [\"position\", \"velocity\"]"};
   }
-  texts = value.get<std::vector<std::string>>();
   return {};
 }
 

@@ -5,7 +5,8 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <nlohmann/json.hpp>
+
+#include "solve/json_tree.hpp"
 
 /// Values of a JSON object, as the numbers and matrices that they stand for.
 namespace flyball::solve {
@@ -18,20 +19,20 @@ struct Complaint {
 using Verdict = std::optional<Complaint>;
 
 /// What stands there, in a few words; lists and objects may be of any size.
-[[nodiscard]] std::string kind_of(const nlohmann::json& value);
+[[nodiscard]] std::string kind_of(JsonValue value);
 
 /// A number, or the texts "inf", "-inf" and "nan" that stand for what JSON cannot write.
-[[nodiscard]] bool read_number(const nlohmann::json& value, double& number);
+[[nodiscard]] bool read_number(JsonValue value, double& number);
 
 /// A list of rows of one length; a number is 1 x 1.
-[[nodiscard]] Verdict read_rows(const nlohmann::json& value, Eigen::MatrixXd& M);
+[[nodiscard]] Verdict read_rows(JsonValue value, Eigen::MatrixXd& M);
 
 /// A list of numbers, as a column.
-[[nodiscard]] Verdict read_column(const nlohmann::json& value, Eigen::MatrixXd& column);
+[[nodiscard]] Verdict read_column(JsonValue value, Eigen::MatrixXd& column);
 
 /// A list of [re, im] and of numbers.
-[[nodiscard]] Verdict read_complex_list(const nlohmann::json& value, Eigen::VectorXcd& list);
+[[nodiscard]] Verdict read_complex_list(JsonValue value, Eigen::VectorXcd& list);
 
-[[nodiscard]] Verdict read_texts(const nlohmann::json& value, std::vector<std::string>& texts);
+[[nodiscard]] Verdict read_texts(JsonValue value, std::vector<std::string>& texts);
 
 }  // namespace flyball::solve

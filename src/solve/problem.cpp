@@ -19,7 +19,6 @@ namespace flyball::solve {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Json = nlohmann::json;
 
 namespace {
 
@@ -54,6 +53,9 @@ constexpr std::array<Field, 5> fields_of_transfer(const Field& transfer) {
           Field{.name = "expr", .type = FieldType::text, .absent = Absent::nothing}};
 }
 
+/// Empty or left out in a static gain.
+constexpr std::array<std::string_view, 3> stateless_names{"A", "B", "C"};
+
 std::string in_quotes(std::string_view text) {
   return fmt::format("\"{}\"", text);
 }
@@ -63,7 +65,7 @@ std::string in_quotes(std::string_view text) {
 /// Reads one object, field after field.
 class ProblemReader {
  public:
-  ProblemReader(const Json& object, std::string_view where, std::string_view prefix, Sizes& sizes)
+  ProblemReader(JsonValue object, std::string_view where, std::string_view prefix, Sizes& sizes)
       : object_(object), where_(where), prefix_(prefix), sizes_(sizes) {}
 
   [[nodiscard]] Expected<void> check_names(std::span<const Field> fields) const;
@@ -81,21 +83,21 @@ class ProblemReader {
         .expected(std::move(expected));
   }
 
-  [[nodiscard]] const Json* find(std::string_view name) const {
+  [[nodiscard]] std::optional<JsonValue> find(std::string_view name) const {
     const auto found = object_.find(name);
-    return found == object_.end() || found->is_null() ? nullptr : &*found;
+    return found == object_.end() || (*found).is_null() ? std::nullopt : std::optional(*found);
   }
-  [[nodiscard]] Expected<void> read_value(const Field& field, const Json& json, Value& value);
+  [[nodiscard]] Expected<void> read_value(const Field& field, JsonValue json, Value& value);
   [[nodiscard]] Expected<void> set_default(const Field& field, Value& value);
-  [[nodiscard]] Expected<double> number(const Field& field, const Json& json) const;
-  [[nodiscard]] Expected<std::string_view> choice(const Field& field, const Json& json) const;
-  [[nodiscard]] Expected<void> matrix(const Field& field, const Json& json, MatrixXd& M);
-  [[nodiscard]] Expected<ContinuousSystem<>> system(const Field& field, const Json& json);
-  [[nodiscard]] Expected<TransferCoefficients> transfer(const Field& field, const Json& json,
+  [[nodiscard]] Expected<double> number(const Field& field, JsonValue json) const;
+  [[nodiscard]] Expected<std::string_view> choice(const Field& field, JsonValue json) const;
+  [[nodiscard]] Expected<void> matrix(const Field& field, JsonValue json, MatrixXd& M);
+  [[nodiscard]] Expected<ContinuousSystem<>> system(const Field& field, JsonValue json);
+  [[nodiscard]] Expected<TransferCoefficients> transfer(const Field& field, JsonValue json,
                                                         std::string_view place = {});
   [[nodiscard]] Expected<std::vector<std::vector<TransferCoefficients>>> transfers(
-      const Field& field, const Json& json);
-  [[nodiscard]] Expected<std::vector<Problem>> objects(const Field& field, const Json& json);
+      const Field& field, JsonValue json);
+  [[nodiscard]] Expected<std::vector<Problem>> objects(const Field& field, JsonValue json);
   [[nodiscard]] Expected<void> refused_if(const Verdict& verdict, const Field& field) const {
     if (verdict) {
       return tl::unexpected(malformed(field, verdict->got, verdict->expected));
@@ -103,9 +105,10 @@ class ProblemReader {
     return {};
   }
 
-  const Json& object_;
+  JsonValue object_;
   std::string_view where_;
-  std::string_view prefix_;  ///< "first." within the object of that name.
+  std::string_view prefix_;                          ///< "first." within the object of that name.
+  std::span<const std::string_view> passed_over_{};  ///< Members that are there and not wanted.
   Sizes& sizes_;
 };
 
@@ -119,14 +122,16 @@ Expected<void> ProblemReader::check_names(std::span<const Field> fields) const {
     }
     return names;
   };
-  for (const auto& [name, value] : object_.items()) {
+  for (auto member = object_.begin(); member != object_.end(); ++member) {
+    const std::string_view name = member.key();
     const bool known = std::any_of(fields.begin(), fields.end(),
                                    [&](const Field& field) { return field.name == name; });
-    if (known || (name == "id" && prefix_.empty())) {
+    if (known || (name == "id" && prefix_.empty()) ||
+        std::find(passed_over_.begin(), passed_over_.end(), name) != passed_over_.end()) {
       continue;
     }
     const std::vector<std::string_view> names = names_of(true);
-    const std::string nearest = nearest_name(name, names);
+    const std::string nearest = nearest_name(std::string(name), names);
     return refusal(ArgumentError::unknown_name, where_,
                    prefix_.empty()
                        ? std::string("field")
@@ -136,7 +141,7 @@ Expected<void> ProblemReader::check_names(std::span<const Field> fields) const {
         .hint(nearest.empty() ? "take it out" : "did you mean " + in_quotes(nearest) + "?");
   }
   for (const Field& field : fields) {
-    if (field.absent == Absent::refused && find(field.name) == nullptr) {
+    if (field.absent == Absent::refused && !find(field.name)) {
       return tl::unexpected(
           malformed(field, "left out",
                     fmt::format("there; a problem needs {}", fmt::join(names_of(false), ", "))));
@@ -150,15 +155,15 @@ Expected<void> ProblemReader::read(std::span<const Field> fields, Problem& probl
   problem.fields_ = fields;
   problem.values_.resize(fields.size() + 1);
   for (std::size_t k = 0; k < fields.size(); ++k) {
-    const Json* json = find(fields[k].name);
-    problem.given_ |= std::uint64_t{json != nullptr} << k;
-    FLYBALL_CHECK(json != nullptr ? read_value(fields[k], *json, problem.values_[k])
-                                  : set_default(fields[k], problem.values_[k]));
+    const std::optional<JsonValue> json = find(fields[k].name);
+    problem.given_ |= std::uint64_t{json.has_value()} << k;
+    FLYBALL_CHECK(json ? read_value(fields[k], *json, problem.values_[k])
+                       : set_default(fields[k], problem.values_[k]));
   }
   return {};
 }
 
-Expected<void> ProblemReader::read_value(const Field& field, const Json& json, Value& value) {
+Expected<void> ProblemReader::read_value(const Field& field, JsonValue json, Value& value) {
   switch (field.type) {
     case FieldType::number:
     case FieldType::integer: {
@@ -198,7 +203,7 @@ Expected<void> ProblemReader::read_value(const Field& field, const Json& json, V
       if (!json.is_string()) {
         return tl::unexpected(malformed(field, kind_of(json), "a text"));
       }
-      value = json.get<std::string>();
+      value = std::string(json.text());
       return {};
     case FieldType::flag:
     case FieldType::matrices:
@@ -239,7 +244,7 @@ Expected<void> ProblemReader::set_default(const Field& field, Value& value) {
   return {};
 }
 
-Expected<double> ProblemReader::number(const Field& field, const Json& json) const {
+Expected<double> ProblemReader::number(const Field& field, JsonValue json) const {
   double value = 0.0;
   if (!read_number(json, value)) {
     return tl::unexpected(malformed(field, kind_of(json), "a number"));
@@ -251,11 +256,11 @@ Expected<double> ProblemReader::number(const Field& field, const Json& json) con
   return value;
 }
 
-Expected<std::string_view> ProblemReader::choice(const Field& field, const Json& json) const {
+Expected<std::string_view> ProblemReader::choice(const Field& field, JsonValue json) const {
   if (!json.is_string()) {
     return tl::unexpected(malformed(field, kind_of(json), "a text"));
   }
-  const std::string& text = json.get_ref<const std::string&>();
+  const std::string_view text = json.text();
   const std::vector<std::string_view> choices = text::split(field.choices, " ");
   const auto found = std::find(choices.begin(), choices.end(), text);
   if (found != choices.end()) {
@@ -267,14 +272,14 @@ Expected<std::string_view> ProblemReader::choice(const Field& field, const Json&
   }
   const std::string last = listed.back();
   listed.pop_back();
-  const std::string nearest = nearest_name(text, choices);
+  const std::string nearest = nearest_name(std::string(text), choices);
   return refusal(ArgumentError::unknown_name, where_, full(field.name))
       .got(in_quotes(text))
       .expected(fmt::format("{} or {}", fmt::join(listed, ", "), last))
       .hint(nearest.empty() ? "" : "did you mean " + in_quotes(nearest) + "?");
 }
 
-Expected<void> ProblemReader::matrix(const Field& field, const Json& json, MatrixXd& M) {
+Expected<void> ProblemReader::matrix(const Field& field, JsonValue json, MatrixXd& M) {
   // Samples are a list of rows, or of the numbers of the one column.
   const bool flat = json.is_array() && !json.empty() && !json.front().is_array();
   const bool column = field.type == FieldType::list || (field.type == FieldType::samples && flat);
@@ -282,7 +287,7 @@ Expected<void> ProblemReader::matrix(const Field& field, const Json& json, Matri
   return check_shape_of(M, field, sizes_, where_, full(field.name));
 }
 
-Expected<ContinuousSystem<>> ProblemReader::system(const Field& field, const Json& json) {
+Expected<ContinuousSystem<>> ProblemReader::system(const Field& field, JsonValue json) {
   if (!json.is_object()) {
     return tl::unexpected(
         malformed(field, kind_of(json), "a system, such as {\"A\": [[-1]], \"B\": [[1]]}"));
@@ -292,17 +297,14 @@ Expected<ContinuousSystem<>> ProblemReader::system(const Field& field, const Jso
   Problem inner;
   const auto stateless = [&](const char* name) {
     const auto found = json.find(name);
-    return found == json.end() || found->is_null() || (found->is_array() && found->empty());
+    return found == json.end() || (*found).is_null() || ((*found).is_array() && (*found).empty());
   };
   if (stateless("A") && stateless("B") && stateless("C") && json.contains("D")) {
     // A static gain, y = D u.
-    Json gain = json;
-    for (const char* name : {"A", "B", "C"}) {
-      gain.erase(name);
-    }
     sizes_.bind(field.rows, 0);
-    FLYBALL_CHECK(
-        ProblemReader(gain, where_, prefix, sizes_).read(std::span(fields).last(1), inner));
+    ProblemReader gain(json, where_, prefix, sizes_);
+    gain.passed_over_ = stateless_names;
+    FLYBALL_CHECK(gain.read(std::span(fields).last(1), inner));
     const MatrixXd& D = inner.matrix("D");
     return ContinuousSystem<>{MatrixXd(0, 0), MatrixXd(0, D.cols()), MatrixXd(D.rows(), 0), D};
   }
@@ -310,12 +312,12 @@ Expected<ContinuousSystem<>> ProblemReader::system(const Field& field, const Jso
   return inner.system();
 }
 
-Expected<TransferCoefficients> ProblemReader::transfer(const Field& field, const Json& json,
+Expected<TransferCoefficients> ProblemReader::transfer(const Field& field, JsonValue json,
                                                        std::string_view place) {
   TransferCoefficients found;
   const std::string name = std::string(field.name).append(place);
   if (json.is_string()) {
-    found.expr = json.get<std::string>();
+    found.expr = std::string(json.text());
     return found;
   }
   if (!json.is_object()) {
@@ -346,7 +348,7 @@ Expected<TransferCoefficients> ProblemReader::transfer(const Field& field, const
 }
 
 Expected<std::vector<std::vector<TransferCoefficients>>> ProblemReader::transfers(
-    const Field& field, const Json& json) {
+    const Field& field, JsonValue json) {
   const auto refuse = [&](std::string got) {
     return tl::unexpected(malformed(field, std::move(got),
                                     "rows of transfer functions of one length, such as "
@@ -356,12 +358,12 @@ Expected<std::vector<std::vector<TransferCoefficients>>> ProblemReader::transfer
     return refuse(json.is_array() ? "empty" : kind_of(json));
   }
   std::vector<std::vector<TransferCoefficients>> rows;
-  for (const Json& row : json) {
+  for (const JsonValue row : json) {
     if (!row.is_array() || row.empty() || row.size() != json.front().size()) {
       return refuse(row.is_array() ? "of rows of several lengths" : "a list of " + kind_of(row));
     }
     rows.emplace_back();
-    for (const Json& entry : row) {
+    for (const JsonValue entry : row) {
       // Each has as many coefficients as it likes.
       Sizes own;
       const std::string place = fmt::format("[{}][{}]", rows.size() - 1, rows.back().size());
@@ -375,12 +377,12 @@ Expected<std::vector<std::vector<TransferCoefficients>>> ProblemReader::transfer
   return rows;
 }
 
-Expected<std::vector<Problem>> ProblemReader::objects(const Field& field, const Json& json) {
+Expected<std::vector<Problem>> ProblemReader::objects(const Field& field, JsonValue json) {
   if (!json.is_array()) {
     return tl::unexpected(malformed(field, kind_of(json), "a list of objects"));
   }
   std::vector<Problem> all;
-  for (const Json& one : json) {
+  for (const JsonValue one : json) {
     const std::string name = fmt::format("{}[{}]", full(field.name), all.size());
     if (!one.is_object()) {
       return refusal(ArgumentError::malformed, where_, name)
@@ -394,7 +396,7 @@ Expected<std::vector<Problem>> ProblemReader::objects(const Field& field, const 
   return all;
 }
 
-Expected<Problem> Problem::read(const Json& object, std::span<const Field> fields,
+Expected<Problem> Problem::read(JsonValue object, std::span<const Field> fields,
                                 std::string_view where) {
   Problem problem;
   Sizes sizes;

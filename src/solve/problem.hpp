@@ -11,10 +11,11 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <nlohmann/json.hpp>
 
 #include <flyball/solve/kind.hpp>
 #include <flyball/systems/analysis.hpp>
+
+#include "solve/json_tree.hpp"
 
 namespace flyball::solve {
 
@@ -36,8 +37,7 @@ class Problem {
   /// @param where   The kind of problem or the file, for messages.
   /// @errors ArgumentError::unknown_name with the nearest name; malformed for a field left out or
   ///         of another type; wrong_shape, empty, not_finite.
-  [[nodiscard]] static Expected<Problem> read(const nlohmann::json& object,
-                                              std::span<const Field> fields,
+  [[nodiscard]] static Expected<Problem> read(JsonValue object, std::span<const Field> fields,
                                               std::string_view where);
 
   // A field by its name in the row; what `has` denies must not be asked for unless the row says

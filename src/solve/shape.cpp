@@ -86,11 +86,16 @@ std::vector<Letter> letters_of(const Kind& kind) {
 }
 
 Index Sizes::value_of(std::string_view size) const {
+  const auto of = [&](char first) {
+    const bool digit = first >= '0' && first <= '9';
+    return digit ? Index{first - '0'} : known_[static_cast<std::size_t>(first)];
+  };
+  if (size.size() == 1) {
+    return of(size.front());
+  }
   Index sum = 0;
   for (const std::string_view part : text::split(size, "+")) {
-    const char first = part.front();
-    const bool digit = first >= '0' && first <= '9';
-    const Index term = digit ? first - '0' : known_[static_cast<std::size_t>(first)];
+    const Index term = of(part.front());
     if (term < 0) {
       return -1;
     }

@@ -5,6 +5,8 @@
 #include <new>
 #include <utility>
 
+#include <nlohmann/json.hpp>
+
 #include <flyball/io/json_text.hpp>
 #include <flyball/io/json_writer.hpp>
 
@@ -14,8 +16,6 @@
 #include "solve/problem.hpp"
 
 namespace flyball::solve {
-
-using Json = nlohmann::json;
 
 ErrorInfo error_info(SolveError code) {
   static constexpr flyball::detail::ErrorRow rows[] = {
@@ -30,14 +30,14 @@ ErrorInfo error_info(SolveError code) {
 namespace {
 
 /// The id of a problem as it was written, on one line; empty if it has none.
-std::string id_of(std::string_view text, const Json& problem) {
-  const auto found = problem.find("id");
-  if (found == problem.end()) {
+std::string id_of(std::string_view text, JsonValue problem) {
+  using Json = nlohmann::json;
+  if (!problem.contains("id")) {
     return {};
   }
   const auto written = scalar_member(text, "id");
   return written ? std::string(*written)
-                 : found->dump(-1, ' ', false, Json::error_handler_t::replace);
+                 : Json::parse(text)["id"].dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 /// A new answer, open, with the problem's id if it has one.
@@ -56,19 +56,23 @@ std::string end(JsonWriter answer) {
 }
 
 /// Whether a JSON value has a number that is NaN (null) or infinite.
-bool is_bounded(const Json& value) {
-  if (value.is_array() || value.is_object()) {
-    return std::all_of(value.begin(), value.end(), is_bounded);
+bool is_bounded(JsonValue value) {
+  if (value.is_structured()) {
+    for (const JsonValue element : value) {
+      if (!is_bounded(element)) {
+        return false;
+      }
+    }
+    return true;
   }
-  // Not by the library's own comparison, which makes a value of the text in a noexcept function.
-  const auto* text = value.get_ptr<const std::string*>();
-  return !value.is_null() && (text == nullptr || (*text != "inf" && *text != "-inf"));
+  return !value.is_null() &&
+         !(value.is_string() && (value.text() == "inf" || value.text() == "-inf"));
 }
 
 /// Refuses an answer in which a number overflowed where its kind's row has no place for that.
 Expected<void> check_answer(const std::string& answer, const Kind& kind) {
-  FLYBALL_TRY(const JsonObject object, parse_object(answer, kind.name, "answer"));
-  const Json& json = object.json();
+  FLYBALL_TRY(const JsonTree tree, parse_object(answer, kind.name, "answer"));
+  const JsonValue json = tree.root();
   for (const Field& field : kind.answer) {
     const auto found = json.find(field.name);
     if (!field.unbounded && found != json.end() && !is_bounded(*found)) {
@@ -86,7 +90,7 @@ Answer refused(const std::string& id, const Error& error) {
   return {end(std::move(answer)), false, error.kind()};
 }
 
-Answer answer_to(const Json& object, const std::string& id, const Kind& kind) {
+Answer answer_to(JsonValue object, const std::string& id, const Kind& kind) {
   const auto problem = Problem::read(object, kind.fields, kind.name);
   if (!problem) {
     return refused(id, problem.error());
@@ -116,15 +120,15 @@ std::string Solver::error_json(const Error& error) {
 }
 
 Answer Solver::solve(std::string_view text) const {
-  Expected<JsonObject> object{};
+  Expected<JsonTree> object{};
   std::string id;
   try {
     object = parse_object(text, kind_->name, "problem");
     if (!object) {
       return refused(id, object.error());
     }
-    id = id_of(text, object->json());
-    return answer_to(object->json(), id, *kind_);
+    id = id_of(text, object->root());
+    return answer_to(object->root(), id, *kind_);
   } catch (const std::bad_alloc&) {
     return refused(id, not_enough_memory("this problem"));
   } catch (const std::exception& defect) {  // the other problems are answered all the same

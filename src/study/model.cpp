@@ -68,8 +68,8 @@ std::span<const solve::Field> model_fields() {
 }
 
 ExpectedAll<ModelFile> parse_matrices(std::string_view text, const std::string& name) {
-  FLYBALL_TRY(const auto object, solve::parse_object(text, name, "model"));
-  FLYBALL_TRY(const auto fields, solve::Problem::read(object.json(), model_fields(), name));
+  FLYBALL_TRY(const solve::JsonTree object, solve::parse_object(text, name, "model"));
+  FLYBALL_TRY(const auto fields, solve::Problem::read(object.root(), model_fields(), name));
   ModelFile model;
   model.path = name;
   model.system = fields.system();
