@@ -1,3 +1,5 @@
+#include <cmath>
+#include <complex>
 #include <limits>
 
 #include <Eigen/Eigenvalues>
@@ -55,8 +57,54 @@ ComplexSchur complex_schur_of_complex(const ComplexMatrixRef& A) {
           schur.info() == Eigen::Success};
 }
 
+namespace {
+
+/// Makes the 2x2 block of a quasi-triangular T at k, which has a pair of eigenvalues, triangular by
+/// a unitary rotation whose first row is an eigenvector's.
+void split_pair(MatrixXcd& T, MatrixXcd& U, Eigen::Index k) {
+  using Complex = std::complex<double>;
+  const Complex a = T(k, k);
+  const Complex d = T(k + 1, k + 1);
+  const Complex half = 0.5 * (a - d);
+  // λ - d with (λ - d)² - (a - d)(λ - d) - bc = 0, of the sign that does not cancel.
+  const Complex root = std::sqrt(half * half + T(k, k + 1) * T(k + 1, k));
+  const Complex mu = half + (std::real(std::conj(half) * root) < 0.0 ? -root : root);
+  const Complex c = T(k + 1, k);
+  const double r = std::hypot(std::abs(mu), std::abs(c));
+  Eigen::Matrix2cd G;
+  G << std::conj(mu) / r, std::conj(c) / r, -c / r, mu / r;
+  const Eigen::Index n = T.cols();
+  T.middleRows(k, 2).rightCols(n - k) = (G * T.middleRows(k, 2).rightCols(n - k)).eval();
+  T.topRows(k + 2).middleCols(k, 2) =
+      (T.topRows(k + 2).middleCols(k, 2) * G.adjoint()).eval();
+  U.middleCols(k, 2) = (U.middleCols(k, 2) * G.adjoint()).eval();
+  T(k + 1, k) = 0.0;
+}
+
+}  // namespace
+
 ComplexSchur complex_schur_of(const MatrixRef& A) {
-  return complex_schur_of_complex(A.cast<std::complex<double>>());
+  if (const int unit = unit_of(A); unit != 0) {
+    ComplexSchur schur = complex_schur_of(times_power(A, -unit));
+    schur.T = times_power(schur.T, unit);
+    return schur;
+  }
+  if (!A.allFinite()) {
+    return {A.cast<std::complex<double>>(), A.cast<std::complex<double>>(), false};
+  }
+  // Real arithmetic first: a quarter of the operations, and real eigenvalues stay real.
+  const Eigen::RealSchur<Eigen::MatrixXd> real(A);
+  if (real.info() != Eigen::Success) {
+    return complex_schur_of_complex(A.cast<std::complex<double>>());
+  }
+  ComplexSchur schur{real.matrixT().cast<std::complex<double>>(),
+                     real.matrixU().cast<std::complex<double>>(), true};
+  for (Eigen::Index k = A.rows() - 2; k >= 0; --k) {
+    if (schur.T(k + 1, k) != 0.0) {
+      split_pair(schur.T, schur.U, k);
+    }
+  }
+  return schur;
 }
 
 Eigen::VectorXcd eigenvalues_of_complex(const ComplexMatrixRef& A) {
