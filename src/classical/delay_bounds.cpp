@@ -70,22 +70,19 @@ void DelayBounds::consider(const VectorXcd& poles) {
   }
 }
 
-DelayBall DelayBounds::around(double frequency, double radius) const {
+DelayPoint DelayBounds::at(double frequency) const {
   const Index n = f_.A.rows();
   const Index k = f_.delays.size();
   const Index N = n + k;
+  DelayPoint point;
+  if (N == 0) {
+    point.value = f_.D11.cast<Complex>();
+    point.slope = MatrixXcd::Zero(f_.D11.rows(), f_.D11.cols());
+    return point;
+  }
   VectorXcd late(k);
-  VectorXd moved(k);
   for (Index i = 0; i < k; ++i) {
     late(i) = std::polar(1.0, -frequency * f_.delays(i));
-    moved(i) = std::expm1(f_.delays(i) * radius);
-  }
-  DelayBall ball;
-  if (N == 0) {
-    ball.value = f_.D11.cast<Complex>();
-    ball.slope = MatrixXcd::Zero(f_.D11.rows(), f_.D11.cols());
-    ball.bound = MatrixXd::Zero(f_.D11.rows(), f_.D11.cols());
-    return ball;
   }
   MatrixXcd delayed(N, k);  // [B₂; D₂₂]
   delayed << f_.B2.cast<Complex>(), f_.D22.cast<Complex>();
@@ -103,30 +100,43 @@ DelayBall DelayBounds::around(double frequency, double radius) const {
   using flyball::detail::complex_product;
   const MatrixXcd Xb = complex_product(X, b);
   const MatrixXcd cX = complex_product(c, X);
-  ball.value = f_.D11.cast<Complex>() + complex_product(c, Xb);
+  point.value = f_.D11.cast<Complex>() + complex_product(c, Xb);
   // G' = c'Xb - cX M'Xb
   const VectorXcd turning = late.cwiseProduct(f_.delays.cast<Complex>());
-  MatrixXcd M_slope = MatrixXcd::Zero(N, N);
-  M_slope.topLeftCorner(n, n).setIdentity();
-  M_slope.rightCols(k) += delayed * turning.asDiagonal();
-  const MatrixXcd c_slope = -f_.D12.cast<Complex>() * turning.asDiagonal();
-  ball.slope = complex_product(c_slope, Xb.bottomRows(k)) -
-               complex_product(cX, complex_product(M_slope, Xb));
+  MatrixXcd moved = delayed * (turning.asDiagonal() * Xb.bottomRows(k));
+  moved.topRows(n) += Xb.topRows(n);
+  point.slope = -complex_product(f_.D12.cast<Complex>() * turning.asDiagonal(), Xb.bottomRows(k)) -
+                complex_product(cX, moved);
+  point.inverse = X.cwiseAbs();
+  point.from_inputs = Xb.cwiseAbs();
+  point.to_outputs = cX.cwiseAbs();
+  return point;
+}
 
+MatrixXd DelayBounds::bound(const DelayPoint& point, double radius) const {
+  const Index n = f_.A.rows();
+  const Index k = f_.delays.size();
+  const Index N = n + k;
+  if (N == 0) {
+    return MatrixXd::Zero(f_.D11.rows(), f_.D11.cols());
+  }
+  VectorXd moved(k);
+  for (Index i = 0; i < k; ++i) {
+    moved(i) = std::expm1(f_.delays(i) * radius);
+  }
   MatrixXd E = MatrixXd::Zero(N, N);
   E.topLeftCorner(n, n).diagonal().setConstant(radius);
-  E.rightCols(k) += delayed.cwiseAbs() * moved.asDiagonal();
-  const auto solved = X.allFinite()
-                          ? neumann(flyball::detail::product(X.cwiseAbs(), E), Xb.cwiseAbs())
+  E.topRightCorner(n, k) = f_.B2.cwiseAbs() * moved.asDiagonal();
+  E.bottomRightCorner(k, k) = f_.D22.cwiseAbs() * moved.asDiagonal();
+  using flyball::detail::product;
+  const auto solved = point.inverse.allFinite()
+                          ? neumann(product(point.inverse, E), point.from_inputs)
                           : std::nullopt;
   if (!solved) {
-    ball.bound = MatrixXd::Constant(f_.D11.rows(), f_.D11.cols(), infinity);
-    return ball;
+    return MatrixXd::Constant(f_.D11.rows(), f_.D11.cols(), infinity);
   }
-  using flyball::detail::product;
-  ball.bound = product(f_.D12.cwiseAbs() * moved.asDiagonal(), solved->bottomRows(k)) +
-               product(cX.cwiseAbs(), product(E, *solved));
-  return ball;
+  return product(f_.D12.cwiseAbs() * moved.asDiagonal(), solved->bottomRows(k)) +
+         product(point.to_outputs, product(E, *solved));
 }
 
 MatrixXd DelayBounds::beyond(double frequency) const {

@@ -9,13 +9,13 @@
 /// How a continuous system with dead time moves around a point of the axis.
 namespace flyball::classical::detail {
 
-/// G around jω, an entry each of a matrix of outputs x inputs: on |s - jω| <= radius
-/// |G(s) - value| <= bound, so that |G(s) - value| <= bound t and
-/// |G(s) - value - slope (s - jω)| <= bound t²/(1 - t) on |s - jω| <= t radius (Schwarz, Cauchy).
-struct DelayBall {
-  Eigen::MatrixXcd value;
+/// G at jω, and what bounds its way from there: what is below is of entries' sizes.
+struct DelayPoint {
+  Eigen::MatrixXcd value;  ///< Outputs x inputs.
   Eigen::MatrixXcd slope;  ///< dG/ds
-  Eigen::MatrixXd bound;   ///< Infinite where a pole may lie in the disk.
+  Eigen::MatrixXd inverse;
+  Eigen::MatrixXd from_inputs;
+  Eigen::MatrixXd to_outputs;
 };
 
 /// The bounds follow from M(s) = [sI - A, -B₂Δ; -C₂, I - D₂₂Δ] moving by no more than
@@ -25,8 +25,13 @@ class DelayBounds {
   /// @param system  Continuous.
   explicit DelayBounds(const DelaySystem& system);
 
-  /// @param radius  rad/s. Cost: O((n + delays)³).
-  [[nodiscard]] DelayBall around(double frequency, double radius) const;
+  /// Cost: O((n + delays)³), as of `bound`.
+  [[nodiscard]] DelayPoint at(double frequency) const;
+  /// b, an entry each: on |s - jω| <= radius |G(s) - value| <= b, so that |G(s) - value| <= b t and
+  /// |G(s) - value - slope (s - jω)| <= b t²/(1 - t) on |s - jω| <= t radius (Schwarz, Cauchy).
+  /// Infinite where a pole may lie in the disk.
+  /// @param radius  rad/s.
+  [[nodiscard]] Eigen::MatrixXd bound(const DelayPoint& point, double radius) const;
 
   /// No |G| is larger at any frequency from here on, by entries; infinite where that is not known.
   [[nodiscard]] Eigen::MatrixXd beyond(double frequency) const;

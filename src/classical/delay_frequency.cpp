@@ -5,6 +5,7 @@
 #include <flyball/classical/delay_poles.hpp>
 #include <flyball/classical/frequency_response.hpp>
 
+#include "classical/delay_frequency.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball::classical {
@@ -19,14 +20,8 @@ namespace {
 
 class DelaySource final : public FrequencyResponse::Source {
  public:
-  explicit DelaySource(DelaySystem system) : system_(std::move(system)) {
+  DelaySource(DelaySystem system, const VectorXcd& rightmost) : system_(std::move(system)) {
     VectorXcd own = flyball::detail::eigenvalues_of(system_.form().A);
-    VectorXcd rightmost;
-    if (!system_.period() && system_.has_delay_in_loop()) {
-      if (const auto found = rightmost_poles(system_)) {
-        rightmost = found->poles;
-      }
-    }
     const VectorXd& delays = system_.delays();
     hints_.places.resize(own.size() + rightmost.size() + delays.size());
     hints_.places << own, rightmost, -delays.cwiseInverse().cast<Complex>();
@@ -63,8 +58,18 @@ class DelaySource final : public FrequencyResponse::Source {
 
 }  // namespace
 
+FrequencyResponse detail::response_with(const DelaySystem& system, const VectorXcd& rightmost) {
+  return FrequencyResponse(std::make_shared<DelaySource>(system, rightmost));
+}
+
 Expected<FrequencyResponse> frequency_response(const DelaySystem& system) {
-  return FrequencyResponse(std::make_shared<DelaySource>(system));
+  VectorXcd rightmost;
+  if (!system.period() && system.has_delay_in_loop()) {
+    if (const auto found = rightmost_poles(system)) {
+      rightmost = found->poles;
+    }
+  }
+  return detail::response_with(system, rightmost);
 }
 
 }  // namespace flyball::classical

@@ -13,14 +13,16 @@
 #include <flyball/systems/system_error.hpp>
 
 #include "classical/delay_bounds.hpp"
+#include "classical/delay_frequency.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/spectral_norm.hpp"
 
 namespace flyball::classical {
 
-using detail::DelayBall;
 using detail::DelayBounds;
+using detail::DelayPoint;
 using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
@@ -31,6 +33,8 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double pi = std::numbers::pi;
 constexpr double closest = 1e-13;
+/// Of the intervals that all crossings of one loop take.
+constexpr long most_steps = 60'000;
 /// Of the disk's radius, how far the ends of an interval are from its middle.
 constexpr double share = 0.25;
 /// The same where L bends little enough that a larger disk tells more of its slope.
@@ -50,10 +54,6 @@ struct Step {
   }
 };
 
-DelayBall around(const DelayBounds& bounds, const Step& step) {
-  return bounds.around(step.middle(), step.half() / share);
-}
-
 /// L in the middle of a step, its slope along the axis, and what both move by on it.
 struct Moves {
   Complex L;
@@ -61,11 +61,9 @@ struct Moves {
   double off = infinity;
   double bend = infinity;
 
-  Moves(const DelayBounds& bounds, const Step& step, double part) {
-    const DelayBall ball = bounds.around(step.middle(), step.half() / part);
-    L = ball.value(0, 0);
-    slope = ball.slope(0, 0) * Complex(0.0, 1.0);
-    off = ball.bound(0, 0) * part;
+  Moves(const DelayBounds& bounds, const DelayPoint& middle, const Step& step, double part)
+      : L(middle.value(0, 0)), slope(middle.slope(0, 0) * Complex(0.0, 1.0)) {
+    off = bounds.bound(middle, step.half() / part)(0, 0) * part;
     bend = off / step.half() * (1.0 / ((1.0 - part) * (1.0 - part)) - 1.0);
   }
   /// Whether a part of L' conj(L) keeps its sign.
@@ -104,25 +102,34 @@ constexpr Crossing phase_crossing{
       return (L.real() < 0.0 ? std::abs(L.imag()) : std::abs(L)) <= off;
     }};
 
+/// So many, and fewer of more than ten states and delays, N, because a step costs O(N³).
+long steps_of(const DelaySystem& system, long most) {
+  const double size = 0.1 * static_cast<double>(system.states() + system.form().delays.size());
+  return std::lround(static_cast<double>(most) / std::max(1.0, size * size * size));
+}
+
 /// Every zero on the range, nothing where they do not end. What holds on the whole of a step of
 /// which ln L moves by less than a radian: its slope's part keeps the sign, or it is halved.
+/// @param steps  How many steps are left.
 std::optional<std::vector<double>> zeros(const DelaySystem& loop, const DelayBounds& bounds,
-                                         const Step& range, const Crossing& crossing) {
+                                         const Step& range, const Crossing& crossing, long& steps) {
   std::vector<double> found;
   std::vector<Step> pending{range};
-  constexpr int most_steps = 60'000;
   const auto value = [&](double w) { return crossing.value(loop.response(w)(0, 0)); };
-  for (int count = 0; !pending.empty(); ++count) {
-    if (count == most_steps) {
+  while (!pending.empty()) {
+    if (--steps < 0) {
       return std::nullopt;
     }
     const Step step = pending.back();
     pending.pop_back();
-    const Moves moves(bounds, step, share);
+    const DelayPoint middle = bounds.at(step.middle());
+    const Moves moves(bounds, middle, step, share);
     if (std::isfinite(moves.off) && !crossing.possible(moves.L, moves.off)) {
       continue;
     }
-    const auto keeps = [&](double part) { return Moves(bounds, step, part).keeps(crossing.part); };
+    const auto keeps = [&](double part) {
+      return Moves(bounds, middle, step, part).keeps(crossing.part);
+    };
     // Of a step far below every root the disk may reach up to those.
     const double least_share = step.half() / (0.1 * bounds.slowest());
     if (moves.keeps(crossing.part) || keeps(smaller_share) ||
@@ -196,7 +203,7 @@ Expected<DelaySystem> closed(const DelaySystem& loop, double of_output, double o
 }
 
 double largest(const MatrixXcd& G) {
-  return G.allFinite() ? flyball::detail::singular_values_of_complex(G)(0) : 0.0;
+  return G.allFinite() ? flyball::detail::spectral_norm_of_complex(G) : 0.0;
 }
 
 double wrapped(double degrees) {
@@ -213,8 +220,18 @@ Expected<Peak> peak_gain(const DelaySystem& system) {
         .got(flyball::detail::format("sampled at {} s", system.period()->si()))
         .expected("continuous");
   }
-  FLYBALL_TRY_IN(where, const auto response, frequency_response(system));
-  FLYBALL_TRY_IN(where, const auto grid, frequency_grid(response));
+  Eigen::VectorXcd rightmost;
+  if (system.has_delay_in_loop()) {
+    if (const auto found = rightmost_poles(system)) {
+      rightmost = found->poles;
+    }
+  }
+  return detail::peak_gain_with(system, rightmost);
+}
+
+Expected<Peak> detail::peak_gain_with(const DelaySystem& system,
+                                      const Eigen::VectorXcd& rightmost) {
+  FLYBALL_TRY_IN("peak gain", const auto grid, frequency_grid(response_with(system, rightmost)));
   DelayBounds bounds(system);
   Peak best;
   const auto consider = [&](double value, double w) {
@@ -240,18 +257,19 @@ Expected<Peak> peak_gain(const DelaySystem& system) {
     pending.push_back({last, 2.0 * last});
   }
   std::reverse(pending.begin(), pending.end());
-  constexpr int most_steps = 20'000;
-  for (int count = 0; !pending.empty() && count < most_steps; ++count) {
+  long steps = steps_of(system, 20'000);
+  for (; !pending.empty() && steps > 0; --steps) {
     const Step step = pending.back();
     pending.pop_back();
-    const DelayBall ball = around(bounds, step);
-    consider(largest(ball.value), step.middle());
+    const DelayPoint middle = bounds.at(step.middle());
+    consider(largest(middle.value), step.middle());
     // Straight between the ends, of which the norm is largest at one, and what is left.
-    const double rest = ball.bound.norm() * share * share / (1.0 - share);
-    const MatrixXcd moved = ball.slope * Complex(0.0, step.half());
+    const double rest =
+        bounds.bound(middle, step.half() / share).norm() * share * share / (1.0 - share);
+    const MatrixXcd moved = middle.slope * Complex(0.0, step.half());
     const double bound =
         std::isfinite(rest)
-            ? std::max(largest(ball.value + moved), largest(ball.value - moved)) + rest
+            ? std::max(largest(middle.value + moved), largest(middle.value - moved)) + rest
             : infinity;
     if (bound > best.value * (1.0 + tolerance) && !step.is_short()) {
       for (const Step& half : step.halves()) {
@@ -297,9 +315,11 @@ Expected<LoopMargins> loop_margins(const DelaySystem& loop) {
   const double fastest = 10.0 * bounds.fastest();
   const double from = lowest(loop, bounds);
   const double end = last_above(bounds, 1.0);
-  const auto unit_gain = zeros(
-      loop, bounds, {from, std::isfinite(end) ? std::max(end, fastest) : fastest}, gain_crossing);
-  const auto places = zeros(loop, bounds, {from, fastest}, phase_crossing);
+  long steps = steps_of(loop, most_steps);
+  const auto unit_gain =
+      zeros(loop, bounds, {from, std::isfinite(end) ? std::max(end, fastest) : fastest},
+            gain_crossing, steps);
+  const auto places = zeros(loop, bounds, {from, fastest}, phase_crossing, steps);
   if (!unit_gain || !places) {
     return refusal(SystemError::no_convergence, where,
                    !unit_gain ? "the list of gain crossings" : "the list of phase crossings")
@@ -335,9 +355,9 @@ Expected<LoopMargins> loop_margins(const DelaySystem& loop) {
   }
   FLYBALL_TRY_IN(where, const DelaySystem S, closed(loop, -1.0, 1.0));
   FLYBALL_TRY_IN(where, const DelaySystem difference, closed(loop, -2.0, 1.0));
-  FLYBALL_TRY_IN(where, margins.sensitivity, peak_gain(S));
-  FLYBALL_TRY_IN(where, margins.complementary, peak_gain(T));
-  FLYBALL_TRY_IN(where, const Peak spread, peak_gain(difference));
+  FLYBALL_TRY_IN(where, margins.sensitivity, detail::peak_gain_with(S, poles.poles));
+  FLYBALL_TRY_IN(where, margins.complementary, detail::peak_gain_with(T, poles.poles));
+  FLYBALL_TRY_IN(where, const Peak spread, detail::peak_gain_with(difference, poles.poles));
   margins.disk_margin = margins.stable ? 2.0 / spread.value : 0.0;
   return margins;
 }
@@ -367,9 +387,10 @@ Expected<std::optional<double>> bandwidth(const DelaySystem& system, double fact
   }
   const DelayBounds bounds(scaled);
   const double end = last_above(bounds, 1.0);
+  long steps = steps_of(scaled, most_steps);
   const auto crossings = zeros(
       scaled, bounds, {lowest(scaled, bounds), std::isfinite(end) ? end : 10.0 * bounds.fastest()},
-      gain_crossing);
+      gain_crossing, steps);
   if (!crossings) {
     return refusal(SystemError::no_convergence, where, "the list of gain crossings")
         .got("without end");

@@ -19,7 +19,9 @@ namespace {
 
 constexpr int points = 12;
 constexpr double tolerance = 1e-12;
-constexpr long most_steps = 2'000'000;
+/// Of a system without states: those of ten states count as three. Of n > 10 states (n/10)³ times
+/// as many; four more for each sample.
+constexpr double most_steps = 250'000.0;
 constexpr std::size_t most_breaks = 200'000;
 
 }  // namespace
@@ -64,7 +66,14 @@ Expected<DelayResponse> Motion::run(const VectorXd& x0) {
   schedule_inputs();
   const double rate = form_.A.size() > 0 ? form_.A.cwiseAbs().rowwise().sum().maxCoeff() : 0.0;
   wanted_ = std::min({shortest_, std::max(end_, step_), rate > 0.0 ? 1.0 / rate : HUGE_VAL});
-  long steps = 0;
+  const double size = 0.1 * static_cast<double>(x_.size());
+  work_ = most_steps * std::max(1.0, size * size * size) + 4.0 * static_cast<double>(samples_);
+  if (end_ > work_ * shortest_) {
+    return refusal(ArgumentError::out_of_range, "response", "the shortest delay")
+        .got(flyball::detail::format("{} s", shortest_))
+        .expected(flyball::detail::format("at least {} s: no step is longer", end_ / work_))
+        .hint("ask for a shorter time, or leave the delay out");
+  }
   while (next_sample_ < samples_) {
     pass_breaks();
     // The last sample has no step behind it.
@@ -74,7 +83,7 @@ Expected<DelayResponse> Motion::run(const VectorXd& x0) {
     }
     const double until =
         std::min(breaks_.empty() ? HUGE_VAL : breaks_.begin()->first, std::max(end_, t_ + step_));
-    FLYBALL_CHECK(cross(until, steps));
+    FLYBALL_CHECK(cross(until));
   }
   if (!response_.y.allFinite() || !response_.x.allFinite()) {
     return refusal(ArgumentError::not_finite, "response", "the response")
@@ -246,19 +255,24 @@ const Propagator& Motion::propagator(double length) {
       right.block(i * n, n + j * q, n, q) = a * B_;
     }
   }
+  // Of ten states one length costs as much as 200 steps.
+  const auto size = static_cast<double>(points * n);
+  work_ -= 5e-3 * size * size * (1.0 + 0.01 * (size + static_cast<double>(right.cols())));
   const MatrixXd X = flyball::detail::solve_linear(M, right);
   return propagators_.emplace(key, Propagator{X.leftCols(n), X.rightCols(points * q)})
       .first->second;
 }
 
-Expected<void> Motion::cross(double until, long& steps) {
+Expected<void> Motion::cross(double until) {
   while (until - t_ > same() && next_sample_ < samples_) {
     const double distance = until - t_;
     const double parts = std::ceil(distance / std::min(wanted_, shortest_) * (1.0 - 1e-9));
     const double length = distance / std::max(parts, 1.0);
-    if (++steps > most_steps) {
+    work_ -= 1.0 + 3e-3 * static_cast<double>(x_.size() * (x_.size() + points * B_.cols()));
+    if (!(work_ >= 0.0)) {
       return refusal(SystemError::no_convergence, "response", "the motion")
-          .got(flyball::detail::format("not followed beyond {} s by {} steps", t_, most_steps))
+          .got(flyball::detail::format("not followed beyond {} s by as many steps as it may take",
+                                       t_))
           .hint("ask for a shorter time, or leave out what is fast");
     }
     if (!take_step(length, parts <= 1.0 ? until : t_ + length)) {

@@ -93,7 +93,7 @@ class Motion {
   const Propagator& propagator(double length);
 
   /// From here to a place, in equal steps of at most the wanted length.
-  Expected<void> cross(double until, long& steps);
+  Expected<void> cross(double until);
 
   /// False where the step is too long.
   bool take_step(double length, double end);
@@ -110,6 +110,7 @@ class Motion {
   VectorXd scaling_{};
   MatrixXd B_{};
   double shortest_ = 0.0;
+  double work_ = 0.0;    ///< What is left, in steps.
   double wanted_ = 0.0;  ///< Length of a step.
   int patience_ = 3;
   int accepted_ = 0;

@@ -28,13 +28,14 @@ using detail::count_right_of;
 using detail::endless_from;
 using detail::jump_abscissa;
 using detail::largest_radius;
+using detail::PoleCountWork;
 using detail::radius_of;
 using flyball::detail::eigenvalues_of;
 
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr Index most_points = 500;
+constexpr Index most_points = 400;
 constexpr std::size_t most_poles = 30;
 constexpr std::string_view where = "poles";
 
@@ -204,7 +205,7 @@ double dividing_line(const Characteristic& f, const std::vector<Complex>& upper,
 /// Those right of the line and the first, with the conjugates; nothing where the count of those
 /// that are there is another.
 std::optional<DelayPoles> counted(const Characteristic& f, const std::vector<Complex>& upper,
-                                  double jumps, double highest) {
+                                  double jumps, double highest, PoleCountWork& work) {
   if (upper.empty()) {
     return std::nullopt;
   }
@@ -221,7 +222,7 @@ std::optional<DelayPoles> counted(const Characteristic& f, const std::vector<Com
       }
     }
   }
-  if (count_right_of(f, line, highest) != right) {
+  if (count_right_of(f, line, highest, work) != right) {
     return std::nullopt;
   }
   DelayPoles found;
@@ -235,7 +236,7 @@ std::optional<DelayPoles> counted(const Characteristic& f, const std::vector<Com
   }
   // More are unstable than are listed.
   for (const double border : {-rounding, -1e4 * rounding, 1e4 * rounding}) {
-    if (const auto unstable = count_right_of(f, border, highest)) {
+    if (const auto unstable = count_right_of(f, border, highest, work)) {
       found.unstable = *unstable;
       return found;
     }
@@ -246,6 +247,7 @@ std::optional<DelayPoles> counted(const Characteristic& f, const std::vector<Com
 /// The rightmost, and the count of those right of a line in the widest gap.
 Expected<DelayPoles> judged(const Characteristic& f, double jumps) {
   const double highest = highest_frequency(f);
+  PoleCountWork work(f);
   for (int attempt = 0; attempt < 3; ++attempt) {
     std::vector<Index> points;
     double total = static_cast<double>(f.states());
@@ -257,7 +259,7 @@ Expected<DelayPoles> judged(const Characteristic& f, double jumps) {
     if (total > static_cast<double>(most_points)) {
       break;
     }
-    if (auto answer = counted(f, candidates(f, seeds(f, points), true), jumps, highest)) {
+    if (auto answer = counted(f, candidates(f, seeds(f, points), true), jumps, highest, work)) {
       return *std::move(answer);
     }
   }
@@ -267,8 +269,8 @@ Expected<DelayPoles> judged(const Characteristic& f, double jumps) {
         "out of reach: the loops' gain matters up to {} rad/s, at which the delays are {} rad",
         highest, highest * f.delays().sum()));
   }
-  if (auto answer =
-          counted(f, candidates(f, seeds_along_the_axis(f, highest), false), jumps, highest)) {
+  if (auto answer = counted(f, candidates(f, seeds_along_the_axis(f, highest), false), jumps,
+                            highest, work)) {
     return *std::move(answer);
   }
   return not_found("not found: their number does not agree with the turns of the determinant");

@@ -11,9 +11,11 @@
 #include <flyball/math/search/minimum.hpp>
 #include <flyball/systems/interconnection.hpp>
 
+#include "classical/delay_frequency.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/spectral_norm.hpp"
 
 namespace flyball::classical {
 
@@ -118,53 +120,72 @@ Expected<System> opened_at(const System& loop, Index channel, std::string_view w
 }
 
 /// min over diagonal D of σ(D M D⁻¹): convex in ln D, one entry after the other.
-/// @param log_d  Where it begins, and what it found. @param floor  An answer below is of no use:
-/// what the beginning gives is enough then.
-double scaled_gain(const Eigen::MatrixXcd& M, Eigen::VectorXd& log_d, double floor = 0.0) {
-  const Index m = M.rows();
-  const auto gain = [&] {
-    Eigen::MatrixXcd scaled = M;
-    for (Index i = 0; i < m; ++i) {
-      for (Index j = 0; j < m; ++j) {
-        scaled(i, j) *= std::exp(log_d(i) - log_d(j));
+class ScaledGain {
+ public:
+  /// @param channels  m. Of up to four 150 000 norms may be looked at, of more as many as take as
+  /// long, O(m³) each.
+  explicit ScaledGain(Index channels)
+      : left_(std::min(150'000L, 10'000'000L / (channels * channels * channels))) {}
+
+  /// An upper bound, and the minimum unless the work is done before.
+  /// @param log_d  Where it begins, and what it found. @param floor  An answer below is of no use:
+  /// it ends there.
+  double operator()(const Eigen::MatrixXcd& M, Eigen::VectorXd& log_d, double floor = 0.0) {
+    const auto gain = [&] {
+      --left_;
+      Eigen::MatrixXcd scaled = M;
+      for (Index i = 0; i < M.rows(); ++i) {
+        for (Index j = 0; j < M.rows(); ++j) {
+          scaled(i, j) *= std::exp(log_d(i) - log_d(j));
+        }
       }
+      return flyball::detail::spectral_norm_of_complex(scaled);
+    };
+    double best = gain();
+    if (M.rows() == 1 || best <= floor) {
+      return best;
     }
-    return flyball::detail::singular_values_of_complex(scaled)(0);
-  };
-  double best = gain();
-  if (m == 1 || best <= floor) {
+    double reach = 4.0;
+    constexpr int most_rounds = 60;
+    for (int round = 0; round < most_rounds && reach > 1e-9; ++round) {
+      const double before = best;
+      for (Index i = 1; i < M.rows(); ++i) {
+        if (left_ <= 0) {
+          return best;
+        }
+        const double middle = log_d(i);
+        const auto lowest = find_minimum(
+            [&](double x) {
+              log_d(i) = x;
+              return gain();
+            },
+            middle - reach, middle + reach, {.absolute_tolerance = std::max(1e-9, 1e-4 * reach)});
+        log_d(i) = lowest && lowest->value <= best ? lowest->x : middle;
+        best = lowest ? std::min(best, lowest->value) : best;
+        if (best <= floor) {
+          return best;
+        }
+      }
+      // Ridges slow it down: the search narrows where a round gains nothing.
+      reach = best < before * (1.0 - 1e-6) ? reach : 0.25 * reach;
+    }
     return best;
   }
-  double reach = 4.0;
-  constexpr int most_rounds = 60;
-  for (int round = 0; round < most_rounds && reach > 1e-9; ++round) {
-    const double before = best;
-    for (Index i = 1; i < m; ++i) {
-      const double middle = log_d(i);
-      const auto lowest = find_minimum(
-          [&](double x) {
-            log_d(i) = x;
-            return gain();
-          },
-          middle - reach, middle + reach, {.absolute_tolerance = 1e-9});
-      log_d(i) = lowest && lowest->value <= best ? lowest->x : middle;
-      best = lowest ? std::min(best, lowest->value) : best;
-    }
-    // Ridges slow it down: the search narrows where a round gains nothing.
-    reach = best < before * (1.0 - 1e-6) ? reach : 0.25 * reach;
-  }
-  return best;
-}
+
+ private:
+  long left_;
+};
 
 /// The largest of it over the frequencies.
 Expected<Peak> largest_scaled_gain(const FrequencyResponse& difference, double full_frequency) {
   FLYBALL_TRY(const auto grid, frequency_grid(difference));
   Eigen::VectorXd log_d = Eigen::VectorXd::Zero(difference.outputs());
+  ScaledGain scaled_gain(difference.outputs());
   // The unscaled gain bounds it: from the largest on, until no other can exceed the best.
   std::vector<Peak> places;
   const auto consider = [&](double w) {
     const Eigen::MatrixXcd M = difference.at(w);
-    places.push_back({M.allFinite() ? flyball::detail::singular_values_of_complex(M)(0) : 0.0, w});
+    places.push_back({M.allFinite() ? flyball::detail::spectral_norm_of_complex(M) : 0.0, w});
   };
   for (const double w : grid.frequency) {
     consider(w);
@@ -174,12 +195,13 @@ Expected<Peak> largest_scaled_gain(const FrequencyResponse& difference, double f
   std::stable_sort(places.begin(), places.end(),
                    [](const Peak& a, const Peak& b) { return a.value > b.value; });
   Peak best;
+  constexpr double as_large = 1.0 + 1e-7;  // of a plateau one place is enough
   for (const Peak& place : places) {
-    if (place.value <= best.value) {
+    if (place.value <= best.value * as_large) {
       break;
     }
     Eigen::VectorXd own = log_d;
-    const double value = scaled_gain(difference.at(place.frequency), own, best.value);
+    const double value = scaled_gain(difference.at(place.frequency), own, best.value * as_large);
     if (value > best.value) {
       log_d = own;
       best = {value, place.frequency};
@@ -283,15 +305,16 @@ Expected<MimoMargins> mimo_margins(const DelaySystem& loop) {
   FLYBALL_TRY_IN(where, const DelaySystem T, rewired(loop, {-one, one, one, 0.0 * one}));
   FLYBALL_TRY_IN(where, const DelaySystem difference, rewired(loop, {-one, one, -2.0 * one, one}));
   MimoMargins margins;
-  FLYBALL_TRY_IN(where, margins.stable, is_stable(S));
-  FLYBALL_TRY_IN(where, margins.sensitivity, peak_gain(S));
-  FLYBALL_TRY_IN(where, margins.complementary, peak_gain(T));
-  FLYBALL_TRY_IN(where, const Peak of_difference, peak_gain(difference));
+  FLYBALL_TRY_IN(where, const DelayPoles poles, rightmost_poles(S));
+  margins.stable = poles.stable;
+  FLYBALL_TRY_IN(where, margins.sensitivity, detail::peak_gain_with(S, poles.poles));
+  FLYBALL_TRY_IN(where, margins.complementary, detail::peak_gain_with(T, poles.poles));
+  FLYBALL_TRY_IN(where, const Peak of_difference, detail::peak_gain_with(difference, poles.poles));
   margins.full_disk_margin = margins.stable ? 2.0 / of_difference.value : 0.0;
   margins.disk_margin = margins.full_disk_margin;
   margins.disk_frequency = of_difference.frequency;
   if (m > 1) {
-    FLYBALL_TRY_IN(where, const auto response, frequency_response(difference));
+    const FrequencyResponse response = detail::response_with(difference, poles.poles);
     FLYBALL_TRY_IN(where, const Peak scaled,
                    largest_scaled_gain(response, of_difference.frequency));
     margins.disk_margin = margins.stable ? 2.0 / scaled.value : 0.0;

@@ -230,6 +230,10 @@ TEST(DelayMargins, Errors) {
                               .value())
           .value();
   EXPECT_TRUE(peak_gain(sampled).error().is(TransferError::period_mismatch));
+  // Of a gain near one for ever crossings do not end, however fast the fastest pole is.
+  const auto endless = loop_margins(late("exp(-1.5s) + 0.2*exp(-s) + 1e8/(s+1e8)*exp(-0.001s)"));
+  ASSERT_FALSE(endless.has_value());
+  EXPECT_TRUE(endless.error().is(SystemError::no_convergence));
   // With a gain above one at infinite frequency the least delay destabilizes.
   const LoopMargins neutral = loop_margins(late("(s+1)/(s+2)*0.6 + 0.6*exp(-s)")).value();
   EXPECT_EQ(neutral.delay_margin, 0.0);

@@ -12,6 +12,7 @@
 #include <flyball/classical/step_metrics.hpp>
 #include <flyball/core/random.hpp>
 
+#include "classical/delay_pole_count.hpp"
 #include "classical/transfer_cases.hpp"
 #include "support/random_systems.hpp"
 
@@ -226,6 +227,42 @@ TEST(DelayPoles, DiscreteSystems) {
     EXPECT_LE(std::abs(z * z * z * (z - 0.9) + 0.2), 1e-14);
   }
   EXPECT_EQ(found.stable, loop_margins(L).value().stable);
+}
+
+// s + 1 + 2e^{-3s} = 0 has a pair with a positive real part. All counts of a system share their
+// work: what is not left is not told, whatever the line.
+TEST(DelayPoles, CountsShareTheirWork) {
+  const auto L = closed(transfer({2.0}, {1.0, 1.0}, 3.0));
+  const detail::Characteristic f(L.form());
+  detail::PoleCountWork work(f);
+  const long whole = work.left;
+  EXPECT_EQ(detail::count_right_of(f, 0.0, 2.0, work), 2);
+  const long taken = whole - work.left;
+  EXPECT_GT(taken, 10);
+  EXPECT_LT(taken, whole / 10);
+  EXPECT_EQ(detail::count_right_of(f, 0.0, 2.0, work), 2);
+  EXPECT_EQ(whole - work.left, 2 * taken);
+  work.left = taken / 2;
+  EXPECT_FALSE(detail::count_right_of(f, 0.0, 2.0, work));
+  EXPECT_FALSE(detail::count_right_of(f, 0.0, 2.0, work));
+}
+
+// det M turns as it does, whatever the units of the signals in the loop: entries of 1e±6.
+TEST(DelayPoles, CountsInAnyUnits) {
+  const DelaySystem G = system_of(transfer({2.0}, {1.0, 1.0}, 3.0));
+  for (const double size : {1e-6, 1e-3, 1.0, 1e6}) {
+    const auto unit = [](double value) {
+      return DelaySystem::gain(MatrixXd::Constant(1, 1, value)).value();
+    };
+    const auto scaled = series(unit(size), G);
+    ASSERT_TRUE(scaled.has_value()) << to_string(scaled.error());
+    const auto closed = feedback(*scaled, unit(1.0 / size));
+    ASSERT_TRUE(closed.has_value()) << to_string(closed.error());
+    const DelaySystem& loop = *closed;
+    const auto found = rightmost_poles(loop);
+    ASSERT_TRUE(found.has_value()) << to_string(found.error());
+    EXPECT_EQ(found->unstable, 2) << size;
+  }
 }
 
 // A thousand radians of dead time at frequencies that matter are told as such.

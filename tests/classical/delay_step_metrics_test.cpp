@@ -101,6 +101,18 @@ TEST(DelayStepMetrics, EachChannelIsItsOwn) {
   EXPECT_TRUE(step_metrics(both, 0, 0, 1.0).error().is(ArgumentError::out_of_range));
 }
 
+// No step is longer than the shortest delay: what takes too many is told before the first of them.
+TEST(DelayStepMetrics, ADelayThatIsNextToNoneIsRefused) {
+  const auto late = DelaySystem::create(transfer({1.0}, {1.0}, 1.0)).value();
+  const auto soon = DelaySystem::create(transfer({2.0}, {1.0}, 5e-324)).value();
+  const auto error = step_metrics(parallel(late, soon).value(), 0, 0).error();
+  EXPECT_TRUE(error.is(ArgumentError::out_of_range));
+  EXPECT_EQ(to_string(error).substr(0, 55),
+            "response: the shortest delay is 5e-324 s; it must be at");
+  const auto near = DelaySystem::create(transfer({2.0}, {1.0}, 1e-3)).value();
+  EXPECT_EQ(step_metrics(parallel(late, near).value(), 0, 0)->final_value, 3.0);
+}
+
 TEST(DelayStepMetrics, OfADiscreteLoopItsSamples) {
   const auto G = TransferFunction::create(Eigen::Vector2d(0.1, 0.08),
                                           Eigen::Vector3d(1.0, -1.5, 0.6), Time(0.02), Time(0.06))

@@ -181,6 +181,44 @@ TEST(MimoMargins, SpinningSatellite) {
   EXPECT_GE(margins.disk_margin, margins.full_disk_margin);
 }
 
+// Loops beside each other bear what the one that bears least does; coordinates of another size,
+// y = S y', leave that as it is, and the full margin alone is smaller there. Of five channels, of
+// which three are alike, the search has a plateau.
+TEST(MimoMargins, OfManyChannelsInOtherCoordinates) {
+  constexpr int channels = 5;
+  ContinuousSystem<> plant;
+  plant.A = MatrixXd::Zero(2 * channels, 2 * channels);
+  plant.B = MatrixXd::Zero(2 * channels, channels);
+  plant.C = MatrixXd::Zero(channels, 2 * channels);
+  plant.D = MatrixXd::Zero(channels, channels);
+  double least = 2.0;
+  for (int k = 0; k < channels; ++k) {
+    const double gain = k < 3 ? 1.0 : 1.0 + 0.3 * k;
+    const auto one =
+        TransferFunction::create(VectorXd::Constant(1, gain), Eigen::Vector3d(1.0, 1.0, 0.0))
+            .value();
+    least = std::min(least, loop_margins(one)->disk_margin);
+    const auto s = one.to_state_space();
+    plant.A.block(2 * k, 2 * k, 2, 2) = s.A;
+    plant.B.block(2 * k, k, 2, 1) = s.B;
+    plant.C.block(k, 2 * k, 1, 2) = s.C;
+  }
+  const auto plain = mimo_margins(plant).value();
+  EXPECT_NEAR(plain.disk_margin, least, 1e-5 * least);
+  VectorXd size(channels);
+  size << 1.0, 30.0, 0.1, 2.0, 1e-3;
+  // A small coupling from each channel to the next, so that the coordinates matter.
+  for (int k = 0; k + 1 < channels; ++k) {
+    plant.C(k, 2 * (k + 1)) = 0.02;
+  }
+  const auto coupled = mimo_margins(plant).value();
+  plant.C = size.asDiagonal() * plant.C;
+  plant.B = plant.B * size.cwiseInverse().asDiagonal();
+  const auto other = mimo_margins(plant).value();
+  EXPECT_NEAR(other.disk_margin, coupled.disk_margin, 1e-3 * coupled.disk_margin);
+  EXPECT_LT(other.full_disk_margin, 0.9 * other.disk_margin);
+}
+
 // Of one channel all of them are those of `loop_margins`, and the four functions those of the sum.
 TEST(MimoMargins, OfOneChannel) {
   Random random(43);

@@ -21,7 +21,8 @@ namespace flyball::classical {
 /// above one at infinite frequency.
 /// @errors ArgumentError::wrong_shape; SystemError::algebraic_loop, no_convergence (of
 /// `rightmost_poles`, or where crossings do not end).
-/// Cost: some thousand systems of n + delays equations.
+/// Cost: some thousand systems of n + delays equations; for the crossings at most 60 000, for the
+/// peaks 20 000 each, and of more than ten equations, N, fewer by (10/N)³.
 [[nodiscard]] Expected<LoopMargins> loop_margins(const DelaySystem& loop);
 
 /// `mimo_margins` of a square loop with dead time in any of its channels or loops. Peaks are found

@@ -39,11 +39,13 @@ struct DelayResponse {
 /// is stepped as it is.
 /// @param u  samples x inputs. @param x0  states. @param step  s; of a discrete system its period.
 /// @errors ArgumentError for shapes and entries; out_of_range for a step that is not the period,
-/// for more than 200 states and for a delay below a millionth of the time; not_finite where the
-/// response exceeds the largest double; SystemError::no_convergence where two million steps do not
-/// suffice. Cost: O((12 n)³) for each length of step, O(n²) a step; allocates. Source: Bellen and
-/// Zennaro, "Numerical Methods for Delay Differential Equations" (2003), chapters 3 and 4; Hairer
-/// and Wanner, "Solving Ordinary Differential Equations II", section IV.5.
+/// for more than 200 states and for a delay below a millionth of the time, or one that takes more
+/// steps than there are; not_finite where the response exceeds the largest double;
+/// SystemError::no_convergence where 250 000 steps and four a sample do not suffice; steps of ten
+/// states count as three, and (n/10)³ times as many of n > 10 are taken. Cost: O((12 n)³) for each
+/// length of step, which counts as the steps that take as long, O(n²) a step; allocates. Source:
+/// Bellen and Zennaro, "Numerical Methods for Delay Differential Equations" (2003), chapters 3 and
+/// 4; Hairer and Wanner, "Solving Ordinary Differential Equations II", section IV.5.
 [[nodiscard]] Expected<DelayResponse> forced_response(const DelaySystem& system, const MatrixRef& u,
                                                       const MatrixRef& x0, Time step,
                                                       InputShape shape = InputShape::held);

@@ -175,6 +175,7 @@ std::optional<Reduced<Matrix>> cayley(const Reduced<Matrix>& r, double gamma) {
 struct Progress {
   int iterations = 0;      ///< Doubling steps plus Newton steps.
   bool converged = false;  ///< Doubling did, so that a solution seems to be there.
+  int idle = 0;            ///< Newton's corrections shrank no more, so often.
 };
 
 /// Structure-preserving doubling:
@@ -210,6 +211,11 @@ std::optional<Matrix> doubling(Reduced<Matrix> r, Progress& progress) {
 template <class Matrix>
 std::optional<Matrix> newton(const Equation<Matrix>& e, Matrix X, Progress& progress) {
   double previous = std::numeric_limits<double>::infinity();
+  // Corrections that are small and shrink no more are what this precision leaves of F.
+  constexpr double small = 1e-6;
+  constexpr int most_idle = 8;
+  double least = small;
+  int idle = 0;
   for (int k = 0; k < 60; ++k) {
     ++progress.iterations;
     const auto here = evaluate(e, X);
@@ -235,6 +241,13 @@ std::optional<Matrix> newton(const Equation<Matrix>& e, Matrix X, Progress& prog
       return X;
     }
     previous = relative;
+    const bool shrinks = relative < 0.7 * least;
+    idle = shrinks || least == small ? 0 : idle + 1;
+    least = shrinks ? relative : least;
+    if (idle == most_idle) {
+      ++progress.idle;
+      return std::nullopt;
+    }
   }
   if (!(previous < converged_step)) {
     return std::nullopt;
@@ -286,12 +299,15 @@ inline MatrixXd uneven_diagonal(Index n, double size) {
 inline constexpr double shifts[] = {0.0, 1.0, 30.0, -0.3, 1e-3, 1e3, -10.0};
 inline constexpr double cayley_parameters[] = {1.0, 0.03, 30.0};
 
-/// The first of so many shifts and Cayley parameters that leads to the solution.
+/// The first of so many shifts and Cayley parameters that leads to the solution. What is left of F
+/// at X does not depend on them: from the second time on that Newton's corrections shrink no more
+/// the precision is not enough.
 template <class Matrix>
 std::optional<RiccatiDigits<Matrix>> solve_with(const Equation<Matrix>& e,
                                                 std::span<const double> factors,
                                                 std::span<const double> parts, Progress& progress) {
   const Index n = e.A.rows();
+  const int most_idle = progress.idle + 2;
   const auto reduced = reduce_extended(e);
   const auto attempt = [&](const Matrix& X0, const std::optional<Matrix>& Y) {
     const auto X = Y ? newton(e, sum(X0, 1.0, *Y), progress) : std::nullopt;
@@ -307,6 +323,9 @@ std::optional<RiccatiDigits<Matrix>> solve_with(const Equation<Matrix>& e,
       }
       if (auto answer = attempt(X0, doubling(*r, progress))) {
         return answer;
+      }
+      if (progress.idle == most_idle) {
+        break;
       }
     }
     return std::nullopt;
@@ -330,6 +349,9 @@ std::optional<RiccatiDigits<Matrix>> solve_with(const Equation<Matrix>& e,
       }
       if (auto answer = attempt(X0, doubling(*discrete, progress))) {
         return answer;
+      }
+      if (progress.idle == most_idle) {
+        return std::nullopt;
       }
     }
   }

@@ -9,6 +9,7 @@
 #include <flyball/control/lqr.hpp>
 #include <flyball/core/random.hpp>
 #include <flyball/math/derivatives/differentiation.hpp>
+#include <flyball/math/riccati/riccati.hpp>
 #include <flyball/systems/discretize.hpp>
 
 #include "book_drive.hpp"
@@ -112,6 +113,25 @@ TEST(LtvDrive, EndsOfTheRange) {
   Gain back = slow;
   back.col(1) *= -1.0;
   EXPECT_EQ(follower.K(-0.1), back);
+}
+
+// A drive that turns a million times faster than it drives asks each gain for sixty digits.
+// Newton's corrections that shrink no more end an attempt in fewer: with sixty each of seven took
+// 440 steps.
+TEST(LtvDrive, GainsThatNeedMoreDigitsAreFoundInAFewSteps) {
+  const auto drive =
+      mechanisms::differential_drive(
+          mechanisms::DriveGains{
+              .kV_linear = 1e-300, .kA_linear = 100.0, .kV_angular = 5e-324, .kA_angular = 0.02})
+          .value();
+  const auto model = drive_error_dynamics(drive, Length(1e-6), 0.5).value();
+  const auto sampled = discretize_zoh(model.A, model.B, Time(0.7822265625)).value();
+  const auto Q = bryson({0.0625, 1.0, 1e-6, 1.0, 1.0}).value();
+  const auto R = bryson({0.001, 0.001}).value();
+  const auto found = dare(sampled.A, sampled.B, Q, R);
+  ASSERT_TRUE(found.has_value()) << to_string(found.error());
+  EXPECT_LT(found->residual, 1e-13);
+  EXPECT_LT(found->iterations, 250);
 }
 
 // The feedforward alone takes the drive from one reference's velocities to the next's, exactly.

@@ -1,8 +1,12 @@
+#include <cmath>
+#include <utility>
+
 #include <gtest/gtest.h>
 
 #include "math/dense/dense.hpp"
 #include "math/dense/dense_reduction.hpp"
 #include "math/dense/ordinary_units.hpp"
+#include "math/dense/spectral_norm.hpp"
 #include "support/random_systems.hpp"
 
 namespace flyball {
@@ -61,6 +65,22 @@ TEST(Dense, DecomposesInAnyUnit) {
       same(detail::solve_least_squares(A_unit, B), -unit, detail::solve_least_squares(A, B));
     }
   }
+}
+
+TEST(Dense, SpectralNormIsTheLargestSingularValue) {
+  Random random(43);
+  for (const auto& [rows, columns] : {std::pair{1, 1}, {1, 6}, {6, 1}, {3, 3}, {8, 8}, {4, 7}}) {
+    for (const int unit : {-1000, -600, 0, 600, 900}) {
+      const MatrixXcd C = random_matrix(random, rows, columns) +
+                          std::complex<double>(0.0, 1.0) * random_matrix(random, rows, columns);
+      const double expected = detail::singular_values_of_complex(C)(0);
+      const double found = detail::spectral_norm_of_complex(detail::times_power(C, unit));
+      EXPECT_NEAR(std::ldexp(found, -unit) / expected, 1.0, 1e-14) << rows << " x " << columns;
+    }
+  }
+  EXPECT_EQ(detail::spectral_norm_of_complex(MatrixXcd::Zero(2, 3)), 0.0);
+  EXPECT_EQ(detail::spectral_norm_of_complex(MatrixXcd(0, 3)), 0.0);
+  EXPECT_TRUE(std::isnan(detail::spectral_norm_of_complex(MatrixXcd::Constant(2, 2, NAN))));
 }
 
 }  // namespace
