@@ -141,9 +141,15 @@ std::vector<std::size_t> fresh_rows(std::span<const double> time, std::span<cons
                                     double period) {
   std::vector<std::size_t> rows;
   for (std::size_t i = 1; i < values.size(); ++i) {
-    const bool overdue = !rows.empty() && time[i] - time[rows.back()] > 1.5 * period;
-    if (rows.empty() || values[i] != values[i - 1] || overdue) {
+    if (rows.empty() || values[i] != values[i - 1]) {
       rows.push_back(i);
+    } else if (const double due = time[rows.back()] + period; time[i] - due > 0.5 * period) {
+      // Refreshed to the same value: where that was due, not where it is noticed.
+      std::size_t row = rows.back() + 1;
+      while (row < i && std::abs(time[row + 1] - due) <= std::abs(time[row] - due)) {
+        ++row;
+      }
+      rows.push_back(row);
     }
   }
   return rows;

@@ -18,7 +18,7 @@ namespace flyball::identification {
                                     std::vector<double> TestRun::* column);
 
 /// Rows that carry a new value: those that change, and, where the value stays the same for longer
-/// than a refresh takes, one row a refresh period.
+/// than a refresh takes, the row at which each further refresh was due.
 [[nodiscard]] std::vector<std::size_t> fresh_rows(std::span<const double> time,
                                                   std::span<const double> values, double period);
 
