@@ -13,8 +13,9 @@
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "identification/subspace_data.hpp"
+#include "identification/subspace_states.hpp"
 #include "math/dense/dense.hpp"
-#include "math/dense/dense_reduction.hpp"
+#include "math/dense/panels.hpp"
 
 namespace flyball::identification {
 
@@ -26,99 +27,8 @@ namespace {
 
 constexpr std::string_view where = "fit_subspace";
 
-ScaledSignals scaled(const MatrixRef& u, const MatrixRef& y) {
-  const auto units = [](const MatrixRef& signals) {
-    VectorXd of(signals.cols());
-    for (Index j = 0; j < signals.cols(); ++j) {
-      const double size =
-          signals.col(j).stableNorm() / std::sqrt(static_cast<double>(signals.rows()));
-      of(j) = size > 0.0 ? std::ldexp(1.0, std::ilogb(size)) : 1.0;
-    }
-    return of;
-  };
-  ScaledSignals record{u, y, units(u), units(y)};
-  record.u *= record.u_unit.cwiseInverse().asDiagonal();
-  record.y *= record.y_unit.cwiseInverse().asDiagonal();
-  return record;
-}
-
-/// Where the block triangular factor's parts are.
-struct Parts {
-  Index m;
-  Index p;
-  Index s;
-  const MatrixXd& L;
-
-  [[nodiscard]] Index past() const { return s * (m + p); }
-  [[nodiscard]] auto L21() const { return L.block(s * m, 0, past(), s * m); }
-  [[nodiscard]] auto L22() const { return L.block(s * m, s * m, past(), past()); }
-  [[nodiscard]] auto L32() const { return L.block(s * m + past(), s * m, s * p, past()); }
-  [[nodiscard]] auto L33() const { return L.bottomRightCorner(s * p, s * p); }
-};
-
-/// The weighted future as the past tells it: left singular vectors, singular values, and the
-/// weighting J⁻¹.
-struct Observed {
-  MatrixXd J;
-  MatrixXd U;
-  VectorXd values;
-};
-
 MatrixXd lower_solve(const MatrixXd& J, const MatrixXd& right) {
   return J.triangularView<Eigen::Lower>().solve(right);
-}
-
-/// Lower triangular J with J Jᵀ = [L32 L33][L32 L33]ᵀ, or nothing where that is singular: data
-/// without noise.
-std::optional<MatrixXd> future_factor(const Parts& parts) {
-  MatrixXd both(parts.past() + parts.s * parts.p, parts.s * parts.p);
-  both << parts.L32().transpose(), parts.L33().transpose();
-  MatrixXd J = detail::triangle_of(both).transpose();
-  const VectorXd size = both.colwise().norm();
-  if ((J.diagonal().cwiseAbs().array() > 1e-7 * size.array()).all()) {
-    return J;
-  }
-  return std::nullopt;
-}
-
-/// U and σ of M Mᵀ = U σ² Uᵀ, with half of the digits: those that noise leaves.
-void from_square(const MatrixXd& square, Observed& observed) {
-  const detail::SymmetricEigensystem modes = detail::symmetric_eigensystem_of(square);
-  observed.U = modes.vectors.rowwise().reverse();
-  observed.values = modes.values.reverse().cwiseMax(0.0).cwiseSqrt();
-}
-
-Observed observe(const Parts& parts, SubspaceWeighting weighting, const MatrixXd* J) {
-  const Index rows = parts.s * parts.p;
-  Observed observed{MatrixXd::Identity(rows, rows), {}, {}};
-  MatrixXd M = parts.L32();
-  if (J == nullptr) {
-    if (weighting == SubspaceWeighting::n4sid) {
-      // L32 L22⁺ [L21 L22]
-      MatrixXd past(parts.past(), parts.s * parts.m + parts.past());
-      past << parts.L21(), parts.L22();
-      M = detail::solve_least_squares(parts.L22().transpose(), M.transpose()).transpose() * past;
-    }
-    // Without the orthogonal factor of Mᵀ, which changes neither.
-    const detail::SingularValues svd =
-        detail::svd_of(detail::triangle_of(M.transpose()).transpose());
-    observed.U = svd.U;
-    observed.values = svd.values;
-    return observed;
-  }
-  if (weighting == SubspaceWeighting::cva) {
-    observed.J = *J;
-    M = lower_solve(*J, M);
-  }
-  MatrixXd square = detail::product_transposed(M, M);
-  if (weighting == SubspaceWeighting::n4sid) {
-    const MatrixXd through =
-        parts.L22().transpose().triangularView<Eigen::Upper>().solve(M.transpose()).transpose() *
-        parts.L21();
-    square += detail::product_transposed(through, through);
-  }
-  from_square(square, observed);
-  return observed;
 }
 
 /// Bauer's criterion over the canonical correlations, or the gaps of exact data.
@@ -191,26 +101,22 @@ MatrixXd reflected(const MatrixXd& A) {
       .real();
 }
 
-/// What the states and what follows are told by: [x⁺; y] over the past's coordinates.
-struct Future {
-  const MatrixXd& X;
-  const MatrixXd& target;
-  Index columns;
-};
-
 /// The model of A and C: its gain by what they leave of the future, B, D and x0 by the whole
 /// record; in the record's units.
-Expected<InnovationsModel> complete(const ScaledSignals& record, const Future& future,
-                                    const MatrixXd& A, const MatrixXd& C, Time period,
+Expected<InnovationsModel> complete(const ScaledSignals& record, const StateSequence& states,
+                                    Index columns, const MatrixXd& A, Time period,
                                     const SubspaceOptions& options, bool& noise_determined) {
+  const MatrixXd& C = states.C;
   const Index n = A.rows();
-  const Index m = record.u.cols();
+  const Index m = record.inputs;
   const Index p = C.rows();
-  MatrixXd left = future.target;
-  left.topLeftCorner(n, future.X.cols()) -= A * future.X;
-  left.bottomLeftCorner(p, future.X.cols()) -= C * future.X;
-  const MatrixXd covariance = detail::symmetrized(detail::product_transposed(left, left)) /
-                              static_cast<double>(future.columns);
+  MatrixXd dynamics(n + p, n);
+  dynamics << A, C;
+  MatrixXd left = states.target;
+  detail::add_product(-1.0, dynamics, states.X, left.leftCols(states.X.cols()));
+  MatrixXd covariance = MatrixXd::Zero(n + p, n + p);
+  detail::add_product_transposed(1.0 / static_cast<double>(columns), left, left, covariance);
+  covariance = detail::symmetrized(covariance);
   const NoiseGain gain = noise_gain(A, C, covariance);
   noise_determined = gain.determined;
   InnovationsModel model;
@@ -240,17 +146,31 @@ Expected<InnovationsModel> complete(const ScaledSignals& record, const Future& f
 }
 
 bool is_stable(const MatrixXd& A) {
+  // A power of less than norm 1 tells sooner than the eigenvalues do.
+  MatrixXd power = A;
+  for (int doubling = 0; doubling < 12; ++doubling) {
+    const double size = power.squaredNorm();
+    if (size < 1.0) {
+      return true;
+    }
+    if (!(size < 1e100)) {
+      break;
+    }
+    MatrixXd square = MatrixXd::Zero(A.rows(), A.cols());
+    detail::add_product(1.0, power, power, square);
+    power.swap(square);
+  }
   return detail::eigenvalues_of(A).cwiseAbs().maxCoeff() < 1.0;
 }
 
 /// -2 log likelihood of normal errors one sample ahead, but for a constant; infinite where the
 /// predictor is of no use.
 double misfit(const ScaledSignals& record, const InnovationsModel& model) {
-  const auto ahead = predict(model, record.u, record.y);
+  const auto ahead = predict(model, record.u(), record.y());
   if (!ahead) {
     return std::numeric_limits<double>::infinity();
   }
-  const MatrixXd errors = record.y - *ahead;
+  const MatrixXd errors = record.y() - *ahead;
   const auto samples = static_cast<double>(errors.rows());
   const auto L = detail::cholesky_of(detail::transposed_product(errors, errors) / samples);
   return L ? 2.0 * samples * L->diagonal().array().log().sum()
@@ -313,71 +233,39 @@ Expected<SubspaceFit> fit_subspace(const MatrixRef& u, const MatrixRef& y, Time 
         .with("needed block rows", static_cast<double>(least));
   }
   const ScaledSignals record = scaled(u, y);
-  const PastAndFuture data = compress(record.u, record.y, s);
-  const Parts parts{m, p, s, data.L};
+  const PastAndFuture data = compress(record, s);
+  const Parts parts{m, p, s, data};
   const VectorXd excitation = data.L.topLeftCorner(s * m, s * m).diagonal().cwiseAbs();
   if (excitation.minCoeff() <= 1e-9 * std::sqrt(static_cast<double>(data.columns))) {
     return refusal(IdentificationError::singular, where)
         .hint("excite every input with more frequencies, or take fewer block rows")
         .with("block rows", static_cast<double>(s));
   }
-  const std::optional<MatrixXd> J = future_factor(parts);
-  const Observed observed = observe(parts, options.weighting, J ? &*J : nullptr);
+  const Index largest = std::min<Index>(wanted, (s - 1) * p);
+  const Observed observed = observe(parts, options.weighting, largest);
 
   SubspaceFit fit;
   fit.block_rows = s;
   fit.singular_values = observed.values;
-  const Index largest = std::min<Index>(wanted, (s - 1) * p);
-  VectorXd correlations = observed.values;
-  if (J && options.weighting != SubspaceWeighting::cva) {
-    correlations = observe(parts, SubspaceWeighting::cva, &*J).values;
-  }
-  fit.criterion = order_criterion(correlations, J.has_value(), largest, parts, samples);
+  fit.criterion = order_criterion(observed.correlations, observed.noisy, largest, parts, samples);
   fit.order = largest;
   if (!options.order) {
     fit.criterion.tail(largest).minCoeff(&fit.order);
     ++fit.order;
   }
-  const Index n = fit.order;
-
-  // Γ = J U₁ √S and X = √S V₁ᵀ of the future; one sample later Γ without its last block row.
-  const VectorXd root = observed.values.head(n).cwiseSqrt().cwiseMax(1e-150);
-  const MatrixXd weighted = observed.U.leftCols(n) * root.asDiagonal();  // J⁻¹ Γ.
-  const MatrixXd Gamma = observed.J * weighted;
-  const Index rest = (s - 1) * p;
-  const MatrixXd J_rest = observed.J.topLeftCorner(rest, rest);
-  const MatrixXd X = root.cwiseInverse().asDiagonal() *
-                     (observed.U.leftCols(n).transpose() * lower_solve(observed.J, parts.L32()));
-  MatrixXd next(rest, parts.past() + p);
-  next << parts.L32().bottomRows(rest), parts.L33().bottomLeftCorner(rest, p);
-  MatrixXd target(n + p, parts.past() + p);
-  target.topRows(n) = detail::solve_least_squares(lower_solve(J_rest, Gamma.topRows(rest)),
-                                                  lower_solve(J_rest, next));
-  target.bottomRows(p) << parts.L32().topRows(p), parts.L33().topLeftCorner(p, p);
+  const StateSequence states = states_of(parts, observed, options.weighting, fit.order);
 
   InnovationsModel& model = fit.model;
-  MatrixXd A;
-  MatrixXd C;
-  if (options.weighting == SubspaceWeighting::moesp) {
-    A = detail::solve_least_squares(Gamma.topRows(rest), Gamma.bottomRows(rest));
-    C = Gamma.topRows(p);
-  } else {
-    const MatrixXd both =
-        detail::solve_least_squares(X.transpose(), target.leftCols(parts.past()).transpose())
-            .transpose();
-    A = both.topRows(n);
-    C = both.bottomRows(p);
-  }
-  const Future future{X, target, data.columns};
-  const bool unstable = !is_stable(A);
-  FLYBALL_TRY(model, complete(record, future, options.stable ? reflected(A) : A, C, period, options,
-                              fit.noise_determined));
+  const bool unstable = !is_stable(states.A);
+  FLYBALL_TRY(model, complete(record, states, data.columns,
+                              unstable && options.stable ? reflected(states.A) : states.A, period,
+                              options, fit.noise_determined));
   if (unstable && !options.stable) {
     // A stable plant's pole near the circle may come out beyond it, and its free run then grows:
     // such a pole stays only where the record is predicted worse without.
     bool determined = false;
-    FLYBALL_TRY(InnovationsModel inside,
-                complete(record, future, reflected(A), C, period, options, determined));
+    FLYBALL_TRY(InnovationsModel inside, complete(record, states, data.columns, reflected(states.A),
+                                                  period, options, determined));
     constexpr double clearly = 12.0;  // χ², of about as many states
     if (misfit(record, inside) < misfit(record, model) + clearly) {
       model = std::move(inside);
@@ -386,12 +274,13 @@ Expected<SubspaceFit> fit_subspace(const MatrixRef& u, const MatrixRef& y, Time 
     }
   }
 
-  model.system.B *= record.u_unit.cwiseInverse().asDiagonal();
-  model.system.C = record.y_unit.asDiagonal() * model.system.C;
-  model.system.D =
-      record.y_unit.asDiagonal() * model.system.D * record.u_unit.cwiseInverse().asDiagonal();
-  model.K *= record.y_unit.cwiseInverse().asDiagonal();
-  model.noise = record.y_unit.asDiagonal() * model.noise * record.y_unit.asDiagonal();
+  const VectorXd u_unit = record.unit.head(m);
+  const VectorXd y_unit = record.unit.tail(p);
+  model.system.B *= u_unit.cwiseInverse().asDiagonal();
+  model.system.C = y_unit.asDiagonal() * model.system.C;
+  model.system.D = y_unit.asDiagonal() * model.system.D * u_unit.cwiseInverse().asDiagonal();
+  model.K *= y_unit.cwiseInverse().asDiagonal();
+  model.noise = y_unit.asDiagonal() * model.noise * y_unit.asDiagonal();
   return fit;
 }
 

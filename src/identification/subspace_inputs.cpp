@@ -1,6 +1,9 @@
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include <flyball/identification/identification_error.hpp>
 #include <flyball/math/regression/streamed_least_squares.hpp>
@@ -8,6 +11,7 @@
 #include "core/try.hpp"
 #include "identification/subspace_data.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/panels.hpp"
 
 namespace flyball::identification {
 
@@ -33,16 +37,16 @@ template <class Take>
 void each_row(const ScaledSignals& record, const InnovationsModel& model, const MatrixXd& W,
               const SubspaceOptions& options, Index size, Take&& take) {
   const Index n = model.system.A.rows();
-  const Index m = record.u.cols();
-  const Index p = record.y.cols();
+  const Index m = record.inputs;
+  const Index p = record.outputs();
   const Index start = options.initial_state ? n : 0;
   const MatrixXd C_T = (W * model.system.C).transpose();
   const MatrixXd Phi = model.system.A - model.K * model.system.C;
   const MatrixXd Phi_T = Phi.transpose();
   const MatrixXd K_T = model.K.transpose();
   // A sample a column: its numbers lie side by side.
-  const MatrixXd u = record.u.transpose();
-  const MatrixXd y = record.y.transpose();
+  const MatrixXd u = record.u().transpose();
+  const MatrixXd y = record.y().transpose();
   // Columns: z of output r and input j at r m + j; then those of x0, Φᵀ^k Cᵀ; then K y's own x̂.
   const Index pairs = p * m;
   MatrixXd Z = MatrixXd::Zero(n, pairs + p + 1);
@@ -98,61 +102,215 @@ void each_row(const ScaledSignals& record, const InnovationsModel& model, const 
   }
 }
 
-/// Least squares by the sums of the rows' products, a block of rows at a time.
-class NormalEquations {
- public:
-  explicit NormalEquations(Index size)
-      : block_(size + 1, 256), sums_(MatrixXd::Zero(size + 1, size + 1)) {}
-
-  void add(const double* row, double target) {
-    double* to = std::copy_n(row, block_.rows() - 1, block_.col(used_).data());
-    *to = target;
-    if (++used_ == block_.cols()) {
-      fold();
+/// F and g of h⁺ = F h + g u whose states are orthonormal for white u, [F g] with orthonormal rows,
+/// F with the given eigenvalues, inside the unit circle, complex ones with their conjugates:
+/// normalised lattices of two states or one in a row, each with an all-pass output for the next. F
+/// beside g. Source: Gray, Markel, IEEE Trans. Acoustics, Speech, and Signal Processing 23 (1975);
+/// Heuberger, Van den Hof, Wahlberg, "Modelling and Identification with Rational Orthogonal Basis
+/// Functions" (2005), chapter 2.
+MatrixXd orthonormal_filter(const Eigen::VectorXcd& eigenvalues) {
+  const Index n = eigenvalues.size();
+  MatrixXd Fg = MatrixXd::Zero(n, n + 1);
+  Eigen::RowVectorXd passed = Eigen::RowVectorXd::Zero(n + 1);  // u, of [h; u].
+  passed(n) = 1.0;
+  const auto below = [](double k) { return std::sqrt((1.0 - k) * (1.0 + k)); };
+  Index done = 0;
+  const auto pair = [&](double sum, double product) {
+    const double k2 = product;
+    const double k1 = std::clamp(-sum / (1.0 + k2), -1.0, 1.0);
+    const double c1 = below(k1);
+    const double c2 = below(k2);
+    Eigen::RowVectorXd inner = c2 * passed;
+    inner(done + 1) -= k2;
+    passed *= k2;
+    passed(done + 1) += c2;
+    Fg.row(done) = c1 * inner;
+    Fg(done, done) -= k1;
+    Fg.row(done + 1) = k1 * inner;
+    Fg(done + 1, done) += c1;
+    done += 2;
+  };
+  std::optional<double> alone;
+  for (const std::complex<double>& value : eigenvalues) {
+    if (value.imag() > 0.0) {
+      pair(2.0 * value.real(), std::norm(value));
+    } else if (value.imag() == 0.0) {
+      if (alone) {
+        pair(*alone + value.real(), *alone * value.real());
+        alone.reset();
+      } else {
+        alone = value.real();
+      }
     }
   }
+  if (alone) {
+    Fg.row(done) = below(*alone) * passed;
+    Fg(done, done) += *alone;
+  }
+  return Fg;
+}
 
-  /// Nothing where squaring the rows has lost more than half of the digits.
-  [[nodiscard]] std::optional<VectorXd> solve() {
-    fold();
-    const Index size = sums_.rows() - 1;
-    const VectorXd unit = sums_.diagonal().head(size).unaryExpr(
-        [](double square) { return square > 0.0 ? 1.0 / std::sqrt(square) : 0.0; });
-    const MatrixXd equations =
-        unit.asDiagonal() * sums_.topLeftCorner(size, size) * unit.asDiagonal();
-    const std::optional<MatrixXd> L = detail::cholesky_of(equations);
-    constexpr double least = 1e-8;
-    if (!L || !(L->diagonal().array().square() > least).all()) {
+/// T with T g = c and T F = Φᵀ T, for each column c of C_T: h of F makes z = T h of Φᵀ, and as F's
+/// states are orthonormal for white inputs, T = Φᵀ T Fᵀ + c gᵀ. By Smith's squared iteration.
+std::vector<MatrixXd> to_states(const MatrixXd& Phi, const MatrixXd& C_T, const MatrixXd& Fg) {
+  const Index n = Phi.rows();
+  std::vector<MatrixXd> T;
+  for (Index r = 0; r < C_T.cols(); ++r) {
+    T.emplace_back(C_T.col(r) * Fg.col(n).transpose());
+  }
+  MatrixXd left = Phi.transpose();
+  MatrixXd right = Fg.leftCols(n).transpose();
+  MatrixXd part(n, n);
+  for (int doubling = 0; doubling < 60; ++doubling) {
+    double step = 0.0;
+    double size = 0.0;
+    for (MatrixXd& of : T) {
+      part.setZero();
+      detail::add_product(1.0, left, of, part);
+      size += of.squaredNorm();
+      const MatrixXd before = of;
+      detail::add_product(1.0, part, right, of);
+      step += (of - before).squaredNorm();
+    }
+    if (!(step > 1e-34 * size)) {
+      break;
+    }
+    part.setZero();
+    detail::add_product(1.0, left, left, part);
+    left.swap(part);
+    part.setZero();
+    detail::add_product(1.0, right, right, part);
+    right.swap(part);
+  }
+  return T;
+}
+
+/// x of S x = b, S's lower triangle given; nothing where more than half of the digits are lost.
+std::optional<VectorXd> solve_normal(MatrixXd S, const VectorXd& b) {
+  const VectorXd unit = S.diagonal().unaryExpr(
+      [](double square) { return square > 0.0 ? 1.0 / std::sqrt(square) : 0.0; });
+  S = MatrixXd(unit.asDiagonal() * S * unit.asDiagonal());
+  constexpr double least = 1e-8;
+  if (!detail::cholesky_in_place(S) || !(S.diagonal().array().square() > least).all()) {
+    return std::nullopt;
+  }
+  VectorXd x = unit.cwiseProduct(b);
+  const Index size = x.size();
+  for (Index j = 0; j < size; ++j) {
+    x(j) /= S(j, j);
+    x.tail(size - j - 1) -= x(j) * S.col(j).tail(size - j - 1);
+  }
+  for (Index j = size - 1; j >= 0; --j) {
+    x(j) = (x(j) - S.col(j).tail(size - j - 1).dot(x.tail(size - j - 1))) / S(j, j);
+  }
+  return VectorXd(unit.cwiseProduct(x));
+}
+
+/// The regression by sums of products, of which each sample needs few: instead of one filter a pair
+/// of output and input one an input, whose states make those of all outputs.
+///
+/// Unknown are x0, B - K D and W D, which meet the sums one by one.
+std::optional<VectorXd> regress_by_products(const ScaledSignals& record,
+                                            const InnovationsModel& model, const MatrixXd& W,
+                                            const SubspaceOptions& options) {
+  const Index n = model.system.A.rows();
+  const Index m = record.inputs;
+  const Index p = record.outputs();
+  const MatrixXd C_T = (W * model.system.C).transpose();
+  const MatrixXd Phi = model.system.A - model.K * model.system.C;
+  MatrixXd Fg(n, n + 1);
+  std::vector<MatrixXd> T;
+  if (p == 1) {
+    Fg << Phi.transpose(), C_T;
+    T.emplace_back(MatrixXd::Identity(n, n));
+  } else {
+    const Eigen::VectorXcd modes = detail::eigenvalues_of(Phi);
+    if (!(modes.cwiseAbs().maxCoeff() < 1.0 - 1e-9)) {
       return std::nullopt;
     }
-    const MatrixXd right = unit.cwiseProduct(sums_.col(size).head(size));
-    return VectorXd(unit.cwiseProduct(detail::solve_symmetric(equations, right).col(0)));
+    Fg = orthonormal_filter(modes);
+    T = to_states(Phi, C_T, Fg);
   }
 
- private:
-  void fold() {
-    sums_ += detail::product_transposed(block_.leftCols(used_), block_.leftCols(used_));
-    used_ = 0;
-  }
+  const auto fours = [](Index rows) { return (rows + 3) / 4 * 4; };
+  MatrixXd F = MatrixXd::Zero(fours(n), n + 1);
+  F.topRows(n) = Fg;
+  MatrixXd both = MatrixXd::Zero(fours(n + p), n + p);
+  both.topLeftCorner(n, n) = Phi;
+  both.block(0, n, n, p) = model.K;
+  both.block(n, 0, p, n) = -C_T.transpose();
+  both.block(n, n, p, p) = W;
+  detail::RecordFilter filter;
+  filter.states = static_cast<int>(n);
+  filter.inputs = static_cast<int>(m);
+  filter.impulse = options.initial_state;
+  filter.F = F.data();
+  filter.both = both.data();
+  const Index rows = detail::filter_rows(filter, static_cast<int>(m + p));
+  MatrixXd sums = MatrixXd::Zero(rows, rows);
+  std::vector<double> memory(
+      static_cast<std::size_t>(detail::filter_workspace(filter.states, static_cast<int>(m + p))));
+  detail::sum_filtered(record.view(), filter, sums.data(), static_cast<int>(rows), memory.data());
 
-  MatrixXd block_;  ///< A row a column, the target last.
-  MatrixXd sums_;
-  Index used_ = 0;
-};
+  // Blocks of unknowns: the columns of B - K D and x0, one a filtered signal; then W D.
+  const Index filtered = m + (options.initial_state ? 1 : 0);
+  const Index states = n * filtered;
+  const Index direct = options.feedthrough ? p * m : 0;
+  const Index first = m + p;  // Of h.
+  MatrixXd S = MatrixXd::Zero(states + direct, states + direct);
+  VectorXd b = VectorXd::Zero(states + direct);
+  MatrixXd turned(states, n);
+  for (Index r = 0; r < p; ++r) {
+    const MatrixXd& to = T[static_cast<std::size_t>(r)];
+    for (Index j = 0; j < filtered; ++j) {
+      // Σ h hᵀ of the signals from this one on, from the right, then from the left.
+      MatrixXd square = sums.block(first + j * n, first + j * n, states - j * n, n);
+      square.topRows(n).triangularView<Eigen::StrictlyUpper>() =
+          square.topRows(n).transpose().triangularView<Eigen::StrictlyUpper>();
+      turned.topRows(states - j * n).setZero();
+      detail::add_product_transposed(1.0, square, to, turned.topRows(states - j * n));
+      for (Index i = j; i < filtered; ++i) {
+        detail::add_product(1.0, to, turned.middleRows((i - j) * n, n),
+                            S.block(i * n, j * n, n, n));
+      }
+      b.segment(j * n, n) += to * sums.col(m + r).segment(first + j * n, n);
+      for (Index i = 0; direct > 0 && i < m; ++i) {
+        S.row(states + i * p + r).segment(j * n, n) = to * sums.col(i).segment(first + j * n, n);
+      }
+    }
+    for (Index j = 0; direct > 0 && j < m; ++j) {
+      for (Index i = j; i < m; ++i) {
+        S(states + i * p + r, states + j * p + r) = sums(i, j);
+      }
+      b(states + j * p + r) = sums(m + r, j);
+    }
+  }
+  std::optional<VectorXd> found = solve_normal(std::move(S), b);
+  if (!found || !found->allFinite()) {
+    return std::nullopt;
+  }
+  VectorXd inputs = found->head(n * m);
+  if (direct > 0) {
+    MatrixXd D = found->tail(direct).reshaped(p, m);
+    D = MatrixXd(W.triangularView<Eigen::Lower>().solve(D));
+    found->tail(direct) = D.reshaped();
+    inputs += (model.K * D).reshaped();
+  }
+  const VectorXd start = found->segment(n * m, states - n * m);
+  found->head(states) << start, inputs;
+  return found;
+}
 
 }  // namespace
 
 Expected<VectorXd> regress_inputs(const ScaledSignals& record, const InnovationsModel& model,
                                   const MatrixXd& W, const SubspaceOptions& options, bool noisy) {
   const Index n = model.system.A.rows();
-  const Index m = record.u.cols();
-  const Index p = record.y.cols();
+  const Index m = record.inputs;
+  const Index p = record.outputs();
   const Index size = (options.initial_state ? n : 0) + n * m + (options.feedthrough ? p * m : 0);
   if (noisy) {
-    NormalEquations normal(size);
-    each_row(record, model, W, options, size,
-             [&](const double* row, double target) { normal.add(row, target); });
-    if (auto found = normal.solve(); found && found->allFinite()) {
+    if (auto found = regress_by_products(record, model, W, options)) {
       return *std::move(found);
     }
   }

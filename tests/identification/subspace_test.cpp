@@ -95,16 +95,18 @@ TEST(Subspace, Compression) {
       y = u.col(0) + u.col(1);  // Only reflections can factor it.
     }
     const Index s = 4;
-    const PastAndFuture data = compress(u, y, s);
+    const ScaledSignals record = scaled(u, y);
+    const PastAndFuture data = compress(record, s);
+    EXPECT_EQ(data.future.size(), exact ? 0 : s * s);
     ASSERT_EQ(data.columns, 400 - 2 * s + 1);
     MatrixXd H(2 * s * 3, data.columns);
     for (Index t = 0; t < data.columns; ++t) {
       VectorXd column(2 * s * 3);
       for (Index i = 0; i < s; ++i) {
-        column.segment(2 * i, 2) = u.row(t + s + i);
-        column.segment(2 * s + 2 * i, 2) = u.row(t + i);
-        column(4 * s + i) = y(t + i, 0);
-        column(5 * s + i) = y(t + s + i, 0);
+        column.segment(2 * i, 2) = record.u().row(t + s + i);
+        column.segment(2 * s + 2 * i, 2) = record.u().row(t + i);
+        column(4 * s + i) = record.y()(t + i, 0);
+        column(5 * s + i) = record.y()(t + s + i, 0);
       }
       H.col(t) = column;
     }
@@ -255,7 +257,8 @@ TEST(Subspace, RegressionOfTheInputs) {
   MatrixXd u = noise(random, 700, 2);
   const auto regress = [&](bool noisy, bool direct) {
     const MatrixXd y = record(model, u, MatrixXd(0.1 * u.rowwise().reverse().cwiseAbs2()));
-    const ScaledSignals signals{u, y, VectorXd::Ones(2), VectorXd::Ones(2)};
+    ScaledSignals signals{MatrixXd::Zero(700 + detail::record_margin, 4), 2, VectorXd::Ones(4)};
+    signals.w.topRows(700) << u, y;
     SubspaceOptions options;
     options.feedthrough = direct;
     options.initial_state = direct;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "math/dense/panel_kernel.hpp"
 #include "math/equations/lyapunov_kernel.hpp"
 #include "math/equations/sylvester_kernel.hpp"
 #include "math/exponential/matrix_exponential_kernel.hpp"
@@ -21,6 +22,8 @@
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 #endif
+#include "math/dense/panel_kernel_body.hpp"
+#include "math/dense/symmetric_kernel_body.hpp"
 #include "math/equations/lyapunov_kernel_body.hpp"
 #include "math/equations/sylvester_kernel_body.hpp"
 #include "math/exponential/matrix_exponential_kernel_body.hpp"
