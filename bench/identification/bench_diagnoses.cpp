@@ -28,10 +28,20 @@ using flyball::identification::FitReport;
 using flyball::identification::GainEstimate;
 
 /// What says that the mechanism or its sensors are not as the gains' model supposes.
-constexpr std::array<std::string_view, 14> kinds{
-    "spring",     "drag",     "asymmetric_friction", "friction_along_travel", "current_limit",
-    "sag",        "backlash", "elastic",             "slip",                  "position_jumps",
-    "saturated",  "outliers", "poor_fit",            "channels_disagree"};
+constexpr std::array<std::string_view, 14> kinds{"spring",
+                                                 "drag",
+                                                 "asymmetric_friction",
+                                                 "friction_along_travel",
+                                                 "current_limit",
+                                                 "sag",
+                                                 "backlash",
+                                                 "elastic",
+                                                 "slip",
+                                                 "position_jumps",
+                                                 "saturated",
+                                                 "outliers",
+                                                 "poor_fit",
+                                                 "channels_disagree"};
 
 bool is_right(const scenarios::Family& family, const Diagnostic& found) {
   return std::any_of(family.diagnoses.begin(), family.diagnoses.end(), [&](std::string_view right) {
@@ -62,8 +72,8 @@ struct Count {
   std::size_t sure = 0;
   std::size_t doubted = 0;
   std::size_t wrong = 0;
-  Share silent;     ///< Intervals of logs without the right diagnosis.
-  Share all;        ///< Intervals of all.
+  Share silent;       ///< Intervals of logs without the right diagnosis.
+  Share all;          ///< Intervals of all.
   Share undiagnosed;  ///< Intervals of logs with no diagnosis whatever.
   void add(const Count& other) {
     logs += other.logs;

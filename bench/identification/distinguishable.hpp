@@ -102,8 +102,7 @@ inline Eigen::MatrixXd whitened(const CharacterizationOptions& options, const Te
     A << 1.0, c, 0.0, a;
     const Eigen::Vector2d b((dt - c) / options.kV, (1.0 - a) / options.kV);
     state = A * state;
-    P = A * P * A.transpose() +
-        options.voltage_noise * options.voltage_noise * b * b.transpose();
+    P = A * P * A.transpose() + options.voltage_noise * options.voltage_noise * b * b.transpose();
     if (!fresh) {
       continue;
     }
@@ -197,8 +196,8 @@ inline double distance_to_plain(const CharacterizationOptions& spoiled) {
       const PlainParameter& parameter = parameters[static_cast<std::size_t>(k)];
       double* value = parameter.of(plain);
       const double reach = 0.5 * std::abs(*value) + 20.0 * parameter.step;
-      *value = std::clamp(*value + std::clamp(step[k], -reach, reach), parameter.least,
-                          parameter.most);
+      *value =
+          std::clamp(*value + std::clamp(step[k], -reach, reach), parameter.least, parameter.most);
     }
     ages += step.tail(runs);
   }

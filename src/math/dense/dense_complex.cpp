@@ -7,6 +7,7 @@
 
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
+#include "math/dense/schur_kernel.hpp"
 
 namespace flyball::detail {
 
@@ -75,10 +76,32 @@ void split_pair(MatrixXcd& T, MatrixXcd& U, Eigen::Index k) {
   G << std::conj(mu) / r, std::conj(c) / r, -c / r, mu / r;
   const Eigen::Index n = T.cols();
   T.middleRows(k, 2).rightCols(n - k) = (G * T.middleRows(k, 2).rightCols(n - k)).eval();
-  T.topRows(k + 2).middleCols(k, 2) =
-      (T.topRows(k + 2).middleCols(k, 2) * G.adjoint()).eval();
+  T.topRows(k + 2).middleCols(k, 2) = (T.topRows(k + 2).middleCols(k, 2) * G.adjoint()).eval();
   U.middleCols(k, 2) = (U.middleCols(k, 2) * G.adjoint()).eval();
   T(k + 1, k) = 0.0;
+}
+
+/// A = U T Uᵀ, T quasi-triangular; by the kernels of the house where they are worth their columns.
+ComplexSchur real_schur_of(const MatrixRef& A) {
+  constexpr Eigen::Index small = 24;
+  if (A.rows() < small) {
+    const Eigen::RealSchur<Eigen::MatrixXd> real(A);
+    return {real.matrixT().cast<std::complex<double>>(),
+            real.matrixU().cast<std::complex<double>>(), real.info() == Eigen::Success};
+  }
+  const auto n = static_cast<int>(A.rows());
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(schur_rows(n), n);
+  H.topRows(n) = A;
+  Eigen::MatrixXd Q(H.rows(), n);
+  Eigen::MatrixXd work(H.rows(), 3);
+  const bool converged = FLYBALL_RUN_KERNEL(schur_form, n, H.data(), Q.data(), work.data());
+  ComplexSchur schur{H.topRows(n).cast<std::complex<double>>(),
+                     Q.topRows(n).cast<std::complex<double>>(), converged};
+  // Of the columns that were reflected to zero, whole vectors were; what is left there is nothing.
+  for (Eigen::Index j = 0; j + 2 < A.rows(); ++j) {
+    schur.T.col(j).tail(A.rows() - j - 2).setZero();
+  }
+  return schur;
 }
 
 }  // namespace
@@ -93,12 +116,10 @@ ComplexSchur complex_schur_of(const MatrixRef& A) {
     return {A.cast<std::complex<double>>(), A.cast<std::complex<double>>(), false};
   }
   // Real arithmetic first: a quarter of the operations, and real eigenvalues stay real.
-  const Eigen::RealSchur<Eigen::MatrixXd> real(A);
-  if (real.info() != Eigen::Success) {
+  ComplexSchur schur = real_schur_of(A);
+  if (!schur.converged) {
     return complex_schur_of_complex(A.cast<std::complex<double>>());
   }
-  ComplexSchur schur{real.matrixT().cast<std::complex<double>>(),
-                     real.matrixU().cast<std::complex<double>>(), true};
   for (Eigen::Index k = A.rows() - 2; k >= 0; --k) {
     if (schur.T(k + 1, k) != 0.0) {
       split_pair(schur.T, schur.U, k);

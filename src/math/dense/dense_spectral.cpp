@@ -8,6 +8,7 @@
 
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
+#include "math/dense/schur_kernel.hpp"
 #include "math/dense/spectral_blocks.hpp"
 
 namespace flyball::detail {
@@ -62,6 +63,25 @@ Eigensystem eigensystem_of(const MatrixRef& A) {
   return system;
 }
 
+namespace {
+
+/// Of a balanced matrix of ordinary size by the kernels of the house, which small ones do not pay
+/// for; false where they do not converge.
+bool eigenvalues_quickly(const MatrixXd& M, Eigen::Ref<Eigen::VectorXcd> values) {
+  constexpr Index small = 24;
+  const Index n = M.rows();
+  if (n < small || n > std::numeric_limits<int>::max() / 4) {
+    return false;
+  }
+  MatrixXd H = MatrixXd::Zero(schur_rows(static_cast<int>(n)), n);
+  H.topRows(n) = M;
+  MatrixXd work(H.rows(), 3);
+  return FLYBALL_RUN_KERNEL(schur_values, static_cast<int>(n), H.data(), work.data(),
+                            values.data());
+}
+
+}  // namespace
+
 Eigen::VectorXcd eigenvalues_of(const MatrixRef& A) {
   Eigen::VectorXcd values(A.rows());
   Eigen::Index done = 0;
@@ -71,6 +91,11 @@ Eigen::VectorXcd eigenvalues_of(const MatrixRef& A) {
       continue;
     }
     const Balanced balanced(block);
+    if (balanced.M.allFinite() && eigenvalues_quickly(balanced.M, values.segment(done, n))) {
+      values.segment(done, n) = times_power(values.segment(done, n), balanced.unit);
+      done += n;
+      continue;
+    }
     Eigen::EigenSolver<MatrixXd> solver(n);
     if (!balanced.M.allFinite() || solver.compute(balanced.M, false).info() != Eigen::Success) {
       return Eigen::VectorXcd::Constant(A.rows(), std::numeric_limits<double>::quiet_NaN());

@@ -36,10 +36,58 @@ inline void eigenvalues_2x2(double a, double b, double c, double d, std::complex
   }
 }
 
+/// All eigenvalues of an upper Hessenberg H (n x n, destroyed): the double-shift QR iteration on
+/// the active block only (hqr). False where `most_sweeps` an eigenvalue do not suffice.
+inline bool hessenberg_eigenvalues(int n, int ld, double* H, std::complex<double>* lambda) {
+  const auto h = [=](int i, int j) -> double& { return H[i + j * ld]; };
+  const double norm = hessenberg_norm(n, ld, H);
+  int end = n - 1;
+  double shift = 0.0;
+  int iteration = 0;
+  while (end >= 0) {
+    const int low = start_of_block(ld, H, end, norm, iteration);
+    double x = h(end, end);
+    if (low == end) {
+      lambda[end--] = x + shift;
+      iteration = 0;
+      continue;
+    }
+    double y = h(end - 1, end - 1);
+    double w = h(end, end - 1) * h(end - 1, end);
+    if (low == end - 1) {
+      eigenvalues_2x2(y + shift, h(end - 1, end), h(end, end - 1), x + shift, lambda + end - 1);
+      end -= 2;
+      iteration = 0;
+      continue;
+    }
+    if (iteration == most_sweeps) {
+      return false;
+    }
+    if (iteration > 0 && iteration % 10 == 0) {
+      shift += x;
+      for (int i = 0; i <= end; ++i) {
+        h(i, i) -= x;
+      }
+      const double s = std::abs(h(end, end - 1)) + std::abs(h(end - 1, end - 2));
+      x = y = 0.75 * s;
+      w = -0.4375 * s * s;
+    }
+    ++iteration;
+    // Whole vectors of rows: those above `low` and below `end` belong to other blocks, whose
+    // eigenvalues do not depend on these columns; the others below the bulge are zero.
+    const int first = low / 4 * 4;
+    sweep(ld, H, start_of_sweep(ld, H, low, end, x, y, w), low, end, end + 1,
+          [=](int k, const Reflection& turn, bool last) {
+            reflect_columns(H + first + k * ld, ld, std::min(end, k + 3) + 1 - first, turn, last);
+          });
+  }
+  return true;
+}
+
 /// All eigenvalues of H (n x n, destroyed): reduction to Hessenberg form by stabilised elimination,
 /// then the double-shift QR iteration on the active block only (Martin, Peters and Wilkinson,
-/// Numerische Mathematik 14 (1970): elmhes and hqr). False where 30 iterations an eigenvalue do not
-/// suffice.
+/// Numerische Mathematik 14 (1970): elmhes and hqr). False where `most_sweeps` for an eigenvalue do
+/// not suffice.
 template <int N>
 inline bool eigenvalues(Size<N> size, double* H, std::complex<double>* lambda) {
   const int n = size();
@@ -96,49 +144,7 @@ inline bool eigenvalues(Size<N> size, double* H, std::complex<double>* lambda) {
       }
     }
   }
-
-  const double norm = hessenberg_norm(n, ld, H);
-  int end = n - 1;
-  double shift = 0.0;
-  int iteration = 0;
-  while (end >= 0) {
-    const int low = start_of_block(ld, H, end, norm, iteration);
-    double x = h(end, end);
-    if (low == end) {
-      lambda[end--] = x + shift;
-      iteration = 0;
-      continue;
-    }
-    double y = h(end - 1, end - 1);
-    double w = h(end, end - 1) * h(end - 1, end);
-    if (low == end - 1) {
-      eigenvalues_2x2(y + shift, h(end - 1, end), h(end, end - 1), x + shift, lambda + end - 1);
-      end -= 2;
-      iteration = 0;
-      continue;
-    }
-    if (iteration == 30) {
-      return false;
-    }
-    if (iteration == 10 || iteration == 20) {
-      shift += x;
-      for (int i = 0; i <= end; ++i) {
-        h(i, i) -= x;
-      }
-      const double s = std::abs(h(end, end - 1)) + std::abs(h(end - 1, end - 2));
-      x = y = 0.75 * s;
-      w = -0.4375 * s * s;
-    }
-    ++iteration;
-    // Whole vectors of rows: those above `low` and below `end` belong to other blocks, whose
-    // eigenvalues do not depend on these columns; the others below the bulge are zero.
-    const int first = low / 4 * 4;
-    sweep(ld, H, start_of_sweep(ld, H, low, end, x, y, w), low, end, end + 1,
-          [=](int k, const Reflection& turn, bool last) {
-            reflect_columns(H + first + k * ld, ld, std::min(end, k + 3) + 1 - first, turn, last);
-          });
-  }
-  return true;
+  return hessenberg_eigenvalues(n, ld, H, lambda);
 }
 
 }  // namespace flyball::detail::FLYBALL_VARIANT

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "math/dense/panel_kernel.hpp"
+#include "math/dense/schur_kernel.hpp"
 #include "math/equations/lyapunov_kernel.hpp"
 #include "math/equations/sylvester_kernel.hpp"
 #include "math/exponential/matrix_exponential_kernel.hpp"
@@ -23,6 +24,7 @@
 #pragma GCC target("avx2,fma")
 #endif
 #include "math/dense/panel_kernel_body.hpp"
+#include "math/dense/schur_kernel_body.hpp"
 #include "math/dense/symmetric_kernel_body.hpp"
 #include "math/equations/lyapunov_kernel_body.hpp"
 #include "math/equations/sylvester_kernel_body.hpp"

@@ -7,16 +7,16 @@
 
 namespace flyball::detail::FLYBALL_VARIANT {
 
-/// H ← UᵀHU upper Hessenberg by Householder reflections, and U; `work` holds three vectors. All
-/// with `ld` rows, a multiple of four, the padding zero.
+/// H ← UᵀHU upper Hessenberg by Householder reflections, and U unless it is null; `work` holds
+/// three vectors. All with `ld` rows, a multiple of four, the padding zero.
 inline void hessenberg(int n, int ld, double* H, double* U, double* work) {
   double* const v = work;
   double* const y = work + ld;
   double* const u = work + 2 * ld;
-  for (int k = 0; k < ld * n; ++k) {
+  for (int k = 0; U != nullptr && k < ld * n; ++k) {
     U[k] = 0.0;
   }
-  for (int i = 0; i < n; ++i) {
+  for (int i = 0; U != nullptr && i < n; ++i) {
     U[i + i * ld] = 1.0;
   }
   for (int c = 0; c + 2 < n; ++c) {
@@ -80,7 +80,7 @@ inline void hessenberg(int n, int ld, double* H, double* U, double* work) {
       }
     }
     // U ← U(I - βvvᵀ).
-    for (int i = 0; i < ld; i += 4) {
+    for (int i = 0; U != nullptr && i < ld; i += 4) {
       Vector4 sum{};
       for (int j = c + 1; j < n; ++j) {
         sum += load4(U + i + j * ld) * v[j];
@@ -155,7 +155,7 @@ inline void standardize(int n, int ld, double* T, double* U, int k) {
 
 /// H (upper Hessenberg) ← real Schur form with standardised 2x2 blocks, U ← U times the
 /// transformation, by the double-shift QR iteration (Martin, Peters and Wilkinson, Numerische
-/// Mathematik 14 (1970): hqr2). False where 30 iterations an eigenvalue do not suffice.
+/// Mathematik 14 (1970): hqr2). False where `most_sweeps` an eigenvalue do not suffice.
 inline bool real_schur(int n, int ld, double* H, double* U) {
   const auto h = [=](int i, int j) -> double& { return H[i + j * ld]; };
   const double norm = hessenberg_norm(n, ld, H);
@@ -174,13 +174,13 @@ inline bool real_schur(int n, int ld, double* H, double* U) {
       iteration = 0;
       continue;
     }
-    if (iteration == 30) {
+    if (iteration == most_sweeps) {
       return false;
     }
     double x = h(end, end);
     double y = h(end - 1, end - 1);
     double w = h(end, end - 1) * h(end - 1, end);
-    if (iteration == 10 || iteration == 20) {
+    if (iteration > 0 && iteration % 10 == 0) {
       const double s = std::abs(h(end, end - 1)) + std::abs(h(end - 1, end - 2));
       x = y = x + 0.75 * s;
       w = -0.4375 * s * s;

@@ -40,7 +40,8 @@ TriangularFactor factorize(const MatrixXd& M) {
     f.converged = true;
     return f;
   }
-  // Single shifts, by rotations, keep more of the small entries of a graded matrix than the real form.
+  // Single shifts, by rotations, keep more of the small entries of a graded matrix than the real
+  // form.
   ComplexSchur schur = complex_schur_of_complex(balanced.cast<Complex>());
   f.T = std::move(schur.T);
   f.U = std::move(schur.U);
