@@ -1,3 +1,5 @@
+#pragma once
+
 // Compiled once for each instruction set; see kernels_wide.cpp.
 
 #include "math/dense/hessenberg_eigenvalues.hpp"
