@@ -73,10 +73,13 @@ double work_of(std::size_t vertices, Index size, Index fixed) {
          unknowns * unknowns * unknowns / 3.0 + 1000.0;
 }
 
-/// Of a loop's enclosure over a piece, as measured beside `work_of`.
-double work_of_enclosure(Index states) {
-  const auto n = static_cast<double>(states);
-  return 2400.0 * n * n * n + 50'000.0;
+/// Of a loop's enclosure over a piece, as measured beside `work_of`. Inputs under way, one a whole
+/// period of delay, are states that are only shifted.
+double work_of_enclosure(const UncertainLoop& loop, const std::vector<TaylorForm>& parameters) {
+  const auto n = static_cast<double>(loop.C.cols() + loop.A_c.rows() + 1);
+  const auto branches = branches_over(parameters.back(), loop.period.si());
+  const double late = branches.empty() ? 0.0 : static_cast<double>(branches.back().whole_periods);
+  return 2400.0 * n * n * n + 300.0 * late * late + 50'000.0;
 }
 
 }  // namespace
@@ -124,7 +127,7 @@ void LoopProver::choose_split(const SetPiece& piece, const MatrixFamily& family,
 bool LoopProver::show_on(const SetPiece& piece, const DelayBranch& branch,
                          const std::vector<TaylorForm>& parameters, const LoopClaim& claim,
                          MatrixXd& T) {
-  work_ += work_of_enclosure(loop_.C.cols() + loop_.A_c.rows() + 1);
+  work_ += work_of_enclosure(loop_, parameters);
   const auto forms = closed_loop_over(loop_, parameters, branch, claim.disk, claim.decay);
   if (!forms) {
     choose_split(piece, {}, nullptr);
@@ -222,8 +225,10 @@ ClaimOutcome LoopProver::show(LoopClaim& claim) {
     // A member of the set in the piece may say more than the search has found.
     const Index round = loop_.set.round;
     if (round == 0 || piece.middle.head(round).squaredNorm() <= 1.0) {
-      search_.look_at(piece.middle);
-      if (search_.unstable() && surely_unstable_member(loop_, search_.slowest())) {
+      work_ += work_of_enclosure(loop_, parameters);
+      // Of a member that was looked at before it is known.
+      const bool worse = search_.look_at(piece.middle);
+      if (worse && search_.unstable() && surely_unstable_member(loop_, search_.slowest())) {
         proof_.resize(kept);
         return ClaimOutcome::refuted;
       }

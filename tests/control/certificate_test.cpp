@@ -323,6 +323,17 @@ TEST(Certificate, WorkIsBounded) {
     EXPECT_LE(answer.undecided_share, 1.0);
   }
   EXPECT_LE(answer.pieces, 1);
+  // Without feedback the integrator stays where it is, which nothing shows or refutes. Inputs under
+  // way are work, too: a piece of 80 periods takes as much as fifty of none.
+  const auto pieces = [](double delay) {
+    const auto open = certify_loop(integrator(0.0, 0.0, 0.0, delay),
+                                   {.most_pieces = 100'000, .most_work = 2e7, .margins = false})
+                          .value();
+    EXPECT_EQ(open.verdict, LoopVerdict::undecided);
+    return open.pieces;
+  };
+  EXPECT_LT(pieces(80.0 * T), 100);
+  EXPECT_GT(pieces(T), pieces(80.0 * T));
 }
 
 TEST(Certificate, Errors) {
