@@ -68,7 +68,7 @@ namespace {
 /// Of a balanced matrix of ordinary size by the kernels of the house, which small ones do not pay
 /// for; false where they do not converge.
 bool eigenvalues_quickly(const MatrixXd& M, Eigen::Ref<Eigen::VectorXcd> values) {
-  constexpr Index small = 24;
+  constexpr Index small = 64;
   const Index n = M.rows();
   if (n < small || n > std::numeric_limits<int>::max() / 4) {
     return false;

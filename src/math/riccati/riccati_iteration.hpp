@@ -244,7 +244,8 @@ std::optional<Matrix> newton(const Equation<Matrix>& e, Matrix X, Progress& prog
     const bool shrinks = relative < 0.7 * least;
     idle = shrinks || least == small ? 0 : idle + 1;
     least = shrinks ? relative : least;
-    if (idle == most_idle) {
+    // Near `converged_step` chance may bring one below it.
+    if (idle >= most_idle && least > 1e3 * converged_step) {
       ++progress.idle;
       return std::nullopt;
     }
