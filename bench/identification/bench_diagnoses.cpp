@@ -1,7 +1,7 @@
 // What the identification says of logs whose mechanism or sensors have what the gains' model lacks.
 //
 //   bench_diagnoses [--seeds N] [--seed FIRST] [--only MECHANISM] [--family NAME]
-//                   [--show silent|wrong|alarms]
+//                   [--show silent|wrong|missed|alarms]
 //
 // Of each family with a diagnosis: how many logs carry it, as a warning or as what the log leaves
 // open (`term_in_doubt`); how many are given another; how many of the intervals of those without
@@ -155,7 +155,7 @@ Counts run(const scenarios::Family& family, const scenarios::Truth& truth, std::
     count.doubted += doubted && !sure ? 1 : 0;
     count.wrong += any && !right ? 1 : 0;
     if ((show == "silent" && !right && !any) || (show == "wrong" && !right && any) ||
-        (show == "alarms" && any)) {
+        (show == "alarms" && any) || (show == "missed" && !right)) {
       print_log(seed, distance, report);
     }
     if (!report.fit) {
@@ -220,7 +220,7 @@ int main(int argc, char** argv) {
     } else {
       std::fprintf(stderr,
                    "usage: %s [--seeds N] [--seed FIRST] [--only MECHANISM] [--family NAME|all] "
-                   "[--show silent|wrong|alarms]\n",
+                   "[--show silent|wrong|missed|alarms]\n",
                    argv[0]);
       return 2;
     }

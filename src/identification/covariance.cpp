@@ -208,6 +208,14 @@ double Covariances::inflation(Eigen::Index parameter) const {
   return alone > 0.0 ? largest / alone : 1.0;
 }
 
+double Covariances::score_inflation(Eigen::Index parameter) const {
+  const double alone = independent(parameter, parameter);
+  const double largest = std::max({alone, estimates[0](parameter, parameter),
+                                   estimates[1](parameter, parameter) / few_blocks,
+                                   estimates[2](parameter, parameter)});
+  return alone > 0.0 ? largest / alone : 1.0;
+}
+
 double Covariances::standard_error(const Eigen::VectorXd& gradient) const {
   double largest = 0.0;
   for (const Eigen::MatrixXd& covariance : estimates) {
@@ -332,9 +340,10 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
     }
   }
   const double blocks_left = std::max(1.0, static_cast<double>(blocks) - static_cast<double>(size));
+  result.few_blocks = static_cast<double>(blocks) / blocks_left;
   for (std::size_t k = 0; k < middles.size(); ++k) {
     const Eigen::MatrixXd covariance = inverse_bread * middles[k](active, active) * inverse_bread *
-                                       (k == 1 ? static_cast<double>(blocks) / blocks_left : 1.0);
+                                       (k == 1 ? result.few_blocks : 1.0);
     result.estimates[k](active, active) = covariance + of_fixed;
   }
   return result;

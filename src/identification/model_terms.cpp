@@ -12,11 +12,16 @@ constexpr int most_terms = 2;
 /// Parameters that one cause moves.
 using Term = std::vector<Eigen::Index>;
 
+/// Whether it is the starts of the steps alone that tell the term.
+bool tells_a_start(const Term& term) {
+  return term.front() == parameter::take_up || term.front() == parameter::headroom;
+}
+
 /// Of a term over its standard error, squared; χ² of as many degrees of freedom as it has
 /// parameters if it is absent: one in a million, as several terms are looked at and residuals are
 /// not quite what is supposed. A start is looked at for one thing alone, and with white noise.
 double beyond_doubt(const Term& term) {
-  if (term.front() == parameter::take_up) {
+  if (tells_a_start(term)) {
     return 12.0;
   }
   return 24.0 + 2.9 * static_cast<double>(term.size() - 1);
@@ -27,6 +32,8 @@ constexpr double worth_a_fit = 0.5;
 constexpr std::size_t most_fits = 3;
 /// s, that crossing backlash may take in a step.
 constexpr std::array take_up_times{0.005, 0.015};
+/// V, of a force: recorded voltages are not much better.
+constexpr double perceptible = 0.02;
 /// Two terms that differ by less evidence explain the same.
 constexpr double as_good = 0.5;
 
@@ -68,6 +75,23 @@ double largest_across(OutputErrorProblem& problem) {
     const auto [low, high] =
         std::minmax_element(run.input.voltage.begin(), run.input.voltage.end());
     largest = std::max({largest, std::abs(*low), std::abs(*high)});
+  }
+  return largest;
+}
+
+/// V, the largest force of a term in the log.
+double largest_force(const OutputErrorProblem& problem, const Eigen::VectorXd& x,
+                     const Term& term) {
+  double largest = 0.0;
+  for (const ResidualRun& run : problem.runs()) {
+    for (std::size_t i = 0; i < run.input.time.size(); ++i) {
+      double force = 0.0;
+      for (const Eigen::Index k : term) {
+        const auto& values = run.input.forces[static_cast<std::size_t>(k - parameter::first_force)];
+        force += values.empty() ? 0.0 : x[k] * values[i];
+      }
+      largest = std::max(largest, std::abs(force));
+    }
   }
   return largest;
 }
@@ -141,6 +165,16 @@ struct Candidate {
   RobustFit start;
 };
 
+/// The largest evidence of those found, at least 1. A constant force has the most of what
+/// correlated residuals make by chance: beside it others must not be overlooked.
+double strongest(const std::vector<Candidate>& found) {
+  double most = 1.0;
+  for (const Candidate& candidate : found) {
+    most = std::max(most, candidate.term.front() == parameter::bias ? 1.0 : candidate.evidence);
+  }
+  return most;
+}
+
 /// The terms that the model lacks, those first that to first order gain most.
 std::vector<Candidate> candidates(OutputErrorProblem& problem, const Bounds& bounds,
                                   const ChannelScales& scales, const RobustFit& best) {
@@ -160,11 +194,7 @@ std::vector<Candidate> candidates(OutputErrorProblem& problem, const Bounds& bou
     }
   }
   const auto worthwhile = [&found](const Term& term) {
-    double most = 1.0;
-    for (const Candidate& other : found) {
-      most = std::max(most, other.evidence);
-    }
-    return worth_a_fit * most * beyond_doubt(term);
+    return worth_a_fit * strongest(found) * beyond_doubt(term);
   };
   if (problem.can_extend(parameter::take_up) && !problem.is_extended(parameter::take_up)) {
     const Term backlash{parameter::take_up};
@@ -190,14 +220,15 @@ std::vector<Candidate> candidates(OutputErrorProblem& problem, const Bounds& bou
 /// How much correlated residuals inflate the fall of the cost by a term. What a start tells stands
 /// in one or two blocks, whose sums say nothing of their spread: there the correlation of all
 /// residuals is what is left to go by.
-double inflation_of(const Covariances& spread, const Term& term) {
+/// @param small  Whether the term is so small that few blocks may have made it.
+double inflation_of(const Covariances& spread, const Term& term, bool small) {
   if (term.front() == parameter::take_up) {
     return std::max(1.0, spread.estimates.back()(term.front(), term.front()) /
                              spread.independent(term.front(), term.front()));
   }
   double largest = 1.0;
   for (const Eigen::Index k : term) {
-    largest = std::max(largest, spread.inflation(k));
+    largest = std::max(largest, small ? spread.inflation(k) : spread.score_inflation(k));
   }
   return largest;
 }
@@ -226,13 +257,16 @@ Judged judge(OutputErrorProblem& problem, const Bounds& bounds, const ChannelSca
     const Covariances spread =
         covariances(problem, larger.x, problem.free_parameters(), bounds, fresh);
     judged.fit = minimize(problem, larger.x, problem.free_parameters(), bounds, fresh, 60, 1e-2);
+    const bool small = term.front() < parameter::headroom &&
+                       largest_force(problem, judged.fit.x, term) < perceptible;
     extend(problem, term, false);
     problem.refresh_forces(best.x);
     const RobustFit without =
         minimize(problem, best.x, problem.free_parameters(), bounds, fresh, 60, 1e-2);
     judged.gain = without.cost - judged.fit.cost;
-    judged.evidence =
-        spread.singular ? 0.0 : judged.gain / inflation_of(spread, term) / beyond_doubt(term);
+    judged.evidence = spread.singular
+                          ? 0.0
+                          : judged.gain / inflation_of(spread, term, small) / beyond_doubt(term);
     judged.moved = judged.fit.x - without.x;
     // So far away, and no better: another valley, not a doubt.
     if (judged.evidence < 1.0 && std::abs(judged.moved[parameter::log_time_constant]) > 0.5) {
@@ -266,6 +300,49 @@ Eigen::VectorXd doubt(const Judged& judged, double share) {
   return moved;
 }
 
+/// Slack and a current limit both make a speed rise late: where one was judged, the other is.
+void judge_rivals(OutputErrorProblem& problem, const Bounds& bounds, const ChannelScales& scales,
+                  const RobustFit& best, const std::vector<Candidate>& found,
+                  std::vector<Judged>& all) {
+  const auto judged = [&all](const Term& term) { return find(all, term.front()) != all.end(); };
+  if (std::none_of(all.begin(), all.end(),
+                   [](const Judged& one) { return tells_a_start(one.term); })) {
+    return;
+  }
+  for (const Candidate& candidate : found) {
+    if (tells_a_start(candidate.term) && !judged(candidate.term)) {
+      all.push_back(judge(problem, bounds, scales, best, candidate));
+    }
+  }
+}
+
+/// Of slack and a current limit the one is taken that explains more; where the other explains
+/// nearly as much, it is told, too.
+void choose_start(std::vector<Judged>& all, std::vector<Judged>::iterator& better,
+                  Extension& extension) {
+  if (better == all.end() || better->evidence < 1.0 || !tells_a_start(better->term)) {
+    return;
+  }
+  const bool limited = better->term.front() == parameter::headroom;
+  const int rival = limited ? int{parameter::take_up} : int{parameter::headroom};
+  auto other = find(all, rival);
+  if (other == all.end()) {
+    return;
+  }
+  if (other->gain > better->gain) {
+    std::swap(other, better);
+    better->evidence = std::max(better->evidence, 1.0);
+  }
+  constexpr double surely = 12.0;  // of twice the logarithm of the likelihood
+  if (better->gain - other->gain < std::max(surely, 0.1 * better->gain)) {
+    Judged between = *other;
+    between.moved -= better->moved;
+    between.term.push_back(better->term.front());
+    extension.doubts.push_back(doubt(between, 0.5));
+    extension.open.push_back({static_cast<int>(other->term.front()), between.moved, true, 0.5});
+  }
+}
+
 }  // namespace
 
 Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds, ChannelScales scales,
@@ -278,40 +355,31 @@ Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds, Channe
     const std::vector<Candidate> found = candidates(problem, bounds, scales, best);
     // To first order a term may look better than it is: some are fitted, the best is taken.
     std::vector<Judged> all;
+    const double least = worth_a_fit * strongest(found);
     for (std::size_t k = 0; k < found.size(); ++k) {
-      const bool promising =
-          k < most_fits && found[k].evidence >= worth_a_fit * std::max(1.0, found[0].evidence);
+      const bool promising = k < most_fits && found[k].evidence >= least;
       const bool as_drag =
           found[k].term.front() == parameter::sag && find(all, parameter::drag) != all.end();
       if (promising || as_drag) {
         all.push_back(judge(problem, bounds, scales, best, found[k]));
       }
     }
+    judge_rivals(problem, bounds, scales, best, found, all);
     auto better = std::max_element(all.begin(), all.end(), [](const Judged& a, const Judged& b) {
       const bool sure = b.evidence >= 1.0;
       return (a.evidence >= 1.0) == sure ? a.chi_squared() < b.chi_squared() : sure;
     });
-    // A speed that rises late at first does so at a limit, too.
-    const auto limit = find(all, parameter::headroom);
-    if (better != all.end() && better->term.front() == parameter::take_up && limit != all.end() &&
-        better->evidence >= 1.0) {
-      if (limit->gain > 1.1 * better->gain) {
-        limit->evidence = std::max(limit->evidence, 1.0);
-        better = limit;
-      } else if (limit->gain > 0.5 * better->gain) {
-        Judged between = *limit;
-        between.moved -= better->moved;
-        between.term.push_back(parameter::take_up);
-        extension.doubts.push_back(doubt(between, 0.5));
-        extension.open.push_back({parameter::headroom, between.moved, true});
-      }
-    }
+    choose_start(all, better, extension);
     if (better == all.end() || better->evidence < 1.0) {
       for (const Judged& judged : all) {
-        // No log of a step of one height tells a sagging battery from more inertia.
+        // No log of a step of one height tells a sagging battery from more inertia: with a sag a
+        // standard error larger than found.
         const bool sags = judged.term.front() == parameter::sag && judged.chi_squared() > 1.0;
-        extension.doubts.push_back(doubt(judged, sags ? 1.0 : std::sqrt(probability(judged))));
-        extension.open.push_back({static_cast<int>(judged.term.front()), judged.moved, false});
+        const double weight =
+            sags ? 1.0 + 1.0 / std::sqrt(judged.chi_squared()) : std::sqrt(probability(judged));
+        extension.doubts.push_back(doubt(judged, weight));
+        extension.open.push_back(
+            {static_cast<int>(judged.term.front()), judged.moved, false, weight});
       }
       break;
     }
@@ -328,7 +396,7 @@ Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds, Channe
       } else if (better == drag && sag->gain > 0.5 * drag->gain) {
         between.moved = -between.moved;
         extension.doubts.push_back(doubt(between, 1.0));
-        extension.open.push_back({parameter::sag, between.moved, true});
+        extension.open.push_back({parameter::sag, between.moved, true, 1.0});
       }
     }
     extend(problem, better->term, true);

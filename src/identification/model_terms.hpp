@@ -13,7 +13,8 @@ struct Extension {
   struct Open {
     int term;  ///< Its first parameter.
     Eigen::VectorXd moved;
-    bool instead;  ///< Of another that was taken in: told in any case.
+    bool instead;         ///< Of another that was taken in: told in any case.
+    double weight = 1.0;  ///< Of `moved` in the doubts.
   };
   std::vector<Open> open{};
   bool extended = false;

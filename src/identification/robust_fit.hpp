@@ -63,11 +63,14 @@ struct Covariances {
   std::array<Eigen::MatrixXd, 3> estimates;
   Eigen::MatrixXd independent;  ///< What it would be if residuals were independent.
   bool singular = false;
+  double few_blocks = 1.0;  ///< What the block sandwich is larger by for its few blocks.
   /// Of the model itself: steps, the largest of which counts as a standard error.
   std::vector<Eigen::VectorXd> doubts{};
   /// How much larger a parameter's variance is than independent residuals would make it, at
   /// least 1.
   [[nodiscard]] double inflation(Eigen::Index parameter) const;
+  /// The same without what few blocks add, for sums of which a threshold allows for their spread.
+  [[nodiscard]] double score_inflation(Eigen::Index parameter) const;
   /// Largest of the three standard errors of gradient · x, with the largest doubt.
   [[nodiscard]] double standard_error(const Eigen::VectorXd& gradient) const;
   /// A covariance of gradients · x that is no smaller than any of the three, with the doubts, in

@@ -13,8 +13,12 @@ namespace {
 constexpr std::size_t beside = 4;     // new positions on each side that tell the usual speed
 constexpr double clear = 8.0;         // standard deviations of what is usual
 constexpr double alone = 5.0;         // times what the new positions beside it are off by
-constexpr double of_top_speed = 0.3;  // smaller jumps spoil nothing
+constexpr double of_top_speed = 0.3;  // from here on one jump tells that it is one
+constexpr double least_share = 0.03;  // of top speed: smaller jumps spoil nothing
 constexpr std::size_t fewest = 2;     // one jump may be anything
+constexpr std::size_t fewest_small = 4;
+constexpr double alike = 0.25;        // of their median, that small jumps of a slip differ by
+constexpr double other_speeds = 1.5;  // that they are alike at
 constexpr double look_back = 0.05;    // s, before a jump, where the velocity may show it
 constexpr double look_on = 0.15;      // s, after it: sensors are late and average
 constexpr double trend = 0.1;         // s, of the velocity's trend on both sides of that
@@ -61,6 +65,9 @@ struct Jump {
   PreparedRun* run;
   std::size_t row;
   double distance;
+  double speed;  ///< Usual there.
+  double shown;  ///< Of it by the velocity.
+  bool large;    ///< Enough to be told by itself.
   bool by_time;  ///< May be a row that lost or gained a refresh of its sensor instead.
 };
 
@@ -73,7 +80,7 @@ void find_jumps(PreparedRun& prepared, const PreparedRecording& recording,
     const double jump = excess[k];
     const double period = run.time[fresh[k]] - run.time[fresh[k - 1]];
     if (std::abs(jump) < 4.0 * recording.position_quantum ||
-        std::abs(jump) < of_top_speed * recording.top_speed * period) {
+        std::abs(jump) < least_share * recording.top_speed * period) {
       continue;
     }
     double largest_beside = 0.0;
@@ -88,16 +95,62 @@ void find_jumps(PreparedRun& prepared, const PreparedRecording& recording,
     const double usual = mad_scale(std::span(excess).subspan(first, last - first));
     // A sensor that was late makes up for it: what it misses beside is what it then has too much.
     if (std::abs(jump) > clear * usual && std::abs(jump) > alone * largest_beside &&
-        std::abs(sum_beside) < 0.3 * std::abs(jump) &&
-        std::abs(shown_by_velocity(run, run.time[fresh[k]])) < 0.5 * std::abs(jump)) {
+        std::abs(sum_beside) < 0.3 * std::abs(jump)) {
       const double moved = run.position[fresh[k]] - run.position[fresh[k - 1]];
       const double usual_move = (moved - jump) / period * recording.position_refresh_period;
       const double refreshes = moved / usual_move;
-      jumps.push_back({&prepared, fresh[k], jump,
+      jumps.push_back({&prepared, fresh[k], jump, std::abs(moved - jump) / period,
+                       shown_by_velocity(run, run.time[fresh[k]]),
+                       std::abs(jump) >= of_top_speed * recording.top_speed * period,
                        std::abs(refreshes - std::round(refreshes)) < 0.15 && refreshes > -0.15 &&
                            refreshes < 3.15});
     }
   }
+}
+
+/// Whether small jumps are those of a slip: of one way at different speeds. A clock's or a sensor's
+/// are of one time, and their way is as large as the speed.
+bool slips_alike(const std::vector<Jump>& jumps) {
+  if (jumps.size() < fewest_small) {
+    return false;
+  }
+  std::vector<double> ways;
+  double shown = 0.0;
+  double slowest = jumps.front().speed;
+  double fastest = 0.0;
+  for (const Jump& jump : jumps) {
+    ways.push_back(std::abs(jump.distance));
+    shown += std::copysign(1.0, jump.distance) * jump.shown;
+    slowest = std::min(slowest, jump.speed);
+    fastest = std::max(fastest, jump.speed);
+  }
+  const double way = median(ways);
+  return std::all_of(ways.begin(), ways.end(),
+                     [way](double one) { return std::abs(one - way) < alike * way; }) &&
+         fastest > other_speeds * slowest &&
+         std::abs(shown) < 0.5 * way * static_cast<double>(jumps.size());
+}
+
+/// The jumps that are a slip's.
+std::vector<Jump> slips_among(const std::vector<Jump>& jumps) {
+  std::vector<Jump> large;
+  std::vector<Jump> small;
+  std::size_t sure = 0;
+  for (const Jump& jump : jumps) {
+    if (!jump.large) {
+      small.push_back(jump);
+    } else if (std::abs(jump.shown) < 0.5 * std::abs(jump.distance)) {
+      large.push_back(jump);
+      sure += jump.by_time ? 0U : 1U;
+    }
+  }
+  if (sure < fewest) {
+    large.clear();
+  }
+  if (slips_alike(small)) {
+    large.insert(large.end(), small.begin(), small.end());
+  }
+  return large;
 }
 
 }  // namespace
@@ -112,9 +165,8 @@ void mend_slips(PreparedRecording& prepared) {
       find_jumps(run, prepared, jumps);
     }
   }
-  const auto sure =
-      std::count_if(jumps.begin(), jumps.end(), [](const Jump& jump) { return !jump.by_time; });
-  if (static_cast<std::size_t>(sure) < fewest) {
+  jumps = slips_among(jumps);
+  if (jumps.empty()) {
     return;
   }
   double largest = 0.0;

@@ -103,13 +103,17 @@ void report_open_terms(const Extension& extension, const FeedforwardFit& fit,
     const double kS = fit.kS.value + open.moved[parameter::static_friction];
     const double kA =
         fit.kA.value * std::exp(open.moved[parameter::log_time_constant]) * kV / fit.kV.value;
-    const bool of_kA = fit.kA.determined && std::abs(kA - fit.kA.value) >= large * kA_half;
+    // What of the half widths the term makes.
+    const auto widens = [&](double moved, double half) {
+      return open.weight * std::abs(moved) >= large * half;
+    };
+    const bool of_kA = fit.kA.determined && widens(kA - fit.kA.value, kA_half);
     // Gravity's share of an arm is told by its angle, which a force along the travel trades with.
     const double kG = gravity_with(fit, open.moved);
-    const bool of_kG = fit.kG && std::abs(kG - fit.kG->value) >=
-                                     large * 0.5 * (fit.kG->interval[1] - fit.kG->interval[0]);
-    if (std::abs(kV - fit.kV.value) < large * kV_half &&
-        std::abs(kS - fit.kS.value) < large * kS_half && !of_kA && !of_kG && !open.instead) {
+    const bool of_kG =
+        fit.kG && widens(kG - fit.kG->value, 0.5 * (fit.kG->interval[1] - fit.kG->interval[0]));
+    if (!widens(kV - fit.kV.value, kV_half) && !widens(kS - fit.kS.value, kS_half) && !of_kA &&
+        !of_kG && !open.instead) {
       continue;
     }
     const bool lift = fit.mechanism == mechanisms::MechanismKind::elevator;
