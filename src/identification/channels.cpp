@@ -140,16 +140,38 @@ double refresh_period(const std::vector<PreparedRun>& runs, std::vector<double> 
 std::vector<std::size_t> fresh_rows(std::span<const double> time, std::span<const double> values,
                                     double period) {
   std::vector<std::size_t> rows;
-  for (std::size_t i = 1; i < values.size(); ++i) {
-    if (rows.empty() || values[i] != values[i - 1]) {
-      rows.push_back(i);
-    } else if (const double due = time[rows.back()] + period; time[i] - due > 0.5 * period) {
-      // Refreshed to the same value: where that was due, not where it is noticed.
-      std::size_t row = rows.back() + 1;
-      while (row < i && std::abs(time[row + 1] - due) <= std::abs(time[row] - due)) {
-        ++row;
+  if (values.size() > 1) {
+    rows.push_back(1);
+  }
+  for (std::size_t i = 2; i < values.size(); ++i) {
+    if (values[i] == values[i - 1]) {
+      continue;
+    }
+    // Refreshes to the same value before: where they were due, counted back from this one.
+    const std::size_t before = rows.size();
+    std::size_t later = i;
+    for (std::size_t k = i; k-- > rows[before - 1] + 1;) {
+      const double due = time[later] - period;
+      if (time[k] > due) {
+        continue;
+      }
+      const std::size_t row = k + 1 < later && time[k + 1] - due < due - time[k] ? k + 1 : k;
+      if (time[row] - time[rows[before - 1]] <= 0.5 * period) {
+        break;
       }
       rows.push_back(row);
+      later = row;
+    }
+    std::reverse(rows.begin() + static_cast<std::ptrdiff_t>(before), rows.end());
+    rows.push_back(i);
+  }
+  // And after the last change.
+  for (std::size_t i = rows.empty() ? 0 : rows.back() + 1; i < values.size(); ++i) {
+    const double due = time[rows.back()] + period;
+    if (time[i] >= due) {
+      const bool nearer = i - 1 > rows.back() && due - time[i - 1] < time[i] - due;
+      rows.push_back(nearer ? i - 1 : i);
+      i = rows.back();
     }
   }
   return rows;

@@ -72,6 +72,7 @@ TEST_P(ModelTerms, AreFoundAndTheGainsHoldBesideThem) {
 INSTANTIATE_TEST_SUITE_P(
     Defects, ModelTerms,
     testing::Values(Defect{"spring", elevator, {.spring = 0.8}, 0.8},
+                    Defect{"spring", arm, {.spring = -0.4}, -0.4},
                     Defect{"drag", flywheel, {.drag = 4e-4}, 4e-4},
                     Defect{"drag", elevator, {.drag = 0.4}, 0.4},
                     Defect{"sag", elevator, {.sag = 0.2}, 0.2},
@@ -109,7 +110,7 @@ TEST(Prepare, AVelocityThatRepeatsUnderNoiseIsNewOnceARefresh) {
 // An arm's spring is nearly gravity's sine: left out without being denied, it must be in kG's
 // interval.
 TEST(ModelTerms, ATermInDoubtWidensTheIntervals) {
-  const SessionDefects weak{.spring = -0.4};
+  const SessionDefects weak{.spring = -0.1};
   const FitReport doubting = report_of(arm, weak);
   const FitReport sure = report_of(arm, weak, false);
   ASSERT_TRUE(doubting.fit && sure.fit);
@@ -137,6 +138,34 @@ TEST(ModelTerms, ABatteryThatMaySagIsInTheInertiasInterval) {
       EXPECT_LE(report.fit->kA.interval[0], truth.kA) << seed;
       EXPECT_GE(report.fit->kA.interval[1], truth.kA) << seed;
     }
+  }
+  EXPECT_GE(told, 5U);
+}
+
+// A flywheel turns 46 times a second, and its encoder slips by a twentieth of a turn twice a test:
+// one way at all speeds, which no clock makes.
+TEST(Slip, OfASmallWayIsToldByItsBeingTheSameAtAllSpeeds) {
+  const FitReport report = report_of(0, {.slip = 0.4});
+  ASSERT_NE(find(report.diagnostics, "slip"), nullptr);
+  expect_gains(report, 0, 0.01);
+}
+
+// Of a limit that acts for hundredths of a second a step's encoder shows what backlash shows, too.
+TEST(ModelTerms, ALimitThatBacklashExplainsNearlyAsWellIsTold) {
+  std::size_t told = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const scenarios::Truth& truth = scenarios::mechanisms.at(arm);
+    CharacterizationOptions options = scenarios::session(truth, seed);
+    options.defects.headroom = 3.8;
+    const FitReport report =
+        identify_feedforward(flyball::record_characterization(options).value());
+    ASSERT_TRUE(report.fit);
+    const auto* doubt = find(report.diagnostics, "term_in_doubt");
+    told +=
+        find(report.diagnostics, "current_limit") != nullptr ||
+                (doubt != nullptr && doubt->message.find("a current limit") != std::string::npos)
+            ? 1
+            : 0;
   }
   EXPECT_GE(told, 5U);
 }

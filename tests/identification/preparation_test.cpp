@@ -15,6 +15,25 @@ using recordings::find;
 using recordings::flywheel;
 using recordings::record;
 
+// A sensor is refreshed every 20 ms, also where its value stays: new are the rows of its own beat
+// alone, from before the motion on.
+TEST(Prepare, RefreshesToTheSameValueKeepTheSensorsBeat) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const auto prepared = prepare(recordings::record(recordings::elevator, seed));
+    ASSERT_TRUE(prepared);
+    for (const PreparedRun& run : prepared->runs) {
+      const std::vector<std::size_t>& fresh = run.fresh_position;
+      ASSERT_GT(fresh.size(), 20U);
+      const double beat = run.run.time[fresh[fresh.size() / 2]];
+      // The first row is new whatever stands before.
+      for (std::size_t k = 1; k < fresh.size(); ++k) {
+        const double beats = (run.run.time[fresh[k]] - beat) / 0.02;
+        EXPECT_NEAR(beats, std::round(beats), 1e-6) << seed << " row " << fresh[k];
+      }
+    }
+  }
+}
+
 TEST(Prepare, FindsRefreshAndResolution) {
   const auto prepared = prepare(record(elevator));
   ASSERT_TRUE(prepared);
