@@ -30,6 +30,8 @@ double beyond_doubt(const Term& term) {
 /// Of the evidence beyond doubt: with more, a term is fitted to see what would come of it.
 constexpr double worth_a_fit = 0.5;
 constexpr std::size_t most_fits = 3;
+/// Of a current limit, its standard error at most: what is known worse is no limit that acts.
+constexpr double widest_limit = 0.2;
 /// s, that crossing backlash may take in a step.
 constexpr std::array take_up_times{0.005, 0.015};
 /// V, of a force: recorded voltages are not much better.
@@ -267,6 +269,11 @@ Judged judge(OutputErrorProblem& problem, const Bounds& bounds, const ChannelSca
     judged.evidence = spread.singular
                           ? 0.0
                           : judged.gain / inflation_of(spread, term, small) / beyond_doubt(term);
+    const Eigen::VectorXd first = Eigen::VectorXd::Unit(best.x.size(), term.front());
+    if (term.front() == parameter::headroom &&
+        spread.standard_error(first) > widest_limit * judged.fit.x[term.front()]) {
+      judged.evidence = std::min(judged.evidence, worth_a_fit);
+    }
     judged.moved = judged.fit.x - without.x;
     // So far away, and no better: another valley, not a doubt.
     if (judged.evidence < 1.0 && std::abs(judged.moved[parameter::log_time_constant]) > 0.5) {
@@ -329,7 +336,7 @@ void choose_start(std::vector<Judged>& all, std::vector<Judged>::iterator& bette
   if (other == all.end()) {
     return;
   }
-  if (other->gain > better->gain) {
+  if (other->gain > better->gain && other->evidence > worth_a_fit) {
     std::swap(other, better);
     better->evidence = std::max(better->evidence, 1.0);
   }
