@@ -29,6 +29,7 @@ struct RecordFilter {
   const double* F = nullptr;
   /// [Φ K; -W C W], with rows of zeros beneath alike.
   const double* both = nullptr;
+  bool squares = true;  ///< Whether Σ h hᵀ is asked for; it follows from the other sums.
 };
 /// Of [inputs; e; h of each input; h of the impulse, where there is one]: the number of rows.
 inline constexpr int filter_rows(const RecordFilter& filter, int signals) {
@@ -38,7 +39,8 @@ inline constexpr int filter_block = 64;
 inline constexpr int filter_workspace(int states, int signals) {
   return (states * (signals + 1) + signals + 8) * (filter_block + 1) + 2 * (states + signals) + 64;
 }
-/// sums += Σ r rᵀ, its lower triangle at least; rows x rows, `sums_step` apart.
+/// sums += Σ r rᵀ, its lower triangle at least; rows x rows, `sums_step` apart. `memory` begins
+/// with the rows after the last sample, of which the h are filled in.
 FLYBALL_KERNEL(void sum_filtered(RecordView record, const RecordFilter& filter, double* sums,
                                  int sums_step, double* memory))
 

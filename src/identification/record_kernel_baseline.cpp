@@ -5,6 +5,7 @@
 #include "identification/record_kernel.hpp"
 
 #define FLYBALL_VARIANT baseline
+#define FLYBALL_HOLD(lanes) static_cast<void>(lanes)
 #include "identification/record_kernel_body.hpp"
 
 namespace flyball::detail {

@@ -1,7 +1,8 @@
 #pragma once
 
 // Part of record_kernel_baseline.cpp and record_kernel_wide.cpp: compiled once for each instruction
-// set, in its own namespace (see instruction_set.hpp).
+// set, in its own namespace (see instruction_set.hpp). FLYBALL_HOLD keeps lanes in a register where
+// each of their products would load them again, across lines of the cache.
 
 #include "math/dense/small_matrix.hpp"
 
@@ -19,9 +20,10 @@ template <int First, int Vectors>
     RecordLanes lanes[Vectors];
     for (int v = 0; v < Vectors; ++v) {
       lanes[v] = load<RecordLanes>(late + t + record_lanes * v);
+      FLYBALL_HOLD(lanes[v]);
     }
     for (int i = 0; i < First; ++i) {
-      const RecordLanes now = RecordLanes{} + w[t + i * step];
+      const double now = w[t + i * step];
       for (int v = 0; v < Vectors; ++v) {
         sums[i][v] += now * lanes[v];
       }
@@ -102,24 +104,23 @@ template <int Columns, int Vectors>
 [[gnu::always_inline]] inline void advance(const double* M, int step, int columns,
                                            const double* from, const double* g, double in,
                                            double* to) {
-  const RecordLanes input = RecordLanes{} + in;
   RecordLanes even[Vectors];
   RecordLanes odd[Vectors] = {};
   for (int v = 0; v < Vectors; ++v) {
-    even[v] = load<RecordLanes>(g + record_lanes * v) * input;
+    even[v] = load<RecordLanes>(g + record_lanes * v) * in;
   }
   const int count = Columns > 0 ? Columns : columns;
   int l = 0;
   for (; l + 2 <= count; l += 2) {
-    const RecordLanes a = RecordLanes{} + from[l];
-    const RecordLanes b = RecordLanes{} + from[l + 1];
+    const double a = from[l];
+    const double b = from[l + 1];
     for (int v = 0; v < Vectors; ++v) {
       even[v] += load<RecordLanes>(M + l * step + record_lanes * v) * a;
       odd[v] += load<RecordLanes>(M + (l + 1) * step + record_lanes * v) * b;
     }
   }
   if (l < count) {
-    const RecordLanes a = RecordLanes{} + from[l];
+    const double a = from[l];
     for (int v = 0; v < Vectors; ++v) {
       even[v] += load<RecordLanes>(M + l * step + record_lanes * v) * a;
     }
@@ -167,7 +168,7 @@ inline void filter_samples(const RecordView& record, const RecordFilter& filter,
     advance<N, BothVectors>(filter.both, both_step, n, both, filter.both + n * both_step, now[m],
                             both_next);
     for (int r = 1; r < outputs; ++r) {
-      const RecordLanes in = RecordLanes{} + now[m + r];
+      const double in = now[m + r];
       const double* column = filter.both + (n + r) * both_step;
       for (int v = 0; v < BothVectors; ++v) {
         double* lanes = both_next + record_lanes * v;
@@ -175,7 +176,15 @@ inline void filter_samples(const RecordView& record, const RecordFilter& filter,
             lanes, load<RecordLanes>(lanes) + load<RecordLanes>(column + record_lanes * v) * in);
       }
     }
-    for (int r = 0; r < outputs; ++r) {
+    // Three by hand: a loop becomes a call that copies memory.
+    now[m] = both_next[n];
+    if (outputs > 1) {
+      now[m + 1] = both_next[n + 1];
+    }
+    if (outputs > 2) {
+      now[m + 2] = both_next[n + 2];
+    }
+    for (int r = 3; r < outputs; ++r) {
       now[m + r] = both_next[n + r];
     }
   }
@@ -305,8 +314,8 @@ void sum_filtered(RecordView record, const RecordFilter& filter, double* sums, i
       default:
         filter_many(record, filter, count, filtered, block, rows_step, x, result);
     }
-    add_panel_product(rows, rows, count, 1.0, {block, rows_step}, {block, rows_step, 1}, sums,
-                      sums_step, true);
+    add_panel_product(rows, filter.squares ? rows : record.signals, count, 1.0, {block, rows_step},
+                      {block, rows_step, 1}, sums, sums_step, true);
     const double* last = block + count * rows_step;
     for (int i = record.signals; i < rows; ++i) {
       block[i] = last[i];

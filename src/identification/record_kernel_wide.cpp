@@ -8,6 +8,7 @@
 // when running. Only functions of this variant's namespace are compiled for them.
 #ifdef FLYBALL_WIDE_VECTORS
 #define FLYBALL_VARIANT wide
+#define FLYBALL_HOLD(lanes) __asm__("" : "+x"(lanes))
 #ifdef __clang__
 #pragma clang attribute push(__attribute__((target("avx2,fma"))), apply_to = function)
 #else

@@ -185,6 +185,56 @@ std::vector<MatrixXd> to_states(const MatrixXd& Phi, const MatrixXd& C_T, const 
   return T;
 }
 
+/// Σ h hᵀ of the filter from Σ h u and where its states end: with P⁺ the same sum a sample later,
+/// P⁺ = F P Fᵀ + F S gᵀ + g SᵀFᵀ + g R gᵀ and P⁺ = P - h₀h₀ᵀ + h_N h_Nᵀ, for P by Smith's squared
+/// iteration. False where that takes so many steps that digits are lost.
+/// @param last  h after the last sample.
+bool add_squares(const MatrixXd& Fg, const detail::RecordFilter& filter, Index first,
+                 const double* last, MatrixXd& sums) {
+  const Index n = Fg.rows();
+  const MatrixXd F = Fg.leftCols(n);
+  const VectorXd g = Fg.col(n);
+  const Index m = filter.inputs;
+  const Index filtered = m + (filter.impulse ? 1 : 0);
+  const auto h_last = [&](Index j) { return Eigen::Map<const VectorXd>(last + first + j * n, n); };
+  // Σ hᵢ uⱼ, nothing for the impulse, which comes before the record.
+  const auto product = [&](Index i, Index j) {
+    return j < m ? VectorXd(F * sums.col(j).segment(first + i * n, n)) : VectorXd::Zero(n);
+  };
+  for (Index j = 0; j < filtered; ++j) {
+    for (Index i = j; i < filtered; ++i) {
+      MatrixXd Q = product(i, j) * g.transpose() + g * product(j, i).transpose() -
+                   h_last(i) * h_last(j).transpose();
+      if (i < m) {
+        Q += g * (sums(i, j) * g.transpose());
+      } else if (j == m) {
+        Q += g * g.transpose();
+      }
+      sums.block(first + i * n, first + j * n, n, n) = Q;
+    }
+  }
+  MatrixXd power = F;
+  MatrixXd half(n, n);
+  for (int doubling = 0; doubling < 14; ++doubling) {
+    const MatrixXd turned = power.transpose();
+    for (Index j = 0; j < filtered; ++j) {
+      for (Index i = j; i < filtered; ++i) {
+        auto P = sums.block(first + i * n, first + j * n, n, n);
+        half.setZero();
+        detail::add_product(1.0, power, P, half);
+        detail::add_product(1.0, half, turned, P);
+      }
+    }
+    if (power.squaredNorm() < 1e-17) {
+      return true;
+    }
+    half.setZero();
+    detail::add_product(1.0, power, power, half);
+    power.swap(half);
+  }
+  return false;
+}
+
 /// x of S x = b, S's lower triangle given; nothing where more than half of the digits are lost.
 std::optional<VectorXd> solve_normal(MatrixXd S, const VectorXd& b) {
   const VectorXd unit = S.diagonal().unaryExpr(
@@ -247,10 +297,19 @@ std::optional<VectorXd> regress_by_products(const ScaledSignals& record,
   filter.F = F.data();
   filter.both = both.data();
   const Index rows = detail::filter_rows(filter, static_cast<int>(m + p));
-  MatrixXd sums = MatrixXd::Zero(rows, rows);
+  MatrixXd sums(rows, rows);
   std::vector<double> memory(
       static_cast<std::size_t>(detail::filter_workspace(filter.states, static_cast<int>(m + p))));
-  detail::sum_filtered(record.view(), filter, sums.data(), static_cast<int>(rows), memory.data());
+  const auto sum = [&] {
+    sums.setZero();
+    detail::sum_filtered(record.view(), filter, sums.data(), static_cast<int>(rows), memory.data());
+  };
+  filter.squares = p == 1;
+  sum();
+  if (!filter.squares && !add_squares(Fg, filter, m + p, memory.data(), sums)) {
+    filter.squares = true;
+    sum();
+  }
 
   // Blocks of unknowns: the columns of B - K D and x0, one a filtered signal; then W D.
   const Index filtered = m + (options.initial_state ? 1 : 0);

@@ -46,7 +46,7 @@ template <int Vectors, int Last, int Columns>
                              : load_lanes<Last>(A + panel_lanes * v);
     }
     for (int j = 0; j < Columns; ++j) {
-      const PanelLanes b = PanelLanes{} + B[j * column_step];
+      const double b = B[j * column_step];
       for (int v = 0; v < Vectors; ++v) {
         sums[j][v] += a[v] * b;
       }

@@ -110,12 +110,13 @@ inline bool tridiagonal_values(int n, double* d, double* e, double smallest) {
       }
       const double old_c = c;
       const double reciprocal = 1.0 / r;
+      const double ratio = r / p;  // 1/c, beside it.
       c = p * reciprocal;
       s = b * reciprocal;
       const double old_gamma = gamma;
       gamma = c * (d[i] - sigma) - s * old_gamma;
       d[i + 1] = old_gamma + (d[i] - gamma);
-      p = c != 0.0 ? gamma * gamma / c : old_c * b;
+      p = ratio < 1e250 ? gamma * gamma * ratio : old_c * b;
     }
     e[l] = s * p;
     d[l] = sigma + gamma;
