@@ -213,7 +213,9 @@ std::optional<Matrix> newton(const Equation<Matrix>& e, Matrix X, Progress& prog
   double previous = std::numeric_limits<double>::infinity();
   // Corrections that are small and shrink no more are what this precision leaves of F.
   constexpr double small = 1e-6;
+  // With few states all sixty cost little, and chance may bring one below the bar.
   constexpr int most_idle = 8;
+  constexpr Eigen::Index few_states = 4;
   double least = small;
   int idle = 0;
   for (int k = 0; k < 60; ++k) {
@@ -244,8 +246,7 @@ std::optional<Matrix> newton(const Equation<Matrix>& e, Matrix X, Progress& prog
     const bool shrinks = relative < 0.7 * least;
     idle = shrinks || least == small ? 0 : idle + 1;
     least = shrinks ? relative : least;
-    // Near `converged_step` chance may bring one below it.
-    if (idle >= most_idle && least > 1e3 * converged_step) {
+    if (idle == most_idle && e.A.rows() > few_states) {
       ++progress.idle;
       return std::nullopt;
     }
@@ -301,14 +302,15 @@ inline constexpr double shifts[] = {0.0, 1.0, 30.0, -0.3, 1e-3, 1e3, -10.0};
 inline constexpr double cayley_parameters[] = {1.0, 0.03, 30.0};
 
 /// The first of so many shifts and Cayley parameters that leads to the solution. What is left of F
-/// at X does not depend on them: from the second time on that Newton's corrections shrink no more
-/// the precision is not enough.
+/// at X hardly depends on them: after `idle_attempts` whose corrections shrink no more the
+/// precision is taken for not enough.
 template <class Matrix>
 std::optional<RiccatiDigits<Matrix>> solve_with(const Equation<Matrix>& e,
                                                 std::span<const double> factors,
-                                                std::span<const double> parts, Progress& progress) {
+                                                std::span<const double> parts, Progress& progress,
+                                                int idle_attempts = 2) {
   const Index n = e.A.rows();
-  const int most_idle = progress.idle + 2;
+  const int most_idle = progress.idle + idle_attempts;
   const auto reduced = reduce_extended(e);
   const auto attempt = [&](const Matrix& X0, const std::optional<Matrix>& Y) {
     const auto X = Y ? newton(e, sum(X0, 1.0, *Y), progress) : std::nullopt;
