@@ -140,7 +140,7 @@ Peak largest(const BoundedLoop& loop, const LoopStep& range, const Eigen::Vector
   std::reverse(pending.begin(), pending.end());
   constexpr double tolerance = 1e-5;
   std::vector<LoopStep> near_the_best;  // where a maximum may be above it by less than that
-  constexpr int most = 60'000;
+  constexpr int most = 30'000;
   for (int count = 0; !pending.empty() && count < most; ++count) {
     const LoopStep step = pending.back();
     pending.pop_back();

@@ -21,14 +21,35 @@ namespace {
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr Complex j(0.0, 1.0);
 
+/// The power of two that makes a size one of 1 to 2, in which squares and quotients have all of
+/// their digits; as two factors, of which each is a double.
+struct OrdinaryUnit {
+  explicit OrdinaryUnit(double size) {
+    const int exponent = -std::ilogb(size);
+    first = std::ldexp(1.0, exponent / 2);
+    second = std::ldexp(1.0, exponent - exponent / 2);
+  }
+  double first, second;
+};
+
 Complex phase_of(const Complex& c) {
-  const double size = std::abs(c);
-  return size > 0.0 ? c / size : Complex(1.0);
+  const double largest = std::max(std::abs(c.real()), std::abs(c.imag()));
+  if (!(largest > 0.0)) {
+    return 1.0;
+  }
+  const OrdinaryUnit to(largest);
+  const Complex ordinary = c * to.first * to.second;
+  return ordinary / std::abs(ordinary);
 }
 
 VectorXcd unit(const VectorXcd& x) {
-  const double size = x.norm();
-  return size > 0.0 ? VectorXcd(x / size) : VectorXcd(VectorXcd::Unit(x.size(), 0));
+  const double largest = std::max(x.real().cwiseAbs().maxCoeff(), x.imag().cwiseAbs().maxCoeff());
+  if (!(largest > 0.0)) {
+    return VectorXcd::Unit(x.size(), 0);
+  }
+  const OrdinaryUnit to(largest);
+  const VectorXcd ordinary = x * to.first * to.second;
+  return ordinary / ordinary.norm();
 }
 
 }  // namespace

@@ -211,6 +211,12 @@ TEST(StructuredSingularValue, SurvivesBadScales) {
     EXPECT_NEAR(mu_of(size * plain, Blocks(3, complex())).upper / size, exact, 1e-6 * exact);
   }
   EXPECT_EQ(mu_of(MatrixXcd::Zero(2, 2), {complex(2)}).upper, 0.0);
+  // Eigenvectors of subnormal entries: a number of size one is one of 1, not of 1 + 1e-9.
+  MatrixXcd M{{-1.5626220703125, 1.0, 0.0, 0.0}, {0.0, -1.5626220703125, 1.0, 0.0}};
+  M += Complex(0.0, 1.0) * MatrixXcd{{-1.3128662109375, -3e21, -5.308227539062501e-124, -1e-272},
+                                     {-1e-321, 0.65850830078125, 1e-298, -1e-273}};
+  const auto tiny = mu_of(M, {full(3, 1), complex()});
+  EXPECT_NEAR(std::abs(tiny.delta(3, 1)) * tiny.lower, 1.0, 1e-13);
 }
 
 TEST(StructuredSingularValue, RefusesWhatIsNoQuestion) {
