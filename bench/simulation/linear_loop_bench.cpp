@@ -50,8 +50,10 @@ double plain(const flyball::LinearLoop& loop, const Eigen::MatrixXd& r) {
     const Eigen::Vector2d next = r.col(std::min(k + 1, samples - 1));
     u = std::clamp(K.dot(now - x_hat) + B_pinv.dot(next - A * now), -12.0, 12.0);
     times(k) = 0.02 * k;
-    xs.col(k) = x;
-    x_hats.col(k) = x_hat;
+    for (int i = 0; i < 2; ++i) {  // GCC 12 warns of whole columns, wrongly
+      xs(i, k) = x(i);
+      x_hats(i, k) = x_hat(i);
+    }
     ys(k) = y;
     us(k) = u;
   }
