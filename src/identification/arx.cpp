@@ -1,4 +1,8 @@
+#include <algorithm>
 #include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include <flyball/identification/identification_error.hpp>
 #include <flyball/identification/polynomial_model.hpp>
@@ -6,6 +10,9 @@
 
 #include "core/try.hpp"
 #include "identification/polynomials.hpp"
+#include "identification/record_kernel.hpp"
+#include "math/dense/dense.hpp"
+#include "math/dense/panels.hpp"
 
 namespace flyball::identification {
 
@@ -24,13 +31,90 @@ Expected<PolynomialOrders> arx_orders(const PolynomialOrders& orders, std::strin
   return orders;
 }
 
+/// What a regression answers here.
+struct Estimate {
+  VectorXd coefficients;
+  VectorXd standard_errors;
+  MatrixXd covariance;
+};
+
+/// The regression by its normal equations, whose sums of products follow from those a sample
+/// earlier by what enters and what leaves; nothing where squaring the data costs more than half of
+/// the digits.
+std::optional<Estimate> regress_by_products(const ScaledRecord& record,
+                                            const PolynomialOrders& orders, Index first) {
+  const Index inputs = record.u.cols();
+  const Index channels = inputs + 1;
+  const Index d = parameters_of(orders, inputs);
+  const Index count = record.y.size() - first;
+  MatrixXd w(record.y.size() + detail::record_margin, channels);
+  w.topRows(record.y.size()) << record.y, record.u;
+  w.bottomRows(detail::record_margin).setZero();
+  const Index shifts = first + 1;
+  const Index apart = (shifts + 3) / 4 * 4;
+  MatrixXd products(apart, channels * channels);
+  detail::lag_products({w.data(), static_cast<int>(w.rows()), static_cast<int>(channels),
+                        static_cast<int>(record.y.size())},
+                       static_cast<int>(count), static_cast<int>(shifts), products.data());
+  MatrixXd G(shifts * channels, shifts * channels);
+  for (Index b = 0; b < shifts; ++b) {
+    for (Index a = 0; a <= b; ++a) {
+      for (Index j = 0; j < channels; ++j) {
+        for (Index i = 0; i < channels; ++i) {
+          const double sum =
+              a == 0 ? products(b, j * channels + i)
+                     : G((a - 1) * channels + i, (b - 1) * channels + j) +
+                           (w(count + a - 1, i) * w(count + b - 1, j) - w(a - 1, i) * w(b - 1, j));
+          G(a * channels + i, b * channels + j) = sum;
+          G(b * channels + j, a * channels + i) = sum;
+        }
+      }
+    }
+  }
+  // Rows of G: a sample l late is shift first - l. The target is the last.
+  std::vector<Index> rows;
+  VectorXd sign = VectorXd::Ones(d + 1);
+  for (Index i = 0; i < orders.a; ++i) {
+    sign(static_cast<Index>(rows.size())) = -1.0;
+    rows.push_back((first - 1 - i) * channels);
+  }
+  for (Index j = 0; j < inputs; ++j) {
+    for (Index i = 0; i < orders.b; ++i) {
+      rows.push_back((first - orders.delay - i) * channels + j + 1);
+    }
+  }
+  rows.push_back(first * channels);
+  MatrixXd S = sign.asDiagonal() * G(rows, rows) * sign.asDiagonal();
+  const VectorXd squares = S.diagonal();
+  constexpr double least = 1e-7;
+  if (!(squares.minCoeff() > 0.0) || !detail::cholesky_in_place(S) ||
+      !(S.diagonal().array().square() > least * squares.array()).all()) {
+    return std::nullopt;
+  }
+  // L of [X y]: its last row tells the coefficients, its last entry what they leave.
+  MatrixXd inverse = MatrixXd::Identity(d, d);
+  detail::divide_by_triangle(inverse, S.topLeftCorner(d, d));
+  Estimate estimate;
+  estimate.coefficients = inverse.transpose() * S.row(d).head(d).transpose();
+  estimate.covariance = MatrixXd::Zero(d, d);
+  const MatrixXd turned = inverse.transpose();
+  detail::add_product_transposed(S(d, d) * S(d, d) / static_cast<double>(count - d), turned, turned,
+                                 estimate.covariance);
+  estimate.covariance = detail::symmetrized(estimate.covariance);
+  estimate.standard_errors = estimate.covariance.diagonal().cwiseSqrt();
+  return estimate;
+}
+
 /// -y_{k-1} … -y_{k-a}, then u_{k-delay} … of each input, from the first sample that counts on.
-Expected<Regression> regress(const ScaledRecord& record, const PolynomialOrders& orders,
-                             Index first, std::string_view where) {
+Expected<Estimate> regress(const ScaledRecord& record, const PolynomialOrders& orders, Index first,
+                           std::string_view where) {
   const Index inputs = record.u.cols();
   const Index d = parameters_of(orders, inputs);
   if (d == 0) {
-    return Regression{};
+    return Estimate{};
+  }
+  if (auto found = regress_by_products(record, orders, first)) {
+    return *std::move(found);
   }
   FLYBALL_TRY(auto stream, StreamedLeastSquares::create(d));
   VectorXd row(d);
@@ -52,12 +136,13 @@ Expected<Regression> regress(const ScaledRecord& record, const PolynomialOrders&
         .with("rank", static_cast<double>(regression.rank))
         .with("parameters", static_cast<double>(d));
   }
-  return regression;
+  return Estimate{std::move(regression.coefficients), std::move(regression.standard_errors),
+                  std::move(regression.covariance)};
 }
 
 Expected<PolynomialFit> fit(const ScaledRecord& record, Time period, const PolynomialOrders& orders,
                             std::string_view where) {
-  FLYBALL_TRY(Regression regression, regress(record, orders, start_of(orders), where));
+  FLYBALL_TRY(Estimate regression, regress(record, orders, start_of(orders), where));
   PolynomialFit result;
   result.orders = orders;
   result.parameters = regression.coefficients;

@@ -29,7 +29,8 @@ struct RecordFilter {
   const double* F = nullptr;
   /// [Φ K; -W C W], with rows of zeros beneath alike.
   const double* both = nullptr;
-  bool squares = true;  ///< Whether Σ h hᵀ is asked for; it follows from the other sums.
+  const double* x0 = nullptr;  ///< Where x begins; zero if not given.
+  bool squares = true;         ///< Whether Σ h hᵀ is asked for; it follows from the other sums.
 };
 /// Of [inputs; e; h of each input; h of the impulse, where there is one]: the number of rows.
 inline constexpr int filter_rows(const RecordFilter& filter, int signals) {

@@ -251,6 +251,9 @@ void sum_filtered(RecordView record, const RecordFilter& filter, double* sums, i
   for (double* at = block; at < result; ++at) {
     *at = 0.0;
   }
+  for (int i = 0; filter.x0 != nullptr && i < n; ++i) {
+    x[i] = filter.x0[i];
+  }
   int filtered = filter.inputs + (filter.impulse ? 1 : 0);
   double* impulse = block + rows - n;
   const int state_vectors = (n + record_lanes - 1) / record_lanes;

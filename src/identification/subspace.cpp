@@ -166,13 +166,12 @@ bool is_stable(const MatrixXd& A) {
 /// -2 log likelihood of normal errors one sample ahead, but for a constant; infinite where the
 /// predictor is of no use.
 double misfit(const ScaledSignals& record, const InnovationsModel& model) {
-  const auto ahead = predict(model, record.u(), record.y());
-  if (!ahead) {
+  const auto samples = static_cast<double>(record.samples());
+  const MatrixXd squares = prediction_squares(record, model);
+  if (!squares.allFinite()) {
     return std::numeric_limits<double>::infinity();
   }
-  const MatrixXd errors = record.y() - *ahead;
-  const auto samples = static_cast<double>(errors.rows());
-  const auto L = detail::cholesky_of(detail::transposed_product(errors, errors) / samples);
+  const auto L = detail::cholesky_of(squares / samples);
   return L ? 2.0 * samples * L->diagonal().array().log().sum()
            : std::numeric_limits<double>::infinity();
 }

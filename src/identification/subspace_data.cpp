@@ -177,4 +177,32 @@ PastAndFuture compress(const ScaledSignals& record, Index block_rows) {
   return {by_reflections(record, block_rows), record.samples() - 2 * block_rows + 1, MatrixXd()};
 }
 
+MatrixXd prediction_squares(const ScaledSignals& record, const InnovationsModel& model) {
+  const DiscreteSystem<>& system = model.system;
+  const Index n = system.A.rows();
+  const Index m = record.inputs;
+  const Index p = record.outputs();
+  // Both inputs and outputs are what the filter of y reads; in place of the inputs it leaves zeros.
+  const Index rows = n + m + p;
+  MatrixXd both = MatrixXd::Zero((rows + 3) / 4 * 4, rows);
+  both.topLeftCorner(n, n) = system.A - model.K * system.C;
+  both.block(0, n, n, m) = system.B - model.K * system.D;
+  both.block(0, n + m, n, p) = model.K;
+  both.block(n + m, 0, p, n) = -system.C;
+  both.block(n + m, n, p, m) = -system.D;
+  both.block(n + m, n + m, p, p).setIdentity();
+  const MatrixXd F = MatrixXd::Zero((n + 3) / 4 * 4, n + 1);
+  detail::RecordFilter filter;
+  filter.states = static_cast<int>(n);
+  filter.F = F.data();
+  filter.both = both.data();
+  filter.x0 = model.x0.data();
+  MatrixXd sums = MatrixXd::Zero(m + p, m + p);
+  std::vector<double> memory(
+      static_cast<std::size_t>(detail::filter_workspace(filter.states, static_cast<int>(m + p))));
+  detail::sum_filtered(record.view(), filter, sums.data(), static_cast<int>(m + p), memory.data());
+  MatrixXd squares = sums.bottomRightCorner(p, p);
+  return squares.selfadjointView<Eigen::Lower>();
+}
+
 }  // namespace flyball::identification

@@ -50,4 +50,8 @@ struct PastAndFuture {
                                                        const Eigen::MatrixXd& W,
                                                        const SubspaceOptions& options, bool noisy);
 
+/// Σ (y - ŷ)(y - ŷ)ᵀ one sample ahead, the model in the record's units.
+[[nodiscard]] Eigen::MatrixXd prediction_squares(const ScaledSignals& record,
+                                                 const InnovationsModel& model);
+
 }  // namespace flyball::identification

@@ -316,5 +316,27 @@ TEST(PolynomialModel, Refusals) {
       fit_of(MatrixXd::Ones(5, 2), MatrixXd::Ones(5, 1)).error().is(ArgumentError::wrong_shape));
 }
 
+// The sums of products of an ARX fit tell what QR of all rows does, its covariance too.
+TEST(PolynomialModel, NormalEquationsOfArx) {
+  const MatrixXd u = noise(900, 2, 31);
+  PolynomialModel truth = second_order();
+  truth.B.push_back(polynomial({0.0, 0.3, -0.2}));
+  truth.F.push_back(VectorXd::Ones(1));
+  const VectorXd y = response(truth, u, noise(900, 1, 32, 0.5));
+  const PolynomialFit fit = fit_arx(u, y, T, {.a = 3, .b = 2, .delay = 2}).value();
+  const Index first = 3;
+  MatrixXd X(900 - first, 7);
+  for (Index k = first; k < 900; ++k) {
+    X.row(k - first) << -y(k - 1), -y(k - 2), -y(k - 3), u(k - 2, 0), u(k - 3, 0), u(k - 2, 1),
+        u(k - 3, 1);
+  }
+  const VectorXd right = y.tail(900 - first);
+  const VectorXd expected = X.householderQr().solve(right);
+  EXPECT_LT((fit.parameters - expected).norm(), 1e-11 * expected.norm());
+  const double variance = (right - X * expected).squaredNorm() / static_cast<double>(X.rows() - 7);
+  const MatrixXd covariance = variance * (X.transpose() * X).inverse();
+  EXPECT_LT((fit.covariance - covariance).norm(), 1e-9 * covariance.norm());
+}
+
 }  // namespace
 }  // namespace flyball::identification

@@ -275,6 +275,21 @@ TEST(Subspace, RegressionOfTheInputs) {
   EXPECT_EQ(regress(true, true), regress(false, true));
 }
 
+// The errors one sample ahead by the kernel are those of the definition, of few states and many.
+TEST(Subspace, PredictionSquares) {
+  Random random(9);
+  for (const Index n : {1, 4, 9, 14}) {
+    InnovationsModel model = random_model(random, n, 2, 3);
+    const MatrixXd u = noise(random, 300, 2);
+    const MatrixXd y = record(model, u, noise(random, 300, 3));
+    ScaledSignals signals{MatrixXd::Zero(300 + detail::record_margin, 5), 2, VectorXd::Ones(5)};
+    signals.w.topRows(300) << u, y;
+    const MatrixXd errors = y - predict(model, u, y).value();
+    const MatrixXd expected = errors.transpose() * errors;
+    EXPECT_LT((prediction_squares(signals, model) - expected).norm(), 1e-10 * expected.norm()) << n;
+  }
+}
+
 TEST(Subspace, Refusals) {
   Random random(5);
   const MatrixXd u = noise(random, 200, 1);

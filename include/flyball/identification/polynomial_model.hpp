@@ -57,7 +57,8 @@ struct PolynomialFit {
   int iterations = 0;
 };
 
-/// A model with A and B alone, by linear least squares (QR).
+/// A model with A and B alone, by linear least squares: normal equations, of whose sums each sample
+/// needs few, where they keep more than half of the digits, else QR.
 /// @param u  samples x inputs. @param y  samples x 1. @param orders  a, b and delay.
 /// @errors ArgumentError for shapes, entries and orders; IdentificationError::too_short,
 /// singular (the data do not tell the parameters apart). Cost: O(samples d²), allocates.
