@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "identification/record_noise.hpp"
 #include "identification/robust_fit.hpp"
 #include "identification/soft_loss.hpp"
 #include "math/dense/dense.hpp"
@@ -262,7 +263,7 @@ Eigen::MatrixXd Covariances::joint(const Eigen::MatrixXd& gradients) const {
 
 Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
                         const std::vector<bool>& free, const Bounds& bounds,
-                        const ChannelScales& scales) {
+                        const ChannelScales& scales, const RecordNoise* noise) {
   const Eigen::Index n = x.size();
   Eigen::MatrixXd bread = Eigen::MatrixXd::Zero(n, n);
   std::vector<Bins> runs(problem.runs().size());
@@ -287,6 +288,11 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
   for (const OutputErrorProblem::Prior& prior : problem.priors()) {
     bread(prior.parameter, prior.parameter) += 1.0 / square(prior.deviation);
   }
+  for (const Eigen::Index a : problem.ages()) {
+    for (const Eigen::Index b : problem.ages()) {
+      bread(a, b) += age_weight(problem);
+    }
+  }
 
   const Covariogram ramp_gamma = covariogram(runs, true);
   const Covariogram step_gamma = covariogram(runs, false);
@@ -298,6 +304,9 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
     scatter(middles[0], hac_middle(scores), run.columns);
     scatter(middles[1], block_middle(scores, blocks), run.columns);
     scatter(middles[2], correlation_middle(run, run.ramp ? ramp_gamma : step_gamma), run.columns);
+  }
+  if (noise != nullptr) {
+    middles[1] = score_covariance(problem, x, free, scales, *noise);
   }
   // What is known before the data has an error, too.
   for (const OutputErrorProblem::Prior& prior : problem.priors()) {
@@ -329,7 +338,9 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
                                         factor.solve(Eigen::MatrixXd::Identity(size, size)) *
                                         equilibrium.asDiagonal();
   result.independent(active, active) = inverse_bread;
-  // Where in a row a ramp's sensor was read is not fitted, as a ramp cannot tell it from friction.
+  // Where in a row a ramp's sensor was read is not fitted, as a ramp cannot tell it from friction:
+  // its share differs from the mean of the steps' by its own and by that mean.
+  Eigen::VectorXd together = Eigen::VectorXd::Zero(size);
   Eigen::MatrixXd of_fixed = Eigen::MatrixXd::Zero(size, size);
   for (const OutputErrorProblem::Prior& prior : problem.priors()) {
     const bool fixed = !free[static_cast<std::size_t>(prior.parameter)];
@@ -337,13 +348,19 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
       const Eigen::VectorXd cross = bread.col(prior.parameter)(active);
       const Eigen::VectorXd moved = prior.deviation * (inverse_bread * cross);
       of_fixed += moved * moved.transpose();
+      together += moved;
     }
+  }
+  if (!problem.ages().empty()) {
+    of_fixed += together * together.transpose() / static_cast<double>(problem.ages().size());
   }
   const double blocks_left = std::max(1.0, static_cast<double>(blocks) - static_cast<double>(size));
   result.few_blocks = static_cast<double>(blocks) / blocks_left;
   for (std::size_t k = 0; k < middles.size(); ++k) {
-    const Eigen::MatrixXd covariance = inverse_bread * middles[k](active, active) * inverse_bread *
-                                       (k == 1 ? result.few_blocks : 1.0);
+    const bool of_blocks = k == 1 && noise == nullptr;
+    const Eigen::MatrixXd covariance =
+        inverse_bread * middles[k](active, active) * inverse_bread *
+        (of_blocks ? result.few_blocks : 1.0);
     result.estimates[k](active, active) = covariance + of_fixed;
   }
   return result;

@@ -18,18 +18,16 @@ constexpr double normal_95 = 1.96;
 constexpr double longest_usual = 0.5;         // s, kA/kV that a ramp's friction allows for
 constexpr double widest_time_constant = 0.6;  // relative half-width beyond which kA is unknown
 
-// What residuals cannot tell: measured voltages are half a millivolt off, clocks and encoders a
-// part in ten thousand, and the sensors are not quite what is supposed of them (simulated sessions
-// with such sensors are covered to 95 % with these).
-constexpr double voltage_allowance = 7e-4;  // V, standard error added to kS and kG
-constexpr double speed_allowance = 1e-4;    // relative, added to kV
-constexpr double inertia_allowance = 2e-3;  // relative, added to kA
+// What no residual tells: a meter's offset, a clock's and an encoder's scale, and that a row's
+// voltage is held to the next. They are below what noise leaves of a log as short as four tests.
+constexpr double voltage_allowance = 2e-4;  // V, standard error added to kS and kG
+constexpr double speed_allowance = 5e-5;    // relative, added to kV
+constexpr double inertia_allowance = 1e-4;  // relative, added to kA
 constexpr double delay_allowance = 2e-4;    // s, added to delays
-constexpr double small_sample = 1.1;        // of all standard errors
 
 /// @param allowance  Standard error of what the model leaves out, in the gain's unit.
 GainEstimate symmetric(double value, double random_error, double allowance) {
-  return symmetric_estimate(value, std::hypot(small_sample * random_error, allowance));
+  return symmetric_estimate(value, std::hypot(random_error, allowance));
 }
 
 void mark_undetermined(GainEstimate& gain, double upper_bound, std::string reason) {
@@ -63,8 +61,7 @@ GainEstimate inertia_gain(const PreparedRecording& prepared, const Eigen::Vector
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(x.size());
   gradient[parameter::log_time_constant] = 1.0;
   gradient[parameter::velocity_gain] = 1.0 / kV;
-  const double relative =
-      std::hypot(small_sample * spread.standard_error(gradient), inertia_allowance);
+  const double relative = std::hypot(spread.standard_error(gradient), inertia_allowance);
   GainEstimate kA;
   kA.value = tau * kV;
   kA.standard_error = relative * kA.value;
@@ -104,7 +101,7 @@ void joint_covariance(const Eigen::VectorXd& x, const Covariances& spread, Feedf
   gradients(1, parameter::log_time_constant) = 1.0;
   gradients(2, parameter::position_delay) = 1.0;
   gradients(3, parameter::velocity_delay) = 1.0;
-  const Eigen::MatrixXd joint = small_sample * small_sample * spread.joint(gradients);
+  const Eigen::MatrixXd joint = spread.joint(gradients);
   const std::array<double, 4> allowances{speed_allowance, inertia_allowance, delay_allowance,
                                          delay_allowance};
   for (std::size_t i = 0; i < 4; ++i) {

@@ -19,6 +19,7 @@
 #include "identification/model_terms.hpp"
 #include "identification/output_error.hpp"
 #include "identification/plausibility.hpp"
+#include "identification/record_noise.hpp"
 #include "identification/robust_fit.hpp"
 #include "identification/settling.hpp"
 #include "identification/statistics.hpp"
@@ -166,7 +167,9 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
     // Friction that a bound held would lend its certainty to what trades with it.
     known.lower[parameter::static_friction] = -1.0;
   }
-  Covariances spread = covariances(problem, best.x, problem.free_parameters(), known, scales);
+  const RecordNoise noise = estimate_record_noise(problem, best.x, scales);
+  Covariances spread =
+      covariances(problem, best.x, problem.free_parameters(), known, scales, &noise);
   spread.doubts = std::move(extension.doubts);
 
   FeedforwardFit fit;

@@ -127,9 +127,10 @@ OutputErrorProblem::OutputErrorProblem(const PreparedRecording& recording,
   for (std::size_t i = 0; i < runs_.size(); ++i) {
     priors_.push_back(
         {initial_velocity_of(i), runs_[i].likely_initial_velocity, 0.1 * recording_.top_speed});
-    // Uniform within a row.
-    priors_.push_back(
-        {extra_delay_of(i), 0.0, std::max(1e-4, recording_.row_period) / std::sqrt(12.0)});
+    priors_.push_back({extra_delay_of(i), 0.0, age_deviation()});
+    if (!runs_[i].ramp) {
+      ages_.push_back(extra_delay_of(i));
+    }
   }
   refresh_forces(Eigen::VectorXd::Zero(parameters()));
 }
@@ -143,12 +144,12 @@ std::size_t OutputErrorProblem::residuals() const {
 }
 
 void OutputErrorProblem::refresh_forces(const Eigen::VectorXd& x) {
-  const double delay = x[parameter::position_delay];
   const double kV = x[parameter::velocity_gain];
   const double middle = 0.5 * (low_ + high_);
   for (std::size_t index = 0; index < runs_.size(); ++index) {
     ResidualRun& run = runs_[index];
     const PreparedRun& prepared = recording_.runs[run.prepared];
+    const double delay = x[parameter::position_delay] + x[extra_delay_of(index)];
     const std::size_t rows = run.input.time.size();
     const bool simulated =
         kV > 0.0 && (is_extended(parameter::drag) || is_extended(parameter::sag));

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <utility>
 #include <vector>
@@ -142,6 +144,15 @@ class OutputErrorProblem {
   };
   [[nodiscard]] const std::vector<Prior>& priors() const { return priors_; }
 
+  /// The steps' own shares of the sensors' age. Their sum is held at zero, so that the delays are
+  /// the steps' mean age: a ramp tells an age only as friction, or as what the voltage's noise
+  /// leaves in its simulation, and must not move what the steps tell.
+  [[nodiscard]] const std::vector<Eigen::Index>& ages() const { return ages_; }
+  /// s, of a run's share.
+  [[nodiscard]] double age_deviation() const {
+    return std::max(1e-4, recording_.row_period) / std::sqrt(12.0);  // uniform within a row
+  }
+
   /// Whether friction and gravity are one number: a lift that moves in one direction alone.
   [[nodiscard]] bool hides_friction() const { return hides_friction_; }
 
@@ -161,6 +172,7 @@ class OutputErrorProblem {
   std::vector<Response> responses_;
   std::array<bool, shared_parameter_count> extended_{};
   std::vector<Prior> priors_;
+  std::vector<Eigen::Index> ages_;
   double low_ = 0.0;            ///< Of the travel.
   double high_ = 0.0;           ///< Of the travel.
   double take_up_time_ = 5e-3;  ///< s

@@ -19,6 +19,14 @@ struct NormalEquations {
   double cost = 0.0;
 };
 
+double sum_of_ages(const OutputErrorProblem& problem, const Eigen::VectorXd& x) {
+  double sum = 0.0;
+  for (const Eigen::Index age : problem.ages()) {
+    sum += x[age];
+  }
+  return sum;
+}
+
 /// Adds a channel of a run to the sums of its columns and to the cost.
 void accumulate(const Eigen::VectorXd& residuals, const ResidualBlock::Jacobian& jacobian,
                 double inverse_scale, Eigen::MatrixXd& hessian, Eigen::VectorXd& gradient,
@@ -64,6 +72,14 @@ NormalEquations normal_equations(OutputErrorProblem& problem, const Eigen::Vecto
     equations.gradient[i] += z / deviation;
     equations.hessian(i, i) += 1.0 / square(deviation);
   }
+  const double ages = sum_of_ages(problem, x);
+  equations.cost += age_weight(problem) * square(ages);
+  for (const Eigen::Index a : problem.ages()) {
+    equations.gradient[a] += age_weight(problem) * ages;
+    for (const Eigen::Index b : problem.ages()) {
+      equations.hessian(a, b) += age_weight(problem);
+    }
+  }
   return equations;
 }
 
@@ -88,6 +104,11 @@ std::vector<Eigen::Index> active_parameters(const Eigen::VectorXd& x,
 
 }  // namespace
 
+double age_weight(const OutputErrorProblem& problem) {
+  constexpr double tight = 0.01;  // of a run's share
+  return 1.0 / square(tight * problem.age_deviation());
+}
+
 double cost_at(OutputErrorProblem& problem, const Eigen::VectorXd& x, const ChannelScales& scales) {
   ResidualBlock block;
   double cost = 0.0;
@@ -103,7 +124,7 @@ double cost_at(OutputErrorProblem& problem, const Eigen::VectorXd& x, const Chan
   for (const OutputErrorProblem::Prior& prior : problem.priors()) {
     cost += square((x[prior.parameter] - prior.mean) / prior.deviation);
   }
-  return cost;
+  return cost + age_weight(problem) * square(sum_of_ages(problem, x));
 }
 
 RobustFit minimize(OutputErrorProblem& problem, const Eigen::VectorXd& start,

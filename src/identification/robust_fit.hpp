@@ -17,6 +17,8 @@ struct ChannelScales {
   double velocity = 1.0;
 };
 
+struct RecordNoise;
+
 struct Bounds {
   Eigen::VectorXd lower;
   Eigen::VectorXd upper;
@@ -57,8 +59,12 @@ struct Score {
                                         const ChannelScales& scales,
                                         const std::vector<std::vector<Eigen::Index>>& groups);
 
-/// Covariances of all parameters at a minimum: HAC, block sandwich, residual autocorrelation.
-/// Rows and columns of fixed parameters and of those at a bound are zero.
+/// 1/s², of the square of the sum of the steps' ages in the cost: far above what else tells of it.
+[[nodiscard]] double age_weight(const OutputErrorProblem& problem);
+
+/// Covariances of all parameters at a minimum: HAC, block sandwich (where the record's noise is
+/// known, by that instead), residual autocorrelation. Rows and columns of fixed parameters and of
+/// those at a bound are zero.
 struct Covariances {
   std::array<Eigen::MatrixXd, 3> estimates;
   Eigen::MatrixXd independent;  ///< What it would be if residuals were independent.
@@ -78,8 +84,11 @@ struct Covariances {
   [[nodiscard]] Eigen::MatrixXd joint(const Eigen::MatrixXd& gradients) const;
 };
 
+/// @param noise  Of the record (record_noise.hpp). Without it the block sandwich is there, which
+/// few blocks make large: for a term's evidence, not for an interval.
 [[nodiscard]] Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
                                       const std::vector<bool>& free, const Bounds& bounds,
-                                      const ChannelScales& scales);
+                                      const ChannelScales& scales,
+                                      const RecordNoise* noise = nullptr);
 
 }  // namespace flyball::identification

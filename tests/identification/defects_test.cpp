@@ -39,14 +39,13 @@ struct Defect {
   const char* code;
   std::size_t mechanism;
   SessionDefects defects;
-  double value;        ///< Of the term.
-  bool spoils = true;  ///< The gains, if it is left out.
+  double value;  ///< Of the term.
 };
 
 class ModelTerms : public testing::TestWithParam<Defect> {};
 
 TEST_P(ModelTerms, AreFoundAndTheGainsHoldBesideThem) {
-  const auto& [code, mechanism, defects, value, spoils] = GetParam();
+  const auto& [code, mechanism, defects, value] = GetParam();
   const FitReport report = report_of(mechanism, defects);
   expect_gains(report, mechanism, 0.01);
   ASSERT_NE(find(report.diagnostics, code), nullptr);
@@ -57,16 +56,18 @@ TEST_P(ModelTerms, AreFoundAndTheGainsHoldBesideThem) {
   const double slack = 1e-3 * std::abs(value);
   EXPECT_LE(term.value.interval[0], value + slack);
   EXPECT_GE(term.value.interval[1], value - slack);
-  // Without the term the gains are off by more than they say.
+  // Without the term the gains are off by more than they say, or say little.
   const FitReport without = report_of(mechanism, defects, false);
   ASSERT_TRUE(without.fit);
   const scenarios::Truth& truth = scenarios::mechanisms.at(mechanism);
   const auto misses = [](const GainEstimate& gain, double true_value) {
     return true_value < gain.interval[0] || true_value > gain.interval[1];
   };
-  EXPECT_EQ(spoils, misses(without.fit->kS, truth.kS) || misses(without.fit->kV, truth.kV) ||
-                        misses(without.fit->kA, truth.kA) ||
-                        (without.fit->kG && misses(*without.fit->kG, truth.kG)));
+  const bool says_little = without.fit->kS.standard_error > 4.0 * report.fit->kS.standard_error &&
+                           without.fit->kA.standard_error > 4.0 * report.fit->kA.standard_error;
+  EXPECT_TRUE(says_little || misses(without.fit->kS, truth.kS) ||
+              misses(without.fit->kV, truth.kV) || misses(without.fit->kA, truth.kA) ||
+              (without.fit->kG && misses(*without.fit->kG, truth.kG)));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -76,8 +77,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Defect{"drag", flywheel, {.drag = 4e-4}, 4e-4},
                     Defect{"drag", elevator, {.drag = 0.4}, 0.4},
                     Defect{"sag", elevator, {.sag = 0.2}, 0.2},
-                    Defect{
-                        "asymmetric_friction", flywheel, {.friction_asymmetry = 0.4}, 0.2, false},
+                    Defect{"asymmetric_friction", flywheel, {.friction_asymmetry = 0.4}, 0.2},
                     Defect{"current_limit", flywheel, {.headroom = 3.0}, 3.0},
                     Defect{"current_limit", elevator, {.headroom = 3.5}, 3.5}));
 

@@ -17,11 +17,14 @@ struct Tally {
   std::vector<double> errors;
   std::vector<double> widths;
   std::size_t covered = 0;
+  double z_squared = 0.0;
 
   void add(const GainEstimate& gain, double truth) {
     errors.push_back(std::abs(gain.value / truth - 1.0));
     widths.push_back(0.5 * (gain.interval[1] - gain.interval[0]) / truth);
     covered += gain.interval[0] <= truth && truth <= gain.interval[1] ? 1U : 0U;
+    const double z = (gain.value - truth) / gain.standard_error;
+    z_squared += z * z;
     EXPECT_TRUE(gain.determined) << gain.reason;
   }
 };
@@ -36,6 +39,10 @@ void expect_within(const Tally& tally, double error, double width, const char* g
   EXPECT_LE(median(tally.widths), width) << gain;
   // At 88 % true coverage fewer than 8 of 12 happen once in 500 sessions.
   EXPECT_GE(tally.covered, 8U) << gain;
+  // Of 12 errors in standard errors χ² leaves 3.1 and 30 once in 200 sessions each: intervals no
+  // narrower and no wider than true, where they are within a fifth of it.
+  EXPECT_GE(tally.z_squared, 3.1 * 0.64) << gain;
+  EXPECT_LE(tally.z_squared, 30.0 * 1.44) << gain;
 }
 
 class MonteCarlo : public testing::TestWithParam<std::size_t> {};
@@ -58,11 +65,11 @@ TEST_P(MonteCarlo, RecoversTheGainsWithHonestIntervals) {
       kG.add(*fit->kG, truth.kG);
     }
   }
-  expect_within(kS, 0.03, 0.15, "kS");
-  expect_within(kV, 0.03, 0.02, "kV");
-  expect_within(kA, 0.05, 0.10, "kA");
+  expect_within(kS, 0.02, 0.05, "kS");
+  expect_within(kV, 0.002, 0.005, "kV");
+  expect_within(kA, 0.006, 0.015, "kA");
   if (!kG.errors.empty()) {
-    expect_within(kG, 0.03, 0.04, "kG");
+    expect_within(kG, 0.003, 0.008, "kG");
   }
 }
 
