@@ -47,6 +47,8 @@ class Laws {
     const QuadMatrix M = quad_matrix(problem_.at(name));
     return Balance(Quad(0.5) * (M + transpose(M)));
   }
+  [[nodiscard]] const json& of_problem(const char* name) const { return problem_.at(name); }
+  [[nodiscard]] const json& of_answer(const char* name) const { return answer_.at(name); }
   /// A matrix of the answer.
   [[nodiscard]] Balance found(const char* name) const {
     return answered(quad_matrix(answer_.at(name)));
@@ -317,6 +319,69 @@ void analysis_law(Laws& laws) {
   laws.eigenvalues(laws.given("A"));
 }
 
+/// Pieces follow each other from the first point to the last.
+void spline_law(Laws& laws) {
+  const json& coefficients = laws.of_answer("coefficients");
+  const json& breaks = laws.of_answer("breaks");
+  const json& points = laws.of_problem("points");
+  const std::size_t n = points[0].size();
+  double worst = 0.0;
+  for (std::size_t j = 0; j < n; ++j) {
+    Quad at = points[0][j].get<double>();
+    Quad terms = at < 0 ? -at : at;
+    for (std::size_t i = 0; i < coefficients.size(); ++i) {
+      const json& row = coefficients[i][j];
+      const Quad begin = row[0].get<double>();
+      const Quad gap = at - begin;
+      const Quad size = terms + (begin < 0 ? -begin : begin);
+      if (size > 0) {
+        worst = std::max(worst, static_cast<double>((gap < 0 ? -gap : gap) / size));
+      }
+      const Quad span = Quad(breaks[i + 1].get<double>()) - Quad(breaks[i].get<double>());
+      at = 0;
+      terms = 0;
+      for (std::size_t k = row.size(); k-- > 0;) {
+        const Quad c = row[k].get<double>();
+        at = at * span + c;
+        terms = terms * span + (c < 0 ? -c : c);
+      }
+    }
+    const Quad end = points[points.size() - 1][j].get<double>();
+    const Quad gap = at - end;
+    const Quad size = terms + (end < 0 ? -end : end);
+    if (size > 0) {
+      worst = std::max(worst, static_cast<double>((gap < 0 ? -gap : gap) / size));
+    }
+  }
+  laws.holds("one after the other", worst);
+}
+
+/// Limits of the coordinates hold to 1e-9 at every sample, and times and parameters ascend.
+void timing_law(Laws& laws) {
+  constexpr double allowed = 1e-9;
+  for (const char* name : {"velocity", "acceleration"}) {
+    if (!laws.has(name)) {
+      continue;
+    }
+    const json& limits = laws.of_problem(name);
+    double most = 0.0;
+    for (const json& row : laws.of_answer(name)) {
+      for (std::size_t j = 0; j < row.size(); ++j) {
+        most = std::max(most, std::abs(row[j].get<double>()) / limits[j].get<double>() - 1.0);
+      }
+    }
+    laws.holds(std::string(name) + " limits", tolerance * most / allowed);
+  }
+  double back = 0.0;
+  for (const char* name : {"time", "parameter"}) {
+    const json& values = laws.of_answer(name);
+    for (std::size_t i = 1; i < values.size(); ++i) {
+      back = std::max(back, values[i - 1].get<double>() > values[i].get<double>() ? 1.0 : 0.0);
+    }
+  }
+  laws.holds("goes on", back);
+}
+
 const std::map<std::string_view, void (*)(Laws&)>& table() {
   static const std::map<std::string_view, void (*)(Laws&)> laws{
       {"dare", [](Laws& l) { riccati(l, "X", true); }},
@@ -338,6 +403,8 @@ const std::map<std::string_view, void (*)(Laws&)>& table() {
       {"place", placement_law},
       {"plant-inversion", inversion},
       {"kalman", kalman},
+      {"spline", spline_law},
+      {"path-parameterization", timing_law},
   };
   return laws;
 }

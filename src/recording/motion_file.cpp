@@ -16,6 +16,7 @@
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "recording/finish_trajectory.hpp"
+#include "recording/table_fault.hpp"
 
 namespace flyball {
 
@@ -335,7 +336,8 @@ ExpectedAll<RobotTrajectory> read_motion(const std::string& file, const std::str
                      : path.empty()        ? "of several paths"
                                            : "not of this project")
                 .expected(project.paths.empty() ? "a trajectory: one of the .traj files beside it"
-                                                : "one of " + cut(names, 200))));
+                                                : "one of " + cut(names, 200))
+                .hint(!project.paths.empty() && path.empty() ? "say which by its name" : "")));
       }
       return trajectory_of(*chosen, file);
     }
@@ -343,7 +345,16 @@ ExpectedAll<RobotTrajectory> read_motion(const std::string& file, const std::str
       return parse_trajectory(text, file);
     case MotionFormat::trajectory_table: {
       FLYBALL_TRY(const Log table, parse_csv(text, file));
-      return trajectory_of(table);
+      auto motion = trajectory_of(table);
+      const bool sorted =
+          std::none_of(table.diagnostics.begin(), table.diagnostics.end(),
+                       [](const Diagnostic& noticed) { return noticed.code == "unsorted_time"; });
+      if (!motion || !sorted) {  // the table knows no lines
+        if (auto fault = recording::table_fault(text, file)) {
+          return tl::unexpected(Errors(std::vector<QuotedError>{*std::move(fault)}));
+        }
+      }
+      return motion;
     }
     case MotionFormat::pathplanner_path:
     case MotionFormat::pathplanner_auto:

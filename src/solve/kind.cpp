@@ -10,6 +10,7 @@
 
 #include "core/try.hpp"
 #include "solve/configurations.hpp"
+#include "solve/paths.hpp"
 #include "solve/row.hpp"
 
 namespace flyball::solve {
@@ -70,6 +71,7 @@ std::span<const Kind> kinds() {
     add("Filters and signals", filter_kinds());
     add("Models from records", identification_kinds());
     add("Configuration spaces", configuration_kinds());
+    add("Paths", path_kinds());
     return table;
   }();
   return all;

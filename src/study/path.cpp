@@ -111,7 +111,8 @@ ExpectedAll<std::string> written(PathResult& result) {
   if (job.to == "csv") {
     return to_csv(table);
   }
-  return exports::motion_table(table, "path", "A trajectory of " + name_of(job));
+  return exports::motion_table(table, "path", "A trajectory of " + name_of(job),
+                               exports::motion_rates);
 }
 
 Expected<void> check_job(const PathJob& job) {
@@ -133,6 +134,7 @@ ExpectedAll<PathResult> plan_path(const PathJob& job) {
   FLYBALL_CHECK(check_job(job));
   PathResult result{.job = job};
   double voltage = 12.0;
+  bool names_count = false;  // whether a file has several paths
   LoadedMotion motion;
   if (!job.project.empty()) {
     if (job.files.empty()) {
@@ -169,9 +171,17 @@ ExpectedAll<PathResult> plan_path(const PathJob& job) {
       one.end_velocity.reset();
     }
     FLYBALL_TRY(const LoadedMotion next, load_motion(job.files[i], one, result.robot, voltage));
+    names_count = names_count || next.format == MotionFormat::choreo_project;
     const MotionFormat format = i == 0 ? next.format : motion.format;
     FLYBALL_CHECK(append(motion, next, 0.0));
     motion.format = format;
+  }
+  if (!job.name.empty() && !names_count) {
+    return tl::unexpected(Errors(Error(ArgumentError::malformed)
+                                     .in("path")
+                                     .about("--name")
+                                     .got("given with files of one path each")
+                                     .expected("left out: it says which path of a .chor of 2024")));
   }
   result.format = motion.format;
   result.timed = motion.timed;

@@ -57,11 +57,11 @@ const std::array rows{
              "Limit of the velocity")
         .without("the file's"),
     quantity("acceleration", at<&PathJob::acceleration>(), Dimension::acceleration, positive,
-             "\"3 m/s^2\"", "Limit of the acceleration, along and across the path")
+             "\"3 m/s^2\"", "Limit of the acceleration, along and across the path together")
         .without("the file's"),
     quantity("centripetal", at<&PathJob::centripetal>(), Dimension::acceleration, positive,
              "\"2 m/s^2\"", "Limit of the acceleration across the path")
-        .without("as acceleration"),
+        .without("that of the acceleration"),
     quantity("angular_velocity", at<&PathJob::angular_velocity>(), Dimension::angular_velocity,
              positive, "\"360 deg/s\"", "Limit of the turning rate")
         .without("the file's"),

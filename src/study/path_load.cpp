@@ -28,9 +28,6 @@ void take_limits(RouteShape& shape, const PathJob& job) {
   const auto take = [](double& limit, const auto& said) { limit = said ? said->si() : limit; };
   take(limits.velocity, job.velocity);
   take(limits.acceleration, job.acceleration);
-  if (job.acceleration) {
-    limits.centripetal = job.acceleration->si();
-  }
   take(limits.centripetal, job.centripetal);
   take(limits.angular_velocity, job.angular_velocity);
   take(limits.angular_acceleration, job.angular_acceleration);

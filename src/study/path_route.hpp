@@ -17,10 +17,11 @@ namespace flyball::study {
 /// What a motion keeps to; infinite is no limit.
 struct RouteLimits {
   double velocity = 0.0;              ///< m/s
-  double acceleration = 0.0;          ///< m/s², along the path.
+  double acceleration = 0.0;          ///< m/s², along and across together.
   double centripetal = 0.0;           ///< m/s², across.
   double angular_velocity = 0.0;      ///< rad/s
   double angular_acceleration = 0.0;  ///< rad/s²
+  Place place{0, 0};                  ///< In the file; line 0: nowhere.
 };
 
 /// A place along a path: 1.5 is halfway along the second segment's parameter.
@@ -72,19 +73,12 @@ struct TimedRoute {
   std::vector<PathBinding> binding{};
 };
 
-/// The motion along a shape under its limits and those of a robot's wheels, motors and grip. The
-/// path is cut at corners of more than 3°, at which it stops; each part is taken at even distances
-/// (1 cm, at least 200 and at most 20 000 of them), with at each the largest speed that the limits
-/// leave
-///
-///     v <= v_max,  v² |κ| <= a_c,  v |θ'| <= ω,  v² |θ''| <= α,  v |p' + θ' × r_k| <= w,
-///     (v² κ)² + a² <= (μ g)²,
-///
-/// and between two of them accelerations within a_max, the angular acceleration |θ' a + θ'' v²| <=
-/// α, the motors' force at that speed and the grip.
+/// The fastest motion along a shape under its limits and those of a robot's wheels, motors and grip
+/// (`time_optimal`), which hold between samples, too. The path is cut at corners of more than 3°,
+/// at which it stops. Samples are 10 ms apart or less.
 /// @param robot  Absent: only the limits count. @param voltage  V, of its motors.
 /// @errors ArgumentError::out_of_range (an end's velocity that cannot be), not_positive, empty.
-/// Cost: O(points). Source: Bobrow, Dubowsky, Gibson (1985); Kunz and Stilman (2012).
+/// Cost: some milliseconds; allocates.
 [[nodiscard]] Expected<TimedRoute> time_route(const RouteShape& shape,
                                               const std::optional<DriveRobot>& robot,
                                               double voltage);

@@ -40,11 +40,12 @@ RouteLimits limits_of(const PathPlannerConstraints& from) {
     return {none, none, none, none, none};
   }
   return {.velocity = from.max_velocity,
-          .acceleration = from.max_acceleration,
           // A module's force does not know along from across.
-          .centripetal = from.max_acceleration,
+          .acceleration = from.max_acceleration,
+          .centripetal = none,
           .angular_velocity = degree * from.max_angular_velocity,
-          .angular_acceleration = degree * from.max_angular_acceleration};
+          .angular_acceleration = degree * from.max_angular_acceleration,
+          .place = from.origin.place()};
 }
 
 }  // namespace
@@ -81,7 +82,6 @@ Expected<RouteShape> shape_of(const PathPlannerPath& path, const std::string& so
     shape.limits = limits_of(PathPlannerConstraints{});
     shape.limits.velocity = path.max_velocity.value_or(shape.limits.velocity);
     shape.limits.acceleration = path.max_acceleration.value_or(shape.limits.acceleration);
-    shape.limits.centripetal = shape.limits.acceleration;
     for (std::size_t i = 0; i < path.waypoints.size(); ++i) {
       const PathPlannerWaypoint& waypoint = path.waypoints[i];
       const double at = static_cast<double>(i);
@@ -185,7 +185,7 @@ Expected<RouteShape> shape_of(const ChoreoTrajectory& trajectory, const std::str
     if (constraint.type == "MaxVelocity") {
       limits.velocity = most;
     } else if (constraint.type == "MaxAcceleration") {
-      limits.acceleration = limits.centripetal = most;
+      limits.acceleration = most;
     } else if (constraint.type == "MaxAngularVelocity") {
       limits.angular_velocity = most;
     } else {

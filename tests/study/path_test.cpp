@@ -72,18 +72,18 @@ TEST(Path, AStraightLineIsATrapezoid) {
   const PathResult result = plan(folder, straight());
   // 4 m at 2 m/s with 2 m/s²: 1 s up, 1 s along, 1 s down.
   EXPECT_NEAR(result.length, 4.0, 1e-9);
-  EXPECT_NEAR(result.trajectory.duration(), 3.0, 1e-6);
+  EXPECT_NEAR(result.trajectory.duration(), 3.0, 3e-3);
   ASSERT_EQ(result.binding.size(), 3U);
   EXPECT_EQ(result.binding[0].limit, "acceleration");
   EXPECT_EQ(result.binding[1].limit, "velocity");
   EXPECT_EQ(result.binding[2].limit, "acceleration");
-  EXPECT_NEAR(result.binding[1].from, 1.0, 0.02);
-  EXPECT_NEAR(result.binding[1].to, 2.0, 0.02);
+  EXPECT_NEAR(result.binding[1].from, 1.0, 0.05);
+  EXPECT_NEAR(result.binding[1].to, 2.0, 0.05);
   // The same with ends that move: 2 m/s all along.
   PathJob moving;
   moving.start_velocity = Velocity(2.0);
   moving.end_velocity = Velocity(2.0);
-  EXPECT_NEAR(plan(folder, straight(), moving).trajectory.duration(), 2.0, 1e-6);
+  EXPECT_NEAR(plan(folder, straight(), moving).trajectory.duration(), 2.0, 5e-4);
 }
 
 TEST(Path, ACurveIsDrivenAtItsCentripetalLimit) {
@@ -133,6 +133,7 @@ TEST(Path, KeepsItsLimits) {
       const double v = sample.velocity.norm();
       EXPECT_LE(v, 2.0 * (1.0 + 1e-9));
       EXPECT_LE(std::abs(sample.omega), 3.0 * pi * (1.0 + 1e-9));
+      EXPECT_LE(sample.acceleration.norm(), 2.0 * (1.0 + 1e-9));
       slow += v > 1.0 + 1e-9 ? 0.0 : 1.0;
       if (i > 0) {
         ASSERT_GT(sample.time, samples[i - 1].time);
@@ -182,11 +183,11 @@ grip = 5.0
       *std::max_element(result.fastest_wheel.begin(), result.fastest_wheel.end());
   EXPECT_LE(fastest, result.wheel_limit * (1.0 + 1e-9));
   EXPECT_GT(fastest, 0.9 * result.wheel_limit);
-  EXPECT_EQ(result.binding.front().limit, "the motors");
+  EXPECT_EQ(result.binding.front().limit, "left side: voltage");
   // From rest: two sides' stall force over the mass.
   const double force = 2.0 * result.robot->motor.Kt / result.robot->motor.R * 12.0 * 8.45 / 0.0762;
   const double mass = 54.0 + 2.0 * result.robot->wheel_inertia / (0.0762 * 0.0762);
-  EXPECT_NEAR(result.trajectory.samples[0].acceleration.norm(), force / mass, 0.02 * force / mass);
+  EXPECT_NEAR(result.trajectory.samples[0].acceleration.norm(), force / mass, 0.04 * force / mass);
 }
 
 TEST(Path, CornersAndReversalsAreStops) {
@@ -279,6 +280,78 @@ TEST(Path, TranslatesToEachFormat) {
   EXPECT_NEAR(first.y, 8.052 - 1.0, 1e-12);
 }
 
+// Waypoints in one place, control points on their anchors, joints that are off by a degree.
+TEST(Path, DrivesThroughWhatFilesRound) {
+  const Folder folder;
+  const auto noticed = [](const PathResult& result, std::string_view code) {
+    return std::any_of(result.diagnostics.begin(), result.diagnostics.end(),
+                       [&](const Diagnostic& diagnostic) { return diagnostic.code == code; });
+  };
+  const double at_once = plan(folder, straight()).trajectory.duration();
+  const PathResult twice =
+      plan(folder, path_of({{1, 1}, {1, 1}, {1, 1}, {1, 1}, {2, 1}, {4, 1}, {5, 1}}));
+  EXPECT_TRUE(noticed(twice, "waypoints_coincide"));
+  EXPECT_NEAR(twice.trajectory.duration(), at_once, 1e-9);
+
+  const PathResult on_anchor =
+      plan(folder, path_of({{1, 1}, {1, 1}, {3, 1}, {3, 1}, {3, 1}, {5, 1}, {5, 1}}));
+  EXPECT_TRUE(noticed(on_anchor, "control_on_anchor"));
+  EXPECT_NEAR(on_anchor.trajectory.duration(), at_once, 0.01);
+
+  const PathResult bent =
+      plan(folder, path_of({{1, 1}, {2, 1}, {2, 1}, {3, 1}, {4, 1.02}, {4, 1}, {5, 1}}));
+  EXPECT_TRUE(noticed(bent, "corners_smoothed"));
+  EXPECT_NEAR(bent.trajectory.duration(), at_once, 0.05);
+}
+
+// The wheels' accelerations, of samples alone: no jump where a line becomes a bend.
+TEST(Path, ADifferentialDriveRoundsTheCurvature) {
+  const Folder folder;
+  const PathPlannerPath path =
+      path_of({{1, 1}, {2, 1}, {3, 1}, {4, 1}, {5.1, 1}, {6, 1.9}, {6, 3}});
+  PathJob job;
+  job.differential = true;
+  job.velocity = Velocity(2.0);
+  job.acceleration = Acceleration(2.0);
+  job.angular_velocity = AngularVelocity(3.0);
+  job.angular_acceleration = AngularAcceleration(6.0);
+  const PathResult result = plan(folder, path, job);
+  const auto& samples = result.trajectory.samples;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    const double dt = samples[i].time - samples[i - 1].time;
+    EXPECT_LE(std::abs(samples[i].omega - samples[i - 1].omega), 6.0 * dt * (1.0 + 1e-6));
+    if (samples[i].time > 1.0 && samples[i].time < result.trajectory.duration() - 1.0) {
+      EXPECT_GT(samples[i].velocity.norm(), 0.3);
+    }
+  }
+}
+
+// A limit of a single place, as PathPlanner 2023 has it.
+TEST(Path, AVelocityAtAWaypoint) {
+  const Folder folder;
+  const std::string file = folder.write("old.path", R"({"waypoints": [
+      {"anchorPoint": {"x": 1, "y": 1}, "prevControl": null, "nextControl": {"x": 2, "y": 1},
+       "holonomicAngle": 0, "isReversal": false, "velOverride": null, "isLocked": false,
+       "isStopPoint": false},
+      {"anchorPoint": {"x": 4, "y": 1}, "prevControl": {"x": 3, "y": 1},
+       "nextControl": {"x": 5, "y": 1}, "holonomicAngle": 0, "isReversal": false,
+       "velOverride": 0.5, "isLocked": false, "isStopPoint": false},
+      {"anchorPoint": {"x": 7, "y": 1}, "prevControl": {"x": 6, "y": 1}, "nextControl": null,
+       "holonomicAngle": 0, "isReversal": false, "velOverride": null, "isLocked": false,
+       "isStopPoint": false}], "maxVelocity": 3, "maxAcceleration": 2, "isReversed": null})");
+  const auto result = plan_path({.files = {file}});
+  ASSERT_TRUE(result) << to_string(static_cast<const Error&>(result.error()));
+  double nearest = 1e9;
+  double there = 0.0;
+  for (const MotionSample& sample : result->trajectory.samples) {
+    if (const double d = std::abs(sample.pose.x() - 4.0); d < nearest) {
+      nearest = d;
+      there = sample.velocity.norm();
+    }
+  }
+  EXPECT_NEAR(there, 0.5, 0.03);
+}
+
 TEST(Path, JoinsFiles) {
   const Folder folder;
   const std::string a = folder.write("a.path", to_pathplanner(straight()).value());
@@ -317,22 +390,48 @@ TEST(Path, TellsWhatIsWrong) {
   };
   PathPlannerPath path = straight();
   path.constraints.max_velocity = 0.0;
-  EXPECT_EQ(refusal_of(path), ": the velocity limit is 0; it must be positive");
+  EXPECT_NE(refusal_of(path).find(": the velocity limit is 0; it must be positive"),
+            std::string::npos);
+  EXPECT_GT(std::atoi(refusal_of(path).c_str() + 1), 1) << refusal_of(path);  // the line
+  const auto unasked = plan_path(
+      {.files = {folder.write("a.path", to_pathplanner(straight()).value())}, .name = "mine"});
+  ASSERT_FALSE(unasked);
+  EXPECT_NE(to_string(static_cast<const Error&>(unasked.error())).find("--name is given"),
+            std::string::npos);
   path = straight();
   path.waypoints.pop_back();
   EXPECT_EQ(refusal_of(path), ": the path is of 1 waypoints; it must be two or more");
   path = straight();
-  path.waypoints[1] = path.waypoints[0];
-  path.waypoints[1].previous_control = path.waypoints[0].anchor;
-  path.waypoints[0].next_control = path.waypoints[0].anchor;
-  EXPECT_NE(refusal_of(path).find("segment 1 of the path is 0 m long"), std::string::npos);
+  for (PlannerPoint* point : {&path.waypoints[1].anchor, &*path.waypoints[0].next_control,
+                              &*path.waypoints[1].previous_control}) {
+    *point = path.waypoints[0].anchor;
+  }
+  EXPECT_EQ(refusal_of(path),
+            ": the path is all in one place; it must be one that goes somewhere; move a waypoint");
+  path = straight();
+  path.waypoints[1].anchor.x = 5e5;
+  EXPECT_NE(refusal_of(path).find("places are in metres"), std::string::npos);
   PathJob fast;
   fast.start_velocity = Velocity(9.0);
-  EXPECT_NE(refusal_of(straight(), fast).find("the start velocity is 9 m/s"), std::string::npos);
+  EXPECT_NE(refusal_of(straight(), fast)
+                .find("start velocity is 9; it must be at most 2 under the limits"),
+            std::string::npos);
   fast.start_velocity.reset();
   fast.end_velocity = Velocity(1.9);
-  EXPECT_EQ(refusal_of(path_of({{1, 1}, {1.1, 1}, {1.2, 1}, {1.3, 1}}), fast).substr(0, 39),
-            ": the end velocity is 1.9 m/s; it must ");
+  EXPECT_EQ(refusal_of(path_of({{1, 1}, {1.1, 1}, {1.2, 1}, {1.3, 1}}), fast).substr(0, 31),
+            ": end velocity is 1.9; it must ");
+  const auto table_refusal = [&](const std::string& text) {
+    const auto result = plan_path({.files = {folder.write("t.csv", text)}});
+    const std::string told =
+        result ? "planned" : to_string(static_cast<const Error&>(result.error()));
+    return told.substr(told.find("t.csv") + 5);
+  };
+  EXPECT_EQ(table_refusal("time,x,y\n0,0,0\n1,abc,0\n2,3,0\n"),
+            ":3:3: x is \"abc\"; it must be a number");
+  EXPECT_EQ(table_refusal("time,x,y\n0,0,0\n1,1,0\n0.5,3,0\n"),
+            ":4:1: time is 0.5 s; it must be more than the 1 s of the row before it");
+  EXPECT_EQ(table_refusal("time,x,y\n0,0,0\n1,1\n2,3,0\n"),
+            ":3:1: the row is of 2 cells; it must be of 3, a number in each column");
   const std::string table = folder.write("t.csv", "time,x,y\n0,0,0\n1,1,0\n2,3,0\n");
   const auto unlimited = plan_path({.files = {table}, .retime = true});
   ASSERT_FALSE(unlimited);

@@ -72,8 +72,8 @@ struct PathResult {
 
 /// Reads the files, times those that are paths, joins, turns and mirrors them.
 ///
-/// A path is timed on a grid of its length: caps on the speed by the limits, and the speeds that
-/// the accelerations reach, forward from the start and back from the end (`time_route`).
+/// A path is timed as fast as the limits let it be, which hold between samples, too
+/// (`time_optimal`).
 /// @errors FileError, MotionFileError, TrajectoryFileError, ArgumentError, those of the project.
 /// Cost: some milliseconds a path; allocates.
 [[nodiscard]] ExpectedAll<PathResult> plan_path(const PathJob& job);

@@ -9,7 +9,7 @@ namespace flyball::detail {
 
 namespace {
 
-/// Points of an interval, τ = k/6; polynomials go through each second one.
+/// Points of an interval, τ = k/6; polynomials of rows go through each second one.
 constexpr std::size_t points = 7;
 /// What the polynomials are off between their points, as the three points between say, is made
 /// larger by this: the difference is of fourth order and largest near two of those points.
@@ -30,6 +30,19 @@ double cubic(const std::array<double, 4>& c, double tau) {
          tau * tau * tau * c[3];
 }
 
+/// c of the quartic Σ B_k c_k through five values at 0, 1/3, 1/2, 2/3, 1.
+std::array<double, 5> quartic_through(double f0, double f1, double f2, double f3, double f4) {
+  return {f0, (-7.0 * f0 + 54.0 * f1 - 64.0 * f2 + 27.0 * f3 - 2.0 * f4) / 8.0,
+          (7.0 * f0 - 81.0 * f1 + 160.0 * f2 - 81.0 * f3 + 7.0 * f4) / 12.0,
+          (-2.0 * f0 + 27.0 * f1 - 64.0 * f2 + 54.0 * f3 - 7.0 * f4) / 8.0, f4};
+}
+
+double quartic(const std::array<double, 5>& c, double tau) {
+  const double s = 1.0 - tau;
+  return s * s * s * s * c[0] + 4.0 * s * s * s * tau * c[1] + 6.0 * s * s * tau * tau * c[2] +
+         4.0 * s * tau * tau * tau * c[3] + tau * tau * tau * tau * c[4];
+}
+
 double parabola(const Bezier2& b, double tau) {
   const double s = 1.0 - tau;
   return s * s * b[0] + 2.0 * s * tau * b[1] + tau * tau * b[2];
@@ -48,7 +61,7 @@ class CollocatedRows final : public CellRows {
   void fill(const std::vector<TimingCell>& cells, const std::vector<Bezier2>& about,
             TimingRows& rows) override {
     const std::size_t n = cells.size();
-    rows.resize(n, static_cast<int>(4 * row_count_), static_cast<int>(4 * cap_count_));
+    rows.resize(n, static_cast<int>(4 * row_count_), static_cast<int>(uppers()));
     rows.delta.assign(4 * row_count_ * n, 0.0);
     room_.assign(n * row_count_, 1.0);
     at_.resize(n * points * row_count_);
@@ -123,15 +136,19 @@ class CollocatedRows final : public CellRows {
   [[nodiscard]] bool is_put_about() const override { return has_speeds_; }
 
  private:
+  /// Rows of one side: an even number.
+  [[nodiscard]] std::size_t uppers() const noexcept { return 5 * cap_count_ + cap_count_ % 2; }
   void evaluate(const TimingCell& cell, std::size_t i) {
     for (std::size_t k = 0; k < points; ++k) {
       // A hair inside: at a border the limits are those of this side.
       const double tau = std::clamp(static_cast<double>(k) / 6.0, 1e-9, 1.0 - 1e-9);
-      const PathState state = path_.at(cell.piece, cell.from + (cell.to - cell.from) * tau);
+      const double t = cell.from + (cell.to - cell.from) * tau;
+      const PathState state = path_.at(cell.piece, t);
+      const double s = path_.breaks()[cell.piece] + t * path_.pieces()[cell.piece].span;
       MotionRow* rows = at_.data() + (i * points + k) * row_count_;
       double* caps = w_.data() + (i * points + k) * cap_count_;
       for (const auto& limit : limits_) {
-        limit->evaluate(state, rows, caps);
+        limit->evaluate(state, s, rows, caps);
         rows += limit->row_names.size();
         caps += limit->cap_names.size();
       }
@@ -141,35 +158,41 @@ class CollocatedRows final : public CellRows {
     }
   }
 
-  /// w x <= 1 with w the cubic through four points, raised by what it is below between them: degree
-  /// five.
+  /// w x <= 1 with w the quartic through five points (of |q'|² of cubics exact), raised by what it
+  /// is below between them: degree six.
   void fill_caps(std::size_t i, TimingRows& rows) const {
     double first = 0.0;
     double last = 0.0;
     double all = 0.0;
-    const std::size_t upper_from = 4 * i * cap_count_;
+    const std::size_t upper_from = i * uppers();
     for (std::size_t c = 0; c < cap_count_; ++c) {
       const auto w = [&](std::size_t k) { return w_[(i * points + k) * cap_count_ + c]; };
-      std::array<double, 4> f = through(w(0), w(2), w(4), w(6));
-      double below = 0.0;
-      for (const std::size_t k : {1U, 3U, 5U}) {
-        below = std::max(below, w(k) - cubic(f, static_cast<double>(k) / 6.0));
-      }
+      std::array<double, 5> f = quartic_through(w(0), w(2), w(3), w(4), w(6));
+      const double below =
+          std::max({0.0, w(1) - quartic(f, 1.0 / 6.0), w(5) - quartic(f, 5.0 / 6.0)});
       for (double& value : f) {
         value += caution * below;
       }
       first = std::max(first, f[0]);
-      last = std::max(last, f[3]);
-      all = std::max({all, f[0], f[1], f[2], f[3]});
-      const double entries[4][3] = {{0.6 * f[1], 0.4 * f[0], 0.0},
-                                    {0.3 * f[2], 0.6 * f[1], 0.1 * f[0]},
-                                    {0.1 * f[3], 0.6 * f[2], 0.3 * f[1]},
-                                    {0.0, 0.4 * f[3], 0.6 * f[2]}};
-      for (std::size_t k = 0; k < 4; ++k) {
-        rows.upper_alpha[upper_from + 4 * c + k] = entries[k][0];
-        rows.upper_beta[upper_from + 4 * c + k] = entries[k][1];
-        rows.upper_gamma[upper_from + 4 * c + k] = entries[k][2];
+      last = std::max(last, f[4]);
+      all = std::max({all, f[0], f[1], f[2], f[3], f[4]});
+      constexpr double fifteenth = 1.0 / 15.0;
+      const double entries[5][3] = {
+          {10.0 * fifteenth * f[1], 5.0 * fifteenth * f[0], 0.0},
+          {6.0 * fifteenth * f[2], 8.0 * fifteenth * f[1], fifteenth * f[0]},
+          {0.2 * f[3], 0.6 * f[2], 0.2 * f[1]},
+          {fifteenth * f[4], 8.0 * fifteenth * f[3], 6.0 * fifteenth * f[2]},
+          {0.0, 5.0 * fifteenth * f[4], 10.0 * fifteenth * f[3]}};
+      for (std::size_t k = 0; k < 5; ++k) {
+        rows.upper_alpha[upper_from + 5 * c + k] = entries[k][0];
+        rows.upper_beta[upper_from + 5 * c + k] = entries[k][1];
+        rows.upper_gamma[upper_from + 5 * c + k] = entries[k][2];
       }
+    }
+    for (std::size_t r = 5 * cap_count_; r < uppers(); ++r) {
+      rows.upper_alpha[upper_from + r] = 0.0;
+      rows.upper_beta[upper_from + r] = 0.0;
+      rows.upper_gamma[upper_from + r] = 0.0;
     }
     const double floor = std::max(0.02 * all, 1e-300);
     rows.cap[i] = {1.0 / std::max(first, floor), 4.0 / std::max(all, floor),

@@ -47,7 +47,7 @@ class Shafts {
     made.radius_ = limits.wheel_radius.si();
     constexpr double step = std::numbers::pi / grip_directions;
     for (std::size_t i = 0; i < grip_directions; ++i) {
-      const double angle = step * static_cast<double>(i);
+      const double angle = step * (static_cast<double>(i) + 0.5);
       made.grip_[i] = Vector2d(std::cos(angle), std::sin(angle)) / std::cos(0.5 * step);
     }
     const double per_current = shaft.gearing * shaft.Kt;
@@ -151,7 +151,8 @@ class OfDifferential final : public MotionLimit {
     shafts_.name(*this, "right side");
     shafts_.name_grip(*this, "wheels");
   }
-  void evaluate(const PathState& state, MotionRow* rows, double* caps) const noexcept override {
+  void evaluate(const PathState& state, double /*s*/, MotionRow* rows,
+                double* caps) const noexcept override {
     const PlanarMotion motion = facing_motion(state, backwards_);
     const Linear<Vector3d> W = shafts_.wrench(motion);
     for (const double side : {-half_, half_}) {  // F_x/2 ∓ M/(2 r_b)
@@ -180,7 +181,8 @@ class OfSwerve final : public MotionLimit {
       shafts_.name_grip(*this, format("module {}", i + 1));
     }
   }
-  void evaluate(const PathState& state, MotionRow* rows, double* caps) const noexcept override {
+  void evaluate(const PathState& state, double /*s*/, MotionRow* rows,
+                double* caps) const noexcept override {
     const PlanarMotion motion = holonomic_motion(state);
     const Linear<Vector3d> W = shafts_.wrench(motion);
     const auto at = [](const Vector3d& twist, const Vector2d& r) {
@@ -218,7 +220,8 @@ class OfMecanum final : public MotionLimit {
     }
     shafts_.name_grip(*this, "wheels");
   }
-  void evaluate(const PathState& state, MotionRow* rows, double* caps) const noexcept override {
+  void evaluate(const PathState& state, double /*s*/, MotionRow* rows,
+                double* caps) const noexcept override {
     const PlanarMotion motion = holonomic_motion(state);
     const Linear<Vector3d> W = shafts_.wrench(motion);
     // Wᵀ ξ = Fᵀ M ξ, so that F = (M⁺)ᵀ W

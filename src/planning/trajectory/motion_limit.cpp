@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include <flyball/core/argument.hpp>
@@ -30,7 +32,8 @@ class OfCoordinates final : public MotionLimit {
       }
     }
   }
-  void evaluate(const PathState& state, MotionRow* rows, double* caps) const noexcept override {
+  void evaluate(const PathState& state, double /*s*/, MotionRow* rows,
+                double* caps) const noexcept override {
     for (const auto& [j, inverse] : acceleration_) {
       *rows++ = {state.first(j) * inverse, state.second(j) * inverse, 0.0, 0.0};
     }
@@ -45,6 +48,10 @@ class OfCoordinates final : public MotionLimit {
   std::vector<std::pair<int, double>> acceleration_;
 };
 
+/// Of a circle of accelerations a polygon of twice as many sides.
+constexpr std::size_t circle_directions = 12;
+constexpr std::size_t most_travel_rows = circle_directions + 2;
+
 class OfTravel final : public MotionLimit {
  public:
   explicit OfTravel(const TravelLimits& limits) : limits_(limits) {
@@ -58,8 +65,18 @@ class OfTravel final : public MotionLimit {
     name(cap_names, limits.angular_velocity, "angular velocity");
     name(row_names, limits.acceleration, "acceleration");
     name(row_names, limits.angular_acceleration, "angular acceleration");
+    if (std::isfinite(limits.total_acceleration)) {
+      row_names.insert(row_names.end(), circle_directions, "acceleration");
+      constexpr double step = std::numbers::pi / circle_directions;
+      const double size = std::cos(0.5 * step) * limits.total_acceleration;
+      for (std::size_t i = 0; i < circle_directions; ++i) {
+        const double angle = step * (static_cast<double>(i) + 0.5);
+        circle_[i] = Vector2d(std::cos(angle), std::sin(angle)) / size;
+      }
+    }
   }
-  void evaluate(const PathState& state, MotionRow* rows, double* caps) const noexcept override {
+  void evaluate(const PathState& state, double /*s*/, MotionRow* rows,
+                double* caps) const noexcept override {
     const PlanarMotion facing = facing_motion(state, false);
     const bool turns = state.position.size() > 2;
     const double turn = turns ? state.first(2) : facing.twist(2);
@@ -81,10 +98,59 @@ class OfTravel final : public MotionLimit {
       *rows++ = {turn / limits_.angular_acceleration, bend / limits_.angular_acceleration, 0.0,
                  0.0};
     }
+    if (std::isfinite(limits_.total_acceleration)) {
+      for (const Vector2d& normal : circle_) {
+        *rows++ = {normal(0) * facing.first(0), normal.dot(facing.second), 0.0, 0.0};
+      }
+    }
   }
 
  private:
   TravelLimits limits_;
+  std::array<Vector2d, circle_directions> circle_{};
+};
+
+class OfStretch final : public MotionLimit {
+ public:
+  OfStretch(const StretchLimits& stretch, std::size_t number)
+      : inner_(stretch.limits), from_(stretch.from), to_(stretch.to) {
+    const std::string name = stretch.name.empty() ? format("stretch {}", number) : stretch.name;
+    const auto named = [&](const std::vector<std::string>& limits, std::vector<std::string>& all) {
+      for (const std::string& limit : limits) {
+        all.push_back(name + ": " + limit);
+      }
+    };
+    named(inner_.cap_names, cap_names);
+    if (from_ < to_) {
+      named(inner_.row_names, row_names);
+    }
+  }
+  void evaluate(const PathState& state, double s, MotionRow* rows,
+                double* caps) const noexcept override {
+    if (s >= from_ && s <= to_) {
+      std::array<MotionRow, most_travel_rows> skipped;  // of a single place: velocities alone count
+      inner_.evaluate(state, s, from_ < to_ ? rows : skipped.data(), caps);
+    } else {
+      std::fill_n(rows, row_names.size(), MotionRow{});
+      std::fill_n(caps, cap_names.size(), 0.0);
+    }
+  }
+  void jumps(const Path& path, std::size_t piece, std::vector<double>& t) const override {
+    for (const double s : {from_, to_}) {
+      const double at = (s - path.breaks()[piece]) / path.pieces()[piece].span;
+      if (at > 0.0 && at < 1.0) {
+        t.push_back(at);
+      }
+    }
+  }
+  [[nodiscard]] std::optional<double> place() const override {
+    return from_ < to_ ? std::nullopt : std::optional(from_);
+  }
+
+ private:
+  OfTravel inner_;
+  double from_;
+  double to_;
 };
 
 class OfRegion final : public MotionLimit {
@@ -93,18 +159,28 @@ class OfRegion final : public MotionLimit {
     cap_names.push_back((limit.name.empty() ? format("region {}", number) : limit.name) +
                         ": velocity");
   }
-  void evaluate(const PathState& state, MotionRow* /*rows*/, double* caps) const noexcept override {
+  void evaluate(const PathState& state, double /*s*/, MotionRow* /*rows*/,
+                double* caps) const noexcept override {
     const bool inside = contains(limit_, state.position.head<2>());
     *caps =
         inside ? state.first.head<2>().squaredNorm() / (limit_.velocity * limit_.velocity) : 0.0;
   }
-  void jumps(const PathPiece& piece, std::vector<double>& t) const override {
-    border_crossings(limit_, piece, t);
+  void jumps(const Path& path, std::size_t piece, std::vector<double>& t) const override {
+    border_crossings(limit_, path.pieces()[piece], t);
   }
 
  private:
   RegionLimit limit_;
 };
+
+Expected<void> check_travel(const TravelLimits& limits, std::string_view where) {
+  FLYBALL_CHECK(check_limit(limits.velocity, where, "velocity limit", "m/s"));
+  FLYBALL_CHECK(check_limit(limits.acceleration, where, "acceleration limit", "m/s²"));
+  FLYBALL_CHECK(check_limit(limits.centripetal, where, "centripetal acceleration limit", "m/s²"));
+  FLYBALL_CHECK(check_limit(limits.total_acceleration, where, "acceleration limit", "m/s²"));
+  FLYBALL_CHECK(check_limit(limits.angular_velocity, where, "angular velocity limit", "rad/s"));
+  return check_limit(limits.angular_acceleration, where, "angular acceleration limit", "rad/s²");
+}
 
 Expected<void> check_coordinate_limits(const Eigen::VectorXd& limits, const Path& path,
                                        std::string_view where, std::string_view name) {
@@ -185,6 +261,7 @@ Expected<std::vector<std::unique_ptr<MotionLimit>>> motion_limits(
     const Path& path, std::span<const PathConstraint> constraints, std::string_view where) {
   std::vector<std::unique_ptr<MotionLimit>> limits;
   std::size_t regions = 0;
+  std::size_t stretches = 0;
   for (const PathConstraint& constraint : constraints) {
     if (const auto* of = std::get_if<CoordinateLimits>(&constraint)) {
       FLYBALL_CHECK(check_coordinate_limits(of->velocity, path, where, "velocity limit"));
@@ -199,16 +276,21 @@ Expected<std::vector<std::unique_ptr<MotionLimit>>> motion_limits(
           .hint("use limits of the coordinates");
     }
     if (const auto* of = std::get_if<TravelLimits>(&constraint)) {
-      FLYBALL_CHECK(check_limit(of->velocity, where, "velocity limit", "m/s"));
-      FLYBALL_CHECK(check_limit(of->acceleration, where, "acceleration limit", "m/s²"));
-      FLYBALL_CHECK(check_limit(of->centripetal, where, "centripetal acceleration limit", "m/s²"));
-      FLYBALL_CHECK(check_limit(of->angular_velocity, where, "angular velocity limit", "rad/s"));
-      FLYBALL_CHECK(
-          check_limit(of->angular_acceleration, where, "angular acceleration limit", "rad/s²"));
+      FLYBALL_CHECK(check_travel(*of, where));
       limits.push_back(std::make_unique<OfTravel>(*of));
     } else if (const auto* region = std::get_if<RegionLimit>(&constraint)) {
       FLYBALL_CHECK(check_region(*region, ++regions, where));
       limits.push_back(std::make_unique<OfRegion>(*region, regions));
+    } else if (const auto* stretch = std::get_if<StretchLimits>(&constraint)) {
+      FLYBALL_CHECK(check_travel(stretch->limits, where));
+      FLYBALL_CHECK(
+          Checks(where).finite(stretch->from, "stretch: from").finite(stretch->to, "stretch: to"));
+      if (!(stretch->from <= stretch->to)) {
+        return refusal(ArgumentError::out_of_range, where, "stretch: to")
+            .got(format_number(stretch->to))
+            .expected("from, " + format_number(stretch->from) + ", or more");
+      }
+      limits.push_back(std::make_unique<OfStretch>(*stretch, ++stretches));
     } else if (const auto* differential = std::get_if<DifferentialDriveLimits>(&constraint)) {
       if (path.coordinates() != 2) {
         return refusal(ArgumentError::wrong_shape, where, "path")

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -26,10 +27,15 @@ struct MotionRow {
 class MotionLimit {
  public:
   virtual ~MotionLimit() = default;
-  /// @param rows  As many as there are row names. @param caps  The same of caps.
-  virtual void evaluate(const PathState& state, MotionRow* rows, double* caps) const noexcept = 0;
+  /// @param s  Parameter of the path. @param rows  As many as there are row names. @param caps  The
+  /// same of caps.
+  virtual void evaluate(const PathState& state, double s, MotionRow* rows,
+                        double* caps) const noexcept = 0;
   /// Places of a piece where the limit jumps, t in (0, 1), in any order.
-  virtual void jumps(const PathPiece& /*piece*/, std::vector<double>& /*t*/) const {}
+  virtual void jumps(const Path& /*path*/, std::size_t /*piece*/,
+                     std::vector<double>& /*t*/) const {}
+  /// The parameter where it holds, of a limit of a single place.
+  [[nodiscard]] virtual std::optional<double> place() const { return std::nullopt; }
 
   std::vector<std::string> row_names;
   std::vector<std::string> cap_names;

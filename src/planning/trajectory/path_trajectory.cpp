@@ -154,7 +154,7 @@ std::vector<BindingLimit> PathTrajectory::binding() const {
       detail::MotionRow* row = rows.data();
       double* w = cap.data();
       for (const auto& limit : *limits) {
-        limit->evaluate(state, row, w);
+        limit->evaluate(state, path_.breaks()[span.piece] + span.parameter + s, row, w);
         row += limit->row_names.size();
         w += limit->cap_names.size();
       }

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <utility>
 
 #include <flyball/core/argument.hpp>
@@ -35,10 +37,19 @@ bool moves(const PathPiece& piece) {
   return c.cols() > 1 && c.rightCols(c.cols() - 1).cwiseAbs().maxCoeff() > 0.0;
 }
 
-/// How x goes on from one piece to the next: (|q'-|/|q'+|)², 0 at a corner.
-double join_of(const Path& path, std::size_t piece, std::size_t next) {
-  const PathVector before = path.at(piece, 1.0).first;
-  const PathVector after = path.at(next, 0.0).first;
+/// What a timing asks of a path's joints.
+struct JointRules {
+  bool accelerates = true;  ///< Whether an acceleration is limited; else velocities may jump.
+  bool faces = false;       ///< Whether turning rates are those of the way, and may not jump.
+};
+
+/// How x goes on from one piece to the next: (|q'-|/|q'+|)²; at a corner, and where the curvature
+/// of a way that is faced jumps, 0.
+double join_of(const Path& path, std::size_t piece, std::size_t next, const JointRules& rules) {
+  const PathState at_end = path.at(piece, 1.0);
+  const PathState at_begin = path.at(next, 0.0);
+  const PathVector& before = at_end.first;
+  const PathVector& after = at_begin.first;
   const double v = before.norm();
   const double w = after.norm();
   if (!(v > 0.0) || !(w > 0.0)) {
@@ -47,13 +58,21 @@ double join_of(const Path& path, std::size_t piece, std::size_t next) {
   if ((before / v - after / w).norm() > corner_angle) {
     return 0.0;
   }
+  if (rules.faces) {
+    constexpr double rounding = 1e-6;
+    const double bend = planar_curvature(at_end);
+    const double next_bend = planar_curvature(at_begin);
+    if (std::abs(bend - next_bend) > rounding * (std::abs(bend) + std::abs(next_bend)) + 1e-9) {
+      return 0.0;
+    }
+  }
   const double ratio = v / w;
   return std::abs(ratio - 1.0) < 1e-9 ? 1.0 : ratio * ratio;
 }
 
 /// The intervals of the first pass.
-std::vector<TimingCell> coarse_cells(const Path& path,
-                                     const std::vector<std::vector<double>>& cuts) {
+std::vector<TimingCell> coarse_cells(const Path& path, const std::vector<std::vector<double>>& cuts,
+                                     const JointRules& rules) {
   std::vector<TimingCell> cells;
   cells.reserve(path.pieces().size() * first_cells);
   for (std::size_t i = 0; i < path.pieces().size(); ++i) {
@@ -77,7 +96,8 @@ std::vector<TimingCell> coarse_cells(const Path& path,
       ++next;
     }
     if (next < path.pieces().size()) {
-      cells.back().join = join_of(path, i, next);
+      const double join = join_of(path, i, next, rules);
+      cells.back().join = join > 0.0 || rules.accelerates ? join : -1.0;
     }
   }
   return cells;
@@ -152,7 +172,10 @@ void refine(std::vector<TimingCell>& cells, std::vector<Bezier2>& motion,
       part.from = cell.from + (cell.to - cell.from) * share * m;
       part.to = m + 1 == parts[i] ? cell.to : cell.from + (cell.to - cell.from) * share * (m + 1);
       part.width = cell.width * share;
-      part.join = m + 1 == parts[i] ? cell.join : 1.0;
+      if (m + 1 < parts[i]) {
+        part.join = 1.0;
+        part.most = std::numeric_limits<double>::infinity();
+      }
       finer.push_back(part);
       if (!motion.empty()) {
         on_finer.push_back(part_of(motion[i], share * m, share * (m + 1)));
@@ -204,6 +227,7 @@ class Timing {
       limits_.verify(cells, passes.b, rows, off_);
     }
     bool again = true;  // a cut was not as fine as asked for
+    bool slow = false;
     for (int round = 0; round < most_refinements && cells.size() < most_cells; ++round) {
       if (round > 0 && !again && tolerance_ >= one_round) {
         break;
@@ -214,13 +238,17 @@ class Timing {
       for (const double one : loss) {
         sum += one;
       }
-      const double allowed = loss_of_gap * tolerance_ * time;
+      const double allowed = (slow ? 1.0 : loss_of_gap) * tolerance_ * time;
       if (round > 0 && sum <= allowed) {
         break;
       }
       const double of_each = allowed / static_cast<double>(cells.size());
       again = cut([&](std::size_t i) { return std::sqrt(loss[i] / of_each); }) > 2 * most_parts;
       pass();
+      // One cut makes the loss smaller by its square where limits are smooth, but only by itself
+      // where the motion is from rest or to it along an interval that is far too long.
+      slow = slow || time > far_too_slow * total_time(cells, passes.b);
+      again = again || slow;
       if (tolerance_ < one_round) {
         limits_.verify(cells, passes.b, rows, off_);
       }
@@ -253,6 +281,8 @@ class Timing {
   static constexpr double loss_of_gap = 3.5;
   /// The tolerance that one cut meets.
   static constexpr double one_round = 1e-3;
+  /// The time before the first cut over that after it: more tells of long intervals.
+  static constexpr double far_too_slow = 1.15;
   /// Of a limit.
   static constexpr double far_off = 0.02;
 
@@ -332,9 +362,11 @@ std::vector<PathConstraint> with_reachable_velocity(const Path& path,
         }
       }
     } else if (auto* travel = std::get_if<TravelLimits>(&constraint);
-               travel != nullptr && std::isinf(travel->velocity) && travel->acceleration > 0.0 &&
-               path.coordinates() >= 2) {
-      travel->velocity = reached(travel->acceleration, travel_of(path, 0) + travel_of(path, 1));
+               travel != nullptr && std::isinf(travel->velocity) && path.coordinates() >= 2) {
+      const double acceleration = std::min(travel->acceleration, travel->total_acceleration);
+      if (acceleration > 0.0) {
+        travel->velocity = reached(acceleration, travel_of(path, 0) + travel_of(path, 1));
+      }
     }
   }
   return all;
@@ -351,6 +383,60 @@ Refusal end_refusal(std::string_view name, double wanted, double possible) {
       .got(format_number(wanted))
       .expected("at most " + format_number(possible) + " under the limits")
       .hint("lower it, or raise the limits");
+}
+
+/// Whether turning rates are those of the way, of a path of the plane.
+bool faces(std::span<const PathConstraint> constraints) {
+  return std::any_of(constraints.begin(), constraints.end(), [](const PathConstraint& constraint) {
+    const auto* travel = std::get_if<TravelLimits>(&constraint);
+    const auto* stretch = std::get_if<StretchLimits>(&constraint);
+    return std::holds_alternative<DifferentialDriveLimits>(constraint) ||
+           (travel != nullptr && std::isfinite(travel->angular_acceleration)) ||
+           (stretch != nullptr && std::isfinite(stretch->limits.angular_acceleration));
+  });
+}
+
+/// Caps of single places at the ends of intervals.
+/// @errors ArgumentError::out_of_range for a start faster than that.
+Expected<void> limit_places(const Path& path,
+                            const std::vector<std::unique_ptr<detail::MotionLimit>>& limits,
+                            std::vector<TimingCell>& cells, double first, double start_velocity) {
+  for (const auto& limit : limits) {
+    const std::optional<double> place = limit->place();
+    if (!place) {
+      continue;
+    }
+    std::vector<double> caps(limit->cap_names.size());
+    const auto most = [&](const PathState& state) {
+      limit->evaluate(state, *place, nullptr, caps.data());
+      double largest = 0.0;
+      for (const double cap : caps) {
+        largest = std::max(largest, cap);
+      }
+      return largest > 0.0 ? 1.0 / largest : std::numeric_limits<double>::infinity();
+    };
+    constexpr double near = 1e-9;
+    const double tolerance = near * path.parameter_end();
+    if (*place <= tolerance && *place >= -tolerance) {
+      const double possible = most(path.at(0, 0.0));
+      if (first > possible * (1.0 + near)) {
+        return end_refusal("start velocity", start_velocity,
+                           start_velocity * std::sqrt(possible / first));
+      }
+    }
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      const double span = path.pieces()[cells[i].piece].span;
+      const double end = path.breaks()[cells[i].piece] + cells[i].to * span;
+      if (std::abs(end - *place) <= tolerance) {
+        cells[i].most = std::min(cells[i].most, most(path.at(cells[i].piece, cells[i].to)));
+        if (i + 1 < cells.size() && cells[i].join > 0.0) {
+          const double after = most(path.at(cells[i + 1].piece, cells[i + 1].from));
+          cells[i].most = std::min(cells[i].most, after / cells[i].join);
+        }
+      }
+    }
+  }
+  return {};
 }
 
 }  // namespace
@@ -375,7 +461,7 @@ Expected<PathTrajectory> time_optimal(const Path& path, std::span<const PathCons
     std::vector<double> t;
     for (std::size_t i = 0; i < path.pieces().size(); ++i) {
       t.clear();
-      limit->jumps(path.pieces()[i], t);
+      limit->jumps(path, i, t);
       if (!t.empty()) {
         cuts.resize(path.pieces().size());
         cuts[i].insert(cuts[i].end(), t.begin(), t.end());
@@ -391,22 +477,31 @@ Expected<PathTrajectory> time_optimal(const Path& path, std::span<const PathCons
       return near;
     });
   }
+  JointRules rules{.accelerates = false, .faces = path.coordinates() == 2 && faces(constraints)};
+  for (const auto& limit : limits) {
+    rules.accelerates = rules.accelerates || !limit->row_names.empty();
+  }
+  std::vector<TimingCell> cells_of_path = coarse_cells(path, cuts, rules);
+  double first = end_rate(path, 0.0, options.start_velocity);
+  double last = end_rate(path, path.parameter_end(), options.end_velocity);
+  FLYBALL_CHECK(limit_places(path, limits, cells_of_path, first, options.start_velocity));
+  if (!rules.accelerates) {  // the velocity jumps to its limit at once
+    first = last = std::numeric_limits<double>::infinity();
+  }
   const std::unique_ptr<CellRows> making =
       cubic ? detail::cubic_rows(path, std::get<CoordinateLimits>(bounded[0]))
             : detail::collocated_rows(path, std::move(limits));
 
-  const double first = end_rate(path, 0.0, options.start_velocity);
-  const double last = end_rate(path, path.parameter_end(), options.end_velocity);
-  Timing timing(path, *making, coarse_cells(path, cuts), first, last, options.tolerance);
+  Timing timing(path, *making, std::move(cells_of_path), first, last, options.tolerance);
   FLYBALL_CHECK(timing.solve());
   const std::vector<TimingCell>& cells = timing.cells;
   const TimingPasses& passes = timing.passes;
   constexpr double rounding = 1.0 + 1e-9;
-  if (first > passes.highest.front() * rounding) {
+  if (rules.accelerates && first > passes.highest.front() * rounding) {
     return end_refusal("start velocity", options.start_velocity,
                        options.start_velocity * std::sqrt(passes.highest.front() / first));
   }
-  if (last > passes.b.back()[2] * rounding) {
+  if (rules.accelerates && last > passes.b.back()[2] * rounding) {
     return end_refusal("end velocity", options.end_velocity,
                        options.end_velocity * std::sqrt(passes.b.back()[2] / last));
   }

@@ -38,6 +38,23 @@ IntervalProgram TimingRows::program(std::size_t cell) const noexcept {
           idle[cell]};
 }
 
+namespace {
+
+/// Of x at the end of an interval, as what follows lets it be.
+double most_after(const std::vector<TimingCell>& cells, std::size_t i,
+                  const TimingPasses& passes) noexcept {
+  const double join = cells[i].join;
+  if (i + 1 == cells.size()) {
+    return std::min(cells[i].most, passes.highest[i + 1]);
+  }
+  if (join < 0.0) {
+    return cells[i].most;
+  }
+  return join > 0.0 ? std::min(cells[i].most, passes.highest[i + 1] / join) : 0.0;
+}
+
+}  // namespace
+
 void pass_back(const std::vector<TimingCell>& cells, const TimingRows& rows, double last,
                TimingPasses& passes) {
   const std::size_t n = cells.size();
@@ -46,12 +63,8 @@ void pass_back(const std::vector<TimingCell>& cells, const TimingRows& rows, dou
   passes.highest[n] = last;
   IntervalBasis basis;
   for (std::size_t i = n; i-- > 0;) {
-    double most = last;
-    if (i + 1 < n) {
-      most = cells[i].join > 0.0 ? passes.highest[i + 1] / cells[i].join : 0.0;
-    }
     IntervalProgram program = rows.program(i);
-    program.cap[2] = std::min(program.cap[2], most);
+    program.cap[2] = std::min(program.cap[2], most_after(cells, i, passes));
     passes.witness[i] = largest_first(program, basis);
     passes.highest[i] = passes.witness[i][0];
   }
@@ -70,10 +83,7 @@ void pass_forward(const std::vector<TimingCell>& cells, const TimingRows& rows, 
       const double share = x / from[0];
       inside = {x, share * from[1], share * from[2]};
     }
-    double most = passes.highest[n];
-    if (i + 1 < n) {
-      most = cells[i].join > 0.0 ? passes.highest[i + 1] / cells[i].join : 0.0;
-    }
+    const double most = most_after(cells, i, passes);
     // On the way that was found back from the end there is nothing to look for.
     const bool found = x >= from[0] && inside[2] >= most * (1.0 - 1e-12);
     if (found) {
@@ -83,9 +93,9 @@ void pass_forward(const std::vector<TimingCell>& cells, const TimingRows& rows, 
       program.cap[2] = std::min(program.cap[2], most);
       passes.b[i] = largest_last(program, inside, basis);
     }
-    x = passes.b[i][2] * cells[i].join;
     if (i + 1 < n) {
-      x = std::min(x, passes.highest[i + 1]);
+      x = cells[i].join < 0.0 ? passes.highest[i + 1]
+                              : std::min(passes.b[i][2] * cells[i].join, passes.highest[i + 1]);
     }
   }
 }

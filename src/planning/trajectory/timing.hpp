@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -19,7 +20,9 @@ struct TimingCell {
   double from = 0.0;   ///< In the piece, of [0, 1].
   double to = 1.0;     ///< In the piece, of [0, 1].
   double width = 0.0;  ///< Of the path's parameter.
-  double join = 1.0;   ///< The next interval's b_0 over this one's b_2; 0 where it is a stop.
+  /// The next interval's b_0 over this one's b_2; 0 where it is a stop, negative where x may jump.
+  double join = 1.0;
+  double most = std::numeric_limits<double>::infinity();  ///< Of x at its end.
 };
 
 /// Numbers that nothing is put into before they are.

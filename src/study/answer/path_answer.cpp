@@ -189,7 +189,8 @@ Answer answer_of(const PathResult& result) {
       names.empty() ? std::string("path") : std::filesystem::path(names.front()).stem().string();
   if (const auto series = to_table(result.trajectory)) {
     answer.files.push_back({"data/path.csv", to_csv(*series)});
-    if (const auto header = exports::motion_table(*series, "path", "A trajectory of " + name)) {
+    if (const auto header = exports::motion_table(*series, "path", "A trajectory of " + name,
+                                                  exports::motion_rates)) {
       answer.files.push_back({"path.hpp", *header});
     }
   }

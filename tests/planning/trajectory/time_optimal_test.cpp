@@ -311,6 +311,129 @@ TEST(TimeOptimal, HolonomicDrivesOnALineAreOneMotor) {
   EXPECT_NEAR(swerve, time, 3e-3 * time);
 }
 
+// Nothing limits an acceleration: the velocity is at its limit from the first moment to the last,
+// round a corner, too.
+TEST(TimeOptimal, AVelocityLimitAloneIsUsedUp) {
+  const Path there = line_path(Vector2d(0.0, 0.0), Vector2d(2.0, 0.0)).value();
+  const Path up = line_path(Vector2d(2.0, 0.0), Vector2d(2.0, 1.0)).value();
+  const Path corner = joined(std::vector<Path>{there, up}).value();
+  for (const PathConstraint& limit : {PathConstraint(TravelLimits{.velocity = 2.0}),
+                                      PathConstraint(CoordinateLimits{Vector2d(2.0, 2.0), {}})}) {
+    EXPECT_NEAR(time_optimal(there, Limits{limit}).value().total_time(), 1.0, 1e-9);
+    const PathTrajectory both = time_optimal(corner, Limits{limit}).value();
+    EXPECT_NEAR(both.total_time(), 1.5, 1e-9);
+    EXPECT_NEAR(both.sample(0.0).velocity(0), 2.0, 1e-9);
+    EXPECT_NEAR(both.sample(1.2).velocity(1), 2.0, 1e-9);
+  }
+}
+
+// d/v + v/a: as near on 10 km as on 10 m.
+TEST(TimeOptimal, LongLinesAreAsFastAsShortOnes) {
+  for (const double length : {10.0, 100.0, 1e3, 1e4}) {
+    const Path path = line_path(Vector2d(0.0, 0.0), Vector2d(length, 0.0)).value();
+    const Limits limits{TravelLimits{.velocity = 2.0, .acceleration = 1.0}};
+    const double fastest = length / 2.0 + 2.0;
+    EXPECT_LE(time_optimal(path, limits).value().total_time(), 1.003 * fastest) << length;
+  }
+}
+
+// Between two parameters, and at one alone.
+TEST(TimeOptimal, StretchesSlowDown) {
+  const Path path = line_path(Vector2d(0.0, 0.0), Vector2d(10.0, 0.0)).value();
+  const double end = path.parameter_end();
+  const TravelLimits travel{.velocity = 3.0, .acceleration = 4.0};
+  const StretchLimits slow{0.4 * end, 0.6 * end, {.velocity = 0.5, .acceleration = 1.0}, "slow"};
+  const PathTrajectory trajectory = time_optimal(path, Limits{travel, slow}).value();
+  const std::size_t count = 100 * trajectory.intervals();
+  bool inside = false;
+  for (std::size_t i = 0; i <= count; ++i) {
+    const PathSample at = trajectory.sample(trajectory.total_time() * static_cast<double>(i) /
+                                            static_cast<double>(count));
+    if (at.position(0) > 4.0 && at.position(0) < 6.0) {
+      inside = true;
+      ASSERT_LE(at.velocity.norm(), 0.5 * (1.0 + 1e-9));
+      ASSERT_LE(at.acceleration.norm(), 1.0 + 1e-9);
+    }
+    ASSERT_LE(at.acceleration.norm(), 4.0 * (1.0 + 1e-9));
+  }
+  EXPECT_TRUE(inside);
+  // Up to 3 m/s and down to 0.5, 2 m at that, and the same back.
+  const double way = 4.0 - 9.0 / 8.0 - (9.0 - 0.25) / 8.0;
+  const double fastest = 2.0 * (0.75 + 0.625 + way / 3.0) + 4.0;
+  EXPECT_NEAR(trajectory.total_time(), fastest, 3e-3 * fastest);
+  bool names_it = false;
+  for (const BindingLimit& limit : trajectory.binding()) {
+    names_it = names_it || limit.limit == "slow: velocity";
+  }
+  EXPECT_TRUE(names_it);
+
+  const StretchLimits gate{0.3 * end, 0.3 * end, {.velocity = 1.0}, ""};
+  const PathTrajectory through = time_optimal(path, Limits{travel, gate}).value();
+  double there = 0.0;
+  for (const double t : through.times()) {
+    const PathSample at = through.sample(t);
+    if (std::abs(at.position(0) - 3.0) < 1e-9) {
+      there = at.velocity(0);
+    }
+  }
+  EXPECT_NEAR(there, 1.0, 1e-3);
+  EXPECT_LE(there, 1.0 + 1e-9);
+
+  const auto error = [&](const StretchLimits& stretch) {
+    return time_optimal(path, Limits{travel, stretch}).error();
+  };
+  EXPECT_TRUE(error({1.0, 0.5, {.velocity = 1.0}, ""}).is(ArgumentError::out_of_range));
+  EXPECT_TRUE(error({std::nan(""), 0.5, {.velocity = 1.0}, ""}).is(ArgumentError::not_finite));
+  EXPECT_TRUE(error({0.0, 0.5, {.velocity = 0.0}, ""}).is(ArgumentError::not_positive));
+}
+
+// |d²p/dt²| by the samples alone; all of it along a line.
+TEST(TimeOptimal, AlongAndAcrossShareTheTotalAcceleration) {
+  Random random(11);
+  const TravelLimits limits{.velocity = 2.0, .total_acceleration = 2.0};
+  for (int k = 0; k < 4; ++k) {
+    const Path path = natural_cubic_path(random_points(random, 2, 6)).value();
+    const PathTrajectory trajectory = time_optimal(path, Limits{limits}).value();
+    const std::size_t count = 100 * trajectory.intervals();
+    double most = 0.0;
+    for (std::size_t i = 0; i <= count; ++i) {
+      const PathSample at = trajectory.sample(trajectory.total_time() * static_cast<double>(i) /
+                                              static_cast<double>(count));
+      most = std::max(most, at.acceleration.norm());
+    }
+    EXPECT_LE(most, 2.0 * (1.0 + 1e-9)) << k;
+    EXPECT_GE(most, 1.97) << k;
+  }
+  const Path line = line_path(Vector2d(1.0, 1.0), Vector2d(3.0, 2.0)).value();
+  const double length = std::sqrt(5.0);
+  EXPECT_NEAR(time_optimal(line, Limits{limits}, {.tolerance = 1e-5}).value().total_time(),
+              length / 2.0 + 1.0, 1e-4);
+}
+
+// From a line to an arc a differential drive's wheels would have to jump: it stops there, and
+// limits that do not know of turning drive through.
+TEST(TimeOptimal, ADifferentialDriveStopsWhereTheCurvatureJumps) {
+  const Path line = line_path(Vector2d(-3.0, -1.0), Vector2d(0.0, -1.0)).value();
+  const Path arc = arc_path({0.0, 0.0}, 1.0, -0.5 * std::numbers::pi, std::numbers::pi).value();
+  const Path path = joined(std::vector<Path>{line, arc}).value();
+  const auto slowest = [&](const Limits& limits) {
+    const PathTrajectory trajectory = time_optimal(path, limits).value();
+    double least = 1e9;
+    for (const double t : trajectory.times()) {
+      const PathSample at = trajectory.sample(t);
+      if (std::abs(at.position(0)) < 1e-9 && at.position(1) < 0.0) {
+        least = std::min(least, at.velocity.norm());
+      }
+    }
+    return least;
+  };
+  EXPECT_EQ(slowest(Limits{DifferentialDriveLimits{small_drive(), Length(0.6)}}), 0.0);
+  EXPECT_EQ(slowest(Limits{
+                TravelLimits{.velocity = 1.0, .acceleration = 1.0, .angular_acceleration = 1.0}}),
+            0.0);
+  EXPECT_GT(slowest(Limits{TravelLimits{.velocity = 1.0, .acceleration = 1.0}}), 0.9);
+}
+
 // A corner and a cusp are driven to a stop; a path goes on through a smooth joint.
 TEST(TimeOptimal, StopsAtCornersAndCusps) {
   const Path there = line_path(Vector2d(0.0, 0.0), Vector2d(2.0, 0.0)).value();

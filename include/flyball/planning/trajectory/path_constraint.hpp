@@ -26,6 +26,10 @@ struct TravelLimits {
   double velocity = none;      ///< m/s, > 0: v = |dp/dt|.
   double acceleration = none;  ///< m/s², > 0: |dv/dt|, along the path.
   double centripetal = none;   ///< m/s², > 0: v² |κ|, across the path.
+  /// m/s², > 0: |d²p/dt²|, along and across together. The circle as the polygon of 24 sides within
+  /// it, whose corners are ahead, behind and to both sides: there all of it is used, in between at
+  /// least 0.991.
+  double total_acceleration = none;
   /// rad/s, > 0: of the third coordinate or, where there is none, of the direction of travel, v
   /// |κ|.
   double angular_velocity = none;
@@ -55,6 +59,16 @@ struct RegionLimit {
   std::variant<EllipseRegion, RectangleRegion, PolygonRegion> region;
   double velocity = 0.0;  ///< m/s, > 0.
   std::string name;       ///< For reports; "region 1" and so on if empty.
+};
+
+/// Limits of travel from one parameter of the path to another, both among them: PathPlanner's
+/// zones, Choreo's constraints between waypoints. Where both are one, the velocities are limited
+/// there.
+struct StretchLimits {
+  double from = 0.0;      ///< Parameter of the path.
+  double to = 0.0;        ///< Parameter of the path, `from` or more.
+  TravelLimits limits{};  ///< What holds there beside all others.
+  std::string name;       ///< For reports; "stretch 1" and so on if empty.
 };
 
 /// A robot's drive as its motors limit it. Each shaft turns its wheel or its side's wheels,
@@ -97,7 +111,7 @@ struct MecanumDriveLimits {
 };
 
 /// One of them.
-using PathConstraint = std::variant<CoordinateLimits, TravelLimits, RegionLimit,
+using PathConstraint = std::variant<CoordinateLimits, TravelLimits, RegionLimit, StretchLimits,
                                     DifferentialDriveLimits, SwerveDriveLimits, MecanumDriveLimits>;
 
 }  // namespace flyball

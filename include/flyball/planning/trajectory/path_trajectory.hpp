@@ -106,8 +106,12 @@ struct TimingOptions {
 /// of three variables (back from the end); the largest b_2 then one of two (forward from the
 /// start). A second pass cuts the intervals in which no limit is used up.
 ///
-/// @param path  Corners of it (`path_stops`) are driven to a stop.
-/// @param constraints  Something must limit the velocity everywhere.
+/// @param path  Corners of it (`path_stops`) are driven to a stop. So are the places where the
+/// curvature jumps (from a line to an arc), if the turning rate is the way's — of a differential
+/// drive, or under an angular acceleration limit on a path (x, y): there it would jump, too.
+/// @param constraints  Something must limit the velocity everywhere. If nothing limits an
+/// acceleration, the velocity jumps to its limit at the ends and corners, whatever it is to be
+/// there.
 /// @errors ArgumentError::empty (no constraint), not_positive (a limit that is zero or negative),
 ///         not_finite (NaN), wrong_shape (not one limit a coordinate; a drive on a path that is not
 ///         of the plane), out_of_range: an end's velocity above what the limits allow there, or
