@@ -681,7 +681,17 @@ class PlanReader {
       };
     };
     long seed = 1;
-    number("seed", given.seed, Dimension::dimensionless, count(seed));
+    number("seed", given.seed, Dimension::dimensionless, [&](double value) {
+      if (!(value >= 0.0 && value <= 2e9 && value == std::floor(value))) {
+        const toml::node* const set = given.seed.empty() ? plan.get("seed") : nullptr;
+        refuse(set != nullptr ? set->source() : toml::source_region{},
+               refusal(ArgumentError::out_of_range, "plan", "seed")
+                   .got(format_number(value))
+                   .expected("a whole number from 0 to 2000000000"));
+        return;
+      }
+      seed = static_cast<long>(value);
+    });
     job.search.seed = static_cast<std::uint64_t>(seed);
     number("seconds", given.seconds, Dimension::time,
            [&](double value) { job.search.seconds = value; });

@@ -456,7 +456,7 @@ void explore(const StatesJob& job, const Machine& machine, StatesResult& result)
   std::set<std::string> ignored;
   constexpr std::size_t most_ways = 60;  // drawn
   for (std::size_t n = 0; n < nodes.size(); ++n) {
-    if (nodes[n].depth >= job.depth) {
+    if (nodes[n].depth >= job.depth || !result.complete) {
       break;
     }
     result.depth_reached = std::max(result.depth_reached, nodes[n].depth + 1);

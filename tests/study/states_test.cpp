@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <flyball/planning/configuration/configuration_space.hpp>
 #include <flyball/study/project.hpp>
 
 namespace flyball::study {
@@ -199,6 +200,20 @@ TEST(States, SetsAndExpectationsAreHeld) {
       validate(with(machine, "states = [\"floor\", \"high\", \"stowed\"]", "within = [\"above\"]"));
   ASSERT_TRUE(way.sequences[0].violation);
   EXPECT_EQ(way.sequences[0].violation->broken, "above");
+}
+
+// A search that ends at its bound decides nothing.
+TEST(States, ASearchThatGaveUpIsUndecided) {
+  StatesResult result = validate(machine);
+  EXPECT_FALSE(answer_of(result).refusal);
+  result.complete = false;
+  result.depth_reached = 4;
+  const Answer answer = answer_of(result);
+  ASSERT_TRUE(answer.refusal);
+  EXPECT_TRUE(answer.refusal->is(ConfigurationError::undecided));
+  EXPECT_NE(to_string(*answer.refusal).find("no sequence of up to 3 events"), std::string::npos)
+      << to_string(*answer.refusal);
+  EXPECT_EQ(answer.document.verdict.line.rfind("Undecided", 0), 0U);
 }
 
 TEST(States, TellsWhatIsWrongAndWhere) {

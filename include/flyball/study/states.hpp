@@ -91,8 +91,8 @@ struct StatesResult {
   std::optional<MachineViolation> violation{};  ///< The first of the exploration: the shortest.
   std::size_t moves = 0;                        ///< Different moves that were judged.
   double sequences_explored = 0;                ///< Sequences of events that these stand for.
-  bool complete = true;  ///< False: a bound ended it before the depth was reached.
-  int depth_reached = 0;
+  bool complete = true;   ///< False: a bound ended it before the depth was reached.
+  int depth_reached = 0;  ///< Of the longest sequences tried: not all of them if not complete.
   std::vector<std::string> unreached{};                  ///< States,
   std::vector<std::string> unknown_events{};             ///< "event in state", ignored.
   std::vector<std::vector<std::vector<double>>> ways{};  ///< Of each different move, for pictures.

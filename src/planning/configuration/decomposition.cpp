@@ -12,14 +12,12 @@ namespace flyball::detail {
 
 namespace {
 
-enum class BoxState : std::uint8_t { mixed, free, blocked, split };
-
 /// A box of the binary tree: halves of halves along one axis after the other.
 struct Box {
   std::array<std::uint32_t, 8> low;  ///< In units of 2^-20 of each axis.
   std::array<std::uint8_t, 8> cuts;  ///< How often each axis has been halved.
   BoxState state;
-  std::uint8_t axis;     ///< Along which it is split.
+  std::uint8_t axis;     ///< Along which it is split, or is to be.
   std::uint8_t reached;  ///< From the start (1), from the goal (2).
   int child;             ///< The first of two.
 };
@@ -44,7 +42,7 @@ class Boxes {
       size_[i] = axis.wraps ? 2.0 * std::numbers::pi : axis.high - axis.low;
     }
     Box root{};
-    classify(root);
+    classify(std::span(&root, 1));
     boxes_.push_back(root);
   }
 
@@ -88,68 +86,72 @@ class Boxes {
     return sum;
   }
 
-  /// Free, blocked or mixed, of boxes alike but for their places.
-  void classify(Box& box) { classify(std::span(&box, 1)); }
-  void classify(std::span<Box> same) {
-    std::array<double, most_axes> halves{};
-    std::array<float, most_axes * lanes> q{};
-    std::array<float, lanes> reach{};
+  /// Free, blocked or mixed, and where to cut.
+  void classify(std::span<Box> some) {
+    std::array<float, most_axes * lanes> middles{};
+    std::array<float, most_axes * lanes> halves{};
+    std::array<BoxState, lanes> states{};
+    std::array<int, lanes> axes{};
     for (std::size_t i = 0; i < static_cast<std::size_t>(n_); ++i) {
-      halves[i] = half(same[0], i);
       for (std::size_t l = 0; l < lanes; ++l) {
-        q[i * lanes + l] = static_cast<float>(middle(same[std::min(l, same.size() - 1)], i));
+        const Box& box = some[std::min(l, some.size() - 1)];
+        middles[i * lanes + l] = static_cast<float>(middle(box, i));
+        halves[i * lanes + l] = static_cast<float>(half(box, i));
       }
     }
-    judge_.box_reaches(q.data(), halves.data(), reach.data());
-    for (std::size_t l = 0; l < same.size(); ++l) {
-      // A float's margin is on the safe side of free; blocked needs as much on the other.
-      same[l].state = reach[l] >= 1.0F      ? BoxState::free
-                      : reach[l] <= -0.999F ? blocked_state(same[l], reach[l])
-                                            : BoxState::mixed;
+    judge_.judge_boxes(middles.data(), halves.data(), states.data(), axes.data());
+    for (std::size_t l = 0; l < some.size(); ++l) {
+      some[l].state = states[l];
+      const auto wanted = static_cast<std::size_t>(std::max(axes[l], 0));
+      some[l].axis =
+          static_cast<std::uint8_t>(some[l].cuts[wanted] < 20 ? wanted : least_cut(some[l]));
     }
-  }
-  /// Floats take a tolerance off every margin: a box is blocked only if doubles say so.
-  BoxState blocked_state(const Box& box, float) {
-    std::array<double, most_axes> q{};
-    std::array<double, most_axes> halves{};
-    for (std::size_t i = 0; i < static_cast<std::size_t>(n_); ++i) {
-      q[i] = middle(box, i);
-      halves[i] = half(box, i);
-    }
-    const SpaceProgram<double>& exact = judge_.model().exact;
-    rates_.resize(exact.rate_count());
-    const InverseRates<double> rates = inverse_rates(exact, halves.data(), rates_.data());
-    return reach_of(exact.view(), q.data(), rates) <= -1.0 ? BoxState::blocked : BoxState::mixed;
   }
 
-  /// The axis along which half of the box moves the mechanism most.
-  [[nodiscard]] std::size_t worst_axis(const Box& box) const {
-    std::size_t worst = 0;
-    double most = -1.0;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(n_); ++i) {
-      const double size = half(box, i) * weight_[i];
-      if (box.cuts[i] < 20 && size > most) {
-        most = size;
-        worst = i;
+  /// What is left to cut where the axis that matters is as fine as it goes.
+  [[nodiscard]] std::size_t least_cut(const Box& box) const {
+    std::size_t least = 0;
+    for (std::size_t i = 1; i < static_cast<std::size_t>(n_); ++i) {
+      least = box.cuts[i] < box.cuts[least] ? i : least;
+    }
+    return least;
+  }
+
+  /// Three cuts one after the other, so that all lanes are used: boxes that are not decided after
+  /// one are cut again as long as a depth allows.
+  void split(int index, int deepest) {
+    std::array<int, lanes> open{index};
+    std::size_t count = 1;
+    for (int round = 0; round < 3 && count > 0; ++round) {
+      std::array<Box, lanes> children{};
+      std::size_t made = 0;
+      for (std::size_t i = 0; i < count; ++i) {
+        Box& parent = boxes_[static_cast<std::size_t>(open[i])];
+        const std::size_t axis = parent.axis;
+        Box child = parent;
+        child.cuts[axis] = static_cast<std::uint8_t>(child.cuts[axis] + 1);
+        child.reached = 0;
+        child.child = 0;
+        parent.state = BoxState::split;
+        parent.child = static_cast<int>(boxes_.size() + made);
+        children[made++] = child;
+        child.low[axis] += whole >> child.cuts[axis];
+        children[made++] = child;
+      }
+      classify(std::span(children.data(), made));
+      const int first = static_cast<int>(boxes_.size());
+      boxes_.insert(boxes_.end(), children.begin(),
+                    children.begin() + static_cast<std::ptrdiff_t>(made));
+      count = 0;
+      for (std::size_t i = 0; i < made; ++i) {
+        if (children[i].state == BoxState::mixed && depth(children[i], n_) < deepest) {
+          open[count++] = first + static_cast<int>(i);
+        }
+      }
+      if (2 * count > lanes) {
+        break;
       }
     }
-    return worst;
-  }
-
-  void split(int index) {
-    Box child = boxes_[static_cast<std::size_t>(index)];
-    const std::size_t axis = worst_axis(child);
-    child.cuts[axis] = static_cast<std::uint8_t>(child.cuts[axis] + 1);
-    child.reached = 0;
-    child.child = 0;
-    std::array<Box, 2> two{child, child};
-    two[1].low[axis] += whole >> child.cuts[axis];
-    classify(two);
-    Box& parent = boxes_[static_cast<std::size_t>(index)];
-    parent.state = BoxState::split;
-    parent.axis = static_cast<std::uint8_t>(axis);
-    parent.child = static_cast<int>(boxes_.size());
-    boxes_.insert(boxes_.end(), two.begin(), two.end());
   }
 
   /// The leaf that holds a point, split down to a depth while it is mixed.
@@ -164,7 +166,7 @@ class Boxes {
     while (true) {
       Box& box = boxes_[static_cast<std::size_t>(index)];
       if (box.state == BoxState::mixed && depth(box, n_) < deepest) {
-        split(index);
+        split(index, deepest);
       }
       const Box& now = boxes_[static_cast<std::size_t>(index)];
       if (now.state != BoxState::split) {
@@ -221,7 +223,7 @@ class Boxes {
             }
           }
           if (boxes_[static_cast<std::size_t>(i)].state == BoxState::mixed) {
-            split(i);
+            split(i, deepest);
           }
           const int child = boxes_[static_cast<std::size_t>(i)].child;
           stack_.push_back(child);
@@ -348,23 +350,6 @@ class Boxes {
     return q;
   }
 
- public:
-  /// How much half of an axis' unit moves the mechanism, for choosing where to cut.
-  void weigh() {
-    const SpaceProgram<double>& exact = judge_.model().exact;
-    std::vector<double> rates(exact.rate_count());
-    for (std::size_t k = 0; k < static_cast<std::size_t>(n_); ++k) {
-      std::array<double, most_axes> by{};
-      by[k] = 1.0;
-      inverse_rates(exact, by.data(), rates.data());
-      double sum = 0.0;
-      for (const double inverse : rates) {
-        sum += inverse < 1e29 ? 1.0 / inverse : 0.0;
-      }
-      weight_[k] = std::max(sum / static_cast<double>(rates.empty() ? 1 : rates.size()), 1e-6);
-    }
-  }
-
  private:
   Judge& judge_;
   int n_;
@@ -374,9 +359,7 @@ class Boxes {
   const double* goal_;
   std::array<double, most_dimension> low_{};
   std::array<double, most_dimension> size_{};
-  std::array<double, most_dimension> weight_{};
   std::array<bool, most_dimension> wraps_{};
-  std::vector<double> rates_{};
   std::vector<Box> boxes_{};
   std::vector<int> queue_{};
   std::vector<int> came_{};
@@ -391,7 +374,6 @@ BoxAnswer decompose(Judge& judge, const double* start, const double* goal, long 
     return {};
   }
   Boxes all(judge, start, goal, boxes, bound);
-  all.weigh();
   return all.run();
 }
 

@@ -20,6 +20,34 @@ Judge::Judge(const SpaceModel& model)
     extent_ += static_cast<float>(way * way / (axis.scale * axis.scale));
   }
   extent_ = std::sqrt(extent_);
+  // What boxes are judged by: rates of pairs and limits, roundings, and how much each coordinate
+  // changes everything.
+  const RateStep& rates = model.quick.rates;
+  for (const std::vector<double>* table : {&rates.pairs, &rates.holds}) {
+    for (const double rate : *table) {
+      box_rates_.push_back(static_cast<float>(rate * (1.0 + 1e-6)));
+    }
+  }
+  for (std::size_t i = 0; i < model.quick.holds.size(); ++i) {
+    box_rates_.push_back(static_cast<float>(
+        2.5 * (model.exact.holds[i].limit - static_cast<double>(model.quick.holds[i].limit))));
+  }
+  std::vector<double> inverse(model.exact.rate_count());
+  for (std::size_t k = 0; k < model.axes.size(); ++k) {
+    std::array<double, most_axes> by{};
+    by[k] = 1.0;
+    inverse_rates(model.exact, by.data(), inverse.data());
+    double sum = 1e-6;
+    for (const double one : inverse) {
+      sum += one < 1e29 ? 1.0 / one : 0.0;
+    }
+    box_rates_.push_back(static_cast<float>(sum));
+  }
+  const float* const from = box_rates_.data();
+  const float* const holds = from + rates.pairs.size();
+  const float* const slacks = holds + rates.holds.size();
+  boxes_ = {from, holds, slacks, slacks + model.quick.holds.size(),
+            static_cast<float>(2.5 * model.quick.slack)};
 }
 
 bool Judge::free(const float* from, const float* by) noexcept {
@@ -59,9 +87,15 @@ void Judge::reaches_of_set(const float* q, float* to) noexcept {
   baseline::reaches(view_, q, set_, to);
 }
 
-void Judge::box_reaches(const float* q, const double* half, float* to) noexcept {
-  set_box(half);
-  reaches_of_set(q, to);
+void Judge::judge_boxes(const float* middles, const float* halves, BoxState* states,
+                        int* axes) const noexcept {
+#ifdef FLYBALL_WIDE_VECTORS
+  if (wide_ && has_wide_vectors()) {
+    wide::judge_boxes(view_, middles, halves, boxes_, states, axes);
+    return;
+  }
+#endif
+  baseline::judge_boxes(view_, middles, halves, boxes_, states, axes);
 }
 
 int Judge::nearest(const float* points, int stride, int count, const float* to) const noexcept {

@@ -61,10 +61,11 @@ class Judge {
     return free(from.data(), by.data());
   }
 
-  /// Smallest margins in shares of a box. @param q  dimension x 8.
-  /// @param half  Half of the box along each axis.
-  void box_reaches(const float* q, const double* half, float* to) noexcept;
-  /// The same for boxes of the halves that were set before.
+  /// Which boxes are free, or blocked as a whole, and where to cut them: see the kernel.
+  void judge_boxes(const float* middles, const float* halves, BoxState* states,
+                   int* axes) const noexcept;
+  /// Smallest margins of eight configurations in shares of a box. @param half  Of it along each
+  /// axis.
   void set_box(const double* half) noexcept;
   void reaches_of_set(const float* q, float* to) noexcept;
 
@@ -106,6 +107,8 @@ class Judge {
   bool empty_;
   std::vector<float> rates_;
   InverseRates<float> set_{};
+  std::vector<float> box_rates_{};
+  BoxRates boxes_{};
   Configuration inverse_scale_{};
   Configuration turn_{};
   float extent_ = 0.0F;

@@ -5,4 +5,4 @@
 #include "planning/configuration/space_program.hpp"
 
 #define FLYBALL_VARIANT baseline
-#include "planning/configuration/space_kernel_body.hpp"
+#include "planning/configuration/box_kernel_body.hpp"

@@ -1,209 +1,12 @@
 #pragma once
 
-// Part of space_kernel_baseline.cpp, _wide.cpp and _exact.cpp: compiled once for each instruction
-// set, and once for doubles. The includer defines FLYBALL_VARIANT; FLYBALL_ONE_LANE means doubles.
+// The margins of a configuration, and moves. Part of space_kernel_baseline.cpp, _wide.cpp and
+// _exact.cpp, which say in what numbers.
 
+#include "planning/configuration/space_lanes.hpp"
 #include "planning/configuration/space_program.hpp"
 
 namespace flyball::detail::FLYBALL_VARIANT {
-
-#ifdef FLYBALL_ONE_LANE
-using Number = double;
-using Real = double;
-using Mask = bool;
-#else
-using Number = float;
-#if defined(FLYBALL_WIDE_LANES) || !defined(__SSE2__)
-typedef float Real __attribute__((vector_size(32)));
-typedef int Mask __attribute__((vector_size(32)));
-#else
-// Halves, since compilers take vectors that the processor does not have apart lane by lane.
-typedef float Half __attribute__((vector_size(16)));
-typedef int HalfMask __attribute__((vector_size(16)));
-struct Mask {
-  HalfMask a, b;
-};
-struct Real {
-  Half a, b;
-  float operator[](int i) const { return i < 4 ? a[i] : b[i - 4]; }
-};
-#define FLYBALL_HALVES(type, op)                                          \
-  [[gnu::always_inline]] static inline type operator op(type x, type y) { \
-    return {x.a op y.a, x.b op y.b};                                      \
-  }
-#define FLYBALL_COMPARE(op)                                               \
-  [[gnu::always_inline]] static inline Mask operator op(Real x, Real y) { \
-    return {x.a op y.a, x.b op y.b};                                      \
-  }
-FLYBALL_HALVES(Real, +)
-FLYBALL_HALVES(Real, -)
-FLYBALL_HALVES(Real, *)
-FLYBALL_HALVES(Real, /)
-FLYBALL_HALVES(Mask, ^)
-FLYBALL_COMPARE(<)
-FLYBALL_COMPARE(>)
-FLYBALL_COMPARE(>=)
-#undef FLYBALL_HALVES
-#undef FLYBALL_COMPARE
-[[gnu::always_inline]] static inline Real operator-(Real x) {
-  return {-x.a, -x.b};
-}
-#define FLYBALL_HALF_LANES
-#endif
-#endif
-
-#define FLYBALL_LANE [[gnu::always_inline]] static inline
-
-#ifdef FLYBALL_ONE_LANE
-FLYBALL_LANE Real splat(Number x) {
-  return x;
-}
-FLYBALL_LANE Real choose(Mask mask, Real a, Real b) {
-  return mask ? a : b;
-}
-FLYBALL_LANE Real root(Real x) {
-  return __builtin_sqrt(x);
-}
-FLYBALL_LANE bool any_negative(Real) {
-  return false;
-}
-FLYBALL_LANE Real round_off(Real x) {
-  return __builtin_rint(x);
-}
-FLYBALL_LANE void sine_cosine(Real x, Real& s, Real& c) {
-  s = __builtin_sin(x);
-  c = __builtin_cos(x);
-}
-#else
-#if defined(FLYBALL_HALF_LANES)
-FLYBALL_LANE Real splat(Number x) {
-  return {Half{x, x, x, x}, Half{x, x, x, x}};
-}
-FLYBALL_LANE Real choose(Mask mask, Real a, Real b) {
-  return {mask.a ? a.a : b.a, mask.b ? a.b : b.b};
-}
-FLYBALL_LANE Mask choose(Mask mask, Mask a, Mask b) {
-  return {mask.a ? a.a : b.a, mask.b ? a.b : b.b};
-}
-FLYBALL_LANE Real root(Real x) {
-  return {reinterpret_cast<Half>(_mm_sqrt_ps(reinterpret_cast<__m128>(x.a))),
-          reinterpret_cast<Half>(_mm_sqrt_ps(reinterpret_cast<__m128>(x.b)))};
-}
-FLYBALL_LANE bool any_negative(Real x) {
-  return (_mm_movemask_ps(reinterpret_cast<__m128>(x.a)) |
-          _mm_movemask_ps(reinterpret_cast<__m128>(x.b))) != 0;
-}
-FLYBALL_LANE Mask bits(Real x) {
-  return {reinterpret_cast<HalfMask>(x.a), reinterpret_cast<HalfMask>(x.b)};
-}
-FLYBALL_LANE Real from_bits(Mask x) {
-  return {reinterpret_cast<Half>(x.a), reinterpret_cast<Half>(x.b)};
-}
-FLYBALL_LANE Mask has_bit(Mask x, int bit) {
-  return {(x.a & bit) != 0, (x.b & bit) != 0};
-}
-FLYBALL_LANE Mask bit_as_sign(Mask x, int add) {
-  return {((x.a + add) & 2) << 30, ((x.b + add) & 2) << 30};
-}
-FLYBALL_LANE Mask count_from(int i) {
-  return {HalfMask{i, i + 1, i + 2, i + 3}, HalfMask{i + 4, i + 5, i + 6, i + 7}};
-}
-FLYBALL_LANE int lane(Mask x, int i) {
-  return i < 4 ? x.a[i] : x.b[i - 4];
-}
-#else
-FLYBALL_LANE Real splat(Number x) {
-  return Real{x, x, x, x, x, x, x, x};
-}
-FLYBALL_LANE Real choose(Mask mask, Real a, Real b) {
-  return mask ? a : b;
-}
-FLYBALL_LANE Mask choose(Mask mask, Mask a, Mask b) {
-  return mask ? a : b;
-}
-FLYBALL_LANE Mask bits(Real x) {
-  return reinterpret_cast<Mask>(x);
-}
-FLYBALL_LANE Real from_bits(Mask x) {
-  return reinterpret_cast<Real>(x);
-}
-FLYBALL_LANE Mask has_bit(Mask x, int bit) {
-  return (x & bit) != 0;
-}
-FLYBALL_LANE Mask bit_as_sign(Mask x, int add) {
-  return ((x + add) & 2) << 30;
-}
-FLYBALL_LANE Mask count_from(int i) {
-  return Mask{i, i + 1, i + 2, i + 3, i + 4, i + 5, i + 6, i + 7};
-}
-FLYBALL_LANE int lane(Mask x, int i) {
-  return x[i];
-}
-FLYBALL_LANE Real root(Real x) {
-#if defined(FLYBALL_WIDE_LANES)
-  return reinterpret_cast<Real>(_mm256_sqrt_ps(reinterpret_cast<__m256>(x)));
-#else
-  Real y = x;
-  for (int i = 0; i < lanes; ++i) {
-    y[i] = __builtin_sqrtf(x[i]);
-  }
-  return y;
-#endif
-}
-FLYBALL_LANE bool any_negative(Real x) {
-#if defined(FLYBALL_WIDE_LANES)
-  return _mm256_movemask_ps(reinterpret_cast<__m256>(x)) != 0;
-#else
-  bool any = false;
-  for (int i = 0; i < lanes; ++i) {
-    any = any || x[i] < 0.0F;
-  }
-  return any;
-#endif
-}
-#endif
-/// To the nearest whole number, of numbers far below 2^22.
-FLYBALL_LANE Real round_off(Real x) {
-  const Real magic = splat(12582912.0F);
-  return (x + magic) - magic;
-}
-/// Sine and cosine within 1e-7 of angles of some turns (Cody and Waite's reduction by π/2,
-/// polynomials of degree 7 and 8).
-FLYBALL_LANE void sine_cosine(Real x, Real& s, Real& c) {
-  const Real magic = splat(12582912.0F);
-  const Real biased = x * splat(0.636619772F) + magic;
-  const Mask quadrant = bits(biased);
-  const Real k = biased - magic;
-  Real r = x - k * splat(1.5703125F);
-  r = r - k * splat(4.83751296997e-4F);
-  r = r - k * splat(7.5497899548918821e-8F);
-  const Real r2 = r * r;
-  const Real sine = r + r * r2 *
-                            (splat(-1.6666654611e-1F) +
-                             r2 * (splat(8.3321608736e-3F) + r2 * splat(-1.9515295891e-4F)));
-  const Real cosine = splat(1.0F) - splat(0.5F) * r2 +
-                      r2 * r2 *
-                          (splat(4.166664568298827e-2F) + r2 * (splat(-1.388731625493765e-3F) +
-                                                                r2 * splat(2.443315711809948e-5F)));
-  const Mask odd = has_bit(quadrant, 1);
-  const Real a = choose(odd, cosine, sine);
-  const Real b = choose(odd, sine, cosine);
-  s = from_bits(bits(a) ^ bit_as_sign(quadrant, 0));
-  c = from_bits(bits(b) ^ bit_as_sign(quadrant, 1));
-}
-#endif
-
-FLYBALL_LANE Real smaller(Real a, Real b) {
-  return choose(a < b, a, b);
-}
-FLYBALL_LANE Real larger(Real a, Real b) {
-  return choose(a > b, a, b);
-}
-FLYBALL_LANE Real size(Real a) {
-  return larger(a, -a);
-}
-
-constexpr Number boundless = static_cast<Number>(1e30);
 
 /// A segment in lanes.
 struct Segment {
@@ -313,8 +116,9 @@ FLYBALL_LANE Real polygon_margin(const SpaceView<Number>& space, const RegionSte
   return inside * root(squared);
 }
 
-FLYBALL_LANE Real region_reach(const SpaceView<Number>& space, const Real* q,
-                               const Number* inverse) {
+/// The smallest of what regions demand. @param share  What a margin of a leaf is, given the leaf.
+template <class Share>
+FLYBALL_LANE Real region_reach(const SpaceView<Number>& space, const Real* q, const Share& share) {
   Real stack[deepest_region];
   int top = 0;
   Real least = splat(boundless);
@@ -325,23 +129,21 @@ FLYBALL_LANE Real region_reach(const SpaceView<Number>& space, const Real* q,
         stack[top++] = splat(boundless);
         break;
       case RegionCode::half_space: {
-        Real value = splat(step.a - step.slack);
+        Real value = splat(step.a);
         for (int k = step.first; k < step.last; ++k) {
           value = value - splat(space.normals[k]) * q[k - step.first];
         }
-        stack[top++] = value * splat(inverse[step.leaf]);
+        stack[top++] = share(step, value);
         break;
       }
       case RegionCode::interval: {
         const Real value = q[step.coordinate];
-        stack[top++] = (smaller(value - splat(step.a), splat(step.b) - value) - splat(step.slack)) *
-                       splat(inverse[step.leaf]);
+        stack[top++] = share(step, smaller(value - splat(step.a), splat(step.b) - value));
         break;
       }
       case RegionCode::turn: {
         const Real value = unwind(q[step.coordinate], step.a);
-        stack[top++] =
-            (splat(step.b - step.slack) - size(value - splat(step.a))) * splat(inverse[step.leaf]);
+        stack[top++] = share(step, splat(step.b) - size(value - splat(step.a)));
         break;
       }
       case RegionCode::polygon: {
@@ -349,10 +151,8 @@ FLYBALL_LANE Real region_reach(const SpaceView<Number>& space, const Real* q,
         Real y = q[step.up];
         x = (step.wraps & 1) != 0 ? unwind(x, step.a) : x;
         y = (step.wraps & 2) != 0 ? unwind(y, step.b) : y;
-        stack[top++] =
-            (polygon_margin(space, step, x - splat(step.shift_x), y - splat(step.shift_y)) -
-             splat(step.slack)) *
-            splat(inverse[step.leaf]);
+        stack[top++] = share(
+            step, polygon_margin(space, step, x - splat(step.shift_x), y - splat(step.shift_y)));
         break;
       }
       case RegionCode::least:
@@ -375,13 +175,15 @@ FLYBALL_LANE Real region_reach(const SpaceView<Number>& space, const Real* q,
   return least;
 }
 
-/// The smallest margin in shares of a move. @param hasty  Whether it may stop at a negative one.
-FLYBALL_LANE Real reach(const SpaceView<Number>& space, const Real* q,
-                        const InverseRates<Number>& rates, bool hasty) {
+/// Where the joints' frames are.
+struct Poses {
   Real ox[most_joints];
   Real oy[most_joints];
   Real c[most_joints];
   Real s[most_joints];
+};
+
+FLYBALL_LANE void place_joints(const SpaceView<Number>& space, const Real* q, Poses& to) {
   for (int j = 0; j < space.joint_count; ++j) {
     const JointStep<Number>& joint = space.joints[j];
     Real mx = splat(joint.x);
@@ -390,46 +192,69 @@ FLYBALL_LANE Real reach(const SpaceView<Number>& space, const Real* q,
     Real ms = splat(joint.sine);
     if (joint.parent >= 0) {
       const int p = joint.parent;
-      mx = ox[p] + c[p] * splat(joint.x) - s[p] * splat(joint.y);
-      my = oy[p] + s[p] * splat(joint.x) + c[p] * splat(joint.y);
+      mx = to.ox[p] + to.c[p] * splat(joint.x) - to.s[p] * splat(joint.y);
+      my = to.oy[p] + to.s[p] * splat(joint.x) + to.c[p] * splat(joint.y);
       if (joint.turned != 0) {
-        mc = c[p] * splat(joint.cosine) - s[p] * splat(joint.sine);
-        ms = s[p] * splat(joint.cosine) + c[p] * splat(joint.sine);
+        mc = to.c[p] * splat(joint.cosine) - to.s[p] * splat(joint.sine);
+        ms = to.s[p] * splat(joint.cosine) + to.c[p] * splat(joint.sine);
       } else {
-        mc = c[p];
-        ms = s[p];
+        mc = to.c[p];
+        ms = to.s[p];
       }
     }
-    const Real at = q[joint.coordinate];
+    const Real value = q[joint.coordinate];
     if (joint.slides != 0) {
-      ox[j] = mx + at * mc;
-      oy[j] = my + at * ms;
-      c[j] = mc;
-      s[j] = ms;
+      to.ox[j] = mx + value * mc;
+      to.oy[j] = my + value * ms;
+      to.c[j] = mc;
+      to.s[j] = ms;
     } else {
       Real qs;
       Real qc;
-      sine_cosine(at, qs, qc);
-      ox[j] = mx;
-      oy[j] = my;
-      c[j] = mc * qc - ms * qs;
-      s[j] = ms * qc + mc * qs;
+      sine_cosine(value, qs, qc);
+      to.ox[j] = mx;
+      to.oy[j] = my;
+      to.c[j] = mc * qc - ms * qs;
+      to.s[j] = ms * qc + mc * qs;
     }
   }
+}
+
+FLYBALL_LANE Segment place(const Poses& at, const BodyStep<Number>& body) {
+  const int j = body.joint;
+  if (body.shifted == 0) {
+    return Segment{at.ox[j], at.oy[j], at.c[j], at.s[j], body.length};
+  }
+  return Segment{at.ox[j] + at.c[j] * splat(body.x) - at.s[j] * splat(body.y),
+                 at.oy[j] + at.s[j] * splat(body.x) + at.c[j] * splat(body.y),
+                 at.c[j] * splat(body.ux) - at.s[j] * splat(body.uy),
+                 at.s[j] * splat(body.ux) + at.c[j] * splat(body.uy), body.length};
+}
+
+/// What a joint holds.
+FLYBALL_LANE Real held(const SpaceView<Number>& space, const Poses& at,
+                       const HoldStep<Number>& hold) {
+  Real sum = splat(0);
+  for (int m = hold.first; m < hold.last; ++m) {
+    const MassStep<Number>& mass = space.masses[m];
+    const int j = mass.joint;
+    const Real arm = hold.slides != 0 ? at.s[hold.joint]
+                                      : at.ox[j] + at.c[j] * splat(mass.x) -
+                                            at.s[j] * splat(mass.y) - at.ox[hold.joint];
+    sum = sum + splat(mass.weight) * arm;
+  }
+  return size(sum);
+}
+
+/// The smallest margin in shares of a move. @param hasty  Whether it may stop at a negative one.
+FLYBALL_LANE Real reach(const SpaceView<Number>& space, const Real* q,
+                        const InverseRates<Number>& rates, bool hasty) {
+  Poses at;
+  place_joints(space, q, at);
   Real least = splat(boundless);
-  const auto place = [&](const BodyStep<Number>& body) {
-    const int j = body.joint;
-    if (body.shifted == 0) {
-      return Segment{ox[j], oy[j], c[j], s[j], body.length};
-    }
-    return Segment{ox[j] + c[j] * splat(body.x) - s[j] * splat(body.y),
-                   oy[j] + s[j] * splat(body.x) + c[j] * splat(body.y),
-                   c[j] * splat(body.ux) - s[j] * splat(body.uy),
-                   s[j] * splat(body.ux) + c[j] * splat(body.uy), body.length};
-  };
   for (int b = 0; b < space.body_count; ++b) {
     const BodyStep<Number>& body = space.bodies[b];
-    const Segment segment = place(body);
+    const Segment segment = place(at, body);
     Real margin = splat(boundless);
     for (int r = body.first_run; r < body.last_run; ++r) {
       const DiscRun<Number>& run = space.runs[r];
@@ -474,24 +299,17 @@ FLYBALL_LANE Real reach(const SpaceView<Number>& space, const Real* q,
   for (int i = 0; i < space.pair_count; ++i) {
     const PairStep<Number>& pair = space.pairs[i];
     const Real distance =
-        segment_distance(place(space.bodies[pair.a]), place(space.bodies[pair.b]));
+        segment_distance(place(at, space.bodies[pair.a]), place(at, space.bodies[pair.b]));
     least = smaller(least, (distance - splat(pair.reach)) * splat(rates.pair[i]));
   }
   for (int i = 0; i < space.hold_count; ++i) {
     const HoldStep<Number>& hold = space.holds[i];
-    Real sum = splat(0);
-    for (int m = hold.first; m < hold.last; ++m) {
-      const MassStep<Number>& mass = space.masses[m];
-      const int j = mass.joint;
-      const Real arm = hold.slides != 0
-                           ? s[hold.joint]
-                           : ox[j] + c[j] * splat(mass.x) - s[j] * splat(mass.y) - ox[hold.joint];
-      sum = sum + splat(mass.weight) * arm;
-    }
-    least = smaller(least, (splat(hold.limit) - size(sum)) * splat(rates.hold[i]));
+    least = smaller(least, (splat(hold.limit) - held(space, at, hold)) * splat(rates.hold[i]));
   }
   if (space.region_count > 0) {
-    least = smaller(least, region_reach(space, q, rates.leaf));
+    least = smaller(least, region_reach(space, q, [&](const RegionStep<Number>& step, Real value) {
+                      return (value - splat(step.slack)) * splat(rates.leaf[step.leaf]);
+                    }));
   }
   return least;
 }
@@ -604,7 +422,5 @@ FLYBALL_LANE Real reach(const SpaceView<Number>& space, const Real* q,
 }
 
 #endif
-
-#undef FLYBALL_LANE
 
 }  // namespace flyball::detail::FLYBALL_VARIANT

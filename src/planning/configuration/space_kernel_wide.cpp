@@ -15,7 +15,7 @@
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 #endif
-#include "planning/configuration/space_kernel_body.hpp"
+#include "planning/configuration/box_kernel_body.hpp"
 #ifdef __clang__
 #pragma clang attribute pop
 #else

@@ -488,6 +488,7 @@ SpaceProgram<float> in_floats(const SpaceModel& model, const SpaceProgram<double
   SpaceProgram<float> to;
   to.dimension = exact.dimension;
   to.rates = exact.rates;
+  to.slack = slack;
   for (const auto& j : exact.joints) {
     to.joints.push_back(
         {j.parent, j.coordinate, j.slides, j.turned, f(j.x), f(j.y), f(j.cosine), f(j.sine)});

@@ -188,6 +188,7 @@ struct SpaceProgram {
   std::vector<E> normals{};
   std::vector<EdgeStep<E>> sides{};
   RateStep rates{};
+  double slack = 0.0;  ///< Taken from distances, of floats.
 
   [[nodiscard]] SpaceView<E> view() const noexcept {
     return {dimension,
@@ -231,6 +232,25 @@ enum class EdgeState : int { free, blocked, unproven };
 /// @param q  dimension x 8, coordinate by coordinate.
 FLYBALL_KERNEL(void reaches(const SpaceView<float>& space, const float* q,
                             const InverseRates<float>& rates, float* to) noexcept)
+/// What is known of a box of configurations.
+enum class BoxState : unsigned char { mixed, free, blocked, split };
+
+/// What a box is judged by beside the space, in floats.
+struct BoxRates {
+  const float* pairs;       ///< dimension numbers a pair: how fast its distance changes.
+  const float* holds;       ///< The same of limits.
+  const float* hold_slack;  ///< What rounding may be of each limit.
+  const float* weights;     ///< Of each coordinate, where regions are to be cut.
+  float slack;              ///< What rounding may be of distances.
+};
+/// Which boxes are free, or blocked as a whole, and where to cut them if they are neither: along
+/// the coordinate that matters most to what is nearest to deciding the box; -1 if nothing does.
+/// Of bodies the bounds follow their pose: joints move one after the other, and of what is touched
+/// the direction counts to first order, with a bound of the second.
+/// @param middles, halves  dimension x 8.
+FLYBALL_KERNEL(void judge_boxes(const SpaceView<float>& space, const float* middles,
+                                const float* halves, const BoxRates& rates, BoxState* states,
+                                int* axes) noexcept)
 /// Whether a straight move is free along its whole length.
 /// @param most  Batches of eight configurations at most.
 FLYBALL_KERNEL(EdgeState check_edge(const SpaceView<float>& space, const float* from,

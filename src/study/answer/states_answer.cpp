@@ -214,13 +214,26 @@ Answer answer_of(const StatesResult& result) {
                          .in("states")
                          .about("the state machine")
                          .got("not safe: " + first->explanation);
+  } else if (!result.complete) {
+    const std::string sure =
+        result.depth_reached > 1
+            ? fmt::format("no sequence of up to {} {} leaves what is allowed, longer ones may",
+                          result.depth_reached - 1, result.depth_reached == 2 ? "event" : "events")
+            : std::string("not even all single events were tried");
+    document.verdict.line = fmt::format(
+        "Undecided: the search ended at its bound of {} moves, before sequences of {} events.",
+        result.moves, result.job.depth);
+    document.verdict.add(Tone::caution, sure);
+    answer.refusal =
+        Error(ConfigurationError::undecided)
+            .in("states")
+            .about("the state machine")
+            .got(fmt::format("{} moves judged: {}", result.moves, sure))
+            .expected(fmt::format("all sequences of up to {} events", result.job.depth))
+            .hint("explore to a smaller depth, or with fewer interrupts");
   } else {
     document.verdict.line =
         fmt::format("No sequence of up to {} events leaves what is allowed.", result.depth_reached);
-    if (!result.complete) {
-      document.verdict.add(Tone::caution,
-                           "the search ended at its bound of moves: longer sequences may");
-    }
   }
   if (first == nullptr && !result.unreached.empty()) {
     document.verdict.add(Tone::caution,

@@ -281,5 +281,48 @@ TEST(GridPath, FindsAWayExactlyWhereThereIsOne) {
   EXPECT_GT(found, 40);
 }
 
+// Discs within reach of the first link part the space of the arm into an upper and a lower side:
+// boxes prove it, and never of ends that random trees join.
+TEST(PathPlanner, ProvesThatDiscsPartTheSpaceOfAnArm) {
+  int proven = 0;
+  int joined = 0;
+  for (const std::uint32_t seed : {9U, 16U}) {
+    const ConfigurationSpace space = test::arm_space(seed, true);
+    PathPlanner planner(space);
+    Random random(seed);
+    const auto valid = [&] {
+      std::vector<double> q;
+      do {
+        q = test::random_configuration(space, random);
+      } while (!space.valid(q));
+      return q;
+    };
+    for (int i = 0; i < 8; ++i) {
+      const std::vector<double> start = valid();
+      const std::vector<double> goal = valid();
+      PathSearch trees;
+      trees.method = PathMethod::rrt_connect;
+      trees.work = 2000;
+      trees.shorten = false;
+      const bool found = planner.plan(start, goal, trees).has_value();
+      PathSearch boxes;
+      boxes.method = PathMethod::decomposition;
+      boxes.work = 20'000;
+      boxes.shorten = false;
+      boxes.wide = i % 2 == 0;
+      const auto path = planner.plan(start, goal, boxes);
+      joined += found ? 1 : 0;
+      if (path) {
+        EXPECT_EQ(fault(space, *path, start, goal), "") << "seed " << seed << ", pair " << i;
+      } else if (path.error().is(ConfigurationError::no_path)) {
+        EXPECT_FALSE(found) << "seed " << seed << ", pair " << i;
+        ++proven;
+      }
+    }
+  }
+  EXPECT_GE(proven, 4);
+  EXPECT_GE(joined, 5);
+}
+
 }  // namespace
 }  // namespace flyball
