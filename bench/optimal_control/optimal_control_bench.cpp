@@ -1,5 +1,6 @@
 // Problems along stages and starts that are disturbed.
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 
@@ -55,6 +56,17 @@ int main() {
     print("flywheel", N, flywheel(N));
   }
   print("double integrator", 700, double_integrator(700));
+  int most = 0;
+  int unsolved = 0;
+  for (int N = 30; N <= 5000; N += N < 400 ? 10 : N == 400 ? 100 : 250) {
+    OptimalControlProblem problem = cart_pole::problem(N);
+    problem.set_start(cart_pole::start(N), Eigen::MatrixXd::Zero(1, N));
+    const OptimalControlSolution solution = solve(problem).value();
+    most = std::max(most, solution.counts.iterations);
+    unsolved += solution.status == SolveStatus::solved ? 0 : 1;
+  }
+  std::printf("N = 30 to 400 and 500 to 5000: %d iterations at most, %d not solved\n", most,
+              unsolved);
   for (const double amplitude : {0.1, 0.3}) {
     for (const int N : {100, 300, 1000}) {
       disturbed(N, amplitude);

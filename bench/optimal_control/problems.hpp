@@ -68,24 +68,54 @@ inline Row swing_up(int N) {
   });
 }
 
-inline Row flywheel(int N) {
+/// A flywheel of time constant 1 s over 5 s, from rest, to `reference`.
+inline void state_flywheel(Problem& problem, int N, const Expression& reference) {
+  const ExpressionMatrix X = problem.decision_variable(1, N + 1);
+  const ExpressionMatrix U = problem.decision_variable(1, N);
+  const double a = std::exp(-5.0 / N);
+  for (int k = 0; k < N; ++k) {
+    problem.subject_to(X(0, k + 1) == a * X(0, k) + (1.0 - a) * U(0, k));
+  }
+  problem.subject_to(X(0, 0) == 0.0);
+  problem.subject_to(-12.0 <= U);
+  problem.subject_to(U <= 12.0);
+  Expression J = 0.0;
+  for (int k = 0; k <= N; ++k) {
+    J += pow(reference - X(0, k), 2);
+  }
+  problem.minimize(J);
+}
+
+/// The double integrator of section 17.1.1 over 3.5 s with exact steps, to `goal`.
+inline void state_double_integrator(Problem& problem, int N, const Expression& goal) {
+  const ExpressionMatrix X = problem.decision_variable(2, N + 1);
+  const ExpressionMatrix U = problem.decision_variable(1, N);
+  const double h = 3.5 / N;
+  for (int k = 0; k < N; ++k) {
+    problem.subject_to(X(0, k + 1) == X(0, k) + h * X(1, k) + 0.5 * h * h * U(0, k));
+    problem.subject_to(X(1, k + 1) == X(1, k) + h * U(0, k));
+  }
+  problem.subject_to(X.col(0) == Eigen::Vector2d(0.0, 0.0));
+  problem.subject_to(X(0, N) == goal);
+  problem.subject_to(X(1, N) == 0.0);
+  problem.subject_to(-1.0 <= X.row(1));
+  problem.subject_to(X.row(1) <= 1.0);
+  problem.subject_to(-1.0 <= U);
+  problem.subject_to(U <= 1.0);
+  Expression J = 0.0;
+  for (int k = 0; k <= N; ++k) {
+    J += pow(goal - X(0, k), 2);
+  }
+  problem.minimize(J);
+}
+
+/// Stated and solved, then solved again from what was found.
+template <class State>
+Row solve_twice(State&& state) {
   return measure(9, [&](Row& row) {
     const double begin = process_milliseconds();
     Problem problem;
-    const ExpressionMatrix X = problem.decision_variable(1, N + 1);
-    const ExpressionMatrix U = problem.decision_variable(1, N);
-    const double a = std::exp(-5.0 / N);
-    for (int k = 0; k < N; ++k) {
-      problem.subject_to(X(0, k + 1) == a * X(0, k) + (1.0 - a) * U(0, k));
-    }
-    problem.subject_to(X(0, 0) == 0.0);
-    problem.subject_to(-12.0 <= U);
-    problem.subject_to(U <= 12.0);
-    Expression J = 0.0;
-    for (int k = 0; k <= N; ++k) {
-      J += pow(10.0 - X(0, k), 2);
-    }
-    problem.minimize(J);
+    state(problem);
     const ProblemSolution solution = problem.solve().value();
     const double middle = process_milliseconds();
     (void)problem.solve();
@@ -93,33 +123,12 @@ inline Row flywheel(int N) {
   });
 }
 
+inline Row flywheel(int N) {
+  return solve_twice([N](Problem& problem) { state_flywheel(problem, N, 10.0); });
+}
+
 inline Row double_integrator(int N) {
-  return measure(9, [&](Row& row) {
-    const double begin = process_milliseconds();
-    Problem problem;
-    const ExpressionMatrix X = problem.decision_variable(2, N + 1);
-    const ExpressionMatrix U = problem.decision_variable(1, N);
-    const double h = 3.5 / N;
-    for (int k = 0; k < N; ++k) {
-      problem.subject_to(X(0, k + 1) == X(0, k) + h * X(1, k) + 0.5 * h * h * U(0, k));
-      problem.subject_to(X(1, k + 1) == X(1, k) + h * U(0, k));
-    }
-    problem.subject_to(X.col(0) == Eigen::Vector2d(0.0, 0.0));
-    problem.subject_to(X.col(N) == Eigen::Vector2d(2.0, 0.0));
-    problem.subject_to(-1.0 <= X.row(1));
-    problem.subject_to(X.row(1) <= 1.0);
-    problem.subject_to(-1.0 <= U);
-    problem.subject_to(U <= 1.0);
-    Expression J = 0.0;
-    for (int k = 0; k <= N; ++k) {
-      J += pow(2.0 - X(0, k), 2);
-    }
-    problem.minimize(J);
-    const ProblemSolution solution = problem.solve().value();
-    const double middle = process_milliseconds();
-    (void)problem.solve();
-    keep(row, middle - begin, process_milliseconds() - middle, solution);
-  });
+  return solve_twice([N](Problem& problem) { state_double_integrator(problem, N, 2.0); });
 }
 
 }  // namespace problems

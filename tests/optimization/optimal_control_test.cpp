@@ -299,6 +299,52 @@ TEST(OptimalControl, AnotherInitialStateTakesFewerIterations) {
   EXPECT_LE(swing_up_residual(second, 80), 2e-5);
 }
 
+// A force of 0.1 N that pushes along, at stages of 5 s / N: the swing-up solved again.
+TEST(OptimalControl, ChangedDataTakeAThirdOfTheIterations) {
+  for (const int N : {100, 1000}) {
+    OptimalControlProblem problem(4, 1, N, 0, 1);
+    problem.set_derivative(
+        [](const auto& x, const auto& u, const auto&, const auto& d) {
+          Eigen::Matrix<Expression, 1, 1> force;
+          force(0) = u(0) + d(0);
+          return cart_pole::Model{}(x, force);
+        },
+        5.0);
+    problem.set_stage_cost([](const auto&, const auto& u) { return u(0) * u(0); });
+    for (int k = 1; k < N; ++k) {
+      problem.bound_state(k, Eigen::Vector4d(0.0, -inf, -inf, -inf),
+                          Eigen::Vector4d(2.0, inf, inf, inf));
+    }
+    problem.bound_inputs(VectorXd::Constant(1, -20.0), VectorXd::Constant(1, 20.0));
+    problem.fix_state(0, Eigen::Vector4d::Zero());
+    problem.fix_state(N, Eigen::Vector4d(1.0, std::numbers::pi, 0.0, 0.0));
+    problem.set_start(cart_pole::start(N), MatrixXd::Zero(1, N));
+    auto solver = OptimalControlSolver::make(problem).value();
+    const OptimalControlSolution first = solver.solve();
+    ASSERT_TRUE(first.solved());
+    // Nothing changed: it is where it was.
+    EXPECT_EQ(solver.resolve().counts.iterations, 0);
+    const MatrixXd push = MatrixXd::Constant(1, N + 1, 0.1);
+    ASSERT_TRUE(solver.set_data(push));
+    const OptimalControlSolution again = solver.resolve();
+    EXPECT_EQ(again.status, SolveStatus::solved);
+    EXPECT_LE(again.counts.iterations * 3, first.counts.iterations) << N;
+    const OptimalControlSolution anew = solver.solve();
+    EXPECT_NEAR(again.cost, anew.cost, 1e-7 * anew.cost) << N;
+  }
+}
+
+// The number of steps does not grow with the mesh.
+TEST(OptimalControl, SixtyStepsAtEveryMesh) {
+  for (int N = 30; N <= 400; N += 50) {
+    OptimalControlProblem problem = cart_pole::problem(N);
+    problem.set_start(cart_pole::start(N), MatrixXd::Zero(1, N));
+    const OptimalControlSolution solution = solve(problem).value();
+    EXPECT_EQ(solution.status, SolveStatus::solved) << N;
+    EXPECT_LE(solution.counts.iterations, 60) << N;
+  }
+}
+
 TEST(OptimalControl, DataOfStages) {
   // Σ (x - d)² with ẋ = u free: x follows the data exactly.
   const int N = 12;

@@ -117,6 +117,7 @@ struct OptimalControlSolver::Parts {
   StageProgram program;
   InteriorPoint solver;
   bool has_solution = false;
+  int patience = 0;  // with a warm start, before it is begun anew
 };
 
 OptimalControlSolver::OptimalControlSolver(std::unique_ptr<Parts> parts)
@@ -251,6 +252,7 @@ OptimalControlSolution OptimalControlSolver::solve(const SolverOptions& options,
     with_barrier.first_barrier = first_barrier;
   }
   const SolveStatus status = parts.solver.run(with_barrier, watch);
+  parts.patience = 5 + parts.solver.counts().iterations / 2;
   OptimalControlSolution result = parts.solution(status);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
@@ -258,14 +260,32 @@ OptimalControlSolution OptimalControlSolver::solve(const SolverOptions& options,
 
 OptimalControlSolution OptimalControlSolver::resolve(const SolverOptions& options) {
   Parts& parts = *parts_;
-  if (!parts.has_solution) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto seconds = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  };
+  if (!parts.has_solution || !parts.solver.warm_start(std::max(0.0, options.first_barrier))) {
     return solve(options);
   }
-  const auto begin = std::chrono::steady_clock::now();
-  parts.solver.warm_start(options.first_barrier > 0.0 ? options.first_barrier : 1e-4);
-  const SolveStatus status = parts.solver.run(options, [](const Iteration&) { return false; });
-  OptimalControlSolution result = parts.solution(status);
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  SolverOptions attempt = options;
+  attempt.max_iterations = std::min(options.max_iterations, parts.patience);
+  const SolveStatus status = parts.solver.run(attempt, [](const Iteration&) { return false; });
+  const SolverCounts counts = parts.solver.counts();
+  if (status == SolveStatus::solved || status == SolveStatus::time_limit ||
+      counts.iterations >= options.max_iterations) {
+    OptimalControlSolution result = parts.solution(status);
+    result.seconds = seconds();
+    return result;
+  }
+  attempt.max_iterations = options.max_iterations - counts.iterations;
+  attempt.time_limit = std::max(0.0, options.time_limit - seconds());
+  OptimalControlSolution result = solve(attempt);
+  result.counts.iterations += counts.iterations;
+  result.counts.restorations += counts.restorations;
+  result.counts.factorizations += counts.factorizations;
+  result.counts.evaluations += counts.evaluations;
+  result.counts.corrections += counts.corrections;
+  result.seconds = seconds();
   return result;
 }
 

@@ -63,6 +63,7 @@ struct Problem::Parts {
   std::unique_ptr<InteriorPoint> general{};
   std::unique_ptr<QuadraticMethod> quadratic{};
   bool is_warm = false;
+  int cold_iterations = 0;                  // of the general method's last cold start
   SolverCounts counts{};                    // of the general method's attempts
   std::vector<double> solved_parameters{};  // of the program's numbers
 
@@ -236,12 +237,17 @@ SolveStatus Problem::Parts::solve_general(const SolverOptions& options,
            counts.iterations < options.max_iterations;
   };
   const bool free = options.first_barrier <= 0.0 && program->stages() == 0;
-  SolveStatus status =
-      run(options.first_barrier, free && !is_warm ? patience : options.max_iterations);
+  SolveStatus status = run(options.first_barrier, is_warm ? 5 + cold_iterations / 2
+                                                  : free  ? patience
+                                                          : options.max_iterations);
   if (is_warm && status != SolveStatus::solved && status != SolveStatus::stopped &&
       status != SolveStatus::time_limit && counts.iterations < options.max_iterations) {
     general->start(program->start(graph.values));
-    status = run(options.first_barrier, free ? patience : options.max_iterations);
+    const bool along = options.first_barrier <= 0.0 && program->stages() > 0;
+    status = run(along ? first_barrier_of_stages : options.first_barrier,
+                 free ? patience : options.max_iterations);
+  } else if (!is_warm) {
+    cold_iterations = counts.iterations;
   }
   for (const double barrier : other_barriers) {
     if (!free || !failed(status)) {
@@ -315,8 +321,9 @@ ProblemSolution Problem::Parts::run(FlatProblem* flat, const SolverOptions& opti
       is_warm = false;
     }
     if (is_warm) {
-      general->warm_start(1e-4);
-    } else {
+      is_warm = general->warm_start(0.0);
+    }
+    if (!is_warm) {
       general->start(begin.size() > 0 ? begin : p.start(graph.values));
     }
     SolverOptions chosen = options;

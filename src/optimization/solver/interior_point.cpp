@@ -42,6 +42,13 @@ InteriorPoint::InteriorPoint(Program& program) : program_(program) {
        {&lambda_, &c_, &dl_, &D_, &residual_c_, &fix_c_, &trial_c_, &corrected_c_, &step_l_}) {
     v->setZero(m);
   }
+  levels_.resize(most_levels);
+  for (Level& level : levels_) {  // pages that no run writes to are none
+    level.w.resize(n);
+    level.zl.resize(n);
+    level.zu.resize(n);
+    level.lambda.resize(m);
+  }
 }
 
 InteriorPoint::~InteriorPoint() = default;
@@ -68,36 +75,7 @@ void InteriorPoint::start(const VectorXd& w) {
   }
   lambda_.setZero();
   mu_ = 0.0;
-}
-
-void InteriorPoint::warm_start(double mu) {
-  mu_ = mu;
-  // The larger of a distance and its multiplier stays, the other makes their product μ again.
-  const auto center = [&](double& distance, double& multiplier, double range) {
-    if (multiplier > distance) {
-      distance = std::min(std::max(distance, mu / multiplier), 0.5 * range);
-    }
-    multiplier = std::max(multiplier, mu / distance);
-  };
-  for (Index i = 0; i < w_.size(); ++i) {
-    const double lower = program_.lower(i);
-    const double upper = program_.upper(i);
-    if (lower == upper) {
-      w_(i) = lower;
-      continue;
-    }
-    const double range = upper - lower;
-    double low = std::max(w_(i) - lower, 1e-12);
-    if (low < infinity) {
-      center(low, zl_(i), range);
-      w_(i) = lower + low;
-    }
-    double high = std::max(upper - w_(i), 1e-12);
-    if (high < infinity) {
-      center(high, zu_(i), range);
-      w_(i) = upper - high;
-    }
-  }
+  is_warm_ = false;
 }
 
 void InteriorPoint::distances() {
@@ -202,7 +180,7 @@ bool InteriorPoint::direction() {
       ++counts_.factorizations;
       good = program_.factor(diagonal_, D_, true);
       if (!good) {
-        added *= last_regularization_ > 0.0 ? 8.0 : 100.0;
+        added *= last_regularization_ > 0.0 ? 4.0 : 100.0;
       }
     }
     last_regularization_ = regularization_;
@@ -289,6 +267,15 @@ SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
   counts_ = {};
   last_ = {};
   last_regularization_ = 0.0;
+  derivatives_fresh_ = false;
+  if (is_warm_) {
+    is_warm_ = false;
+    if (!choose_level(options)) {
+      return SolveStatus::no_progress;
+    }
+  } else {
+    level_count_ = 0;
+  }
   distances();
   if (mu_ == 0.0) {
     mu_ = options.first_barrier > 0.0 ? options.first_barrier : 0.1;
@@ -306,7 +293,6 @@ SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
   first_primal_ = c_.size() > 0 ? c_.lpNorm<Eigen::Infinity>() : 0.0;
   first_mu_ = mu_;
   reset_filter();
-  derivatives_fresh_ = false;
   const double mu_min = options.tolerance / 11.0;
   for (int k = 0;; ++k) {
     if (!derivatives_fresh_ && !program_.derivatives(w_, lambda_, 1.0, gradient_)) {
@@ -323,6 +309,7 @@ SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
     last_.regularization = regularization_;
     counts_.iterations = last_.number;
     if (error.largest() <= options.tolerance) {
+      keep_level();
       return SolveStatus::solved;
     }
     if (f_ < -1e20 && error.primal < 1e-4) {
@@ -341,10 +328,11 @@ SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
     for (bool lowered = true; lowered && mu_ > mu_min;) {
       const Errors now = errors(mu_);
       const bool small = now.largest() <= 10 * mu_;
-      const bool feasible = now.primal <= std::max(0.3 * first_primal_ * std::sqrt(mu_ / first_mu_),
+      const bool feasible = now.primal <= std::max(0.1 * first_primal_ * std::sqrt(mu_ / first_mu_),
                                                    0.1 * options.tolerance);
       lowered = small && feasible;
       if (lowered) {
+        keep_level();
         mu_ = std::max(mu_min, std::min(0.2 * mu_, std::pow(mu_, 1.4)));
         reset_filter();
       }

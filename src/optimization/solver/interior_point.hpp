@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <memory>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -30,8 +31,15 @@ class InteriorPoint {
 
   /// Where to start: w is moved into the bounds' interior. Multipliers become zero.
   void start(const Eigen::VectorXd& w);
-  /// Keeps what the last run left, as a warm start: μ at first.
-  void warm_start(double mu);
+  /// Lets the next run begin, after a change of the program's numbers, at a point of the central
+  /// path that the last run went through: at its end where that still holds, else at the smallest
+  /// barrier that is not less than the violation which the change made, so that what the bounds
+  /// leave of the first steps is most of them.
+  /// @param mu  Not below this barrier; 0: any.
+  /// @return false, and nothing done, if no run has been solved before.
+  /// Source: Yildirim, Wright, "Warm-start strategies in interior-point methods for linear
+  /// programming" (2002).
+  [[nodiscard]] bool warm_start(double mu);
 
   /// After each accepted step; true: stop with `stopped`.
   using Watch = FunctionRef<bool(const Iteration&)>;
@@ -81,6 +89,20 @@ class InteriorPoint {
   double first_primal_ = 0.0, first_mu_ = 0.0;
   bool derivatives_fresh_ = false;
   bool is_restoration_ = false;
+  /// A point of the central path that a run went through.
+  struct Level {
+    double mu = 0.0;
+    Eigen::VectorXd w{}, lambda{}, zl{}, zu{};
+  };
+  void keep_level();
+  void load_level(const Level& level);
+  [[nodiscard]] bool evaluate();
+  [[nodiscard]] bool choose_level(const SolverOptions& options);
+  static constexpr int most_levels = 12;
+  std::vector<Level> levels_;  // of falling barriers, the last run's end last
+  int level_count_ = 0;
+  bool is_warm_ = false;
+  double least_level_ = 0.0;
   Filter filter_;
   Iteration last_;
   SolverCounts counts_;

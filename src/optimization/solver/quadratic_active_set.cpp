@@ -24,7 +24,9 @@ double largest(const VectorXd& v) {
 bool QuadraticMethod::settle(const SolverOptions& options) {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
-  constexpr int most_rounds = 6;  // farther away an interior point goes faster
+  // Farther away an interior point goes faster: where many bounds change, or one after the other.
+  constexpr int most_rounds = 4;
+  constexpr int most_changes = 8;
   const VectorXd& lower = program_.lower;
   const VectorXd& upper = program_.upper;
   if (!has_curvature_) {
@@ -67,7 +69,7 @@ bool QuadraticMethod::settle(const SolverOptions& options) {
       lambda_ += dl_;
     }
     residuals();
-    bool changed = false;
+    int changes = 0;
     for (Index i = 0; i < w_.size(); ++i) {
       if (free_(i) == 0.0) {
         continue;
@@ -82,11 +84,14 @@ bool QuadraticMethod::settle(const SolverOptions& options) {
       }
       if (wanted != side(i)) {
         side(i) = wanted;
-        changed = true;
+        ++changes;
       }
       w_(i) = wanted < 0.0 ? lower(i) : wanted > 0.0 ? upper(i) : w_(i);
     }
-    if (!changed) {
+    if (changes > most_changes) {
+      return false;
+    }
+    if (changes == 0) {
       for (Index i = 0; i < w_.size(); ++i) {
         zl_(i) = side(i) < 0.0 ? std::max(0.0, rd_(i)) : 0.0;
         zu_(i) = side(i) > 0.0 ? std::max(0.0, -rd_(i)) : 0.0;

@@ -13,6 +13,8 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
+/// How far the complementarity falls before a run keeps where the next one may begin.
+constexpr double middle = 1e-2;
 
 double largest(const VectorXd& v) {
   return v.size() > 0 ? v.lpNorm<Eigen::Infinity>() : 0.0;
@@ -32,6 +34,10 @@ QuadraticMethod::QuadraticMethod(Program& program) : program_(program) {
     v->setZero(m);
   }
   certificate_.setZero(std::max(n, m));
+  for (VectorXd* v : {&middle_w_, &middle_zl_, &middle_zu_}) {
+    v->resize(n);
+  }
+  middle_lambda_.resize(m);
 }
 
 void QuadraticMethod::distances() {
@@ -101,6 +107,10 @@ bool QuadraticMethod::begin(bool warm) {
     w(i) = free_(i) == 0.0 ? lower(i) : 0.0;
   }
   if (warm) {
+    w_ = middle_w_;
+    lambda_ = middle_lambda_;
+    zl_ = middle_zl_;
+    zu_ = middle_zu_;
     for (Index i = 0; i < w_.size(); ++i) {
       w_(i) = free_(i) == 0.0 ? lower(i) : w_(i);
     }
@@ -133,13 +143,13 @@ bool QuadraticMethod::begin(bool warm) {
     lambda_ += dl_;
   }
   residuals();
-  const double least = warm ? 1e-4 : 1.0;
+  const double least = warm ? 1e-3 : 1.0;
   double largest_multiplier = 0.0;
   for (Index i = 0; i < w_.size(); ++i) {
     largest_multiplier = std::max(largest_multiplier, std::abs(rd_(i)));
   }
   const double multiplier =
-      warm ? 1e-4 * size_ : std::max(1.0, std::min(largest_multiplier, 1e3 * size_));
+      warm ? 1e-8 * size_ : std::max(1.0, std::min(largest_multiplier, 1e3 * size_));
   for (Index i = 0; i < w_.size(); ++i) {
     if (free_(i) == 0.0) {
       continue;
@@ -201,6 +211,7 @@ SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool
     (void)watch(last_);
     return SolveStatus::solved;
   }
+  warm = warm && has_middle_;
   if (!begin(warm)) {
     return SolveStatus::no_progress;
   }
@@ -209,10 +220,21 @@ SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool
   double expected_dual = infinity;
   int since_best = 0;
   D_.setZero();
+  double first_mu = 0.0;
+  has_middle_ = false;
+  const int before = last_.number;
   for (;; ++last_.number) {
     counts_.iterations = last_.number;
     if (converged(options.tolerance)) {
       return SolveStatus::solved;
+    }
+    first_mu = last_.number == before ? mu_ : first_mu;
+    if (!has_middle_ && (mu_ <= middle * first_mu || warm)) {
+      has_middle_ = true;
+      middle_w_ = w_;
+      middle_lambda_ = lambda_;
+      middle_zl_ = zl_;
+      middle_zu_ = zu_;
     }
     // A step along a line takes its share off the residuals; where it did not, the system was not
     // solved well, and is solved again for what it leaves from now on.

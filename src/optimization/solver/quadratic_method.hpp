@@ -52,6 +52,8 @@ class QuadraticMethod {
   Eigen::VectorXd g_, c0_, c_, rd_, diagonal_, D_, rw_, dw_, dl_, dzl_, dzu_, affine_w_, affine_l_;
   Eigen::VectorXd residual_w_, residual_c_, fix_w_, fix_c_, hw_, hc_, certificate_, low_target_,
       high_target_, il_, iu_;
+  Eigen::VectorXd middle_w_, middle_lambda_, middle_zl_, middle_zu_;  // where the next run begins
+  bool has_middle_ = false;
   double f_ = 0.0, f0_ = 0.0, mu_ = 0.0, size_ = 1.0;
   int pairs_ = 0;
   bool has_curvature_ = false;
