@@ -8,6 +8,7 @@
 #include <flyball/planning/drive/optimize_drive.hpp>
 
 #include "core/format.hpp"
+#include "planning/drive/check_drive.hpp"
 #include "planning/drive/drive_body.hpp"
 #include "planning/drive/drive_rules.hpp"
 
@@ -15,52 +16,98 @@ namespace flyball {
 
 using drive_rules::Span;
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::Vector2d;
 using Eigen::VectorXd;
 
 namespace {
 
-constexpr int instants = 8;  // of an interval
+constexpr int instants_of_an_interval = 100;
 constexpr std::size_t most_violations = 10;
 
-/// The worst of each thing.
+/// What a wheel may exceed.
+enum class WheelLimit : std::uint8_t { speed, force, torque, grip };
+constexpr std::size_t wheel_limits = 4;
+
+/// The worst of each thing: constraints by their place, then the wheels' limits.
 class Worst {
  public:
-  Worst(const std::vector<DriveSample>& samples, const std::vector<int>& waypoint_samples)
-      : samples_(samples), waypoints_(waypoint_samples) {}
+  Worst(const DriveProblem& problem, const std::vector<DriveSample>& samples,
+        const std::vector<int>& waypoint_samples)
+      : problem_(problem),
+        samples_(samples),
+        waypoints_(waypoint_samples),
+        found_(problem.constraints.size() + 4 * wheel_limits) {}
 
-  void add(const std::string& name, std::string_view unit, double amount, double limit, double time,
-           int constraint) {
-    if (!(amount > 0.0)) {
-      return;
-    }
-    DriveViolation& worst = of(name, constraint);
-    if (amount > worst.amount) {
-      worst.unit = unit;
-      worst.amount = amount;
-      worst.share = limit > 0.0 ? amount / limit : amount;
-      worst.time = time;
-      worst.segment = segment_at(time);
-    }
+  void add_constraint(std::size_t number, double amount, double limit, double time) {
+    add(number, amount, limit, time);
   }
-  [[nodiscard]] std::vector<DriveViolation> sorted() && {
-    std::sort(found_.begin(), found_.end(),
-              [](const DriveViolation& a, const DriveViolation& b) { return a.share > b.share; });
-    if (found_.size() > most_violations) {
-      found_.resize(most_violations);
+  void add_wheel(WheelLimit kind, std::size_t wheel, double amount, double limit, double time) {
+    add(problem_.constraints.size() + static_cast<std::size_t>(kind) * 4 + wheel, amount, limit,
+        time);
+  }
+  [[nodiscard]] std::vector<DriveViolation> sorted() const {
+    std::vector<DriveViolation> sorted;
+    for (std::size_t i = 0; i < found_.size(); ++i) {
+      if (found_[i].amount > 0.0) {
+        sorted.push_back(named(i));
+      }
     }
-    return std::move(found_);
+    std::sort(sorted.begin(), sorted.end(),
+              [](const DriveViolation& a, const DriveViolation& b) { return a.share > b.share; });
+    if (sorted.size() > most_violations) {
+      sorted.resize(most_violations);
+    }
+    return sorted;
   }
 
  private:
-  DriveViolation& of(const std::string& name, int constraint) {
-    for (DriveViolation& v : found_) {
-      if (v.name == name && v.constraint == constraint) {
-        return v;
-      }
+  struct Found {
+    double amount = 0.0, share = 0.0, time = 0.0;
+  };
+
+  void add(std::size_t place, double amount, double limit, double time) {
+    Found& worst = found_[place];
+    if (amount > worst.amount) {
+      worst = {amount, limit > 0.0 ? amount / limit : amount, time};
     }
-    found_.push_back({.name = name, .constraint = constraint});
-    return found_.back();
+  }
+  [[nodiscard]] DriveViolation named(std::size_t place) const {
+    constexpr std::array<std::string_view, 4> corners{"front left", "front right", "back left",
+                                                      "back right"};
+    constexpr std::array<std::string_view, 2> sides{"left", "right"};
+    const Found& worst = found_[place];
+    DriveViolation v{.segment = segment_at(worst.time),
+                     .time = worst.time,
+                     .amount = worst.amount,
+                     .share = worst.share};
+    const std::size_t constraints = problem_.constraints.size();
+    if (place < constraints) {
+      v.name = drive_rules::name_of(problem_, place);
+      v.unit = drive_rules::unit_of(problem_.constraints[place].kind);
+      v.constraint = static_cast<int>(place);
+      return v;
+    }
+    const std::size_t wheel = (place - constraints) % 4;
+    const std::string_view which =
+        problem_.model.drivetrain == Drivetrain::differential ? sides[wheel % 2] : corners[wheel];
+    v.unit = "N";
+    switch (static_cast<WheelLimit>((place - constraints) / 4)) {
+      case WheelLimit::speed:
+        v.name = flyball::detail::format("speed of the {} wheel", which);
+        v.unit = "m/s";
+        break;
+      case WheelLimit::force:
+        v.name = flyball::detail::format("force of the {} wheel", which);
+        break;
+      case WheelLimit::torque:
+        v.name = flyball::detail::format("torque of the {} motor at its speed", which);
+        break;
+      case WheelLimit::grip:
+        v.name = flyball::detail::format("grip of the {} side", which);
+        break;
+    }
+    return v;
   }
   [[nodiscard]] int segment_at(double time) const {
     int segment = 0;
@@ -72,9 +119,10 @@ class Worst {
     return segment;
   }
 
+  const DriveProblem& problem_;
   const std::vector<DriveSample>& samples_;
   const std::vector<int>& waypoints_;
-  std::vector<DriveViolation> found_;
+  std::vector<Found> found_;
 };
 
 VectorXd state_of(const DriveModel& model, const DriveSample& s) {
@@ -100,49 +148,63 @@ VectorXd push_of(const DriveModel& model, const DriveSample& s) {
   return u;
 }
 
-/// What the wheels do at an instant.
-void check_wheels(const DriveModel& model, const VectorXd& x, const VectorXd& u, double t,
-                  Worst& worst) {
-  constexpr std::array<std::string_view, 4> corners{"front left", "front right", "back left",
-                                                    "back right"};
-  constexpr std::array<std::string_view, 2> sides{"left", "right"};
+/// What the wheels exceed at an instant, as shares of limits.
+struct WheelShares {
+  double speed = 0.0, line = 0.0;
+};
+WheelShares check_wheels(const DriveModel& model, const VectorXd& x, const VectorXd& u, double t,
+                         Worst& worst) {
+  WheelShares shares;
   for (int i = 0; i < model.wheel_count(); ++i) {
     const auto w = static_cast<std::size_t>(i);
-    const std::string_view which =
-        model.drivetrain == Drivetrain::differential ? sides[w % 2] : corners[w];
     const auto v = drive_body::wheel_velocity<double>(model, x, i);
     const auto f = drive_body::wheel_force<double>(model, u, i);
     const double speed = std::hypot(v[0], v[1]);
     const double force = std::hypot(f[0], f[1]) * model.force();
-    worst.add(flyball::detail::format("speed of the {} wheel", which), "m/s",
-              speed - model.max_speed, model.max_speed, t, -1);
-    worst.add(flyball::detail::format("force of the {} wheel", which), "N", force - model.force(),
-              model.force(), t, -1);
+    worst.add_wheel(WheelLimit::speed, w, speed - model.max_speed, model.max_speed, t);
+    shares.speed = std::max(shares.speed, speed / model.max_speed - 1.0);
+    worst.add_wheel(WheelLimit::force, w, force - model.force(), model.force(), t);
     if (model.free_speed > 0.0 && speed > 1e-3 * model.max_speed) {
       const double along = (f[0] * v[0] + f[1] * v[1]) / speed * model.force();
       const double most = model.stall_force * (1.0 - speed / model.free_speed);
-      worst.add(flyball::detail::format("torque of the {} motor at its speed", which), "N",
-                along - most, model.stall_force, t, -1);
+      worst.add_wheel(WheelLimit::torque, w, along - most, model.stall_force, t);
+      shares.line = std::max(shares.line, (along - most) / model.stall_force);
     }
     if (model.drivetrain == Drivetrain::differential && model.friction > 0.0) {
       const auto at = drive_body::motion<double>(model, x, u);
       const double across = 0.25 * model.mass * (x(3) + x(4)) * at.omega;
-      worst.add(flyball::detail::format("grip of the {} side", which), "N",
-                std::hypot(force, across) - model.friction, model.friction, t, -1);
+      const double beyond = std::hypot(force, across) - model.friction;
+      worst.add_wheel(WheelLimit::grip, w, beyond, model.friction, t);
+      shares.line = std::max(shares.line, beyond / model.friction);
     }
   }
+  return shares;
 }
 
 }  // namespace
 
 DriveCheck check_drive(const DriveProblem& problem, const std::vector<DriveSample>& samples,
                        const std::vector<int>& waypoint_samples) {
+  return drive_check::check(problem, samples, waypoint_samples, instants_of_an_interval, nullptr);
+}
+
+DriveCheck drive_check::check(const DriveProblem& problem, const std::vector<DriveSample>& samples,
+                              const std::vector<int>& waypoint_samples, int instants,
+                              Excesses* excesses) {
   DriveCheck result;
   if (samples.size() < 2 || waypoint_samples.size() != problem.waypoints.size()) {
     return result;
   }
   const DriveModel& model = problem.model;
-  Worst worst(samples, waypoint_samples);
+  Worst worst(problem, samples, waypoint_samples);
+  const auto intervals = static_cast<Index>(samples.size()) - 1;
+  const auto constraints = static_cast<Index>(problem.constraints.size());
+  Excesses unwanted;
+  Excesses& found = excesses != nullptr ? *excesses : unwanted;
+  found.constraints = MatrixXd::Zero(constraints, intervals);
+  found.shares = MatrixXd::Zero(constraints, intervals);
+  found.wheel_speed = VectorXd::Zero(intervals);
+  found.motor_line = VectorXd::Zero(intervals);
   VectorXd x = state_of(model, samples.front());
   const auto check_waypoint = [&](std::size_t sample) {
     for (std::size_t i = 0; i < waypoint_samples.size(); ++i) {
@@ -162,7 +224,7 @@ DriveCheck check_drive(const DriveProblem& problem, const std::vector<DriveSampl
   };
   // Where in a constraint's span an instant lies: an interval, or a waypoint's sample alone.
   const auto check_constraints = [&](const VectorXd& u, std::size_t sample, bool at_sample,
-                                     double t) {
+                                     bool at_end, double t) {
     const auto k = static_cast<int>(sample);
     for (std::size_t c = 0; c < problem.constraints.size(); ++c) {
       const DriveConstraint& constraint = problem.constraints[c];
@@ -173,10 +235,14 @@ DriveCheck check_drive(const DriveProblem& problem, const std::vector<DriveSampl
       const bool spans = constraint.kind != DriveConstraintKind::stop_point || !constraint.to;
       const bool inside =
           at_sample ? a <= k && k <= b && (!pushes || a == b || k < b) : spans && a <= k && k < b;
-      if (inside && (spans || k == a || k == b)) {
+      if (inside && (spans || k == a || k == b) && (pushes || !at_end)) {
         const auto excess = drive_rules::excess(problem, constraint, x, u);
-        worst.add(drive_rules::name_of(problem, c), drive_rules::unit_of(constraint.kind),
-                  excess.amount, excess.limit, t, static_cast<int>(c));
+        worst.add_constraint(c, excess.amount, excess.limit, t);
+        const auto row = static_cast<Index>(c);
+        if (!at_sample && excess.amount > found.constraints(row, k)) {
+          found.constraints(row, k) = excess.amount;
+          found.shares(row, k) = excess.limit > 0.0 ? excess.amount / excess.limit : excess.amount;
+        }
       }
     }
   };
@@ -186,9 +252,9 @@ DriveCheck check_drive(const DriveProblem& problem, const std::vector<DriveSampl
     const bool last = k + 1 == samples.size();
     const VectorXd u = push_of(model, samples[k]);
     check_waypoint(k);
-    check_constraints(u, k, true, samples[k].time);
+    check_constraints(u, k, true, false, samples[k].time);
     if (last) {
-      check_wheels(model, x, u, samples[k].time, worst);
+      static_cast<void>(check_wheels(model, x, u, samples[k].time, worst));
       break;
     }
     const double h = samples[k + 1].time - samples[k].time;
@@ -201,18 +267,21 @@ DriveCheck check_drive(const DriveProblem& problem, const std::vector<DriveSampl
       result.waypoint_error = std::numeric_limits<double>::infinity();
       break;
     }
-    for (int j = 0; j < instants; ++j) {
+    for (int j = 0; j <= instants; ++j) {  // at its end, too, where its force still pushes
       const double share = static_cast<double>(j) / instants;
       x = motion->at(share);
       const double t = samples[k].time + share * h;
-      check_wheels(model, x, u, t, worst);
+      const WheelShares shares = check_wheels(model, x, u, t, worst);
+      const auto at = static_cast<Index>(k);
+      found.wheel_speed(at) = std::max(found.wheel_speed(at), shares.speed);
+      found.motor_line(at) = std::max(found.motor_line(at), shares.line);
       if (j > 0) {
-        check_constraints(u, k, false, t);
+        check_constraints(u, k, false, j == instants, t);
       }
     }
     x = VectorXd(motion->final_state());
   }
-  result.violations = std::move(worst).sorted();
+  result.violations = worst.sorted();
   return result;
 }
 

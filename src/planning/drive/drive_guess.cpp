@@ -263,7 +263,7 @@ Guess guess(const DriveProblem& problem, const Choice& choice, std::vector<int>&
   const double a = 0.7 * model.wheel_count() * model.force() / model.mass;
   double v = 0.8 * model.max_speed;
   for (const DriveConstraint& c : problem.constraints) {
-    if (c.kind == DriveConstraintKind::max_velocity && c.to && c.limit > 0.05) {
+    if (c.kind == DriveConstraintKind::max_velocity && c.to && c.limit > 1e-4) {
       v = std::min(v, c.limit);
     }
   }

@@ -101,6 +101,11 @@ double from_segment(const Vector2d& p, const Vector2d& a, const Vector2d& b) {
   return (p - a - share * edge).norm();
 }
 
+/// What a distance beyond a size is a share of: the size, between 1 cm and 1 m.
+double share_of(double size) {
+  return size > 0.0 ? std::clamp(size, 0.01, 1.0) : 1.0;
+}
+
 double area_of(const std::vector<Vector2d>& polygon) {
   double sum = 0.0;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -380,7 +385,7 @@ Excess excess(const DriveProblem& problem, const DriveConstraint& c, const Eigen
       const double sign = c.flip ? -1.0 : 1.0;
       const double off =
           std::atan2(sign * (cosine * d(1) - sine * d(0)), sign * (cosine * d(0) + sine * d(1)));
-      return {std::abs(off) - c.tolerance, 1.0};
+      return {std::abs(off) - c.tolerance, share_of(c.tolerance)};
     }
     case DriveConstraintKind::keep_in_rectangle:
       return {
@@ -390,13 +395,13 @@ Excess excess(const DriveProblem& problem, const DriveConstraint& c, const Eigen
           1.0};
     case DriveConstraintKind::keep_in_circle:
       return {worst([&](const Vector2d& q) { return (q - Vector2d(c.x, c.y)).norm() - c.radius; }),
-              1.0};
+              share_of(c.radius)};
     case DriveConstraintKind::keep_in_lane: {
       const Lane lane = lane_of(problem, c);
-      return {std::abs(lane.left.dot(p - lane.start)) - c.tolerance, 1.0};
+      return {std::abs(lane.left.dot(p - lane.start)) - c.tolerance, share_of(c.tolerance)};
     }
     case DriveConstraintKind::keep_out_circle:
-      return {c.radius - distance(corners, {Vector2d(c.x, c.y)}), 1.0};
+      return {c.radius - distance(corners, {Vector2d(c.x, c.y)}), share_of(c.radius)};
     case DriveConstraintKind::keep_in_polygon:
       return {worst([&](const Vector2d& q) {
                 double most = -std::numeric_limits<double>::infinity();

@@ -23,7 +23,6 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double shortest = 1e-4;  // s, of a segment
-constexpr double longest = 120.0;  // s
 /// s a unit (m, m/s, rad) that a constraint gives way by: more than what any of them could win.
 constexpr double elastic_price = 300.0;
 
@@ -506,16 +505,17 @@ OptimalControlProblem transcribe(const DriveProblem& problem, const Layout& layo
   VectorXd upper = VectorXd::Constant(layout.states(), infinity);
   lower(layout.duration()) = shortest;
   // What gives way does so in a time that can be told from standing still.
-  upper(layout.duration()) =
-      layout.elastic ? std::min(longest, 2.0 + 5.0 * guess.durations.maxCoeff()) : longest;
+  upper(layout.duration()) = layout.elastic
+                                 ? std::min(layout.longest, 2.0 + 5.0 * guess.durations.maxCoeff())
+                                 : layout.longest;
   ocp.bound_states(lower, upper);
   const double most = problem.model.drivetrain == Drivetrain::swerve ? 1.1 : 1.0;
   for (int k = 0; k < N; ++k) {
     const bool changes = layout.is_change(k);
     VectorXd low = VectorXd::Constant(layout.inputs(), changes ? 0.0 : -most);
     VectorXd high = VectorXd::Constant(layout.inputs(), changes ? 0.0 : most);
-    low(layout.change()) = changes ? -longest : 0.0;
-    high(layout.change()) = changes ? longest : 0.0;
+    low(layout.change()) = changes ? -layout.longest : 0.0;
+    high(layout.change()) = changes ? layout.longest : 0.0;
     for (const std::size_t obstacle : layout.obstacles) {
       const Span span = drive_rules::span_of(problem, problem.constraints[obstacle]);
       const bool there = layout.first[static_cast<std::size_t>(span.from)] <= k &&
@@ -548,10 +548,13 @@ OptimalControlProblem transcribe(const DriveProblem& problem, const Layout& layo
                          VectorXd::Constant(layout.parameters(), infinity));
     ocp.set_parameter_start(VectorXd::Constant(layout.parameters(), 1.0));
   }
-  Margins margins;
-  margins.constraints.assign(problem.constraints.size(), 0.0);
-  ocp.set_data(data_of(layout, margins));
+  ocp.set_data(data_of(layout, no_margins(layout)));
   return ocp;
+}
+
+Margins no_margins(const Layout& layout) {
+  const int nodes = layout.stages() + 1;
+  return {VectorXd::Zero(nodes), VectorXd::Zero(nodes), MatrixXd::Zero(layout.constraints, nodes)};
 }
 
 MatrixXd data_of(const Layout& layout, const Margins& margins) {
@@ -562,11 +565,9 @@ MatrixXd data_of(const Layout& layout, const Margins& margins) {
     const int b = layout.first[s + 1];
     data.block(0, a, 1, b - a).setConstant(1.0 / (b - a));
   }
-  data.row(1).setConstant(margins.wheel_speed);
-  data.row(2).setConstant(margins.motor_line);
-  for (int i = 0; i < layout.constraints; ++i) {
-    data.row(3 + i).setConstant(margins.constraints[static_cast<std::size_t>(i)]);
-  }
+  data.row(1) = margins.wheel_speed.transpose();
+  data.row(2) = margins.motor_line.transpose();
+  data.bottomRows(layout.constraints) = margins.constraints;
   return data;
 }
 

@@ -27,6 +27,7 @@ struct Layout {
   std::vector<std::size_t> obstacles{};  ///< Constraints that have an angle.
   bool elastic = false;
   int constraints = 0;
+  double longest = 120.0;  ///< s, of a segment.
 
   [[nodiscard]] int stages() const noexcept { return first.back(); }
   [[nodiscard]] int duration() const noexcept { return n; }
@@ -46,11 +47,12 @@ struct Layout {
   [[nodiscard]] int data() const noexcept { return 3 + constraints; }
 };
 
-/// What limits are drawn tighter by: shares of the wheels' limits, units of constraints.
+/// What limits are drawn tighter by at each stage: shares of the wheels' limits, units of
+/// constraints (a row each).
 struct Margins {
-  double wheel_speed = 0.0;
-  double motor_line = 0.0;
-  std::vector<double> constraints{};
+  Eigen::VectorXd wheel_speed{};
+  Eigen::VectorXd motor_line{};
+  Eigen::MatrixXd constraints{};
 };
 
 /// A start: x (n + 1) x (N + 1) without the durations, and the durations of the segments.
@@ -70,6 +72,7 @@ struct Start {
   Eigen::MatrixXd states{}, inputs{};
 };
 [[nodiscard]] Start start_of(const DriveProblem& problem, const Layout& layout, const Guess& guess);
+[[nodiscard]] Margins no_margins(const Layout& layout);
 [[nodiscard]] Eigen::MatrixXd data_of(const Layout& layout, const Margins& margins);
 
 /// The trajectory in what was solved.

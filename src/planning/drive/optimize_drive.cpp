@@ -10,7 +10,9 @@
 
 #include "core/format.hpp"
 #include "core/try.hpp"
+#include "planning/drive/check_drive.hpp"
 #include "planning/drive/drive_guess.hpp"
+#include "planning/drive/drive_margins.hpp"
 #include "planning/drive/drive_rules.hpp"
 #include "planning/drive/drive_transcription.hpp"
 
@@ -27,7 +29,9 @@ using optimization::SolveStatus;
 namespace {
 
 constexpr std::string_view where = "drive trajectory";
-constexpr int most_tightenings = 4;
+constexpr int most_tightenings = 5;
+constexpr int coarse = 10;    // instants of an interval that are looked at while solving
+constexpr double bar = 1e-3;  // m, rad and shares of limits that a simulation may be off by
 
 /// A start that led to a trajectory.
 struct Attempt {
@@ -47,36 +51,34 @@ class Search {
     const auto choices = drive_guess::choices(problem_, std::max(1, options_.max_attempts));
     std::optional<Attempt> best;
     std::optional<Attempt> nearest;
+    Guess best_guess;
     double least = 0.0;
     std::vector<int> intervals;
     for (std::size_t i = 0; i < choices.size() && !over(); ++i) {
       const Guess guess = drive_guess::guess(problem_, choices[i], intervals);
-      Layout layout(problem_, intervals, false);
-      optimization::OptimalControlProblem ocp =
-          drive_transcription::transcribe(problem_, layout, guess);
-      const auto start = drive_transcription::start_of(problem_, layout, guess);
-      ocp.set_start(start.states, start.inputs);
-      FLYBALL_TRY_IN(where, OptimalControlSolver solver, OptimalControlSolver::make(ocp));
-      Attempt attempt{std::move(layout), std::move(solver)};
+      FLYBALL_TRY(Attempt attempt, attempt_of(guess, intervals));
       attempt.found = solve(attempt.solver, guess.name);
       const DriveAttempt& told = result_.attempts.back();
       if (told.solved && (!best || told.duration < least - 1e-6)) {
         least = told.duration;
         result_.best = told.name;
         best = std::move(attempt);
+        best_guess = guess;
       } else if (!nearest || attempt.found.infeasibility < nearest->found.infeasibility) {
         nearest = std::move(attempt);
       }
     }
     if (best) {
-      result_.solved = true;
-      tighten(*best);
+      if (!tighten(*best)) {
+        refine(*best, best_guess);
+      }
+      judge();
       return finish();
     }
     if (over()) {
       result_.message = stopped_ ? "stopped" : "the time limit is over";
       if (nearest) {
-        take(nearest->layout, nearest->found);
+        take(nearest->layout, nearest->found, coarse);
       }
       return finish();
     }
@@ -85,7 +87,7 @@ class Search {
 
  private:
   /// Of the barrier, where the start is a guess.
-  static constexpr double first_barrier = 1.0;
+  static constexpr double first_barrier = 0.1;
 
   [[nodiscard]] double elapsed() const {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
@@ -123,60 +125,154 @@ class Search {
     return found;
   }
 
-  void take(const Layout& layout, const OptimalControlSolution& found) {
+  drive_check::Excesses take(const Layout& layout, const OptimalControlSolution& found,
+                             int instants) {
     drive_transcription::write_samples(problem_, layout, found, result_);
-    const DriveCheck check = check_drive(problem_, result_.samples, result_.waypoint_samples);
+    drive_check::Excesses excesses;
+    const DriveCheck check = drive_check::check(problem_, result_.samples, result_.waypoint_samples,
+                                                instants, &excesses);
     result_.waypoint_error = check.waypoint_error;
     result_.heading_error = check.heading_error;
     result_.violations = check.violations;
+    return excesses;
   }
 
   /// Draws limits that are exceeded between points tighter by as much, and solves again.
-  void tighten(Attempt& best) {
-    Margins margins;
-    margins.constraints.assign(problem_.constraints.size(), 0.0);
-    take(best.layout, best.found);
+  /// @return whether they are kept then.
+  bool tighten(Attempt& best) {
+    Margins margins = drive_transcription::no_margins(best.layout);
+    drive_check::Excesses excesses = take(best.layout, best.found, coarse);
     for (int round = 0; round < most_tightenings && !over(); ++round) {
-      bool any = false;
-      for (const DriveViolation& v : result_.violations) {
-        const double beyond = v.constraint >= 0 && v.unit == "m" ? v.amount : v.share;
-        if (beyond <= options_.keep_limits_to) {
-          continue;
-        }
-        if (v.constraint >= 0) {
-          margins.constraints[static_cast<std::size_t>(v.constraint)] += 1.1 * v.amount;
-          any = true;
-        } else if (v.name.starts_with("speed")) {
-          margins.wheel_speed = std::max(margins.wheel_speed, last_speed_margin_ + 2.2 * v.share);
-          any = true;
-        } else if (v.name.starts_with("torque") || v.name.starts_with("grip")) {
-          margins.motor_line = std::max(margins.motor_line, last_line_margin_ + 1.1 * v.share);
-          any = true;
-        }
+      if (!drive_margins::tighten(problem_, best.layout, result_.samples, excesses,
+                                  options_.keep_limits_to, margins)) {
+        return true;
       }
-      if (!any) {
-        return;
-      }
-      last_speed_margin_ = margins.wheel_speed;
-      last_line_margin_ = margins.motor_line;
       if (!best.solver.set_data(drive_transcription::data_of(best.layout, margins))) {
-        return;
+        break;
       }
       OptimalControlSolution again = best.solver.resolve(solver_options());
       note(result_.best + ", limits drawn tighter", again);
       if (!again.solved()) {
-        result_.message =
-            "limits are kept at the points of the mesh, but exceeded between them: see violations";
-        return;
+        break;
       }
-      take(best.layout, again);
+      excesses = take(best.layout, again, coarse);
+      best.found = std::move(again);
     }
+    return worst() <= 2.0 * options_.keep_limits_to;
+  }
+
+  /// The same with intervals half as long, from the trajectory that was found.
+  void refine(Attempt& best, const Guess& headings) {
+    if (over()) {
+      return;
+    }
+    Guess guess{.name = result_.best + ", intervals halved", .headings = headings.headings};
+    const auto n = static_cast<Eigen::Index>(best.layout.n);
+    const auto segments = static_cast<std::size_t>(best.layout.first.size()) - 1;
+    std::vector<int> intervals;
+    int nodes = 1;
+    for (std::size_t s = 0; s < segments; ++s) {
+      intervals.push_back(2 * (best.layout.first[s + 1] - best.layout.begin(s)));
+      nodes += intervals.back();
+    }
+    guess.states = Eigen::MatrixXd(n, nodes);
+    guess.durations = Eigen::VectorXd(static_cast<Eigen::Index>(segments));
+    Eigen::Index k = 0;
+    for (std::size_t s = 0; s < segments; ++s) {
+      guess.durations(static_cast<Eigen::Index>(s)) =
+          best.found.states(best.layout.duration(), best.layout.begin(s));
+      for (int j = best.layout.begin(s); j < best.layout.first[s + 1]; ++j) {
+        const auto here = best.found.states.col(j).head(n);
+        const auto next = best.found.states.col(j + 1).head(n);
+        guess.states.col(k++) = here;
+        guess.states.col(k++) = 0.5 * (here + next);
+      }
+    }
+    guess.states.col(k) = best.found.states.col(best.found.states.cols() - 1).head(n);
+    auto finer = attempt_of(guess, intervals);
+    if (!finer) {
+      return;
+    }
+    finer->found = solve(finer->solver, guess.name);
+    if (!finer->found.solved()) {
+      return;
+    }
+    const DriveSolution before = result_;
+    result_.best = guess.name;
+    tighten(*finer);
+    if (worst() < worst_of(before)) {
+      best = *std::move(finer);
+    } else {
+      std::vector<DriveAttempt> attempts = std::move(result_.attempts);
+      result_ = before;
+      result_.attempts = std::move(attempts);
+    }
+  }
+
+  [[nodiscard]] static double worst_of(const DriveSolution& s) {
+    return s.violations.empty() ? 0.0 : s.violations.front().share;
+  }
+  [[nodiscard]] double worst() const { return worst_of(result_); }
+
+  /// Looks at what was found at a hundred instants of each interval: a success, or not.
+  void judge() {
+    const DriveCheck check = check_drive(problem_, result_.samples, result_.waypoint_samples);
+    result_.waypoint_error = check.waypoint_error;
+    result_.heading_error = check.heading_error;
+    result_.violations = check.violations;
+    result_.found = true;
+    result_.solved = false;
+    if (!(result_.waypoint_error <= bar)) {
+      result_.message = flyball::detail::format("a simulation misses a waypoint by {} m",
+                                                format_number(result_.waypoint_error, 3));
+    } else if (!(result_.heading_error <= bar)) {
+      result_.message = flyball::detail::format("a simulation misses a heading by {} rad",
+                                                format_number(result_.heading_error, 3));
+    } else if (!(worst() <= bar)) {
+      const DriveViolation& v = result_.violations.front();
+      result_.message = flyball::detail::format(
+          "the trajectory exceeds {} by {} {} {}, at {} s, between points of its mesh: shorter "
+          "intervals keep it",
+          v.name, format_number(v.amount, 3), v.unit, where_of(v), format_number(v.time, 4));
+    } else {
+      result_.solved = true;
+    }
+    for (std::size_t s = 0; s + 1 < result_.waypoint_times.size(); ++s) {
+      if (result_.solved && result_.waypoint_times[s + 1] - result_.waypoint_times[s] >
+                                0.999 * options_.longest_segment) {
+        result_.message = flyball::detail::format(
+            "the way from waypoint {} to {} takes the longest time that a segment may, {} s", s,
+            s + 1, format_number(options_.longest_segment, 4));
+      }
+    }
+    if (result_.solved && over()) {
+      result_.message = stopped_ ? "stopped: not all starts were tried"
+                                 : "the time limit is over: not all starts were tried";
+    }
+  }
+
+  [[nodiscard]] std::string where_of(const DriveViolation& v) const {
+    return v.segment + 1 < static_cast<int>(problem_.waypoints.size())
+               ? flyball::detail::format("between waypoints {} and {}", v.segment, v.segment + 1)
+               : flyball::detail::format("at waypoint {}", v.segment);
+  }
+
+  Expected<Attempt> attempt_of(const Guess& guess, const std::vector<int>& intervals) {
+    Layout layout(problem_, intervals, false);
+    layout.longest = options_.longest_segment;
+    optimization::OptimalControlProblem ocp =
+        drive_transcription::transcribe(problem_, layout, guess);
+    const auto start = drive_transcription::start_of(problem_, layout, guess);
+    ocp.set_start(start.states, start.inputs);
+    FLYBALL_TRY_IN(where, OptimalControlSolver solver, OptimalControlSolver::make(ocp));
+    return Attempt{std::move(layout), std::move(solver)};
   }
 
   /// What cannot be kept gives way, at a price, so that as little as possible does.
   Expected<DriveSolution> elastic(const drive_guess::Choice& choice, std::vector<int> intervals) {
     const Guess guess = drive_guess::guess(problem_, choice, intervals);
     Layout layout(problem_, intervals, true);
+    layout.longest = options_.longest_segment;
     FLYBALL_TRY_IN(
         where, OptimalControlSolver solver,
         OptimalControlSolver::make(drive_transcription::transcribe(problem_, layout, guess)));
@@ -185,7 +281,7 @@ class Search {
     const OptimalControlSolution found = solve(solver, "constraints give way");
     result_.elastic = true;
     result_.best = result_.attempts.back().name;
-    take(layout, found);
+    take(layout, found, coarse);
     result_.attempts.back().duration = result_.duration;  // without the price
     for (Eigen::Index i = 0; i < found.parameters.size(); ++i) {
       const double amount = found.parameters(i);
@@ -230,18 +326,25 @@ class Search {
       }
     } else if (result_.relaxed.empty()) {
       // What gives way by nothing holds: a start that the others did not have.
-      result_.solved = true;
       result_.elastic = false;
+      judge();
     } else {
       const DriveViolation& v = result_.relaxed.front();
       result_.message = flyball::detail::format(
           "the constraints contradict each other: {} cannot be kept; the nearest trajectory "
           "exceeds it by {} {} {}, at {} s",
-          v.name, format_number(v.amount, 3), v.unit,
-          v.segment + 1 < static_cast<int>(problem_.waypoints.size())
-              ? flyball::detail::format("between waypoints {} and {}", v.segment, v.segment + 1)
-              : flyball::detail::format("at waypoint {}", v.segment),
-          format_number(v.time, 4));
+          v.name, format_number(v.amount, 3), v.unit, where_of(v), format_number(v.time, 4));
+    }
+    for (std::size_t i = 0; i + 1 < problem_.waypoints.size() && !result_.solved; ++i) {
+      const double wanted = guess.durations(static_cast<Eigen::Index>(i));
+      if (wanted > options_.longest_segment) {
+        result_.message = flyball::detail::format(
+            "the way from waypoint {} to {} takes about {} s within its limits, and a segment may "
+            "take {} s (the longest segment); without more time, {}",
+            i, i + 1, format_number(wanted, 3), format_number(options_.longest_segment, 4),
+            result_.message);
+        break;
+      }
     }
     return finish();
   }
@@ -257,8 +360,6 @@ class Search {
   DriveSolution result_{};
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   bool stopped_ = false;
-  double last_speed_margin_ = 0.0;
-  double last_line_margin_ = 0.0;
 };
 
 }  // namespace
@@ -274,6 +375,7 @@ Expected<DriveSolution> optimize_drive(const DriveProblem& problem, const DriveO
                     .positive(options.tolerance, "the tolerance")
                     .within(options.max_iterations, 1, 100000, "the most iterations")
                     .positive(options.time_limit, "the time limit", "s")
+                    .positive(options.longest_segment, "the longest segment", "s")
                     .within(options.max_attempts, 1, 100, "the most attempts")
                     .positive(options.keep_limits_to, "what limits are kept to"));
   return Search(problem, options, watch).run();

@@ -87,7 +87,9 @@ void write(JsonWriter& json, const OptimizeTask& task, const DriveSolution& s) {
   json.add("name", task.name);
   json.add("drivetrain", to_string(task.problem.model.drivetrain));
   json.add("solved", s.solved);
+  json.add("found", s.found);
   json.add("elastic", s.elastic);
+  json.add("largest_share", s.violations.empty() ? 0.0 : s.violations.front().share);
   json.add("duration", s.duration);
   if (task.given_duration) {
     json.add("given_duration", *task.given_duration);
@@ -169,6 +171,15 @@ Section section_of(const OptimizeResult& result, std::size_t i) {
   facts.add("best start", s.best);
   facts.add("waypoints", fmt::format("missed by {} mm in an independent simulation",
                                      number(1e3 * s.waypoint_error, 2)));
+  if (s.found) {
+    facts.add("limits",
+              s.violations.empty()
+                  ? std::string("kept at a hundred instants of each interval")
+                  : fmt::format("exceeded by at most {} % there: {}, {}",
+                                number(100.0 * s.violations.front().share, 2),
+                                s.violations.front().name, where_of(task, s.violations.front())),
+              s.solved ? Tone::good : Tone::bad);
+  }
   section.blocks.emplace_back(std::move(facts));
   if (!s.message.empty()) {
     section.blocks.emplace_back(Paragraph{text::capitalized(s.message) + "."});
@@ -201,8 +212,9 @@ Verdict verdict_of(const OptimizeResult& result) {
   }
   if (result.solutions.size() == 1) {
     const DriveSolution& s = result.solutions.front();
-    verdict.line = s.solved ? fmt::format("The fastest trajectory takes {}.", seconds(s.duration))
-                            : "There is no such trajectory.";
+    verdict.line = s.solved  ? fmt::format("The fastest trajectory takes {}.", seconds(s.duration))
+                   : s.found ? "A trajectory was found, but it does not keep its limits."
+                             : "There is no such trajectory.";
   } else {
     verdict.line = fmt::format("{} of {} trajectories found, {} in all.", solved,
                                result.solutions.size(), seconds(total));
@@ -270,7 +282,7 @@ Answer answer_of(const OptimizeResult& result) {
           Error(s.relaxed.empty() ? OptimizeError::not_found : OptimizeError::contradiction)
               .in(result.job.path)
               .about(fmt::format("the trajectory {}", result.job.tasks[i].name))
-              .got("not possible")
+              .got(s.found ? "found, but not within its limits" : "not possible")
               .hint(s.message);
     }
   }

@@ -1,5 +1,6 @@
 #include <flyball/planning/drive/optimize_drive.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -240,6 +241,51 @@ TEST(OptimizeDrive, TriesBothSidesOfAnObstacle) {
     EXPECT_EQ(s.attempts[1].name, "left of keep out circle");
     EXPECT_GT(s.attempts[1].duration, s.duration) << to_string(kind);
   }
+}
+
+// Corners of a robot that turns beside an obstacle swing into it between two points: at a hundred
+// instants of each interval they keep out all the same.
+TEST(OptimizeDrive, KeepsLimitsBetweenPointsToo) {
+  for (const Drivetrain kind :
+       {Drivetrain::swerve, Drivetrain::mecanum, Drivetrain::differential}) {
+    DriveProblem problem = from_to(choreo_robot(), 4.0, 0.0, 2.0);
+    problem.model.drivetrain = kind;
+    if (kind == Drivetrain::differential) {
+      problem.waypoints[1].fix_heading = false;
+    }
+    problem.constraints.push_back(
+        {.kind = Kind::keep_out_circle, .from = 0, .to = -1, .x = 2.0, .y = 0.1, .radius = 0.5});
+    const DriveSolution s = solved(problem);
+    EXPECT_TRUE(s.found);
+    const DriveCheck check = check_drive(problem, s.samples, s.waypoint_samples);
+    EXPECT_LT(check.waypoint_error, 1e-3) << to_string(kind);
+    for (const DriveViolation& v : check.violations) {
+      EXPECT_LT(v.share, 1e-3) << to_string(kind) << " " << v.name;
+    }
+    // What pushes harder than it may is seen, and by how much.
+    std::vector<DriveSample> harder = s.samples;
+    harder[1].forces[0](0) = 1.05 * problem.model.force();
+    harder[1].forces[0](1) = 0.0;
+    const DriveCheck beyond = check_drive(problem, harder, s.waypoint_samples);
+    const auto force =
+        std::find_if(beyond.violations.begin(), beyond.violations.end(),
+                     [](const DriveViolation& v) { return v.name.starts_with("force"); });
+    ASSERT_NE(force, beyond.violations.end());
+    EXPECT_NEAR(force->share, 0.05, 1e-9);
+  }
+}
+
+// A crawl of five minutes is longer than a segment may be unless told: the limit is named.
+TEST(OptimizeDrive, SaysThatASegmentIsAsLongAsItMayBe) {
+  DriveProblem problem = from_to(choreo_robot(), 1.0, 0.0, 0.0);
+  problem.constraints.push_back({.kind = Kind::max_velocity, .from = 0, .to = -1, .limit = 0.004});
+  const DriveSolution s = optimize_drive(problem, {.longest_segment = 120.0}).value();
+  EXPECT_FALSE(s.solved);
+  EXPECT_NE(s.message.find("120 s"), std::string::npos) << s.message;
+  EXPECT_FALSE(s.samples.empty());
+  const DriveSolution longer = optimize_drive(problem, {.longest_segment = 600.0}).value();
+  EXPECT_TRUE(longer.solved) << longer.message;
+  EXPECT_NEAR(longer.duration, 250.0, 4.0);
 }
 
 TEST(OptimizeDrive, KeepsOutOfAndWithinPolygons) {
