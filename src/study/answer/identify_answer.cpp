@@ -190,10 +190,12 @@ Verdict verdict_of(const IdentifyResult& result) {
   for (const Diagnostic& found : result.diagnostics()) {
     const bool unit = found.code == "unit_assumed";
     const bool kind = found.code == "mechanism_assumed" || found.code == "mechanism_contradicted";
-    if (unit || kind) {
+    const bool volts = found.code == "duty_cycle";
+    if (unit || kind || volts) {
       verdict.add(Tone::caution, found.message);
-      assumed +=
-          (assumed.empty() ? "" : " and ") + std::string(unit ? "the unit" : "the mechanism");
+      assumed += (assumed.empty() ? "" : " and ") + std::string(unit    ? "the unit"
+                                                                : volts ? "the voltage's unit"
+                                                                        : "the mechanism");
     }
   }
   const bool several = assumed.find(" and ") != std::string::npos;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -180,7 +181,45 @@ std::string run_csv(const TestRun& run, const std::string& unit) {
   return to_csv(series);
 }
 
+/// How far a run's simulation is from what was measured, of the speed's own size; 0 without one.
+double miss_of(const FittedRun* run) {
+  if (run == nullptr || !run->used) {
+    return 0.0;
+  }
+  double error = 0.0;
+  double square = 0.0;
+  for (const std::size_t row : run->fresh) {
+    error += run->velocity_residual[row] * run->velocity_residual[row];
+    square += run->velocity[row] * run->velocity[row];
+  }
+  return square > 0.0 ? error / square : 0.0;
+}
+
 }  // namespace
+
+std::vector<PreparedRun> pictured_runs(const IdentifyResult& result) {
+  std::vector<PreparedRun> runs = shown_runs(result);
+  if (runs.size() <= most_pictured) {
+    return runs;
+  }
+  const auto rest = runs.begin() + most_pictured / 2;
+  std::vector<std::pair<double, std::size_t>> misses;
+  for (auto run = rest; run != runs.end(); ++run) {
+    misses.emplace_back(-miss_of(fitted_run(result, run->source)),
+                        static_cast<std::size_t>(run - runs.begin()));
+  }
+  const auto end = misses.begin() + most_pictured / 2;
+  std::partial_sort(misses.begin(), end, misses.end());
+  std::vector<std::size_t> worst;
+  std::transform(misses.begin(), end, std::back_inserter(worst),
+                 [](const auto& miss) { return miss.second; });
+  std::sort(worst.begin(), worst.end());
+  std::vector<PreparedRun> chosen(runs.begin(), rest);
+  for (const std::size_t at : worst) {
+    chosen.push_back(std::move(runs[at]));
+  }
+  return chosen;
+}
 
 std::vector<Figure> figures_of(const IdentifyResult& result) {
   if (result.drive) {
@@ -190,7 +229,7 @@ std::vector<Figure> figures_of(const IdentifyResult& result) {
   if (result.report.fit) {
     figures = interval_figures({{"", &*result.report.fit}});
   }
-  for (const PreparedRun& prepared : shown_runs(result)) {
+  for (const PreparedRun& prepared : pictured_runs(result)) {
     const FittedRun* fitted = fitted_run(result, prepared.source);
     const bool simulated = fitted != nullptr && fitted->used && !fitted->time.empty() &&
                            fitted->velocity_hat.size() == fitted->time.size();

@@ -230,6 +230,11 @@ Section data_section(const IdentifyResult& result) {
     size += ", one every " + seconds(data.row_period);
   }
   facts.add("size", size);
+  if (runs.size() > most_pictured) {
+    facts.add("pictures", fmt::format("of {} runs: the first {}, and the {} whose simulation is "
+                                      "furthest from what was measured; the data are of all",
+                                      most_pictured, most_pictured / 2, most_pictured / 2));
+  }
   if (data.has_position) {
     facts.add("position", channel_text(data.position_refresh_period, data.row_period,
                                        data.position_quantum, result.unit));

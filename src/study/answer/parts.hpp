@@ -21,6 +21,10 @@ void append(std::vector<T>& list, std::vector<T> more) {
 
 /// The runs to show: as prepared, or as recorded where the log was refused before.
 [[nodiscard]] std::vector<identification::PreparedRun> shown_runs(const IdentifyResult& result);
+/// Of them those that are pictured: all, or of very many the first and those whose simulation is
+/// furthest from what was measured.
+inline constexpr std::size_t most_pictured = 24;
+[[nodiscard]] std::vector<identification::PreparedRun> pictured_runs(const IdentifyResult& result);
 /// The fit of a run, or null.
 [[nodiscard]] const identification::FittedRun* fitted_run(const IdentifyResult& result,
                                                           std::size_t source);
