@@ -35,7 +35,7 @@ constexpr double widest_limit = 0.2;
 /// s, that crossing backlash may take in a step.
 constexpr std::array take_up_times{0.005, 0.015};
 /// V, of a force: recorded voltages are not much better.
-constexpr double perceptible = 0.02;
+constexpr double perceptible = 0.05;
 /// Two terms that differ by less evidence explain the same.
 constexpr double as_good = 0.5;
 

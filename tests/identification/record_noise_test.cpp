@@ -100,7 +100,7 @@ TEST(RecordNoise, StepsAgesSumToNothing) {
     largest = std::max(largest, std::abs(fitted.fit.x[age]));
   }
   EXPECT_LT(std::abs(sum), 1e-5);
-  EXPECT_GT(largest, 1e-4);
+  EXPECT_GT(largest, 5e-5);  // else there was nothing to sum
 }
 
 }  // namespace
