@@ -270,6 +270,11 @@ Expected<FrequencyGrid> frequency_grid(const FrequencyResponse& response,
         within.push_back(w);
       }
     }
+    if (within.empty()) {
+      return refusal(ArgumentError::out_of_range, where, "low and high")
+          .got(flyball::detail::format("{} and {} rad/s", low, high))
+          .expected("frequencies between which there are data");
+    }
     return FrequencyGrid{Eigen::Map<VectorXd>(within.data(), static_cast<Index>(within.size()))};
   }
 
@@ -348,6 +353,12 @@ Expected<FrequencyGrid> frequency_grid(const FrequencyResponse& response,
     grid.gain_error = std::max(grid.gain_error, interval.gain_error);
     grid.phase_error = std::max(grid.phase_error, interval.phase_error);
     keep(interval.to);
+  }
+  if (frequencies.empty()) {
+    return refusal(ArgumentError::not_finite, where, "the response")
+        .got(flyball::detail::format("without a finite value from {} to {} rad/s", low, high))
+        .expected("finite")
+        .hint("measure time and signals in units in which its numbers are near one");
   }
   grid.frequency = Eigen::Map<VectorXd>(frequencies.data(), static_cast<Index>(frequencies.size()));
   return grid;

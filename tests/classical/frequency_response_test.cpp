@@ -194,6 +194,17 @@ TEST(FrequencyGrid, FindsResonanceAndNotch) {
   EXPECT_LE(data.frequency.size(), 1500);
 }
 
+// A peak of 1.7e308 times 50 and more is beyond doubles: there is no point to begin at.
+TEST(FrequencyGrid, RefusesAResponseWithoutAFiniteValue) {
+  const auto peak = frequency_response(transfer({1.7e308}, {1.0, 0.002, 1.0})).value();
+  FrequencyGridOptions near;
+  near.low = 0.995;
+  near.high = 1.005;
+  const auto grid = frequency_grid(peak, near);
+  ASSERT_FALSE(grid.has_value());
+  EXPECT_TRUE(grid.error().is(ArgumentError::not_finite));
+}
+
 TEST(FrequencyGrid, IsBoundedAndGoesWhereItIsTold) {
   // A delay of a thousand turns.
   const auto late = frequency_response(transfer({1.0}, {1.0, 1.0}, 1000.0)).value();

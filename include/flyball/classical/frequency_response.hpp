@@ -130,7 +130,8 @@ struct FrequencyGrid {
 /// A grid that finds each resonance and notch by itself: it begins at the poles and zeros, as close
 /// to each as it is to the axis, and halves the worst interval until gain and phase of each entry
 /// are straight to the tolerance, or the points run out.
-/// @errors ArgumentError::not_positive, out_of_range for the options.
+/// @errors ArgumentError::not_positive, out_of_range for the options; not_finite where the response
+///         is finite at none of its frequencies.
 /// Cost: three evaluations a point.
 [[nodiscard]] Expected<FrequencyGrid> frequency_grid(const FrequencyResponse& response,
                                                      const FrequencyGridOptions& options = {});
