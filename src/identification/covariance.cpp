@@ -358,9 +358,8 @@ Covariances covariances(OutputErrorProblem& problem, const Eigen::VectorXd& x,
   result.few_blocks = static_cast<double>(blocks) / blocks_left;
   for (std::size_t k = 0; k < middles.size(); ++k) {
     const bool of_blocks = k == 1 && noise == nullptr;
-    const Eigen::MatrixXd covariance =
-        inverse_bread * middles[k](active, active) * inverse_bread *
-        (of_blocks ? result.few_blocks : 1.0);
+    const Eigen::MatrixXd covariance = inverse_bread * middles[k](active, active) * inverse_bread *
+                                       (of_blocks ? result.few_blocks : 1.0);
     result.estimates[k](active, active) = covariance + of_fixed;
   }
   return result;
