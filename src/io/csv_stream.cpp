@@ -108,13 +108,15 @@ class Rows {
 
 Expected<std::optional<StreamedLog>> stream_csv(ChunkedFile& file, const std::string& source,
                                                 LogSink& sink) {
-  file.fill(head_bytes);
-  const std::string_view head = file.rest().substr(0, head_bytes);
-  const std::size_t whole = head.rfind('\n');
-  if (whole == std::string_view::npos || !is_utf8(head.substr(0, whole + 1))) {
+  const bool goes_on = file.fill(head_bytes);
+  std::string_view head = file.rest().substr(0, head_bytes);
+  if (goes_on) {
+    head = head.substr(0, head.rfind('\n') + 1);  // npos + 1 is 0
+  }
+  if (head.empty() || !is_utf8(head)) {
     return std::optional<StreamedLog>();
   }
-  FLYBALL_TRY(auto layout, csv_layout(head.substr(0, whole + 1), source));
+  FLYBALL_TRY(auto layout, csv_layout(head, source));
   if (!layout) {
     return std::optional<StreamedLog>();
   }

@@ -174,6 +174,8 @@ TEST(LogStream, WhatOnlyAWholeFileTellsIsLeft) {
       {"none.wpilog", "WPIL"},
       {"wrong.wpilog", std::string("WPILOG\0\2\0\0\0\0", 12)},
       {"one_line.csv", "time,volts"},
+      {"other_letters_at_the_end.csv", "time,volts,a\n0,1,b\n1,2,\x91"},
+      {"key_twice.json", R"({"slow-forward": [[0,1,1,0]], "test": "a", "test": "b"})"},
       {"blank.csv", "  \n "},
       {"empty.csv", ""}};
   for (const auto& [name, contents] : files) {
