@@ -180,7 +180,7 @@ bool InteriorPoint::direction() {
       ++counts_.factorizations;
       good = program_.factor(diagonal_, D_, true);
       if (!good) {
-        added *= last_regularization_ > 0.0 ? 4.0 : 100.0;
+        added *= last_regularization_ > 0.0 ? regularization_growth_ : 100.0;
       }
     }
     last_regularization_ = regularization_;
@@ -260,6 +260,7 @@ SolveStatus InteriorPoint::restore(const SolverOptions& options, double seconds_
 }
 
 SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
+  regularization_growth_ = std::max(1.5, options.regularization_growth);
   using Clock = std::chrono::steady_clock;
   const auto begin = Clock::now();
   const VectorXd& lower = program_.lower;

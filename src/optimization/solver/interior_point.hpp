@@ -86,6 +86,7 @@ class InteriorPoint {
   Eigen::VectorXd trial_, trial_c_, corrected_c_, step_w_, step_l_, free_;
   double f_ = 0.0, trial_f_ = 0.0, mu_ = 0.1, theta_max_ = 0.0, theta_min_ = 0.0;
   double regularization_ = 0.0, last_regularization_ = 0.0, tau_ = 0.99;
+  double regularization_growth_ = 4.0;
   double first_primal_ = 0.0, first_mu_ = 0.0;
   bool derivatives_fresh_ = false;
   bool is_restoration_ = false;

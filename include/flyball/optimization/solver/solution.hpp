@@ -16,6 +16,9 @@ struct SolverOptions {
   int max_iterations = 1000;   ///< Steps.
   double time_limit = 1e9;     ///< Seconds of wall time; looked at between two steps.
   double first_barrier = 0.0;  ///< μ at the start; 0: chosen.
+  /// By how much the regularisation of a Hessian that is indefinite grows, until it is no longer;
+  /// > 1.
+  double regularization_growth = 4.0;
 };
 
 /// How a minimisation ended.
