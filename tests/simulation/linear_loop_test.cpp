@@ -133,5 +133,20 @@ TEST(SimulateLinear, Errors) {
   EXPECT_EQ(simulate_linear(books_loop(), Eigen::MatrixXd::Zero(2, 0)).value().x.cols(), 0);
 }
 
+// An observer that knows the plant, and starts where it does, stays with it, feedthrough and all.
+TEST(SimulateLinear, AnExactObserverStaysWithThePlant) {
+  LinearLoop loop;
+  loop.plant.A = Eigen::Matrix2d{{1.0, 0.1}, {0.0, 0.9}};
+  loop.plant.B = Eigen::Vector2d(0.01, 0.1);
+  loop.plant.C = Eigen::RowVector2d(1.0, 0.0);
+  loop.plant.D = Eigen::MatrixXd::Constant(1, 1, 0.7);
+  loop.plant.period = Time(0.1);
+  loop.K = Eigen::RowVector2d(3.0, 1.0);
+  loop.K_e = Eigen::Vector2d(0.5, 0.8);
+  const auto result = simulate_linear(loop, Eigen::MatrixXd::Ones(2, 40)).value();
+  EXPECT_GT(result.u.norm(), 0.1);
+  EXPECT_LT((result.x - result.x_hat).norm(), 1e-12 * result.x.norm());
+}
+
 }  // namespace
 }  // namespace flyball
