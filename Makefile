@@ -5,6 +5,7 @@ BUILD := build/release
 ifneq ($(shell command -v ccache),)
 LAUNCHER := -DCMAKE_CXX_COMPILER_LAUNCHER=ccache
 export CCACHE_SLOPPINESS := pch_defines,time_macros
+export CCACHE_BASEDIR := $(CURDIR)
 endif
 
 .PHONY: help demo test build bench fuzz format format-check lint docs install clean configure

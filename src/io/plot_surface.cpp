@@ -63,7 +63,7 @@ std::vector<std::size_t> chosen(std::size_t count) {
   return result;
 }
 
-constexpr std::string_view palette =
+constexpr std::string_view viridis =
     "set palette defined (0 '#440154', 1 '#472D7B', 2 '#3B528B', 3 '#2C728E', 4 '#21918C', 5 "
     "'#28AE80', 6 '#5EC962', 7 '#ADDC30', 8 '#FDE725')\n";
 
@@ -89,7 +89,7 @@ class MapScript {
                    "set tics out nomirror textcolor rgb '#333333' scale 0.6\nunset key\n"
                    "set label 1 {} at screen 0.5, screen {} center font ',{}'\n"
                    "set cbrange [{}:{}]\n",
-                   palette, literal(plot_.title), 1.0 - 22.0 / plot_.height,
+                   viridis, literal(plot_.title), 1.0 - 22.0 / plot_.height,
                    title_size(plot_.title, plot_.width), z_.low(), z_.high());
     for (std::size_t i = 0; i < maps_.size(); ++i) {
       draw(*maps_[i], i);
@@ -224,7 +224,7 @@ std::string perspective_script(const SurfacePlot& plot, const Range& z, PictureF
                  "set border 15 lc rgb '#555555'\nset grid x y z lc rgb '#DDDDDD'\n"
                  "set pm3d depthorder border lc rgb '#40FFFFFF' lw 0.4\nunset colorbox\n"
                  "splot $z with pm3d\n",
-                 palette, literal(plot.title), title_size(plot.title, plot.width), z.low(),
+                 viridis, literal(plot.title), title_size(plot.title, plot.width), z.low(),
                  z.high(), z.low(), z.high(), literal(plot.x_label), literal(plot.y_label),
                  literal(plot.z_label));
   return script;

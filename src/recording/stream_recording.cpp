@@ -30,7 +30,6 @@ constexpr std::size_t most_named = 8;     // tests of a kind
 constexpr std::size_t most_unnamed = 16;  // tests of a sign, ramps and steps among them
 constexpr double shortest_unnamed = 0.3;  // s, as of `split_by_voltage`
 constexpr double split_gap = 1.0;         // s, between stretches of one test
-constexpr double stretch_length = 2.0;    // s
 
 /// The tests of a log as it passes by.
 class Bounding : public LogSink {

@@ -17,7 +17,7 @@ namespace flyball::recording {
 
 namespace {
 
-std::string_view trimmed(std::string_view cell) {
+std::string_view bare(std::string_view cell) {
   constexpr std::string_view blanks = " \t\r\"";
   const std::size_t from = cell.find_first_not_of(blanks);
   return from == std::string_view::npos
@@ -42,8 +42,8 @@ std::vector<std::string_view> cells_of(std::string_view line, char separator) {
 std::string name_of(std::string_view cell) {
   constexpr std::array<std::string_view, 11> known{"time", "t",     "x",  "y",  "heading", "vx",
                                                    "vy",   "omega", "ax", "ay", "alpha"};
-  const std::string_view plain = trimmed(cell);
-  std::string name(trimmed(plain.substr(0, plain.find_first_of("(["))));
+  const std::string_view plain = bare(cell);
+  std::string name(bare(plain.substr(0, plain.find_first_of("(["))));
   std::transform(name.begin(), name.end(), name.begin(), [](char c) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   });
@@ -51,7 +51,7 @@ std::string name_of(std::string_view cell) {
 }
 
 std::optional<double> number_of(std::string_view cell, char separator) {
-  std::string text(trimmed(cell));
+  std::string text(bare(cell));
   if (separator != ',') {
     std::replace(text.begin(), text.end(), ',', '.');
   }
@@ -76,7 +76,7 @@ std::optional<QuotedError> table_fault(std::string_view text, const std::string&
     }
     begin = end + 1;
     ++number;
-    if (trimmed(line).empty() || trimmed(line).front() == '#') {
+    if (bare(line).empty() || bare(line).front() == '#') {
       continue;
     }
     const auto fault = [&](std::string_view cell, Error error) {
@@ -117,12 +117,12 @@ std::optional<QuotedError> table_fault(std::string_view text, const std::string&
                          .got(fmt::format("of {} cells", cells.size()))
                          .expected(fmt::format("of {}, a number in each column", names.size())));
       }
-      const std::string_view cell = trimmed(cells[k]).empty() ? cells[k] : trimmed(cells[k]);
+      const std::string_view cell = bare(cells[k]).empty() ? cells[k] : bare(cells[k]);
       const std::optional<double> value = number_of(cell, separator);
       if (!value) {
         return fault(cell, Error(TrajectoryFileError::wrong_sample)
                                .about(names[k])
-                               .got(fmt::format("\"{}\"", cut(printable(trimmed(cell)), 40)))
+                               .got(fmt::format("\"{}\"", cut(printable(bare(cell)), 40)))
                                .expected("a number"));
       }
       if (names[k] != "time" && names[k] != "t") {

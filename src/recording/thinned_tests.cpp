@@ -9,7 +9,6 @@ namespace flyball::recording {
 
 namespace {
 
-constexpr double stretch_length = 2.0;      // s
 constexpr std::size_t most_stretches = 16;  // of a running test
 constexpr std::size_t few_stretches = 8;    // of one that had more
 constexpr double finest_row = 2.5e-3;       // s: a tenth of the delay of usual sensors

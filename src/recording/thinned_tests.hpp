@@ -10,6 +10,9 @@
 /// A bounded part of tests that are longer, or more, than can be held.
 namespace flyball::recording {
 
+/// What is kept of a long test in one piece (s).
+constexpr double stretch_length = 2.0;
+
 /// Keeps of the samples of tests, as they come, what a fit needs: of each class of tests a few
 /// whole ones; of a test that is longer than 32 s stretches of 2 s that are spread evenly from its
 /// beginning to its end; of samples that come faster than one every 2.5 ms those at that distance.

@@ -31,13 +31,13 @@ namespace {
 
 /// The id of a problem as it was written, on one line; empty if it has none.
 std::string id_of(std::string_view text, JsonValue problem) {
-  using Json = nlohmann::json;
   if (!problem.contains("id")) {
     return {};
   }
   const auto written = scalar_member(text, "id");
   return written ? std::string(*written)
-                 : Json::parse(text)["id"].dump(-1, ' ', false, Json::error_handler_t::replace);
+                 : nlohmann::json::parse(text)["id"].dump(-1, ' ', false,
+                                                          nlohmann::json::error_handler_t::replace);
 }
 
 /// A new answer, open, with the problem's id if it has one.
