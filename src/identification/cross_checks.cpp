@@ -13,6 +13,7 @@ namespace flyball::identification {
 namespace {
 
 constexpr double one_sided_95 = 1.645;
+constexpr double normal_95 = 1.96;
 constexpr int profile_points = 8;
 constexpr int refit_iterations = 12;
 
@@ -102,6 +103,42 @@ double inertia_ceiling(OutputErrorProblem& problem, const RobustFit& best, const
     rise_below = rise;
   }
   return std::exp(below) * x[parameter::velocity_gain];
+}
+
+double friction_ceiling(OutputErrorProblem& problem, const RobustFit& best, const Bounds& bounds,
+                        const ChannelScales& scales, const Covariances& spread) {
+  constexpr int kS = parameter::static_friction;
+  std::vector<bool> free = problem.free_parameters();
+  free[kS] = false;
+  const Score beyond = scores(problem, best.x, free, bounds, scales, {{kS}}).front();
+  // The best value without the bound, and what the cost would fall by.
+  const double least = beyond.step.size() > 0 ? std::min(0.0, beyond.step[0]) : 0.0;
+  const double gain = least < 0.0 ? beyond.gain : 0.0;
+  // Friction below zero is none: what asks for it is an error of the model, as large at least.
+  const double allowed = normal_95 * normal_95 * std::max(spread.inflation(kS), gain);
+  const double by_curvature =
+      least + std::sqrt(least * least + allowed * spread.independent(kS, kS));
+  Eigen::VectorXd x = best.x;
+  double below = 0.0;
+  double rise_below = 0.0;
+  double above = 0.8 * by_curvature;
+  for (int point = 0; point < profile_points; ++point) {
+    x[kS] = above;
+    const RobustFit fit =
+        minimize(problem, x, free, bounds, scales, refit_iterations, 0.02 * allowed);
+    const double rise = std::max(0.0, fit.cost - best.cost);
+    x = fit.x;
+    if (rise > allowed) {
+      // √(rise + gain) is linear in the parameter.
+      const double from = std::sqrt(rise_below + gain);
+      const double fraction = (std::sqrt(allowed + gain) - from) / (std::sqrt(rise + gain) - from);
+      return below + fraction * (above - below);
+    }
+    below = above;
+    rise_below = rise;
+    above *= 1.5;
+  }
+  return below;
 }
 
 void compare_channels(OutputErrorProblem& problem, const RobustFit& best, const Bounds& bounds,

@@ -18,6 +18,14 @@ namespace flyball::identification {
                                      const Bounds& bounds, const ChannelScales& scales,
                                      const Covariances& spread);
 
+/// The largest kS that the data do not contradict where the fit ends at kS = 0: the loss profiled
+/// over kS, its rise compared with χ² inflated by the residuals' correlation, or by what the fit
+/// would gain from a friction below zero where that is more (as the model is wrong by it at least).
+/// @param spread  With kS not held by its bound.
+[[nodiscard]] double friction_ceiling(OutputErrorProblem& problem, const RobustFit& best,
+                                      const Bounds& bounds, const ChannelScales& scales,
+                                      const Covariances& spread);
+
 /// Fits position differences alone and velocities alone and tells where their kA disagree.
 void compare_channels(OutputErrorProblem& problem, const RobustFit& best, const Bounds& bounds,
                       const ChannelScales& scales, std::vector<Diagnostic>& diagnostics);

@@ -163,7 +163,9 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
     }
   }
   Bounds known = bounds;
-  if (coverage.one_way()) {
+  const bool frictionless = problem.free_parameters()[parameter::static_friction] &&
+                            best.x[parameter::static_friction] <= 0.0;
+  if (coverage.one_way() || frictionless) {
     // Friction that a bound held would lend its certainty to what trades with it.
     known.lower[parameter::static_friction] = -1.0;
   }
@@ -183,6 +185,10 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
   fit.velocity_scale = best.x[parameter::velocity_scale];
   add_runs(problem, best.x, fit);
   FLYBALL_CHECK(estimate_gains(prepared, best.x, spread, bounds, fit));
+  if (frictionless) {
+    fit.kS.upper_bound = std::max(1e-3, friction_ceiling(problem, best, bounds, scales, spread));
+    fit.kS.interval = {0.0, fit.kS.upper_bound};
+  }
   estimate_what_tests_leave(coverage, problem, best.x, spread, fit);
   FLYBALL_CHECK(check_plausibility(prepared, fit, diagnostics));
   fit.terms = estimate_terms(problem, best, spread);

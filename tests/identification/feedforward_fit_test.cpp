@@ -67,6 +67,28 @@ TEST(FeedforwardFit, OverlaysSimulationAndMeasurement) {
   }
 }
 
+// Without friction the fit ends at kS = 0 in every other log. What is said of it there is as wide
+// as what is said of it elsewhere.
+TEST(FeedforwardFit, ABoundOfFrictionIsItsLikelihoods) {
+  std::vector<double> at_bound;
+  std::vector<double> inside;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    auto options = scenarios::session(scenarios::mechanisms[elevator], seed);
+    options.kS = 0.0;
+    const auto fit = fit_feedforward(flyball::record_characterization(options).value());
+    ASSERT_TRUE(fit) << to_string(fit.error());
+    EXPECT_EQ(fit->kS.interval[0], 0.0) << seed;
+    (fit->kS.value == 0.0 ? at_bound : inside).push_back(fit->kS.interval[1] - fit->kS.value);
+  }
+  ASSERT_GE(at_bound.size(), 3U);
+  ASSERT_GE(inside.size(), 2U);
+  const double usual = *std::max_element(inside.begin(), inside.end());
+  for (const double upper : at_bound) {
+    EXPECT_GT(upper, 0.2 * usual);
+    EXPECT_LT(upper, 3.0 * usual);
+  }
+}
+
 TEST(FeedforwardFit, IsDeterministic) {
   const Recording recording = record(arm, 3);
   EXPECT_EQ(fit_feedforward(recording)->kA.value, fit_feedforward(recording)->kA.value);
