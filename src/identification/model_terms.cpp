@@ -36,6 +36,8 @@ constexpr double widest_limit = 0.2;
 constexpr std::array take_up_times{0.005, 0.015};
 /// V, of a force: recorded voltages are not much better.
 constexpr double perceptible = 0.05;
+/// Of χ² of one degree of freedom whose sign is known, exceeded once in twenty.
+constexpr double one_sided_95 = 2.7;
 /// Two terms that differ by less evidence explain the same.
 constexpr double as_good = 0.5;
 
@@ -379,9 +381,10 @@ Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds, Channe
     choose_start(all, better, extension);
     if (better == all.end() || better->evidence < 1.0) {
       for (const Judged& judged : all) {
-        // No log of a step of one height tells a sagging battery from more inertia: with a sag a
-        // standard error larger than found.
-        const bool sags = judged.term.front() == parameter::sag && judged.chi_squared() > 1.0;
+        // No log of a step of one height tells a sagging battery from more inertia: where one log
+        // in twenty without it would show as much, with a sag a standard error larger than found.
+        const bool sags =
+            judged.term.front() == parameter::sag && judged.chi_squared() > one_sided_95;
         const double weight =
             sags ? 1.0 + 1.0 / std::sqrt(judged.chi_squared()) : std::sqrt(probability(judged));
         extension.doubts.push_back(doubt(judged, weight));
