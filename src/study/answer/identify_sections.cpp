@@ -77,8 +77,9 @@ Table runs_table(const IdentifyResult& result) {
       found = true;
       const FittedRun* fitted = fitted_run(result, prepared.source);
       const bool used = fitted != nullptr && fitted->used;
+      // A recorded velocity's largest value may be its noise.
       const std::vector<double>& speed =
-          prepared.run.velocity.empty() ? prepared.smoothed_velocity : prepared.run.velocity;
+          prepared.smoothed_velocity.empty() ? prepared.run.velocity : prepared.smoothed_velocity;
       Value state = used ? Value("yes", Tone::good) : Value("no", Tone::caution);
       if (prepared.run.left_out) {
         state = {"left out by hand", Tone::quiet};
@@ -108,26 +109,35 @@ std::string interval_text(const GainEstimate& gain) {
                      in_digits_of(gain.interval[1], half));
 }
 
-Table gains_table(const FeedforwardFit& fit) {
+/// Whether the voltage may have been a duty cycle: its gains are per unit of what was recorded.
+bool is_per_unit(const IdentifyResult& result) {
+  const std::vector<Diagnostic>& all = result.source.diagnostics;
+  return std::any_of(all.begin(), all.end(),
+                     [](const Diagnostic& found) { return found.code == "duty_cycle"; });
+}
+
+Table gains_table(const FeedforwardFit& fit, bool per_unit) {
   const std::string speed = fit.unit + "/s";
+  const std::string V = per_unit ? "p.u." : "V";
   Table table;
-  table.header = {"gain", "value", "95 % interval", "unit", "one-step", "volts it takes to"};
+  table.header = {"gain", "value",    "95 % interval",
+                  "unit", "one-step", (per_unit ? V : "volts") + " it takes to"};
   table.words = {0, 3, 5};
   const bool has = fit.one_step.has_value();
   const auto one = fit.one_step.value_or(identification::OneStepFit{});
-  table.rows.push_back(gain_row("kS", fit.kS, "V", one.kS, has, "overcome friction"));
+  table.rows.push_back(gain_row("kS", fit.kS, V, one.kS, has, "overcome friction"));
   table.rows.push_back(
-      gain_row("kV", fit.kV, "V·s/" + fit.unit, one.kV, has, "hold a speed of 1 " + speed));
+      gain_row("kV", fit.kV, V + "·s/" + fit.unit, one.kV, has, "hold a speed of 1 " + speed));
   table.rows.push_back(
-      gain_row("kA", fit.kA, "V·s²/" + fit.unit, one.kA, has, "speed up by 1 " + speed + "²"));
+      gain_row("kA", fit.kA, V + "·s²/" + fit.unit, one.kA, has, "speed up by 1 " + speed + "²"));
   if (fit.kG) {
     const bool arm = fit.mechanism == mechanisms::MechanismKind::arm;
     table.rows.push_back(
-        gain_row("kG", *fit.kG, "V", one.kG, has, arm ? "hold the arm level" : "hold it up"));
+        gain_row("kG", *fit.kG, V, one.kG, has, arm ? "hold the arm level" : "hold it up"));
   }
   if (fit.gravity_with_friction) {
     table.rows.push_back(gain_row(fit.in_reverse ? "kG − kS" : "kG + kS",
-                                  *fit.gravity_with_friction, "V", 0.0, false,
+                                  *fit.gravity_with_friction, V, 0.0, false,
                                   fit.in_reverse ? "let it down" : "move it up"));
   }
   if (fit.angle_offset) {
@@ -286,7 +296,15 @@ Section gains_section(const IdentifyResult& result) {
     return section;
   }
   const FeedforwardFit& fit = *result.report.fit;
-  section.blocks.emplace_back(gains_table(fit));
+  const bool per_unit = is_per_unit(result);
+  section.blocks.emplace_back(gains_table(fit, per_unit));
+  if (per_unit) {
+    section.blocks.emplace_back(
+        Paragraph{"p.u. is one of what was recorded as the voltage. Of a duty cycle it is the "
+                  "battery's voltage: with --voltage-scale 12 the gains are in volts. If it was "
+                  "volts, read V.",
+                  Tone::caution});
+  }
   if (!fit.kA.determined) {
     section.blocks.emplace_back(Paragraph{
         fmt::format("kA is not determined, below {} V·s²/{} (95 %): {}. The design takes the "
