@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "planning/trajectory/cell_rows.hpp"
+#include "planning/trajectory/four_points.hpp"
 
 namespace flyball::detail {
 
@@ -17,19 +18,6 @@ constexpr double caution = 1.25;
 /// Of the cap of √x: linearised no nearer to standstill.
 constexpr double least_speed = 1e-3;
 
-/// c of the cubic Σ B_k c_k through four values at 0, 1/3, 2/3, 1.
-template <class Value>
-std::array<Value, 4> through(const Value& f0, const Value& f1, const Value& f2, const Value& f3) {
-  return {f0, (-5.0 * f0 + 18.0 * f1 - 9.0 * f2 + 2.0 * f3) / 6.0,
-          (2.0 * f0 - 9.0 * f1 + 18.0 * f2 - 5.0 * f3) / 6.0, f3};
-}
-
-double cubic(const std::array<double, 4>& c, double tau) {
-  const double s = 1.0 - tau;
-  return s * s * s * c[0] + 3.0 * s * s * tau * c[1] + 3.0 * s * tau * tau * c[2] +
-         tau * tau * tau * c[3];
-}
-
 /// c of the quartic Σ B_k c_k through five values at 0, 1/3, 1/2, 2/3, 1.
 std::array<double, 5> quartic_through(double f0, double f1, double f2, double f3, double f4) {
   return {f0, (-7.0 * f0 + 54.0 * f1 - 64.0 * f2 + 27.0 * f3 - 2.0 * f4) / 8.0,
@@ -41,11 +29,6 @@ double quartic(const std::array<double, 5>& c, double tau) {
   const double s = 1.0 - tau;
   return s * s * s * s * c[0] + 4.0 * s * s * s * tau * c[1] + 6.0 * s * s * tau * tau * c[2] +
          4.0 * s * tau * tau * tau * c[3] + tau * tau * tau * tau * c[4];
-}
-
-double parabola(const Bezier2& b, double tau) {
-  const double s = 1.0 - tau;
-  return s * s * b[0] + 2.0 * s * tau * b[1] + tau * tau * b[2];
 }
 
 class CollocatedRows final : public CellRows {
@@ -99,7 +82,7 @@ class CollocatedRows final : public CellRows {
         double apart = 0.0;
         for (std::size_t k = 0; k < points; ++k) {
           const double exact = value(cells[i], i, r, k, b[i]);
-          apart = std::max(apart, std::abs(exact - cubic(c, static_cast<double>(k) / 6.0)));
+          apart = std::max(apart, std::abs(exact - cubic_at(c, static_cast<double>(k) / 6.0)));
         }
         const double broken = hull + apart - 1.0;
         if (broken > allowed) {
@@ -225,7 +208,7 @@ class CollocatedRows final : public CellRows {
       }
       for (std::size_t e = 0; e < 4; ++e) {
         const std::array<double, 4> c =
-            through(entries[0][e], entries[1][e], entries[2][e], entries[3][e]);
+            cubic_through(entries[0][e], entries[1][e], entries[2][e], entries[3][e]);
         double* const all[4] = {rows.alpha.data(), rows.beta.data(), rows.gamma.data(),
                                 rows.delta.data()};
         double* into = all[e] + 4 * row_count_ * i + r;

@@ -30,6 +30,16 @@ class OfCoordinates final : public MotionLimit {
         row_names.push_back(format("coordinate {}: acceleration", j + 1));
         acceleration_.emplace_back(j, 1.0 / limits.acceleration(j));
       }
+      if (limits.jerk.size() > 0 && std::isfinite(limits.jerk(j))) {
+        jerk_names.push_back(format("coordinate {}: jerk", j + 1));
+        jerk_.emplace_back(j, 1.0 / limits.jerk(j));
+      }
+    }
+  }
+  void evaluate_jerk(const PathState& state, double /*s*/, JerkRow* rows) const noexcept override {
+    for (const auto& [j, inverse] : jerk_) {
+      *rows++ = {state.first(j) * inverse, 3.0 * state.second(j) * inverse,
+                 state.third(j) * inverse};
     }
   }
   void evaluate(const PathState& state, double /*s*/, MotionRow* rows,
@@ -46,7 +56,23 @@ class OfCoordinates final : public MotionLimit {
  private:
   std::vector<std::pair<int, double>> velocity_;
   std::vector<std::pair<int, double>> acceleration_;
+  std::vector<std::pair<int, double>> jerk_;
 };
+
+/// dl/ds, d²l/ds² and d³l/ds³ of the length l in the plane.
+Eigen::Vector3d length_rates(const PathState& state) noexcept {
+  const Vector2d p1 = state.first.head<2>();
+  const Vector2d p2 = state.second.head<2>();
+  const Vector2d p3 = state.third.head<2>();
+  const double square = p1.squaredNorm();
+  if (square > 1e-20 * p2.squaredNorm()) {
+    const double first = std::sqrt(square);
+    const double second = p1.dot(p2) / first;
+    return {first, second, (p2.squaredNorm() + p1.dot(p3) - second * second) / first};
+  }
+  const double second = p2.norm();  // a cusp: what follows it
+  return {0.0, second, second > 0.0 ? p2.dot(p3) / second : 0.0};
+}
 
 /// Of a circle of accelerations a polygon of twice as many sides.
 constexpr std::size_t circle_directions = 12;
@@ -65,6 +91,7 @@ class OfTravel final : public MotionLimit {
     name(cap_names, limits.angular_velocity, "angular velocity");
     name(row_names, limits.acceleration, "acceleration");
     name(row_names, limits.angular_acceleration, "angular acceleration");
+    name(jerk_names, limits.jerk, "jerk");
     if (std::isfinite(limits.total_acceleration)) {
       row_names.insert(row_names.end(), circle_directions, "acceleration");
       constexpr double step = std::numbers::pi / circle_directions;
@@ -73,6 +100,12 @@ class OfTravel final : public MotionLimit {
         const double angle = step * (static_cast<double>(i) + 0.5);
         circle_[i] = Vector2d(std::cos(angle), std::sin(angle)) / size;
       }
+    }
+  }
+  void evaluate_jerk(const PathState& state, double /*s*/, JerkRow* rows) const noexcept override {
+    if (std::isfinite(limits_.jerk)) {
+      const Eigen::Vector3d l = length_rates(state) / limits_.jerk;
+      *rows = {l(0), 3.0 * l(1), l(2)};
     }
   }
   void evaluate(const PathState& state, double /*s*/, MotionRow* rows,
@@ -123,6 +156,14 @@ class OfStretch final : public MotionLimit {
     named(inner_.cap_names, cap_names);
     if (from_ < to_) {
       named(inner_.row_names, row_names);
+      named(inner_.jerk_names, jerk_names);
+    }
+  }
+  void evaluate_jerk(const PathState& state, double s, JerkRow* rows) const noexcept override {
+    if (s >= from_ && s <= to_) {
+      inner_.evaluate_jerk(state, s, rows);
+    } else {
+      std::fill_n(rows, jerk_names.size(), JerkRow{});
     }
   }
   void evaluate(const PathState& state, double s, MotionRow* rows,
@@ -179,6 +220,7 @@ Expected<void> check_travel(const TravelLimits& limits, std::string_view where) 
   FLYBALL_CHECK(check_limit(limits.centripetal, where, "centripetal acceleration limit", "m/s²"));
   FLYBALL_CHECK(check_limit(limits.total_acceleration, where, "acceleration limit", "m/s²"));
   FLYBALL_CHECK(check_limit(limits.angular_velocity, where, "angular velocity limit", "rad/s"));
+  FLYBALL_CHECK(check_limit(limits.jerk, where, "jerk limit", "m/s³"));
   return check_limit(limits.angular_acceleration, where, "angular acceleration limit", "rad/s²");
 }
 
@@ -266,6 +308,7 @@ Expected<std::vector<std::unique_ptr<MotionLimit>>> motion_limits(
     if (const auto* of = std::get_if<CoordinateLimits>(&constraint)) {
       FLYBALL_CHECK(check_coordinate_limits(of->velocity, path, where, "velocity limit"));
       FLYBALL_CHECK(check_coordinate_limits(of->acceleration, path, where, "acceleration limit"));
+      FLYBALL_CHECK(check_coordinate_limits(of->jerk, path, where, "jerk limit"));
       limits.push_back(std::make_unique<OfCoordinates>(*of, path.coordinates()));
       continue;
     }

@@ -22,6 +22,13 @@ struct MotionRow {
   double c = 0.0;
 };
 
+/// |√x (e x + b u + ½ a x'')| <= 1: a jerk e ṡ³ + b ṡ s̈ + a s⃛.
+struct JerkRow {
+  double a = 0.0;
+  double b = 0.0;
+  double e = 0.0;
+};
+
 /// A constraint, checked and in plain numbers. Rows and caps, w x <= 1, are the same ones
 /// everywhere.
 class MotionLimit {
@@ -31,6 +38,9 @@ class MotionLimit {
   /// same of caps.
   virtual void evaluate(const PathState& state, double s, MotionRow* rows,
                         double* caps) const noexcept = 0;
+  /// @param rows  As many as there are jerk names.
+  virtual void evaluate_jerk(const PathState& /*state*/, double /*s*/,
+                             JerkRow* /*rows*/) const noexcept {}
   /// Places of a piece where the limit jumps, t in (0, 1), in any order.
   virtual void jumps(const Path& /*path*/, std::size_t /*piece*/,
                      std::vector<double>& /*t*/) const {}
@@ -39,6 +49,7 @@ class MotionLimit {
 
   std::vector<std::string> row_names;
   std::vector<std::string> cap_names;
+  std::vector<std::string> jerk_names;
 
  protected:
   MotionLimit() = default;

@@ -85,15 +85,39 @@ std::size_t PathTrajectory::span_at(double t) const noexcept {
   return low;
 }
 
-PathSample PathTrajectory::sample(double t) const noexcept {
-  t = t > 0.0 ? std::min(t, total_time_) : 0.0;
-  const Span& span = spans_[span_at(t)];
+/// s from the beginning of a span, and its derivatives by the time.
+struct PathTrajectory::Progress {
+  double s;
+  double rate;
+  double u;
+};
+
+PathTrajectory::Progress PathTrajectory::progress(const Span& span, double t) const noexcept {
   const double dt = std::min(t - span.start, span.duration);
+  if (span.jerk != 0.0) {
+    const double s = dt * (span.rate + dt * (0.5 * span.u + dt * span.jerk / 6.0));
+    const double rate = span.rate + dt * (span.u + 0.5 * dt * span.jerk);
+    return {std::clamp(s, 0.0, span.width), std::max(0.0, rate), span.u + dt * span.jerk};
+  }
   const auto [S, C] = growth(span.c, dt);
   // s'' = u + c s, s(0) = 0, s'(0) = rate
   const double s = std::clamp(span.rate * S + span.u * C, 0.0, span.width);
-  const double rate = std::max(0.0, span.rate * (1.0 + span.c * C) + span.u * S);
-  const double u = span.u + span.c * s;
+  return {s, std::max(0.0, span.rate * (1.0 + span.c * C) + span.u * S), span.u + span.c * s};
+}
+
+PathVector PathTrajectory::jerk(double t) const noexcept {
+  t = t > 0.0 ? std::min(t, total_time_) : 0.0;
+  const Span& span = spans_[span_at(t)];
+  const auto [s, rate, u] = progress(span, t);
+  const double third = span.jerk != 0.0 ? span.jerk : span.c * rate;
+  const PathState state = path_.at(span.piece, std::min(1.0, (span.parameter + s) * span.scale));
+  return state.third * (rate * rate * rate) + state.second * (3.0 * rate * u) + state.first * third;
+}
+
+PathSample PathTrajectory::sample(double t) const noexcept {
+  t = t > 0.0 ? std::min(t, total_time_) : 0.0;
+  const Span& span = spans_[span_at(t)];
+  const auto [s, rate, u] = progress(span, t);
 
   const PathPiece& piece = path_.pieces()[span.piece];
   const Eigen::Index n = path_.coordinates();
@@ -141,20 +165,36 @@ std::vector<BindingLimit> PathTrajectory::binding() const {
     names.insert(names.end(), limit->row_names.begin(), limit->row_names.end());
   }
   std::vector<detail::MotionRow> rows(names.size() - caps);
+  for (const auto& limit : *limits) {
+    names.insert(names.end(), limit->jerk_names.begin(), limit->jerk_names.end());
+  }
+  std::vector<detail::JerkRow> jerks(names.size() - caps - rows.size());
   std::vector<double> cap(caps);
   std::vector<double> use(names.size());
   std::size_t before = names.size();
   for (const Span& span : spans_) {
     std::fill(use.begin(), use.end(), 0.0);
     for (const double share : {0.1, 0.5, 0.9}) {
-      const double s = share * span.width;
-      const double u = span.u + span.c * s;
-      const double x = std::max(0.0, span.rate * span.rate + 2.0 * span.u * s + span.c * s * s);
+      double s = share * span.width;
+      double u = span.u + span.c * s;
+      double x = std::max(0.0, span.rate * span.rate + 2.0 * span.u * s + span.c * s * s);
+      double third = span.c * std::sqrt(x);
+      if (span.jerk != 0.0) {
+        const Progress at = progress(span, span.start + share * span.duration);
+        s = at.s;
+        u = at.u;
+        x = at.rate * at.rate;
+        third = span.jerk;
+      }
       const PathState state = path_.at(span.piece, (span.parameter + s) * span.scale);
       detail::MotionRow* row = rows.data();
       double* w = cap.data();
+      detail::JerkRow* jerk = jerks.data();
       for (const auto& limit : *limits) {
-        limit->evaluate(state, path_.breaks()[span.piece] + span.parameter + s, row, w);
+        const double at = path_.breaks()[span.piece] + span.parameter + s;
+        limit->evaluate(state, at, row, w);
+        limit->evaluate_jerk(state, at, jerk);
+        jerk += limit->jerk_names.size();
         row += limit->row_names.size();
         w += limit->cap_names.size();
       }
@@ -164,6 +204,11 @@ std::vector<BindingLimit> PathTrajectory::binding() const {
       for (std::size_t i = 0; i < rows.size(); ++i) {
         const detail::MotionRow& r = rows[i];
         use[caps + i] += std::abs(r.a * u + r.b * x + r.k * std::sqrt(x) + r.c) / 3.0;
+      }
+      for (std::size_t i = 0; i < jerks.size(); ++i) {
+        const detail::JerkRow& r = jerks[i];
+        use[caps + rows.size() + i] +=
+            std::abs((r.e * x + r.b * u) * std::sqrt(x) + r.a * third) / 3.0;
       }
     }
     const auto most = std::max_element(use.begin(), use.end());

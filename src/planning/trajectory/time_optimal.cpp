@@ -5,14 +5,15 @@
 #include <utility>
 
 #include <flyball/core/argument.hpp>
-#include <flyball/planning/path/edit_path.hpp>
 #include <flyball/planning/trajectory/path_trajectory.hpp>
 
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "planning/trajectory/cell_rows.hpp"
+#include "planning/trajectory/jerk_timing.hpp"
 #include "planning/trajectory/motion_limit.hpp"
 #include "planning/trajectory/timing.hpp"
+#include "planning/trajectory/timing_cells.hpp"
 
 namespace flyball {
 
@@ -25,166 +26,9 @@ using detail::TimingPasses;
 using detail::TimingRows;
 
 constexpr std::string_view where = "time_optimal";
-/// Intervals of a piece in the first pass.
-constexpr int first_cells = 3;
 /// Into how many one is cut at most, each time.
 constexpr int most_parts = 8;
 constexpr std::size_t most_cells = 200'000;
-
-/// Whether a piece goes anywhere.
-bool moves(const PathPiece& piece) {
-  const Eigen::MatrixXd& c = piece.coefficients;
-  return c.cols() > 1 && c.rightCols(c.cols() - 1).cwiseAbs().maxCoeff() > 0.0;
-}
-
-/// What a timing asks of a path's joints.
-struct JointRules {
-  bool accelerates = true;  ///< Whether an acceleration is limited; else velocities may jump.
-  bool faces = false;       ///< Whether turning rates are those of the way, and may not jump.
-};
-
-/// How x goes on from one piece to the next: (|q'-|/|q'+|)²; at a corner, and where the curvature
-/// of a way that is faced jumps, 0.
-double join_of(const Path& path, std::size_t piece, std::size_t next, const JointRules& rules) {
-  const PathState at_end = path.at(piece, 1.0);
-  const PathState at_begin = path.at(next, 0.0);
-  const PathVector& before = at_end.first;
-  const PathVector& after = at_begin.first;
-  const double v = before.norm();
-  const double w = after.norm();
-  if (!(v > 0.0) || !(w > 0.0)) {
-    return 0.0;
-  }
-  if ((before / v - after / w).norm() > corner_angle) {
-    return 0.0;
-  }
-  if (rules.faces) {
-    constexpr double rounding = 1e-6;
-    const double bend = planar_curvature(at_end);
-    const double next_bend = planar_curvature(at_begin);
-    if (std::abs(bend - next_bend) > rounding * (std::abs(bend) + std::abs(next_bend)) + 1e-9) {
-      return 0.0;
-    }
-  }
-  const double ratio = v / w;
-  return std::abs(ratio - 1.0) < 1e-9 ? 1.0 : ratio * ratio;
-}
-
-/// The intervals of the first pass.
-std::vector<TimingCell> coarse_cells(const Path& path, const std::vector<std::vector<double>>& cuts,
-                                     const JointRules& rules) {
-  std::vector<TimingCell> cells;
-  cells.reserve(path.pieces().size() * first_cells);
-  for (std::size_t i = 0; i < path.pieces().size(); ++i) {
-    const PathPiece& piece = path.pieces()[i];
-    if (!moves(piece)) {
-      continue;
-    }
-    double from = 0.0;
-    const std::size_t parts = cuts.empty() ? 1 : cuts[i].size() + 1;
-    for (std::size_t k = 0; k < parts; ++k) {
-      const double to = k + 1 < parts ? cuts[i][k] : 1.0;
-      for (int m = 0; m < first_cells; ++m) {
-        const double a = from + (to - from) * m / first_cells;
-        const double b = m + 1 == first_cells ? to : from + (to - from) * (m + 1) / first_cells;
-        cells.push_back({i, a, b, (b - a) * piece.span, 1.0});
-      }
-      from = to;
-    }
-    std::size_t next = i + 1;
-    while (next < path.pieces().size() && !moves(path.pieces()[next])) {
-      ++next;
-    }
-    if (next < path.pieces().size()) {
-      const double join = join_of(path, i, next, rules);
-      cells.back().join = join > 0.0 || rules.accelerates ? join : -1.0;
-    }
-  }
-  return cells;
-}
-
-double total_time(const std::vector<TimingCell>& cells, const std::vector<Bezier2>& b) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    const double duration = detail::cell_duration(b[i], cells[i].width);
-    sum += std::isfinite(duration) ? duration : 0.0;
-  }
-  return sum;
-}
-
-/// What each interval costs: its time times the share of the limits that it leaves. Where x is
-/// smallest that share slows down the way to it and from it, too.
-std::vector<double> losses(const std::vector<TimingCell>& cells, const std::vector<Bezier2>& b,
-                           const CellRows& limits, const TimingRows& rows) {
-  const std::size_t n = cells.size();
-  std::vector<double> left(n);
-  std::vector<double> time(n);
-  std::vector<double> loss(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    left[i] = limits.left(cells, i, b[i], rows);
-    time[i] = detail::cell_duration(b[i], cells[i].width);
-    loss[i] = left[i] * time[i];
-  }
-  for (std::size_t i = 1; i < n; ++i) {
-    const double x = b[i][0];
-    if (!(x < b[i - 1][0] && x <= b[i][2])) {
-      continue;
-    }
-    double weight = 0.0;
-    for (std::size_t k = i; k < n && b[k][2] >= b[k][0]; ++k) {
-      weight += time[k] * x / b[k][2];
-    }
-    for (std::size_t k = i; k-- > 0 && b[k][0] >= b[k][2];) {
-      weight += time[k] * x / b[k][0];
-    }
-    for (std::size_t k = i > 1 ? i - 2 : 0; k < std::min(n, i + 2); ++k) {
-      const double share = k == i || k + 1 == i ? 2.0 : 1.0;
-      loss[k] = std::max(loss[k], share * left[k] * weight);
-    }
-  }
-  return loss;
-}
-
-/// The part of a parabola between two shares of its interval.
-Bezier2 part_of(const Bezier2& b, double from, double to) {
-  const auto blossom = [&](double s, double t) {
-    return (1.0 - s) * (1.0 - t) * b[0] + (s + t - 2.0 * s * t) * b[1] + s * t * b[2];
-  };
-  return {blossom(from, from), blossom(from, to), blossom(to, to)};
-}
-
-/// Intervals cut into parts, and a motion on them.
-void refine(std::vector<TimingCell>& cells, std::vector<Bezier2>& motion,
-            const std::vector<int>& parts) {
-  std::vector<TimingCell> finer;
-  std::vector<Bezier2> on_finer;
-  std::size_t count = 0;
-  for (const int part : parts) {
-    count += static_cast<std::size_t>(part);
-  }
-  finer.reserve(count);
-  on_finer.reserve(motion.empty() ? 0 : count);
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    const TimingCell& cell = cells[i];
-    const double share = 1.0 / parts[i];
-    for (int m = 0; m < parts[i]; ++m) {
-      TimingCell part = cell;
-      part.from = cell.from + (cell.to - cell.from) * share * m;
-      part.to = m + 1 == parts[i] ? cell.to : cell.from + (cell.to - cell.from) * share * (m + 1);
-      part.width = cell.width * share;
-      if (m + 1 < parts[i]) {
-        part.join = 1.0;
-        part.most = std::numeric_limits<double>::infinity();
-      }
-      finer.push_back(part);
-      if (!motion.empty()) {
-        on_finer.push_back(part_of(motion[i], share * m, share * (m + 1)));
-      }
-    }
-  }
-  cells = std::move(finer);
-  motion = std::move(on_finer);
-}
 
 /// @errors ArgumentError::out_of_range where nothing limits the velocity.
 Expected<void> check_limited(const Path& path, const std::vector<TimingCell>& cells,
@@ -232,8 +76,12 @@ class Timing {
       if (round > 0 && !again && tolerance_ >= one_round) {
         break;
       }
-      const std::vector<double> loss = losses(cells, passes.b, limits_, rows);
-      const double time = total_time(cells, passes.b);
+      std::vector<double> left(cells.size());
+      for (std::size_t i = 0; i < cells.size(); ++i) {
+        left[i] = limits_.left(cells, i, passes.b[i], rows);
+      }
+      const std::vector<double> loss = detail::losses(cells, passes.b, left);
+      const double time = detail::total_duration(cells, passes.b);
       double sum = 0.0;
       for (const double one : loss) {
         sum += one;
@@ -247,7 +95,7 @@ class Timing {
       pass();
       // One cut makes the loss smaller by its square where limits are smooth, but only by itself
       // where the motion is from rest or to it along an interval that is far too long.
-      slow = slow || time > far_too_slow * total_time(cells, passes.b);
+      slow = slow || time > far_too_slow * detail::total_duration(cells, passes.b);
       again = again || slow;
       if (tolerance_ < one_round) {
         limits_.verify(cells, passes.b, rows, off_);
@@ -305,7 +153,7 @@ class Timing {
     if (limits_.is_put_about()) {
       motion = passes.b;
     }
-    refine(cells, motion, parts);
+    detail::refine(cells, motion, parts);
     limits_.fill(cells, motion, rows);
     return most;
   }
@@ -396,6 +244,14 @@ bool faces(std::span<const PathConstraint> constraints) {
   });
 }
 
+/// Whether a coordinate's jerk is limited, so that no acceleration may jump.
+bool bends(std::span<const PathConstraint> constraints) {
+  return std::any_of(constraints.begin(), constraints.end(), [](const PathConstraint& constraint) {
+    const auto* of = std::get_if<CoordinateLimits>(&constraint);
+    return of != nullptr && (of->jerk.array() < TravelLimits::none).any();
+  });
+}
+
 /// Caps of single places at the ends of intervals.
 /// @errors ArgumentError::out_of_range for a start faster than that.
 Expected<void> limit_places(const Path& path,
@@ -439,6 +295,31 @@ Expected<void> limit_places(const Path& path,
   return {};
 }
 
+Expected<std::vector<PathTrajectory::Span>> spans_of(const Path& path,
+                                                     const std::vector<TimingCell>& cells,
+                                                     const std::vector<Bezier2>& motion) {
+  std::vector<PathTrajectory::Span> spans;
+  spans.reserve(cells.size());
+  double t = 0.0;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const Bezier2& b = motion[i];
+    const TimingCell& cell = cells[i];
+    const double duration = detail::cell_duration(b, cell.width);
+    spans.push_back({t, duration, cell.from * path.pieces()[cell.piece].span, cell.width,
+                     std::sqrt(b[0]), (b[1] - b[0]) / cell.width,
+                     (b[0] - 2.0 * b[1] + b[2]) / (cell.width * cell.width), 0.0, cell.piece,
+                     1.0 / path.pieces()[cell.piece].span});
+    t += duration;
+    if (!std::isfinite(t)) {
+      return refusal(ArgumentError::out_of_range, where, "constraints")
+          .got("limits that let nothing move")
+          .expected("limits that a motion can keep to")
+          .with("parameter", path.breaks()[cell.piece] + spans.back().parameter);
+    }
+  }
+  return spans;
+}
+
 }  // namespace
 
 Expected<PathTrajectory> time_optimal(const Path& path, std::span<const PathConstraint> constraints,
@@ -477,11 +358,15 @@ Expected<PathTrajectory> time_optimal(const Path& path, std::span<const PathCons
       return near;
     });
   }
-  JointRules rules{.accelerates = false, .faces = path.coordinates() == 2 && faces(constraints)};
+  detail::JointRules rules{.accelerates = false,
+                           .faces = path.coordinates() == 2 && faces(constraints)};
+  bool jerks = false;
   for (const auto& limit : limits) {
-    rules.accelerates = rules.accelerates || !limit->row_names.empty();
+    jerks = jerks || !limit->jerk_names.empty();
+    rules.accelerates = rules.accelerates || !limit->row_names.empty() || jerks;
   }
-  std::vector<TimingCell> cells_of_path = coarse_cells(path, cuts, rules);
+  rules.bends = bends(constraints);
+  std::vector<TimingCell> cells_of_path = detail::coarse_cells(path, cuts, rules);
   double first = end_rate(path, 0.0, options.start_velocity);
   double last = end_rate(path, path.parameter_end(), options.end_velocity);
   FLYBALL_CHECK(limit_places(path, limits, cells_of_path, first, options.start_velocity));
@@ -492,7 +377,9 @@ Expected<PathTrajectory> time_optimal(const Path& path, std::span<const PathCons
       cubic ? detail::cubic_rows(path, std::get<CoordinateLimits>(bounded[0]))
             : detail::collocated_rows(path, std::move(limits));
 
-  Timing timing(path, *making, std::move(cells_of_path), first, last, options.tolerance);
+  // Where jerks are limited it is what that motion begins with.
+  Timing timing(path, *making, std::move(cells_of_path), first, last,
+                jerks ? std::max(options.tolerance, TimingOptions{}.tolerance) : options.tolerance);
   FLYBALL_CHECK(timing.solve());
   const std::vector<TimingCell>& cells = timing.cells;
   const TimingPasses& passes = timing.passes;
@@ -507,23 +394,12 @@ Expected<PathTrajectory> time_optimal(const Path& path, std::span<const PathCons
   }
 
   std::vector<PathTrajectory::Span> spans;
-  spans.reserve(cells.size());
-  double t = 0.0;
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    const Bezier2& b = passes.b[i];
-    const TimingCell& cell = cells[i];
-    const double duration = detail::cell_duration(b, cell.width);
-    spans.push_back({t, duration, cell.from * path.pieces()[cell.piece].span, cell.width,
-                     std::sqrt(b[0]), (b[1] - b[0]) / cell.width,
-                     (b[0] - 2.0 * b[1] + b[2]) / (cell.width * cell.width), cell.piece,
-                     1.0 / path.pieces()[cell.piece].span});
-    t += duration;
-    if (!std::isfinite(t)) {
-      return refusal(ArgumentError::out_of_range, where, "constraints")
-          .got("limits that let nothing move")
-          .expected("limits that a motion can keep to")
-          .with("parameter", path.breaks()[cell.piece] + spans.back().parameter);
-    }
+  if (jerks) {
+    FLYBALL_TRY(const auto held, detail::motion_limits(path, bounded, where));
+    FLYBALL_TRY(spans, detail::jerk_limited(path, *making, held, cells, passes.b,
+                                            {first, last, options.tolerance, !rules.bends}));
+  } else {
+    FLYBALL_TRY(spans, spans_of(path, cells, passes.b));
   }
   return PathTrajectory(path, std::move(spans),
                         std::vector<PathConstraint>(constraints.begin(), constraints.end()));

@@ -13,11 +13,12 @@
 /// What a motion along a path must keep to. Whatever is infinite is no limit.
 namespace flyball {
 
-/// Of each coordinate of the path alone: |dq_j/dt| <= velocity_j, |d²q_j/dt²| <= acceleration_j.
-/// What an arm of any number of joints needs.
+/// Of each coordinate of the path alone: |dq_j/dt| <= velocity_j, |d²q_j/dt²| <= acceleration_j,
+/// |d³q_j/dt³| <= jerk_j. What an arm of any number of joints needs.
 struct CoordinateLimits {
   Eigen::VectorXd velocity;      ///< One a coordinate, unit/s, > 0; empty for none.
   Eigen::VectorXd acceleration;  ///< One a coordinate, unit/s², > 0; empty for none.
+  Eigen::VectorXd jerk{};        ///< One a coordinate, unit/s³, > 0; empty for none.
 };
 
 /// Of a robot's travel in the plane, the path's first two coordinates (x, y).
@@ -34,6 +35,7 @@ struct TravelLimits {
   /// |κ|.
   double angular_velocity = none;
   double angular_acceleration = none;  ///< rad/s², > 0, of the same.
+  double jerk = none;                  ///< m/s³, > 0: |d²v/dt²|, along the path.
 };
 
 /// A shape of the plane. Its border belongs to it.

@@ -37,7 +37,8 @@ struct BindingLimit {
 ///
 ///     x(s) = x_0 + 2 u_0 s + c s²,   d²s/dt² = u_0 + c s,
 ///
-/// so that in time s is a parabola, a hyperbolic or a circular function, and exact.
+/// so that in time s is a parabola, a hyperbolic or a circular function, and exact; beside stops of
+/// a motion whose jerk is limited d³s/dt³ is constant instead.
 class PathTrajectory {
  public:
   [[nodiscard]] const Path& path() const noexcept { return path_; }
@@ -46,6 +47,9 @@ class PathTrajectory {
   /// At a time, held to [0, total time] (NaN is the start). Cost: O(1) and a polynomial a
   /// coordinate; noexcept, allocation-free.
   [[nodiscard]] PathSample sample(double t) const noexcept;
+  /// d³q/dt³ of the time, by the path's derivatives and ds/dt, d²s/dt², d³s/dt³. It jumps between
+  /// intervals, and where no jerk is limited accelerations do. Cost as of `sample`.
+  [[nodiscard]] PathVector jerk(double t) const noexcept;
   /// What binds, neighbouring intervals of one limit together. Cost: O(intervals · limits),
   /// allocates.
   [[nodiscard]] std::vector<BindingLimit> binding() const;
@@ -65,6 +69,7 @@ class PathTrajectory {
     double rate = 0.0;       ///< ds/dt at its beginning.
     double u = 0.0;          ///< d²s/dt² there.
     double c = 0.0;          ///< 1/s², by how much that rises with s.
+    double jerk = 0.0;       ///< d³s/dt³ where it is constant instead: from rest and to it.
     std::size_t piece = 0;   ///< Of the path.
     double scale = 1.0;      ///< 1 over the piece's span.
   };
@@ -78,6 +83,8 @@ class PathTrajectory {
 
  private:
   [[nodiscard]] std::size_t span_at(double t) const noexcept;
+  struct Progress;
+  [[nodiscard]] Progress progress(const Span& span, double t) const noexcept;
 
   Path path_;
   std::vector<Span> spans_;
@@ -116,11 +123,21 @@ struct TimingOptions {
 ///         not_finite (NaN), wrong_shape (not one limit a coordinate; a drive on a path that is not
 ///         of the plane), out_of_range: an end's velocity above what the limits allow there, or
 ///         that the path is too short to brake from or to reach; a friction that the motors cannot
-///         overcome.
-/// Cost: O(intervals · limits), 10 to 40 intervals a piece; allocates.
+///         overcome; limits of jerks with which no motion was found.
+/// Where a jerk is limited d²s/dt² is continuous, too, and vanishes at stops and at the ends (of an
+/// end that is passed the acceleration along the path). With s⃛ = ½ x'' √x the jerk is √x times what
+/// is linear in b, and 1/√x is convex: convex programs of all intervals together, each about the
+/// motion of the one before it and within the limits, come to a motion that no small change makes
+/// faster. Limits of coordinates' jerks make stops of places where the curvature jumps. The
+/// tolerance is then 5e-5 or more.
+///
+/// Cost: O(intervals · limits), 10 to 40 intervals a piece; with limits of jerks some hundred to a
+/// thousand times as much. Allocates.
 /// Source: Pham and Pham, "A new approach to time-optimal path parameterization based on
-/// reachability analysis", IEEE T-RO 34 (2018), for the two passes; the Bézier points in place of a
-/// grid's are Flyball's.
+/// reachability analysis", IEEE T-RO 34 (2018), for the two passes; Debrouwere et al.,
+/// "Time-optimal path following for robots with convex-concave constraints using sequential convex
+/// programming", IEEE T-RO 29 (2013), for those of jerks; the Bézier points in place of a grid's
+/// are Flyball's.
 [[nodiscard]] Expected<PathTrajectory> time_optimal(const Path& path,
                                                     std::span<const PathConstraint> constraints,
                                                     const TimingOptions& options = {});
