@@ -92,13 +92,16 @@ double limit(const Problem& problem, std::string_view name) {
 
 std::vector<PathConstraint> constraints_of(const Problem& problem) {
   std::vector<PathConstraint> all;
-  if (problem.has("velocity") || problem.has("acceleration")) {
+  if (problem.has("velocity") || problem.has("acceleration") || problem.has("jerk")) {
     CoordinateLimits limits;
     if (problem.has("velocity")) {
       limits.velocity = problem.matrix("velocity").col(0);
     }
     if (problem.has("acceleration")) {
       limits.acceleration = problem.matrix("acceleration").col(0);
+    }
+    if (problem.has("jerk")) {
+      limits.jerk = problem.matrix("jerk").col(0);
     }
     all.push_back(std::move(limits));
   }
@@ -107,10 +110,11 @@ std::vector<PathConstraint> constraints_of(const Problem& problem) {
                             .centripetal = limit(problem, "centripetal"),
                             .total_acceleration = limit(problem, "total_acceleration"),
                             .angular_velocity = limit(problem, "angular_velocity"),
-                            .angular_acceleration = limit(problem, "angular_acceleration")};
+                            .angular_acceleration = limit(problem, "angular_acceleration"),
+                            .jerk = limit(problem, "travel_jerk")};
   for (const double one :
        {travel.velocity, travel.acceleration, travel.centripetal, travel.total_acceleration,
-        travel.angular_velocity, travel.angular_acceleration}) {
+        travel.angular_velocity, travel.angular_acceleration, travel.jerk}) {
     if (!std::isinf(one)) {
       all.push_back(travel);
       break;
@@ -164,6 +168,13 @@ Outcome solve_timing(const Problem& problem, JsonWriter& answer) {
   answer.add("position", position);
   answer.add("velocity", velocity);
   answer.add("acceleration", acceleration);
+  if (problem.has("jerk") || problem.has("travel_jerk")) {
+    MatrixXd jerk(count, n);
+    for (int i = 0; i < count; ++i) {
+      jerk.row(i) = motion.jerk(time[static_cast<std::size_t>(i)]).transpose();
+    }
+    answer.add("jerk", jerk);
+  }
   const std::vector<BindingLimit> binding = motion.binding();
   MatrixXd stretches(static_cast<Index>(binding.size()), 5);
   std::vector<std::string> names;
@@ -214,8 +225,10 @@ std::vector<Kind> path_kinds() {
            std::vector{
                optional(list("velocity", "n", "", "limit of each coordinate's velocity")),
                optional(list("acceleration", "n", "", "limit of each coordinate's acceleration")),
+               optional(list("jerk", "n", "", "limit of each coordinate's jerk")),
                optional(number("travel_velocity", "m/s", "limit of |dp/dt|, p = (x, y)")),
                optional(number("travel_acceleration", "m/s^2", "limit along the path")),
+               optional(number("travel_jerk", "m/s^3", "limit of |d²v/dt²| along the path")),
                optional(number("centripetal", "m/s^2", "limit across the path")),
                optional(number("total_acceleration", "m/s^2", "limit of |d²p/dt²|: a circle")),
                optional(number("angular_velocity", "rad/s",
@@ -234,6 +247,7 @@ std::vector<Kind> path_kinds() {
        {number("total_time", "s", "of the motion"), list("time", "t", "s", "evenly from 0"),
         list("parameter", "t", "", "of the curve"), matrix("position", "t", "n", "q"),
         matrix("velocity", "t", "n", "dq/dt"), matrix("acceleration", "t", "n", "d²q/dt²"),
+        optional(matrix("jerk", "t", "n", "d³q/dt³, where a jerk is limited")),
         texts("binding", "l", "the limit that holds each stretch back"),
         matrix("stretches", "l", "5",
                "from and to by the parameter, from and to in s, how much of the limit is used")},

@@ -139,7 +139,7 @@ ExpectedAll<PathResult> plan_path(const PathJob& job) {
   if (!job.project.empty()) {
     if (job.files.empty()) {
       if (job.retime || job.velocity || job.acceleration || job.centripetal ||
-          job.angular_velocity || job.angular_acceleration) {
+          job.angular_velocity || job.angular_acceleration || job.ramp) {
         return tl::unexpected(Errors(
             Error(ArgumentError::malformed)
                 .in("path")

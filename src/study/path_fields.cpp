@@ -69,6 +69,9 @@ const std::array rows{
              Dimension::angular_acceleration, positive, "\"720 deg/s^2\"",
              "Limit of the angular acceleration")
         .without("the file's"),
+    quantity("ramp", at<&PathJob::ramp>(), Dimension::time, positive, "\"200 ms\"",
+             "Time from no to full acceleration, which limits the jerk along the path")
+        .without("none: the jerk is not limited"),
     quantity("start_velocity", at<&PathJob::start_velocity>(), Dimension::velocity, not_negative,
              "\"1 m/s\"", "How fast it starts")
         .without("the file's, or 0"),
@@ -107,6 +110,8 @@ std::string value_of(const Field& field) {
       return "ACCELERATION";
     case angular_velocity:
       return "RATE";
+    case Dimension::time:
+      return "TIME";
     default:
       return "QUANTITY";
   }

@@ -31,6 +31,9 @@ void take_limits(RouteShape& shape, const PathJob& job) {
   take(limits.centripetal, job.centripetal);
   take(limits.angular_velocity, job.angular_velocity);
   take(limits.angular_acceleration, job.angular_acceleration);
+  if (job.ramp) {
+    limits.jerk = limits.acceleration / job.ramp->si();
+  }
   take(shape.start_velocity, job.start_velocity);
   take(shape.end_velocity, job.end_velocity);
 }
@@ -49,6 +52,14 @@ ExpectedAll<LoadedMotion> timed(RouteShape shape, MotionFormat format, const Pat
             .expected("given, to make new times")
             .hint("--velocity \"3 m/s\" --acceleration \"3 m/s^2\", or a project file with the "
                   "robot's [drive]")));
+  }
+  if (job.ramp && std::isinf(shape.limits.acceleration)) {
+    return tl::unexpected(Errors(Error(ArgumentError::empty)
+                                     .in(shape.source)
+                                     .about("an acceleration limit")
+                                     .got("left out")
+                                     .expected("given, for --ramp is the time to it from none")
+                                     .hint("--acceleration \"3 m/s^2\"")));
   }
   FLYBALL_TRY(TimedRoute route, time_route(shape, robot, voltage));
   return LoadedMotion{format, true, std::move(route.trajectory), std::move(route.binding), {}};
@@ -177,7 +188,7 @@ ExpectedAll<LoadedMotion> load_motion(const std::string& file, const PathJob& jo
   FLYBALL_TRY(const MotionFormat format, motion_format(text, file));
   const bool sides = job.differential || (robot && robot->kind == DriveKind::differential);
   const bool anew = job.retime || job.velocity || job.acceleration || job.centripetal ||
-                    job.angular_velocity || job.angular_acceleration;
+                    job.angular_velocity || job.angular_acceleration || job.ramp;
   LoadedMotion motion{.format = format};
   if (format == MotionFormat::pathplanner_path) {
     FLYBALL_TRY(const PathPlannerPath path, parse_pathplanner_path(text, file));

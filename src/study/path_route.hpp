@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,12 +17,13 @@ namespace flyball::study {
 
 /// What a motion keeps to; infinite is no limit.
 struct RouteLimits {
-  double velocity = 0.0;              ///< m/s
-  double acceleration = 0.0;          ///< m/s², along and across together.
-  double centripetal = 0.0;           ///< m/s², across.
-  double angular_velocity = 0.0;      ///< rad/s
-  double angular_acceleration = 0.0;  ///< rad/s²
-  Place place{0, 0};                  ///< In the file; line 0: nowhere.
+  double velocity = 0.0;                                  ///< m/s
+  double acceleration = 0.0;                              ///< m/s², along and across together.
+  double centripetal = 0.0;                               ///< m/s², across.
+  double angular_velocity = 0.0;                          ///< rad/s
+  double angular_acceleration = 0.0;                      ///< rad/s²
+  double jerk = std::numeric_limits<double>::infinity();  ///< m/s³, along the path.
+  Place place{0, 0};                                      ///< In the file; line 0: nowhere.
 };
 
 /// A place along a path: 1.5 is halfway along the second segment's parameter.

@@ -28,7 +28,8 @@ TravelLimits travel(const RouteLimits& limits) {
           .centripetal = limits.centripetal,
           .total_acceleration = limits.acceleration,
           .angular_velocity = limits.angular_velocity,
-          .angular_acceleration = limits.angular_acceleration};
+          .angular_acceleration = limits.angular_acceleration,
+          .jerk = limits.jerk};
 }
 
 /// What the robot's motors, wheels and grip limit.
@@ -180,7 +181,7 @@ Expected<TimedRoute> time_route(const RouteShape& shape, const std::optional<Dri
     FLYBALL_TRY(const Path path, part_of(route.path, part.first, part.second).map_error(named));
     TimingOptions options;
     options.start_velocity = p == 0 ? shape.start_velocity : 0.0;
-    options.tolerance = 2e-4;
+    options.tolerance = std::isinf(shape.limits.jerk) ? 2e-4 : 1e-3;
     options.end_velocity = p + 1 == route.parts.size() ? shape.end_velocity : 0.0;
     FLYBALL_TRY(PathTrajectory motion,
                 time_optimal(path, constraints_of(shape, route, part, robot, voltage), options)

@@ -28,6 +28,7 @@ struct PathJob {
   std::optional<Acceleration> centripetal{};
   std::optional<AngularVelocity> angular_velocity{};
   std::optional<AngularAcceleration> angular_acceleration{};
+  std::optional<Time> ramp{};  ///< From no to full acceleration: limits the jerk along the path.
   std::optional<Velocity> start_velocity{}, end_velocity{};
   bool differential = false;  ///< It looks where it goes; else only if the file or robot says so.
   bool retime = false;        ///< A trajectory's times are made anew; so they are with limits.
