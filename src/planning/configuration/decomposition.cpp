@@ -10,9 +10,9 @@
 
 namespace flyball::detail {
 
+/// A box of the binary tree: halves of halves along one axis after the other.
 namespace {
 
-/// A box of the binary tree: halves of halves along one axis after the other.
 struct Box {
   std::array<std::uint32_t, 8> low;  ///< In units of 2^-20 of each axis.
   std::array<std::uint8_t, 8> cuts;  ///< How often each axis has been halved.
@@ -20,20 +20,17 @@ struct Box {
   std::uint8_t axis;     ///< Along which it is split, or is to be.
   std::uint8_t reached;  ///< From the start (1), from the goal (2).
   int child;             ///< The first of two.
+  int parent;            ///< -1 for the whole.
 };
 
 constexpr std::uint32_t whole = 1U << 20;
 constexpr int most_dimension = 8;
 
-class Boxes {
+}  // namespace
+
+class BoxTree::Boxes {
  public:
-  Boxes(Judge& judge, const double* start, const double* goal, long most, WorkBound& bound)
-      : judge_(judge),
-        n_(judge.dimension()),
-        most_(most),
-        bound_(bound),
-        start_(start),
-        goal_(goal) {
+  explicit Boxes(Judge& judge) : judge_(judge), n_(judge.dimension()) {
     for (int k = 0; k < n_; ++k) {
       const auto i = static_cast<std::size_t>(k);
       const SpaceAxis& axis = judge.model().axes[i];
@@ -42,15 +39,28 @@ class Boxes {
       size_[i] = axis.wraps ? 2.0 * std::numbers::pi : axis.high - axis.low;
     }
     Box root{};
+    root.parent = -1;
     classify(std::span(&root, 1));
     boxes_.push_back(root);
   }
 
-  BoxAnswer run() {
+  BoxAnswer run(const double* start, const double* goal, long most, WorkBound& bound,
+                const GrowAlong& along) {
+    constexpr long most_kept = 10'000'000;
+    start_ = start;
+    goal_ = goal;
+    most_ = std::min(most_kept, static_cast<long>(boxes_.size()) + most);
+    bound_ = &bound;
     BoxAnswer answer;
+    answer.boxes = static_cast<long>(boxes_.size());
+    if (parted()) {
+      answer.proven = true;
+      return answer;
+    }
+    std::size_t before = boxes_.size();
     // Coarse first: each round floods from both ends through what is not blocked, splitting what is
     // not decided down to the round's size.
-    for (int depth = n_; depth <= 20 * n_ && !bound_.over(); ++depth) {
+    for (int depth = n_; depth <= 20 * n_ && !bound.over(); ++depth) {
       const FloodEnd end = flood(depth);
       answer.boxes = static_cast<long>(boxes_.size());
       if (end == FloodEnd::closed) {
@@ -65,6 +75,16 @@ class Boxes {
       if (answer.path) {
         return answer;
       }
+      if (along) {  // as much work as there was in boxes
+        constexpr std::size_t least = 200;
+        const std::size_t work = std::max(least, boxes_.size() - before);
+        answer.path = along(channel_, static_cast<long>(work));
+        answer.grown = answer.path.has_value();
+        if (answer.path) {
+          return answer;
+        }
+      }
+      before = boxes_.size();
     }
     return answer;
   }
@@ -132,6 +152,7 @@ class Boxes {
         child.cuts[axis] = static_cast<std::uint8_t>(child.cuts[axis] + 1);
         child.reached = 0;
         child.child = 0;
+        child.parent = open[i];
         parent.state = BoxState::split;
         parent.child = static_cast<int>(boxes_.size() + made);
         children[made++] = child;
@@ -142,6 +163,9 @@ class Boxes {
       const int first = static_cast<int>(boxes_.size());
       boxes_.insert(boxes_.end(), children.begin(),
                     children.begin() + static_cast<std::ptrdiff_t>(made));
+      for (std::size_t i = 0; i < count; ++i) {
+        settle(open[i]);
+      }
       count = 0;
       for (std::size_t i = 0; i < made; ++i) {
         if (children[i].state == BoxState::mixed && depth(children[i], n_) < deepest) {
@@ -154,14 +178,23 @@ class Boxes {
     }
   }
 
+  /// A box of two that are blocked is blocked, one of two that are free is free, and so on upwards.
+  void settle(int index) {
+    while (index >= 0) {
+      Box& box = boxes_[static_cast<std::size_t>(index)];
+      const BoxState first = boxes_[static_cast<std::size_t>(box.child)].state;
+      const BoxState second = boxes_[static_cast<std::size_t>(box.child) + 1].state;
+      if (first != second || (first != BoxState::blocked && first != BoxState::free)) {
+        return;
+      }
+      box.state = first;
+      index = box.parent;
+    }
+  }
+
   /// The leaf that holds a point, split down to a depth while it is mixed.
   int leaf_at(const double* q, int deepest) {
-    std::array<std::uint32_t, most_dimension> at{};
-    for (std::size_t i = 0; i < static_cast<std::size_t>(n_); ++i) {
-      double share = (q[i] - low_[i]) / size_[i];
-      share -= wraps_[i] ? std::floor(share) : 0.0;
-      at[i] = std::min(static_cast<std::uint32_t>(std::max(share, 0.0) * whole), whole - 1);
-    }
+    const auto at = place_of(q);
     int index = 0;
     while (true) {
       Box& box = boxes_[static_cast<std::size_t>(index)];
@@ -169,67 +202,83 @@ class Boxes {
         split(index, deepest);
       }
       const Box& now = boxes_[static_cast<std::size_t>(index)];
-      if (now.state != BoxState::split) {
+      if (now.state != BoxState::split || (deepest > 0 && depth(now, n_) >= deepest)) {
         return index;
       }
-      const std::size_t a = now.axis;
-      const Box& first = boxes_[static_cast<std::size_t>(now.child)];
-      const std::uint32_t end = first.low[a] + (whole >> first.cuts[a]);
-      index = now.child + (at[a] >= end ? 1 : 0);
+      index = child_at(index, at);
     }
   }
 
-  /// All leaves that touch a face of a box, split down to a depth while they are mixed.
+  /// In units of 2^-20 of each axis.
+  [[nodiscard]] std::array<std::uint32_t, most_dimension> place_of(const double* q) const {
+    std::array<std::uint32_t, most_dimension> at{};
+    for (std::size_t i = 0; i < static_cast<std::size_t>(n_); ++i) {
+      double share = (q[i] - low_[i]) / size_[i];
+      share -= wraps_[i] ? std::floor(share) : 0.0;
+      at[i] = std::min(static_cast<std::uint32_t>(std::max(share, 0.0) * whole), whole - 1);
+    }
+    return at;
+  }
+
+  /// The child that holds a place.
+  [[nodiscard]] int child_at(int index, const std::array<std::uint32_t, most_dimension>& at) const {
+    const Box& box = boxes_[static_cast<std::size_t>(index)];
+    const Box& first = boxes_[static_cast<std::size_t>(box.child)];
+    const std::uint32_t end = first.low[box.axis] + (whole >> first.cuts[box.axis]);
+    return box.child + (at[box.axis] >= end ? 1 : 0);
+  }
+
+  /// All leaves that touch a face of a box, split down to a depth while they are mixed. In one
+  /// descent: what it comes through overlaps the box, but along one axis at most, where it touches.
   template <class Found>
   void across(int index, int deepest, const Found& found) {
     const Box box = boxes_[static_cast<std::size_t>(index)];
-    for (std::size_t axis = 0; axis < static_cast<std::size_t>(n_); ++axis) {
-      const std::uint32_t size = whole >> box.cuts[axis];
-      for (const bool up : {false, true}) {
-        std::uint32_t line = up ? box.low[axis] + size : box.low[axis];
-        if (up ? line == whole : line == 0) {
-          if (!wraps_[axis]) {
-            continue;
-          }
-          line = up ? 0 : whole;
+    std::array<std::uint32_t, most_dimension> ends{};
+    for (std::size_t k = 0; k < static_cast<std::size_t>(n_); ++k) {
+      ends[k] = box.low[k] + (whole >> box.cuts[k]);
+    }
+    const auto touches = [&](const Box& other) {
+      int sides = 0;
+      for (std::size_t k = 0; k < static_cast<std::size_t>(n_); ++k) {
+        const std::uint32_t from = other.low[k];
+        const std::uint32_t to = from + (whole >> other.cuts[k]);
+        if (from < ends[k] && box.low[k] < to) {
+          continue;
         }
-        stack_.assign(1, 0);
-        while (!stack_.empty()) {
-          const int i = stack_.back();
-          stack_.pop_back();
-          {
-            const Box& other = boxes_[static_cast<std::size_t>(i)];
-            bool touches = true;
-            for (std::size_t k = 0; k < static_cast<std::size_t>(n_) && touches; ++k) {
-              const std::uint32_t from = other.low[k];
-              const std::uint32_t to = from + (whole >> other.cuts[k]);
-              if (k == axis) {
-                touches = up ? from <= line && line < to : from < line && line <= to;
-              } else {
-                const std::uint32_t mine = box.low[k];
-                touches = from < mine + (whole >> box.cuts[k]) && mine < to;
-              }
-            }
-            if (!touches || other.state == BoxState::blocked) {
-              continue;
-            }
-            if (other.state == BoxState::free) {
-              found(i);
-              continue;
-            }
-            if (other.state == BoxState::mixed && depth(other, n_) >= deepest) {
-              found(i);
-              continue;
-            }
-          }
-          if (boxes_[static_cast<std::size_t>(i)].state == BoxState::mixed) {
-            split(i, deepest);
-          }
-          const int child = boxes_[static_cast<std::size_t>(i)].child;
-          stack_.push_back(child);
-          stack_.push_back(child + 1);
+        const bool beside =
+            from == ends[k] || to == box.low[k] ||
+            (wraps_[k] && ((from == 0 && ends[k] == whole) || (to == whole && box.low[k] == 0)));
+        if (!beside || ++sides > 1) {
+          return false;
         }
       }
+      return true;
+    };
+    stack_.assign(1, 0);
+    while (!stack_.empty()) {
+      const int i = stack_.back();
+      stack_.pop_back();
+      const Box& other = boxes_[static_cast<std::size_t>(i)];
+      if (i == index || other.state == BoxState::blocked || !touches(other)) {
+        continue;
+      }
+      if (other.state == BoxState::free) {
+        found(i);
+        continue;
+      }
+      // What is finer from an earlier query is not looked into.
+      if ((other.state == BoxState::mixed || (deepest > 0 && other.state == BoxState::split)) &&
+          depth(other, n_) >= deepest) {
+        found(i);
+        continue;
+      }
+      if (other.state == BoxState::mixed) {
+        split(i, deepest);
+        stack_.push_back(i);
+        continue;
+      }
+      stack_.push_back(other.child);
+      stack_.push_back(other.child + 1);
     }
   }
 
@@ -241,31 +290,97 @@ class Boxes {
     const int source = leaf_at(start_, deepest);
     const int target = leaf_at(goal_, deepest);
     if (source == target) {
+      came_.assign(boxes_.size(), -1);
+      set_channel(source, -1);
       return FloodEnd::met;
     }
     std::array<std::vector<int>, 2> queues{std::vector<int>{source}, std::vector<int>{target}};
     std::array<std::size_t, 2> heads{};
     boxes_[static_cast<std::size_t>(source)].reached = 1;
     boxes_[static_cast<std::size_t>(target)].reached = 2;
-    bool met = false;
-    for (std::size_t side = 0; !met; side = 1 - side) {
+    came_.assign(boxes_.size(), -1);
+    int met = -1;
+    int met_from = -1;
+    for (std::size_t side = 0; met < 0; side = 1 - side) {
       if (heads[side] == queues[side].size()) {
+        close(queues[side]);
         return FloodEnd::closed;
       }
-      if (static_cast<long>(boxes_.size()) > most_ || !bound_.spend()) {
+      if (static_cast<long>(boxes_.size()) > most_ || !bound_->spend()) {
         return FloodEnd::full;
       }
       const auto mark = static_cast<std::uint8_t>(side + 1);
-      across(queues[side][heads[side]++], deepest, [&](int i) {
+      const int at = queues[side][heads[side]++];
+      across(at, deepest, [&](int i) {
         Box& box = boxes_[static_cast<std::size_t>(i)];
         if (box.reached == 0) {
           box.reached = mark;
+          came_.resize(boxes_.size(), -1);
+          came_[static_cast<std::size_t>(i)] = at;
           queues[side].push_back(i);
+        } else if (box.reached != mark && met < 0) {
+          met = i;
+          met_from = at;
         }
-        met = met || box.reached != mark;
       });
     }
+    set_channel(met, met_from);
     return FloodEnd::met;
+  }
+
+  /// Keeps what nothing leaves: these boxes have none but blocked ones beside them.
+  void close(const std::vector<int>& all) {
+    constexpr std::size_t most_kept = 64;
+    if (closed_.size() < most_kept) {
+      std::vector<bool> inside(boxes_.size(), false);
+      for (const int i : all) {
+        inside[static_cast<std::size_t>(i)] = true;
+      }
+      closed_.push_back(std::move(inside));
+    }
+  }
+
+  /// Whether one end is within what an earlier query found closed, and the other is not.
+  [[nodiscard]] bool parted() {
+    if (closed_.empty()) {
+      return false;
+    }
+    std::array<std::vector<bool>, 2> in;
+    for (std::size_t e = 0; e < 2; ++e) {
+      in[e].assign(closed_.size(), false);
+      const auto at = place_of(e == 0 ? start_ : goal_);
+      // Down to the finest, also below what was merged since.
+      for (int i = 0;;) {
+        for (std::size_t c = 0; c < closed_.size(); ++c) {
+          const auto k = static_cast<std::size_t>(i);
+          in[e][c] = in[e][c] || (k < closed_[c].size() && closed_[c][k]);
+        }
+        if (boxes_[static_cast<std::size_t>(i)].child == 0) {
+          break;
+        }
+        i = child_at(i, at);
+      }
+    }
+    return in[0] != in[1];
+  }
+
+  /// The boxes through which two met.
+  void set_channel(int one, int other) {
+    channel_.middles.clear();
+    channel_.halves.clear();
+    for (const int end : {one, other}) {
+      for (int i = end; i >= 0; i = came_[static_cast<std::size_t>(i)]) {
+        const Box& box = boxes_[static_cast<std::size_t>(i)];
+        Configuration q{};
+        Configuration by{};
+        for (std::size_t k = 0; k < static_cast<std::size_t>(n_); ++k) {
+          q[k] = static_cast<float>(middle(box, k));
+          by[k] = static_cast<float>(half(box, k));
+        }
+        channel_.middles.push_back(q);
+        channel_.halves.push_back(by);
+      }
+    }
   }
 
   /// Through free boxes alone, from middle to middle of what they share; nothing if there is none.
@@ -353,10 +468,10 @@ class Boxes {
  private:
   Judge& judge_;
   int n_;
-  long most_;
-  WorkBound& bound_;
-  const double* start_;
-  const double* goal_;
+  long most_ = 0;
+  WorkBound* bound_ = nullptr;
+  const double* start_ = nullptr;
+  const double* goal_ = nullptr;
   std::array<double, most_dimension> low_{};
   std::array<double, most_dimension> size_{};
   std::array<bool, most_dimension> wraps_{};
@@ -364,17 +479,20 @@ class Boxes {
   std::vector<int> queue_{};
   std::vector<int> came_{};
   std::vector<int> stack_{};
+  Channel channel_{};
+  std::vector<std::vector<bool>> closed_{};  ///< By the boxes: what nothing leaves.
 };
 
-}  // namespace
-
-BoxAnswer decompose(Judge& judge, const double* start, const double* goal, long boxes,
-                    WorkBound& bound) {
-  if (judge.dimension() > most_dimension) {
-    return {};
+BoxTree::BoxTree(Judge& judge) : boxes_(nullptr) {
+  if (judge.dimension() <= most_dimension) {
+    boxes_ = std::make_unique<Boxes>(judge);
   }
-  Boxes all(judge, start, goal, boxes, bound);
-  return all.run();
+}
+BoxTree::~BoxTree() = default;
+
+BoxAnswer BoxTree::connect(const double* start, const double* goal, long boxes, WorkBound& bound,
+                           const GrowAlong& along) {
+  return boxes_ ? boxes_->run(start, goal, boxes, bound, along) : BoxAnswer{};
 }
 
 }  // namespace flyball::detail

@@ -76,6 +76,7 @@ struct PathPlanner::State {
   detail::Tree a;
   detail::Tree b;
   detail::Roadmap roadmap{};
+  detail::BoxTree boxes{judge};
 };
 
 PathPlanner::PathPlanner(ConfigurationSpace space)
@@ -215,10 +216,18 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
   if (any || method == PathMethod::decomposition) {
     constexpr long most_boxes = 3'000'000;
     detail::WorkBound part(search.work, any ? 0.6 * search.seconds : search.seconds);
-    boxes = detail::decompose(judge, start.data(), goal.data(), most_boxes, part);
+    detail::GrowAlong along;
+    if (any) {
+      along = [&](const detail::Channel& channel, long work) {
+        return detail::rrt_connect(judge, state_->a, state_->b, start.data(), goal.data(), random,
+                                   work, part, &channel);
+      };
+    }
+    boxes = state_->boxes.connect(start.data(), goal.data(), most_boxes, part, along);
     if (boxes.path) {
-      result.nodes = boxes.boxes;
-      return done(*std::move(boxes.path), PathMethod::decomposition);
+      result.nodes = boxes.grown ? state_->a.size() + state_->b.size() : boxes.boxes;
+      return done(*std::move(boxes.path),
+                  boxes.grown ? PathMethod::rrt_connect : PathMethod::decomposition);
     }
     if (boxes.proven) {
       return refusal(ConfigurationError::no_path, where, "the goal")

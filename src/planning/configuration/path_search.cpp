@@ -191,8 +191,10 @@ Path join(const Tree& a, int at_a, const Tree& b, int at_b, int dimension, const
 }  // namespace
 
 std::optional<Path> rrt_connect(Judge& judge, Tree& a, Tree& b, const double* start,
-                                const double* goal, Random& random, long work, WorkBound& bound) {
+                                const double* goal, Random& random, long work, WorkBound& bound,
+                                const Channel* channel) {
   const int n = judge.dimension();
+  constexpr double share_of_channel = 0.85;
   Configuration q{};
   Configuration by{};
   Configuration near{};
@@ -209,7 +211,18 @@ std::optional<Path> rrt_connect(Judge& judge, Tree& a, Tree& b, const double* st
   Tree* from = &a;
   Tree* to = &b;
   for (long i = 0; i < work && bound.spend(); ++i) {
-    judge.sample(random, q.data());
+    if (channel != nullptr && random.uniform() < share_of_channel) {
+      const auto box = std::min(
+          static_cast<std::size_t>(random.uniform() * static_cast<double>(channel->middles.size())),
+          channel->middles.size() - 1);
+      for (int k = 0; k < n; ++k) {
+        const auto j = static_cast<std::size_t>(k);
+        q[j] = channel->middles[box][j] +
+               channel->halves[box][j] * static_cast<float>(random.uniform(-1.0, 1.0));
+      }
+    } else {
+      judge.sample(random, q.data());
+    }
     int at = from->nearest(judge, q.data());
     from->get(at, near.data());
     judge.difference(near.data(), q.data(), by.data());

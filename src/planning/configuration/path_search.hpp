@@ -2,6 +2,7 @@
 
 #include <array>
 #include <chrono>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -145,10 +146,20 @@ class Tree {
   std::vector<int> parents_{};
 };
 
+/// Boxes one beside the other, in which a path is looked for.
+struct Channel {
+  std::vector<Configuration> middles{};
+  std::vector<Configuration> halves{};
+};
+/// Looks for a path along a channel with so many moves.
+using GrowAlong = std::function<std::optional<Path>(const Channel& channel, long work)>;
+
 /// Random trees from both ends. @return The waypoints; nothing when the work is done.
-/// @param work  Moves of this call, within `bound`.
+/// @param work  Moves of this call, within `bound`. @param channel  Where most samples are taken
+/// from; null for anywhere.
 std::optional<Path> rrt_connect(Judge& judge, Tree& a, Tree& b, const double* start,
-                                const double* goal, Random& random, long work, WorkBound& bound);
+                                const double* goal, Random& random, long work, WorkBound& bound,
+                                const Channel* channel = nullptr);
 
 /// The way of RRT*, if one was found when its nodes or its work are there.
 std::optional<Path> rrt_star(Judge& judge, Tree& tree, const double* start, const double* goal,

@@ -324,5 +324,43 @@ TEST(PathPlanner, ProvesThatDiscsPartTheSpaceOfAnArm) {
   EXPECT_GE(joined, 5);
 }
 
+// What a planner has learnt of a space changes no verdict, and proves the next query sooner.
+TEST(PathPlanner, KeepsWhatBoxesProve) {
+  const ConfigurationSpace space = test::arm_space(16, true);
+  Random random(4);
+  PathPlanner keeps(space);
+  int proven = 0;
+  int proven_at_once = 0;
+  for (int i = 0; i < 30; ++i) {
+    std::vector<double> start;
+    std::vector<double> goal;
+    do {
+      start = test::random_configuration(space, random);
+    } while (!space.valid(start));
+    do {
+      goal = test::random_configuration(space, random);
+    } while (!space.valid(goal));
+    PathSearch search;
+    search.seed = static_cast<std::uint64_t>(i);
+    search.seconds = 60.0;
+    const auto kept = keeps.plan(start, goal, search);
+    const auto fresh = plan_path(space, start, goal, search);
+    ASSERT_EQ(kept.has_value(), fresh.has_value()) << i;
+    if (kept) {
+      EXPECT_EQ(fault(space, *kept, start, goal), "") << i;
+      continue;
+    }
+    ASSERT_TRUE(kept.error().is(ConfigurationError::no_path)) << to_string(kept.error());
+    ASSERT_TRUE(fresh.error().is(ConfigurationError::no_path)) << to_string(fresh.error());
+    ++proven;
+    // Either way between the ends.
+    const auto back = keeps.plan(goal, start, search);
+    ASSERT_FALSE(back);
+    proven_at_once += back.error().is(ConfigurationError::no_path) ? 1 : 0;
+  }
+  EXPECT_GE(proven, 3);
+  EXPECT_EQ(proven_at_once, proven);
+}
+
 }  // namespace
 }  // namespace flyball

@@ -30,7 +30,8 @@ enum class PathMethod {
 /// What is asked of a search.
 struct PathSearch {
   PathMethod method = PathMethod::automatic;
-  std::uint64_t seed = 1;  ///< The same seed and bounds give the same path.
+  /// The same seed and bounds give the same path, of planners that were asked the same before.
+  std::uint64_t seed = 1;
   /// s, > 0: when to give up. A search that ends before it does not depend on the clock.
   double seconds = 10.0;
   /// How many moves may be judged, >= 1, and boxes made, whichever comes first.
@@ -58,7 +59,8 @@ struct ConfigurationPath {
 ///
 /// Random trees judge moves eight configurations at a time, in floats with a tolerance on the safe
 /// side, along their whole length. What they do not find within a part of the work is decided by
-/// boxes that are proven free or blocked: they give a path, or the proof that there is none.
+/// boxes that are proven free or blocked: they give a path, a channel in which the trees grow on, or
+/// the proof that there is none. Boxes and proofs are kept for later queries.
 /// Source: J. Kuffner, S. LaValle, RRT-Connect, ICRA 2000; S. Karaman, E. Frazzoli, Sampling-based
 /// algorithms for optimal motion planning, IJRR 30 (2011); L. Kavraki et al., Probabilistic
 /// roadmaps, IEEE T-RA 12 (1996); D. Zhu, J.-C. Latombe, New heuristic algorithms for efficient
