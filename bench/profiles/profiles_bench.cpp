@@ -1,10 +1,10 @@
 // Profiles: how long a plan takes, and whether any of many millions breaks a law.
 //
-//   bench_profiles                  times of each profile over random states, beside the
-//   trapezoid's bench_profiles --campaign N     N random boundary-value problems a profile through
-//   the law suite
-//                                   (tests/planning/profiles/profile_laws.hpp); says each law
-//                                   broken
+//   bench_profiles                  times of each profile over random states, and how many of the
+//                                   trapezoid's times that is
+//   bench_profiles --campaign N     N random boundary-value problems a profile through the law
+//                                   suite (tests/planning/profiles/profile_laws.hpp); says each
+//                                   law broken
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -19,6 +19,7 @@
 #include <flyball/planning/profiles/parabolic_profile.hpp>
 #include <flyball/planning/profiles/synchronized_motion.hpp>
 
+#include "plain_trapezoid.hpp"
 #include "planning/profiles/profile_laws.hpp"
 
 namespace {
@@ -108,28 +109,41 @@ void time_all() {
   double sum = 0.0;
   const double period = 0.02;
   // Rebuilt each period from its own last sample, as a loop on a robot does.
-  const auto loop = [&](std::vector<Case> one) {
-    MotionState at = one.front().start;
-    int left = 200;
+  const auto loop = [&]<class Profile>(const Profile*, const MotionLimits& limits) {
+    constexpr int periods = 200;
+    const MotionState goal{4.0};
+    const double motion = nanoseconds(500, [&](std::size_t) {
+      MotionState at{};
+      for (int k = 0; k < periods; ++k) {
+        at = Profile(limits, at, goal).sample(period);
+      }
+      sum += at.position;
+    });
+    return motion / periods;
+  };
+  const auto step = [&]<class Profile>(const Profile*) {
     return nanoseconds(
-        std::vector<Case>(20000, one.front()),
-        [&](const Case& c) {
-          if (--left == 0) {
-            at = c.start;
-            left = 200;
-          }
-          at = TrapezoidProfile(c.limits, at, c.goal).sample(period);
-          return at.position;
-        },
+        cases,
+        [&](const Case& c) { return Profile(c.limits, c.start, c.goal).sample(period).position; },
         sum);
   };
-  const double trapezoid_loop = loop({{{1.5, 3.0}, {}, {4.0}}});
-  const double trapezoid = nanoseconds(
-      cases,
-      [&](const Case& c) {
-        return TrapezoidProfile(c.limits, c.start, c.goal).sample(period).position;
-      },
-      sum);
+  constexpr const TrapezoidProfile* ours = nullptr;
+  constexpr const bench::PlainTrapezoid* plain = nullptr;
+  constexpr MotionLimits equal{1.5, 3.0};
+  constexpr MotionLimits unequal{1.5, 3.0, 2.0, 1.2};
+  // In turns, so that what else the machine does meets both.
+  double trapezoid_loop = 1e300;
+  double unequal_loop = 1e300;
+  double plain_loop = 1e300;
+  double trapezoid = 1e300;
+  double plain_step = 1e300;
+  for (int turn = 0; turn < 5; ++turn) {
+    trapezoid_loop = std::min(trapezoid_loop, loop(ours, equal));
+    plain_loop = std::min(plain_loop, loop(plain, equal));
+    unequal_loop = std::min(unequal_loop, loop(ours, unequal));
+    trapezoid = std::min(trapezoid, step(ours));
+    plain_step = std::min(plain_step, step(plain));
+  }
   const double s_curve = nanoseconds(
       cases, [&](const Case& c) { return SCurveProfile(c.limits, c.start, c.goal).total_time(); },
       sum);
@@ -156,7 +170,10 @@ void time_all() {
     std::printf("%-44s %10.1f %10.2f\n", name, ns, ns / trapezoid);
   };
   row("trapezoid and one sample, rebuilt in a loop", trapezoid_loop);
+  row("  with unequal limits", unequal_loop);
+  row("  by plain formulas, equal limits only", plain_loop);
   row("trapezoid and one sample, random states", trapezoid);
+  row("  by plain formulas", plain_step);
   row("S-curve, random states", s_curve);
   row("S-curve, 3 axes at once", three);
   row("S-curve, 7 axes at once", seven);

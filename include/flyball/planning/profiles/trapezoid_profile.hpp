@@ -68,93 +68,113 @@ inline bool TrapezoidProfile::reversible() const noexcept {
   const double down = limits.deceleration == 0.0 ? up : limits.deceleration;
   const double v_high = limits.velocity;
   const double v_low = limits.reverse_velocity == 0.0 ? v_high : limits.reverse_velocity;
-  // Within these nothing below overflows, nor does any place on the way.
+  // Within these nothing below overflows, nor does any place on the way. What is not a number makes
+  // the sum none.
   constexpr double largest = 1e100;  // core/signal.hpp
   constexpr double least = 1e-100;
-  const double size = __builtin_fabs(start.position) + __builtin_fabs(start.velocity) +
-                      __builtin_fabs(goal.position) + __builtin_fabs(goal.velocity);
-  const double most_velocity = v_high > v_low ? v_high : v_low;
-  const double most_acceleration = up > down ? up : down;
-  const bool usable = v_high >= least && v_low >= least && up >= least && down >= least &&
-                      size + most_velocity + most_acceleration <= largest;
-  if (!usable) [[unlikely]] {
+  const double speeds = __builtin_fabs(start.velocity) + __builtin_fabs(goal.velocity);
+  const double size = __builtin_fabs(start.position) + __builtin_fabs(goal.position) + speeds;
+  const double sum = size + (v_high + v_low) + (up + down);
+  const double lowest_velocity = v_high < v_low ? v_high : v_low;
+  const double lowest_acceleration = up < down ? up : down;
+  const double lowest =
+      lowest_velocity < lowest_acceleration ? lowest_velocity : lowest_acceleration;
+  if (!(sum <= largest && lowest >= least)) [[unlikely]] {
     goal_.position = __builtin_isfinite(goal.position) ? goal.position : 0.0;
     goal_.velocity = 0.0;
     start_ = goal_;
     return;
   }
-  const double end = goal.velocity > v_high   ? v_high
-                     : goal.velocity < -v_low ? -v_low
-                                              : goal.velocity;
+  const double at_most = goal.velocity < v_high ? goal.velocity : v_high;
+  const double end = at_most > -v_low ? at_most : -v_low;
   goal_.velocity = end;
 
-  // Going straight from one velocity to the other covers (v_g² - v_0²)/2a with the acceleration a
-  // of that sign. What lies beyond it needs acceleration first, what falls short of it braking
-  // first: the same motion mirrored.
+  // Going straight from one velocity to the other covers |v_g - v_0| (v_g + v_0)/2s with the
+  // acceleration s of that sign. What lies beyond it needs acceleration first, what falls short of
+  // it braking first: the same motion mirrored.
   const double distance = goal.position - start.position;
-  const double squares = end * end - start.velocity * start.velocity;
-  const double straight = end >= start.velocity ? up : -down;
-  const double beyond = 2.0 * straight * distance - squares;  // times 2a
-  const bool forward = (beyond >= 0.0) == (straight > 0.0) || beyond == 0.0;
+  const double change = end - start.velocity;
+  const double s = up == down || change >= 0.0 ? up : down;
+  const double beyond = 2.0 * s * distance - __builtin_fabs(change) * (end + start.velocity);
+  const bool forward = beyond >= 0.0;
   const double sign = forward ? 1.0 : -1.0;
   const double a = forward ? up : down;
   const double b = forward ? down : up;
   const double v_max = forward ? v_high : v_low;
-  const double d = sign * distance;
   const double v_0 = sign * start.velocity;
   const double v_g = sign * end;
 
-  // Divisions cost most here: with equal limits one is enough.
+  // The peak c of a motion without cruise, (c² - v_0²)/2a + (c² - v_g²)/2b = d, from the larger of
+  // the ends' velocities up, where one of the terms is the straight change and the other what lies
+  // beyond it. Divisions cost most: with equal limits one is enough, and none of them waits for
+  // the states.
+  const double larger = v_0 > v_g ? v_0 : v_g;
   const double per_a = 1.0 / a;
-  const double per_b = a == b ? per_a : 1.0 / b;
-  const double to_peak = a == b ? 0.5 * a : 1.0 / (per_a + per_b);
-
-  // The peak c of a motion without cruise: (c² - v_0²)/2a + (c² - v_g²)/2b = d.
-  const double peak_square = (2.0 * d + v_0 * v_0 * per_a + v_g * v_g * per_b) * to_peak;
-  double peak = __builtin_sqrt(peak_square > 0.0 ? peak_square : 0.0);
+  double per_b = per_a;
+  double per_both = per_a;
+  double share = 0.5;
+  if (a != b) {
+    per_b = 1.0 / b;
+    per_both = 0.5 * (per_a + per_b);
+    share = (s == a ? b : a) / (a + b);
+  }
+  const double peak_square = larger * larger + share * __builtin_fabs(beyond);
+  const double excess = peak_square - v_max * v_max;
   // Of what is straight only rounding is left (of states that were sampled on the way, too). Its
   // root must not become a phase, nor a goal that moves be missed by it.
-  const double scale = 2.0 * a * size + v_0 * v_0 + v_g * v_g;
-  if (__builtin_fabs(beyond) <= 2e-15 * scale) [[unlikely]] {
-    peak = v_0 > v_g ? v_0 : v_g;
+  const double rounding = 2e-15 * (2.0 * s * size + 0.5 * speeds * speeds);
+  double c = v_max;
+  double t_2 = 0.0;
+  if (__builtin_fabs(beyond) <= rounding) [[unlikely]] {
+    c = larger;
+  } else if (excess < 0.0) {
+    c = __builtin_sqrt(peak_square);
+  } else {
+    t_2 = excess * per_both / v_max;
   }
-  const double c = peak < v_max ? peak : v_max;
-  const double t_1 = __builtin_fabs(c - v_0) * (a == b || c >= v_0 ? per_a : per_b);
-  const double t_3 = __builtin_fabs(v_g - c) * (a == b || v_g > c ? per_a : per_b);
-  const double slack = d - 0.5 * ((v_0 + c) * t_1 + (c + v_g) * t_3);
-  const double cruised = (c < v_max ? 0.0 : slack) / v_max;
-  const double t_2 = cruised > 0.0 ? cruised : 0.0;
+  first_acceleration_ = sign * a;
+  last_acceleration_ = -sign * b;
+  double t_1 = (c - v_0) * per_a;
+  if (v_0 > v_max) [[unlikely]] {
+    c = v_max;
+    t_1 = (v_0 - c) * per_b;
+    first_acceleration_ = last_acceleration_;
+    const double slack =
+        sign * distance - 0.5 * per_b * ((v_0 + c) * (v_0 - c) + (c + v_g) * (c - v_g));
+    t_2 = slack > 0.0 ? slack / v_max : 0.0;
+  }
   cruise_ = sign * c;
-  first_acceleration_ = t_1 > 0.0 ? sign * (c >= v_0 ? a : -b) : 0.0;
-  last_acceleration_ = t_3 > 0.0 ? sign * (v_g > c ? a : -b) : 0.0;
-  start_.acceleration = t_1 > 0.0 ? first_acceleration_ : t_2 > 0.0 ? 0.0 : last_acceleration_;
   time_[0] = t_1;
   time_[1] = t_1 + t_2;
-  time_[2] = t_1 + t_2 + t_3;
+  time_[2] = t_1 + t_2 + (c - v_g) * per_b;
 }
 
 [[gnu::always_inline]] inline MotionState TrapezoidProfile::sample(double t) const noexcept {
   if (!(t > 0.0)) {
-    return {start_.position, start_.velocity, t == 0.0 ? start_.acceleration : 0.0};
+    const double first = time_[0] > 0.0        ? first_acceleration_
+                         : time_[1] > 0.0      ? 0.0
+                         : time_[2] > time_[1] ? last_acceleration_
+                                               : 0.0;
+    return {start_.position, start_.velocity, t == 0.0 ? first : 0.0};
   }
   if (t < time_[0]) {
     return {start_.position + (start_.velocity + 0.5 * first_acceleration_ * t) * t,
             start_.velocity + first_acceleration_ * t, first_acceleration_};
-  }
-  if (t >= time_[2]) {
-    const double past = __builtin_isfinite(t) ? t - time_[2] : 0.0;
-    const double position = goal_.position + goal_.velocity * past;
-    return {__builtin_isfinite(position) ? position : goal_.position, goal_.velocity, 0.0};
   }
   if (t < time_[1]) {
     const double t_1 = time_[0];
     const double x_1 = start_.position + (start_.velocity + 0.5 * first_acceleration_ * t_1) * t_1;
     return {x_1 + cruise_ * (t - t_1), cruise_, 0.0};
   }
-  // Backwards from the goal, so that the end is met exactly.
-  const double left = time_[2] - t;
-  return {goal_.position - (goal_.velocity - 0.5 * last_acceleration_ * left) * left,
-          goal_.velocity - last_acceleration_ * left, last_acceleration_};
+  if (t < time_[2]) {
+    // Backwards from the goal, so that the end is met exactly.
+    const double left = time_[2] - t;
+    return {goal_.position - (goal_.velocity - 0.5 * last_acceleration_ * left) * left,
+            goal_.velocity - last_acceleration_ * left, last_acceleration_};
+  }
+  const double past = __builtin_isfinite(t) ? t - time_[2] : 0.0;
+  const double position = goal_.position + goal_.velocity * past;
+  return {__builtin_isfinite(position) ? position : goal_.position, goal_.velocity, 0.0};
 }
 
 static_assert(MotionProfile<TrapezoidProfile>);
