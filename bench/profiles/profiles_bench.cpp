@@ -20,6 +20,7 @@
 #include <flyball/planning/profiles/synchronized_motion.hpp>
 
 #include "plain_trapezoid.hpp"
+#include "planning/profiles/fastest_duration.hpp"
 #include "planning/profiles/profile_laws.hpp"
 
 namespace {
@@ -197,66 +198,153 @@ void campaign(const char* name, long count, Try&& attempt) {
   std::fflush(stdout);
 }
 
+std::string try_trapezoid(Random& random, bool outside) {
+  const test::ProfileDemand demand = test::random_demand(random, 2, outside);
+  const TrapezoidProfile profile(demand.limits, demand.start, demand.goal);
+  std::string law = test::broken_law(profile, demand);
+  const MotionLimits all = demand.limits.both_ways();
+  return law.empty()
+             ? test::broken_optimality(
+                   profile.total_time(), test::ConstantEffort{all.acceleration, all.deceleration},
+                   all.velocity, all.reverse_velocity, demand.start, demand.goal)
+             : law;
+}
+
+std::string try_s_curve(Random& random, bool outside) {
+  const test::ProfileDemand demand = test::random_demand(random, 3, outside);
+  return test::broken_law(SCurveProfile(demand.limits, demand.start, demand.goal), demand);
+}
+
+std::string try_parabolic(Random& random, bool outside) {
+  test::ProfileDemand demand = test::random_demand(random, 2, outside);
+  const double V = demand.limits.velocity;
+  demand.limits = {V, demand.limits.acceleration};
+  if (!outside) {
+    demand.start.velocity = std::clamp(demand.start.velocity, -V, V);
+  }
+  demand.goal.velocity = std::clamp(demand.goal.velocity, -V, V);
+  demand.replan = false;
+  const ParabolicProfile profile(demand.limits, demand.start, demand.goal);
+  std::string law = test::broken_law(profile, demand);
+  return law.empty() ? test::broken_optimality(profile.total_time(),
+                                               test::ParabolicEffort{V, demand.limits.acceleration},
+                                               V, V, demand.start, demand.goal)
+                     : law;
+}
+
+std::string try_exponential(Random& random, bool outside) {
+  test::ProfileDemand demand = test::random_demand(random, 2, outside);
+  MotorMotionLimits motor{.kV = 12.0 / demand.limits.velocity,
+                          .kA = 12.0 / demand.limits.acceleration,
+                          .voltage = 12.0,
+                          .kS = random.uniform(0.0, 1.0),
+                          .kG = random.uniform(-3.0, 3.0)};
+  const double top = 8.0 / motor.kV;
+  if (random.uniform() < 0.5) {
+    motor.current_voltage = random.uniform(5.0, 20.0);
+  }
+  if (random.uniform() < 0.5) {
+    motor.velocity = random.uniform(0.1, 1.0) * top;
+  }
+  const double most = std::min(top, motor.velocity);
+  if (!outside) {
+    demand.start.velocity = std::clamp(demand.start.velocity, -most, most);
+  }
+  demand.goal.velocity = std::clamp(demand.goal.velocity, -most, most);
+  demand.replan = false;
+  const ExponentialProfile profile(motor, demand.start, demand.goal);
+  // At speed it brakes harder than it accelerates from rest.
+  const double fastest = std::max(std::abs(demand.start.velocity), 2.0 * demand.limits.velocity);
+  demand.limits = {2.0 * demand.limits.velocity, (28.0 + motor.kV * fastest) / motor.kA};
+  std::string law = test::broken_law(profile, demand);
+  if (!law.empty()) {
+    return law;
+  }
+  constexpr double nearly = 1.0 - 1e-9;  // of the top speed: the profile's own limit
+  const double free = motor.voltage - motor.kS;
+  return test::broken_optimality(profile.total_time(), test::MotorEffort{motor},
+                                 std::min(motor.velocity, nearly * (free - motor.kG) / motor.kV),
+                                 std::min(motor.velocity, nearly * (free + motor.kG) / motor.kV),
+                                 demand.start, demand.goal);
+}
+
+/// @param rest  From rest to rest, which every limit lets be kept.
+/// @param kept  Counts those that keep their limits.
+std::string try_minimum_jerk(Random& random, bool rest, bool looks_for_shorter, long& kept) {
+  test::ProfileDemand demand = test::random_demand(random, 3, false);
+  demand.replan = false;
+  if (rest) {
+    demand.start = {demand.start.position};
+    demand.goal = {demand.goal.position};
+  }
+  const MinimumJerkProfile profile(demand.limits, demand.start, demand.goal);
+  if (!profile.keeps_limits()) {
+    return rest ? "from rest to rest it breaks the limits" : "";
+  }
+  ++kept;
+  std::string law = test::broken_law(profile, demand);
+  if (!law.empty() || profile.total_time() == 0.0) {
+    return law;
+  }
+  if (rest) {
+    const MotionLimits all = demand.limits.both_ways();
+    const double d = demand.goal.position - demand.start.position;
+    const double v = d > 0.0 ? all.velocity : all.reverse_velocity;
+    const double a = std::min(all.acceleration, all.deceleration);
+    const double best =
+        std::max({1.875 * std::abs(d) / v, std::sqrt(10.0 / std::sqrt(3.0) * std::abs(d) / a),
+                  std::cbrt(60.0 * std::abs(d) / all.jerk)});
+    return std::abs(profile.total_time() - best) <= 2e-9 * best ? "" : "not the shortest";
+  }
+  constexpr int tries = 30;
+  return looks_for_shorter ? test::shorter_polynomial(profile, demand, tries) : law;
+}
+
+std::string try_three_axes(Random& random) {
+  SynchronizedMotion<3>::Limits limits;
+  SynchronizedMotion<3>::States start;
+  SynchronizedMotion<3>::States goal;
+  test::ProfileDemand demands[3];
+  for (std::size_t i = 0; i < 3; ++i) {
+    demands[i] = test::random_demand(random, 3, false);
+    limits[i] = demands[i].limits;
+    start[i] = demands[i].start;
+    goal[i] = demands[i].goal;
+  }
+  const SynchronizedMotion<3> motion(limits, start, goal);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const JerkMotion& axis = motion.axis(static_cast<int>(i));
+    if (std::abs(axis.total_time() - motion.total_time()) > 1e-9 * motion.total_time()) {
+      return "an axis ends by itself";
+    }
+    std::string law = test::broken_law(axis, demands[i]);
+    if (!law.empty()) {
+      return law;
+    }
+  }
+  return "";
+}
+
 void run_campaigns(long count) {
   for (const bool outside : {false, true}) {
-    campaign(outside ? "trapezoid, from outside" : "trapezoid", count, [&](Random& random) {
-      const test::ProfileDemand demand = test::random_demand(random, 2, outside);
-      return test::broken_law(TrapezoidProfile(demand.limits, demand.start, demand.goal), demand);
-    });
-    campaign(outside ? "s-curve, from outside" : "s-curve", count, [&](Random& random) {
-      const test::ProfileDemand demand = test::random_demand(random, 3, outside);
-      return test::broken_law(SCurveProfile(demand.limits, demand.start, demand.goal), demand);
-    });
+    const auto run = [&](const char* inside_name, const char* outside_name, auto&& attempt) {
+      campaign(outside ? outside_name : inside_name, count,
+               [&](Random& random) { return attempt(random, outside); });
+    };
+    run("trapezoid", "trapezoid, from outside", try_trapezoid);
+    run("s-curve", "s-curve, from outside", try_s_curve);
+    run("parabolic", "parabolic, from outside", try_parabolic);
+    run("exponential", "exponential, from outside", try_exponential);
   }
-  campaign("parabolic", count, [&](Random& random) {
-    test::ProfileDemand demand = test::random_demand(random, 2, false);
-    demand.limits = {demand.limits.velocity, demand.limits.acceleration};
-    demand.start.velocity =
-        std::clamp(demand.start.velocity, -demand.limits.velocity, demand.limits.velocity);
-    demand.goal.velocity =
-        std::clamp(demand.goal.velocity, -demand.limits.velocity, demand.limits.velocity);
-    demand.replan = false;
-    return test::broken_law(ParabolicProfile(demand.limits, demand.start, demand.goal), demand);
-  });
-  campaign("exponential", count, [&](Random& random) {
-    test::ProfileDemand demand = test::random_demand(random, 2, false);
-    const MotorMotionLimits motor{.kV = 12.0 / demand.limits.velocity,
-                                  .kA = 12.0 / demand.limits.acceleration,
-                                  .voltage = 12.0,
-                                  .kS = random.uniform(0.0, 1.0),
-                                  .kG = random.uniform(-3.0, 3.0)};
-    const double top = 8.0 / motor.kV;
-    demand.start.velocity = std::clamp(demand.start.velocity, -top, top);
-    demand.goal.velocity = std::clamp(demand.goal.velocity, -top, top);
-    demand.replan = false;
-    const ExponentialProfile profile(motor, demand.start, demand.goal);
-    demand.limits = {2.0 * demand.limits.velocity, 28.0 / motor.kA};
-    return test::broken_law(profile, demand);
-  });
-  campaign("three axes at once", count / 3, [&](Random& random) {
-    SynchronizedMotion<3>::Limits limits;
-    SynchronizedMotion<3>::States start;
-    SynchronizedMotion<3>::States goal;
-    test::ProfileDemand demands[3];
-    for (std::size_t i = 0; i < 3; ++i) {
-      demands[i] = test::random_demand(random, 3, false);
-      limits[i] = demands[i].limits;
-      start[i] = demands[i].start;
-      goal[i] = demands[i].goal;
-    }
-    const SynchronizedMotion<3> motion(limits, start, goal);
-    for (std::size_t i = 0; i < 3; ++i) {
-      const JerkMotion& axis = motion.axis(static_cast<int>(i));
-      if (std::abs(axis.total_time() - motion.total_time()) > 1e-9 * motion.total_time()) {
-        return std::string("an axis ends by itself");
-      }
-      std::string law = test::broken_law(axis, demands[i]);
-      if (!law.empty()) {
-        return law;
-      }
-    }
-    return std::string();
-  });
+  for (const bool rest : {true, false}) {
+    long kept = 0;
+    long tried = 0;
+    campaign(rest ? "minimum jerk, at rest" : "minimum jerk", count, [&](Random& random) {
+      return try_minimum_jerk(random, rest, ++tried % 50 == 0, kept);
+    });
+    std::printf("%-28s %10ld of them can keep their limits\n", "", kept);
+  }
+  campaign("three axes at once", count / 3, try_three_axes);
 }
 
 }  // namespace

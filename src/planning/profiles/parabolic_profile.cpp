@@ -14,7 +14,7 @@ struct Parabola {
   double V = 0.0;
   double T = 0.0;
 
-  [[nodiscard]] double left(double v) const { return T * std::sqrt(std::max(0.0, 1.0 - v / V)); }
+  [[nodiscard]] double left(double v) const { return T * std::sqrt(std::max(0.0, (V - v) / V)); }
   [[nodiscard]] double velocity(double s) const { return V * (1.0 - s * s / (T * T)); }
   /// The way from s to t, 0 <= t <= s.
   [[nodiscard]] double way(double s, double t) const {

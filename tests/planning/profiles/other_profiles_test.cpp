@@ -9,6 +9,7 @@
 #include <flyball/planning/profiles/minimum_jerk_profile.hpp>
 #include <flyball/planning/profiles/parabolic_profile.hpp>
 
+#include "planning/profiles/fastest_duration.hpp"
 #include "planning/profiles/profile_laws.hpp"
 #include "support/allocation_count.hpp"
 
@@ -84,6 +85,27 @@ TEST(ExponentialProfile, UsesWhatTheMotorHas) {
   }
 }
 
+// No duration is shorter, by bisection over the velocity between full effort up and down.
+TEST(ExponentialProfile, IsTheFastest) {
+  Random random(35);
+  for (int trial = 0; trial < 2000; ++trial) {
+    const MotorMotionLimits motor = random_motor(random);
+    const double top = std::min(motor.velocity, 8.0 / motor.kV);
+    const MotionState start{random.normal(), random.uniform(-2.0, 2.0) * top};
+    const MotionState goal{random.normal() * 3.0, random.uniform(-1.0, 1.0) * top};
+    const ExponentialProfile profile(motor, start, goal);
+    constexpr double nearly = 1.0 - 1e-9;  // of the top speed
+    const double high =
+        std::min(motor.velocity, nearly * (motor.voltage - motor.kS - motor.kG) / motor.kV);
+    const double low =
+        std::min(motor.velocity, nearly * (motor.voltage - motor.kS + motor.kG) / motor.kV);
+    ASSERT_EQ(test::broken_optimality(profile.total_time(), test::MotorEffort{motor}, high, low,
+                                      start, goal),
+              "")
+        << trial;
+  }
+}
+
 // The same motor as a trapezoid that it can follow everywhere needs longer.
 TEST(ExponentialProfile, BeatsEveryTrapezoidOfItsMotor) {
   const MotorMotionLimits motor{.kV = 4.0, .kA = 0.4, .voltage = 12.0, .kS = 0.3, .kG = 0.8};
@@ -125,6 +147,21 @@ TEST(ParabolicProfile, KeepsTheLaws) {
         ASSERT_LE(std::abs(at.acceleration), most + 1e-6 * demand.limits.acceleration) << trial;
       }
     }
+  }
+}
+
+TEST(ParabolicProfile, IsTheFastest) {
+  Random random(36);
+  for (int trial = 0; trial < 2000; ++trial) {
+    const test::ProfileDemand demand = test::random_demand(random, 2, trial % 2 == 0);
+    const double V = demand.limits.velocity;
+    const double A = demand.limits.acceleration;
+    MotionState goal = demand.goal;
+    goal.velocity = std::clamp(goal.velocity, -V, V);
+    ASSERT_EQ(test::broken_optimality(ParabolicProfile({V, A}, demand.start, goal).total_time(),
+                                      test::ParabolicEffort{V, A}, V, V, demand.start, goal),
+              "")
+        << trial;
   }
 }
 
@@ -178,6 +215,26 @@ TEST(MinimumJerkProfile, KeepsTheLaws) {
     }
   }
   EXPECT_GT(kept, 600);
+}
+
+// No shorter duration keeps the limits, be it below a gap of durations that do not.
+TEST(MinimumJerkProfile, IsTheShortest) {
+  Random random(37);
+  int kept = 0;
+  for (int trial = 0; trial < 500; ++trial) {
+    const test::ProfileDemand demand = test::random_demand(random, 3, false);
+    const MinimumJerkProfile profile(demand.limits, demand.start, demand.goal);
+    if (profile.keeps_limits() && profile.total_time() > 0.0) {
+      ++kept;
+      ASSERT_EQ(test::shorter_polynomial(profile, demand, 30), "") << trial;
+    }
+  }
+  EXPECT_GT(kept, 200);
+  // From a velocity back to the same place with the same velocity, with another acceleration, it
+  // goes round: no bound of the duration is above zero, and there is one that keeps the limits.
+  const MinimumJerkProfile round({2.0, 3.0, 0.0, 0.0, 20.0}, {0.0, 0.4, 0.0}, {0.0, 0.4, 0.1});
+  EXPECT_TRUE(round.keeps_limits());
+  EXPECT_GT(round.total_time(), 0.1);
 }
 
 // Of all motions that take its time it has the least ∫ jerk²: adding s³(1-s)³ times anything, which

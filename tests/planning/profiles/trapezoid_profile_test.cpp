@@ -8,6 +8,7 @@
 
 #include <flyball/core/random.hpp>
 
+#include "planning/profiles/fastest_duration.hpp"
 #include "planning/profiles/profile_laws.hpp"
 #include "support/allocation_count.hpp"
 
@@ -113,6 +114,32 @@ TEST(TrapezoidProfile, IsTheFastest) {
       if (c != 0.0 && rest / c >= 0.0) {
         ASSERT_GE(t_1 + rest / c + t_3, best - 1e-9);
       }
+    }
+  }
+}
+
+// The same of all limits and states, by bisection over the peak.
+TEST(TrapezoidProfile, IsTheFastestOfAll) {
+  Random random(6);
+  for (int trial = 0; trial < 4000; ++trial) {
+    const test::ProfileDemand demand = test::random_demand(random, 2, trial % 2 == 0);
+    const MotionLimits all = demand.limits.both_ways();
+    const TrapezoidProfile profile(demand.limits, demand.start, demand.goal);
+    ASSERT_EQ(test::broken_optimality(
+                  profile.total_time(), test::ConstantEffort{all.acceleration, all.deceleration},
+                  all.velocity, all.reverse_velocity, demand.start, demand.goal),
+              "")
+        << trial;
+  }
+}
+
+// At its velocity limit, with almost no acceleration, it still cruises to its goal.
+TEST(TrapezoidProfile, CruisesWithLimitsOfAllSizes) {
+  for (const double down : {1e-99, 1e-20, 1.0}) {
+    for (const double up : {1e-99, 1e-20, 1.0}) {
+      const MotionLimits limits{.velocity = 2.0, .acceleration = up, .deceleration = down};
+      EXPECT_NEAR(TrapezoidProfile(limits, {0.0, 2.0}, {1.0, 2.0}).total_time(), 0.5, 1e-15);
+      EXPECT_NEAR(TrapezoidProfile(limits, {1.0, -2.0}, {0.0, -2.0}).total_time(), 0.5, 1e-15);
     }
   }
 }

@@ -11,9 +11,10 @@ namespace flyball {
 ///
 /// Where no duration keeps them (a start outside of the limits), the one that breaks them least of
 /// those tried is taken and `keeps_limits()` is false. Run-time object: noexcept, allocation-free,
-/// bounded (at most 150 durations are tried, some tenths of a millisecond), finite: unusable
-/// numbers give a profile that is at the goal from the start. Source: T. Flash, N. Hogan, The
-/// coordination of arm movements, J. Neuroscience 5 (1985), (6).
+/// bounded (at most 260 durations are looked at; four on average, and 64 where none keeps the
+/// limits, each in under a microsecond), finite: unusable numbers give a profile that is at the
+/// goal from the start. Source: T. Flash, N. Hogan, The coordination of arm movements, J.
+/// Neuroscience 5 (1985), (6).
 class MinimumJerkProfile {
  public:
   MinimumJerkProfile(const MotionLimits& limits, const MotionState& start,
@@ -43,8 +44,6 @@ class MinimumJerkProfile {
  private:
   MinimumJerkProfile() = default;
   void set(double duration, const MotionState& start, const MotionState& goal) noexcept;
-  /// By how much the limits are broken at worst: 1 keeps them just so.
-  [[nodiscard]] double excess() const noexcept;
 
   MotionLimits limits_{};
   MotionState goal_{};

@@ -9,10 +9,10 @@ namespace flyball {
 ///
 /// A start above the velocity limit is braked down to it at the acceleration limit; a goal velocity
 /// above it is cut to it. Run-time object: noexcept, allocation-free, and finite for whatever it is
-/// given: limits outside of 1e-100 to 1e100, or states that are not finite or beyond
-/// `largest_signal` (all together), give a profile that is at the goal from the start. The jerk
-/// limit has no part in it. Planning and one sample take some ten nanoseconds, so that it may be
-/// planned anew each period. Source: book, section 15.1.3.
+/// given: limits below 1e-100, accelerations above 1e100 or states that are not finite or beyond
+/// `largest_signal` (all together) give a profile that is at the goal from the start. A velocity
+/// limit may be infinite. The jerk limit has no part in it. Planning and one sample take some ten
+/// nanoseconds, so that it may be planned anew each period. Source: book, section 15.1.3.
 class TrapezoidProfile {
  public:
   /// @param start  Where it is (its acceleration is ignored). @param goal  Where it is to be.
@@ -72,14 +72,11 @@ inline bool TrapezoidProfile::reversible() const noexcept {
   // the sum none.
   constexpr double largest = 1e100;  // core/signal.hpp
   constexpr double least = 1e-100;
-  const double speeds = __builtin_fabs(start.velocity) + __builtin_fabs(goal.velocity);
-  const double size = __builtin_fabs(start.position) + __builtin_fabs(goal.position) + speeds;
-  const double sum = size + (v_high + v_low) + (up + down);
-  const double lowest_velocity = v_high < v_low ? v_high : v_low;
-  const double lowest_acceleration = up < down ? up : down;
-  const double lowest =
-      lowest_velocity < lowest_acceleration ? lowest_velocity : lowest_acceleration;
-  if (!(sum <= largest && lowest >= least)) [[unlikely]] {
+  const double places = __builtin_fabs(start.position) + __builtin_fabs(goal.position);
+  const double sum =
+      places + __builtin_fabs(start.velocity) + __builtin_fabs(goal.velocity) + (up + down);
+  const double lowest = up < down ? up : down;
+  if (!(sum <= largest && lowest >= least && v_high >= least && v_low >= least)) [[unlikely]] {
     goal_.position = __builtin_isfinite(goal.position) ? goal.position : 0.0;
     goal_.velocity = 0.0;
     start_ = goal_;
@@ -109,6 +106,10 @@ inline bool TrapezoidProfile::reversible() const noexcept {
   // beyond it. Divisions cost most: with equal limits one is enough, and none of them waits for
   // the states.
   const double larger = v_0 > v_g ? v_0 : v_g;
+  // Of what is straight only rounding is left (of states that were sampled on the way, too). Its
+  // root must not become a phase, nor a goal that moves be missed by it.
+  const double speeds = __builtin_fabs(start.velocity) + __builtin_fabs(end);
+  double rounding = 4e-15 * s * places + 1e-15 * speeds * speeds;
   const double per_a = 1.0 / a;
   double per_b = per_a;
   double per_both = per_a;
@@ -117,31 +118,33 @@ inline bool TrapezoidProfile::reversible() const noexcept {
     per_b = 1.0 / b;
     per_both = 0.5 * (per_a + per_b);
     share = (s == a ? b : a) / (a + b);
+    // In the peak's square.
+    const double lost = 1e-15 * larger * larger * (a + b) * (s == a ? per_b : per_a);
+    rounding = rounding > lost ? rounding : lost;
   }
-  const double peak_square = larger * larger + share * __builtin_fabs(beyond);
-  const double excess = peak_square - v_max * v_max;
-  // Of what is straight only rounding is left (of states that were sampled on the way, too). Its
-  // root must not become a phase, nor a goal that moves be missed by it.
-  const double rounding = 2e-15 * (2.0 * s * size + 0.5 * speeds * speeds);
+  const double more = share * __builtin_fabs(beyond);
+  const double excess = (larger - v_max) * (larger + v_max) + more;  // of the peak's square
   double c = v_max;
   double t_2 = 0.0;
-  if (__builtin_fabs(beyond) <= rounding) [[unlikely]] {
-    c = larger;
-  } else if (excess < 0.0) {
-    c = __builtin_sqrt(peak_square);
+  if (excess < 0.0) {
+    c = __builtin_sqrt(larger * larger + more);
   } else {
     t_2 = excess * per_both / v_max;
   }
   first_acceleration_ = sign * a;
   last_acceleration_ = -sign * b;
   double t_1 = (c - v_0) * per_a;
-  if (v_0 > v_max) [[unlikely]] {
-    c = v_max;
-    t_1 = (v_0 - c) * per_b;
-    first_acceleration_ = last_acceleration_;
+  if (__builtin_fabs(beyond) <= rounding || v_0 > v_max) [[unlikely]] {
+    c = larger < v_max ? larger : v_max;
+    t_1 = (c - v_0) * per_a;
+    if (v_0 > v_max) {
+      t_1 = (v_0 - c) * per_b;
+      first_acceleration_ = last_acceleration_;
+    }
+    // What is more than rounding of places is cruised.
     const double slack =
-        sign * distance - 0.5 * per_b * ((v_0 + c) * (v_0 - c) + (c + v_g) * (c - v_g));
-    t_2 = slack > 0.0 ? slack / v_max : 0.0;
+        sign * distance - 0.5 * ((v_0 + c) * t_1 + (c + v_g) * ((c - v_g) * per_b));
+    t_2 = c > 0.0 && slack > 2e-15 * places ? slack / c : 0.0;
   }
   cruise_ = sign * c;
   time_[0] = t_1;
