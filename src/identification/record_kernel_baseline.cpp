@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "identification/record_kernel.hpp"
+#include "math/dense/gemm_kernel.hpp"
 
 #define FLYBALL_VARIANT baseline
 #define FLYBALL_HOLD(lanes) static_cast<void>(lanes)

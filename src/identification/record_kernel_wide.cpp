@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "identification/record_kernel.hpp"
+#include "math/dense/gemm_kernel.hpp"
 
 // For processors with 256-bit vectors and fused multiply-add, which instruction_set.hpp asks for
 // when running. Only functions of this variant's namespace are compiled for them.

@@ -5,6 +5,7 @@
 
 #include "math/dense/balance_columns.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/gemm_kernel.hpp"
 #include "math/dense/ordinary_units.hpp"
 
 namespace flyball::detail {
@@ -12,21 +13,56 @@ namespace flyball::detail {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
+namespace {
+
+/// C = A B by the kernel of the house, which the products of some ten rows do not pay for; steps of
+/// A's rows and depth, and of B's depth and columns. False where Eigen's does.
+bool multiply_quickly(const MatrixRef& A, bool A_turned, const MatrixRef& B, bool B_turned,
+                      MatrixXd& C) {
+  constexpr Index small = 16;
+  constexpr Index most = 1 << 15;  // steps are ints
+  const Index depth = A_turned ? A.rows() : A.cols();
+  if (C.rows() < small || C.cols() < small || depth < small || A.outerStride() > most ||
+      B.outerStride() > most || C.rows() > most || C.cols() > most || depth > most) {
+    return false;
+  }
+  const auto A_step = static_cast<int>(A.outerStride());
+  const auto B_step = static_cast<int>(B.outerStride());
+  gemm({static_cast<int>(C.rows()),
+        static_cast<int>(C.cols()),
+        static_cast<int>(depth),
+        {A.data(), A_turned ? A_step : 1, A_turned ? 1 : A_step},
+        {B.data(), B_turned ? B_step : 1, B_turned ? 1 : B_step},
+        C.data(),
+        static_cast<int>(C.rows()),
+        GemmKind::assign,
+        false});
+  return true;
+}
+
+}  // namespace
+
 MatrixXd product(const MatrixRef& A, const MatrixRef& B) {
   MatrixXd C(A.rows(), B.cols());
-  C.noalias() = A * B;
+  if (!multiply_quickly(A, false, B, false, C)) {
+    C.noalias() = A * B;
+  }
   return C;
 }
 
 MatrixXd transposed_product(const MatrixRef& A, const MatrixRef& B) {
   MatrixXd C(A.cols(), B.cols());
-  C.noalias() = A.transpose() * B;
+  if (!multiply_quickly(A, true, B, false, C)) {
+    C.noalias() = A.transpose() * B;
+  }
   return C;
 }
 
 MatrixXd product_transposed(const MatrixRef& A, const MatrixRef& B) {
   MatrixXd C(A.rows(), B.rows());
-  C.noalias() = A * B.transpose();
+  if (!multiply_quickly(A, false, B, true, C)) {
+    C.noalias() = A * B.transpose();
+  }
   return C;
 }
 

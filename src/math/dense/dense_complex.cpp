@@ -15,6 +15,17 @@ using Eigen::MatrixXcd;
 
 MatrixXcd complex_product(const ComplexMatrixRef& A, const ComplexMatrixRef& B) {
   MatrixXcd C(A.rows(), B.cols());
+  // Four real products by the kernel of the house take a fraction of the time of a complex one.
+  constexpr Eigen::Index small = 32;
+  if (A.rows() >= small && A.cols() >= small && B.cols() >= small) {
+    const Eigen::MatrixXd re = A.real();
+    const Eigen::MatrixXd im = A.imag();
+    const Eigen::MatrixXd B_re = B.real();
+    const Eigen::MatrixXd B_im = B.imag();
+    C.real() = product(re, B_re) - product(im, B_im);
+    C.imag() = product(re, B_im) + product(im, B_re);
+    return C;
+  }
   C.noalias() = A * B;
   return C;
 }

@@ -29,6 +29,13 @@ namespace flyball::detail {
   static const bool has = __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
   return has;
 }
+/// 512-bit vectors, too: of kernels whose time is all in products.
+[[nodiscard]] inline bool has_widest_vectors() {
+  static const bool has = has_wide_vectors() && __builtin_cpu_supports("avx512f") != 0 &&
+                          __builtin_cpu_supports("avx512dq") != 0 &&
+                          __builtin_cpu_supports("avx512vl") != 0;
+  return has;
+}
 #endif
 
 }  // namespace flyball::detail

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "math/dense/gemm_kernel.hpp"
 #include "math/dense/panel_kernel.hpp"
 #include "math/dense/schur_kernel.hpp"
 #include "math/equations/lyapunov_kernel.hpp"

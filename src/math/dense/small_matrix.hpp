@@ -141,6 +141,23 @@ inline void multiply(Size<N> n, double* C, std::ptrdiff_t ldc, const double* A, 
       return;
     }
   }
+  if constexpr (N == 0) {
+    if (is_worth_packing(rows, columns, depth)) {
+      const auto step = [](std::ptrdiff_t value) { return static_cast<int>(value); };
+      gemm(GemmTask{step(rows),
+                    step(columns),
+                    step(depth),
+                    {A, 1, step(lda)},
+                    {B, 1, step(ldb)},
+                    C,
+                    step(ldc),
+                    Kind == Product::assign ? GemmKind::assign
+                    : Kind == Product::add  ? GemmKind::add
+                                            : GemmKind::subtract,
+                    Lower});
+      return;
+    }
+  }
   if (rows == 2) {
     product_strip<Vector2, 1, Kind>(C, ldc, A, lda, B, ldb, depth, columns);
     return;

@@ -35,6 +35,10 @@ class StableLyapunov {
     }
     load();
     ClosedLoop<N> loop(n_, data_.continuous, S_, loop_work_, pivots_, powers_);
+    // A Schur form costs less than a series of many terms.
+    if (n_() > 5 && !loop.fades_quickly()) {
+      return false;
+    }
     const double gain = loop.gain(1e10);
     copy(X_, C_);
     if (!std::isfinite(gain) || !loop.solve(X_)) {
@@ -104,7 +108,7 @@ class StableLyapunov {
         double X[8] = {};
         double C[8] = {};
         double R[8];
-        double work[16];
+        double work[24];
         for (int j = 0; j < n; ++j) {
           for (int i = 0; i < n; ++i) {
             A[i + 4 * j] = S_[j + 2 * i];
@@ -126,7 +130,7 @@ class StableLyapunov {
       }
     }
     double* const work = loop_work_ + 2 * size();
-    double* const A = loop_work_ + 4 * size();
+    double* const A = loop_work_ + 5 * size();
     for (int k = 0; k < size(); ++k) {
       A[k] = 0.0;
       T_[k] = -C_[k];

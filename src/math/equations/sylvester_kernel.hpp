@@ -40,7 +40,7 @@ inline constexpr int sylvester_stack_size = 16;
 [[nodiscard]] bool solve_sylvester_quickly(const SylvesterData& data, SylvesterAnswer& answer);
 
 /// R = F - (A X + X B), or F - (A X B - X), summed in twice the working precision. All padded with
-/// zeros to whole vectors, A, X, F and R to the same; `work` holds two matrices as X.
+/// zeros to whole vectors, A, X, F and R to the same; `work` holds three matrices as X.
 void sylvester_residual(const SylvesterData& padded, const double* X, double* R, double* work);
 
 FLYBALL_KERNEL([[nodiscard]] bool solve_sylvester(const SylvesterData& data,

@@ -33,7 +33,7 @@ class HessenbergSchur {
     for (double** matrix : {&F_, &X_, &R_, &first_, &second_}) {
       *matrix = work.take(lda_ * m_);
     }
-    Y_ = work.take(3 * lda_ * m_);
+    Y_ = work.take(3 * lda_ * m_);  // the residual takes `first_`, `second_` and a part of this
     known_ = work.take(6 * lda_);
     vectors_ = work.take(6 * std::max(lda_, ldb_));
     da_ = work.take(lda_);

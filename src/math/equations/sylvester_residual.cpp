@@ -1,4 +1,7 @@
+#include <algorithm>
+
 #include "math/equations/sylvester_kernel.hpp"
+#include "math/extended/twice_product.hpp"
 
 // Compiled with -ffp-contract=off: a fused product would no longer be what the next line corrects.
 
@@ -84,6 +87,62 @@ inline __attribute__((always_inline)) void residual(const SylvesterData& data, c
   }
 }
 
+/// hi + lo += value.
+inline void add(double value, double& hi, double& lo) {
+  const double sum = hi + value;
+  const double part = sum - hi;
+  lo += (hi - (sum - part)) + (value - part);
+  hi = sum;
+}
+
+/// The same residual by products of whole matrices.
+void residual_by_products(const SylvesterData& data, const double* X, double* R, double* work) {
+  const int n = data.rows;
+  const int m = data.columns;
+  const int ld = padded_rows(n);
+  const int ldb = padded_rows(m);
+  const int size = ld * m;
+  double* const low = work + size;
+  std::fill_n(work, 2 * size, 0.0);
+  if (data.continuous && data.symmetric) {
+    // X B is (A X)ᵀ.
+    add_product_twice({ld, m, n, -1.0, {data.A, 1, ld}, {X, 1, ld}, nullptr, work, low, ld, false});
+    for (int j = 0; j < m; ++j) {
+      for (int i = j / width * width; i < ld; ++i) {
+        double hi = data.F[i + j * ld];
+        double lo = low[i + j * ld];
+        add(work[i + j * ld], hi, lo);
+        if (i < n) {
+          add(work[j + i * ld], hi, lo);
+          lo += low[j + i * ld];
+        }
+        R[i + j * ld] = hi + lo;
+      }
+    }
+    return;
+  }
+  std::copy_n(data.F, size, R);
+  if (data.continuous) {
+    add_product_twice({ld, m, n, -1.0, {data.A, 1, ld}, {X, 1, ld}, nullptr, R, low, ld, false});
+    add_product_twice({ld, m, m, -1.0, {X, 1, ld}, {data.B, 1, ldb}, nullptr, R, low, ld, false});
+    for (int k = 0; k < size; ++k) {
+      R[k] += low[k];
+    }
+    return;
+  }
+  add_product_twice({ld, m, m, 1.0, {X, 1, ld}, {data.B, 1, ldb}, nullptr, work, low, ld, false});
+  double* const rest = low + size;
+  std::fill_n(rest, size, 0.0);
+  for (int k = 0; k < size; ++k) {
+    add(X[k], R[k], rest[k]);
+  }
+  add_product_twice(
+      {ld, m, n, -1.0, {data.A, 1, ld}, {work, 1, ld}, low, R, rest, ld, data.symmetric});
+  for (int k = 0; k < size; ++k) {
+    R[k] += rest[k];
+  }
+}
+
 /// The upper triangle of an R that is symmetric is its lower one.
 void mirror(int n, double* R) {
   const int ld = padded_rows(n);
@@ -108,6 +167,13 @@ __attribute__((target("avx2,fma"))) void residual_wide(const SylvesterData& data
 }  // namespace
 
 void sylvester_residual(const SylvesterData& padded, const double* X, double* R, double* work) {
+  if (is_worth_twice(padded.rows, padded.columns, padded.rows)) {
+    residual_by_products(padded, X, R, work);
+    if (padded.symmetric) {
+      mirror(padded.rows, R);
+    }
+    return;
+  }
 #ifdef FLYBALL_WIDE_VECTORS
   (has_wide_vectors() ? residual_wide : residual_baseline)(padded, X, R, work);
 #else

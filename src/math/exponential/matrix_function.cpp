@@ -43,7 +43,8 @@ struct Triangularized {
 
   [[nodiscard]] MatrixXd assemble(const MatrixXcd& F) const {
     const MatrixXcd UF = detail::complex_product(schur.U, F);
-    const MatrixXd M = detail::complex_product(UF, schur.U.adjoint()).real();
+    const MatrixXd M = detail::product_transposed(MatrixXd(UF.real()), MatrixXd(schur.U.real())) +
+                       detail::product_transposed(MatrixXd(UF.imag()), MatrixXd(schur.U.imag()));
     return d.asDiagonal() * M * d.cwiseInverse().asDiagonal();
   }
 };

@@ -74,10 +74,54 @@ void restore_power(const MatrixXcd& T, double s, MatrixXcd& P) {
   }
 }
 
-/// The principal square root of an upper triangular matrix (Björck and Hammarling).
-MatrixXcd square_root(const MatrixXcd& T) {
+/// Up to here rows and columns one by one; beyond, matrices are halved, so that most of the work is
+/// in products.
+constexpr Index unhalved = 40;
+
+/// C becomes the X of A X + X B = C, A and B upper triangular (Jonsson and Kågström, ACM
+/// Transactions on Mathematical Software 28 (2002)).
+void solve_sylvester(const Eigen::Ref<const MatrixXcd>& A, const Eigen::Ref<const MatrixXcd>& B,
+                     Eigen::Ref<MatrixXcd> C) {
+  const Index n = A.rows();
+  const Index m = B.rows();
+  if (n <= unhalved && m <= unhalved) {
+    for (Index j = 0; j < m; ++j) {
+      for (Index k = 0; k < j; ++k) {
+        C.col(j) -= B(k, j) * C.col(k);
+      }
+      for (Index i = n - 1; i >= 0; --i) {
+        C(i, j) /= A(i, i) + B(j, j);
+        C.col(j).head(i) -= C(i, j) * A.col(i).head(i);
+      }
+    }
+    return;
+  }
+  if (n >= m) {
+    const Index half = n / 2;
+    solve_sylvester(A.bottomRightCorner(n - half, n - half), B, C.bottomRows(n - half));
+    C.topRows(half) -= complex_product(A.topRightCorner(half, n - half), C.bottomRows(n - half));
+    solve_sylvester(A.topLeftCorner(half, half), B, C.topRows(half));
+  } else {
+    const Index half = m / 2;
+    solve_sylvester(A, B.topLeftCorner(half, half), C.leftCols(half));
+    C.rightCols(m - half) -= complex_product(C.leftCols(half), B.topRightCorner(half, m - half));
+    solve_sylvester(A, B.bottomRightCorner(m - half, m - half), C.rightCols(m - half));
+  }
+}
+
+/// The principal square root R of an upper triangular matrix (Björck and Hammarling; by halves:
+/// Deadman, Higham and Ralha, Applied Parallel and Scientific Computing (2013)), R zero before.
+void square_root(const Eigen::Ref<const MatrixXcd>& T, Eigen::Ref<MatrixXcd> R) {
   const Index n = T.rows();
-  MatrixXcd R = MatrixXcd::Zero(n, n);
+  if (n > unhalved) {
+    const Index half = n / 2;
+    square_root(T.topLeftCorner(half, half), R.topLeftCorner(half, half));
+    square_root(T.bottomRightCorner(n - half, n - half), R.bottomRightCorner(n - half, n - half));
+    R.topRightCorner(half, n - half) = T.topRightCorner(half, n - half);
+    solve_sylvester(R.topLeftCorner(half, half), R.bottomRightCorner(n - half, n - half),
+                    R.topRightCorner(half, n - half));
+    return;
+  }
   for (Index j = 0; j < n; ++j) {
     R(j, j) = std::sqrt(T(j, j));
     for (Index i = j - 1; i >= 0; --i) {
@@ -88,6 +132,11 @@ MatrixXcd square_root(const MatrixXcd& T) {
       R(i, j) = sum / (R(i, i) + R(j, j));
     }
   }
+}
+
+MatrixXcd square_root(const MatrixXcd& T) {
+  MatrixXcd R = MatrixXcd::Zero(T.rows(), T.cols());
+  square_root(T, R);
   return R;
 }
 
@@ -173,16 +222,40 @@ MatrixXcd shifted_by_identity(MatrixXcd X) {
 
 }  // namespace
 
-MatrixXcd solve_triangular(const MatrixXcd& T, MatrixXcd B) {
+namespace {
+
+void divide_by_triangle(const Eigen::Ref<const MatrixXcd>& T, Eigen::Ref<MatrixXcd> B) {
+  const Index n = T.rows();
+  if (n > unhalved) {
+    const Index half = n / 2;
+    // Of an upper triangular B the lower rows begin with zeros, which stay.
+    const bool upper = B.cols() == n && B.bottomLeftCorner(n - half, half).isZero(0.0);
+    const Index columns = upper ? n - half : B.cols();
+    auto lower_rows = B.bottomRightCorner(n - half, columns);
+    divide_by_triangle(T.bottomRightCorner(n - half, n - half), lower_rows);
+    B.topRightCorner(half, columns) -=
+        complex_product(T.topRightCorner(half, n - half), lower_rows);
+    if (upper) {
+      divide_by_triangle(T.topLeftCorner(half, half), B.topLeftCorner(half, half));
+    }
+    divide_by_triangle(T.topLeftCorner(half, half), B.topRightCorner(half, columns));
+    return;
+  }
   for (Index j = 0; j < B.cols(); ++j) {
-    for (Index k = T.rows() - 1; k >= 0; --k) {
-      B(k, j) /= T(k, k);
-      const Complex factor = B(k, j);
-      if (factor != 0.0) {
+    for (Index k = n - 1; k >= 0; --k) {
+      if (B(k, j) != 0.0) {
+        const Complex factor = B(k, j) / T(k, k);
+        B(k, j) = factor;
         B.col(j).head(k) -= factor * T.col(k).head(k);
       }
     }
   }
+}
+
+}  // namespace
+
+MatrixXcd solve_triangular(const MatrixXcd& T, MatrixXcd B) {
+  divide_by_triangle(T, B);
   return B;
 }
 

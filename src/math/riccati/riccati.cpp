@@ -109,6 +109,45 @@ bool holds_in_given_units(const detail::RiccatiData& data, detail::RiccatiAnswer
   return true;
 }
 
+/// The kernel in units by powers of two that balance A, of many states whose units make A far
+/// larger than its eigenvalues: doubling would take many steps, and lose as many digits, for
+/// nothing. False where the units are not so, or where the kernel does not vouch for its result.
+bool solve_in_balanced_units(const detail::RiccatiData& data, detail::RiccatiAnswer& answer) {
+  constexpr int few = 20;
+  constexpr double far_larger = 64.0;
+  const int n = data.states;
+  const int m = data.inputs;
+  if (n <= few) {
+    return false;
+  }
+  const ConstMap A(data.A, n, n);
+  const Eigen::VectorXd d = detail::balance_of(A);
+  const Eigen::VectorXd inverse = d.cwiseInverse();
+  const Eigen::MatrixXd scaled_A = inverse.asDiagonal() * A * d.asDiagonal();
+  if (!(far_larger * detail::norm1(scaled_A) < detail::norm1(A))) {
+    return false;
+  }
+  const Eigen::MatrixXd B = inverse.asDiagonal() * ConstMap(data.B, n, m);
+  const Eigen::MatrixXd Q = d.asDiagonal() * ConstMap(data.Q, n, n) * d.asDiagonal();
+  const Eigen::MatrixXd N = d.asDiagonal() * cross_weight(data);
+  const detail::RiccatiData scaled{n,
+                                   m,
+                                   scaled_A.data(),
+                                   B.data(),
+                                   Q.data(),
+                                   data.R,
+                                   data.N == nullptr ? nullptr : N.data(),
+                                   data.continuous};
+  if (!detail::solve_riccati_quickly(scaled, answer)) {
+    return false;
+  }
+  Eigen::Map<Eigen::MatrixXd> X(answer.X, n, n);
+  Eigen::Map<Eigen::MatrixXd> K(answer.K, m, n);
+  X = (inverse.asDiagonal() * X * inverse.asDiagonal()).eval();
+  K = (K * inverse.asDiagonal()).eval();
+  return X.allFinite() && K.allFinite();
+}
+
 /// The same answer as check_symmetric without its message; S finite.
 bool symmetric(const double* S, int n) {
   for (int j = 0; j < n; ++j) {
@@ -154,7 +193,7 @@ Expected<void> solve_riccati(const RiccatiData& data, RiccatiAnswer& answer) {
       is_ordinary(largest(data.R, m * m)) &&
       (data.N == nullptr || is_ordinary(largest(data.N, n * m)));
   if (ordinary && symmetric(data.Q, n) && symmetric(data.R, m) &&
-      solve_riccati_quickly(data, answer)) {
+      (solve_in_balanced_units(data, answer) || solve_riccati_quickly(data, answer))) {
     if (!in_units_far_apart(answer.X, n)) {
       return {};
     }

@@ -43,9 +43,9 @@ class ClosedLoop {
   }
 
   /// An estimate of trace(L⁻¹(I)), a bound of ‖L⁻¹‖: exact for few states, from four vectors of
-  /// signs else (Hutchinson); infinite where the powers of A do not fade, or grow beyond `most`
-  /// times their squared size.
-  double gain(double most = std::numeric_limits<double>::infinity()) {
+  /// signs else (Hutchinson); infinite where the powers of A do not fade within so many steps, or
+  /// grow beyond `most` times their squared size.
+  double gain(double most = std::numeric_limits<double>::infinity(), int steps = 2000) {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     if (!valid_) {
       return infinity;
@@ -68,7 +68,24 @@ class ClosedLoop {
       }
       return trace;
     }
-    return sampled_gain(most);
+    return sampled_gain(most, steps);
+  }
+
+  /// Whether A^128 is small: of one that is not the series has many terms. Where the powers are
+  /// kept, those that are formed for this serve the solutions.
+  bool fades_quickly() {
+    if (!valid_) {
+      return false;
+    }
+    const double* A = A_;
+    for (int k = 1; k <= 7; ++k) {
+      A = next_power(k, A);
+      const double size = squared_norm(n_, A, n_());
+      if (!(size < 1e100) || size < 1e-2) {
+        return size < 1.0;
+      }
+    }
+    return squared_norm(n_, A, n_()) < 1.0;
   }
 
   /// C ← L⁻¹(C), C symmetric; false where the powers of A do not fade. What the series lacks is
@@ -154,7 +171,7 @@ class ClosedLoop {
     }
   }
 
-  double sampled_gain(double most) {
+  double sampled_gain(double most, int steps) {
     const int ld = n_.padded();
     double* y = take(2);
     double* next = y + 4 * ld;
@@ -181,7 +198,7 @@ class ClosedLoop {
       sum = advance(M_);
     }
     const double largest = most * sum;
-    for (int k = 0; k < 2000; ++k) {
+    for (int k = 0; k < steps; ++k) {
       const double norm = advance(A_);
       sum += norm;
       if (!(norm <= largest)) {

@@ -1,6 +1,10 @@
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <memory>
 #include <new>
 
+#include "math/extended/twice_product.hpp"
 #include "math/riccati/riccati_kernel.hpp"
 
 // Compiled with -ffp-contract=off: a fused product would no longer be what the next line corrects.
@@ -115,11 +119,124 @@ __attribute__((target("avx2,fma"))) void residual_wide(const RiccatiData& data, 
 }
 #endif
 
+/// The same by products of whole matrices; false where there is no memory for them.
+bool residual_by_products(const RiccatiData& data, const double* X, const double* K, double* F) {
+  const int n = data.states;
+  const int m = data.inputs;
+  const int size = n + m;
+  const auto area = [](int rows, int columns) {
+    return static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
+  };
+  const std::size_t T_size = area(size, size);
+  const std::unique_ptr<double[]> memory(
+      new (std::nothrow) double[4 * T_size + area(n, size) + 2 * area(n, n) + area(m + 1, n)]());
+  if (memory == nullptr) {
+    return false;
+  }
+  double* const S = memory.get();
+  double* const S_low = S + T_size;
+  double* const T = S_low + T_size;
+  double* const T_low = T + T_size;
+  double* const AB = T_low + T_size;
+  double* const F_low = AB + area(n, size);
+  double* const Y = F_low + area(n, n);
+  double* const L = Y + area(n, n);
+  double* const d = L + area(m, n);
+  // In states measured by powers of two near √X_ii, so that rows and columns are of one size.
+  for (int i = 0; i < n; ++i) {
+    const double x = X[i + i * n];
+    d[i] = x > 0.0 && std::isfinite(x) ? std::ldexp(1.0, std::ilogb(x) / 2) : 1.0;
+  }
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      AB[i + j * n] = data.A[i + j * n] * d[i] / d[j];
+      Y[i + j * n] = X[i + j * n] / d[i] / d[j];
+    }
+    for (int i = 0; i < m; ++i) {
+      L[i + j * m] = K[i + j * m] / d[j];
+    }
+  }
+  for (int j = 0; j < m; ++j) {
+    for (int i = 0; i < n; ++i) {
+      AB[i + (n + j) * n] = data.B[i + j * n] * d[i];
+    }
+  }
+  // T = X[A B].
+  add_product_twice({n, size, n, 1.0, {Y, 1, n}, {AB, 1, n}, nullptr, T, T_low, n, false});
+  // S, its lower triangle.
+  for (int j = 0; j < n; ++j) {
+    for (int i = j; i < n; ++i) {
+      S[i + j * size] = 0.5 * (data.Q[i + j * n] + data.Q[j + i * n]) / d[i] / d[j];
+    }
+    for (int i = 0; data.N != nullptr && i < m; ++i) {
+      S[n + i + j * size] = data.N[j + i * n] / d[j];
+    }
+  }
+  for (int j = 0; j < m; ++j) {
+    for (int i = j; i < m; ++i) {
+      S[n + i + (n + j) * size] = 0.5 * (data.R[i + j * m] + data.R[j + i * m]);
+    }
+  }
+  if (data.continuous) {
+    for (int j = 0; j < n; ++j) {
+      for (int i = j; i < size; ++i) {
+        Sum sum{S[i + j * size], 0.0};
+        if (i < n) {
+          add(sum, T[i + j * n]);
+          sum.lo += T_low[i + j * n];
+        }
+        add(sum, T[j + i * n]);
+        sum.lo += T_low[j + i * n];
+        S[i + j * size] = sum.hi;
+        S_low[i + j * size] = sum.lo;
+      }
+    }
+  } else {
+    add_product_twice({size, size, n, 1.0, {AB, n, 1}, {T, 1, n}, T_low, S, S_low, size, true});
+  }
+  for (int j = 0; j < size; ++j) {
+    for (int i = 0; i < j; ++i) {
+      S[i + j * size] = S[j + i * size];
+      S_low[i + j * size] = S_low[j + i * size];
+    }
+  }
+  // The first columns of S become S Z, Z = [I; -K].
+  add_product_twice(
+      {size, n, m, -1.0, {S + n * size, 1, size}, {L, 1, m}, nullptr, S, S_low, size, false});
+  std::fill_n(T, T_size, 0.0);
+  std::fill_n(T_low, T_size, 0.0);
+  add_product_twice(
+      {size, n, m, -1.0, {S_low + n * size, 1, size}, {L, 1, m}, nullptr, T, T_low, size, false});
+  for (int k = 0; k < size * n; ++k) {
+    S_low[k] += T[k];
+  }
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      Sum sum{S[i + j * size], S_low[i + j * size]};
+      if (!data.continuous) {
+        add(sum, -Y[i + j * n]);
+      }
+      F[i + j * n] = sum.hi;
+      F_low[i + j * n] = sum.lo;
+    }
+  }
+  add_product_twice({n, n, m, -1.0, {L, m, 1}, {S + n, 1, size}, S_low + n, F, F_low, n, false});
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      F[i + j * n] = (F[i + j * n] + F_low[i + j * n]) * d[i] * d[j];
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 bool riccati_residual(const RiccatiData& data, const double* X, const double* K, double* F) {
   constexpr int on_stack = 16;
   const int size = data.states + data.inputs;
+  if (size > on_stack && is_worth_twice(data.states, data.states, data.states)) {
+    return residual_by_products(data, X, K, F);
+  }
   Sum stack[2 * on_stack * on_stack];
   std::unique_ptr<Sum[]> heap;
   Sum* S = stack;

@@ -186,6 +186,22 @@ TEST(MatrixLogarithm, IsTheInverseOfTheExponential) {
   }
 }
 
+// So many states that triangles are halved.
+TEST(MatrixLogarithm, OfManyStates) {
+  Random random(12);
+  for (const Eigen::Index n : {41, 90, 131}) {
+    const Eigen::MatrixXd G = normal(random, n);
+    const Eigen::MatrixXd X = G * (4.0 / G.norm());
+    const Eigen::MatrixXd A = expm(X).value();
+    const auto L = logm(A);
+    ASSERT_TRUE(L) << to_string(L.error());
+    EXPECT_LT((*L - X).norm(), 1e-12 * X.norm()) << n;
+    const auto root = powm(A, 0.5);
+    ASSERT_TRUE(root) << to_string(root.error());
+    EXPECT_LT((*root - expm(0.5 * X).value()).norm(), 1e-12 * root->norm()) << n;
+  }
+}
+
 TEST(MatrixLogarithm, ClosedForms) {
   Eigen::Matrix2d rotation;
   const double angle = 3.1;

@@ -3,7 +3,10 @@
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
+#include <flyball/math/riccati/riccati.hpp>
+
 #include "math/equations/sylvester_kernel.hpp"
+#include "math/extended/double_double.hpp"
 #include "math/riccati/riccati_kernel.hpp"
 #include "support/random_systems.hpp"
 
@@ -41,6 +44,83 @@ TEST(ShortWay, RiccatiEquations) {
           continuous ? MatrixXd(B.transpose() * X)
                      : MatrixXd((R + B.transpose() * X * B).inverse() * B.transpose() * X * A);
       EXPECT_LT((K - gain).norm(), 1e-12 * (1.0 + gain.norm()));
+    }
+  }
+}
+
+// States in units far apart, of so many that only the short way answers in time.
+TEST(ShortWay, ManyStatesInUnitsFarApart) {
+  Random random(33);
+  const int n = 60;
+  const int m = 4;
+  for (const bool continuous : {false, true}) {
+    const MatrixXd A = random_matrix(random, n, n) / std::sqrt(n);
+    const MatrixXd B = random_matrix(random, n, m);
+    const MatrixXd Q = MatrixXd::Identity(n, n);
+    const MatrixXd R = MatrixXd::Identity(m, m);
+    Eigen::VectorXd d(n);
+    for (int i = 0; i < n; ++i) {
+      d(i) = std::ldexp(1.0, (7 * i) % 31 - 15);
+    }
+    const MatrixXd D = d.asDiagonal();
+    const MatrixXd inverse = d.cwiseInverse().asDiagonal();
+    const auto solve = [&](const MatrixXd& a, const MatrixXd& b, const MatrixXd& q) {
+      return continuous ? care(a, b, q, R) : dare(a, b, q, R);
+    };
+    const auto plain = solve(A, B, Q);
+    const auto far = solve(D * A * inverse, D * B, inverse * Q * inverse);
+    ASSERT_TRUE(plain.has_value());
+    ASSERT_TRUE(far.has_value());
+    EXPECT_LT((D * far->X * D - plain->X).norm(), 1e-12 * plain->X.norm());
+    EXPECT_LT((far->K * D - plain->K).norm(), 1e-12 * plain->K.norm());
+  }
+}
+
+// The residual by whole products is that by sums of two doubles, in units far apart, too.
+TEST(ShortWay, RiccatiResidual) {
+  Random random(34);
+  for (const int n : {9, 24}) {
+    const int m = 8;
+    for (const bool continuous : {false, true}) {
+      const MatrixXd A = random_matrix(random, n, n);
+      const MatrixXd B = random_matrix(random, n, m);
+      const MatrixXd N = random_matrix(random, n, m);
+      const MatrixXd K = random_matrix(random, m, n);
+      const auto symmetric = [&](int size) -> MatrixXd {
+        const MatrixXd M = random_matrix(random, size, size);
+        return M + M.transpose();
+      };
+      MatrixXd X = symmetric(n);
+      X.row(2) *= 1e9;
+      X.col(2) *= 1e9;
+      X(2, 2) = std::abs(X(2, 2));
+      const MatrixXd R = symmetric(m);
+      // Zᵀ([A B]ᵀX[A B] + W)Z - X, or of the continuous equation, with Z = [I; -K].
+      const auto exact = [&](const MatrixXd& Q) -> MatrixXd {
+        using Matrix = detail::DoubleDoubleMatrix;
+        const Matrix k(K);
+        const Matrix S = detail::add_product(Matrix(A), -1.0, Matrix(B), k);
+        const Matrix XS = detail::product(Matrix(X), S);
+        const Matrix NK = detail::product(Matrix(N), k);
+        Matrix left = detail::add_product(Matrix(Q), 1.0, Matrix(K.transpose()),
+                                          detail::product(Matrix(R), k));
+        left = detail::sum(detail::sum(left, -1.0, NK), -1.0, NK.transpose());
+        left = continuous ? detail::sum(detail::sum(left, 1.0, XS), 1.0, XS.transpose())
+                          : detail::sum(detail::add_product(left, 1.0, S.transpose(), XS), -1.0,
+                                        Matrix(X));
+        return left.rounded();
+      };
+      // So that the terms cancel to their last digits.
+      MatrixXd Q = symmetric(n);
+      const MatrixXd rest = exact(Q);
+      Q -= 0.5 * (rest + rest.transpose());
+      const MatrixXd expected = exact(Q);
+      MatrixXd F(n, n);
+      ASSERT_TRUE(detail::riccati_residual(
+          {n, m, A.data(), B.data(), Q.data(), R.data(), N.data(), continuous}, X.data(), K.data(),
+          F.data()));
+      EXPECT_LT(expected.norm(), 1e-12 * rest.norm());
+      EXPECT_LT((F - expected).norm(), 1e-9 * expected.norm());
     }
   }
 }
