@@ -685,7 +685,7 @@ class PlanReader {
       if (!(value >= 0.0 && value <= 2e9 && value == std::floor(value))) {
         const toml::node* const set = given.seed.empty() ? plan.get("seed") : nullptr;
         refuse(set != nullptr ? set->source() : toml::source_region{},
-               refusal(ArgumentError::out_of_range, "plan", "seed")
+               refusal(ArgumentError::out_of_range, {}, given.seed.empty() ? "plan.seed" : "--seed")
                    .got(format_number(value))
                    .expected("a whole number from 0 to 2000000000"));
         return;

@@ -170,7 +170,8 @@ class Reader {
     }
     if (!node.is_string()) {
       return wrong(node, name,
-                   fmt::format("a {} with its unit, in quotes: \"{}\"", to_string(dimension),
+                   fmt::format("{} with its unit, in quotes: \"{}\"",
+                               dimension == Dimension::angle ? "an angle" : "a length",
                                dimension == Dimension::angle ? "30 deg" : "0.5 m"));
     }
     auto value = parse_quantity(node.as_string()->get(), dimension, name);

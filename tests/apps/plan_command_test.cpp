@@ -51,10 +51,11 @@ TEST_F(PlanCommand, WritesPicturesAndTables) {
 TEST_F(PlanCommand, SaysWhyThereIsNoWay) {
   const Answer inside = run("plan " + space() + " --goal '0 deg, 1 m'");
   EXPECT_EQ(inside.status, 1);
-  EXPECT_TRUE(holds(inside.err, "the goal is chassis by")) << inside.err;
+  EXPECT_TRUE(holds(inside.err, "the goal is in breach of chassis by")) << inside.err;
   const Answer near = run("plan " + space() + " --goal '46 deg, 1 m'");
   EXPECT_EQ(near.status, 1);
-  EXPECT_TRUE(holds(near.err, "the goal, with the tracking error, is chassis")) << near.err;
+  EXPECT_TRUE(holds(near.err, "the goal, with the tracking error, is in breach of chassis"))
+      << near.err;
   const Answer none = run("plan " + file("[[region]]\nname = \"post\"\nbox = { arm = [\"0 deg\", "
                                          "\"1 deg\"] }\n[plan]\nstart = [\"-10 deg\"]\ngoal = "
                                          "[\"10 deg\"]\n"));

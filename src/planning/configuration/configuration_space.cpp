@@ -253,6 +253,23 @@ std::vector<ConstraintState> ConfigurationSpace::broken(std::span<const double> 
   return all;
 }
 
+namespace {
+
+/// Of distances in all coordinates together: "rad", "m or rad".
+std::string units_of(const std::vector<SpaceAxis>& axes) {
+  std::vector<std::string_view> all;
+  std::string text;
+  for (const SpaceAxis& axis : axes) {
+    if (!axis.unit.empty() && std::find(all.begin(), all.end(), axis.unit) == all.end()) {
+      text += (all.empty() ? "" : " or ") + axis.unit;
+      all.push_back(axis.unit);
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
 Expected<void> ConfigurationSpace::check(std::span<const double> q, std::string_view place,
                                          std::string_view name) const {
   if (q.size() != model_->axes.size()) {
@@ -274,11 +291,14 @@ Expected<void> ConfigurationSpace::check(std::span<const double> q, std::string_
   const std::vector<ConstraintState> all = broken(q);
   Refusal error = refusal(ConfigurationError::in_collision, place, name);
   if (!all.empty()) {
-    std::string got = all[0].name + detail::format(" by {:.3g}", -all[0].margin) +
-                      (all[0].unit.empty() ? "" : " " + all[0].unit);
+    const auto worded = [&](const ConstraintState& one) {
+      const std::string unit = one.unit.empty() ? units_of(model_->axes) : one.unit;
+      return one.name + detail::format(" by {:.3g}", -one.margin) +
+             (unit.empty() ? "" : " " + unit);
+    };
+    std::string got = "in breach of " + worded(all[0]);
     for (std::size_t i = 1; i < std::min<std::size_t>(all.size(), 3); ++i) {
-      got += "; " + all[i].name + detail::format(" by {:.3g}", -all[i].margin) +
-             (all[i].unit.empty() ? "" : " " + all[i].unit);
+      got += "; " + worded(all[i]);
     }
     if (all.size() > 3) {
       got += detail::format("; and {} more", all.size() - 3);

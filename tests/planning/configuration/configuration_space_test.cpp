@@ -110,7 +110,8 @@ TEST(ConfigurationSpace, MarginsOfContactsAreDistances) {
   const auto error = space.check(std::vector{-0.25 * pi}, "plan", "the goal");
   ASSERT_FALSE(error);
   EXPECT_TRUE(error.error().is(ConfigurationError::in_collision));
-  EXPECT_EQ(to_string(error.error()).find("plan: the goal is arm meets box by 0.1"), 0U)
+  EXPECT_EQ(to_string(error.error()).find("plan: the goal is in breach of arm meets box by 0.1"),
+            0U)
       << to_string(error.error());
 }
 

@@ -80,7 +80,8 @@ TEST(PathMotion, GoesAlongTheLinesOfFigure16_4) {
   const auto refused = move_along(space, path, options);
   ASSERT_FALSE(refused);
   EXPECT_TRUE(refused.error().is(ConfigurationError::in_collision));
-  EXPECT_NE(to_string(refused.error()).find("waypoint 2 is chassis"), std::string::npos)
+  EXPECT_NE(to_string(refused.error()).find("waypoint 2 is in breach of chassis"),
+            std::string::npos)
       << to_string(refused.error());
 }
 

@@ -180,7 +180,8 @@ TEST(PathPlanner, BadQueriesAreExplained) {
   const auto in_chassis = plan_path(space, x, std::vector{0.0, 1.5});
   ASSERT_FALSE(in_chassis);
   EXPECT_EQ(to_string(in_chassis.error()),
-            "plan: the goal is chassis by 0.5; it must be a configuration that breaks no "
+            "plan: the goal is in breach of chassis by 0.5 rad or m; it must be a configuration "
+            "that breaks no "
             "constraint (configuration = [0, 1.5])");
   EXPECT_TRUE(plan_path(space, x, std::vector{0.0}).error().is(ArgumentError::wrong_shape));
   EXPECT_TRUE(
