@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "answers.hpp"
@@ -53,6 +54,19 @@ TEST(SolvePaths, TheFastestMotion) {
       R"({"points":[[0,0],[9,0]],"curve":"bezier","travel_velocity":2,"slow":[[0.333,0.667,0.5]]})");
   // Nothing limits accelerations: velocities jump.
   EXPECT_NEAR(slow.at("total_time").get<double>(), 9.0 * (0.666 / 2.0 + 0.334 / 0.5), 0.05);
+  // d/v + v/a + a/j = 4 + 2 + 1/2 s, and a jerk at each sample.
+  const Json smooth =
+      answer("path-parameterization",
+             R"({"points":[[0,0],[8,0]],"curve":"bezier","velocity":[2,2],"acceleration":[1,1],)"
+             R"("jerk":[2,2],"samples":101})");
+  EXPECT_GE(smooth.at("total_time").get<double>(), 6.5 * (1.0 - 1e-9));
+  EXPECT_LE(smooth.at("total_time").get<double>(), 6.5 * (1.0 + 1.5e-3));
+  double most = 0.0;
+  for (const Json& jerk : smooth.at("jerk")) {
+    most = std::max(most, std::abs(jerk.at(0).get<double>()));
+  }
+  EXPECT_LE(most, 2.0 * (1.0 + 1e-9));
+  EXPECT_GE(most, 1.99);
   EXPECT_EQ(refusal("path-parameterization", R"({"points":[[0,0],[9,0]]})"), "empty");
   EXPECT_EQ(refusal("path-parameterization",
                     R"({"points":[[0,0],[9,0]],"velocity":[1,1],"acceleration":[1]})"),

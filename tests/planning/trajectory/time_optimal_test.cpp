@@ -80,7 +80,7 @@ TEST(TimeOptimal, StraightLines) {
     const Path path = line_path(Vector2d(0.0, 0.0), Vector2d(length, 0.0)).value();
     const Limits limits{TravelLimits{.velocity = 2.0, .acceleration = 1.0}};
     const PathTrajectory trajectory = time_optimal(path, limits, {.tolerance = 1e-5}).value();
-    EXPECT_NEAR(trajectory.total_time(), time, 1e-4 * time);
+    EXPECT_LE(trajectory.total_time(), time * (1.0 + 1e-5));
     EXPECT_GE(trajectory.total_time(), time * (1.0 - 1e-12));
     expect_motion(trajectory);
   }
@@ -285,7 +285,7 @@ TEST(TimeOptimal, HolonomicDrivesOnALineAreOneMotor) {
       time_optimal(ahead, Limits{MecanumDriveLimits{drive, corners}}, {.tolerance = 1e-4})
           .value()
           .total_time();
-  EXPECT_NEAR(swerve, mecanum, 1e-3 * swerve);
+  EXPECT_NEAR(swerve, mecanum, 2e-4 * swerve);
   // Bang-bang by small steps of m/4 dv/dt = (G K_t/r) (±V - G v/(r K_v))/R ∓ friction/r: the way up
   // to a speed and the way down from it together are the line.
   const mechanisms::DcMotor& motor = drive.shaft.motor;
@@ -308,7 +308,8 @@ TEST(TimeOptimal, HolonomicDrivesOnALineAreOneMotor) {
     time += dv / rise + dv / fall;
     v += dv;
   }
-  EXPECT_NEAR(swerve, time, 3e-3 * time);
+  EXPECT_GE(swerve, time * (1.0 - 1e-5));  // dv: some 1e-6
+  EXPECT_LE(swerve, time * (1.0 + 2e-4));
 }
 
 // Nothing limits an acceleration: the velocity is at its limit from the first moment to the last,
@@ -333,7 +334,9 @@ TEST(TimeOptimal, LongLinesAreAsFastAsShortOnes) {
     const Path path = line_path(Vector2d(0.0, 0.0), Vector2d(length, 0.0)).value();
     const Limits limits{TravelLimits{.velocity = 2.0, .acceleration = 1.0}};
     const double fastest = length / 2.0 + 2.0;
-    EXPECT_LE(time_optimal(path, limits).value().total_time(), 1.003 * fastest) << length;
+    const double time = time_optimal(path, limits).value().total_time();
+    EXPECT_GE(time, fastest * (1.0 - 1e-12)) << length;
+    EXPECT_LE(time, fastest * (1.0 + TimingOptions{}.tolerance)) << length;
   }
 }
 
