@@ -1,6 +1,8 @@
 #include <flyball/optimization/problem/problem.hpp>
 
+#include <array>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include <Eigen/Dense>
@@ -389,6 +391,59 @@ TEST(Problem, NotFiniteIsNamed) {
   const auto solution = problem.solve().value();
   EXPECT_EQ(solution.status, SolveStatus::not_finite);
   EXPECT_EQ(solution.message, "the logarithm is not finite");
+}
+
+/// Rows, bounds, a linear and a quadratic cost and what is neither, all of parameters: after a
+/// change of these the problem is the one that is stated with their new values.
+TEST(Problem, EveryNumberFollowsItsParameters) {
+  const auto state = [](Problem& problem, const std::array<Expression, 4>& p) {
+    ExpressionMatrix x = problem.decision_variable(3);
+    x.set_value(Eigen::Vector3d(1.0, 1.0, 1.0));
+    problem.subject_to(x(0) + p[0] * x(1) - x(2) / p[1] == p[2] * p[0] - 1.0, "row");
+    problem.subject_to(p[1] * x(0) <= p[3] + 4.0, "bound");
+    problem.subject_to(x(1) >= -p[3], "lower");
+    problem.subject_to(p[2] * exp(x(2)) + p[0] * pow(x(0), 2) <= 9.0 * p[1], "two terms");
+    problem.subject_to(pow(x(0) - p[2], 2) + x(2) <= 4.0 * p[3], "a term");
+    problem.minimize(p[1] * pow(x(0) - p[3], 2) + p[2] * x(1) + pow(x(1) - p[0], 4) +
+                     p[0] * cosh(x(2) - p[1]) + p[3] * p[1]);
+    return x;
+  };
+  const std::array<std::array<double, 4>, 4> values{
+      {{1.0, 2.0, 0.5, 1.5}, {1.2, 1.0, 0.8, 2.0}, {0.7, 3.0, 1.1, 1.0}, {1.0, 2.0, 0.5, 1.5}}};
+  Problem problem;
+  std::array<Expression, 4> p;
+  for (std::size_t i = 0; i < 4; ++i) {
+    p[i] = problem.parameter(values[0][i]);
+  }
+  const ExpressionMatrix x = state(problem, p);
+  for (const std::array<double, 4>& now : values) {
+    Problem anew;
+    std::array<Expression, 4> q;
+    for (std::size_t i = 0; i < 4; ++i) {
+      p[i].set_value(now[i]);
+      q[i] = anew.parameter(now[i]);
+    }
+    const ExpressionMatrix y = state(anew, q);
+    const ProblemSolution again = problem.solve().value();
+    const ProblemSolution expected = anew.solve().value();
+    ASSERT_TRUE(expected.solved()) << expected.message;
+    ASSERT_TRUE(again.solved()) << again.message;
+    EXPECT_NEAR(again.cost, expected.cost, 1e-7);
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      EXPECT_NEAR(x.value(i), y.value(i), 1e-6);
+    }
+    EXPECT_LE((again.multipliers - expected.multipliers).cwiseAbs().maxCoeff(), 1e-5);
+  }
+  // A number that is not finite is refused; the last good ones are solved again after that.
+  p[2].set_value(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_TRUE(problem.solve().error().is(ProblemError::not_finite));
+  p[2].set_value(values[3][2]);
+  EXPECT_TRUE(problem.solve().value().solved());
+  // Bounds that part, and the way back.
+  p[3].set_value(-50.0);
+  EXPECT_EQ(problem.solve().value().status, SolveStatus::infeasible);
+  p[3].set_value(values[3][3]);
+  EXPECT_TRUE(problem.solve().value().solved());
 }
 
 TEST(Problem, MisuseIsRefused) {

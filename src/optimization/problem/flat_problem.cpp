@@ -7,6 +7,7 @@
 #include <flyball/math/expression/tape_builder.hpp>
 
 #include "optimization/problem/flat_problem.hpp"
+#include "optimization/problem/flat_walk.hpp"
 
 namespace flyball::optimization::detail {
 
@@ -33,40 +34,30 @@ struct KeyHash {
   }
 };
 
-/// A node and what it is multiplied by.
-struct Part {
-  std::uint32_t node;
-  double factor;
-};
-
 class Flattener {
  public:
   Flattener(const ExpressionGraph& graph, FlatProblem& flat)
       : graph_(graph),
         nodes_(graph.nodes().data()),
         flat_(flat),
-        numbers_(graph.nodes().size(), 0.0),
+        numbers_(flat.numbers),
         seen_(graph.nodes().size(), 0),
         local_(graph.nodes().size(), 0),
         column_at_(static_cast<std::size_t>(flat.variables), -1) {
-    // Values of what does not depend on variables.
-    for (std::uint32_t i = 0; i < numbers_.size(); ++i) {
-      const Node& node = nodes_[i];
-      if (graph.degree(i) != Degree::constant) {
-        continue;
+    // Values of what does not depend on variables, and what depends on parameters.
+    const std::size_t nodes = graph.nodes().size();
+    numbers_.assign(nodes, 0.0);
+    if (graph.parameters() > 0) {
+      parametric_.assign(nodes, 0);
+    }
+    for (std::uint32_t i = 0; i < nodes; ++i) {
+      if (graph.degree(i) == Degree::constant) {
+        numbers_[i] = number_of(graph, i, numbers_);
       }
-      switch (node.operation) {
-        case Operation::constant:
-          numbers_[i] = node.value();
-          break;
-        case Operation::parameter:
-          numbers_[i] = graph.parameter_values[node.a];
-          break;
-        default: {
-          const int operands = expression::operand_count(node.operation);
-          numbers_[i] = expression::apply<double>(node.operation, numbers_[node.a],
-                                                  operands > 1 ? numbers_[node.b] : 0.0,
-                                                  operands > 2 ? numbers_[node.c] : 0.0);
+      if (graph.parameters() > 0 && depends(nodes_[i])) {
+        parametric_[i] = 1;
+        if (graph.degree(i) == Degree::constant) {
+          flat.parametric_nodes.push_back(i);
         }
       }
     }
@@ -74,12 +65,19 @@ class Flattener {
 
   void cost(std::uint32_t root, double sign) {
     flat_.cost_coefficients.assign(static_cast<std::size_t>(flat_.variables), 0.0);
-    walk(
-        root, sign,
+    flat_.cost_is_parametric = is_parametric(root);
+    take_apart(
+        graph_, numbers_, stack_, Part{root, sign}, flat_.cost_offset,
         [&](int variable, double c) {
           flat_.cost_coefficients[static_cast<std::size_t>(variable)] += c;
         },
-        flat_.cost_offset, -1);
+        [&](const Part& part) {  // terms of the cost are each their own
+          leaves_.assign(1, part);
+          term(leaves_, -1);
+          if (flat_.cost_is_parametric) {
+            flat_.cost_terms.push_back({term_shape_, term_});
+          }
+        });
   }
 
   void constraint(std::uint32_t root, bool equality, int number) {
@@ -88,8 +86,8 @@ class Flattener {
     double offset = 0.0;
     const std::size_t begin = flat_.columns.size();
     leaves_.clear();
-    walk(
-        root, 1.0,
+    take_apart(
+        graph_, numbers_, stack_, Part{root, 1.0}, offset,
         [&](int variable, double c) {
           int& at = column_at_[static_cast<std::size_t>(variable)];
           if (at >= static_cast<int>(begin)) {
@@ -100,7 +98,7 @@ class Flattener {
           flat_.columns.push_back(variable);
           flat_.coefficients.push_back(c);
         },
-        offset, row);
+        [&](const Part& part) { leaves_.push_back(part); });
     for (std::size_t i = begin; i < flat_.columns.size(); ++i) {
       column_at_[static_cast<std::size_t>(flat_.columns[i])] = -1;
     }
@@ -113,11 +111,19 @@ class Flattener {
       const int variable = count == 1 ? flat_.columns.back() : 0;
       flat_.columns.resize(begin);
       flat_.coefficients.resize(begin);
-      bound(variable, slope, offset, equality, number);
+      flat_.bounds.push_back({variable, slope, offset, equality, number});
+      state_bound(flat_, flat_.bounds.back());
+      if (is_parametric(root)) {
+        flat_.parametric.push_back({number, -1, flat_.bounds.size() - 1, -1, 0});
+      }
       return;
     }
     if (!leaves_.empty()) {
       term(leaves_, row);
+    }
+    if (is_parametric(root)) {
+      flat_.parametric.push_back(
+          {number, row, 0, leaves_.empty() ? -1 : static_cast<std::ptrdiff_t>(term_shape_), term_});
     }
     flat_.offsets.push_back(offset);
     flat_.row_start.push_back(static_cast<int>(flat_.columns.size()));
@@ -126,110 +132,13 @@ class Flattener {
   }
 
  private:
-  /// slope x + offset ≥ 0, or = 0.
-  void bound(int variable, double slope, double offset, bool equality, int number) {
-    if (slope == 0.0) {
-      const double by = equality ? std::abs(offset) : -offset;
-      if (by > 1e-9 * std::max(1.0, std::abs(offset))) {
-        note_impossible(number, by);
-      }
-      return;
-    }
-    const auto i = static_cast<std::size_t>(variable);
-    const double at = -offset / slope;
-    if ((equality || slope > 0.0) && at >= flat_.lower[i]) {
-      flat_.lower[i] = at;
-      flat_.lower_from[i] = number;
-      flat_.lower_slope[i] = slope;
-    }
-    if ((equality || slope < 0.0) && at <= flat_.upper[i]) {
-      flat_.upper[i] = at;
-      flat_.upper_from[i] = number;
-      flat_.upper_slope[i] = slope;
-    }
-    const double crossed = flat_.lower[i] - flat_.upper[i];
-    if (crossed > 0.0) {
-      if (crossed > 1e-9 * std::max(1.0, std::abs(flat_.lower[i]))) {
-        note_impossible(number, crossed);
-      }
-      flat_.lower[i] = flat_.upper[i];
-    }
-  }
-
-  void note_impossible(int number, double by) {
-    if (flat_.impossible < 0) {
-      flat_.impossible = number;
-      flat_.impossible_by = by;
-    }
-  }
-
-  /// Sums and multiples are taken apart: linear parts go to `linear`, others become terms.
-  template <class Linear>
-  void walk(std::uint32_t root, double factor, Linear&& linear, double& offset, int row) {
-    stack_.clear();
-    stack_.push_back({root, factor});
-    while (!stack_.empty()) {
-      const auto [i, c] = stack_.back();
-      stack_.pop_back();
-      const Node& node = nodes_[i];
-      if (graph_.degree(i) == Degree::constant) {
-        offset += c * numbers_[i];
-        continue;
-      }
-      switch (node.operation) {
-        case Operation::input:
-          linear(static_cast<int>(node.a), c);
-          continue;
-        case Operation::add:
-          stack_.push_back({node.b, c});
-          stack_.push_back({node.a, c});
-          continue;
-        case Operation::subtract:
-          stack_.push_back({node.b, -c});
-          stack_.push_back({node.a, c});
-          continue;
-        case Operation::negate:
-          stack_.push_back({node.a, -c});
-          continue;
-        case Operation::multiply:
-          if (graph_.degree(node.a) == Degree::constant) {
-            stack_.push_back({node.b, c * numbers_[node.a]});
-            continue;
-          }
-          if (graph_.degree(node.b) == Degree::constant) {
-            stack_.push_back({node.a, c * numbers_[node.b]});
-            continue;
-          }
-          break;
-        case Operation::divide:
-          if (graph_.degree(node.b) == Degree::constant) {
-            stack_.push_back({node.a, c / numbers_[node.b]});
-            continue;
-          }
-          break;
-        case Operation::power:
-          if (graph_.degree(i) == Degree::linear) {  // x¹
-            stack_.push_back({node.a, c});
-            continue;
-          }
-          break;
-        default:
-          break;
-      }
-      leaves_.push_back({i, c});
-      if (row < 0) {  // terms of the cost are each their own
-        term(leaves_, row);
-        leaves_.clear();
-      }
-    }
-  }
-
   /// A weighted sum that is not linear: its key is its operations, in an order of their own, with
   /// its variables and numbers by their places; terms of one key are of one shape.
   void term(const std::vector<Part>& roots, int row) {
     key_.clear();
     variables_.clear();
     data_.clear();
+    data_nodes_.clear();
     ++stamp_;
     next_local_ = 0;
     order_.clear();
@@ -264,6 +173,7 @@ class Flattener {
       if (is_number) {
         key_.push_back(of_number);
         data_.push_back(numbers_[i]);
+        data_nodes_.push_back(i);
       } else if (node.operation == Operation::input) {
         key_.push_back(of_variable);
         variables_.push_back(static_cast<int>(node.a));
@@ -271,6 +181,7 @@ class Flattener {
         key_.push_back(static_cast<std::uint32_t>(node.operation));
         for (int k = 0; k < operands; ++k) {
           if (is_exponent(node, k)) {
+            flat_.structure_is_parametric = flat_.structure_is_parametric || is_parametric(node.b);
             const Node exponent = Node::constant(numbers_[node.b]);
             key_.push_back(exponent.a);
             key_.push_back(exponent.b);
@@ -284,13 +195,19 @@ class Flattener {
       for (const Part& root : roots) {
         key_.push_back(local_[root.node]);
         data_.push_back(root.factor);
+        data_nodes_.push_back(factor_of_part);
       }
     }
     const auto [found, is_new] = shapes_.try_emplace(key_, flat_.shapes.size());
     if (is_new) {
       flat_.shapes.push_back(shape(roots));
     }
-    Shape& shape = flat_.shapes[found->second];
+    term_shape_ = found->second;
+    Shape& shape = flat_.shapes[term_shape_];
+    term_ = shape.rows.size();
+    if (!parametric_.empty()) {
+      shape.data_nodes.insert(shape.data_nodes.end(), data_nodes_.begin(), data_nodes_.end());
+    }
     shape.columns.insert(shape.columns.end(), variables_.begin(), variables_.end());
     shape.data.insert(shape.data.end(), data_.begin(), data_.end());
     shape.rows.push_back(row);
@@ -344,10 +261,20 @@ class Flattener {
     return made;
   }
 
+  [[nodiscard]] bool is_parametric(std::uint32_t i) const {
+    return !parametric_.empty() && parametric_[i] != 0;
+  }
+  [[nodiscard]] bool depends(const Node& node) const {
+    const int operands = expression::operand_count(node.operation);
+    return node.operation == Operation::parameter || (operands > 0 && parametric_[node.a] != 0) ||
+           (operands > 1 && parametric_[node.b] != 0) || (operands > 2 && parametric_[node.c] != 0);
+  }
+
   const ExpressionGraph& graph_;
   const Node* nodes_;
   FlatProblem& flat_;
-  std::vector<double> numbers_;
+  std::vector<double>& numbers_;
+  std::vector<unsigned char> parametric_;  // of each node; empty: there are no parameters
   std::vector<std::uint32_t> seen_, local_;
   std::vector<int> column_at_;
   std::uint32_t stamp_ = 0;
@@ -357,6 +284,8 @@ class Flattener {
   std::vector<std::uint32_t> visit_, order_, key_;
   std::vector<int> variables_;
   std::vector<double> data_;
+  std::vector<std::uint32_t> data_nodes_;
+  std::size_t term_shape_ = 0, term_ = 0;  // the term that was made last
   std::unordered_map<std::vector<std::uint32_t>, std::size_t, KeyHash> shapes_;
 };
 

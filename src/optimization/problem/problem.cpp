@@ -237,7 +237,7 @@ SolveStatus Problem::Parts::solve_general(const SolverOptions& options,
            counts.iterations < options.max_iterations;
   };
   const bool free = options.first_barrier <= 0.0 && program->stages() == 0;
-  SolveStatus status = run(options.first_barrier, is_warm ? 5 + cold_iterations / 2
+  SolveStatus status = run(options.first_barrier, is_warm ? 50 + 5 * cold_iterations
                                                   : free  ? patience
                                                           : options.max_iterations);
   if (is_warm && status != SolveStatus::solved && status != SolveStatus::stopped &&
@@ -340,13 +340,13 @@ ProblemSolution Problem::Parts::run(FlatProblem* flat, const SolverOptions& opti
   }
   solution.status = status;
   if (status == SolveStatus::not_finite) {
-    const int row = p.find_fault(*w);
-    solution.message =
-        row == -1 ? std::string("the cost is not finite")
-        : row == -2
-            ? std::string("a derivative is not finite")
-            : name_of(static_cast<std::size_t>(stated.constraint[static_cast<std::size_t>(row)])) +
-                  " is not finite";
+    const SparseProgram::Fault fault = p.find_fault(*w);
+    const std::string what = fault.row == -2 ? std::string("a number")
+                             : fault.row < 0
+                                 ? std::string("the cost")
+                                 : name_of(static_cast<std::size_t>(
+                                       stated.constraint[static_cast<std::size_t>(fault.row)]));
+    solution.message = (fault.derivative ? "a derivative of " : "") + what + " is not finite";
   }
   std::copy_n(w->data(), graph.inputs(), graph.values.begin());
   is_warm = status == SolveStatus::solved;
@@ -397,7 +397,10 @@ Expected<ProblemSolution> Problem::solve(const SolverOptions& options,
   ProblemSolution solution;
   std::vector<Iteration> rows;
   FlatProblem flat;
-  const bool is_new = !parts.program || parts.solved_parameters != parts.graph.parameter_values;
+  const bool same = parts.solved_parameters == parts.graph.parameter_values;
+  parts.solved_parameters.clear();  // until the program has the numbers
+  const bool is_new = !parts.program ||
+                      (!same && !parts.program->renew(parts.graph, parts.cost, parts.constraints));
   if (is_new) {
     flat = detail::flatten(parts.graph, parts.cost, parts.sign, parts.constraints);
     if (flat.not_finite != -1) {
@@ -414,8 +417,8 @@ Expected<ProblemSolution> Problem::solve(const SolverOptions& options,
       parts.report(solution, flat);
       return solution;
     }
-    parts.solved_parameters = parts.graph.parameter_values;
   }
+  parts.solved_parameters = parts.graph.parameter_values;
   const auto look = [&](const Iteration& row) {
     rows.push_back(row);
     return watch(row);

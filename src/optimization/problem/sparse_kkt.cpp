@@ -121,4 +121,9 @@ void SparseProgram::solve(const VectorXd& rw, const VectorXd& rc, VectorXd& dw, 
   }
 }
 
+bool SparseProgram::roll(const VectorXd& w, VectorXd& side, VectorXd& dw) {
+  return stages_ && w.size() == n_ &&  // slacks follow from what they are of
+         stages_->roll(w.data(), lower.data(), upper.data(), side.data(), dw.data());
+}
+
 }  // namespace flyball::optimization::detail

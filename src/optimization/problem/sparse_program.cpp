@@ -63,17 +63,29 @@ bool SparseProgram::update(FlatProblem& flat) {
                                         std::equal(a.tape.nodes().begin(), a.tape.nodes().end(),
                                                    b.tape.nodes().begin(), b.tape.nodes().end());
                                });
-  if (!same) {
+  if (!same || !fixes_the_same(flat)) {
     return false;
-  }
-  for (int i = 0; i < n_; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    if ((flat.lower[k] == flat.upper[k]) != (fixed_[k] != 0)) {
-      return false;
-    }
   }
   flat_ = std::move(flat);
   refresh();
+  return true;
+}
+
+bool SparseProgram::renew(const ExpressionGraph& graph, const Expression& cost,
+                          const Constraints& constraints) {
+  if (!renew_numbers(graph, cost, constraints, flat_) || !fixes_the_same(flat_)) {
+    return false;
+  }
+  refresh();
+  return true;
+}
+
+bool SparseProgram::fixes_the_same(const FlatProblem& flat) const {
+  for (std::size_t i = 0; i < fixed_.size(); ++i) {
+    if ((flat.lower[i] == flat.upper[i]) != (fixed_[i] != 0)) {
+      return false;
+    }
+  }
   return true;
 }
 
@@ -115,6 +127,16 @@ void SparseProgram::build_pattern() {
     h_rows_.push_back(static_cast<int>(key / n_));
     h_columns_.push_back(static_cast<int>(key % n_));
   }
+  linear_places_.reserve(flat_.columns.size());
+  for (std::size_t r = 0; r < static_cast<std::size_t>(m_); ++r) {
+    const auto begin = a_columns_.begin() + a_start_[r];
+    const auto end = a_columns_.begin() + a_start_[r + 1];
+    for (int e = flat_.row_start[r]; e < flat_.row_start[r + 1]; ++e) {
+      const auto at = std::lower_bound(begin, end, flat_.columns[static_cast<std::size_t>(e)]);
+      linear_places_.push_back(static_cast<int>(at - a_columns_.begin()));
+    }
+  }
+  a_linear_.assign(a_columns_.size(), 0.0);
   a_is_linear_.assign(a_columns_.size(), 1);
   h_.assign(hessian.size(), 0.0);
   a_.assign(a_columns_.size(), 0.0);
@@ -154,15 +176,9 @@ void SparseProgram::refresh() {
     fixed_[k] = flat_.lower[k] == flat_.upper[k] ? 1 : 0;
     analyzed_ = analyzed_ && was == (fixed_[k] != 0);
   }
-  a_linear_.assign(a_columns_.size(), 0.0);
-  for (std::size_t r = 0; r < static_cast<std::size_t>(m_); ++r) {
-    const auto begin = a_columns_.begin() + a_start_[r];
-    const auto end = a_columns_.begin() + a_start_[r + 1];
-    for (int e = flat_.row_start[r]; e < flat_.row_start[r + 1]; ++e) {
-      const auto at = std::lower_bound(begin, end, flat_.columns[static_cast<std::size_t>(e)]);
-      a_linear_[static_cast<std::size_t>(at - a_columns_.begin())] +=
-          flat_.coefficients[static_cast<std::size_t>(e)];
-    }
+  std::fill(a_linear_.begin(), a_linear_.end(), 0.0);
+  for (std::size_t e = 0; e < linear_places_.size(); ++e) {
+    a_linear_[static_cast<std::size_t>(linear_places_[e])] += flat_.coefficients[e];
   }
 }
 
@@ -356,23 +372,32 @@ VectorXd SparseProgram::start(const std::vector<double>& x) {
   return w;
 }
 
-int SparseProgram::find_fault(const VectorXd& w) {
-  for (std::size_t s = 0; s < flat_.shapes.size(); ++s) {
-    const Shape& shape = flat_.shapes[s];
-    Compiled& compiled = compiled_[s];
-    double* const work = compiled.value_work.data();
-    for (std::size_t first = 0; first < shape.rows.size(); first += lanes) {
-      const std::size_t count = std::min(lanes, shape.rows.size() - first);
-      gather(shape, compiled.values, first, count, w.data(), work);
-      compiled.values.evaluate(work);
-      for (std::size_t l = 0; l < count; ++l) {
-        if (!std::isfinite(compiled.values.output(0, work)[l])) {
-          return shape.rows[first + l];
+SparseProgram::Fault SparseProgram::find_fault(const VectorXd& w) {
+  for (const bool derivative : {false, true}) {
+    for (std::size_t s = 0; s < flat_.shapes.size(); ++s) {
+      const Shape& shape = flat_.shapes[s];
+      Compiled& compiled = compiled_[s];
+      const LaneTape& tape = derivative ? compiled.derivatives : compiled.values;
+      double* const work =
+          derivative ? compiled.derivative_work.data() : compiled.value_work.data();
+      for (std::size_t first = 0; first < shape.rows.size(); first += lanes) {
+        const std::size_t count = std::min(lanes, shape.rows.size() - first);
+        gather(shape, tape, first, count, w.data(), work);
+        if (derivative) {
+          std::fill_n(tape.input(shape.variables + shape.numbers, work), lanes, 1.0);
+        }
+        tape.evaluate(work);
+        for (std::size_t e = 0; e < tape.outputs(); ++e) {
+          for (std::size_t l = 0; l < count; ++l) {
+            if (!std::isfinite(tape.output(e, work)[l])) {
+              return {shape.rows[first + l], derivative};
+            }
+          }
         }
       }
     }
   }
-  return -2;
+  return {};
 }
 
 }  // namespace flyball::optimization::detail

@@ -25,6 +25,10 @@ class SparseProgram final : public Program {
   /// Takes the numbers of a problem of the same structure. @return false, and nothing taken, if it
   /// is another structure.
   [[nodiscard]] bool update(FlatProblem& flat);
+  /// Takes what parameters have made of the numbers. @return false, and its numbers of no use
+  /// until `update`, where that must be flattened anew.
+  [[nodiscard]] bool renew(const ExpressionGraph& graph, const Expression& cost,
+                           const Constraints& constraints);
 
   [[nodiscard]] bool values(const Eigen::VectorXd& w, double& f, Eigen::VectorXd& c) override;
   [[nodiscard]] bool derivatives(const Eigen::VectorXd& w, const Eigen::VectorXd& lambda,
@@ -37,6 +41,9 @@ class SparseProgram final : public Program {
   void solve(const Eigen::VectorXd& rw, const Eigen::VectorXd& rc, Eigen::VectorXd& dw,
              Eigen::VectorXd& dl) override;
 
+  [[nodiscard]] bool roll(const Eigen::VectorXd& w, Eigen::VectorXd& side,
+                          Eigen::VectorXd& dw) override;
+
   /// w of x: x moved to fixed values, slacks at their rows. Sets the scales of rows and cost.
   [[nodiscard]] Eigen::VectorXd start(const std::vector<double>& x);
   [[nodiscard]] const FlatProblem& flat() const noexcept { return flat_; }
@@ -48,8 +55,12 @@ class SparseProgram final : public Program {
   [[nodiscard]] bool is_quadratic() const noexcept;
   /// Stages that the KKT systems are factorised along, once one was; 0: there are none.
   [[nodiscard]] std::size_t stages() const noexcept { return stages_ ? stages_->stages() : 0; }
-  /// The row (or -1: the cost) that is not finite at a point; -2: none.
-  [[nodiscard]] int find_fault(const Eigen::VectorXd& w);
+  /// What is not finite at a point: a value, or where all are finite a derivative.
+  struct Fault {
+    int row = -2;  ///< -1: the cost; -2: nothing is.
+    bool derivative = false;
+  };
+  [[nodiscard]] Fault find_fault(const Eigen::VectorXd& w);
 
  private:
   struct Compiled {
@@ -61,6 +72,7 @@ class SparseProgram final : public Program {
   };
 
   void build_pattern();
+  [[nodiscard]] bool fixes_the_same(const FlatProblem& flat) const;
   void refresh();
   void gather(const Shape& shape, const expression::LaneTape& tape, std::size_t first,
               std::size_t count, const double* w, double* work) const;
@@ -72,6 +84,7 @@ class SparseProgram final : public Program {
   std::vector<Compiled> compiled_;
   std::vector<int> a_start_, a_columns_;  // of c by x, by rows
   std::vector<double> a_linear_, a_;
+  std::vector<int> linear_places_;       // of the flat rows' entries
   std::vector<int> h_rows_, h_columns_;  // lower triangle
   std::vector<double> h_;
   std::vector<int> slack_;  // of a row in w, or -1

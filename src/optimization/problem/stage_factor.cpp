@@ -355,4 +355,84 @@ void StageFactor::solve(const double* rw, const double* rc, double* dw, double* 
   }
 }
 
+bool StageFactor::roll(const double* w, const double* lower, const double* upper, double* side,
+                       double* dw) {
+  constexpr double slack = 1e-9;
+  const std::size_t n = system_.states;
+  const std::size_t size = n + system_.inputs;
+  const std::size_t width = system_.width;
+  if (variable_.empty()) {
+    variable_.assign(fixed_.size(), -1);
+    for (std::size_t i = 0; i < place_.size(); ++i) {
+      variable_[place_[i]] = static_cast<int>(i);
+    }
+  }
+  bool kept = false;
+  // The step of a place within its bounds: of a variable that is at none of them yet.
+  const auto within = [&](std::size_t at, double step) {
+    const int i = variable_[at];
+    if (fixed_[at] != 0 || i < 0 || side[i] != 0.0) {
+      return step;
+    }
+    if (w[i] + step < lower[i] - slack) {
+      side[i] = -1.0;
+      kept = true;
+      return lower[i] - w[i];
+    }
+    if (w[i] + step > upper[i] + slack) {
+      side[i] = 1.0;
+      kept = true;
+      return upper[i] - w[i];
+    }
+    return step;
+  };
+  const auto by_feedback = [&](std::size_t k, std::size_t j) {
+    const double* const L = L_.data() + (k * size + j) * width;
+    double sum = -g_[k * size + j];
+    for (std::size_t a = 0; a < j; ++a) {
+      sum -= L[a] * dz_[k * size + a];
+    }
+    return fixed_[k * size + j] != 0 ? 0.0 : sum;
+  };
+  for (std::size_t j = 0; j < n; ++j) {
+    dz_[j] = within(j, by_feedback(0, j));
+  }
+  for (std::size_t k = 0; k < system_.stages; ++k) {
+    double* const z = dz_.data() + k * size;
+    for (std::size_t j = n; j < size; ++j) {
+      z[j] = within(k * size + j, by_feedback(k, j));
+    }
+    if (k + 1 == system_.stages) {
+      break;
+    }
+    const auto next = [&](std::size_t i) {
+      double sum = b_[k * n + i];
+      for (std::size_t a = 0; a < size; ++a) {
+        sum += AB_[(k * n + i) * width + a] * z[a];
+      }
+      return sum;
+    };
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::size_t at = (k + 1) * size + i;
+      const double free = next(i);
+      const double bounded = within(at, free);
+      for (std::size_t j = n; j < size && bounded != free; ++j) {
+        const int v = variable_[k * size + j];
+        const double slope = AB_[(k * n + i) * width + j];
+        if (fixed_[k * size + j] == 0 && v >= 0 && side[v] == 0.0 && slope != 0.0) {
+          z[j] = within(k * size + j, z[j] + (bounded - free) / slope);
+          break;
+        }
+      }
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      z[size + i] = fixed_[(k + 1) * size + i] != 0 ? 0.0 : next(i);
+    }
+  }
+  for (std::size_t i = 0; i < place_.size(); ++i) {
+    dw[i] = dz_[place_[i]];
+  }
+  return kept;
+}
+
 }  // namespace flyball::optimization::detail

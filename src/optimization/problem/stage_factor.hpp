@@ -43,6 +43,11 @@ class StageFactor {
   [[nodiscard]] bool factor(const double* diagonal, const double* D, bool soft, bool with_hessian);
   /// @param rw  Of the variables. @param rc  Of the rows, slacks eliminated. Solves for (-rw, -rc).
   void solve(const double* rw, const double* rc, double* dw, double* dl);
+  /// The forward sweep of the last `solve` again, stage by stage: inputs by its feedback, but not
+  /// beyond their bounds; where a next state would leave its own, an input that is still within its
+  /// bounds keeps it there. @return whether any was kept, as Program::roll.
+  [[nodiscard]] bool roll(const double* w, const double* lower, const double* upper, double* side,
+                          double* dw);
 
   [[nodiscard]] std::size_t stages() const noexcept { return system_.stages; }
 
@@ -60,6 +65,7 @@ class StageFactor {
   std::vector<int> level_;              // of a variable, then its stage
   std::vector<int> output_;             // of a row: the next state that it gives, or -1
   std::vector<std::size_t> place_;      // of a variable among stages x size
+  std::vector<int> variable_;           // of a place, or -1; made by the first `roll`
   std::vector<std::size_t> row_place_;  // of a row: among defects, or among the stages' own rows
   std::vector<double> scale_;           // of a row: -1 / coefficient of its output; 1 of others
   std::vector<Move> hessian_moves_, defect_moves_, row_moves_;

@@ -36,6 +36,15 @@ class Program {
   virtual void solve(const Eigen::VectorXd& rw, const Eigen::VectorXd& rc, Eigen::VectorXd& dw,
                      Eigen::VectorXd& dl) = 0;
 
+  /// What `solve` found last, but with each variable that would leave its bounds kept at the one it
+  /// meets, and what follows from it with that: `side` of it becomes -1 or 1.
+  /// @param w  Where dw begins. @param side  0: within its bounds. @return whether one was kept;
+  /// false where the program knows no order in which variables follow from each other.
+  [[nodiscard]] virtual bool roll(const Eigen::VectorXd& /*w*/, Eigen::VectorXd& /*side*/,
+                                  Eigen::VectorXd& /*dw*/) {
+    return false;
+  }
+
   [[nodiscard]] Eigen::Index variables() const noexcept { return lower.size(); }
   [[nodiscard]] Eigen::Index constraints() const noexcept { return constraint_count; }
 

@@ -24,9 +24,13 @@ double largest(const VectorXd& v) {
 bool QuadraticMethod::settle(const SolverOptions& options) {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
-  // Farther away an interior point goes faster: where many bounds change, or one after the other.
+  // Farther away an interior point goes faster: where many bounds change, or one after the other,
+  // unless what variables are kept at their bounds along the stages shows which.
   constexpr int most_rounds = 4;
+  constexpr int most_rolls = 4;
   constexpr int most_changes = 8;
+  int rolls = 0;
+  int before = static_cast<int>(w_.size());  // changes of the last round
   const VectorXd& lower = program_.lower;
   const VectorXd& upper = program_.upper;
   if (!has_curvature_) {
@@ -43,7 +47,7 @@ bool QuadraticMethod::settle(const SolverOptions& options) {
   zu_.setZero();
   D_.setZero();
   const double held = 1e12 * size_;
-  for (int round = 0; round < most_rounds && round < options.max_iterations; ++round) {
+  for (int round = 0; round < most_rounds + rolls && round < options.max_iterations; ++round) {
     for (Index i = 0; i < w_.size(); ++i) {
       diagonal_(i) = side(i) != 0.0 ? held : 1e-12 * size_;
     }
@@ -56,7 +60,8 @@ bool QuadraticMethod::settle(const SolverOptions& options) {
     if (!program_.factor(diagonal_, D_, true)) {
       return false;
     }
-    for (int correction = 0; correction < 4; ++correction) {
+    bool rolled = false;
+    for (int correction = 0; correction < 4 && !rolled; ++correction) {
       residuals();
       for (Index i = 0; i < w_.size(); ++i) {
         rw_(i) = side(i) != 0.0 ? 0.0 : rd_(i);
@@ -65,10 +70,25 @@ bool QuadraticMethod::settle(const SolverOptions& options) {
         break;
       }
       program_.solve(rw_, c_, dw_, dl_);
+      if (correction == 0 && rolls < most_rolls && program_.roll(w_, side, affine_w_)) {
+        rolled = true;
+        ++rolls;
+        w_ += affine_w_;
+        break;
+      }
       w_ += dw_;
       lambda_ += dl_;
     }
+    if (rolled) {  // the multipliers of the bounds that are new are found with them
+      for (Index i = 0; i < w_.size(); ++i) {
+        w_(i) = side(i) < 0.0 ? lower(i) : side(i) > 0.0 ? upper(i) : w_(i);
+      }
+      continue;
+    }
     residuals();
+    if (rolls > 0 && largest(rd_) > 1e4 * size_) {
+      return false;  // no point keeps all that was kept, as where a last state is given
+    }
     int changes = 0;
     for (Index i = 0; i < w_.size(); ++i) {
       if (free_(i) == 0.0) {
@@ -88,9 +108,10 @@ bool QuadraticMethod::settle(const SolverOptions& options) {
       }
       w_(i) = wanted < 0.0 ? lower(i) : wanted > 0.0 ? upper(i) : w_(i);
     }
-    if (changes > most_changes) {
+    if (changes > most_changes && (rolls == 0 || 2 * changes > before)) {
       return false;
     }
+    before = changes;
     if (changes == 0) {
       for (Index i = 0; i < w_.size(); ++i) {
         zl_(i) = side(i) < 0.0 ? std::max(0.0, rd_(i)) : 0.0;
