@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -286,6 +287,71 @@ TEST(ContinuousProblem, ErrorsOfIntervalsFallWithTheOrder) {
   }
 }
 
+/// The end of an interval by 400 steps of Runge and Kutta's method, from where it begins and with
+/// its input.
+Vector2d end_of(const PhaseTrajectory& phase, Eigen::Index k) {
+  const auto slope = [&](double t, const Vector2d& x) {
+    return Vector2d(x(1), -std::sin(x(0)) + phase.input(t)(0));
+  };
+  const double from = phase.times(k);
+  const double whole = phase.times(k + 1) - from;
+  // An input of its own each interval: its ends belong to it.
+  const auto inside = [&](double t) {
+    return std::clamp(t, from + 1e-12 * whole, from + (1.0 - 1e-12) * whole);
+  };
+  Vector2d x = phase.states.col(k);
+  const double h = whole / 400;
+  for (int i = 0; i < 400; ++i) {
+    const double t = from + h * i;
+    const Vector2d a = slope(inside(t), x);
+    const Vector2d b = slope(t + 0.5 * h, x + 0.5 * h * a);
+    const Vector2d c = slope(t + 0.5 * h, x + 0.5 * h * b);
+    const Vector2d d = slope(inside(t + h), x + h * c);
+    x += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+  }
+  return x;
+}
+
+// What refinement goes by is the error that an integrator of this file's own finds, interval by
+// interval, on the first mesh and on each that refinement makes; the largest one falls below what
+// was asked for.
+TEST(ContinuousProblem, RefinementLowersAnErrorThatIsTrue) {
+  ContinuousProblem problem(2, 1);
+  problem.set_derivative([](const auto& x, const auto& u) {
+    return std::array<Expression, 2>{x(1), -sin(x(0)) + u(0)};
+  });
+  problem.set_running_cost(squared_input);
+  problem.fix_start(Vector2d(0.0, 0.0));
+  problem.fix_end(Vector2d(2.0, 0.0));
+  problem.set_duration(2.0);
+  for (const Transcription method : {Transcription::hermite_simpson, Transcription::radau}) {
+    double before = inf;
+    for (const int rounds : {0, 1, 8}) {
+      TranscriptionOptions options{.method = method, .intervals = 3};
+      options.error_tolerance = 1e-9;
+      options.max_refinements = rounds;
+      const ContinuousSolution s = solve(problem, options).value();
+      ASSERT_TRUE(s.solved()) << to_string(method) << ": " << s.message;
+      const PhaseTrajectory& phase = s.phases[0];
+      const Eigen::ArrayXd size = 1.0 + phase.states.cwiseAbs().rowwise().maxCoeff().array();
+      double largest = 0.0;
+      for (Eigen::Index k = 0; k < phase.errors.size(); ++k) {
+        const Vector2d end = phase.states.col(k + 1);
+        const double error = ((end - end_of(phase, k)).array().abs() / size).maxCoeff();
+        EXPECT_NEAR(phase.errors(k), error, 0.05 * error + 2e-11)
+            << to_string(method) << ", interval " << k << " after " << s.refinements;
+        largest = std::max(largest, error);
+      }
+      EXPECT_NEAR(s.largest_error, largest, 0.05 * largest + 2e-11);
+      EXPECT_LT(largest, 0.3 * before) << to_string(method) << " after " << s.refinements;
+      EXPECT_LE(s.refinements, rounds);
+      before = largest;
+      EXPECT_EQ(s.accurate, rounds == 8) << s.message;
+    }
+    EXPECT_LE(before, 1e-9);
+  }
+}
+
 TEST(ContinuousProblem, GoesAroundAnObstacle) {
   ContinuousProblem problem(4, 2);
   problem.set_derivative([](const auto& x, const auto& u) {
@@ -377,12 +443,16 @@ TEST(ContinuousProblem, SaysWhatCannotBeDone) {
   problem.fix_start(Vector2d(0.0, 0.0));
   problem.fix_end(Vector2d(1.0, 0.0));
   problem.set_duration(1.0);
-  const auto s = solve(problem, {.method = Transcription::runge_kutta}).value();
-  EXPECT_EQ(s.status, SolveStatus::infeasible);
-  ASSERT_FALSE(s.violations.empty());
-  EXPECT_GT(s.violations[0].amount, 1e-4);
-  EXPECT_NE(s.message.find("infeasible"), std::string::npos) << s.message;
-  EXPECT_NE(s.message.find(" s)"), std::string::npos) << s.message;  // when
+  for (const Transcription method :
+       {Transcription::runge_kutta, Transcription::multiple_shooting}) {
+    const auto s = solve(problem, {.method = method}).value();
+    EXPECT_EQ(s.status, SolveStatus::infeasible) << to_string(method) << ": " << s.message;
+    ASSERT_FALSE(s.violations.empty()) << to_string(method);
+    EXPECT_GT(s.violations[0].amount, 1e-4);
+    EXPECT_NE(s.message.find("infeasible"), std::string::npos) << s.message;
+    EXPECT_NE(s.message.find("at stage"), std::string::npos) << s.message;
+    EXPECT_NE(s.message.find(" s)"), std::string::npos) << s.message;  // when
+  }
   // A root of what turns negative.
   problem.set_derivative([](const auto& x, const auto& u) {
     return std::array<Expression, 2>{x(1), u(0) + sqrt(-1.0 - x(0) * x(0))};
@@ -390,6 +460,13 @@ TEST(ContinuousProblem, SaysWhatCannotBeDone) {
   const auto bad = solve(problem).value();
   EXPECT_EQ(bad.status, SolveStatus::not_finite);
   EXPECT_NE(bad.message.find("stage"), std::string::npos) << bad.message;
+  // A root's slope where it ends: the value is finite, the derivative is not.
+  problem.set_derivative([](const auto& x, const auto& u) {
+    return std::array<Expression, 2>{x(1), u(0) + sqrt(x(0) * x(0))};
+  });
+  const auto steep = solve(problem, {.method = Transcription::runge_kutta}).value();
+  EXPECT_EQ(steep.status, SolveStatus::not_finite);
+  EXPECT_EQ(steep.message, "a derivative of dynamics of state 0 is not finite at stage 0");
 }
 
 }  // namespace

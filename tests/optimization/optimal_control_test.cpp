@@ -1,6 +1,7 @@
 #include <flyball/optimization/ocp/optimal_control.hpp>
 
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -259,6 +260,45 @@ TEST(OptimalControl, LimitsAreHonoured) {
   EXPECT_EQ(solver.solve({}, watch).status, SolveStatus::stopped);
   EXPECT_EQ(seen, 3);
   EXPECT_EQ(solver.solve().status, SolveStatus::solved);  // none of it left a trace
+}
+
+// Limits hold in the phase that restores feasibility, too: this problem has no solution. Each look
+// at a step takes a while, so that seconds are told from steps.
+TEST(OptimalControl, LimitsAreHonouredWhereNothingIsFeasible) {
+  OptimalControlProblem problem = rest_to_rest(30, 1.0, 10.0);
+  problem.bound_inputs(one(-1.0), one(1.0));
+  auto solver = OptimalControlSolver::make(problem).value();
+  const OptimalControlSolution whole = solver.solve();
+  ASSERT_EQ(whole.status, SolveStatus::infeasible);
+  ASSERT_GT(whole.counts.restorations, 0);
+  for (int most = 0; most < whole.counts.iterations; ++most) {
+    SolverOptions options;
+    options.max_iterations = most;
+    int seen = 0;
+    const OptimalControlSolution solution = solver.solve(options, [&](const Iteration&) {
+      ++seen;
+      return false;
+    });
+    EXPECT_EQ(solution.status, SolveStatus::iteration_limit) << most;
+    EXPECT_EQ(solution.counts.iterations, most);
+    EXPECT_LE(seen, most);
+  }
+  using Clock = std::chrono::steady_clock;
+  for (const double limit : {0.002, 0.02}) {
+    SolverOptions options;
+    options.time_limit = limit;
+    const auto begin = Clock::now();
+    int late = 0;  // steps that were begun after the limit
+    const OptimalControlSolution solution = solver.solve(options, [&](const Iteration&) {
+      const auto now = Clock::now();
+      late += std::chrono::duration<double>(now - begin).count() > limit ? 1 : 0;
+      while (std::chrono::duration<double>(Clock::now() - now).count() < 1e-3) {
+      }
+      return false;
+    });
+    EXPECT_EQ(solution.status, SolveStatus::time_limit) << limit;
+    EXPECT_LE(late, 1) << limit;
+  }
 }
 
 // From the first step to the last no memory is asked for: the restoration phase alone is made when

@@ -221,9 +221,10 @@ OptimalControlSolution OptimalControlSolver::Parts::solution(SolveStatus status)
   if (status == SolveStatus::not_finite) {
     const StageProgram::Fault fault = program.find_fault(solver.w());
     result.message = fault.found ? flyball::detail::format(
-                                       "{} is not finite at stage {}",
+                                       "{}{} is not finite at stage {}",
+                                       fault.derivative ? "a derivative of " : "",
                                        name_of_output(fault.stage, fault.output), fault.stage)
-                                 : std::string("a derivative is not finite");
+                                 : std::string("a number is not finite");
     return result;
   }
   if (!result.solved()) {
@@ -252,7 +253,7 @@ OptimalControlSolution OptimalControlSolver::solve(const SolverOptions& options,
     with_barrier.first_barrier = first_barrier;
   }
   const SolveStatus status = parts.solver.run(with_barrier, watch);
-  parts.patience = 5 + parts.solver.counts().iterations / 2;
+  parts.patience = 50 + 5 * parts.solver.counts().iterations;
   OptimalControlSolution result = parts.solution(status);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;

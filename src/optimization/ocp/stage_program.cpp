@@ -420,7 +420,41 @@ StageProgram::Fault StageProgram::find_fault(const Eigen::VectorXd& w) {
       for (std::size_t l = 0; l < count; ++l) {
         for (std::size_t i = 0; i < kind.values.outputs(); ++i) {
           if (!std::isfinite(kind.values.output(i, work)[l])) {
-            return {batch.stages[first + l], i, true};
+            return {batch.stages[first + l], i, true, false};
+          }
+        }
+      }
+    }
+  }
+  return find_derivative_fault(w);
+}
+
+/// Rows one by one: of the Hessian each has its own part.
+StageProgram::Fault StageProgram::find_derivative_fault(const Eigen::VectorXd& w) {
+  for (const Batch& batch : batches_) {
+    Compiled& kind = compiled_[batch.kind];
+    const LaneTape& tape = kind.derivatives;
+    const expression::Lagrangian& functions = problem_.kinds[batch.kind].functions;
+    double* const work = kind.derivative_work.data();
+    const std::size_t first_weight = size_ + static_cast<std::size_t>(problem_.data.rows());
+    for (std::size_t first = 0; first < batch.stages.size(); first += lanes) {
+      const std::size_t count = std::min(lanes, batch.stages.size() - first);
+      gather(kind, tape, batch.stages.data() + first, count, w.data(), work);
+      for (std::size_t row = 0; row < functions.rows; ++row) {
+        double* const mu = tape.input(first_weight, work);
+        std::fill_n(mu, functions.rows * lanes, 0.0);
+        std::fill_n(mu + row * lanes, lanes, 1.0);
+        tape.evaluate(work);
+        for (std::size_t e = functions.rows; e < tape.outputs(); ++e) {
+          const std::size_t entry = e - functions.rows;
+          if (entry < functions.jacobian.size() && functions.jacobian[entry].row != row) {
+            continue;
+          }
+          const double* const y = tape.output(e, work);
+          for (std::size_t l = 0; l < count; ++l) {
+            if (!std::isfinite(y[l])) {
+              return {batch.stages[first + l], row, true, true};
+            }
           }
         }
       }

@@ -68,15 +68,18 @@ class StageProgram final : public Program {
   [[nodiscard]] const std::vector<std::size_t>& first_row() const noexcept { return first_row_; }
   /// The place of a row's slack in w, or -1.
   [[nodiscard]] std::ptrdiff_t slack(std::size_t row) const noexcept { return slack_[row]; }
-  /// The first stage at which a value was not finite, and which output of its kind; for messages.
+  /// The first stage at which a value was not finite, or where all are a derivative, and which
+  /// output of its kind; for messages.
   struct Fault {
     std::size_t stage = 0;
     std::size_t output = 0;
     bool found = false;
+    bool derivative = false;
   };
   [[nodiscard]] Fault find_fault(const Eigen::VectorXd& w);
 
  private:
+  [[nodiscard]] Fault find_derivative_fault(const Eigen::VectorXd& w);
   struct Batch {
     std::size_t kind;
     std::vector<std::size_t> stages;

@@ -269,6 +269,7 @@ SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
   last_ = {};
   last_regularization_ = 0.0;
   derivatives_fresh_ = false;
+  bool warm = is_warm_;
   if (is_warm_) {
     is_warm_ = false;
     if (!choose_level(options)) {
@@ -288,14 +289,20 @@ SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
   if (!program_.values(w_, f_, c_)) {
     return SolveStatus::not_finite;
   }
-  const double first_theta = c_.lpNorm<1>();
-  theta_max_ = 1e4 * std::max(1.0, first_theta);
-  theta_min_ = 1e-4 * std::max(1.0, first_theta);
-  first_primal_ = c_.size() > 0 ? c_.lpNorm<Eigen::Infinity>() : 0.0;
-  first_mu_ = mu_;
-  reset_filter();
+  begin_filter();
   const double mu_min = options.tolerance / 11.0;
-  for (int k = 0;; ++k) {
+  int blocked = 0;  // steps in a row that were short
+  for (int k = 0, since = 0;; ++k, ++since) {
+    blocked = k > 0 && last_.step < 0.1 ? blocked + 1 : 0;
+    if (warm && ((since == 1 && blocked > 0) || blocked >= 3)) {
+      warm = retreat();
+      if (warm) {
+        derivatives_fresh_ = true;
+        begin_filter();
+        blocked = 0;
+        since = 0;
+      }
+    }
     if (!derivatives_fresh_ && !program_.derivatives(w_, lambda_, 1.0, gradient_)) {
       return SolveStatus::not_finite;
     }

@@ -34,7 +34,8 @@ class InteriorPoint {
   /// Lets the next run begin, after a change of the program's numbers, at a point of the central
   /// path that the last run went through: at its end where that still holds, else at the smallest
   /// barrier that is not less than the violation which the change made, so that what the bounds
-  /// leave of the first steps is most of them.
+  /// leave of the first steps is most of them. Where the first step is short all the same, or
+  /// three in a row are, the run goes back to a point of a larger barrier.
   /// @param mu  Not below this barrier; 0: any.
   /// @return false, and nothing done, if no run has been solved before.
   /// Source: Yildirim, Wright, "Warm-start strategies in interior-point methods for linear
@@ -76,6 +77,7 @@ class InteriorPoint {
   [[nodiscard]] bool search();
   void accept(double alpha, double alpha_dual);
   [[nodiscard]] SolveStatus restore(const SolverOptions& options, double seconds_left, Watch watch);
+  void begin_filter();
   void reset_filter();
   void bound_multipliers();
 
@@ -99,9 +101,11 @@ class InteriorPoint {
   void load_level(const Level& level);
   [[nodiscard]] bool evaluate();
   [[nodiscard]] bool choose_level(const SolverOptions& options);
+  [[nodiscard]] bool retreat();
   static constexpr int most_levels = 12;
   std::vector<Level> levels_;  // of falling barriers, the last run's end last
   int level_count_ = 0;
+  int level_at_ = 0;  // where a warm run began
   bool is_warm_ = false;
   double least_level_ = 0.0;
   Filter filter_;

@@ -43,6 +43,16 @@ double InteriorPoint::dual_step(double tau) const {
   return alpha;
 }
 
+/// Of the point at hand, where a run begins.
+void InteriorPoint::begin_filter() {
+  const double theta = c_.lpNorm<1>();
+  theta_max_ = 1e4 * std::max(1.0, theta);
+  theta_min_ = 1e-4 * std::max(1.0, theta);
+  first_primal_ = c_.size() > 0 ? c_.lpNorm<Eigen::Infinity>() : 0.0;
+  first_mu_ = mu_;
+  reset_filter();
+}
+
 void InteriorPoint::reset_filter() {
   filter_.clear();
   filter_.add(theta_max_, -infinity);

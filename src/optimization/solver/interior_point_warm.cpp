@@ -98,8 +98,21 @@ bool InteriorPoint::choose_level(const SolverOptions& options) {
     load_level(levels_[static_cast<std::size_t>(at)]);
     is_finite = evaluate();
   }
+  level_at_ = at;
   derivatives_fresh_ = is_finite;
   return is_finite;
+}
+
+/// Where bounds block the way from a point of the last run's path, it is farther from the changed
+/// problem's path than its barrier allows: the point of one 25 times as large is nearer to that.
+/// @return false where there is none.
+bool InteriorPoint::retreat() {
+  level_at_ = std::min(level_at_, level_count_) - 2;
+  if (level_at_ < 0) {
+    return false;
+  }
+  load_level(levels_[static_cast<std::size_t>(level_at_)]);
+  return evaluate();
 }
 
 }  // namespace flyball::optimization::detail
