@@ -13,7 +13,8 @@ namespace flyball {
 namespace detail {
 
 Expected<LqrDesign<>> solve_lqr(const MatrixRef& A, const MatrixRef& B, const Weight& Q,
-                                const Weight& R, const Eigen::MatrixXd* N, TimeDomain domain) {
+                                const Weight& R, const Eigen::MatrixXd* N, TimeDomain domain,
+                                CarefulWork* work) {
   const bool continuous = domain == TimeDomain::continuous;
   const std::string_view where = continuous ? "continuous_lqr" : "lqr";
   if (!Q.get() || !R.get()) {
@@ -33,6 +34,12 @@ Expected<LqrDesign<>> solve_lqr(const MatrixRef& A, const MatrixRef& B, const We
                                           : check_shape(*N, n, m, where, "N", "states x inputs");
                     }));
   const auto solve = [&](const auto&... cross) {
+    if (work != nullptr) {
+      const Eigen::MatrixXd given =
+          N == nullptr ? Eigen::MatrixXd(Eigen::MatrixXd::Zero(n, m)) : *N;
+      return continuous ? care_within(A, B, weight_Q, weight_R, given, *work)
+                        : dare_within(A, B, weight_Q, weight_R, given, *work);
+    }
     return continuous ? care(A, B, weight_Q, weight_R, cross...)
                       : dare(A, B, weight_Q, weight_R, cross...);
   };

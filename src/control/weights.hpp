@@ -5,13 +5,18 @@
 #include <flyball/control/integral_control.hpp>
 #include <flyball/systems/analysis.hpp>
 
+#include "math/riccati/riccati_work.hpp"
+
 /// What the designs with quadratic costs have in common.
 namespace flyball::detail {
 
 /// `lqr` and `continuous_lqr`. @param N  The cross weight, none where it is null.
+/// @param work  What is left of a budget for equations that doubles do not solve, where there is
+/// one.
 [[nodiscard]] Expected<LqrDesign<>> solve_lqr(const MatrixRef& A, const MatrixRef& B,
                                               const Weight& Q, const Weight& R,
-                                              const Eigen::MatrixXd* N, TimeDomain domain);
+                                              const Eigen::MatrixXd* N, TimeDomain domain,
+                                              CarefulWork* work = nullptr);
 
 /// The matrix of a weight, or its maker's error; symmetric, of the given size.
 [[nodiscard]] Expected<Eigen::MatrixXd> weight_of(const Weight& weight, Eigen::Index size,

@@ -8,6 +8,7 @@
 #include <flyball/math/riccati/riccati.hpp>
 #include <flyball/systems/discretize.hpp>
 
+#include "control/weights.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -91,8 +92,11 @@ Expected<LtvDriveFollower> LtvDriveFollower::create(const mechanisms::Differenti
         .got(detail::format("{:.4g} m/s", largest))
         .expected(detail::format("above low_speed.velocity, {:.4g} m/s", least));
   }
+  // Where all of the gains need sixty digits it would take seconds.
+  detail::CarefulWork work{2e8};
   const auto design = [&](double speed) {
-    return lqr(follower.A(speed), follower.B(speed), follower.Q_, follower.R_);
+    return detail::solve_lqr(follower.A(speed), follower.B(speed), follower.Q_, follower.R_,
+                             nullptr, TimeDomain::discrete, &work);
   };
   const auto speed_at = [&](double i) {
     const double share = i / intervals;

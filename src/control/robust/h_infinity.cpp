@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <flyball/math/riccati/riccati.hpp>
 #include <flyball/systems/conversion.hpp>
@@ -14,11 +15,13 @@
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/riccati/riccati_work.hpp"
 
 namespace flyball {
 
 namespace {
 
+using detail::CarefulWork;
 using detail::NormalizedPlant;
 using detail::Partition;
 using detail::product;
@@ -74,7 +77,8 @@ struct Level {
 
 /// Nothing where no controller stays under γ. Disturbances are in units of γ, so that the weight
 /// of Glover and Doyle's equation (3.1) is near one.
-std::optional<Level> level(const Partition& P, double gamma) {
+/// @param work  What is left for equations that doubles do not solve.
+std::optional<Level> level(const Partition& P, double gamma, CarefulWork& work) {
   const Index m1 = P.B1.cols();
   const Index m2 = P.B2.cols();
   const Index p1 = P.C1.rows();
@@ -93,7 +97,7 @@ std::optional<Level> level(const Partition& P, double gamma) {
   if (meets_the_axis(P.A, B, Q, R, N)) {
     return std::nullopt;
   }
-  const auto X = care(P.A, B, Q, R, N);
+  const auto X = detail::care_within(P.A, B, Q, R, N, work);
   if (!X || !is_semidefinite(X->X, Q, P.A)) {
     return std::nullopt;
   }
@@ -109,7 +113,7 @@ std::optional<Level> level(const Partition& P, double gamma) {
   if (meets_the_axis(P.A.transpose(), C.transpose(), V, S, M)) {
     return std::nullopt;
   }
-  const auto Y = care(P.A.transpose(), C.transpose(), V, S, M);
+  const auto Y = detail::care_within(P.A.transpose(), C.transpose(), V, S, M, work);
   if (!Y || !is_semidefinite(Y->X, V, P.A)) {
     return std::nullopt;
   }
@@ -204,17 +208,36 @@ std::optional<Verified> verified(const Partition& given, const NormalizedPlant& 
   return Verified{*std::move(controller), *std::move(closed_loop), *norm};
 }
 
+/// No controller stays under `low`, one does under that of `high`.
 struct Bracket {
   double low = 0.0;
   std::optional<Level> high;
 };
 
-Expected<Bracket> least_level(const Partition& P, double tolerance, std::string_view where) {
+/// Of a search for the least level, a second's; of more than 24 states in proportion.
+CarefulWork search_work(const Partition& P) {
+  const double size = std::max(1.0, static_cast<double>(P.n) / 24.0);
+  return {2e8 * size * size * size};
+}
+
+Refusal out_of_work(std::string_view where, std::string got) {
+  return refusal(SynthesisError::not_verified, where, "the least level")
+      .got(std::move(got))
+      .hint(
+          "its Riccati equations need more digits than there is work for: measure time and signals "
+          "in units in which the plant's entries are near one");
+}
+
+Expected<Bracket> least_level(const Partition& P, double tolerance, CarefulWork& work,
+                              std::string_view where) {
   Bracket found;
   found.low = floor_of(P);
   constexpr double most = 1e15;
   double trial = std::max(1.0, 2.0 * found.low);
-  while (!(found.high = level(P, trial))) {
+  while (!(found.high = level(P, trial, work))) {
+    if (work.is_done()) {
+      return out_of_work(where, "not found: it is above " + format_number(found.low));
+    }
     found.low = trial;
     trial *= 10.0;
     if (trial > most) {
@@ -228,8 +251,10 @@ Expected<Bracket> least_level(const Partition& P, double tolerance, std::string_
   // Down by tens where one was already enough.
   while (found.low == 0.0 && found.high->gamma > 1e-12) {
     const double next = 0.1 * found.high->gamma;
-    if (auto lower = level(P, next)) {
+    if (auto lower = level(P, next, work)) {
       found.high = std::move(lower);
+    } else if (work.is_done()) {
+      return out_of_work(where, "not found: it is below " + format_number(found.high->gamma));
     } else {
       found.low = next;
     }
@@ -240,10 +265,15 @@ Expected<Bracket> least_level(const Partition& P, double tolerance, std::string_
     const double middle = found.high->gamma > 4.0 * found.low
                               ? std::sqrt(found.high->gamma * found.low)
                               : 0.5 * (found.high->gamma + found.low);
-    if (auto lower = level(P, middle)) {
+    if (auto lower = level(P, middle, work)) {
       found.high = std::move(lower);
-    } else {
+    } else if (!work.is_done()) {
       found.low = middle;
+    } else if (found.high->gamma <= found.low * (1.0 + tolerance)) {
+      break;  // as near as was asked for
+    } else {
+      return out_of_work(where, "between " + format_number(found.low) + " and " +
+                                    format_number(found.high->gamma));
     }
   }
   return found;
@@ -263,19 +293,21 @@ Expected<RobustDesign<Continuous>> synthesize(const Continuous& system, Index me
   Bracket bracket;
   double gamma = options.gamma;
   std::optional<Level> at;
+  CarefulWork search = search_work(plant.P);
+  CarefulWork last = search_work(plant.P);  // of the levels that are designed for
   if (gamma > 0.0) {
-    at = gamma > floor_of(plant.P) ? level(plant.P, gamma) : std::nullopt;
+    at = gamma > floor_of(plant.P) ? level(plant.P, gamma, last) : std::nullopt;
     if (!at) {
-      FLYBALL_TRY(const auto least, least_level(plant.P, 1e-3, where));
+      FLYBALL_TRY(const auto least, least_level(plant.P, 1e-3, search, where));
       return refusal(SynthesisError::level_not_reached, where, "gamma")
           .got(format_number(gamma))
           .expected("at least " + format_number(least.high->gamma))
           .with("least level", least.high->gamma);
     }
   } else {
-    FLYBALL_TRY(bracket, least_level(plant.P, options.tolerance, where));
+    FLYBALL_TRY(bracket, least_level(plant.P, options.tolerance, search, where));
     gamma = bracket.high->gamma * (1.0 + 0.9 * options.tolerance);
-    at = level(plant.P, gamma);
+    at = level(plant.P, gamma, last);
   }
   std::optional<Verified> best;
   if (options.gamma > 0.0) {
@@ -293,7 +325,7 @@ Expected<RobustDesign<Continuous>> synthesize(const Continuous& system, Index me
       if (best && best->norm.norm <= bracket.high->gamma * (1.0 + options.tolerance)) {
         break;
       }
-      at = level(plant.P, bracket.high->gamma * (1.0 + 2.0 * further * options.tolerance));
+      at = level(plant.P, bracket.high->gamma * (1.0 + 2.0 * further * options.tolerance), last);
     }
     if (best && !(best->norm.norm <= 2.0 * bracket.high->gamma)) {
       best.reset();

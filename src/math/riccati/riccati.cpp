@@ -181,7 +181,10 @@ ErrorInfo error_info(RiccatiError code) {
 
 namespace detail {
 
-Expected<void> solve_riccati(const RiccatiData& data, RiccatiAnswer& answer) {
+namespace {
+
+Expected<void> solve_riccati_within(const RiccatiData& data, RiccatiAnswer& answer,
+                                    CarefulWork* work) {
   constexpr double nearly_nothing = 0x1p-800;
   const int n = data.states;
   const int m = data.inputs;
@@ -207,7 +210,8 @@ Expected<void> solve_riccati(const RiccatiData& data, RiccatiAnswer& answer) {
   const ConstMap R(data.R, m, m);
   const Eigen::MatrixXd N = cross_weight(data);
   FLYBALL_CHECK(check_values(A, B, Q, R, N, data.continuous ? "care" : "dare"));
-  const RiccatiProblem problem{A, B, symmetrized(Q), symmetrized(R), N, data.continuous};
+  const RiccatiProblem problem{A, B,    symmetrized(Q), symmetrized(R), N, data.continuous,
+                               0, work};
   FLYBALL_TRY(auto solution,
               ordinary ? solve_riccati_robustly(problem) : solve_riccati_in_other_units(problem));
   Eigen::Map<Eigen::MatrixXd>(answer.X, n, n) = solution.X;
@@ -219,12 +223,19 @@ Expected<void> solve_riccati(const RiccatiData& data, RiccatiAnswer& answer) {
   return {};
 }
 
+}  // namespace
+
+Expected<void> solve_riccati(const RiccatiData& data, RiccatiAnswer& answer) {
+  return solve_riccati_within(data, answer, nullptr);
+}
+
 }  // namespace detail
 
 namespace {
 
 Expected<RiccatiSolution> solve(bool continuous, const MatrixRef& A, const MatrixRef& B,
-                                const MatrixRef& Q, const MatrixRef& R, const MatrixRef* N) {
+                                const MatrixRef& Q, const MatrixRef& R, const MatrixRef* N,
+                                detail::CarefulWork* work = nullptr) {
   const Eigen::Index n = A.rows();
   const Eigen::Index m = B.cols();
   FLYBALL_CHECK(check_shapes(A, B, Q, R, N, continuous ? "care" : "dare"));
@@ -232,21 +243,19 @@ Expected<RiccatiSolution> solve(bool continuous, const MatrixRef& A, const Matri
       R.outerStride() != m || (N != nullptr && N->outerStride() != n)) {
     // Blocks of larger matrices: copied, because the kernels take columns without gaps.
     const Eigen::MatrixXd cross = N == nullptr ? Eigen::MatrixXd::Zero(n, m) : Eigen::MatrixXd(*N);
-    using Solver = Expected<RiccatiSolution>(const MatrixRef&, const MatrixRef&, const MatrixRef&,
-                                             const MatrixRef&, const MatrixRef&);
-    Solver& solver = continuous ? static_cast<Solver&>(care) : static_cast<Solver&>(dare);
-    return solver(Eigen::MatrixXd(A), Eigen::MatrixXd(B), Eigen::MatrixXd(Q), Eigen::MatrixXd(R),
-                  cross);
+    const MatrixRef whole = cross;
+    return solve(continuous, Eigen::MatrixXd(A), Eigen::MatrixXd(B), Eigen::MatrixXd(Q),
+                 Eigen::MatrixXd(R), &whole, work);
   }
   Expected<RiccatiSolution> solution;
   solution->X.resize(n, n);
   solution->K.resize(m, n);
   solution->poles.resize(n);
   detail::RiccatiAnswer answer{solution->X.data(), solution->K.data(), solution->poles.data()};
-  FLYBALL_CHECK(
-      detail::solve_riccati({static_cast<int>(n), static_cast<int>(m), A.data(), B.data(), Q.data(),
-                             R.data(), N == nullptr ? nullptr : N->data(), continuous},
-                            answer));
+  FLYBALL_CHECK(detail::solve_riccati_within(
+      {static_cast<int>(n), static_cast<int>(m), A.data(), B.data(), Q.data(), R.data(),
+       N == nullptr ? nullptr : N->data(), continuous},
+      answer, work));
   solution->residual = answer.residual;
   solution->condition = answer.condition;
   solution->iterations = answer.iterations;
@@ -274,5 +283,19 @@ Expected<RiccatiSolution> care(const MatrixRef& A, const MatrixRef& B, const Mat
                                const MatrixRef& R) {
   return solve(true, A, B, Q, R, nullptr);
 }
+
+namespace detail {
+
+Expected<RiccatiSolution> dare_within(const MatrixRef& A, const MatrixRef& B, const MatrixRef& Q,
+                                      const MatrixRef& R, const MatrixRef& N, CarefulWork& work) {
+  return flyball::solve(false, A, B, Q, R, &N, &work);
+}
+
+Expected<RiccatiSolution> care_within(const MatrixRef& A, const MatrixRef& B, const MatrixRef& Q,
+                                      const MatrixRef& R, const MatrixRef& N, CarefulWork& work) {
+  return flyball::solve(true, A, B, Q, R, &N, &work);
+}
+
+}  // namespace detail
 
 }  // namespace flyball

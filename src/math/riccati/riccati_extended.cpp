@@ -65,7 +65,7 @@ std::optional<ExtendedRiccati> solve_riccati_extended(const RiccatiProblem& p) {
   // to the square of that for each state: 31 digits are not enough. With more states it would take
   // seconds.
   constexpr Index most_states = 20;
-  Progress progress;
+  Progress progress{.work = p.work};
   if (auto found =
           solve_with(equation_of<DoubleDoubleMatrix>(p), shifts, cayley_parameters, progress)) {
     return std::move(found->rounded);

@@ -25,11 +25,30 @@ struct Equation {
   bool continuous = false;
 };
 
+/// How far the attempts came.
+struct Progress {
+  CarefulWork* work = nullptr;  ///< What is left of a budget, where there is one.
+  int iterations = 0;           ///< Doubling steps plus Newton steps.
+  bool converged = false;       ///< Doubling did, so that a solution seems to be there.
+  int idle = 0;                 ///< Newton's corrections shrank no more, so often.
+
+  /// Whether the budget has so many more products of n x n.
+  template <class Matrix>
+  [[nodiscard]] bool spend(double products, const Matrix& A) const {
+    if (work == nullptr) {
+      return true;
+    }
+    const auto n = static_cast<double>(A.rows());
+    constexpr double four_times = 12.0;
+    return work->spend((Matrix::precision < 1e-40 ? four_times : 1.0) * products * n * n * n);
+  }
+};
+
 /// X = AᵀXA + C by squared Smith iterations; nothing where A's powers do not vanish.
 template <class Matrix>
-std::optional<Matrix> solve_stein(Matrix A, Matrix C) {
+std::optional<Matrix> solve_stein(Matrix A, Matrix C, const Progress& progress) {
   Matrix X = std::move(C);
-  for (int k = 0; k < 110; ++k) {
+  for (int k = 0; k < 110 && progress.spend(3.0, A); ++k) {
     const auto moved = product(A.transpose(), product(X, A));
     X = sum(std::move(X), 1.0, moved);
     const double power = A.norm();
@@ -46,9 +65,10 @@ std::optional<Matrix> solve_stein(Matrix A, Matrix C) {
 
 /// The solution of the closed loop's Lyapunov equation, AᵀX + XA + C = 0 or AᵀXA - X + C = 0.
 template <class Matrix>
-std::optional<Matrix> solve_lyapunov(const Matrix& A, const Matrix& C, bool continuous) {
+std::optional<Matrix> solve_lyapunov(const Matrix& A, const Matrix& C, bool continuous,
+                                     const Progress& progress) {
   if (!continuous) {
-    return solve_stein(A, C);
+    return solve_stein(A, C, progress);
   }
   // With the Cayley transform A_d = (A - γI)⁻¹(A + γI) = I + 2γ (A - γI)⁻¹ it is
   // X = A_dᵀX A_d + 2γ (A - γI)⁻ᵀC(A - γI)⁻¹.
@@ -62,7 +82,8 @@ std::optional<Matrix> solve_lyapunov(const Matrix& A, const Matrix& C, bool cont
     return std::nullopt;
   }
   return solve_stein(shifted_diagonal(scaled(*inverse, 2.0 * gamma), 1.0),
-                     scaled(product(inverse->transpose(), product(C, *inverse)), 2.0 * gamma));
+                     scaled(product(inverse->transpose(), product(C, *inverse)), 2.0 * gamma),
+                     progress);
 }
 
 /// K, the closed loop and F at X.
@@ -171,19 +192,12 @@ std::optional<Reduced<Matrix>> cayley(const Reduced<Matrix>& r, double gamma) {
                          symmetrized(scaled(product(product(*W, r.H), *inverse), 2.0 * gamma))};
 }
 
-/// How far the attempts came.
-struct Progress {
-  int iterations = 0;      ///< Doubling steps plus Newton steps.
-  bool converged = false;  ///< Doubling did, so that a solution seems to be there.
-  int idle = 0;            ///< Newton's corrections shrank no more, so often.
-};
-
 /// Structure-preserving doubling:
 ///   W = I + GH,  A ← A W⁻¹A,  G ← G + A W⁻¹G Aᵀ,  H ← H + AᵀH W⁻¹A.
 template <class Matrix>
 std::optional<Matrix> doubling(Reduced<Matrix> r, Progress& progress) {
   const Index n = r.A.rows();
-  for (int k = 0; k < 90; ++k) {
+  for (int k = 0; k < 90 && progress.spend(10.0, r.A); ++k) {
     ++progress.iterations;
     const auto solved = solve(shifted_diagonal(product(r.G, r.H), 1.0), beside(r.A, r.G));
     if (!solved) {
@@ -218,13 +232,13 @@ std::optional<Matrix> newton(const Equation<Matrix>& e, Matrix X, Progress& prog
   constexpr Eigen::Index few_states = 4;
   double least = small;
   int idle = 0;
-  for (int k = 0; k < 60; ++k) {
+  for (int k = 0; k < 60 && progress.spend(6.0, e.A); ++k) {
     ++progress.iterations;
     const auto here = evaluate(e, X);
     if (!here) {
       return std::nullopt;
     }
-    const auto step = solve_lyapunov(here->closed_loop, here->F, e.continuous);
+    const auto step = solve_lyapunov(here->closed_loop, here->F, e.continuous, progress);
     if (!step) {
       return std::nullopt;
     }
@@ -267,7 +281,7 @@ struct RiccatiDigits {
 
 template <class Matrix>
 std::optional<RiccatiDigits<Matrix>> finish(const Equation<Matrix>& e, const Matrix& X,
-                                            int iterations) {
+                                            const Progress& progress) {
   const auto exact = evaluate(e, X);
   if (!exact) {
     return std::nullopt;
@@ -277,13 +291,14 @@ std::optional<RiccatiDigits<Matrix>> finish(const Equation<Matrix>& e, const Mat
   answer.K = exact->K.rounded();
   answer.closed_loop = exact->closed_loop.rounded();
   const auto rounded = evaluate(e, Matrix(answer.X));
-  const auto gain = solve_lyapunov(exact->closed_loop, Matrix::identity(e.A.rows()), e.continuous);
+  const auto gain =
+      solve_lyapunov(exact->closed_loop, Matrix::identity(e.A.rows()), e.continuous, progress);
   if (!rounded || !gain) {
     return std::nullopt;
   }
   answer.scale = rounded->scale;
   answer.gain = gain->norm();
-  answer.iterations = iterations;
+  answer.iterations = progress.iterations;
   return RiccatiDigits<Matrix>{X, exact->K, std::move(answer)};
 }
 
@@ -314,7 +329,7 @@ std::optional<RiccatiDigits<Matrix>> solve_with(const Equation<Matrix>& e,
   const auto reduced = reduce_extended(e);
   const auto attempt = [&](const Matrix& X0, const std::optional<Matrix>& Y) {
     const auto X = Y ? newton(e, sum(X0, 1.0, *Y), progress) : std::nullopt;
-    return X ? finish(e, *X, progress.iterations) : std::nullopt;
+    return X ? finish(e, *X, progress) : std::nullopt;
   };
   if (!e.continuous) {
     const double unit = e.Q.norm() > 0.0 ? e.Q.norm() : 1.0;

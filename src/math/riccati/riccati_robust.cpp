@@ -97,6 +97,12 @@ Error hangs_on_digits(const RiccatiProblem& p, const MatrixXd& X) {
       .with("size of X", X.norm());
 }
 
+Error out_of_work(const RiccatiProblem& p) {
+  return refusal(RiccatiError::no_convergence, p.continuous ? "care" : "dare", "X")
+      .got("not found within the work that is left for it")
+      .hint("choose units in which the numbers are nearer to 1");
+}
+
 }  // namespace
 
 std::optional<ReducedRiccati> reduce(const RiccatiProblem& p) {
@@ -165,13 +171,15 @@ Expected<RiccatiSolution> solve_riccati_robustly(const RiccatiProblem& problem) 
                          problem.R,
                          d.asDiagonal() * problem.N,
                          problem.continuous,
-                         problem.rate};
+                         problem.rate,
+                         problem.work};
   if (auto why = unreached_at_sight(p)) {
     return tl::unexpected(*std::move(why));
   }
   const auto answer = solve_riccati_extended(p);
   if (!answer) {
-    return tl::unexpected(diagnose_riccati(p));
+    return tl::unexpected(p.work != nullptr && p.work->is_done() ? out_of_work(p)
+                                                                 : diagnose_riccati(p));
   }
   RiccatiSolution solution;
   solution.X = answer->X;

@@ -3,6 +3,7 @@
 #include <flyball/math/riccati/riccati.hpp>
 
 #include "math/extended/double_double.hpp"
+#include "math/riccati/riccati_work.hpp"
 
 namespace flyball::detail {
 
@@ -15,6 +16,7 @@ struct RiccatiProblem {
   Eigen::MatrixXd N;
   bool continuous = false;
   int rate = 0;  ///< A is given in units of 2^rate, which its eigenvalues are told without.
+  CarefulWork* work = nullptr;  ///< What is left of a budget, where there is one.
 };
 
 /// M⁻¹ rhs for a symmetric M, equilibrated by powers of two first; `rcond` is that of the scaled M.

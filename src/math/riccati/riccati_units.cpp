@@ -104,7 +104,8 @@ Expected<RiccatiSolution> solve_in_doubles(const RiccatiProblem& given, const Ri
                          times_powers(given.R, u, u, -units.weight + units.rate),
                          times_powers(given.N, x, u, -units.weight),
                          given.continuous,
-                         units.rate};
+                         units.rate,
+                         given.work};
   const char* const where = p.continuous ? "care" : "dare";
   if (!p.A.allFinite() || !p.B.allFinite() || !p.Q.allFinite() || !p.R.allFinite() ||
       !p.N.allFinite()) {

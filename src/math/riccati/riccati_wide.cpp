@@ -103,7 +103,7 @@ std::optional<RiccatiSolution> solve_riccati_wide(const RiccatiProblem& given,
   if (given.A.rows() > most_states) {
     return std::nullopt;
   }
-  Progress progress;
+  Progress progress{.work = given.work};
   const auto found = solve_with(equation_in(given, units), std::span(shifts).first(2),
                                 std::span(cayley_parameters).first(1), progress);
   if (!found) {

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <limits>
+
+#include <flyball/math/riccati/riccati.hpp>
+
+namespace flyball::detail {
+
+/// What a design that solves many equations gives for those of them that the kernels do not vouch
+/// for, in multiplications of doubles' twice precision: a product of n x n counts n³ of them, and
+/// `four_times` as many in four times the precision of doubles. The same problem spends the same.
+struct CarefulWork {
+  double left = std::numeric_limits<double>::infinity();
+
+  /// Whether there was so much left.
+  bool spend(double work) noexcept {
+    left -= work;
+    return left >= 0.0;
+  }
+  [[nodiscard]] bool is_done() const noexcept { return left < 0.0; }
+};
+
+/// `dare` and `care` within what is left; RiccatiError::no_convergence once that is done.
+[[nodiscard]] Expected<RiccatiSolution> dare_within(const MatrixRef& A, const MatrixRef& B,
+                                                    const MatrixRef& Q, const MatrixRef& R,
+                                                    const MatrixRef& N, CarefulWork& work);
+[[nodiscard]] Expected<RiccatiSolution> care_within(const MatrixRef& A, const MatrixRef& B,
+                                                    const MatrixRef& Q, const MatrixRef& R,
+                                                    const MatrixRef& N, CarefulWork& work);
+
+}  // namespace flyball::detail
