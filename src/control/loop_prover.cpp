@@ -136,6 +136,8 @@ bool LoopProver::show_on(const SetPiece& piece, const DelayBranch& branch,
   MatrixFamily family = family_of(*forms);
   const Index fixed = claim.disk > 0.0 ? 1 : 0;
   const Index size = family.centre.rows();
+  const double eigenvalues = eigenvalue_work(static_cast<double>(size));
+  work_ += 3.0 * eigenvalues;  // of Lyapunov's equation
   auto T_0 = first_coordinates(family.centre, fixed);
   if (!T_0) {
     choose_split(piece, family, nullptr);
@@ -144,6 +146,11 @@ bool LoopProver::show_on(const SetPiece& piece, const DelayBranch& branch,
   choose_split(piece, family, &*T_0);
   MatrixXd Z = solve_linear(*T_0, MatrixXd::Identity(size, size));
   fold_small_slopes(family, *T_0, Z);
+  const double of_vertices = static_cast<double>(family.vertices()) * eigenvalues;
+  work_ += of_vertices;
+  if (family.vertices() > 1 && of_vertices > options_.most_work) {
+    return false;
+  }
   std::vector<MatrixXd> members;
   for (unsigned v = 0; v < family.vertices(); ++v) {
     members.push_back(family.vertex(v));
@@ -226,8 +233,10 @@ ClaimOutcome LoopProver::show(LoopClaim& claim) {
     const Index round = loop_.set.round;
     if (round == 0 || piece.middle.head(round).squaredNorm() <= 1.0) {
       work_ += work_of_enclosure(loop_, parameters);
+      const double before = search_.work();
       // Of a member that was looked at before it is known.
       const bool worse = search_.look_at(piece.middle);
+      work_ += search_.work() - before;
       if (worse && search_.unstable() && surely_unstable_member(loop_, search_.slowest())) {
         proof_.resize(kept);
         return ClaimOutcome::refuted;

@@ -50,15 +50,17 @@ bool MemberSearch::look_at(const VectorXd& z) {
   const Eigen::MatrixXd M = family_of(*forms).centre;
   const Index n = M.rows() - 1;
   const auto size = static_cast<double>(n);
-  work_ += (margins_ ? 300.0 : 20.0) * size * size * size;
+  work_ += 300.0 * size * size + eigenvalue_work(size);
   LoopMember member{.parameters = parameters_at(loop_.set, z)};
-  member.spectral_radius =
-      n == 0 ? 0.0 : eigenvalues_of(M.topLeftCorner(n, n)).cwiseAbs().maxCoeff();
+  const Eigen::VectorXcd poles =
+      n == 0 ? Eigen::VectorXcd() : eigenvalues_of(M.topLeftCorner(n, n));
+  member.spectral_radius = n == 0 ? 0.0 : poles.cwiseAbs().maxCoeff();
   if (!std::isfinite(member.spectral_radius)) {
     return false;
   }
   if (margins_ && member.spectral_radius < 1.0) {
-    member.disk_margin = disk_margin_of(M);
+    work_ += disk_margin_work(size);
+    member.disk_margin = disk_margin_of(M, poles);
   }
   const bool slower = !found() || member.spectral_radius > slowest_.member.spectral_radius;
   const bool thinner = margins_ && (!found() || member.disk_margin < thinnest_.member.disk_margin);

@@ -28,6 +28,8 @@ class MemberSearch {
   bool look_at(const Eigen::VectorXd& z);
 
   [[nodiscard]] bool found() const noexcept { return looked_; }
+  /// Done so far, floating-point operations.
+  [[nodiscard]] double work() const noexcept { return work_; }
   [[nodiscard]] bool unstable() const noexcept {
     return found() && !(slowest_.member.spectral_radius < 1.0);
   }

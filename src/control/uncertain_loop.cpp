@@ -2,15 +2,62 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <utility>
 
 #include "control/uncertain_loop.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/dense_reduction.hpp"
 
 namespace flyball::detail {
 
 namespace {
 
+using Complex = std::complex<double>;
 using Eigen::Index;
+
+/// |C(zI - A)⁻¹B + D| on the unit circle, M = [A B; C D]: with A in Hessenberg form each costs
+/// O(n²).
+class ChannelGain {
+ public:
+  explicit ChannelGain(const Eigen::MatrixXd& M) : n_(M.rows() - 1), D_(M(n_, n_)) {
+    Hessenberg form = hessenberg_of(M.topLeftCorner(n_, n_));
+    B_ = transposed_product(form.Q, M.topRightCorner(n_, 1));
+    C_ = product(M.bottomLeftCorner(1, n_), form.Q);
+    H_ = std::move(form.H);
+  }
+
+  /// By elimination of the subdiagonal with row pivoting.
+  [[nodiscard]] double operator()(double theta) {
+    U_ = -H_.cast<Complex>();
+    U_.diagonal().array() += std::polar(1.0, theta);
+    x_ = B_.cast<Complex>();
+    for (Index k = 0; k + 1 < n_; ++k) {
+      if (std::abs(U_(k + 1, k)) > std::abs(U_(k, k))) {
+        U_.row(k).tail(n_ - k).swap(U_.row(k + 1).tail(n_ - k));
+        std::swap(x_(k), x_(k + 1));
+      }
+      if (U_(k + 1, k) != 0.0) {
+        const Complex factor = U_(k + 1, k) / U_(k, k);
+        U_.row(k + 1).tail(n_ - k - 1) -= factor * U_.row(k).tail(n_ - k - 1);
+        x_(k + 1) -= factor * x_(k);
+      }
+    }
+    Complex y = D_;
+    for (Index k = n_ - 1; k >= 0; --k) {
+      x_(k) /= U_(k, k);
+      x_.head(k) -= U_.col(k).head(k) * x_(k);
+      y += C_(0, k) * x_(k);
+    }
+    return std::abs(y);
+  }
+
+ private:
+  Index n_;
+  double D_;
+  Eigen::MatrixXd H_, B_, C_;
+  Eigen::MatrixXcd U_{};
+  Eigen::VectorXcd x_{};
+};
 
 /// The plant sampled: e^{AT}, Γ(T) and Γ(T - f), Γ(t) = ∫₀ᵗ e^{As} ds B.
 struct SampledForms {
@@ -288,16 +335,8 @@ Eigen::VectorXd parameters_at(const ParameterSet& set, const Eigen::VectorXd& z)
   return set.centre + set.axes * z;
 }
 
-double disk_margin_of(const Eigen::MatrixXd& M) {
-  using Complex = std::complex<double>;
-  const Index n = M.rows() - 1;
-  const auto gain = [&](double theta) {
-    Eigen::MatrixXcd zI_A = -M.topLeftCorner(n, n).cast<Complex>();
-    zI_A.diagonal().array() += std::polar(1.0, theta);
-    const Eigen::MatrixXcd x = solve_complex(zI_A, M.topRightCorner(n, 1).cast<Complex>());
-    const Complex y = (M.bottomLeftCorner(1, n).cast<Complex>().lazyProduct(x))(0, 0) + M(n, n);
-    return std::abs(y);
-  };
+double disk_margin_of(const Eigen::MatrixXd& M, const Eigen::VectorXcd& poles) {
+  ChannelGain gain(M);
   // A grid that is finer towards zero, and where the poles are; the best is refined.
   std::vector<double> grid;
   constexpr int points = 48;
@@ -305,7 +344,6 @@ double disk_margin_of(const Eigen::MatrixXd& M) {
     const double share = static_cast<double>(i) / points;
     grid.push_back(std::numbers::pi * share * share);
   }
-  const Eigen::VectorXcd poles = eigenvalues_of(M.topLeftCorner(n, n));
   for (const Complex pole : poles) {
     if (std::abs(pole) > 0.3) {
       grid.push_back(std::abs(std::arg(pole)));

@@ -42,7 +42,17 @@ struct SetPiece {
 /// The coordinates of a member: its parameters. @param z  Of the set.
 [[nodiscard]] Eigen::VectorXd parameters_at(const ParameterSet& set, const Eigen::VectorXd& z);
 
+/// Of all eigenvalues of so many states, floating-point operations.
+[[nodiscard]] constexpr double eigenvalue_work(double states) {
+  return 25.0 * states * states * states;
+}
+
 /// 2/‖S - T‖∞ of a stable closed loop with the channel of α = 2: M = [A B; C 1].
-[[nodiscard]] double disk_margin_of(const Eigen::MatrixXd& M);
+/// @param poles  The eigenvalues of A. Cost: `disk_margin_work(A.rows())`.
+[[nodiscard]] double disk_margin_of(const Eigen::MatrixXd& M, const Eigen::VectorXcd& poles);
+/// What that takes, in floating-point operations: the Hessenberg form, and about 100 + n responses.
+[[nodiscard]] constexpr double disk_margin_work(double states) {
+  return (10.0 * states + 12.0 * (100.0 + states)) * states * states;
+}
 
 }  // namespace flyball::detail
