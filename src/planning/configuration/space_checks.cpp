@@ -16,6 +16,13 @@ namespace {
 
 constexpr std::string_view where = "configuration space";
 
+/// m, rad: margins are judged in single precision, and of what is larger nothing is left there.
+constexpr double largest_number = 1e9;
+
+Expected<void> check_ordinary(double value, std::string_view name, std::string_view unit = "") {
+  return check_within(value, -largest_number, largest_number, where, name, unit);
+}
+
 Expected<void> check_coordinate(const std::vector<SpaceAxis>& axes, int coordinate,
                                 const std::string& name) {
   if (coordinate < 0 || static_cast<std::size_t>(coordinate) >= axes.size()) {
@@ -44,10 +51,10 @@ Expected<void> check_node(const std::vector<SpaceAxis>& axes, const std::string&
             .got(format("a normal of {} entries", node.normal.size()))
             .expected(format("one for each of the {} axes", axes.size()));
       }
-      FLYBALL_CHECK(check_finite(node.offset, where, name));
+      FLYBALL_CHECK(check_ordinary(node.offset, name));
       bool any = false;
       for (std::size_t k = 0; k < axes.size(); ++k) {
-        FLYBALL_CHECK(check_finite(node.normal[k], where, name));
+        FLYBALL_CHECK(check_ordinary(node.normal[k], name));
         any = any || node.normal[k] != 0.0;
         if (axes[k].wraps && node.normal[k] != 0.0) {
           return refusal(ArgumentError::out_of_range, where, name)
@@ -106,7 +113,12 @@ Expected<void> check_node(const std::vector<SpaceAxis>& axes, const std::string&
 }
 
 Expected<void> check_point(const std::array<double, 2>& p, std::string_view name) {
-  return Checks(where).finite(p[0], name).finite(p[1], name);
+  FLYBALL_CHECK(check_ordinary(p[0], name, "m"));
+  return check_ordinary(p[1], name, "m");
+}
+
+Expected<void> check_size(double value, std::string_view name, std::string_view unit) {
+  return check_within(value, 0.0, largest_number, where, name, unit);
 }
 
 Expected<void> check_joint(const PlanarMechanism& mechanism, int joint, const std::string& name) {
@@ -123,9 +135,11 @@ Expected<void> check_obstacle(const PlanarObstacle& obstacle, const std::string&
   FLYBALL_CHECK(check_point(obstacle.at, name));
   switch (obstacle.shape) {
     case Shape::disc:
-      return check_not_negative(obstacle.radius, where, name + ".radius", "m");
+      return check_size(obstacle.radius, name + ".radius", "m");
     case Shape::half_plane:
-      FLYBALL_CHECK(check_point(obstacle.normal, name));
+      for (const double part : obstacle.normal) {
+        FLYBALL_CHECK(check_ordinary(part, name + ".normal"));
+      }
       if (obstacle.normal[0] == 0.0 && obstacle.normal[1] == 0.0) {
         return refusal(ArgumentError::out_of_range, where, name + ".normal")
             .got("zero")
@@ -164,8 +178,8 @@ Expected<void> check_axes(const std::vector<SpaceAxis>& axes) {
     const SpaceAxis& axis = axes[i];
     const std::string name = axis.name.empty() ? format("axis {}", i + 1) : axis.name;
     FLYBALL_CHECK(Checks(where)
-                      .finite(axis.low, name + ".low")
-                      .finite(axis.high, name + ".high")
+                      .within(axis.low, -largest_number, largest_number, name + ".low", axis.unit)
+                      .within(axis.high, -largest_number, largest_number, name + ".high", axis.unit)
                       .positive(axis.scale, name + ".scale"));
     if (!(axis.low < axis.high)) {
       return refusal(ArgumentError::out_of_range, where, name)
@@ -199,8 +213,8 @@ Expected<void> check_mechanism(const std::vector<SpaceAxis>& axes,
   for (std::size_t j = 0; j < mechanism.joints.size(); ++j) {
     const PlanarJoint& joint = mechanism.joints[j];
     const std::string name = joint.name.empty() ? format("joint {}", j + 1) : joint.name;
-    FLYBALL_CHECK(
-        Checks(where).finite(joint.x, name).finite(joint.y, name).finite(joint.angle, name));
+    FLYBALL_CHECK(check_point({joint.x, joint.y}, name));
+    FLYBALL_CHECK(check_ordinary(joint.angle, name, "rad"));
     FLYBALL_CHECK(check_coordinate(axes, joint.coordinate, name));
     if (joint.parent < -1 || joint.parent >= static_cast<int>(j)) {
       return refusal(ArgumentError::out_of_range, where, name)
@@ -219,7 +233,7 @@ Expected<void> check_mechanism(const std::vector<SpaceAxis>& axes,
     FLYBALL_CHECK(check_joint(mechanism, body.joint, name));
     FLYBALL_CHECK(check_point(body.from, name));
     FLYBALL_CHECK(check_point(body.to, name));
-    FLYBALL_CHECK(check_not_negative(body.radius, where, name + ".radius", "m"));
+    FLYBALL_CHECK(check_size(body.radius, name + ".radius", "m"));
   }
   for (std::size_t o = 0; o < mechanism.obstacles.size(); ++o) {
     const PlanarObstacle& obstacle = mechanism.obstacles[o];
@@ -250,13 +264,13 @@ Expected<void> check_mechanism(const std::vector<SpaceAxis>& axes,
   for (const LinkMass& mass : mechanism.masses) {
     FLYBALL_CHECK(check_joint(mechanism, mass.joint, "mass"));
     FLYBALL_CHECK(check_point(mass.at, "mass.at"));
-    FLYBALL_CHECK(check_not_negative(mass.mass, where, "mass", "kg"));
+    FLYBALL_CHECK(check_size(mass.mass, "mass", "kg"));
   }
   for (const HoldingLimit& hold : mechanism.holding) {
     FLYBALL_CHECK(check_joint(mechanism, hold.joint, "holding limit"));
     FLYBALL_CHECK(check_positive(hold.most, where, "holding limit"));
   }
-  return check_finite(mechanism.gravity, where, "gravity");
+  return check_ordinary(mechanism.gravity, "gravity", "m/s²");
 }
 
 }  // namespace flyball::detail

@@ -313,8 +313,18 @@ TEST(ConfigurationSpace, WhatCannotBeASpaceIsRefused) {
   EXPECT_EQ(to_string(space.attach(mechanism).error()),
             "configuration space: apart is \"leg\"; it must be the name of a body");
   mechanism.apart.clear();
+  // Beyond 1e9 single precision has no margins: of such a link each move was judged for nothing.
+  mechanism.bodies[0].to = {1.7e308, 0.0};
+  EXPECT_TRUE(space.attach(mechanism).error().is(ArgumentError::out_of_range));
+  mechanism.bodies[0].to = {1.0, 0.0};
+  mechanism.obstacles = {PlanarObstacle::disc("far", {0.0, -1e20}, 1.0)};
+  EXPECT_TRUE(space.attach(mechanism).error().is(ArgumentError::out_of_range));
+  mechanism.obstacles = {PlanarObstacle::disc("far", {0.0, -1e8}, 1.0)};
   EXPECT_TRUE(space.attach(mechanism));
   EXPECT_FALSE(space.attach(mechanism));
+  bad = good;
+  bad.high = 1e20;
+  EXPECT_TRUE(ConfigurationSpace::create({bad}).error().is(ArgumentError::out_of_range));
 }
 
 }  // namespace

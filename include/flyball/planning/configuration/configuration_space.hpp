@@ -67,7 +67,7 @@ struct MoveCheck {
 /// of rigid body systems, 1996.
 class ConfigurationSpace {
  public:
-  /// @param axes  1 to 16, with different names, low < high.
+  /// @param axes  1 to 16, with different names, low < high, within 1e9 of zero.
   /// @errors ArgumentError::empty, not_finite, out_of_range, ambiguous_name.
   [[nodiscard]] static Expected<ConfigurationSpace> create(std::vector<SpaceAxis> axes);
 
@@ -80,7 +80,7 @@ class ConfigurationSpace {
   [[nodiscard]] Expected<void> forbid(std::string name, const Region& region);
 
   /// The mechanism that the coordinates move; one a space.
-  /// @errors ArgumentError: numbers that are not finite, names and joints that are not there, a
+  /// @errors ArgumentError: numbers that are not within 1e9, names and joints not there, a
   ///         coordinate that two kinds of joint share wrongly, limits that are not positive.
   [[nodiscard]] Expected<void> attach(const PlanarMechanism& mechanism);
 
