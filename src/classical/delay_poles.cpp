@@ -37,6 +37,8 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr Index most_points = 400;
 constexpr std::size_t most_poles = 30;
+/// Of which the rightmost are kept: seeds are near the zeros that they lead to.
+constexpr std::size_t most_candidates = 4 * most_poles;
 constexpr std::string_view where = "poles";
 
 Refusal not_found(std::string got) {
@@ -157,6 +159,9 @@ std::vector<Complex> candidates(const Characteristic& f, const std::vector<Compl
   std::vector<Complex> found;
   std::vector<Complex> origins;
   for (const Complex& value : rough) {
+    if (found.size() == most_candidates) {
+      break;
+    }
     const auto pole = refined(f, value);
     const double size = std::abs(value) + 1.0 / f.delays().maxCoeff();
     if (!pole || (multiple && std::abs(*pole - value) > 0.1 * size)) {
