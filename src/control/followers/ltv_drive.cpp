@@ -93,7 +93,7 @@ Expected<LtvDriveFollower> LtvDriveFollower::create(const mechanisms::Differenti
         .expected(detail::format("above low_speed.velocity, {:.4g} m/s", least));
   }
   // Where all of the gains need sixty digits it would take seconds.
-  detail::CarefulWork work{2e8};
+  detail::CarefulWork work{3e8};
   const auto design = [&](double speed) {
     return detail::solve_lqr(follower.A(speed), follower.B(speed), follower.Q_, follower.R_,
                              nullptr, TimeDomain::discrete, &work);
