@@ -5,7 +5,7 @@
 
 #define FLYBALL_VARIANT baseline
 #define FLYBALL_GEMM_WIDTH 4
-#include "math/dense/gemm_kernel_body.hpp"
+#include "math/dense/gemm_kernel_body.inc"
 #undef FLYBALL_VARIANT
 #undef FLYBALL_GEMM_WIDTH
 
@@ -18,7 +18,7 @@
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 #endif
-#include "math/dense/gemm_kernel_body.hpp"
+#include "math/dense/gemm_kernel_body.inc"
 #undef FLYBALL_VARIANT
 #undef FLYBALL_GEMM_WIDTH
 #ifdef __clang__
@@ -36,7 +36,7 @@
 #pragma GCC push_options
 #pragma GCC target("avx512f,avx512dq,avx512vl,avx2,fma")
 #endif
-#include "math/dense/gemm_kernel_body.hpp"
+#include "math/dense/gemm_kernel_body.inc"
 #ifdef __clang__
 #pragma clang attribute pop
 #else

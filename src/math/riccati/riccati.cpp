@@ -210,8 +210,7 @@ Expected<void> solve_riccati_within(const RiccatiData& data, RiccatiAnswer& answ
   const ConstMap R(data.R, m, m);
   const Eigen::MatrixXd N = cross_weight(data);
   FLYBALL_CHECK(check_values(A, B, Q, R, N, data.continuous ? "care" : "dare"));
-  const RiccatiProblem problem{A, B,    symmetrized(Q), symmetrized(R), N, data.continuous,
-                               0, work};
+  const RiccatiProblem problem{A, B, symmetrized(Q), symmetrized(R), N, data.continuous, 0, work};
   FLYBALL_TRY(auto solution,
               ordinary ? solve_riccati_robustly(problem) : solve_riccati_in_other_units(problem));
   Eigen::Map<Eigen::MatrixXd>(answer.X, n, n) = solution.X;
