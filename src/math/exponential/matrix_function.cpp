@@ -116,8 +116,14 @@ struct Balanced {
   detail::DoubleDoubleMatrix M;
 };
 
+/// A^f and what it is multiplied with to be A.
+struct Fraction {
+  MatrixXd power;
+  MatrixXd rest;  ///< A^(1 - f)
+};
+
 /// A^f = e^(f log A) where the Schur form loses the large entries' digits in balanced units.
-Expected<MatrixXd> power_in_twice(const MatrixRef& A, double f, std::string_view where) {
+Expected<Fraction> power_in_twice(const MatrixRef& A, double f, std::string_view where) {
   const Balanced balanced(A);
   const auto L = detail::extended_logarithm(balanced.M);
   if (!L) {
@@ -127,19 +133,18 @@ Expected<MatrixXd> power_in_twice(const MatrixRef& A, double f, std::string_view
     const detail::DoubleDoubleMatrix weight(MatrixXd::Identity(A.rows(), A.cols()) * p);
     return balanced.unbalanced(detail::extended_exponential(detail::product(weight, *L)));
   };
-  const MatrixXd result = power(f);
-  const MatrixXd rest = power(1.0 - f);
+  Fraction made{power(f), power(1.0 - f)};
   const MatrixXd back =
-      detail::product(detail::DoubleDoubleMatrix(result), detail::DoubleDoubleMatrix(rest))
+      detail::product(detail::DoubleDoubleMatrix(made.power), detail::DoubleDoubleMatrix(made.rest))
           .rounded();
-  if (!agree(back, A, detail::product(result.cwiseAbs(), rest.cwiseAbs()).maxCoeff())) {
+  if (!agree(back, A, detail::product(made.power.cwiseAbs(), made.rest.cwiseAbs()).maxCoeff())) {
     return not_accurate(where);
   }
-  return result;
+  return made;
 }
 
-/// A^f, 0 < f < 1.
-Expected<MatrixXd> fractional_power(const MatrixRef& given, double f, std::string_view where) {
+/// 0 < f < 1.
+Expected<Fraction> fractional_power(const MatrixRef& given, double f, std::string_view where) {
   const bool lower = is_lower_triangular(given);
   const MatrixXd A = lower ? MatrixXd(given.transpose()) : MatrixXd(given);
   Triangularized form = triangularize(A);
@@ -198,7 +203,7 @@ Expected<MatrixXd> fractional_power(const MatrixRef& given, double f, std::strin
   if (!agree(back, A, detail::product(result.cwiseAbs(), rest.cwiseAbs()).maxCoeff())) {
     return power_in_twice(given, f, where);
   }
-  return lower ? MatrixXd(result.transpose()) : result;
+  return lower ? Fraction{result.transpose(), rest.transpose()} : Fraction{result, rest};
 }
 
 /// The largest entry that A X and X A miss of I, beside its terms; infinity where X is not finite.
@@ -244,6 +249,48 @@ Expected<MatrixXd> inverse_of(const MatrixRef& A, std::string_view where) {
     return not_accurate(where);
   }
   return X;
+}
+
+/// Whether X = A^-(k + f) and Y = A^-(1 - f) undo A^k and A, of f = 1/2 and k = 0 X² A = I, to
+/// rounding beside the largest terms.
+bool undoes(const MatrixXd& X, const MatrixXd& Y, const MatrixXd& A_k, const MatrixRef& A) {
+  const MatrixXd inverse = detail::product(detail::product(X, A_k), Y);
+  const double terms = std::max(detail::product(inverse.cwiseAbs(), A.cwiseAbs()).maxCoeff(),
+                                inverse.cwiseAbs().maxCoeff() * A.cwiseAbs().maxCoeff());
+  return agree(detail::product(inverse, A), MatrixXd::Identity(X.rows(), X.cols()), terms);
+}
+
+/// A^-(k + f), the inverse of the positive power: A⁻¹A^(1 - f) would lose as many digits as A has,
+/// not as A^f has. An error of A^f may be more than one of A in its inverse: where they do not undo
+/// A together, both are taken in twice the precision.
+Expected<MatrixXd> negative_power(const MatrixRef& A, long long k, double f,
+                                  const Fraction& fraction, std::string_view where) {
+  const MatrixXd A_k = whole_power(A, k);
+  const MatrixXd positive = detail::product(A_k, fraction.power);
+  if (!positive.allFinite()) {
+    return refusal(MatrixFunctionError::overflow, where);
+  }
+  const auto X = inverse_of(positive, where);
+  if (!X && X.error().is(MatrixFunctionError::singular)) {
+    return X;
+  }
+  if (const auto Y = inverse_of(fraction.rest, where); X && Y && undoes(*X, *Y, A_k, A)) {
+    return X;
+  }
+  const Balanced balanced(A);
+  const auto L = detail::extended_logarithm(balanced.M);
+  if (!L) {
+    return not_accurate(where);
+  }
+  const auto power = [&](double p) {
+    const detail::DoubleDoubleMatrix weight(MatrixXd::Identity(A.rows(), A.cols()) * p);
+    return balanced.unbalanced(detail::extended_exponential(detail::product(weight, *L)));
+  };
+  MatrixXd better = power(-(static_cast<double>(k) + f));
+  if (!undoes(better, power(f - 1.0), A_k, A)) {
+    return not_accurate(where);
+  }
+  return better;
 }
 
 /// L, where e^L is A; else log A in twice the precision.
@@ -338,8 +385,6 @@ Expected<MatrixXd> powm(const MatrixRef& A, double power) {
   const bool whole = std::abs(power - nearest) <= 1e-12 * std::max(1.0, std::abs(power));
   const double magnitude = std::abs(whole ? nearest : power);
   const double integer = std::floor(magnitude);
-  // A whole negative power is one of the inverse; another one the inverse of the positive power,
-  // because A⁻¹A^{1-p} would lose as many digits as A has, not as A^p has.
   MatrixXd base = A;
   if (power < 0.0 && whole && integer > 0.0) {
     FLYBALL_TRY(base, inverse_of(A, where));
@@ -350,10 +395,11 @@ Expected<MatrixXd> powm(const MatrixRef& A, double power) {
     if (!fraction) {
       return tl::unexpected(Error(fraction.error()).about("the power " + format_number(power)));
     }
-    result = detail::product(result, *fraction);
-    if (power < 0.0 && result.allFinite()) {
-      FLYBALL_TRY(result, inverse_of(result, where));
+    if (power < 0.0) {
+      return negative_power(A, static_cast<long long>(integer), magnitude - integer, *fraction,
+                            where);
     }
+    result = detail::product(result, fraction->power);
   }
   if (!result.allFinite()) {
     return refusal(MatrixFunctionError::overflow, where);
