@@ -4,7 +4,13 @@
 # exported, and never an -march flag: Eigen's layout depends on it.
 add_library(flyball_options INTERFACE)
 target_compile_features(flyball_options INTERFACE cxx_std_20)
-target_compile_options(flyball_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion)
+target_compile_options(flyball_options INTERFACE -Wall -Wextra -Wpedantic -Wconversion)
+# Among the sources of one unit, a local name may be that of something in another source.
+if(FLYBALL_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_compile_options(flyball_options INTERFACE -Wshadow=local)
+elseif(NOT FLYBALL_UNITY_BUILD)
+  target_compile_options(flyball_options INTERFACE -Wshadow)
+endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   # False positives on std::string in g++ 12: https://gcc.gnu.org/bugzilla/show_bug.cgi?id=105651
   target_compile_options(flyball_options INTERFACE -Wno-restrict -Wno-stringop-overflow
@@ -68,6 +74,24 @@ function(flyball_precompile target)
   endif()
 endfunction()
 
+# flyball_batch(<target>)
+#
+# Where FLYBALL_UNITY_BUILD is on, what several sources of a unit share is compiled once: a whole build
+# takes half the time, one source a little more. Names in unnamed namespaces are hence those of the
+# domain. Kernels stay alone: they choose instructions for the rest of their unit.
+function(flyball_batch target)
+  get_target_property(sources ${target} SOURCES)
+  list(FILTER sources INCLUDE REGEX "kernel|_(baseline|wide)\\.cpp$")
+  set_source_files_properties(${sources} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+  get_target_property(is_text ${target} FLYBALL_TEXT)
+  set(size 5)
+  if(is_text)
+    set(size 8)
+  endif()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${FLYBALL_UNITY_BUILD}
+                                             UNITY_BUILD_BATCH_SIZE ${size})
+endfunction()
+
 # flyball_add_domain(<domain> [TEXT] SOURCES <files...> [DEPENDS <domains...>]
 #                    [PRIVATE_HEADERS <targets...>] [PRIVATE_LIBRARIES <targets...>])
 #
@@ -104,6 +128,7 @@ function(flyball_add_domain domain)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:${library}>)
   endforeach()
   set_target_properties(${target} PROPERTIES FLYBALL_TEXT "${ARG_TEXT}")
+  flyball_batch(${target})
   flyball_precompile(${target})
   set_property(GLOBAL APPEND PROPERTY FLYBALL_DOMAINS ${domain})
 endfunction()

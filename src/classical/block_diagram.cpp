@@ -21,7 +21,7 @@ using Eigen::MatrixXd;
 
 namespace {
 
-constexpr std::string_view where = "connect";
+constexpr std::string_view in_connect = "connect";
 
 /// A name as it is used: its sign and the signal.
 struct Use {
@@ -39,13 +39,13 @@ class Signals {
  public:
   Expected<void> add(const std::string& name, std::string maker) {
     if (name.empty() || name.front() == '-' || name.front() == '+') {
-      return refusal(ArgumentError::empty, where, "the name of a signal of " + maker)
+      return refusal(ArgumentError::empty, in_connect, "the name of a signal of " + maker)
           .got(name.empty() ? "empty" : text::printable(name))
           .expected("a name without a sign");
     }
     const auto found = std::find(names_.begin(), names_.end(), name);
     if (found != names_.end()) {
-      return refusal(ArgumentError::ambiguous_name, where, "signal " + text::printable(name))
+      return refusal(ArgumentError::ambiguous_name, in_connect, "signal " + text::printable(name))
           .got(flyball::detail::format("made by {} and by {}",
                                        makers_[static_cast<std::size_t>(found - names_.begin())],
                                        maker))
@@ -63,7 +63,7 @@ class Signals {
     if (found == names_.end()) {
       std::vector<std::string_view> known(names_.begin(), names_.end());
       const std::string nearest = nearest_name(name, known);
-      return refusal(ArgumentError::unknown_name, where,
+      return refusal(ArgumentError::unknown_name, in_connect,
                      flyball::detail::format("signal {} of {}", text::printable(name), user))
           .got("made by nothing")
           .expected("made by a block or a junction, or an input of the diagram")
@@ -108,7 +108,7 @@ Expected<std::vector<Part>> parts_of(const BlockDiagram& diagram,
          {std::tuple{&block.inputs, block.system.inputs(), "input"},
           {&block.outputs, block.system.outputs(), "output"}}) {
       if (static_cast<Index>(names->size()) != count) {
-        return refusal(ArgumentError::wrong_shape, where,
+        return refusal(ArgumentError::wrong_shape, in_connect,
                        flyball::detail::format("the number of names for {}s of {}", what, name))
             .got(std::to_string(names->size()))
             .expected(flyball::detail::format("{}, one for each {}", count, what));
@@ -120,7 +120,7 @@ Expected<std::vector<Part>> parts_of(const BlockDiagram& diagram,
     const std::string name =
         flyball::detail::format("the junction of {}", text::printable(junction.output));
     if (junction.terms.empty()) {
-      return refusal(ArgumentError::empty, where, name).got("without terms");
+      return refusal(ArgumentError::empty, in_connect, name).got("without terms");
     }
     FLYBALL_TRY(
         const auto sum,
@@ -157,12 +157,12 @@ std::string loop_text(const MatrixXd& L, const std::vector<Part>& parts) {
 
 Expected<ConnectedDiagram> connect(const BlockDiagram& diagram) {
   if (diagram.blocks.empty()) {
-    return refusal(ArgumentError::empty, where, "the list of blocks").got("empty");
+    return refusal(ArgumentError::empty, in_connect, "the list of blocks").got("empty");
   }
   for (const auto& [names, what] :
        {std::pair{&diagram.inputs, "inputs"}, {&diagram.outputs, "outputs"}}) {
     if (names->empty()) {
-      return refusal(ArgumentError::empty, where,
+      return refusal(ArgumentError::empty, in_connect,
                      flyball::detail::format("the list of the diagram's {}", what))
           .got("empty");
     }
@@ -211,7 +211,7 @@ Expected<ConnectedDiagram> connect(const BlockDiagram& diagram) {
   auto connected = rewired(all, wiring);
   if (!connected && connected.error().is(SystemError::algebraic_loop)) {
     const MatrixXd L = flyball::detail::product(wiring.F, all.form().D11);
-    return refusal(SystemError::algebraic_loop, where, "the loop of " + loop_text(L, parts))
+    return refusal(SystemError::algebraic_loop, in_connect, "the loop of " + loop_text(L, parts))
         .got("without dynamics and without an answer")
         .expected("a loop whose gain is not one at infinite frequency")
         .hint("give one of them dynamics or dead time");

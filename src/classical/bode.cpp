@@ -17,7 +17,7 @@ namespace {
 
 constexpr double turn = 360.0;
 
-double degrees(Complex value) {
+double phase_in_degrees(Complex value) {
   return std::arg(value) * 180.0 / std::numbers::pi;
 }
 
@@ -38,7 +38,7 @@ double first_phase(const VectorXd& frequency, const Eigen::VectorXcd& values) {
   const double slope =
       std::log(std::abs(values(1) / values(0))) / std::log(frequency(1) / frequency(0));
   const double upward = 90.0 * std::round(slope);
-  const double angle = degrees(values(0));
+  const double angle = phase_in_degrees(values(0));
   const double as_positive = nearest(angle, upward);
   const double as_negative = nearest(angle, upward - 180.0);
   return std::abs(as_positive - upward) <= std::abs(as_negative - upward + 180.0) ? as_positive
@@ -73,7 +73,7 @@ Expected<BodeData> bode(const FrequencyResponse& response, const VectorXd& frequ
                                     ? unwrapped_phase(*factors, frequencies(k), response.period())
                                 : k > 0 ? curve.phase(k - 1)
                                         : first_phase(frequencies, G);
-        curve.phase(k) = has_angle(G(k)) ? nearest(degrees(G(k)), expected) : expected;
+        curve.phase(k) = has_angle(G(k)) ? nearest(phase_in_degrees(G(k)), expected) : expected;
       }
       data.curves.push_back(std::move(curve));
     }

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <string>
 #include <vector>
 
 #include <flyball/math/search/roots.hpp>
 
 #include "classical/whole_periods.hpp"
+#include "core/constants.hpp"
 #include "core/error_rows.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
@@ -21,8 +21,6 @@ namespace {
 using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::VectorXd;
-
-constexpr double pi = std::numbers::pi;
 
 double degrees(double radians) {
   return radians * 180.0 / pi;

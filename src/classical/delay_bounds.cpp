@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "classical/delay_bounds.hpp"
+#include "core/constants.hpp"
 #include "math/dense/dense.hpp"
 #include "systems/balance.hpp"
 
@@ -16,8 +16,6 @@ using Eigen::VectorXd;
 using Complex = std::complex<double>;
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// (I - T)⁻¹V of matrices without negative entries; nothing where Neumann's series does not end: a
 /// positive solution for a positive right side shows that it does.

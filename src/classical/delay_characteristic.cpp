@@ -1,9 +1,8 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 
 #include "classical/delay_characteristic.hpp"
+#include "core/constants.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/spectral_blocks.hpp"
 #include "systems/balance.hpp"
@@ -20,9 +19,6 @@ using flyball::detail::eigenvalues_of;
 using flyball::detail::product;
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double pi = std::numbers::pi;
 
 /// Of functions at the p + 1 points (1 - cos πj/p)/2 of [0, 1].
 MatrixXd chebyshev_derivative(Index p) {

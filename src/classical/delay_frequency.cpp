@@ -1,11 +1,11 @@
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include <flyball/classical/delay_poles.hpp>
 #include <flyball/classical/frequency_response.hpp>
 
 #include "classical/delay_frequency.hpp"
+#include "core/constants.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball::classical {
@@ -46,7 +46,6 @@ class DelaySource final : public FrequencyResponse::Source {
   }
   [[nodiscard]] MatrixXcd at_point(Complex s) const override {
     const auto value = system_.at(system_.period() ? std::exp(s * system_.period()->si()) : s);
-    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     return value ? *value : MatrixXcd(MatrixXcd::Constant(outputs(), inputs(), Complex(nan, nan)));
   }
   [[nodiscard]] Hints hints() const override { return hints_; }

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <utility>
 
 #include <flyball/classical/delay_poles.hpp>
@@ -14,6 +12,7 @@
 
 #include "classical/delay_bounds.hpp"
 #include "classical/delay_frequency.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -30,8 +29,6 @@ using Complex = std::complex<double>;
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double pi = std::numbers::pi;
 constexpr double closest = 1e-13;
 /// Of the intervals that all crossings of one loop take.
 constexpr long most_steps = 60'000;
@@ -84,7 +81,7 @@ Expected<void> check_single(const DelaySystem& loop, std::string_view where) {
 }
 
 /// Gain or phase of a loop, as what is zero where it crosses.
-struct Crossing {
+struct DelayCrossing {
   double (*value)(Complex L);
   /// Of L'/L along the axis.
   double (*part)(Complex slope);
@@ -92,10 +89,10 @@ struct Crossing {
   bool (*possible)(Complex L, double off);
 };
 
-constexpr Crossing gain_crossing{
+constexpr DelayCrossing gain_crossing_of_delays{
     [](Complex L) { return std::log(std::abs(L)); }, [](Complex slope) { return slope.real(); },
     [](Complex L, double off) { return std::abs(std::abs(L) - 1.0) <= off; }};
-constexpr Crossing phase_crossing{
+constexpr DelayCrossing phase_crossing_of_delays{
     [](Complex L) { return std::arg(-L); }, [](Complex slope) { return slope.imag(); },
     // The distance from the negative half of the real line.
     [](Complex L, double off) {
@@ -112,7 +109,8 @@ long steps_of(const DelaySystem& system, long most) {
 /// which ln L moves by less than a radian: its slope's part keeps the sign, or it is halved.
 /// @param steps  How many steps are left.
 std::optional<std::vector<double>> zeros(const DelaySystem& loop, const DelayBounds& bounds,
-                                         const Step& range, const Crossing& crossing, long& steps) {
+                                         const Step& range, const DelayCrossing& crossing,
+                                         long& steps) {
   std::vector<double> found;
   std::vector<Step> pending{range};
   const auto value = [&](double w) { return crossing.value(loop.response(w)(0, 0)); };
@@ -206,7 +204,7 @@ double largest(const MatrixXcd& G) {
   return G.allFinite() ? flyball::detail::spectral_norm_of_complex(G) : 0.0;
 }
 
-double wrapped(double degrees) {
+double wrapped_degrees(double degrees) {
   const double turned = std::remainder(degrees, 360.0);
   return turned == -180.0 ? 180.0 : turned;
 }
@@ -318,8 +316,8 @@ Expected<LoopMargins> loop_margins(const DelaySystem& loop) {
   long steps = steps_of(loop, most_steps);
   const auto unit_gain =
       zeros(loop, bounds, {from, std::isfinite(end) ? std::max(end, fastest) : fastest},
-            gain_crossing, steps);
-  const auto places = zeros(loop, bounds, {from, fastest}, phase_crossing, steps);
+            gain_crossing_of_delays, steps);
+  const auto places = zeros(loop, bounds, {from, fastest}, phase_crossing_of_delays, steps);
   if (!unit_gain || !places) {
     return refusal(SystemError::no_convergence, where,
                    !unit_gain ? "the list of gain crossings" : "the list of phase crossings")
@@ -327,7 +325,7 @@ Expected<LoopMargins> loop_margins(const DelaySystem& loop) {
   }
   double further = infinity;
   for (const double w : *unit_gain) {
-    const double margin = wrapped(180.0 + std::arg(loop.response(w)(0, 0)) * 180.0 / pi);
+    const double margin = wrapped_degrees(180.0 + std::arg(loop.response(w)(0, 0)) * 180.0 / pi);
     margins.gain_crossings.push_back({w, margin});
     further = std::min(further, (margin > 0.0 ? margin : margin + 360.0) * pi / 180.0 / w);
     if (!margins.phase_margin || std::abs(margin) < std::abs(*margins.phase_margin)) {
@@ -390,7 +388,7 @@ Expected<std::optional<double>> bandwidth(const DelaySystem& system, double fact
   long steps = steps_of(scaled, most_steps);
   const auto crossings = zeros(
       scaled, bounds, {lowest(scaled, bounds), std::isfinite(end) ? end : 10.0 * bounds.fastest()},
-      gain_crossing, steps);
+      gain_crossing_of_delays, steps);
   if (!crossings) {
     return refusal(SystemError::no_convergence, where, "the list of gain crossings")
         .got("without end");

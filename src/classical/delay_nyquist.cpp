@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <utility>
 
 #include <flyball/classical/delay_margins.hpp>
 #include <flyball/classical/delay_poles.hpp>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -17,16 +17,14 @@ using Complex = std::complex<double>;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
-struct AxisPoles {
+struct DelayAxisPoles {
   double frequency = 0.0;
   int multiplicity = 0;
 };
 
 /// Those of the upper half of the axis, and how many lie right of it.
 struct OpenPoles {
-  std::vector<AxisPoles> axis{};
+  std::vector<DelayAxisPoles> axis{};
   int right = 0;
 };
 
@@ -46,17 +44,19 @@ OpenPoles sorted(const DelayPoles& found) {
       continue;
     }
     const double w = std::max(pole.imag(), 0.0) <= blur ? 0.0 : pole.imag();
-    const auto same = std::find_if(open.axis.begin(), open.axis.end(), [&](const AxisPoles& other) {
-      return std::abs(other.frequency - w) <= std::max(blur, 1e-7 * w);
-    });
+    const auto same =
+        std::find_if(open.axis.begin(), open.axis.end(), [&](const DelayAxisPoles& other) {
+          return std::abs(other.frequency - w) <= std::max(blur, 1e-7 * w);
+        });
     if (same != open.axis.end()) {
       ++same->multiplicity;
     } else {
       open.axis.push_back({w, 1});
     }
   }
-  std::sort(open.axis.begin(), open.axis.end(),
-            [](const AxisPoles& a, const AxisPoles& b) { return a.frequency < b.frequency; });
+  std::sort(
+      open.axis.begin(), open.axis.end(),
+      [](const DelayAxisPoles& a, const DelayAxisPoles& b) { return a.frequency < b.frequency; });
   return open;
 }
 
@@ -72,7 +72,7 @@ class Curve {
     }
   }
   /// To the right of a pole, on a circle on which |L| is above 100.
-  Indentation go_around(const AxisPoles& poles, double lowest) {
+  Indentation go_around(const DelayAxisPoles& poles, double lowest) {
     double radius = 0.01 * std::max(poles.frequency, lowest);
     const auto small = [&] {
       for (int i = 0; i <= 4; ++i) {
@@ -149,7 +149,7 @@ Expected<NyquistData> nyquist(const DelaySystem& loop, const FrequencyGridOption
   if (open.axis.empty() || open.axis.front().frequency > 0.0) {
     curve.add(0.0);
   }
-  for (const AxisPoles& poles : open.axis) {
+  for (const DelayAxisPoles& poles : open.axis) {
     walk_until(poles.frequency);
     data.indentations.push_back(curve.go_around(poles, grid.frequency(0)));
     const Indentation& arc = data.indentations.back();

@@ -1,9 +1,8 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 
 #include "classical/delay_pole_count.hpp"
+#include "core/constants.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball::classical::detail {
@@ -14,9 +13,6 @@ using Eigen::MatrixXd;
 using Complex = std::complex<double>;
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double pi = std::numbers::pi;
 
 double larger_part(Complex z) {
   return std::max(std::abs(z.real()), std::abs(z.imag()));

@@ -10,6 +10,7 @@
 
 #include "classical/delay_characteristic.hpp"
 #include "classical/delay_pole_count.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -34,15 +35,14 @@ using flyball::detail::eigenvalues_of;
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr Index most_points = 400;
 constexpr std::size_t most_poles = 30;
 /// Of which the rightmost are kept: seeds are near the zeros that they lead to.
 constexpr std::size_t most_candidates = 4 * most_poles;
-constexpr std::string_view where = "poles";
+constexpr std::string_view in_poles = "poles";
 
 Refusal not_found(std::string got) {
-  return refusal(SystemError::no_convergence, where, "the set of rightmost poles")
+  return refusal(SystemError::no_convergence, in_poles, "the set of rightmost poles")
       .got(std::move(got))
       .hint("a rational approximation has as many poles as its order (`pade`)");
 }

@@ -22,7 +22,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double rounding = 1e-10;
-constexpr double most_states = 200.0;
+constexpr double most_step_states = 200.0;
 
 /// A polynomial by Legendre's coefficients, and its slope over [-1, 1].
 struct Piece {
@@ -150,13 +150,13 @@ Expected<StepMetrics> of_samples(const DelaySystem& system, Index output, Index 
 Expected<StepMetrics> step_metrics(const DelaySystem& system, Index output, Index input,
                                    double band) {
   constexpr std::string_view where = "step_metrics";
-  FLYBALL_CHECK(
-      Checks(where)
-          .within(static_cast<double>(output), 0.0, static_cast<double>(system.outputs() - 1),
-                  "output")
-          .within(static_cast<double>(input), 0.0, static_cast<double>(system.inputs() - 1),
-                  "input")
-          .within(static_cast<double>(system.states()), 0.0, most_states, "the number of states"));
+  FLYBALL_CHECK(Checks(where)
+                    .within(static_cast<double>(output), 0.0,
+                            static_cast<double>(system.outputs() - 1), "output")
+                    .within(static_cast<double>(input), 0.0,
+                            static_cast<double>(system.inputs() - 1), "input")
+                    .within(static_cast<double>(system.states()), 0.0, most_step_states,
+                            "the number of states"));
   if (!(band > 0.0 && band < 1.0)) {
     return refusal(ArgumentError::out_of_range, where, "band")
         .got(format_number(band))

@@ -34,7 +34,7 @@ using detail::solve_loop;
 namespace {
 
 constexpr std::string_view noun = "delay system";
-constexpr Index most_states = 800;
+constexpr Index most_delay_states = 800;
 
 Expected<void> check_form(const DelayForm& f) {
   const Index n = f.A.rows();
@@ -378,10 +378,10 @@ Expected<DiscreteSystem<>> DelaySystem::to_discrete() const {
     total += static_cast<double>(detail::periods_in(delays()(i), period_));
     lengths.push_back(static_cast<Index>(total));
   }
-  if (total > static_cast<double>(most_states)) {
+  if (total > static_cast<double>(most_delay_states)) {
     return refusal(ArgumentError::out_of_range, noun, "the number of states with the delays'")
         .got(flyball::detail::format("{}", total))
-        .expected(flyball::detail::format("at most {}", most_states))
+        .expected(flyball::detail::format("at most {}", most_delay_states))
         .hint("sample it more slowly");
   }
   // A line of states for each delay: the first takes z, the last is w.

@@ -9,6 +9,7 @@
 #include <flyball/core/text.hpp>
 #include <flyball/math/search/roots.hpp>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -18,8 +19,6 @@ using Eigen::Index;
 using Complex = std::complex<double>;
 
 namespace {
-
-constexpr double pi = std::numbers::pi;
 
 constexpr std::array<std::string_view, 5> names{"saturation", "dead-zone", "relay", "hysteresis",
                                                 "backlash"};

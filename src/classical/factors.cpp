@@ -1,16 +1,13 @@
 #include <cmath>
 
 #include "classical/factors.hpp"
+#include "core/constants.hpp"
 
 namespace flyball::classical {
 
 using Complex = std::complex<double>;
 
 namespace {
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double pi = std::numbers::pi;
 
 /// Left of the axis or on it, within the circle or on it: on which side the curve passes.
 bool is_left(Complex root, bool discrete) {

@@ -9,6 +9,7 @@
 #include <flyball/math/search/minimum.hpp>
 #include <flyball/math/search/roots.hpp>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -23,10 +24,6 @@ using Eigen::VectorXd;
 using Complex = std::complex<double>;
 
 namespace {
-
-constexpr double pi = std::numbers::pi;
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// One entry over ln ω: ln G at the frequencies, unwrapped, and its slopes there.
 class LogCurve {

@@ -6,6 +6,7 @@
 #include <flyball/classical/frequency_response.hpp>
 
 #include "classical/factors.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -17,9 +18,6 @@ using Eigen::VectorXd;
 using Complex = std::complex<double>;
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double pi = std::numbers::pi;
 
 /// What is known before the first evaluation: where the response is steep, and how far it goes.
 struct Landmarks {

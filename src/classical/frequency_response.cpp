@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "classical/state_space_response.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -18,8 +19,6 @@ using Eigen::VectorXd;
 using Complex = std::complex<double>;
 
 namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 class TransferSource final : public FrequencyResponse::Source {
  public:
@@ -81,7 +80,6 @@ class EntrySource final : public FrequencyResponse::Source {
 /// How far a root moves when the coefficients of its polynomial move by their last digit: the δ of
 /// Σ |p⁽ᵐ⁾(r)|/m! δᵐ = ε Σ |cₖ rᵏ| is at most the smallest of its terms' own.
 double uncertainty(const VectorXd& p, Complex root) {
-  constexpr double epsilon = std::numeric_limits<double>::epsilon();
   const Index n = p.size() - 1;
   VectorXcd shifted = p.cast<Complex>();  // p(r + x), by repeated synthetic division
   for (Index from = 0; from < n; ++from) {

@@ -21,24 +21,25 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr std::string_view where = "transfer function";
+constexpr std::string_view in_late_quotient = "transfer function";
 
-bool same(const Polynomial& a, const Polynomial& b) {
+bool identical(const Polynomial& a, const Polynomial& b) {
   return a.rows() == b.rows() && a.hi == b.hi && a.lo == b.lo;
 }
 
-bool same(const LateSum& a, const LateSum& b) {
-  return std::equal(
-      a.begin(), a.end(), b.begin(), b.end(),
-      [](const LateTerm& x, const LateTerm& y) { return x.delay == y.delay && same(x.p, y.p); });
+bool identical(const LateSum& a, const LateSum& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const LateTerm& x, const LateTerm& y) {
+                      return x.delay == y.delay && identical(x.p, y.p);
+                    });
 }
 
 /// What two lists have in common, each as often as in both.
 std::vector<LateSum> common(const std::vector<LateSum>& a, std::vector<LateSum> b) {
   std::vector<LateSum> both;
   for (const LateSum& sum : a) {
-    const auto found =
-        std::find_if(b.begin(), b.end(), [&](const LateSum& other) { return same(sum, other); });
+    const auto found = std::find_if(b.begin(), b.end(),
+                                    [&](const LateSum& other) { return identical(sum, other); });
     if (found != b.end()) {
       both.push_back(sum);
       b.erase(found);
@@ -50,7 +51,7 @@ std::vector<LateSum> common(const std::vector<LateSum>& a, std::vector<LateSum> 
 std::vector<LateSum> without(std::vector<LateSum> sums, const std::vector<LateSum>& less) {
   for (const LateSum& sum : less) {
     const auto found = std::find_if(sums.begin(), sums.end(),
-                                    [&](const LateSum& other) { return same(sum, other); });
+                                    [&](const LateSum& other) { return identical(sum, other); });
     if (found != sums.end()) {
       sums.erase(found);
     }
@@ -102,7 +103,7 @@ LateSum multiplied(LateSum a, const std::vector<LateSum>& factors) {
 }  // namespace
 
 Index degree(const LateQuotient& value) {
-  const auto of = [](const Factors& factors, const std::vector<LateSum>& sums) {
+  const auto of = [](const RatioFactors& factors, const std::vector<LateSum>& sums) {
     Index total = degree(factors);
     for (const LateSum& sum : sums) {
       Index most = 0;
@@ -142,15 +143,15 @@ LateQuotient sum(const LateQuotient& a, double sign, const LateQuotient& b) {
   if (a.is_rational() && b.is_rational() && a.q.delay == b.q.delay) {
     return {sum(a.q, sign, b.q)};
   }
-  const Factors in_front = common(a.q.num, b.q.num);
-  const Factors below = common(a.q.den, b.q.den);
-  const Factors only_a = without(a.q.den, below);
-  const Factors only_b = without(b.q.den, below);
+  const RatioFactors in_front = common(a.q.num, b.q.num);
+  const RatioFactors below = common(a.q.den, b.q.den);
+  const RatioFactors only_a = without(a.q.den, below);
+  const RatioFactors only_b = without(b.q.den, below);
   const std::vector<LateSum> front = common(a.above, b.above);
   const std::vector<LateSum> under = common(a.below, b.below);
   const std::vector<LateSum> under_a = without(a.below, under);
   const std::vector<LateSum> under_b = without(b.below, under);
-  const auto side = [&](const LateQuotient& x, const Factors& other,
+  const auto side = [&](const LateQuotient& x, const RatioFactors& other,
                         const std::vector<LateSum>& under_other) {
     const Polynomial p = trimmed(expanded(together(without(x.q.num, in_front), other), x.q.gain));
     return multiplied(multiplied(LateSum{{x.q.delay, p}}, without(x.above, front)), under_other);
@@ -296,7 +297,7 @@ Expected<void> take_roots(const Polynomial& p, Index times,
                           std::vector<std::complex<double>>& all) {
   const auto found = roots(p);
   if (!found) {
-    return refusal(SystemError::no_convergence, where, "a pole").got("not found");
+    return refusal(SystemError::no_convergence, in_late_quotient, "a pole").got("not found");
   }
   for (const MultipleRoot& root : grouped(*found, p)) {
     all.insert(all.end(), static_cast<std::size_t>(root.times * times), root.at);
@@ -307,7 +308,7 @@ Expected<void> take_roots(const Polynomial& p, Index times,
 Expected<void> check_degrees(const LateSum& terms, Index most, std::string_view what) {
   for (const LateTerm& term : terms) {
     if (term.p.rows() - 1 > most) {
-      return refusal(TransferError::improper, where, what)
+      return refusal(TransferError::improper, in_late_quotient, what)
           .got(flyball::detail::format("of degree {} at a dead time of {} s", term.p.rows() - 1,
                                        term.delay))
           .expected(flyball::detail::format("of degree {} at most, as the part below without dead "
@@ -342,7 +343,7 @@ Expected<DelaySystem> realised(const LateQuotient& value, double gain, double de
     }
   }
   std::vector<std::complex<double>> poles;
-  for (const Factor& factor : value.q.den) {
+  for (const RatioFactor& factor : value.q.den) {
     FLYBALL_CHECK(take_roots(factor.p, factor.times, poles));
   }
   for (const LateSum& sum : value.below) {

@@ -7,6 +7,7 @@
 
 #include "classical/locus_loop.hpp"
 #include "classical/whole_periods.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -18,8 +19,6 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 /// Π(s - root)^times in 31 digits. @param roots  With their exact conjugates.
 Polynomial expanded(const std::vector<MultipleRoot>& roots) {

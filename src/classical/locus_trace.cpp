@@ -1,13 +1,12 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <span>
 #include <utility>
 
 #include <flyball/systems/system_error.hpp>
 
 #include "classical/locus_trace.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -18,11 +17,6 @@ namespace {
 using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::VectorXcd;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double pi = std::numbers::pi;
 
 /// A closed-loop pole on the real axis, or one above it that speaks for its mirror image, too.
 struct Point {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include <flyball/math/search/minimum.hpp>
@@ -14,6 +13,7 @@
 #include "classical/loop_peaks.hpp"
 #include "classical/polynomial.hpp"
 #include "classical/whole_periods.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "core/wording.hpp"
@@ -28,9 +28,6 @@ using detail::times;
 using Eigen::Index;
 using Eigen::VectorXd;
 using Complex = std::complex<double>;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double pi = std::numbers::pi;
 
 tl::unexpected<Error> no_convergence() {
   return refusal(SystemError::no_convergence, "margins", "a root of a polynomial")
@@ -174,7 +171,7 @@ class Border {
 };
 
 /// In (-180, 180].
-double wrapped(double degrees) {
+double wrapped_phase(double degrees) {
   const double turned = std::remainder(degrees, 360.0);
   return turned == -180.0 ? 180.0 : turned;
 }
@@ -409,7 +406,7 @@ Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
           .hint("the phase turns so often by then that no digit of a margin is left");
     }
     const double rational = border.phase(x) * 180.0 / pi;
-    const double margin = wrapped(180.0 + rational - w * border.delay() * 180.0 / pi);
+    const double margin = wrapped_phase(180.0 + rational - w * border.delay() * 180.0 / pi);
     margins.gain_crossings.push_back({w, margin});
     // Roots cross the axis at w when the delay is (φ + 2πk)/w, rightwards where |L| falls.
     double turn = std::fmod(180.0 + rational + 720.0, 360.0) * pi / 180.0;

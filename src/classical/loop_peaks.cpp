@@ -9,6 +9,7 @@
 #include "classical/bounded_loop.hpp"
 #include "classical/delay_characteristic.hpp"
 #include "classical/loop_peaks.hpp"
+#include "core/constants.hpp"
 #include "core/try.hpp"
 
 namespace flyball::classical {
@@ -20,8 +21,6 @@ using Eigen::Index;
 using Complex = std::complex<double>;
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// What a loop is looked at for: its largest over the frequencies.
 enum class Measure { sensitivity, complementary, spread };

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "classical/modal_response.hpp"
+#include "core/constants.hpp"
 #include "math/dense/dense.hpp"
 #include "math/extended/double_double.hpp"
 
@@ -92,7 +93,6 @@ MatrixXd real_columns(const MatrixXcd& M, const std::vector<bool>& begins_pair) 
 /// V ← V (I + F), Λ ← Λ + diag of V⁻¹(A V - V Λ), with the rest of that over the distances of the
 /// poles for F; the largest entry of F, infinite where it has none.
 double refine(const DoubleDoubleMatrix& A, RealModes& modes) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   const Index n = A.rows();
   const DoubleDoubleMatrix error = add_product(product(A, modes.V), -1.0, modes.V, modes.Lambda);
   const MatrixXcd V = complex_columns(modes.V.hi, modes.begins_pair);

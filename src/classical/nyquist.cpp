@@ -6,6 +6,7 @@
 
 #include "classical/delay_characteristic.hpp"
 #include "classical/factors.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -17,9 +18,6 @@ using Eigen::VectorXd;
 using Complex = std::complex<double>;
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double pi = std::numbers::pi;
 
 /// Poles in one place on the upper half of the axis.
 struct AxisPoles {

@@ -24,7 +24,7 @@ using Complex = std::complex<double>;
 
 namespace {
 
-constexpr std::string_view where = "partial_fractions";
+constexpr std::string_view in_partial_fractions = "partial_fractions";
 
 /// A root and how often it is one.
 struct Repeated {
@@ -240,7 +240,7 @@ Expected<PartialFractions> checked(PartialFractions found) {
     finite = finite && fraction.residues.allFinite();
   }
   if (!finite) {
-    return refusal(ArgumentError::not_finite, where, "a residue")
+    return refusal(ArgumentError::not_finite, in_partial_fractions, "a residue")
         .got("beyond the largest double")
         .hint("measure time in a unit in which the poles are near one");
   }
@@ -265,21 +265,21 @@ Expected<PartialFractions> partial_fractions(const VectorXd& num, const VectorXd
   for (const auto& [p, name] :
        {std::pair<const VectorXd&, const char*>{num, "num"}, {den, "den"}}) {
     if (p.size() == 0) {
-      return refusal(ArgumentError::empty, where, name)
+      return refusal(ArgumentError::empty, in_partial_fractions, name)
           .got("empty")
           .expected("coefficients in descending powers");
     }
-    FLYBALL_CHECK(check_finite(MatrixXd(p), where, name));
+    FLYBALL_CHECK(check_finite(MatrixXd(p), in_partial_fractions, name));
   }
   const VectorXd n = without_leading_zeros(num);
   const VectorXd d = without_leading_zeros(den);
   if (d(0) == 0.0) {
-    return refusal(TransferError::zero_denominator, where, "den").got("zero");
+    return refusal(TransferError::zero_denominator, in_partial_fractions, "den").got("zero");
   }
   const auto zeros = detail::roots(detail::polynomial(n));
   const auto poles = detail::roots(detail::polynomial(d));
   if (!zeros || !poles) {
-    return refusal(SystemError::no_convergence, where, zeros ? "a pole" : "a zero")
+    return refusal(SystemError::no_convergence, in_partial_fractions, zeros ? "a pole" : "a zero")
         .got("not found: the iteration for the eigenvalues of the companion matrix did not end");
   }
   PartialFractions found{quotient_of(n, d), {}};

@@ -20,8 +20,8 @@ bool is_variable(const Polynomial& p) {
          p.lo(1, 0) == 0.0;
 }
 
-Index count_of(const Factors& factors, const Polynomial& p) {
-  for (const Factor& factor : factors) {
+Index count_of(const RatioFactors& factors, const Polynomial& p) {
+  for (const RatioFactor& factor : factors) {
     if (same(factor.p, p)) {
       return factor.times;
     }
@@ -29,13 +29,13 @@ Index count_of(const Factors& factors, const Polynomial& p) {
   return 0;
 }
 
-void remove(Factors& factors, const Polynomial& p, Index times) {
-  for (Factor& factor : factors) {
+void remove(RatioFactors& factors, const Polynomial& p, Index times) {
+  for (RatioFactor& factor : factors) {
     if (same(factor.p, p)) {
       factor.times -= times;
     }
   }
-  std::erase_if(factors, [](const Factor& factor) { return factor.times == 0; });
+  std::erase_if(factors, [](const RatioFactor& factor) { return factor.times == 0; });
 }
 
 }  // namespace
@@ -48,16 +48,16 @@ bool is_zero(const Polynomial& p) {
   return p.hi.isZero(0.0) && p.lo.isZero(0.0);
 }
 
-Index degree(const Factors& factors) {
+Index degree(const RatioFactors& factors) {
   Index sum = 0;
-  for (const Factor& factor : factors) {
+  for (const RatioFactor& factor : factors) {
     sum += (factor.p.rows() - 1) * factor.times;
   }
   return sum;
 }
 
-void multiply(Factors& factors, const Polynomial& p, Index times) {
-  for (Factor& factor : factors) {
+void multiply(RatioFactors& factors, const Polynomial& p, Index times) {
+  for (RatioFactor& factor : factors) {
     if (same(factor.p, p)) {
       factor.times += times;
       return;
@@ -66,9 +66,9 @@ void multiply(Factors& factors, const Polynomial& p, Index times) {
   factors.push_back({p, times});
 }
 
-Factors common(const Factors& a, const Factors& b) {
-  Factors both;
-  for (const Factor& factor : a) {
+RatioFactors common(const RatioFactors& a, const RatioFactors& b) {
+  RatioFactors both;
+  for (const RatioFactor& factor : a) {
     if (const Index times = std::min(factor.times, count_of(b, factor.p)); times > 0) {
       both.push_back({factor.p, times});
     }
@@ -76,22 +76,22 @@ Factors common(const Factors& a, const Factors& b) {
   return both;
 }
 
-Factors without(Factors factors, const Factors& less) {
-  for (const Factor& factor : less) {
+RatioFactors without(RatioFactors factors, const RatioFactors& less) {
+  for (const RatioFactor& factor : less) {
     remove(factors, factor.p, factor.times);
   }
   return factors;
 }
 
-Factors together(Factors factors, const Factors& more) {
-  for (const Factor& factor : more) {
+RatioFactors together(RatioFactors factors, const RatioFactors& more) {
+  for (const RatioFactor& factor : more) {
     multiply(factors, factor.p, factor.times);
   }
   return factors;
 }
 
-Polynomial expanded(const Factors& factors, Polynomial p) {
-  for (const Factor& factor : factors) {
+Polynomial expanded(const RatioFactors& factors, Polynomial p) {
+  for (const RatioFactor& factor : factors) {
     for (Index i = 0; i < factor.times; ++i) {
       p = times(p, factor.p);
     }
@@ -115,7 +115,7 @@ void clear_shifts(Quotient& q, char variable) {
   if (variable != 'z') {
     return;
   }
-  for (const Factor& factor : common(q.num, q.den)) {
+  for (const RatioFactor& factor : common(q.num, q.den)) {
     if (is_variable(factor.p)) {
       remove(q.num, factor.p, factor.times);
       remove(q.den, factor.p, factor.times);
@@ -136,10 +136,10 @@ Quotient product(const Quotient& a, const Quotient& b) {
 Quotient sum(const Quotient& a, double sign, const Quotient& b) {
   // a/c + b/d = (a d' + b c')/lcm(c, d), factors that both have kept in front.
   Quotient whole{.delay = a.delay};
-  const Factors in_front = common(a.num, b.num);
-  const Factors below = common(a.den, b.den);
-  const Factors only_a = without(a.den, below);
-  const Factors only_b = without(b.den, below);
+  const RatioFactors in_front = common(a.num, b.num);
+  const RatioFactors below = common(a.den, b.den);
+  const RatioFactors only_a = without(a.den, below);
+  const RatioFactors only_b = without(b.den, below);
   const Polynomial left = expanded(together(without(a.num, in_front), only_b), a.gain);
   const Polynomial right = expanded(together(without(b.num, in_front), only_a), b.gain);
   const Polynomial above = trimmed(plus(left, sign, right));

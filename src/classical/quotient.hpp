@@ -8,30 +8,30 @@
 namespace flyball::classical::detail {
 
 /// A polynomial that is not a constant, and how often it stands there.
-struct Factor {
+struct RatioFactor {
   Polynomial p;
   Eigen::Index times = 1;
 };
-using Factors = std::vector<Factor>;
+using RatioFactors = std::vector<RatioFactor>;
 
 [[nodiscard]] Polynomial constant(double value);
 [[nodiscard]] bool is_zero(const Polynomial& p);
 
-[[nodiscard]] Eigen::Index degree(const Factors& factors);
+[[nodiscard]] Eigen::Index degree(const RatioFactors& factors);
 /// Puts a factor to the others.
-void multiply(Factors& factors, const Polynomial& p, Eigen::Index times);
+void multiply(RatioFactors& factors, const Polynomial& p, Eigen::Index times);
 /// What two have in common.
-[[nodiscard]] Factors common(const Factors& a, const Factors& b);
-[[nodiscard]] Factors without(Factors factors, const Factors& less);
-[[nodiscard]] Factors together(Factors factors, const Factors& more);
+[[nodiscard]] RatioFactors common(const RatioFactors& a, const RatioFactors& b);
+[[nodiscard]] RatioFactors without(RatioFactors factors, const RatioFactors& less);
+[[nodiscard]] RatioFactors together(RatioFactors factors, const RatioFactors& more);
 /// p times all of them.
-[[nodiscard]] Polynomial expanded(const Factors& factors, Polynomial p);
+[[nodiscard]] Polynomial expanded(const RatioFactors& factors, Polynomial p);
 
 /// gain Π num / Π den e^{-delay s}, factored as it was written; it may be improper.
 struct Quotient {
   Polynomial gain = constant(1.0);  ///< A number.
-  Factors num{};
-  Factors den{};
+  RatioFactors num{};
+  RatioFactors den{};
   double delay = 0.0;
 
   [[nodiscard]] bool is_zero() const { return detail::is_zero(gain); }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <flyball/classical/nyquist.hpp>
@@ -10,6 +9,7 @@
 #include <flyball/systems/system_error.hpp>
 
 #include "classical/bounded_loop.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -21,9 +21,6 @@ using detail::LoopStep;
 using Complex = std::complex<double>;
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double pi = std::numbers::pi;
 
 /// Gain or phase of a loop, as what is zero where it crosses, with what bounds its motion.
 struct Crossing {

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <utility>
 
 #include <flyball/math/search/roots.hpp>
@@ -11,6 +9,7 @@
 
 #include "classical/locus_loop.hpp"
 #include "classical/locus_trace.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -28,12 +27,9 @@ using Eigen::Index;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double pi = std::numbers::pi;
-constexpr double degrees = 180.0 / pi;
+constexpr double degrees_per_radian = 180.0 / pi;
 
-double wrapped(double angle) {
+double wrapped_angle(double angle) {
   const double turned = std::remainder(angle, 360.0);
   return turned <= -180.0 ? turned + 360.0 : turned;
 }
@@ -41,10 +37,10 @@ double wrapped(double angle) {
 /// The angles of the m-th roots of a number, deg.
 std::vector<double> root_angles(Complex power, int m) {
   std::vector<double> angles;
-  const double first =
-      power.imag() == 0.0 ? (power.real() < 0.0 ? 180.0 : 0.0) : std::arg(power) * degrees;
+  const double first = power.imag() == 0.0 ? (power.real() < 0.0 ? 180.0 : 0.0)
+                                           : std::arg(power) * degrees_per_radian;
   for (int l = 0; l < m; ++l) {
-    angles.push_back(wrapped((first + 360.0 * l) / m));
+    angles.push_back(wrapped_angle((first + 360.0 * l) / m));
   }
   std::sort(angles.begin(), angles.end());
   return angles;
@@ -445,7 +441,7 @@ Expected<GainAtPoint> gain_at_point(const TransferFunction& loop, Complex point)
   const double negative = std::arg(-L);
   const bool of_positive = std::abs(negative) <= 0.5 * pi;
   return GainAtPoint{(of_positive ? 1.0 : -1.0) / std::abs(L),
-                     (of_positive ? negative : std::arg(L)) * degrees};
+                     (of_positive ? negative : std::arg(L)) * degrees_per_radian};
 }
 
 }  // namespace flyball::classical

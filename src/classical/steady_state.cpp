@@ -8,6 +8,7 @@
 #include <flyball/systems/system_error.hpp>
 
 #include "classical/polynomial.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -19,8 +20,6 @@ using Eigen::VectorXd;
 using Complex = std::complex<double>;
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// (s - rest)^excess times a function that is `value` there.
 struct AtRest {

@@ -12,6 +12,7 @@
 
 #include "classical/polynomial.hpp"
 #include "classical/step_judge.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -27,13 +28,11 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Complex = std::complex<double>;
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
 /// What poles of like size add to a step response: C e^{At} x(0), exact at the ends of steps.
-class Part {
+class ResponsePart {
  public:
   /// @param transfer  Strictly proper and stable. @param fastest, slowest  |p| and -Re p.
-  Part(const TransferFunction& transfer, double fastest, double slowest)
+  ResponsePart(const TransferFunction& transfer, double fastest, double slowest)
       : system_(transfer.to_state_space()),
         // From rest to the final state: A⁻¹B is what is still missing, turned round.
         x_(flyball::detail::solve_linear(system_.A, system_.B)),
@@ -87,8 +86,8 @@ class Part {
 
 /// The strictly proper part of G as a sum of parts whose poles are of like size, so that fast ones
 /// can be left out once they are over and slow ones are not lost beside them.
-Expected<std::vector<Part>> parts_of(const TransferFunction& transfer,
-                                     const Eigen::VectorXcd& poles) {
+Expected<std::vector<ResponsePart>> parts_of(const TransferFunction& transfer,
+                                             const Eigen::VectorXcd& poles) {
   using detail::Polynomial;
   constexpr double apart = 10.0;
   std::vector<Complex> sorted(poles.begin(), poles.end());
@@ -144,7 +143,7 @@ Expected<std::vector<Part>> parts_of(const TransferFunction& transfer,
         .hint("choose a unit of time in which the poles are nearer to 1");
   }
   const VectorXd nums = found->rounded();
-  std::vector<Part> parts;
+  std::vector<ResponsePart> parts;
   column = 0;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const auto size = static_cast<Index>(groups[g].size());
@@ -257,7 +256,7 @@ Expected<StepMetrics> step_metrics(const TransferFunction& transfer, double band
   const auto whole = [&] { return dc == 0.0 ? judge.of_zero(delay) : judge.metrics(dc, delay); };
   const auto now = [&] {
     double y = rest;
-    for (const Part& part : parts) {
+    for (const ResponsePart& part : parts) {
       y += part.value() / unit;
     }
     return y;

@@ -17,7 +17,6 @@ using flyball::detail::format;
 
 namespace {
 
-constexpr std::string_view where = "transfer function";
 constexpr std::size_t most_delays = 64;
 
 class Evaluator {
@@ -32,14 +31,14 @@ class Evaluator {
       auto value = evaluate(node, values);
       if (!value) {
         return tl::unexpected(
-            at_place(std::move(value).error().in(std::string(where)), node.place));
+            at_place(std::move(value).error().in(std::string(in_transfer_function)), node.place));
       }
       clear_shifts(value->q, syntax_.variable);
       const Index most = degree(*value);
       if (const std::size_t parts = terms(*value); most > highest_degree || parts > most_delays) {
         return tl::unexpected(at_place(
             Error(TransferTextError::degree_too_high)
-                .in(std::string(where))
+                .in(std::string(in_transfer_function))
                 .about(words(node))
                 .got(most > highest_degree ? format("of degree {}", most)
                                            : format("a sum of {} dead times", parts))
@@ -63,7 +62,7 @@ class Evaluator {
   }
   [[nodiscard]] Error not_a_number(const TransferNode& node, std::string got) const {
     return Error(TransferTextError::not_a_number)
-        .in(std::string(where))
+        .in(std::string(in_transfer_function))
         .about(words(node))
         .got(std::move(got))
         .expected("a finite number");
@@ -142,7 +141,7 @@ class Evaluator {
       return constant_of(0.0);
     }
     LateQuotient whole = product(a, turned_over(b));
-    const Factors cleared = common(a.q.den, b.q.den);
+    const RatioFactors cleared = common(a.q.den, b.q.den);
     whole.q = Quotient{.gain = *gain,
                        .num = together(a.q.num, without(b.q.den, cleared)),
                        .den = together(without(a.q.den, cleared), b.q.num),

@@ -26,19 +26,18 @@ using detail::clear_shifts;
 using detail::constant;
 using detail::degree;
 using detail::expanded;
-using detail::Factor;
-using detail::Factors;
 using detail::highest_degree;
+using detail::in_transfer_function;
 using detail::LateQuotient;
 using detail::number;
 using detail::quote;
 using detail::Quotient;
+using detail::RatioFactor;
+using detail::RatioFactors;
 using detail::TextPlace;
 using Eigen::Index;
 using Eigen::VectorXd;
 using flyball::detail::format;
-
-constexpr std::string_view where = "transfer function";
 
 struct Parsed {
   detail::TransferSyntax syntax;
@@ -56,7 +55,7 @@ Expected<void> check_period(const detail::TransferSyntax& syntax,
                             const std::optional<Time>& period) {
   if (syntax.variable == 'z' && !period) {
     return tl::unexpected(at_place(Error(TransferTextError::period_missing)
-                                       .in(std::string(where))
+                                       .in(std::string(in_transfer_function))
                                        .about("the sample period")
                                        .got("not given")
                                        .expected("that of z")
@@ -65,7 +64,7 @@ Expected<void> check_period(const detail::TransferSyntax& syntax,
   }
   if (syntax.variable == 's' && period) {
     return tl::unexpected(at_place(Error(TransferTextError::period_without_z)
-                                       .in(std::string(where))
+                                       .in(std::string(in_transfer_function))
                                        .about("the expression")
                                        .got("of s, which has no sample period")
                                        .expected("of z with a period, or of s without")
@@ -82,7 +81,7 @@ Expected<Quotient> rational(const LateQuotient& value, std::string_view text) {
   }
   const TextPlace whole{0, text.size()};
   return tl::unexpected(at_place(Error(TransferError::delay_in_loop)
-                                     .in(std::string(where))
+                                     .in(std::string(in_transfer_function))
                                      .about(quote(text, whole))
                                      .got("made of parts of several dead times")
                                      .expected("a rational function behind one dead time")
@@ -91,12 +90,13 @@ Expected<Quotient> rational(const LateQuotient& value, std::string_view text) {
 }
 
 /// The roots of factors, each on its own.
-Expected<Eigen::VectorXcd> roots_of(const Factors& factors, std::string_view name, bool discrete) {
+Expected<Eigen::VectorXcd> roots_of(const RatioFactors& factors, std::string_view name,
+                                    bool discrete) {
   std::vector<std::complex<double>> all;
-  for (const Factor& factor : factors) {
+  for (const RatioFactor& factor : factors) {
     auto found = detail::roots(factor.p);
     if (!found) {
-      return refusal(SystemError::no_convergence, where, name).got("not found");
+      return refusal(SystemError::no_convergence, in_transfer_function, name).got("not found");
     }
     detail::settle_on_border(*found, factor.p, discrete);
     for (const detail::MultipleRoot& root : detail::grouped(*found, factor.p)) {
@@ -107,9 +107,9 @@ Expected<Eigen::VectorXcd> roots_of(const Factors& factors, std::string_view nam
       Eigen::Map<const Eigen::VectorXcd>(all.data(), static_cast<Index>(all.size())));
 }
 
-bool is_power(const Factors& factors) {
+bool is_power(const RatioFactors& factors) {
   return std::any_of(factors.begin(), factors.end(),
-                     [](const Factor& factor) { return factor.times > 1; });
+                     [](const RatioFactor& factor) { return factor.times > 1; });
 }
 
 Expected<TransferFunction> finished(const LateQuotient& value, const std::optional<Time>& period,
@@ -121,7 +121,7 @@ Expected<TransferFunction> finished(const LateQuotient& value, const std::option
   if (above > below) {
     return tl::unexpected(
         at_place(Error(TransferError::improper)
-                     .in(std::string(where))
+                     .in(std::string(in_transfer_function))
                      .about(quote(text, whole))
                      .got(format("of degree {} above and {} below", above, below))
                      .expected("of a numerator whose degree is not above the denominator's")
@@ -175,7 +175,7 @@ namespace {
 Expected<LateQuotient> product_of(std::span<const std::string> texts,
                                   const std::optional<Time>& period) {
   if (texts.empty()) {
-    return refusal(ArgumentError::empty, where, "the factors");
+    return refusal(ArgumentError::empty, in_transfer_function, "the factors");
   }
   LateQuotient whole{number(1.0)};
   char variable = 0;
@@ -193,7 +193,7 @@ Expected<LateQuotient> product_of(std::span<const std::string> texts,
     const char own = parsed->syntax.variable;
     if (own != 0 && variable != 0 && own != variable) {
       return tell(at_place(Error(TransferTextError::both_variables)
-                               .in(std::string(where))
+                               .in(std::string(in_transfer_function))
                                .about(quote(texts[i], parsed->syntax.first_use))
                                .got(format("in a product with an expression of {}", variable))
                                .expected("of one variable"),
@@ -204,7 +204,7 @@ Expected<LateQuotient> product_of(std::span<const std::string> texts,
     clear_shifts(whole.q, variable);
   }
   if (degree(whole) > highest_degree) {
-    return refusal(TransferTextError::degree_too_high, where, "the product")
+    return refusal(TransferTextError::degree_too_high, in_transfer_function, "the product")
         .got(format("of degree {}", degree(whole)))
         .expected(format("of degree {} at most", highest_degree));
   }
@@ -234,7 +234,7 @@ Expected<TransferFunction> parse_transfer_product(std::span<const std::string> t
 
 Expected<TransferSystem> parse_transfer_system(std::span<const std::string> texts,
                                                const TransferScale& loop) {
-  FLYBALL_CHECK(Checks(where).finite(loop.gain, "the gain"));
+  FLYBALL_CHECK(Checks(in_transfer_function).finite(loop.gain, "the gain"));
   FLYBALL_TRY(const LateQuotient whole, product_of(texts, loop.period));
   const std::string text = written(texts);
   if (whole.is_rational()) {
@@ -256,10 +256,10 @@ Expected<ZeroPoleGain> parse_zero_pole_gain(std::span<const std::string> texts,
   FLYBALL_TRY(const auto zeros, roots_of(whole.num, "a zero", period.has_value()));
   FLYBALL_TRY(const auto poles, roots_of(whole.den, "a pole", period.has_value()));
   double gain = whole.value();
-  for (const Factor& factor : whole.num) {
+  for (const RatioFactor& factor : whole.num) {
     gain *= std::pow(factor.p.hi(0, 0), static_cast<double>(factor.times));
   }
-  for (const Factor& factor : whole.den) {
+  for (const RatioFactor& factor : whole.den) {
     gain /= std::pow(factor.p.hi(0, 0), static_cast<double>(factor.times));
   }
   return ZeroPoleGain::create(zeros, poles, gain, period, Time(whole.delay));

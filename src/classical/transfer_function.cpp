@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +11,7 @@
 #include "classical/factors.hpp"
 #include "classical/polynomial.hpp"
 #include "classical/whole_periods.hpp"
+#include "core/constants.hpp"
 #include "core/error_rows.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
@@ -27,9 +26,7 @@ using Complex = std::complex<double>;
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-VectorXd without_leading_zeros(const VectorXd& p) {
+VectorXd significant_coefficients(const VectorXd& p) {
   Index first = 0;
   while (first + 1 < p.size() && p(first) == 0.0) {
     ++first;
@@ -138,8 +135,8 @@ Expected<TransferFunction> TransferFunction::create(const VectorXd& num, const V
     FLYBALL_CHECK(check_positive(period->si(), where, "period", "s"));
   }
   FLYBALL_CHECK(Checks(where).not_negative(delay.si(), "delay", "s"));
-  VectorXd n = without_leading_zeros(num);
-  VectorXd d = without_leading_zeros(den);
+  VectorXd n = significant_coefficients(num);
+  VectorXd d = significant_coefficients(den);
   if (d(0) == 0.0) {
     return refusal(TransferError::zero_denominator, where, "den")
         .got("zero")
@@ -358,7 +355,7 @@ Expected<TransferFunction> feedback(const TransferFunction& forward, const Trans
           .rounded();
   const Index order = forward.order() + back.order();
   const double cancelled = std::abs(forward.den()(0) * back.den()(0));
-  if (without_leading_zeros(den).size() < order + 1 || std::abs(den(0)) <= 4e-16 * cancelled) {
+  if (significant_coefficients(den).size() < order + 1 || std::abs(den(0)) <= 4e-16 * cancelled) {
     return refusal(TransferError::algebraic_loop, where, negative ? "1 + G1 G2" : "1 - G1 G2")
         .got("zero at infinite frequency")
         .expected("invertible")

@@ -17,8 +17,6 @@ using expression::ExpressionError;
 
 namespace {
 
-constexpr std::string_view where = "transfer function";
-
 struct Spelling {
   std::string_view text;
   Token token;
@@ -80,12 +78,12 @@ Error at_place(Error error, TextPlace place) {
 std::string quote(std::string_view text, TextPlace place) {
   constexpr std::size_t most = 60;
   const std::string_view words = text.substr(std::min(place.offset, text.size()), place.length);
-  return "\"" + cut(printable(words), most) + "\"";
+  return "\"" + flyball::cut(printable(words), most) + "\"";
 }
 
 void TransferLexer::fail(Error error, TextPlace place) {
   if (!error_) {
-    error_ = at_place(std::move(error).in(std::string(where)), place);
+    error_ = at_place(std::move(error).in(std::string(in_transfer_function)), place);
   }
   here_ = {Token::end, {text_.size(), 0}};
   at_ = text_.size();

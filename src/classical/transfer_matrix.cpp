@@ -8,6 +8,7 @@
 #include <flyball/systems/realization.hpp>
 #include <flyball/systems/system_error.hpp>
 
+#include "classical/delay_parts.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "systems/zero_pole_gain.hpp"
@@ -22,12 +23,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr std::string_view noun = "transfer matrix";
+constexpr std::string_view transfer_matrix_noun = "transfer matrix";
 using Entries = std::vector<std::vector<ZeroPoleGain>>;
-
-std::string period_text(const std::optional<Time>& period) {
-  return period ? flyball::detail::format("{} s", period->si()) : std::string("continuous");
-}
 
 /// The states that `from` reaches along entries of M that are not zero.
 std::vector<bool> reached(const MatrixXd& M, const VectorXd& from) {
@@ -60,8 +57,8 @@ Expected<ZeroPoleGain> channel(const ContinuousSystem<>& s, Index output, Index 
                                std::optional<Time> period) {
   for (const auto& [i, count, name] :
        {std::tuple{output, s.C.rows(), "output"}, {input, s.B.cols(), "input"}}) {
-    FLYBALL_CHECK(
-        check_within(static_cast<double>(i), 0.0, static_cast<double>(count - 1), noun, name));
+    FLYBALL_CHECK(check_within(static_cast<double>(i), 0.0, static_cast<double>(count - 1),
+                               transfer_matrix_noun, name));
   }
   std::vector<Index> kept;
   const auto moved = reached(s.A, s.B.col(input));
@@ -83,7 +80,7 @@ Expected<ZeroPoleGain> channel(const ContinuousSystem<>& s, Index output, Index 
     // Nothing passes, or an iteration did not end.
     FLYBALL_TRY(const VectorXcd values, poles(part));
     if (!values.allFinite()) {
-      return refusal(SystemError::no_convergence, noun, "a pole").got("not found");
+      return refusal(SystemError::no_convergence, transfer_matrix_noun, "a pole").got("not found");
     }
     return ZeroPoleGain::create(VectorXcd(0), VectorXcd(0), 0.0, period);
   }
@@ -108,12 +105,13 @@ Expected<TransferMatrix> of_system(const ContinuousSystem<>& s, std::optional<Ti
 
 Expected<TransferMatrix> TransferMatrix::create(Entries entries) {
   if (entries.empty() || entries.front().empty()) {
-    return refusal(ArgumentError::empty, noun, "the rows of entries").got("empty");
+    return refusal(ArgumentError::empty, transfer_matrix_noun, "the rows of entries").got("empty");
   }
   const auto& period = entries.front().front().period();
   for (std::size_t i = 0; i < entries.size(); ++i) {
     if (entries[i].size() != entries.front().size()) {
-      return refusal(ArgumentError::wrong_shape, noun, flyball::detail::format("row {}", i))
+      return refusal(ArgumentError::wrong_shape, transfer_matrix_noun,
+                     flyball::detail::format("row {}", i))
           .got(flyball::detail::format("of {} entries", entries[i].size()))
           .expected(flyball::detail::format("of {}, as the first", entries.front().size()));
     }
@@ -121,10 +119,10 @@ Expected<TransferMatrix> TransferMatrix::create(Entries entries) {
       const auto& own = entries[i][j].period();
       if (own.has_value() != period.has_value() ||
           (own && std::abs(own->si() - period->si()) > 1e-12 * period->si())) {
-        return refusal(TransferError::period_mismatch, noun,
+        return refusal(TransferError::period_mismatch, transfer_matrix_noun,
                        flyball::detail::format("the sample period of entry ({}, {})", i, j))
-            .got(period_text(own))
-            .expected(period_text(period) + ", the first's")
+            .got(detail::period_text(own))
+            .expected(detail::period_text(period) + ", the first's")
             .hint("discretize or resample one of them");
       }
     }
@@ -146,12 +144,12 @@ Expected<TransferMatrix> TransferMatrix::create(
 }
 
 Expected<TransferMatrix> TransferMatrix::of(const ContinuousSystem<>& system) {
-  FLYBALL_CHECK(check_system_or_gain(system, noun));
+  FLYBALL_CHECK(check_system_or_gain(system, transfer_matrix_noun));
   return of_system(system, std::nullopt);
 }
 
 Expected<TransferMatrix> TransferMatrix::of(const DiscreteSystem<>& system) {
-  FLYBALL_CHECK(check_system_or_gain(system, noun));
+  FLYBALL_CHECK(check_system_or_gain(system, transfer_matrix_noun));
   return of_system({system.A, system.B, system.C, system.D}, system.period);
 }
 
@@ -239,13 +237,13 @@ Expected<DiscreteSystem<>> TransferMatrix::to_discrete(double tolerance) const {
 
 Expected<ZeroPoleGain> channel_of(const ContinuousSystem<>& system, Index output, Index input,
                                   bool cut) {
-  FLYBALL_CHECK(check_system_or_gain(system, noun));
+  FLYBALL_CHECK(check_system_or_gain(system, transfer_matrix_noun));
   return channel(system, output, input, cut, std::nullopt);
 }
 
 Expected<ZeroPoleGain> channel_of(const DiscreteSystem<>& system, Index output, Index input,
                                   bool cut) {
-  FLYBALL_CHECK(check_system_or_gain(system, noun));
+  FLYBALL_CHECK(check_system_or_gain(system, transfer_matrix_noun));
   return channel({system.A, system.B, system.C, system.D}, output, input, cut, system.period);
 }
 

@@ -21,7 +21,6 @@ namespace {
 using expression::ExpressionError;
 using flyball::detail::format;
 
-constexpr std::string_view where = "transfer function";
 constexpr std::size_t longest = 10'000;
 constexpr int deepest = 400;  // two a parenthesis
 
@@ -31,7 +30,7 @@ class Parser : TransferLexer {
 
   Expected<TransferSyntax> run() {
     if (text_.size() > longest) {
-      return refusal(ExpressionError::too_large, where, "the expression")
+      return refusal(ExpressionError::too_large, in_transfer_function, "the expression")
           .got(format("{} bytes long", text_.size()))
           .expected(format("at most {}", longest));
     }

@@ -11,6 +11,9 @@
 /// The grammar of transfer functions in text.
 namespace flyball::classical::detail {
 
+/// Where errors of transfer functions in text say that they are.
+inline constexpr std::string_view in_transfer_function = "transfer function";
+
 /// A part of a text, in bytes.
 struct TextPlace {
   std::size_t offset = 0;

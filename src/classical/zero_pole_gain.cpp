@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <utility>
 
 #include <flyball/systems/system_error.hpp>
 
+#include "classical/delay_parts.hpp"
 #include "classical/whole_periods.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "systems/balance.hpp"
@@ -23,8 +24,7 @@ using Complex = std::complex<double>;
 
 namespace {
 
-constexpr std::string_view noun = "zero-pole-gain";
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr std::string_view zero_pole_gain_noun = "zero-pole-gain";
 
 /// The roots with each pair's members exact conjugates of each other.
 Expected<VectorXcd> paired(const VectorXcd& roots, std::string_view name) {
@@ -33,7 +33,7 @@ Expected<VectorXcd> paired(const VectorXcd& roots, std::string_view name) {
   for (Index i = 0; i < roots.size(); ++i) {
     const Complex r = roots(i);
     if (!std::isfinite(r.real()) || !std::isfinite(r.imag())) {
-      return refusal(ArgumentError::not_finite, noun, name)
+      return refusal(ArgumentError::not_finite, zero_pole_gain_noun, name)
           .got("not finite")
           .with("entry", static_cast<double>(i));
     }
@@ -50,7 +50,7 @@ Expected<VectorXcd> paired(const VectorXcd& roots, std::string_view name) {
       }
     }
     if (partner < 0) {
-      return refusal(ArgumentError::malformed, noun, name)
+      return refusal(ArgumentError::malformed, zero_pole_gain_noun, name)
           .got(flyball::detail::format("without the conjugate of {} {} {}j", r.real(),
                                        r.imag() < 0.0 ? "-" : "+", std::abs(r.imag())))
           .expected("in pairs of conjugates: the coefficients are real");
@@ -92,18 +92,14 @@ Complex quotient_of_factors(const VectorXcd& zeros, const VectorXcd& poles, Comp
   return value;
 }
 
-std::string period_text(const std::optional<Time>& period) {
-  return period ? flyball::detail::format("{} s", period->si()) : std::string("continuous");
-}
-
 Expected<void> check_periods(const ZeroPoleGain& a, const ZeroPoleGain& b, std::string_view where) {
   if (a.period().has_value() == b.period().has_value() &&
       (!a.period() || std::abs(a.period()->si() - b.period()->si()) <= 1e-12 * a.period()->si())) {
     return {};
   }
   return refusal(TransferError::period_mismatch, where, "the second's sample period")
-      .got(period_text(b.period()))
-      .expected(period_text(a.period()) + ", the first's")
+      .got(detail::period_text(b.period()))
+      .expected(detail::period_text(a.period()) + ", the first's")
       .hint("discretize or resample one of them");
 }
 
@@ -113,11 +109,12 @@ Expected<ZeroPoleGain> ZeroPoleGain::create(const VectorXcd& zeros, const Vector
                                             double gain, std::optional<Time> period, Time delay) {
   FLYBALL_TRY(VectorXcd z, paired(zeros, "zeros"));
   FLYBALL_TRY(VectorXcd p, paired(poles, "poles"));
-  FLYBALL_CHECK(Checks(noun).finite(gain, "gain").not_negative(delay.si(), "delay", "s"));
+  FLYBALL_CHECK(
+      Checks(zero_pole_gain_noun).finite(gain, "gain").not_negative(delay.si(), "delay", "s"));
   if (period) {
-    FLYBALL_CHECK(check_positive(period->si(), noun, "period", "s"));
-    FLYBALL_CHECK(
-        detail::check_whole_periods(delay.si(), period, noun, "a discrete transfer function"));
+    FLYBALL_CHECK(check_positive(period->si(), zero_pole_gain_noun, "period", "s"));
+    FLYBALL_CHECK(detail::check_whole_periods(delay.si(), period, zero_pole_gain_noun,
+                                              "a discrete transfer function"));
   }
   return ZeroPoleGain(std::move(z), std::move(p), gain, period, delay.si());
 }
@@ -158,9 +155,10 @@ double ZeroPoleGain::dc_gain() const {
 }
 
 Expected<Complex> ZeroPoleGain::at(Complex s) const {
-  FLYBALL_CHECK(Checks(noun).finite(s.real(), "the point").finite(s.imag(), "the point"));
+  FLYBALL_CHECK(
+      Checks(zero_pole_gain_noun).finite(s.real(), "the point").finite(s.imag(), "the point"));
   if ((poles_.array() == s).any()) {
-    return refusal(TransferError::at_a_pole, noun, "the point")
+    return refusal(TransferError::at_a_pole, zero_pole_gain_noun, "the point")
         .got("a pole")
         .with("point", std::vector<double>{s.real(), s.imag()});
   }
@@ -180,7 +178,7 @@ Complex ZeroPoleGain::response(double frequency) const {
 namespace {
 
 Refusal improper(const ZeroPoleGain& G) {
-  return refusal(TransferError::improper, noun, "the number of zeros")
+  return refusal(TransferError::improper, zero_pole_gain_noun, "the number of zeros")
       .got(std::to_string(G.zeros().size()))
       .expected(flyball::detail::format("at most {}, the number of poles", G.poles().size()))
       .hint("a differentiator needs a pole that ends it; `descriptor` realises it as it is");

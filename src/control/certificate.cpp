@@ -19,7 +19,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::string_view where = "certify_loop";
+constexpr std::string_view in_certify_loop = "certify_loop";
 
 Index plant_parameters(const UncertainLoop& loop) {
   return loop.set.centre.size() - 2;
@@ -35,25 +35,25 @@ Index plant_states(const UncertainLoop& loop) {
 Expected<void> check_slopes(const std::vector<MatrixXd>& slopes, std::string_view name, Index count,
                             Index rows, Index columns) {
   if (!slopes.empty() && static_cast<Index>(slopes.size()) != count) {
-    return refusal(ArgumentError::wrong_shape, where, name)
+    return refusal(ArgumentError::wrong_shape, in_certify_loop, name)
         .got(detail::format("{} matrices", slopes.size()))
         .expected(detail::format("one for each of the plant's {} parameters, or none", count));
   }
   for (const MatrixXd& slope : slopes) {
-    FLYBALL_CHECK(Checks(where).shape(slope, rows, columns, name).finite(slope, name));
+    FLYBALL_CHECK(Checks(in_certify_loop).shape(slope, rows, columns, name).finite(slope, name));
   }
   return {};
 }
 
 Expected<void> check_family(const LinearPlantFamily& family, Index count) {
-  FLYBALL_CHECK(check_square(family.A, where, "A"));
+  FLYBALL_CHECK(check_square(family.A, in_certify_loop, "A"));
   const Index n = family.A.rows();
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_certify_loop)
                     .finite(family.A, "A")
                     .shape(family.B, n, 1, "B", "states x 1")
                     .finite(family.B, "B"));
   if (family.E.size() > 0) {
-    FLYBALL_CHECK(Checks(where).shape(family.E, n, n, "E").finite(family.E, "E"));
+    FLYBALL_CHECK(Checks(in_certify_loop).shape(family.E, n, n, "E").finite(family.E, "E"));
   }
   FLYBALL_CHECK(check_slopes(family.A_p, "A_p", count, n, n));
   FLYBALL_CHECK(check_slopes(family.B_p, "B_p", count, n, 1));
@@ -67,39 +67,41 @@ double least_of(const ParameterSet& set, Index i) {
 
 Expected<void> check_family(const MechanismFamily& family, const ParameterSet& set) {
   if (set.centre.size() != 4) {
-    return refusal(ArgumentError::wrong_shape, where, "the set")
+    return refusal(ArgumentError::wrong_shape, in_certify_loop, "the set")
         .got(detail::format("{} parameters", set.centre.size()))
         .expected("kV, kA, the gain and the delay");
   }
-  FLYBALL_CHECK(check_positive(least_of(set, 0), where, "the least kV of the set", "V·s/unit"));
-  return family.logarithmic ? Expected<void>()
-                            : check_not_negative(least_of(set, 1) + 1e-15 * std::abs(set.centre(1)),
-                                                 where, "the least kA of the set", "V·s²/unit");
+  FLYBALL_CHECK(
+      check_positive(least_of(set, 0), in_certify_loop, "the least kV of the set", "V·s/unit"));
+  return family.logarithmic
+             ? Expected<void>()
+             : check_not_negative(least_of(set, 1) + 1e-15 * std::abs(set.centre(1)),
+                                  in_certify_loop, "the least kA of the set", "V·s²/unit");
 }
 
 Expected<void> check(const UncertainLoop& loop) {
   const ParameterSet& set = loop.set;
   const Index count = set.centre.size();
   if (count < 2) {
-    return refusal(ArgumentError::wrong_shape, where, "the set")
+    return refusal(ArgumentError::wrong_shape, in_certify_loop, "the set")
         .got(detail::format("{} parameters", count))
         .expected("those of the plant, the gain and the delay");
   }
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_certify_loop)
                     .finite(set.centre, "the set's centre")
                     .shape(set.axes, count, set.axes.cols(), "the set's axes", "parameters x axes")
                     .finite(set.axes, "the set's axes")
                     .positive(loop.period.si(), "period", "s"));
   if (set.axes.cols() > detail::most_parameters || set.round < 0 || set.round > set.axes.cols()) {
-    return refusal(ArgumentError::out_of_range, where, "the set")
+    return refusal(ArgumentError::out_of_range, in_certify_loop, "the set")
         .got(detail::format("{} axes, {} of them round", set.axes.cols(), set.round))
         .expected(
             detail::format("at most {} axes, and no more of them round", detail::most_parameters));
   }
   const double most_delay = set.centre(count - 1) + set.axes.row(count - 1).cwiseAbs().sum();
-  FLYBALL_CHECK(Checks(where).not_negative(most_delay, "the set's largest delay", "s"));
+  FLYBALL_CHECK(Checks(in_certify_loop).not_negative(most_delay, "the set's largest delay", "s"));
   if (most_delay > most_delay_periods * loop.period.si()) {
-    return refusal(ArgumentError::out_of_range, where, "the set's largest delay")
+    return refusal(ArgumentError::out_of_range, in_certify_loop, "the set's largest delay")
         .got(format_number(most_delay) + " s")
         .expected(format_number(most_delay_periods) + " periods or less");
   }
@@ -110,7 +112,7 @@ Expected<void> check(const UncertainLoop& loop) {
   }
   const Index p = loop.C.rows();
   const Index q = loop.A_c.rows();
-  return Checks(where)
+  return Checks(in_certify_loop)
       .shape(loop.C, p, plant_states(loop), "C", "outputs x states")
       .shape(loop.A_c, q, q, "A_c")
       .shape(loop.B_c, q, p, "B_c")
@@ -243,12 +245,12 @@ Expected<ParameterSet> parameter_box(const std::vector<double>& low,
 
 Expected<PlantInputLoop> loop_of(const UncertainLoop& loop, const VectorXd& parameters) {
   FLYBALL_CHECK(check(loop));
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_certify_loop)
                     .shape(parameters, loop.set.centre.size(), 1, "parameters")
                     .finite(parameters, "parameters"));
   const auto matrices = matrices_of(loop, parameters.head(plant_parameters(loop)));
   if (!matrices) {
-    return refusal(ArgumentError::out_of_range, where, "the member")
+    return refusal(ArgumentError::out_of_range, in_certify_loop, "the member")
         .got("without an equation of motion: its E is singular, or its kA zero")
         .expected("a plant that is one");
   }
@@ -267,12 +269,12 @@ Expected<PlantInputLoop> loop_of(const UncertainLoop& loop, const VectorXd& para
 Expected<LoopCertificate> certify_loop(const UncertainLoop& loop,
                                        const CertificateOptions& options) {
   FLYBALL_CHECK(check(loop));
-  FLYBALL_CHECK(check_within(options.closeness, 0.0, 0.999, where, "closeness"));
+  FLYBALL_CHECK(check_within(options.closeness, 0.0, 0.999, in_certify_loop, "closeness"));
   LoopCertificate certificate;
   detail::MemberSearch search(loop, options.margins, options.most_work);
   search.run();
   if (!search.found()) {
-    return refusal(ArgumentError::out_of_range, where, "the set")
+    return refusal(ArgumentError::out_of_range, in_certify_loop, "the set")
         .got("without a member whose loop is finite")
         .expected("plants that can be sampled");
   }

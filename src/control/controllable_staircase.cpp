@@ -1,7 +1,7 @@
 #include <algorithm>
-#include <limits>
 
 #include "control/placement.hpp"
+#include "core/constants.hpp"
 
 namespace flyball::detail {
 
@@ -9,7 +9,6 @@ ControllableStaircase controllable_staircase(const MatrixRef& A, const MatrixRef
   const Eigen::Index n = A.rows();
   // An input counts however weak it is made: only its direction is judged.
   ControllableStaircase form{Eigen::MatrixXd::Identity(n, n), A, B, 0, 0, {}};
-  const double epsilon = std::numeric_limits<double>::epsilon();
   const double tolerance =
       20.0 * static_cast<double>(n) * epsilon * std::max(form.A.norm(), 1e-300);
   for (Eigen::Index j = 0; j < form.B.cols(); ++j) {

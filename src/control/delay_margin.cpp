@@ -1,20 +1,17 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <optional>
 
 #include <flyball/math/search/roots.hpp>
 
 #include "control/delay_margin.hpp"
+#include "core/constants.hpp"
 
 namespace flyball::detail {
 
 namespace {
 
 using Complex = std::complex<double>;
-constexpr double pi = std::numbers::pi;
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // Where |L| = 1 near a frequency, for a loop that differs a little.
 std::optional<double> follow_crossover(const SampledLoop& loop, double theta) {

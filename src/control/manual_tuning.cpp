@@ -13,7 +13,7 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "tune_manually";
+constexpr std::string_view in_tune_manually = "tune_manually";
 
 /// Above this share of the step an overshoot that comes back counts as oscillation.
 constexpr double oscillating = 0.05;
@@ -70,7 +70,7 @@ class Bench {
 
   /// Simulates and notes what was seen; what was decided is filled in by whoever decides.
   [[nodiscard]] Expected<TuningStep*> attempt(const PidGains& gains) {
-    FLYBALL_TRY_IN(where, const auto response, simulate_pid(plant_, gains, scenario_));
+    FLYBALL_TRY_IN(in_tune_manually, const auto response, simulate_pid(plant_, gains, scenario_));
     TuningStep step{gains, response.metrics, jitter_of(response, scenario_.settings)};
     step.seen = seen_in(step.metrics, step.jitter);
     steps_.push_back(std::move(step));
@@ -193,7 +193,7 @@ Expected<PidGains> raise_ki(Bench& bench, PidGains gains, double duration) {
 
 Expected<ManualTuning> tune_manually(const DiscreteSystem<>& plant, const TuningScenario& scenario,
                                      bool velocity) {
-  FLYBALL_CHECK(detail::check_single_loop(plant, where));
+  FLYBALL_CHECK(detail::check_single_loop(plant, in_tune_manually));
   Bench bench(plant, scenario);
   FLYBALL_TRY(auto rest, bench.attempt({}));
   rest->decided = "start with all gains zero (step 1), then raise Kp (step 2)";
@@ -210,7 +210,7 @@ Expected<ManualTuning> tune_manually(const DiscreteSystem<>& plant, const Tuning
   };
   FLYBALL_TRY(auto gains, raise_kp(bench, first_gain(scenario), push(), velocity));
   if (gains.kp == 0.0) {
-    return refusal(TuningError::nothing_improves, where, "Kp")
+    return refusal(TuningError::nothing_improves, in_tune_manually, "Kp")
         .hint("even a small one makes the loop oscillate: shorten the period or the delay")
         .with("smallest Kp tried", first_gain(scenario));
   }
@@ -226,7 +226,7 @@ Expected<ManualTuning> tune_manually(const DiscreteSystem<>& plant, const Tuning
   }
   FLYBALL_TRY(auto response, simulate_pid(plant, gains, scenario));
   if (std::abs(response.metrics.steady_state_error) >= std::abs(scenario.reference)) {
-    return refusal(TuningError::nothing_improves, where, "the loop")
+    return refusal(TuningError::nothing_improves, in_tune_manually, "the loop")
         .hint(
             "the plant needs more than its limits allow, or another controller: see whether it is "
             "controllable")

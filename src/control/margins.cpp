@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <flyball/systems/system_error.hpp>
 
 #include "classical/loop_peaks.hpp"
 #include "control/delay_margin.hpp"
 #include "control/sampled_loop.hpp"
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
@@ -18,8 +18,6 @@ namespace {
 
 using Complex = std::complex<double>;
 using detail::SampledLoop;
-constexpr double pi = std::numbers::pi;
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 Crossover crossover(double frequency, const Complex& L) {
   return {frequency, std::abs(L), std::arg(L) * 180.0 / pi};

@@ -9,7 +9,7 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "MechanismController";
+constexpr std::string_view in_mechanism_controller = "MechanismController";
 
 // @param wanted  The states of the class that is asked; two when it was not said.
 Expected<void> check_states(const MechanismControllerDesign& design, Eigen::Index wanted) {
@@ -18,7 +18,7 @@ Expected<void> check_states(const MechanismControllerDesign& design, Eigen::Inde
   if (n == wanted && !(flywheel && n == 2)) {
     return {};
   }
-  return refusal(ArgumentError::wrong_shape, where, "the plant")
+  return refusal(ArgumentError::wrong_shape, in_mechanism_controller, "the plant")
       .got(n == 1 ? std::string("of one state") : detail::format("of {} states", n))
       .expected(flywheel      ? "of one state, the velocity"
                 : wanted == 1 ? "of one state, the position"
@@ -32,7 +32,7 @@ Expected<void> check_output(const DiscreteSystem<>& plant) {
   if (plant.C == first && plant.D.isZero(0.0)) {
     return {};
   }
-  return refusal(ArgumentError::out_of_range, where, "the plant's output")
+  return refusal(ArgumentError::out_of_range, in_mechanism_controller, "the plant's output")
       .got("a mixture of its states and input")
       .expected("its first state: C = [1 0], D = 0");
 }
@@ -63,8 +63,8 @@ auto MechanismController<States>::create(const MechanismControllerDesign& design
     -> Expected<MechanismController> {
   const DiscreteSystem<>& plant = design.plant;
   FLYBALL_CHECK(check_states(design, States));
-  FLYBALL_CHECK(check_system(plant, where));
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(check_system(plant, in_mechanism_controller));
+  FLYBALL_CHECK(Checks(in_mechanism_controller)
                     .shape(plant.B, States, 1, "the plant's B", "states x 1 input")
                     .shape(plant.C, 1, States, "the plant's C", "1 output x states")
                     .also([&] { return check_output(plant); })
@@ -91,7 +91,7 @@ auto MechanismController<States>::regulator_of(const MechanismControllerDesign& 
     return Regulator(prompt);
   }
   const ContinuousSystem<>& model = *design.predicts_with;
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_mechanism_controller)
                     .shape(model.A, States, States, "predicts_with's A", "of the plant's states")
                     .shape(model.B, States, 1, "predicts_with's B", "states x 1 input"));
   FLYBALL_TRY(const auto predictor,

@@ -10,15 +10,15 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "place_observer";
+constexpr std::string_view in_place_observer = "place_observer";
 
 /// The dual's refusal in words of the observer.
 Error observer_error(const Error& dual) {
   if (!dual.is(PolePlacementError::not_controllable)) {
-    return Error(dual).in(std::string(where));
+    return Error(dual).in(std::string(in_place_observer));
   }
   Error error = Error(PolePlacementError::not_observable)
-                    .in(std::string(where))
+                    .in(std::string(in_place_observer))
                     .about("(A, C)")
                     .hint("keep this mode among the poles, or measure what shows it");
   for (const Evidence& evidence : dual.evidence()) {
@@ -30,7 +30,7 @@ Error observer_error(const Error& dual) {
 
 template <class System>
 Expected<ObserverPlacement> placed(const System& plant, const Eigen::VectorXcd& poles) {
-  FLYBALL_CHECK(check_system(plant, where));
+  FLYBALL_CHECK(check_system(plant, in_place_observer));
   auto dual = place(MatrixRef(plant.A.transpose()), MatrixRef(plant.C.transpose()), poles);
   if (!dual) {
     return tl::unexpected(observer_error(dual.error()));

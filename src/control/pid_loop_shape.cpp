@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <string>
 
 #include <flyball/control/pid_design.hpp>
@@ -9,6 +8,7 @@
 #include <flyball/math/search/roots.hpp>
 
 #include "control/pid_basis.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -18,8 +18,6 @@ namespace {
 
 using classical::TransferFunction;
 using Complex = std::complex<double>;
-
-constexpr double pi = std::numbers::pi;
 
 double degrees(double radians) {
   return radians * 180.0 / pi;

@@ -1,8 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <vector>
 
 #include <flyball/control/pid_design.hpp>
@@ -10,6 +8,7 @@
 #include <flyball/math/search/roots.hpp>
 
 #include "control/pid_basis.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -19,9 +18,6 @@ namespace {
 
 using classical::TransferFunction;
 using Complex = std::complex<double>;
-
-constexpr double pi = std::numbers::pi;
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// Frequencies at which a plant shows all that it does.
 struct Span {

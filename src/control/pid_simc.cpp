@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include <flyball/control/pid_design.hpp>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -15,8 +15,6 @@ namespace {
 
 using classical::TransferFunction;
 using Complex = std::complex<double>;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// K Π(T s + 1)/(s^m Π(τ s + 1)) e^{-θs}: real lags, leads and inverse responses.
 struct Lags {

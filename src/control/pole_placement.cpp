@@ -19,7 +19,7 @@ namespace flyball {
 namespace {
 
 using Complex = std::complex<double>;
-constexpr std::string_view where = "place";
+constexpr std::string_view in_place = "place";
 
 /// Real poles first, then pairs side by side with their conjugates made exact.
 /// @param time  The poles are in units of 2^time; messages are not.
@@ -45,7 +45,7 @@ Expected<Eigen::VectorXcd> paired(const Eigen::VectorXcd& poles, int time) {
     });
     if (partner == lower.end() ||
         std::abs(*partner - std::conj(pole)) > conjugate * std::max(1.0, std::abs(pole))) {
-      return refusal(PolePlacementError::not_conjugate, where, "poles")
+      return refusal(PolePlacementError::not_conjugate, in_place, "poles")
           .hint("add the conjugate of each complex pole")
           .with("pole", given(pole));
     }
@@ -54,7 +54,7 @@ Expected<Eigen::VectorXcd> paired(const Eigen::VectorXcd& poles, int time) {
     sorted.push_back(std::conj(pole));
   }
   if (!lower.empty()) {
-    return refusal(PolePlacementError::not_conjugate, where, "poles")
+    return refusal(PolePlacementError::not_conjugate, in_place, "poles")
         .hint("add the conjugate of each complex pole")
         .with("pole", given(lower.front()));
   }
@@ -79,7 +79,7 @@ struct Scaled {
 };
 
 /// A gain in those units, and where it puts the poles.
-struct Candidate {
+struct PoleCandidate {
   Eigen::MatrixXd K;
   detail::Reached reached;
   bool determined = true;  ///< By the plant's digits.
@@ -132,10 +132,10 @@ bool is_determined(const Part& part, const detail::PlacedLoop& loop, const Eigen
                       other * driven.norm();
 }
 
-std::optional<Candidate> candidate_of(const Scaled& plant, const Part& part,
-                                      const detail::ControllableStaircase& form,
-                                      const Eigen::VectorXcd& wanted,
-                                      const std::optional<detail::PlacedLoop>& loop) {
+std::optional<PoleCandidate> candidate_of(const Scaled& plant, const Part& part,
+                                          const detail::ControllableStaircase& form,
+                                          const Eigen::VectorXcd& wanted,
+                                          const std::optional<detail::PlacedLoop>& loop) {
   if (!loop) {
     return std::nullopt;
   }
@@ -148,7 +148,7 @@ std::optional<Candidate> candidate_of(const Scaled& plant, const Part& part,
   if (form.controllable < plant.A.rows()) {
     K = detail::product_transposed(K, form.Q.leftCols(form.controllable));
     auto reached = detail::reached_by(plant.A, plant.B, K, plant.units, wanted);
-    return Candidate{std::move(K), std::move(reached), determined};
+    return PoleCandidate{std::move(K), std::move(reached), determined};
   }
   const auto reached_with = [&](const Eigen::MatrixXd& gain) {
     return detail::reached_by(plant.A, plant.B, gain, exact->X, exact->inverse, plant.units,
@@ -170,22 +170,22 @@ std::optional<Candidate> candidate_of(const Scaled& plant, const Part& part,
   if (loop->condition > 0.0 && (plant.units.given.array() == 1.0).all()) {
     reached.condition = std::min(reached.condition, loop->condition);
   }
-  return Candidate{std::move(K), std::move(reached), determined};
+  return PoleCandidate{std::move(K), std::move(reached), determined};
 }
 
 /// The gain of the method that serves these poles best.
-std::optional<Candidate> best_candidate(const Scaled& plant, const Part& part,
-                                        const detail::ControllableStaircase& form,
-                                        const Eigen::VectorXcd& wanted) {
+std::optional<PoleCandidate> best_candidate(const Scaled& plant, const Part& part,
+                                            const detail::ControllableStaircase& form,
+                                            const Eigen::VectorXcd& wanted) {
   const Eigen::VectorXcd& poles = part.problem.poles;
   if (poles.size() == 0) {
     Eigen::MatrixXd K = Eigen::MatrixXd::Zero(plant.B.cols(), plant.A.rows());
     auto reached = detail::reached_by(plant.A, plant.B, K, plant.units, wanted);
-    return Candidate{std::move(K), std::move(reached)};
+    return PoleCandidate{std::move(K), std::move(reached)};
   }
   // Eigenvectors this dependent say less than the triangular form keeps.
   constexpr double dependent = 1e6;
-  std::optional<Candidate> chosen;
+  std::optional<PoleCandidate> chosen;
   if (form.rank > 1 && largest_multiplicity(poles) <= form.rank) {
     const auto loop = detail::place_eigenvectors(part.problem);
     chosen = candidate_of(plant, part, form, wanted, loop);
@@ -216,21 +216,21 @@ Expected<PolePlacement<>> place_in_units(const MatrixRef& A, const MatrixRef& B,
                      {units, units.cwiseQuotient(balanced)}};
   const detail::ControllableStaircase form = detail::controllable_staircase(plant.A, plant.B);
   PolePlacement<> placed;
-  FLYBALL_TRY_IN(where, const auto moved,
+  FLYBALL_TRY_IN(in_place, const auto moved,
                  detail::poles_to_move(form, {units, time}, wanted, placed.uncontrollable));
   const Part part = controllable_part(plant, form, moved);
-  const std::optional<Candidate> found = best_candidate(plant, part, form, poles);
+  const std::optional<PoleCandidate> found = best_candidate(plant, part, form, poles);
   // Rounding of the plant would make another gain: because a mode hangs on it alone, or because so
   // many poles are one.
   if (found && !found->determined && !surely_controllable(plant.A, plant.B)) {
     return tl::unexpected(
-        detail::weakest_mode(plant.A, plant.B, {units, time}, wanted).in(std::string(where)));
+        detail::weakest_mode(plant.A, plant.B, {units, time}, wanted).in(std::string(in_place)));
   }
   if (!found || !found->reached.accepted()) {
     const detail::Reached reached = found ? found->reached : detail::Reached{};
     return tl::unexpected(
         Error(PolePlacementError::not_reached)
-            .in(std::string(where))
+            .in(std::string(in_place))
             .about("(A, B)")
             .hint(
                 "it is nearly uncontrollable, or these poles are nearly one: ask for poles nearer "
@@ -287,20 +287,20 @@ Expected<PolePlacement<>> place_near_one(const MatrixRef& A, const MatrixRef& B,
 
 Expected<void> check_arguments(const MatrixRef& A, const MatrixRef& B,
                                const Eigen::VectorXcd& poles) {
-  FLYBALL_CHECK(check_square(A, where, "A"));
+  FLYBALL_CHECK(check_square(A, in_place, "A"));
   const Eigen::Index n = A.rows();
   if (B.cols() == 0) {
-    return refusal(ArgumentError::empty, where, "B")
+    return refusal(ArgumentError::empty, in_place, "B")
         .got("without columns")
         .expected("states x inputs with at least one input");
   }
-  FLYBALL_CHECK(check_shape(B, n, B.cols(), where, "B", "states x inputs"));
+  FLYBALL_CHECK(check_shape(B, n, B.cols(), in_place, "B", "states x inputs"));
   if (poles.size() != n) {
-    return refusal(ArgumentError::wrong_shape, where, "poles")
+    return refusal(ArgumentError::wrong_shape, in_place, "poles")
         .got(detail::format("{} numbers", poles.size()))
         .expected(detail::format("one pole a state ({})", n));
   }
-  return Checks(where)
+  return Checks(in_place)
       .finite(A, "A")
       .finite(B, "B")
       .finite(Eigen::MatrixXd(poles.real()), "poles")
@@ -340,7 +340,7 @@ Expected<PolePlacement<>> place(const MatrixRef& A, const MatrixRef& B,
   }
   if (!held) {
     return tl::unexpected(Error(PolePlacementError::not_reached)
-                              .in(std::string(where))
+                              .in(std::string(in_place))
                               .about("K")
                               .got("beyond the range of doubles")
                               .hint("measure states and inputs in other units"));

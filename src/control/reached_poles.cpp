@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <utility>
 
 #include "control/placement.hpp"
+#include "core/constants.hpp"
 #include "math/extended/extended_eigenvalues.hpp"
 
 namespace flyball::detail {
@@ -16,8 +16,6 @@ using Complex = std::complex<double>;
 double scale_of(Complex pole) {
   return std::max(1.0, std::abs(pole));
 }
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 /// What the errors of poles are relative to: a pole that is nothing beside the plant and the other
 /// poles is judged as zero, by their size.

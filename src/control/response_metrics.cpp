@@ -12,18 +12,20 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "response_metrics";
+constexpr std::string_view in_response_metrics = "response_metrics";
 
 Expected<void> check_samples(std::span<const double> times, std::span<const double> values) {
   if (values.size() != times.size() || times.size() < 2) {
-    return refusal(ArgumentError::wrong_shape, where, "values")
+    return refusal(ArgumentError::wrong_shape, in_response_metrics, "values")
         .got(detail::format("{} for {} times", values.size(), times.size()))
         .expected("as many as times, at least two");
   }
   for (std::size_t k = 0; k < times.size(); ++k) {
-    FLYBALL_CHECK(Checks(where).finite(times[k], "times").finite(values[k], "values"));
+    FLYBALL_CHECK(
+        Checks(in_response_metrics).finite(times[k], "times").finite(values[k], "values"));
     if (k > 0 && !(times[k] > times[k - 1])) {
-      return refusal(ArgumentError::out_of_range, where, detail::format("times[{}]", k))
+      return refusal(ArgumentError::out_of_range, in_response_metrics,
+                     detail::format("times[{}]", k))
           .got(format_number(times[k]))
           .expected("after the one before it, " + format_number(times[k - 1]));
     }
@@ -36,14 +38,15 @@ Expected<void> check_samples(std::span<const double> times, std::span<const doub
 Expected<ResponseMetrics> response_metrics(std::span<const double> times,
                                            std::span<const double> values, double reference,
                                            double tolerance) {
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_response_metrics)
                     .also([&] { return check_samples(times, values); })
                     .finite(reference, "reference")
                     .positive(tolerance, "tolerance"));
   const double start = values.front();
   const double step = reference - start;
   if (step == 0.0 || tolerance >= 1.0) {
-    return refusal(ArgumentError::out_of_range, where, step == 0.0 ? "reference" : "tolerance")
+    return refusal(ArgumentError::out_of_range, in_response_metrics,
+                   step == 0.0 ? "reference" : "tolerance")
         .got(format_number(step == 0.0 ? reference : tolerance))
         .expected(step == 0.0 ? "different from the first value" : "below 1, a share of the step");
   }

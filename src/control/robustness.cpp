@@ -12,14 +12,17 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "robustness_grid";
+constexpr std::string_view in_robustness_grid = "robustness_grid";
 
 Expected<void> check_factors(const std::vector<double>& factors, std::string_view name) {
   if (factors.empty()) {
-    return refusal(ArgumentError::empty, where, name).got("empty").expected("at least one factor");
+    return refusal(ArgumentError::empty, in_robustness_grid, name)
+        .got("empty")
+        .expected("at least one factor");
   }
   for (std::size_t i = 0; i < factors.size(); ++i) {
-    FLYBALL_CHECK(check_positive(factors[i], where, detail::format("{} factor {}", name, i)));
+    FLYBALL_CHECK(
+        check_positive(factors[i], in_robustness_grid, detail::format("{} factor {}", name, i)));
   }
   return {};
 }
@@ -30,7 +33,7 @@ Expected<RobustnessGrid> robustness_grid(const MatrixRef& A, const MatrixRef& B,
                                          const DiscreteSystem<>& model, const MatrixRef& K,
                                          const MatrixRef& K_e, Time delay,
                                          const RobustnessOptions& options) {
-  FLYBALL_TRY_IN(where, [[maybe_unused]] const auto nominal,
+  FLYBALL_TRY_IN(in_robustness_grid, [[maybe_unused]] const auto nominal,
                  observer_regulator_loop(A, B, C, model, K, K_e, delay));
   FLYBALL_CHECK(check_factors(options.inertia, "inertia"));
   FLYBALL_CHECK(check_factors(options.gain, "gain"));
@@ -48,12 +51,13 @@ Expected<RobustnessGrid> robustness_grid(const MatrixRef& A, const MatrixRef& B,
       true_A.bottomRows(1) /= inertia;
       true_B.bottomRows(1) /= inertia;
       const ContinuousSystem<> truth{true_A, true_B, C, Eigen::MatrixXd::Zero(C.rows(), 1)};
-      FLYBALL_TRY_IN(where, const auto loop, running_loop(truth, model, K, K_e, delay));
+      FLYBALL_TRY_IN(in_robustness_grid, const auto loop,
+                     running_loop(truth, model, K, K_e, delay));
       RobustnessCase result{.inertia = inertia, .gain = gain};
       result.spectral_radius = std::abs(loop.poles(0));
       result.stable = result.spectral_radius < 1.0;
       if (result.stable) {
-        FLYBALL_TRY_IN(where, const auto step, step_of(loop, F.leftCols(1)));
+        FLYBALL_TRY_IN(in_robustness_grid, const auto step, step_of(loop, F.leftCols(1)));
         result.overshoot = step.metrics.overshoot;
         result.steady_error = step.final_value - 1.0;
       } else {

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -51,7 +51,6 @@ Expected<SaturationAnalysis> analyze_saturation(const MatrixRef& K, const Eigen:
                                                 const Eigen::VectorXd& u_max,
                                                 const Eigen::VectorXd& u_ff) {
   constexpr std::string_view where = "analyze_saturation";
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   const Eigen::Index m = K.rows();
   const Eigen::Index n = K.cols();
   FLYBALL_CHECK(Checks(where)

@@ -15,7 +15,7 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "steady_state_feedforward";
+constexpr std::string_view in_steady_state_feedforward = "steady_state_feedforward";
 
 /// N_x and N_u for one set of inputs and outputs.
 Expected<SteadyStateFeedforward<>> solve(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C,
@@ -46,7 +46,7 @@ Expected<SteadyStateFeedforward<>> solve(const MatrixRef& A, const MatrixRef& B,
     for (Eigen::Index i = 0; i < n + p; ++i) {
       const double size = std::max(terms(i, j), target(i, j));
       if (!(std::abs(rest(i, j)) <= left_over * size) && size > 0.0) {
-        return refusal(FeedforwardError::no_steady_state, where,
+        return refusal(FeedforwardError::no_steady_state, in_steady_state_feedforward,
                        detail::format("output {}", first_output + j))
             .hint("hold another output, or give the plant an input that can")
             .with("what is left of its equation", rest.col(j).norm());
@@ -75,7 +75,9 @@ ErrorInfo error_info(FeedforwardError code) {
 Expected<SteadyStateFeedforward<>> steady_state_feedforward(const MatrixRef& A, const MatrixRef& B,
                                                             const MatrixRef& C,
                                                             const MatrixRef& D) {
-  return check_system(A, B, C, D, where).and_then([&] { return solve(A, B, C, D, 0); });
+  return check_system(A, B, C, D, in_steady_state_feedforward).and_then([&] {
+    return solve(A, B, C, D, 0);
+  });
 }
 
 Expected<SteadyStateFeedforward<>> steady_state_feedforward_of_pairs(const MatrixRef& A,
@@ -83,12 +85,12 @@ Expected<SteadyStateFeedforward<>> steady_state_feedforward_of_pairs(const Matri
                                                                      const MatrixRef& C,
                                                                      const MatrixRef& D,
                                                                      std::span<const int> inputs) {
-  FLYBALL_CHECK(check_system(A, B, C, D, where));
+  FLYBALL_CHECK(check_system(A, B, C, D, in_steady_state_feedforward));
   const Eigen::Index n = A.rows();
   const Eigen::Index m = B.cols();
   const Eigen::Index p = C.rows();
   if (static_cast<Eigen::Index>(inputs.size()) != p) {
-    return refusal(ArgumentError::wrong_shape, where, "inputs")
+    return refusal(ArgumentError::wrong_shape, in_steady_state_feedforward, "inputs")
         .got(detail::format("{} entries", inputs.size()))
         .expected(detail::format("one an output ({})", p));
   }
@@ -97,7 +99,7 @@ Expected<SteadyStateFeedforward<>> steady_state_feedforward_of_pairs(const Matri
   for (Eigen::Index j = 0; j < p; ++j) {
     const int input = inputs[static_cast<std::size_t>(j)];
     if (input < 0 || input >= m) {
-      return refusal(ArgumentError::out_of_range, where,
+      return refusal(ArgumentError::out_of_range, in_steady_state_feedforward,
                      detail::format("the input of output {}", j))
           .got(detail::format("{}", input))
           .expected(detail::format("from 0 to {}", m - 1));

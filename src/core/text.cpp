@@ -10,7 +10,7 @@ namespace flyball {
 
 namespace {
 
-std::string lower(std::string_view text) {
+std::string lower_case(std::string_view text) {
   std::string out(text);
   for (char& c : out) {
     c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
@@ -152,7 +152,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }
 
 std::string nearest_name(std::string_view wanted, std::span<const std::string_view> names) {
-  const std::string folded = lower(wanted);
+  const std::string folded = lower_case(wanted);
   std::string_view best;
   std::size_t best_distance = std::max<std::size_t>(2, wanted.size() / 3) + 1;
   for (const std::string_view name : names) {
@@ -161,7 +161,7 @@ std::string nearest_name(std::string_view wanted, std::span<const std::string_vi
         best_distance) {
       continue;
     }
-    const std::size_t distance = edit_distance(folded, lower(name));
+    const std::size_t distance = edit_distance(folded, lower_case(name));
     if (distance < best_distance && distance < name.size()) {
       best_distance = distance;
       best = name;

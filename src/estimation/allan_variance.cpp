@@ -19,7 +19,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr std::string_view where = "allan_deviation";
+constexpr std::string_view in_allan_deviation = "allan_deviation";
 constexpr std::size_t least_readings = 18;
 constexpr std::size_t averages = 9;  ///< Of the longest time of averaging, in the record.
 
@@ -45,17 +45,18 @@ std::array<double, terms> terms_at(double tau) {
 
 Expected<std::vector<AllanPoint>> allan_deviation(std::span<const double> readings, double period,
                                                   int per_decade) {
-  FLYBALL_CHECK(
-      Checks(where).positive(period, "period", "s").within(per_decade, 1.0, 1000.0, "per_decade"));
+  FLYBALL_CHECK(Checks(in_allan_deviation)
+                    .positive(period, "period", "s")
+                    .within(per_decade, 1.0, 1000.0, "per_decade"));
   if (readings.size() < least_readings) {
-    return refusal(ArgumentError::out_of_range, where, "readings")
+    return refusal(ArgumentError::out_of_range, in_allan_deviation, "readings")
         .got(detail::format("{} of them", readings.size()))
         .expected(detail::format("{} at least", least_readings));
   }
   // Of y less its mean, which does not count, so that θ stays small.
   double mean = 0.0;
   for (std::size_t k = 0; k < readings.size(); ++k) {
-    FLYBALL_CHECK(check_finite(readings[k], where, detail::format("readings({})", k)));
+    FLYBALL_CHECK(check_finite(readings[k], in_allan_deviation, detail::format("readings({})", k)));
     mean += (readings[k] - mean) / static_cast<double>(k + 1);
   }
   std::vector<double> theta(readings.size() + 1, 0.0);

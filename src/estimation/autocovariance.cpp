@@ -21,7 +21,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::string_view where = "fit_autocovariances";
+constexpr std::string_view in_fit_autocovariances = "fit_autocovariances";
 
 /// The unknown entries of Q and R, each symmetric or diagonal, in coordinates in which the distance
 /// of matrices is that of vectors.
@@ -207,7 +207,7 @@ Expected<AutocovarianceFit> fit_autocovariances(const MatrixRef& A, const Matrix
   const Index n = A.rows();
   const Index p = C.rows();
   const Index g = G.cols();
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_fit_autocovariances)
                     .square(A, "A")
                     .shape(C, p, n, "C", "outputs x states")
                     .shape(G, n, g, "G", "states x noises")
@@ -219,26 +219,27 @@ Expected<AutocovarianceFit> fit_autocovariances(const MatrixRef& A, const Matrix
                     .within(static_cast<double>(count), 1.0, 1e15, "count")
                     .within(options.iterations, 1.0, 1e9, "iterations"));
   if (covariances.empty()) {
-    return refusal(ArgumentError::empty, where, "covariances")
+    return refusal(ArgumentError::empty, in_fit_autocovariances, "covariances")
         .got("empty")
         .expected("Ĉ_0 and later ones");
   }
   for (const MatrixXd& one : covariances) {
-    FLYBALL_CHECK(Checks(where)
+    FLYBALL_CHECK(Checks(in_fit_autocovariances)
                       .shape(one, p, p, "covariances", "outputs x outputs")
                       .finite(one, "covariances"));
   }
   const MatrixXd decays = A - L * C;
   const double radius = spectral_radius(decays);
   if (!(radius < 1.0)) {
-    return refusal(AutocovarianceError::unstable, where, "A - L C")
+    return refusal(AutocovarianceError::unstable, in_fit_autocovariances, "A - L C")
         .got(detail::format("not stable, with an eigenvalue of magnitude {}", radius))
         .expected("stable")
         .hint("take the gain of a Kalman filter");
   }
   const auto scale = detail::cholesky_of(detail::symmetrized(covariances.front()));
   if (!scale) {
-    return refusal(ArgumentError::not_positive, where, "the innovations' covariance")
+    return refusal(ArgumentError::not_positive, in_fit_autocovariances,
+                   "the innovations' covariance")
         .got("not positive definite")
         .expected("positive definite: an output without noise tells nothing of it");
   }
@@ -300,7 +301,7 @@ Expected<AutocovarianceFit> fit_autocovariances(const MatrixRef& A, const Matrix
     const auto& entry = unknowns[which];
     const bool is_process = entry.row < g;
     const Index first = is_process ? 0 : g;
-    return refusal(AutocovarianceError::not_determined, where, "the noise")
+    return refusal(AutocovarianceError::not_determined, in_fit_autocovariances, "the noise")
         .got(detail::format("not determined by {} outputs, above all {}({}, {})", p,
                             is_process ? "Q" : "R", entry.row - first + 1,
                             entry.column - first + 1))
@@ -344,7 +345,8 @@ Expected<AutocovarianceFit> fit_noise_by_autocovariances(const MatrixRef& A, con
   constexpr double same = 1e-3;
   const Index n = A.rows();
   const Index p = C.rows();
-  FLYBALL_CHECK(Checks(where).square(A, "A").shape(G, n, G.cols(), "G", "states x noises"));
+  FLYBALL_CHECK(
+      Checks(in_fit_autocovariances).square(A, "A").shape(G, n, G.cols(), "G", "states x noises"));
   MatrixXd gain = L;
   if (L.size() == 0) {
     FLYBALL_TRY(const auto first, kalman_gain(A, C, MatrixXd(MatrixXd::Identity(n, n)),
@@ -362,7 +364,7 @@ Expected<AutocovarianceFit> fit_noise_by_autocovariances(const MatrixRef& A, con
       if (round > 0) {
         break;  // The last filter forgets too slowly for the record; the one before did not.
       }
-      return refusal(AutocovarianceError::too_few, where, "y")
+      return refusal(AutocovarianceError::too_few, in_fit_autocovariances, "y")
           .got(detail::format("{} samples, of which {} count", all.cols(),
                               std::max<Index>(count, 0)))
           .expected(detail::format("{} or more for {} autocovariances", skipped + 10 * lags, lags));

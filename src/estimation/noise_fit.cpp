@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -17,8 +17,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::string_view where = "fit_noise";
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr std::string_view in_fit_noise = "fit_noise";
 
 /// The search over the logarithms of what is free.
 class Search {
@@ -166,14 +165,15 @@ VectorXd errors_of(const Search& search, const Search::Place& place,
 Expected<NoiseFit> fit_noise(std::span<const NoiseRecord> records, const VectorXd& process,
                              const VectorXd& measurement, const NoiseFitOptions& options) {
   if (options.iterations < 1 || !(options.tolerance > 0.0)) {
-    return refusal(ArgumentError::out_of_range, where, "options")
+    return refusal(ArgumentError::out_of_range, in_fit_noise, "options")
         .got(detail::format("{} iterations, tolerance {}", options.iterations, options.tolerance))
         .expected("one iteration at least and a positive tolerance");
   }
   const Search search(records, process, measurement);
   const Index size = search.size();
   if (size == 0 || search.readings() == 0.0) {
-    return refusal(ArgumentError::empty, where, size == 0 ? "what is looked for" : "the records")
+    return refusal(ArgumentError::empty, in_fit_noise,
+                   size == 0 ? "what is looked for" : "the records")
         .got(size == 0 ? "empty: every deviation is zero" : "without a measurement")
         .hint(size == 0 ? "begin with a positive one" : "");
   }

@@ -18,7 +18,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::string_view where = "noise_likelihood";
+constexpr std::string_view in_noise_likelihood = "noise_likelihood";
 
 Expected<void> check_step(const NoiseStep& step, Index n, Index r, Index p, Index k) {
   const auto named = [&](std::string_view name) {
@@ -29,7 +29,7 @@ Expected<void> check_step(const NoiseStep& step, Index n, Index r, Index p, Inde
   const std::string of_G = named("G");
   const std::string of_input = named("input");
   const Index parts = step.G.empty() ? 0 : r;
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_noise_likelihood)
                     .shape(step.A, n, n, of_A, "states x states")
                     .finite(step.A, of_A)
                     .shape(step.input, step.input.size() == 0 ? 0 : n, 1, of_input, "states x 1")
@@ -38,26 +38,28 @@ Expected<void> check_step(const NoiseStep& step, Index n, Index r, Index p, Inde
                     .finite(step.C, of_C)
                     .shape(step.y, p, 1, named("y"), "outputs x 1"));
   if (static_cast<Index>(step.G.size()) != parts) {
-    return refusal(ArgumentError::wrong_shape, where, of_G)
+    return refusal(ArgumentError::wrong_shape, in_noise_likelihood, of_G)
         .got(detail::format("{} matrices", step.G.size()))
         .expected(detail::format("{}, one for each deviation, or none", r));
   }
   for (const MatrixXd& G : step.G) {
-    FLYBALL_CHECK(Checks(where).shape(G, n, n, of_G, "states x states").finite(G, of_G));
+    FLYBALL_CHECK(
+        Checks(in_noise_likelihood).shape(G, n, n, of_G, "states x states").finite(G, of_G));
   }
   for (Index i = 0; i < p; ++i) {
     if (std::isinf(step.y(i))) {
-      FLYBALL_CHECK(check_finite(step.y(i), where, named("y")));
+      FLYBALL_CHECK(check_finite(step.y(i), in_noise_likelihood, named("y")));
     }
   }
   return {};
 }
 
 Expected<void> check_deviations(const VectorXd& values, std::string_view name) {
-  FLYBALL_CHECK(Checks(where).finite(values, std::string(name)));
+  FLYBALL_CHECK(Checks(in_noise_likelihood).finite(values, std::string(name)));
   for (Index i = 0; i < values.size(); ++i) {
     if (values(i) < 0.0) {
-      return refusal(ArgumentError::out_of_range, where, detail::format("{}({})", name, i))
+      return refusal(ArgumentError::out_of_range, in_noise_likelihood,
+                     detail::format("{}({})", name, i))
           .got(detail::format("{}", values(i)))
           .expected("zero or greater");
     }
@@ -71,9 +73,10 @@ Expected<void> check(std::span<const NoiseRecord> records, const VectorXd& proce
   FLYBALL_CHECK(check_deviations(measurement, "measurement"));
   for (const NoiseRecord& record : records) {
     const Index n = record.x0.size();
-    FLYBALL_CHECK(
-        Checks(where).finite(record.x0, "x0").shape(record.P0, n, n, "P0", "states x states"));
-    FLYBALL_CHECK(check_covariance(record.P0, where, "P0"));
+    FLYBALL_CHECK(Checks(in_noise_likelihood)
+                      .finite(record.x0, "x0")
+                      .shape(record.P0, n, n, "P0", "states x states"));
+    FLYBALL_CHECK(check_covariance(record.P0, in_noise_likelihood, "P0"));
     Index k = 0;
     for (const NoiseStep& step : record.steps) {
       FLYBALL_CHECK(check_step(step, n, process.size(), measurement.size(), ++k));
@@ -213,7 +216,7 @@ Expected<NoiseLikelihood> noise_likelihood(std::span<const NoiseRecord> records,
   for (const NoiseRecord& record : records) {
     Pass pass(record, process, measurement);
     if (!pass.forward(result.log_likelihood)) {
-      return refusal(ArgumentError::not_positive, where,
+      return refusal(ArgumentError::not_positive, in_noise_likelihood,
                      detail::format("the innovation's covariance of step {}", pass.failed()))
           .got("singular, or not finite")
           .hint("a noise of measurement of zero, or deviations of very different sizes");

@@ -21,7 +21,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::string_view where = "smooth";
+constexpr std::string_view in_smooth = "smooth";
 
 /// What the backward pass needs of a step, with the factors of P⁺ of before and of Q.
 struct Backward {
@@ -61,7 +61,7 @@ class FactorOfMatrix {
  public:
   Expected<const MatrixXd*> of(const MatrixXd& M, Index step, std::string_view name) {
     if (M.rows() != matrix_.rows() || M.cols() != matrix_.cols() || M != matrix_ || !known_) {
-      FLYBALL_TRY(factor_, detail::covariance_factor(M, where, entry_of_step(step, name)));
+      FLYBALL_TRY(factor_, detail::covariance_factor(M, in_smooth, entry_of_step(step, name)));
       matrix_ = M;
       known_ = true;
     }
@@ -76,14 +76,15 @@ class FactorOfMatrix {
 
 Expected<void> check_start(const VectorXd& x0, const MatrixRef& P0) {
   if (x0.size() == 0) {
-    return refusal(ArgumentError::empty, where, "x0").got("empty");
+    return refusal(ArgumentError::empty, in_smooth, "x0").got("empty");
   }
-  return Checks(where).finite(x0, "x0").shape(P0, x0.size(), x0.size(), "P0", "states x states");
+  return Checks(in_smooth).finite(x0, "x0").shape(P0, x0.size(), x0.size(), "P0",
+                                                  "states x states");
 }
 
 Expected<void> check_model(const MatrixXd& A, const MatrixXd& Q, Index n, Index k) {
   const std::string of_A = entry_of_step(k, "A");
-  return Checks(where)
+  return Checks(in_smooth)
       .shape(A, n, n, of_A, "states x states")
       .finite(A, of_A)
       .shape(Q, n, n, entry_of_step(k, "Q"), "states x states");
@@ -94,7 +95,7 @@ Expected<void> check_step(const LinearStep& step, Index n, Index k) {
   const Index p = step.y.size();
   const std::string input = entry_of_step(k, "input");
   const std::string of_C = entry_of_step(k, "C");
-  return Checks(where)
+  return Checks(in_smooth)
       .shape(step.input, step.input.size() == 0 ? 0 : n, 1, input, "states x 1")
       .finite(step.input, input)
       .shape(step.C, p, n, of_C, "outputs x states")
@@ -103,7 +104,7 @@ Expected<void> check_step(const LinearStep& step, Index n, Index k) {
       .also([&]() -> Expected<void> {
         for (Index i = 0; i < p; ++i) {
           if (std::isinf(step.y(i))) {
-            return check_finite(step.y(i), where, detail::format("y({}) of step {}", i, k));
+            return check_finite(step.y(i), in_smooth, detail::format("y({}) of step {}", i, k));
           }
         }
         return {};
@@ -111,7 +112,7 @@ Expected<void> check_step(const LinearStep& step, Index n, Index k) {
 }
 
 /// What is needed of a forward step to go back over it.
-struct Passed {
+struct PassedStep {
   MatrixXd S;        ///< Factor of P⁺ before the step.
   MatrixXd S_noise;  ///< Of Q.
   VectorXd x_prior;
@@ -125,10 +126,10 @@ class Forward {
     keep(0);
   }
 
-  Expected<Passed> take(const LinearStep& step, Index k) {
+  Expected<PassedStep> take(const LinearStep& step, Index k) {
     FLYBALL_CHECK(check_step(step, x_.size(), k));
     FLYBALL_TRY(const MatrixXd* S_noise, noise_.of(step.Q, k, "Q"));
-    Passed passed{S_, *S_noise, {}};
+    PassedStep passed{S_, *S_noise, {}};
     // (9.36), (9.37)
     x_ = detail::product(step.A, x_);
     if (step.input.size() > 0) {
@@ -150,7 +151,7 @@ class Forward {
 
  private:
   static Refusal beyond_doubles(Index k) {
-    return refusal(ArgumentError::out_of_range, where, entry_of_step(k, "the estimate"))
+    return refusal(ArgumentError::out_of_range, in_smooth, entry_of_step(k, "the estimate"))
         .got("beyond the largest double");
   }
 
@@ -184,7 +185,7 @@ class Forward {
     result_.nis(k) =
         of.squared_distance(innovation, y.cwiseAbs() + C.cwiseAbs() * x_.cwiseAbs(), contradicted);
     if (contradicted >= 0) {
-      return refusal(GaussianError::contradiction, where,
+      return refusal(GaussianError::contradiction, in_smooth,
                      detail::format("y({}) of step {}",
                                     there[static_cast<std::size_t>(contradicted)], k))
           .got(format_number(y(contradicted)))
@@ -211,7 +212,7 @@ class Forward {
 Expected<LinearSmoothing> smooth_steps(const VectorXd& x0, const MatrixRef& P0, Index N,
                                        FunctionRef<const LinearStep&(Index)> step_at) {
   FLYBALL_CHECK(check_start(x0, P0));
-  FLYBALL_TRY(auto S0, detail::covariance_factor(P0, where, "P0"));
+  FLYBALL_TRY(auto S0, detail::covariance_factor(P0, in_smooth, "P0"));
   const Index n = x0.size();
   const auto count = static_cast<std::size_t>(N);
   LinearSmoothing result;
@@ -220,7 +221,7 @@ Expected<LinearSmoothing> smooth_steps(const VectorXd& x0, const MatrixRef& P0, 
   result.nis.resize(N);
   result.measured.resize(N);
   Forward forward(result, x0, std::move(S0));
-  std::vector<Passed> passed;
+  std::vector<PassedStep> passed;
   passed.reserve(count);
   for (Index k = 0; k < N; ++k) {
     FLYBALL_TRY(auto step, forward.take(step_at(k), k));
@@ -274,7 +275,7 @@ Expected<SmoothedPath> smooth(const VectorXd& x0, const MatrixRef& P0,
     FLYBALL_CHECK(check_model(step.F, step.Q, n, k));
     const std::string prior = entry_of_step(k, "x_prior");
     const std::string posterior = entry_of_step(k, "x");
-    FLYBALL_CHECK(Checks(where)
+    FLYBALL_CHECK(Checks(in_smooth)
                       .shape(step.x_prior, n, 1, prior, "states x 1")
                       .finite(step.x_prior, prior)
                       .shape(step.x, n, 1, posterior, "states x 1")
@@ -289,8 +290,8 @@ Expected<SmoothedPath> smooth(const VectorXd& x0, const MatrixRef& P0,
     return k == 0 ? x0 : steps[static_cast<std::size_t>(k - 1)].x;
   };
   const auto factor = [&](Index k) {
-    return k == 0 ? detail::covariance_factor(P0, where, "P0")
-                  : detail::covariance_factor(steps[static_cast<std::size_t>(k - 1)].P, where,
+    return k == 0 ? detail::covariance_factor(P0, in_smooth, "P0")
+                  : detail::covariance_factor(steps[static_cast<std::size_t>(k - 1)].P, in_smooth,
                                               entry_of_step(k - 1, "P"));
   };
   FLYBALL_TRY(auto S_smoothed, factor(N));
@@ -321,10 +322,10 @@ Expected<LinearSmoothing> smooth(const DiscreteSystem<>& plant, const Covariance
   for (const Covariance* covariance : {&Q, &R, &P0}) {
     FLYBALL_CHECK(covariance->get());
   }
-  FLYBALL_CHECK(check_system(plant, where));
+  FLYBALL_CHECK(check_system(plant, in_smooth));
   const Index n = plant.A.rows();
   const Index p = plant.C.rows();
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_smooth)
                     .shape(x0, n, 1, "x0", "states x 1")
                     .shape(*Q.get(), n, n, "Q", "states x states")
                     .shape(*R.get(), p, p, "R", "outputs x outputs")

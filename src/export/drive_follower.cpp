@@ -13,26 +13,6 @@ namespace flyball::exports {
 
 namespace {
 
-std::string number(double value) {
-  return std::isinf(value) ? "std::numeric_limits<double>::infinity()" : literal(value);
-}
-
-std::string rows(const Eigen::MatrixXd& M) {
-  std::vector<std::string> lines;
-  for (Eigen::Index i = 0; i < M.rows(); ++i) {
-    std::vector<std::string> words;
-    for (Eigen::Index j = 0; j < M.cols(); ++j) {
-      words.push_back(literal(M(i, j)));
-    }
-    lines.push_back(fmt::format("{{{}}}", fmt::join(words, ", ")));
-  }
-  return fmt::format("{{{}}}", fmt::join(lines, ", "));
-}
-
-std::string constant(std::string_view name, double value, std::string_view comment) {
-  return fmt::format("inline constexpr double {} = {};  // {}\n", name, number(value), comment);
-}
-
 /// What all of them begin with.
 std::string beginning(std::string_view law, std::string_view origin, double period,
                       double trackwidth, double voltage_limit, const DriveInversion& inversion) {
@@ -50,13 +30,13 @@ namespace follower {{
 
 )",
       law, comment_text(origin), literal(1e3 * period, constant_digits));
-  text += constant("period", period, "s");
-  text += constant("trackwidth", trackwidth, "m");
-  text += constant("voltage_limit", voltage_limit, "V");
+  text += constant_line("period", period, "s");
+  text += constant_line("trackwidth", trackwidth, "m");
+  text += constant_line("voltage_limit", voltage_limit, "V");
   text += "// The sides' velocities, left and right: v[k+1] = A v[k] + B u[k].\n";
-  text += fmt::format("inline constexpr double A[2][2] = {};\n", rows(inversion.A()));
-  text +=
-      fmt::format("inline constexpr double B_inverse[2][2] = {};\n", rows(inversion.B_inverse()));
+  text += fmt::format("inline constexpr double A[2][2] = {};\n", rows_of(inversion.A()));
+  text += fmt::format("inline constexpr double B_inverse[2][2] = {};\n",
+                      rows_of(inversion.B_inverse()));
   text += fmt::format("inline constexpr double kS[2] = {{{}, {}}};  // V\n",
                       literal(inversion.kS()(0)), literal(inversion.kS()(1)));
   return text;
@@ -170,16 +150,16 @@ inline Error no_farther(const Error& e) noexcept {
 
 /// Constants of what is within limits of speed.
 std::string limits_text(const SpeedLimits& limits) {
-  return constant("max_velocity", limits.velocity, "m/s") +
-         constant("max_angular_velocity", limits.angular_velocity, "rad/s") +
-         constant("max_wheel_velocity", limits.wheel_velocity, "m/s") +
-         constant("limited_trackwidth", limits.trackwidth, "m, of the wheels' limit");
+  return constant_line("max_velocity", limits.velocity, "m/s") +
+         constant_line("max_angular_velocity", limits.angular_velocity, "rad/s") +
+         constant_line("max_wheel_velocity", limits.wheel_velocity, "m/s") +
+         constant_line("limited_trackwidth", limits.trackwidth, "m, of the wheels' limit");
 }
 
 std::string tracker_text(const DriveVelocityTracker& tracker) {
   return "// Of the sides' velocities, V/(m/s).\n" +
          fmt::format("inline constexpr double K_sides[2][2] = {};\n",
-                     rows(Eigen::MatrixXd(tracker.K())));
+                     rows_of(Eigen::MatrixXd(tracker.K())));
 }
 
 constexpr const char* on_arc = R"(
@@ -282,8 +262,8 @@ std::string drive_follower_header(const RamseteFollower& follower,
                 tracker.settings().period.si(), trackwidth, tracker.settings().voltage_limit,
                 tracker.inversion());
   text += tracker_text(tracker);
-  text += constant("b", of.b, "rad²/m²");
-  text += constant("zeta", of.zeta, "1/rad");
+  text += constant_line("b", of.b, "rad²/m²");
+  text += constant_line("zeta", of.zeta, "1/rad");
   text += limits_text(of.limits);
   text += shared;
   text += on_arc;
@@ -315,16 +295,16 @@ std::string drive_follower_header(const LtvUnicycleFollower& follower,
   const double heading = of.angular_velocity_tolerance / of.heading_tolerance;
   const double root = std::sqrt(4.0 + heading * T * (heading * T));
   text += "// K(v) = [k_x, 0, 0; 0, k_y(v), k_heading(v)], the discrete LQR's in closed form.\n";
-  text += constant("follower_period", T, "s");
-  text += constant("k_x", follower.K(0.0)(0, 0), "1/s");
-  text += constant("across", across, "rad/(s m), of the tolerances");
-  text += constant("turn", heading, "1/s, of the tolerances");
-  text += constant("root", root, "√(4 + turn² T²)");
-  text += constant("root_less", heading * T * (heading * T) / (2.0 + root), "less 2");
-  text +=
-      constant("low_velocity", of.low_speed.velocity,
-               fades ? "m/s: below it the cross-track gain fades" : "m/s: below it the gain stays");
-  text += constant("farthest_error", of.farthest_error, "m");
+  text += constant_line("follower_period", T, "s");
+  text += constant_line("k_x", follower.K(0.0)(0, 0), "1/s");
+  text += constant_line("across", across, "rad/(s m), of the tolerances");
+  text += constant_line("turn", heading, "1/s, of the tolerances");
+  text += constant_line("root", root, "√(4 + turn² T²)");
+  text += constant_line("root_less", heading * T * (heading * T) / (2.0 + root), "less 2");
+  text += constant_line(
+      "low_velocity", of.low_speed.velocity,
+      fades ? "m/s: below it the cross-track gain fades" : "m/s: below it the gain stays");
+  text += constant_line("farthest_error", of.farthest_error, "m");
   text += limits_text(of.limits);
   text += shared;
   text += on_arc;
@@ -353,18 +333,18 @@ std::string drive_follower_header(const LtvDriveFollower& follower, std::string_
   std::string text = beginning(
       "The time-varying regulator of a differential drive, its gain scheduled over the velocity.",
       origin, of.period.si(), follower.trackwidth(), of.voltage_limit, follower.inversion());
-  text +=
-      constant("low_velocity", of.low_speed.velocity,
-               fades ? "m/s: below it the cross-track gain fades" : "m/s: below it the gain stays");
-  text += constant("largest_velocity", of.largest_velocity, "m/s: above it the gain stays");
-  text += constant("farthest_error", of.farthest_error, "m");
+  text += constant_line(
+      "low_velocity", of.low_speed.velocity,
+      fades ? "m/s: below it the cross-track gain fades" : "m/s: below it the gain stays");
+  text += constant_line("largest_velocity", of.largest_velocity, "m/s: above it the gain stays");
+  text += constant_line("farthest_error", of.farthest_error, "m");
   text += fmt::format("inline constexpr int intervals = {};\n", LtvDriveFollower::intervals);
   text +=
       "// K of [x, y, heading, left, right] at low + (largest - low) (i/intervals)²; at -v with\n"
       "// the gain of y negated.\n"
       "inline constexpr double K[intervals + 1][2][5] = {\n";
   for (const auto& K : follower.schedule()) {
-    text += fmt::format("    {},\n", rows(K));
+    text += fmt::format("    {},\n", rows_of(K));
   }
   text += "};\n";
   text += shared;

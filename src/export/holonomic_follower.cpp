@@ -10,22 +10,6 @@ namespace flyball::exports {
 
 namespace {
 
-std::string constant(std::string_view name, double value, std::string_view comment) {
-  return fmt::format("inline constexpr double {} = {};  // {}\n", name, literal(value), comment);
-}
-
-std::string rows(const Eigen::MatrixXd& M) {
-  std::vector<std::string> lines;
-  for (Eigen::Index i = 0; i < M.rows(); ++i) {
-    std::vector<std::string> words;
-    for (Eigen::Index j = 0; j < M.cols(); ++j) {
-      words.push_back(literal(M(i, j)));
-    }
-    lines.push_back(fmt::format("{{{}}}", fmt::join(words, ", ")));
-  }
-  return fmt::format("{{{}}}", fmt::join(lines, ", "));
-}
-
 std::string constants_text(const HolonomicProgram& of, std::string_view origin) {
   std::string text = fmt::format(
       R"(// The holonomic follower with the loops of its wheels{}, of a {} drive.
@@ -43,35 +27,36 @@ namespace follower {{
 )",
       of.swerve ? " and modules" : "", of.swerve ? "swerve" : "mecanum", comment_text(origin),
       literal(1e3 * of.period, constant_digits));
-  text += constant("period", of.period, "s");
-  text += constant("k_x", of.gains(0), "1/s");
-  text += constant("k_y", of.gains(1), "1/s");
-  text += constant("k_heading", of.gains(2), "1/s");
-  text += constant("max_velocity", of.max_velocity, "m/s");
-  text += constant("voltage_limit", of.voltage_limit, "V");
+  text += constant_line("period", of.period, "s");
+  text += constant_line("k_x", of.gains(0), "1/s");
+  text += constant_line("k_y", of.gains(1), "1/s");
+  text += constant_line("k_heading", of.gains(2), "1/s");
+  text += constant_line("max_velocity", of.max_velocity, "m/s");
+  text += constant_line("voltage_limit", of.voltage_limit, "V");
   text += "// A wheel's speed: v[k+1] = A v[k] + B u[k].\n";
-  text += constant("A", of.A, "");
-  text += constant("B", of.B, "m/s/V");
-  text += constant("K", of.K, "V/(m/s)");
-  text += constant("kS", of.kS, "V");
+  text += constant_line("A", of.A, "");
+  text += constant_line("B", of.B, "m/s/V");
+  text += constant_line("K", of.K, "V/(m/s)");
+  text += constant_line("kS", of.kS, "V");
   if (!of.swerve) {
     text += "// The wheels' speeds of (vx, vy, omega).\n";
-    text += fmt::format("inline constexpr double M[4][3] = {};\n", rows(of.M));
+    text += fmt::format("inline constexpr double M[4][3] = {};\n", rows_of(of.M));
     return text;
   }
-  text += constant("max_wheel_velocity", of.max_wheel_velocity, "m/s");
+  text += constant_line("max_wheel_velocity", of.max_wheel_velocity, "m/s");
   Eigen::Matrix<double, 4, 2> places;
   for (Eigen::Index i = 0; i < 4; ++i) {
     places.row(i) = of.modules[static_cast<std::size_t>(i)].transpose();
   }
-  text += fmt::format("inline constexpr double modules[4][2] = {};  // m, x and y\n", rows(places));
-  text += constant("steer_K", of.steer(0), "V/rad");
-  text += constant("steer_D", of.steer(1), "V/(rad/s)");
-  text += constant("creep", of.creep, "m/s, below which a module's direction stays");
+  text +=
+      fmt::format("inline constexpr double modules[4][2] = {};  // m, x and y\n", rows_of(places));
+  text += constant_line("steer_K", of.steer(0), "V/rad");
+  text += constant_line("steer_D", of.steer(1), "V/(rad/s)");
+  text += constant_line("creep", of.creep, "m/s, below which a module's direction stays");
   return text;
 }
 
-constexpr const char* shared = R"(
+constexpr const char* holonomic_types = R"(
 // How an answer came about, the gravest reason first.
 enum class Status {
   no_reference,  // The reference is not of finite numbers: 0 V.
@@ -276,7 +261,7 @@ inline Command calculate(const Pose& pose, const Modules& measured, const Pose& 
 }  // namespace
 
 std::string holonomic_follower_header(const HolonomicProgram& program, std::string_view origin) {
-  return constants_text(program, origin) + shared + (program.swerve ? swerve : mecanum);
+  return constants_text(program, origin) + holonomic_types + (program.swerve ? swerve : mecanum);
 }
 
 }  // namespace flyball::exports

@@ -8,10 +8,6 @@ namespace flyball::exports {
 
 namespace {
 
-bool is_word(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
-}
-
 /// "x_hat_" is m_xHat, "r_next" is rNext: as robot code in Java is written.
 std::string java_name(std::string_view name) {
   const bool member = name.size() > 1 && name.back() == '_';
@@ -93,7 +89,7 @@ class Java final : public BracesLanguage {
   }
 };
 
-std::string declarations(const LoopProgram& program) {
+std::string java_declarations(const LoopProgram& program) {
   std::string text;
   for (const LoopConstant& constant : program.constants) {
     std::string value;
@@ -139,7 +135,7 @@ std::string members(const LoopProgram& program) {
          "  private boolean m_measured = false;\n\n";
 }
 
-std::string helpers(const LoopProgram& program) {
+std::string java_helpers(const LoopProgram& program) {
   std::string usable;
   for (Eigen::Index i = 0; i < program.states; ++i) {
     usable += fmt::format("{}usable(x[{}])", i == 0 ? "" : " && ", i);
@@ -194,7 +190,7 @@ std::string java_loop(const LoopProgram& program, const std::string& name) {
       "  public static final int states = {};\n\n",
       program.on_the_way > 0 ? "import java.util.Arrays;\n\n" : "",
       fmt::join(program.state_names, " and "), name, program.states);
-  text += declarations(program) + "\n" + members(program);
+  text += java_declarations(program) + "\n" + members(program);
   text += fmt::format(
       "  /**\n"
       "   * Starts at a known state. Call it with the first measurement before the first update, "
@@ -244,7 +240,7 @@ std::string java_loop(const LoopProgram& program, const std::string& name) {
       "   * @param state from 0 to states - 1\n   * @return its value\n   */\n"
       "  public double xHat(int state) {{\n    return m_xHat[state];\n  }}\n",
       program.compensates ? " with the battery's sag compensated" : "");
-  return text + helpers(program) + "}\n";
+  return text + java_helpers(program) + "}\n";
 }
 
 }  // namespace flyball::exports

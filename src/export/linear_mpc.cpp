@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "core/constants.hpp"
 #include "export/mpc_texts.hpp"
 #include "export/text.hpp"
 
@@ -13,14 +14,14 @@ namespace flyball::exports {
 
 namespace {
 
-std::string number(double value) {
+std::string bound(double value) {
   return std::isinf(value) ? (value > 0.0 ? "infinity" : "-infinity") : literal(value);
 }
 
 std::string list(const Eigen::VectorXd& v) {
   std::string text;
   for (const double value : v) {
-    text += (text.empty() ? "" : ", ") + number(value);
+    text += (text.empty() ? "" : ", ") + bound(value);
   }
   return "{" + text + "}";
 }
@@ -356,7 +357,6 @@ std::string linear_mpc_header(const flyball::detail::MpcCore& mpc, std::string_v
   const MpcSettings& of = mpc.settings();
   const Eigen::Index n = mpc.states();
   const Eigen::Index m = mpc.inputs();
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   std::string text = fmt::format(
       R"(// A linear model predictive controller over {} periods: {} states, {} inputs.
 // Made by Flyball from {}.

@@ -15,7 +15,7 @@ namespace flyball::exports {
 
 namespace {
 
-constexpr std::string_view where = "motion_table";
+constexpr std::string_view in_motion_table = "motion_table";
 
 bool is_identifier(std::string_view name) {
   return !name.empty() && !(name.front() >= '0' && name.front() <= '9') &&
@@ -30,13 +30,13 @@ bool is_identifier(std::string_view name) {
 Expected<std::string> motion_table(const TimeSeries& table, const std::string& name,
                                    const std::string& about, std::span<const MotionRate> rates) {
   if (table.rows() < 2 || table.columns().empty()) {
-    return refusal(ArgumentError::empty, where, "the table")
+    return refusal(ArgumentError::empty, in_motion_table, "the table")
         .got(fmt::format("of {} rows and {} columns", table.rows(), table.columns().size()))
         .expected("two rows and a column or more");
   }
   const auto check_name = [](const std::string& of) -> Expected<void> {
     if (!is_identifier(of)) {
-      return refusal(ArgumentError::malformed, where, "a name")
+      return refusal(ArgumentError::malformed, in_motion_table, "a name")
           .got(fmt::format("\"{}\"", cut(printable(of), 40)))
           .expected("an identifier of C++");
     }
@@ -53,7 +53,7 @@ Expected<std::string> motion_table(const TimeSeries& table, const std::string& n
   for (const MotionRate& rate : rates) {
     for (const std::string_view of : {rate.value, rate.rate}) {
       if (!is_column(of)) {
-        return refusal(ArgumentError::unknown_name, where, "a rate's column")
+        return refusal(ArgumentError::unknown_name, in_motion_table, "a rate's column")
             .got(fmt::format("\"{}\"", cut(printable(of), 40)))
             .expected("one of the table");
       }
@@ -73,7 +73,7 @@ Expected<std::string> motion_table(const TimeSeries& table, const std::string& n
     }
     for (const double value : column.values) {
       if (!std::isfinite(value)) {
-        return refusal(ArgumentError::not_finite, where, column.name)
+        return refusal(ArgumentError::not_finite, in_motion_table, column.name)
             .got(fmt::format("{}", value))
             .expected("finite");
       }

@@ -8,10 +8,6 @@ namespace flyball::exports {
 
 namespace {
 
-bool is_word(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
-}
-
 /// Members with their object: "x_hat_" is self._x_hat.
 std::string python(std::string_view expression) {
   std::string text;
@@ -89,7 +85,7 @@ std::string tuple(const Eigen::MatrixXd& row) {
   return fmt::format("({}{})", literals(row), row.size() == 1 ? "," : "");
 }
 
-std::string declarations(const LoopProgram& program) {
+std::string python_declarations(const LoopProgram& program) {
   std::string text =
       fmt::format("states = {}  # {}\n", program.states, fmt::join(program.state_names, " and "));
   for (const LoopConstant& constant : program.constants) {
@@ -113,7 +109,7 @@ std::string declarations(const LoopProgram& program) {
   return text;
 }
 
-std::string helpers(const LoopProgram& program) {
+std::string python_helpers(const LoopProgram& program) {
   std::string text =
       "\n\ndef _limited(value, limit):\n"
       "    return -limit if value < -limit else limit if value > limit else value\n"
@@ -154,7 +150,7 @@ std::string python_loop(const LoopProgram& program, const std::string& name) {
     text += line.empty() ? "#\n" : "# " + line + "\n";
   }
   text += "# Python 3.8, no dependency but the standard library.\nimport math\n\n";
-  text += declarations(program) + helpers(program);
+  text += python_declarations(program) + python_helpers(program);
   text += fmt::format(
       "\n\nclass {}:\n"
       "    \"\"\"The loop of one mechanism.\"\"\"\n\n"

@@ -21,14 +21,6 @@ std::string list(const Vector& values) {
   return fmt::format("{{{}}}", fmt::join(words, ", "));
 }
 
-std::string rows(const Eigen::MatrixXd& M) {
-  std::vector<std::string> words;
-  for (Eigen::Index i = 0; i < M.rows(); ++i) {
-    words.push_back(list(Eigen::VectorXd(M.row(i))));
-  }
-  return fmt::format("{{{}}}", fmt::join(words, ", "));
-}
-
 }  // namespace
 
 Expected<std::string> swing_up_header(const SwingUpProgram& program) {
@@ -134,7 +126,7 @@ class Controller {{
       fmt::arg("origin", comment_text(program.origin)), fmt::arg("names", names), fmt::arg("n", n),
       fmt::arg("point", list(program.x)), fmt::arg("angles", fmt::join(angles, ", ")),
       fmt::arg("u", literal(program.u)), fmt::arg("limit", literal(program.limit)),
-      fmt::arg("K", list(program.K)), fmt::arg("P", rows(program.P)),
+      fmt::arg("K", list(program.K)), fmt::arg("P", rows_of(program.P)),
       fmt::arg("level", literal(program.level)), fmt::arg("leave", literal(program.leave)),
       fmt::arg("energy", literal(program.energy)), fmt::arg("scale", literal(program.scale)),
       fmt::arg("sharpness", literal(program.sharpness)), fmt::arg("hold", list(program.hold)),

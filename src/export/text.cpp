@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -12,6 +13,28 @@ std::string literal(double value, int digits) {
     text += ".0";
   }
   return text;
+}
+
+std::string rows_of(const Eigen::MatrixXd& M) {
+  std::vector<std::string> lines;
+  for (Eigen::Index i = 0; i < M.rows(); ++i) {
+    std::vector<std::string> words;
+    for (Eigen::Index j = 0; j < M.cols(); ++j) {
+      words.push_back(literal(M(i, j)));
+    }
+    lines.push_back(fmt::format("{{{}}}", fmt::join(words, ", ")));
+  }
+  return fmt::format("{{{}}}", fmt::join(lines, ", "));
+}
+
+std::string constant_line(std::string_view name, double value, std::string_view comment) {
+  return fmt::format("inline constexpr double {} = {};  // {}\n", name,
+                     std::isinf(value) ? "std::numeric_limits<double>::infinity()" : literal(value),
+                     comment);
+}
+
+bool is_word(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
 }
 
 std::string capitalized(mechanisms::MechanismKind kind) {

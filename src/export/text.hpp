@@ -4,6 +4,8 @@
 #include <string_view>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include <flyball/export/language.hpp>
 #include <flyball/mechanisms/mechanism_kind.hpp>
 
@@ -13,6 +15,16 @@ namespace flyball::exports {
 /// A number as source code: its digits, with a decimal point or an exponent ("12.0", never "12").
 /// @param digits  Significant ones; 0 for as many as it takes to read back the same double.
 [[nodiscard]] std::string literal(double value, int digits = 0);
+
+/// A C++ initializer, "{{1.0, 0.5}, {0.0, 2.0}}".
+[[nodiscard]] std::string rows_of(const Eigen::MatrixXd& M);
+
+/// "inline constexpr double NAME = VALUE;  // comment", a line of C++.
+[[nodiscard]] std::string constant_line(std::string_view name, double value,
+                                        std::string_view comment);
+
+/// Whether c may be in a name: of letters, digits and '_'.
+[[nodiscard]] bool is_word(char c);
 
 /// "Elevator", "SwerveSteer".
 [[nodiscard]] std::string capitalized(mechanisms::MechanismKind kind);

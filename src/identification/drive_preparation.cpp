@@ -17,7 +17,7 @@ namespace flyball::identification {
 
 namespace {
 
-constexpr std::string_view where = "identify";
+constexpr std::string_view in_drive_preparation = "identify";
 constexpr double against = -0.3;  ///< Correlation below which two signals have opposite signs.
 
 struct NamedSide {
@@ -38,7 +38,7 @@ Expected<void> check_columns(const DriveRun& run, std::size_t index) {
                        fits(run.heading) && fits(run.heading_rate);
     const bool moves = rows == 0 || !side.position.empty() || !side.velocity.empty();
     if (!sized || !moves) {
-      return refusal(ArgumentError::wrong_shape, where,
+      return refusal(ArgumentError::wrong_shape, in_drive_preparation,
                      detail::format("run {} ({}), {} side", index, to_string(run.kind), of.name))
           .got(detail::format("{} times, {} voltages, {} positions, {} velocities, {} headings",
                               rows, side.voltage.size(), side.position.size(), side.velocity.size(),
@@ -49,7 +49,7 @@ Expected<void> check_columns(const DriveRun& run, std::size_t index) {
   return {};
 }
 
-void negate(std::vector<double>& values) {
+void negate_drive(std::vector<double>& values) {
   for (double& value : values) {
     value = -value;
   }
@@ -128,7 +128,7 @@ Expected<void> check_motion(const DriveRecording& recording) {
     if (speeds[i] < std::max(standstill, 0.01 * fastest)) {
       const bool both = fastest < standstill;
       return refusal(
-                 IdentificationError::no_motion, where,
+                 IdentificationError::no_motion, in_drive_preparation,
                  both ? std::string("neither side") : detail::format("the {} side", sides[i].name))
           .got(both ? detail::format("moving under up to {:.3g} V", volts)
                     : detail::format("at rest while the other one reaches {:.3g} {}/s", fastest,
@@ -154,7 +154,7 @@ void mend_velocities(DriveRecording& recording, std::vector<Diagnostic>& diagnos
     }
     if (products.correlation() < against) {
       for (DriveRun& run : recording.runs) {
-        negate((run.*of.side).velocity);
+        negate_drive((run.*of.side).velocity);
       }
       warn(diagnostics, "sign_mismatch",
            "the {} side's position and velocity have opposite signs; the velocity was negated",
@@ -186,7 +186,7 @@ void sign_voltages(DriveRecording& recording, std::vector<Diagnostic>& diagnosti
       continue;
     }
     for (const std::size_t i : backward) {
-      negate((recording.runs[i].*of.side).voltage);
+      negate_drive((recording.runs[i].*of.side).voltage);
     }
     warn(diagnostics, "sign_mismatch",
          "the {} side's voltage carries no sign: it is positive in all tests, but the side runs "
@@ -240,8 +240,8 @@ void mend_sides(DriveRecording& recording, std::vector<Diagnostic>& diagnostics)
   for (std::size_t i = 0; i < sides.size(); ++i) {
     if (reversed[i]) {
       for (DriveRun& run : recording.runs) {
-        negate((run.*sides[i].side).position);
-        negate((run.*sides[i].side).velocity);
+        negate_drive((run.*sides[i].side).position);
+        negate_drive((run.*sides[i].side).velocity);
       }
       warn(diagnostics, "inverted_encoder",
            "the {} side's encoder counts against its voltage (correlation {:.2f}): it is inverted. "
@@ -350,7 +350,8 @@ Expected<void> mend_drive(DriveRecording& recording, std::vector<Diagnostic>& di
     rows += recording.runs[i].time.size();
   }
   if (rows < 2) {
-    return refusal(IdentificationError::no_data, where).hint("record the four tests again");
+    return refusal(IdentificationError::no_data, in_drive_preparation)
+        .hint("record the four tests again");
   }
   FLYBALL_CHECK(check_motion(recording));
   mend_velocities(recording, diagnostics);

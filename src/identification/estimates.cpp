@@ -14,7 +14,7 @@ namespace {
 
 using mechanisms::MechanismKind;
 
-constexpr double normal_95 = 1.96;
+constexpr double two_sided_95 = 1.96;
 constexpr double longest_usual = 0.5;         // s, kA/kV that a ramp's friction allows for
 constexpr double widest_time_constant = 0.6;  // relative half-width beyond which kA is unknown
 
@@ -65,7 +65,7 @@ GainEstimate inertia_gain(const PreparedRecording& prepared, const Eigen::Vector
   GainEstimate kA;
   kA.value = tau * kV;
   kA.standard_error = relative * kA.value;
-  const double reach = std::min(normal_95 * relative, 20.0);
+  const double reach = std::min(two_sided_95 * relative, 20.0);
   kA.interval = {kA.value * std::exp(-reach), kA.value * std::exp(reach)};
 
   const double refresh = std::max(
@@ -82,12 +82,12 @@ GainEstimate inertia_gain(const PreparedRecording& prepared, const Eigen::Vector
         detail::format("the time constant kA/kV = {:.1f} ms is shorter than the {:.0f} "
                        "ms between sensor values",
                        1e3 * tau, 1e3 * refresh));
-  } else if (normal_95 * relative > widest_time_constant) {
+  } else if (two_sided_95 * relative > widest_time_constant) {
     mark_undetermined(
         kA, kA.interval[1],
         detail::format("its 95 % interval is ±{:.0f} %: it trades against the sensors' "
                        "delay and averaging",
-                       100.0 * normal_95 * relative));
+                       100.0 * two_sided_95 * relative));
   }
   return kA;
 }
@@ -152,7 +152,8 @@ GainEstimate symmetric_estimate(double value, double standard_error) {
   GainEstimate estimate;
   estimate.value = value;
   estimate.standard_error = standard_error;
-  estimate.interval = {value - normal_95 * standard_error, value + normal_95 * standard_error};
+  estimate.interval = {value - two_sided_95 * standard_error,
+                       value + two_sided_95 * standard_error};
   return estimate;
 }
 
@@ -186,10 +187,10 @@ Expected<void> estimate_gains(const PreparedRecording& prepared, const Eigen::Ve
         .expected("positive")
         .hint("check the signs and units of voltage and velocity");
   }
-  if (normal_95 * fit.kV.standard_error > 0.5 * fit.kV.value) {
+  if (two_sided_95 * fit.kV.standard_error > 0.5 * fit.kV.value) {
     return refusal(IdentificationError::singular, "identify", "kV")
         .got(detail::format("{:.4g} ± {:.2g} V/({}/s)", fit.kV.value,
-                            normal_95 * fit.kV.standard_error, fit.unit))
+                            two_sided_95 * fit.kV.standard_error, fit.unit))
         .expected("known to better than 50 %")
         .hint("record longer tests with more travel");
   }
@@ -217,7 +218,7 @@ void estimate_what_tests_leave(const TestCoverage& coverage, const OutputErrorPr
     const std::string reason = detail::format(
         "tests {} alone tell kG {} kS = {:.3g} ± {:.2g} V, not the two apart; {} would",
         coverage.forward ? "forward" : "in reverse", coverage.forward ? "+" : "−", both.value,
-        normal_95 * both.standard_error, other);
+        two_sided_95 * both.standard_error, other);
     double most = both.interval[1];
     for (const ResidualRun& run : problem.runs()) {
       for (std::size_t i = 0; direction < 0.0 && i < run.input.voltage.size(); ++i) {
@@ -250,7 +251,7 @@ void estimate_what_tests_leave(const TestCoverage& coverage, const OutputErrorPr
       const double low = -rate * (sign > 0.0 ? longest_usual - tau : tau);
       gain.interval[0] += low;
       gain.interval[1] += low + share;
-      gain.standard_error = (gain.interval[1] - gain.interval[0]) / (2.0 * normal_95);
+      gain.standard_error = (gain.interval[1] - gain.interval[0]) / (2.0 * two_sided_95);
     };
     if (fit.gravity_with_friction) {
       widen(*fit.gravity_with_friction, fit.in_reverse ? -1.0 : 1.0);

@@ -4,6 +4,7 @@
 
 #include <flyball/identification/identification_error.hpp>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "core/wording.hpp"
@@ -16,8 +17,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// What a run's simulation gets wrong, over the standard deviations of the outputs.
 class RunResiduals final : public optimization::ResidualBlock {

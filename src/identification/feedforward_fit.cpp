@@ -30,7 +30,7 @@ namespace {
 
 using mechanisms::MechanismKind;
 
-constexpr std::string_view where = "identify";
+constexpr std::string_view in_identify = "identify";
 
 std::string named(MechanismKind kind) {
   return std::string(has_gravity(kind) ? "an " : "a ") + std::string(to_string(kind));
@@ -111,14 +111,14 @@ Expected<FeedforwardFit> fit_prepared(const PreparedRecording& prepared, const F
                                       bool whole, std::vector<Diagnostic>& diagnostics) {
   FLYBALL_TRY(const TestCoverage coverage, cover_tests(prepared));
   if (*prepared.mechanism == MechanismKind::arm && !prepared.has_position) {
-    return refusal(IdentificationError::singular, where, "the position")
+    return refusal(IdentificationError::singular, in_identify, "the position")
         .got("missing or constant")
         .expected("the arm's angle, which its gravity depends on");
   }
   FLYBALL_TRY(auto gains, regress_gains(prepared));
   OutputErrorProblem problem(prepared, options);
   if (problem.residuals() < 10 * static_cast<std::size_t>(problem.parameters())) {
-    return refusal(IdentificationError::too_short, where)
+    return refusal(IdentificationError::too_short, in_identify)
         .hint("record longer tests")
         .with("usable values", static_cast<double>(problem.residuals()));
   }
@@ -240,7 +240,7 @@ Expected<void> propose_mechanism(PreparedRecording& prepared, const FitOptions& 
         detail::format("{}--mechanism {}{}", between, to_string(kind),
                        drum ? " with the metres a rotation (or radian) in --scale" : "");
   }
-  Error error = refusal(IdentificationError::unknown_mechanism, where)
+  Error error = refusal(IdentificationError::unknown_mechanism, in_identify)
                     .got("data that fit " + kinds + ": " + choice.evidence)
                     .hint("say which, with " + options_text);
   for (const KindEvidence& compared : choice.compared) {

@@ -26,7 +26,7 @@ using Eigen::VectorXd;
 namespace {
 
 using Complex = std::complex<double>;
-constexpr std::string_view where = "fit_frequency_response";
+constexpr std::string_view in_fit_frequency_response = "fit_frequency_response";
 
 /// Σ R_i φ_i + D in real states: for each pole as many as the smaller side of R has.
 ContinuousSystem<> realize(const Poles& poles, const MatrixXd& coefficients, Index outputs,
@@ -77,43 +77,46 @@ ContinuousSystem<> realize(const Poles& poles, const MatrixXd& coefficients, Ind
 
 Expected<void> check(const VectorXd& frequency, const std::vector<MatrixXcd>& response,
                      const FrequencyFitOptions& options) {
-  FLYBALL_CHECK(check_finite(frequency, where, "frequency"));
+  FLYBALL_CHECK(check_finite(frequency, in_fit_frequency_response, "frequency"));
   if (frequency.size() == 0 || static_cast<Index>(response.size()) != frequency.size()) {
-    return refusal(frequency.size() == 0 ? ArgumentError::empty : ArgumentError::wrong_shape, where,
-                   "the response")
+    return refusal(frequency.size() == 0 ? ArgumentError::empty : ArgumentError::wrong_shape,
+                   in_fit_frequency_response, "the response")
         .got(detail::format("of {} frequencies", response.size()))
         .expected(detail::format("of {}, as frequency has", frequency.size()));
   }
   for (Index k = 0; k < frequency.size(); ++k) {
     if (frequency(k) < 0.0 || (k > 0 && frequency(k) <= frequency(k - 1))) {
-      return refusal(ArgumentError::out_of_range, where, detail::format("frequency {}", k))
+      return refusal(ArgumentError::out_of_range, in_fit_frequency_response,
+                     detail::format("frequency {}", k))
           .got(format_number(frequency(k)))
           .expected("not negative and larger than the one before");
     }
     const MatrixXcd& G = response[static_cast<std::size_t>(k)];
     if (G.size() == 0 || G.rows() != response[0].rows() || G.cols() != response[0].cols()) {
-      return refusal(ArgumentError::wrong_shape, where, detail::format("response {}", k))
+      return refusal(ArgumentError::wrong_shape, in_fit_frequency_response,
+                     detail::format("response {}", k))
           .got(detail::format("{}x{}", G.rows(), G.cols()))
           .expected("outputs x inputs, as the others");
     }
     if (G.cwiseAbs().maxCoeff() == std::numeric_limits<double>::infinity()) {
-      return refusal(ArgumentError::not_finite, where, detail::format("response {}", k))
+      return refusal(ArgumentError::not_finite, in_fit_frequency_response,
+                     detail::format("response {}", k))
           .got("infinite")
           .expected("numbers, or NaN for what is not known");
     }
   }
   if (options.weights) {
     const Index entries = response[0].size();
-    FLYBALL_CHECK(check_finite(*options.weights, where, "weights"));
+    FLYBALL_CHECK(check_finite(*options.weights, in_fit_frequency_response, "weights"));
     if (options.weights->rows() != frequency.size() ||
         (options.weights->cols() != 1 && options.weights->cols() != entries)) {
-      return refusal(ArgumentError::wrong_shape, where, "weights")
+      return refusal(ArgumentError::wrong_shape, in_fit_frequency_response, "weights")
           .got(detail::format("{}x{}", options.weights->rows(), options.weights->cols()))
           .expected(
               detail::format("frequencies x 1 or x entries ({}x{})", frequency.size(), entries));
     }
     if (options.weights->minCoeff() < 0.0) {
-      return refusal(ArgumentError::out_of_range, where, "a weight")
+      return refusal(ArgumentError::out_of_range, in_fit_frequency_response, "a weight")
           .got(format_number(options.weights->minCoeff()))
           .expected("not negative");
     }
@@ -122,7 +125,7 @@ Expected<void> check(const VectorXd& frequency, const std::vector<MatrixXcd>& re
        {std::tuple{options.poles, Index{100}, "poles"},
         {Index{options.most_iterations}, Index{10'000}, "most_iterations"}}) {
     if (value < 1 || value > most) {
-      return refusal(ArgumentError::out_of_range, where, name)
+      return refusal(ArgumentError::out_of_range, in_fit_frequency_response, name)
           .got(std::to_string(value))
           .expected(detail::format("from 1 to {}", most));
     }
@@ -165,7 +168,7 @@ Expected<FrequencyFit<ContinuousSystem<>>> fit_axis(const VectorXd& axis,
   const Points points = points_of(axis, response, options, unit);
   const Index K = points.frequency.size();
   if (K < options.poles + 1 || points.frequency.maxCoeff() == 0.0) {
-    return refusal(IdentificationError::too_short, where)
+    return refusal(IdentificationError::too_short, in_fit_frequency_response)
         .hint("give more frequencies, or take fewer poles")
         .with("frequencies", static_cast<double>(K))
         .with("poles", static_cast<double>(options.poles));
@@ -202,12 +205,12 @@ Expected<FrequencyFit<ContinuousSystem<>>> fit_frequency_response(
 Expected<FrequencyFit<DiscreteSystem<>>> fit_frequency_response(
     const VectorXd& frequency, const std::vector<MatrixXcd>& response, Time period,
     const FrequencyFitOptions& options) {
-  FLYBALL_CHECK(check_positive(period.si(), where, "period", "s"));
+  FLYBALL_CHECK(check_positive(period.si(), in_fit_frequency_response, "period", "s"));
   FLYBALL_CHECK(check(frequency, response, options));
   // w = (z - 1)/(z + 1) is j tan(ωT/2) on the circle. At half the sample rate it has no place.
   VectorXd axis = 0.5 * period.si() * frequency;
   if (axis(axis.size() - 1) >= 0.5 * std::numbers::pi * (1.0 + 1e-9)) {
-    return refusal(ArgumentError::out_of_range, where, "frequency")
+    return refusal(ArgumentError::out_of_range, in_fit_frequency_response, "frequency")
         .got(format_number(frequency(frequency.size() - 1)) + " rad/s")
         .expected("below half the sample rate, " + format_number(std::numbers::pi / period.si()) +
                   " rad/s");

@@ -16,7 +16,7 @@ namespace {
 constexpr double largest_sample = 1e60;
 
 /// Of a normal distribution; what is estimated from few samples is not found anyway.
-constexpr double quantile = 1.959963984540054;
+constexpr double normal_975 = 1.959963984540054;
 
 }  // namespace
 
@@ -141,7 +141,7 @@ mechanisms::FeedforwardGains GainEstimator::half_widths() const noexcept {
   const double variance = together * regression_.variance();
   const double few = regression_.samples() > 5.0 + together ? 1.0 : 1e50;
   const auto width = [&](double covariance) {
-    return detail::cut(few * quantile * std::sqrt(std::max(variance * covariance, 0.0)) +
+    return detail::cut(few * normal_975 * std::sqrt(std::max(variance * covariance, 0.0)) +
                        (few > 1.0 ? few : 0.0));
   };
   mechanisms::FeedforwardGains widths{width(P(0, 0)), width(P(1, 1)), width(P(2, 2)), 0.0, 0.0};

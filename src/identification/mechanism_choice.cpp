@@ -18,9 +18,9 @@ namespace {
 
 using mechanisms::MechanismKind;
 
-constexpr double beyond_doubt = 24.0;    // as of a term of the model
-constexpr double least_gravity = 0.1;    // V; less may be friction that differs by direction
-constexpr double hidden_gravity = 0.15;  // V; what can be no larger than that is none
+constexpr double term_beyond_doubt = 24.0;  // as of a term of the model
+constexpr double least_gravity = 0.1;       // V; less may be friction that differs by direction
+constexpr double hidden_gravity = 0.15;     // V; what can be no larger than that is none
 constexpr double turn = 2.0 * std::numbers::pi;
 constexpr double arm_travel = 1.05 * turn;       // rad, of an arm at most
 constexpr double flywheel_travel = 10.0 * turn;  // rad, of a flywheel at least
@@ -220,7 +220,7 @@ Expected<MechanismChoice> choose_mechanism(const PreparedRecording& prepared,
     choice.compared.back().evidence = (all.front()->fit.cost - made->fit.cost) / inflation;
   }
   const auto gravity_of = [](const KindEvidence& found) {
-    return std::isfinite(found.standard_error) && found.evidence >= beyond_doubt &&
+    return std::isfinite(found.standard_error) && found.evidence >= term_beyond_doubt &&
            found.gravity >= least_gravity && found.gravity > 3.0 * found.standard_error;
   };
   const auto none_of = [](const KindEvidence& found) {
@@ -241,12 +241,12 @@ Expected<MechanismChoice> choose_mechanism(const PreparedRecording& prepared,
       choice.evidence = travel + ", and " + (turns ? gravity_text(arm) : no_gravity_text(arm));
       if (!turns) {
         choice.fitting.push_back(MechanismKind::turret);
-      } else if (constant.evidence > arm.evidence + beyond_doubt) {
+      } else if (constant.evidence > arm.evidence + term_beyond_doubt) {
         choice.fitting.push_back(MechanismKind::flywheel);
       }
       return choice;
     }
-    if (gravity_of(arm) && arm.evidence > constant.evidence + beyond_doubt) {
+    if (gravity_of(arm) && arm.evidence > constant.evidence + term_beyond_doubt) {
       choice.fitting = {MechanismKind::arm, MechanismKind::flywheel};
       choice.evidence = travel + ", and " + gravity_text(arm);
       return choice;

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/constants.hpp"
 #include "identification/model_simulation.hpp"
 #include "math/dense/dense.hpp"
 
@@ -12,8 +13,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// A state and its sensitivities S = ∂x/∂q, stepped together: what is computed is differentiated.
 class Stepper {

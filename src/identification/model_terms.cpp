@@ -37,7 +37,7 @@ constexpr std::array take_up_times{0.005, 0.015};
 /// V, of a force: recorded voltages are not much better.
 constexpr double perceptible = 0.05;
 /// Of χ² of one degree of freedom whose sign is known, exceeded once in twenty.
-constexpr double one_sided_95 = 2.7;
+constexpr double evidence_95 = 2.7;
 /// Two terms that differ by less evidence explain the same.
 constexpr double as_good = 0.5;
 
@@ -384,7 +384,7 @@ Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds, Channe
         // No log of a step of one height tells a sagging battery from more inertia: where one log
         // in twenty without it would show as much, with a sag a standard error larger than found.
         const bool sags =
-            judged.term.front() == parameter::sag && judged.chi_squared() > one_sided_95;
+            judged.term.front() == parameter::sag && judged.chi_squared() > evidence_95;
         const double weight =
             sags ? 1.0 + 1.0 / std::sqrt(judged.chi_squared()) : std::sqrt(probability(judged));
         extension.doubts.push_back(doubt(judged, weight));

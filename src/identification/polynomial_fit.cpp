@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include <flyball/identification/identification_error.hpp>
 #include <flyball/identification/polynomial_model.hpp>
 #include <flyball/math/regression/least_squares.hpp>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "identification/polynomials.hpp"
 #include "math/dense/dense.hpp"
@@ -19,8 +19,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// The sum of squares of e over a record, and what Gauss and Newton make of it.
 class PredictionErrors {

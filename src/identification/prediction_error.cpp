@@ -8,6 +8,7 @@
 #include <flyball/identification/identification_error.hpp>
 #include <flyball/math/probability/distributions.hpp>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "identification/experiment.hpp"
@@ -24,8 +25,7 @@ using optimization::Bound;
 using optimization::LeastSquaresError;
 using optimization::LeastSquaresResult;
 
-constexpr std::string_view where = "fit_model";
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr std::string_view in_fit_model = "fit_model";
 
 /// Whether outputs' standard deviations are estimated: not given, and not the only one of a loss
 /// that does not need it.
@@ -139,7 +139,8 @@ class Fitting {
                                    static_cast<Index>(experiment_.output_std.size()));
     const auto found = plan_integration(model, experiment_.runs, initial, options_.hold, tolerance);
     if (!found) {
-      return refusal(LeastSquaresError::no_start, where, "the simulation from the start values")
+      return refusal(LeastSquaresError::no_start, in_fit_model,
+                     "the simulation from the start values")
           .got("not finite")
           .hint(
               "start the parameters elsewhere, bound them to where the model is stable, or keep "
@@ -295,10 +296,10 @@ Expected<PredictionErrorFit> fit_model(const AnyModel& model,
                                        const std::vector<ExperimentRun>& runs,
                                        const std::vector<FreeParameter>& parameters,
                                        const PredictionErrorOptions& options) {
-  FLYBALL_CHECK(check_options(model, options, where));
-  FLYBALL_TRY(Experiment experiment, Experiment::create(model, runs, parameters, where));
+  FLYBALL_CHECK(check_options(model, options, in_fit_model));
+  FLYBALL_TRY(Experiment experiment, Experiment::create(model, runs, parameters, in_fit_model));
   if (experiment.unknowns() == 0) {
-    return refusal(ArgumentError::empty, where, "the list of free parameters")
+    return refusal(ArgumentError::empty, in_fit_model, "the list of free parameters")
         .got("empty")
         .expected("a parameter of the model, or a free initial state");
   }

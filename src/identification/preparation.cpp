@@ -19,7 +19,7 @@
 namespace flyball::identification {
 namespace {
 
-constexpr std::string_view where = "prepare";
+constexpr std::string_view in_prepare = "prepare";
 
 Expected<void> check_columns(const TestRun& run, std::size_t index) {
   const std::size_t rows = run.time.size();
@@ -31,7 +31,7 @@ Expected<void> check_columns(const TestRun& run, std::size_t index) {
   if (sized && moves) {
     return {};
   }
-  return refusal(ArgumentError::wrong_shape, where,
+  return refusal(ArgumentError::wrong_shape, in_prepare,
                  detail::format("run {} ({})", index, to_string(run.kind)))
       .got(detail::format("{} times, {} voltages, {} positions, {} velocities", rows,
                           run.voltage.size(), run.position.size(), run.velocity.size()))

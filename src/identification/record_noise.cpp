@@ -9,7 +9,7 @@
 namespace flyball::identification {
 namespace {
 
-constexpr std::size_t enough = 500;  // residuals of a run, for the sizes of the noise
+constexpr std::size_t enough_rows = 500;  // residuals of a run, for the sizes of the noise
 constexpr int most_sweeps = 6;
 constexpr double shortest_disturbance = 0.3;  // s, of memory
 constexpr double longest_disturbance = 3.0;   // s
@@ -71,10 +71,10 @@ MissedRun misses_of(OutputErrorProblem& problem, std::size_t index, const Eigen:
   std::stable_sort(missed.misses.begin(), missed.misses.end(),
                    [](const Miss& a, const Miss& b) { return a.time < b.time; });
   // Of a long run the middle tells the sizes well enough.
-  if (missed.misses.size() > enough) {
-    const auto before = static_cast<std::ptrdiff_t>((missed.misses.size() - enough) / 2);
+  if (missed.misses.size() > enough_rows) {
+    const auto before = static_cast<std::ptrdiff_t>((missed.misses.size() - enough_rows) / 2);
     missed.misses.erase(missed.misses.begin(), missed.misses.begin() + before);
-    missed.misses.resize(enough, missed.misses.front());
+    missed.misses.resize(enough_rows, missed.misses.front());
     missed.begin = missed.misses.front().time;
     missed.at_rest = false;
   }

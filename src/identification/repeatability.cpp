@@ -14,7 +14,7 @@
 namespace flyball::identification {
 namespace {
 
-constexpr double normal_95 = 1.959963984540054;
+constexpr double z_975 = 1.959963984540054;
 
 struct Gain {
   std::string_view name;
@@ -45,7 +45,7 @@ struct Reading {
 
 /// Half the interval over 1.96: intervals also hold what standard errors of one fit do not.
 double sigma_of(const GainEstimate& gain) {
-  return std::max(gain.standard_error, 0.5 * (gain.interval[1] - gain.interval[0]) / normal_95);
+  return std::max(gain.standard_error, 0.5 * (gain.interval[1] - gain.interval[0]) / z_975);
 }
 
 struct Scatter {

@@ -31,7 +31,7 @@ struct Constants {
 };
 
 /// Places of the first columns.
-enum Column : int { by_friction, by_velocity_gain, by_time_constant };
+enum ResponseColumn : int { by_friction, by_velocity_gain, by_time_constant };
 
 /// The state with its derivatives by the columns (none for a width of 0).
 template <int width>

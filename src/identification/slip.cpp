@@ -17,7 +17,7 @@ constexpr double of_top_speed = 0.3;  // from here on one jump tells that it is 
 constexpr double least_share = 0.03;  // of top speed: smaller jumps spoil nothing
 constexpr std::size_t fewest = 2;     // one jump may be anything
 constexpr std::size_t fewest_small = 4;
-constexpr double alike = 0.25;        // of their median, that small jumps of a slip differ by
+constexpr double alike_jumps = 0.25;  // of their median, that small jumps of a slip differ by
 constexpr double other_speeds = 1.5;  // that they are alike at
 constexpr double look_back = 0.05;    // s, before a jump, where the velocity may show it
 constexpr double look_on = 0.15;      // s, after it: sensors are late and average
@@ -126,7 +126,7 @@ bool slips_alike(const std::vector<Jump>& jumps) {
   }
   const double way = median(ways);
   return std::all_of(ways.begin(), ways.end(),
-                     [way](double one) { return std::abs(one - way) < alike * way; }) &&
+                     [way](double one) { return std::abs(one - way) < alike_jumps * way; }) &&
          fastest > other_speeds * slowest &&
          std::abs(shown) < 0.5 * way * static_cast<double>(jumps.size());
 }

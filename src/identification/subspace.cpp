@@ -25,7 +25,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr std::string_view where = "fit_subspace";
+constexpr std::string_view in_fit_subspace = "fit_subspace";
 
 MatrixXd lower_solve(const MatrixXd& J, const MatrixXd& right) {
   return J.triangularView<Eigen::Lower>().solve(right);
@@ -178,13 +178,13 @@ double misfit(const ScaledSignals& record, const InnovationsModel& model) {
 
 Expected<void> check(const MatrixRef& u, const MatrixRef& y, Time period,
                      const SubspaceOptions& options) {
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_fit_subspace)
                     .finite(u, "u")
                     .shape(y, u.rows(), y.cols(), "y", "samples of u x outputs")
                     .finite(y, "y")
                     .positive(period.si(), "period", "s"));
   if (u.cols() == 0 || y.cols() == 0) {
-    return refusal(ArgumentError::empty, where, u.cols() == 0 ? "u" : "y")
+    return refusal(ArgumentError::empty, in_fit_subspace, u.cols() == 0 ? "u" : "y")
         .expected("samples x signals");
   }
   struct Range {
@@ -199,7 +199,7 @@ Expected<void> check(const MatrixRef& u, const MatrixRef& y, Time period,
         Range{options.most_order, "most_order", 1, options.most_order != 0},
         Range{options.block_rows, "block_rows", 2, options.block_rows != 0}}) {
     if (range.given && (range.value < range.least || range.value > 200)) {
-      return refusal(ArgumentError::out_of_range, where, range.name)
+      return refusal(ArgumentError::out_of_range, in_fit_subspace, range.name)
           .got(std::to_string(range.value))
           .expected(detail::format("from {} to 200", range.least));
     }
@@ -224,7 +224,7 @@ Expected<SubspaceFit> fit_subspace(const MatrixRef& u, const MatrixRef& y, Time 
                                          : std::clamp<Index>(std::max<Index>(15, least + 3), 2,
                                                              std::max<Index>(2, most));
   if (s > most || (options.order && s < least)) {
-    return refusal(IdentificationError::too_short, where)
+    return refusal(IdentificationError::too_short, in_fit_subspace)
         .hint(s > most ? "record more samples, or take a smaller order"
                        : "take more block rows, or a smaller order")
         .with("samples", static_cast<double>(samples))
@@ -236,7 +236,7 @@ Expected<SubspaceFit> fit_subspace(const MatrixRef& u, const MatrixRef& y, Time 
   const Parts parts{m, p, s, data};
   const VectorXd excitation = data.L.topLeftCorner(s * m, s * m).diagonal().cwiseAbs();
   if (excitation.minCoeff() <= 1e-9 * std::sqrt(static_cast<double>(data.columns))) {
-    return refusal(IdentificationError::singular, where)
+    return refusal(IdentificationError::singular, in_fit_subspace)
         .hint("excite every input with more frequencies, or take fewer block rows")
         .with("block rows", static_cast<double>(s));
   }

@@ -12,7 +12,7 @@
 namespace flyball::identification {
 namespace {
 
-constexpr std::string_view where = "identify";
+constexpr std::string_view in_test_coverage = "identify";
 constexpr double apart = 1.2;  // the ratio of two steps' voltages that tell friction from speed
 
 Error no_motion(const PreparedRecording& prepared) {
@@ -28,7 +28,7 @@ Error no_motion(const PreparedRecording& prepared) {
       travel = std::max(travel, *high - *low);
     }
   }
-  return refusal(IdentificationError::no_motion, where)
+  return refusal(IdentificationError::no_motion, in_test_coverage)
       .hint(voltage < 0.1 ? "no voltage was applied either: the log was started but no test ran"
                           : "check that the encoder counts and that the mechanism is free")
       .with("largest voltage (V)", voltage)
@@ -48,7 +48,8 @@ double median_of_window(const PreparedRun& run, const std::vector<double>& value
 
 Expected<TestCoverage> cover_tests(const PreparedRecording& prepared) {
   if (prepared.runs.empty()) {
-    return refusal(IdentificationError::no_data, where).hint("record the four tests again");
+    return refusal(IdentificationError::no_data, in_test_coverage)
+        .hint("record the four tests again");
   }
   TestCoverage coverage;
   double lowest = 0.0;
@@ -77,7 +78,8 @@ Expected<TestCoverage> cover_tests(const PreparedRecording& prepared) {
     return tl::unexpected(no_motion(prepared));
   }
   if (!coverage.ramps && highest < apart * lowest) {
-    return refusal(IdentificationError::missing_tests, where, "quasistatic tests (ramps)")
+    return refusal(IdentificationError::missing_tests, in_test_coverage,
+                   "quasistatic tests (ramps)")
         .got("missing or without usable motion")
         .hint(detail::format(
             "steps of one voltage alone tell that {:.3g} V end in {:.3g} {}/s, friction and speed "

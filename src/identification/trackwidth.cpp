@@ -1,13 +1,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <string>
 #include <utility>
 
 #include <flyball/math/probability/distributions.hpp>
 #include <flyball/math/regression/least_squares.hpp>
 
+#include "core/constants.hpp"
 #include "core/diagnose.hpp"
 #include "core/format.hpp"
 #include "identification/drive_preparation.hpp"
@@ -18,7 +18,6 @@ namespace flyball::identification {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr double least_turn = 0.5;  // rad, of a run that tells something
 constexpr std::size_t most_rows = 2000;
 

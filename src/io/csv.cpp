@@ -95,10 +95,10 @@ bool is_time_name(std::string_view name) {
   return io::time_name(name).is_time;
 }
 
-class Reader {
+class CsvReader {
  public:
   /// @param period  s, between rows that have no time of their own.
-  Reader(CsvTable table, const std::string& source, std::optional<double> period = {})
+  CsvReader(CsvTable table, const std::string& source, std::optional<double> period = {})
       : table_(std::move(table)), source_(source), period_(period) {
     log_.source = source;
     log_.format = "CSV";
@@ -537,20 +537,20 @@ std::string header_cell(const std::string& name, const std::string& unit) {
 Expected<std::optional<io::CsvLayout>> io::csv_layout(std::string_view head,
                                                       const std::string& source) {
   return split_csv(head, source).and_then([&](CsvTable table) {
-    return Reader(std::move(table), source).layout();
+    return CsvReader(std::move(table), source).layout();
   });
 }
 
 Expected<Log> parse_csv(std::string_view text, const std::string& source) {
   return io::split_csv(text, source).and_then([&](CsvTable table) {
-    return Reader(std::move(table), source).read();
+    return CsvReader(std::move(table), source).read();
   });
 }
 
 Expected<Log> parse_csv(std::string_view text, const std::string& source, double period) {
   FLYBALL_CHECK(check_positive(period, "parse_csv", "period", "s"));
   return io::split_csv(text, source).and_then([&](CsvTable table) {
-    return Reader(std::move(table), source, period).read();
+    return CsvReader(std::move(table), source, period).read();
   });
 }
 

@@ -17,9 +17,9 @@ namespace {
 constexpr std::size_t head_bytes = std::size_t{1} << 20;
 constexpr std::size_t longest_line = std::size_t{1} << 22;
 
-class Rows {
+class StreamedRows {
  public:
-  Rows(CsvLayout layout, LogSink& sink) : layout_(std::move(layout)), sink_(sink) {
+  StreamedRows(CsvLayout layout, LogSink& sink) : layout_(std::move(layout)), sink_(sink) {
     for (std::size_t c = 0, id = 0; c < layout_.columns.size(); ++c) {
       if (c != layout_.clock) {
         sink_.channel(id++, layout_.columns[c].name, layout_.columns[c].unit);
@@ -121,7 +121,7 @@ Expected<std::optional<StreamedLog>> stream_csv(ChunkedFile& file, const std::st
     return std::optional<StreamedLog>();
   }
   StreamedLog log{"CSV", {}, 0, layout->diagnostics};
-  Rows rows(*std::move(layout), sink);
+  StreamedRows rows(*std::move(layout), sink);
   for (bool ended = false; !ended;) {
     std::size_t end = file.rest().find('\n');
     while (end == std::string_view::npos && !ended) {

@@ -42,7 +42,7 @@ std::size_t utf8_length(std::string_view text) {
   return length;
 }
 
-void append_utf8(std::string& out, std::uint32_t code) {
+void append_code_point(std::string& out, std::uint32_t code) {
   if (code < 0x80) {
     out += static_cast<char>(code);
   } else if (code < 0x800) {
@@ -156,7 +156,7 @@ std::string from_windows_1252(std::string_view text) {
   result.reserve(text.size());
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);
-    append_utf8(result, byte >= 0x80 && byte < 0xA0 ? high[byte - 0x80U] : byte);
+    append_code_point(result, byte >= 0x80 && byte < 0xA0 ? high[byte - 0x80U] : byte);
   }
   return result;
 }

@@ -9,11 +9,11 @@ namespace flyball::mechanisms {
 
 namespace {
 
-constexpr std::string_view where = "differential_drive";
+constexpr std::string_view in_differential_drive = "differential_drive";
 
 Expected<DifferentialDrive> finite(DifferentialDrive drive) {
-  FLYBALL_CHECK(check_finite(drive.A, where, "A"));
-  FLYBALL_CHECK(check_finite(drive.B, where, "B"));
+  FLYBALL_CHECK(check_finite(drive.A, in_differential_drive, "A"));
+  FLYBALL_CHECK(check_finite(drive.B, in_differential_drive, "B"));
   return drive;
 }
 
@@ -25,7 +25,7 @@ DifferentialDrive measured_velocities() {
 }
 
 Expected<void> check_gains(const DriveGains& gains) {
-  return Checks(where)
+  return Checks(in_differential_drive)
       .positive(gains.kV_linear, "kV_linear", "V s/m")
       .positive(gains.kA_linear, "kA_linear", "V s^2/m")
       .positive(gains.kV_angular, "kV_angular", "V s/m")
@@ -50,13 +50,14 @@ Expected<DifferentialDrive> differential_drive(const DifferentialDriveParameters
   const double r = wheel_radius.si();
   const double r_b = 0.5 * trackwidth.si();
   const double J = moment_of_inertia.si();
-  FLYBALL_CHECK(Checks(where)
-                    .also([&] { return check_drive(motor, G_l, where, "left_gearing"); })
-                    .also([&] { return check_drive(motor, G_r, where, "right_gearing"); })
-                    .positive(m, "mass", "kg")
-                    .positive(r, "wheel_radius", "m")
-                    .positive(trackwidth.si(), "trackwidth", "m")
-                    .positive(J, "moment_of_inertia", "kg m^2"));
+  FLYBALL_CHECK(
+      Checks(in_differential_drive)
+          .also([&] { return check_drive(motor, G_l, in_differential_drive, "left_gearing"); })
+          .also([&] { return check_drive(motor, G_r, in_differential_drive, "right_gearing"); })
+          .positive(m, "mass", "kg")
+          .positive(r, "wheel_radius", "m")
+          .positive(trackwidth.si(), "trackwidth", "m")
+          .positive(J, "moment_of_inertia", "kg m^2"));
   const double R = motor.R;
   const double Kt = motor.Kt;
   const double Kv = motor.Kv;

@@ -7,7 +7,7 @@ namespace flyball::mechanisms {
 
 namespace {
 
-constexpr std::string_view where = "double_jointed_arm";
+constexpr std::string_view in_double_jointed_arm = "double_jointed_arm";
 
 TwoLinkPart part_of(const JointParameters& joint) {
   return {joint.length.si(), joint.mass.si(), joint.center_of_mass.si(),
@@ -17,7 +17,7 @@ TwoLinkPart part_of(const JointParameters& joint) {
 Expected<JointDrive> drive_of(const JointParameters& joint, std::string_view gearing,
                               std::string_view motor) {
   const DcMotor& driven = joint.motor;
-  return Checks(where)
+  return Checks(in_double_jointed_arm)
       .positive(joint.gearing, gearing)
       .positive(driven.R, motor, "Ω")
       .positive(driven.Kt, motor, "N m/A")
@@ -43,7 +43,7 @@ ModelDescription DoubleJointedArm::description() const {
 Expected<DoubleJointedArm> double_jointed_arm(const DoubleJointedArmParameters& parameters) {
   FLYBALL_TRY(const TwoLink links,
               detail::checked_links(part_of(parameters.first), part_of(parameters.second),
-                                    parameters.gravity, where));
+                                    parameters.gravity, in_double_jointed_arm));
   FLYBALL_TRY(const JointDrive first, drive_of(parameters.first, "first.gearing", "first.motor"));
   FLYBALL_TRY(const JointDrive second,
               drive_of(parameters.second, "second.gearing", "second.motor"));

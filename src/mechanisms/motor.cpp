@@ -144,7 +144,8 @@ Expected<DcMotor> motor(std::string_view name, const MotorDatasheet& one, int co
   if (one.free_current >= one.stall_current) {
     return refusal(ArgumentError::out_of_range, where, "free_current")
         .got(to_text(one.free_current))
-        .expected(detail::format("below the stall current ({})", to_text(one.stall_current)));
+        .expected(
+            flyball::detail::format("below the stall current ({})", to_text(one.stall_current)));
   }
   DcMotor result = from_datasheet(name, one, count);
   // Numbers can have quotients that are none: 1e300 V / 1e-300 A.
@@ -181,14 +182,15 @@ Expected<DcMotor> motor(std::string_view name, int count) {
   }
   if (const auto candidates = motors_like(name); candidates.size() > 1) {
     return refusal(ArgumentError::ambiguous_name, {}, "motor")
-        .got(detail::format("\"{}\", which fits several", name))
-        .expected(detail::format("one of {}", detail::comma_separated("{}", candidates)));
+        .got(flyball::detail::format("\"{}\", which fits several", name))
+        .expected(flyball::detail::format("one of {}",
+                                          flyball::detail::comma_separated("{}", candidates)));
   } else if (candidates.size() == 1 && is_words_of(candidates.front(), wanted)) {
     return table_motor(candidates.front(), count);
   } else if (candidates.size() == 1) {
     return refusal(ArgumentError::unknown_name, {}, "motor")
-        .got(detail::format("\"{}\", which is not in the table", name))
-        .hint(detail::format("is it \"{}\"?", candidates.front()));
+        .got(flyball::detail::format("\"{}\", which is not in the table", name))
+        .hint(flyball::detail::format("is it \"{}\"?", candidates.front()));
   }
   std::vector<std::string_view> names;
   names.reserve(table.size());
@@ -197,12 +199,12 @@ Expected<DcMotor> motor(std::string_view name, int count) {
   }
   const std::string nearest = nearest_name(name, names);
   return refusal(ArgumentError::unknown_name, {}, "motor")
-      .got(detail::format("\"{}\", which is not in the table", name))
+      .got(flyball::detail::format("\"{}\", which is not in the table", name))
       .hint(nearest.empty()
-                ? detail::format(
+                ? flyball::detail::format(
                       "known motors are {}; another one can be given by its five datasheet numbers",
-                      detail::comma_separated("{}", names))
-                : detail::format("did you mean \"{}\"?", nearest));
+                      flyball::detail::comma_separated("{}", names))
+                : flyball::detail::format("did you mean \"{}\"?", nearest));
 }
 
 DcMotor cim(int count) {

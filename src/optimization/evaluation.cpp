@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <flyball/core/argument.hpp>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense_reduction.hpp"
@@ -12,8 +12,6 @@
 namespace flyball::optimization {
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 VectorXd or_all(const VectorXd& given, Index n, double otherwise) {
   return given.size() == 0 ? VectorXd(VectorXd::Constant(n, otherwise)) : given;

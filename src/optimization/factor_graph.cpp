@@ -38,11 +38,11 @@ namespace detail {
 
 namespace {
 
-constexpr std::string_view where = "FactorGraph";
+constexpr std::string_view in_factor_graph = "FactorGraph";
 
 Expected<void> check_graph(const GraphFunctions& graph) {
   if (graph.factors.empty()) {
-    return refusal(FactorGraphError::no_factors, where, "the graph")
+    return refusal(FactorGraphError::no_factors, in_factor_graph, "the graph")
         .got(flyball::detail::format("{} variables and no residual", graph.sizes.size()))
         .expected("at least one residual (add_factor)");
   }
@@ -50,7 +50,8 @@ Expected<void> check_graph(const GraphFunctions& graph) {
     for (int i = 0; i < graph.factors[f].count; ++i) {
       const int link = graph.links[graph.factors[f].first_link + static_cast<std::size_t>(i)];
       if (link < 0 || static_cast<std::size_t>(link) >= graph.sizes.size()) {
-        return refusal(ArgumentError::out_of_range, where, flyball::detail::format("factor {}", f))
+        return refusal(ArgumentError::out_of_range, in_factor_graph,
+                       flyball::detail::format("factor {}", f))
             .got("a variable that was not added to this graph")
             .expected("what `add` returned");
       }
@@ -66,7 +67,8 @@ Refusal not_finite(const GraphFunctions& graph, std::size_t factor) {
         "{}{}", i == 0 ? "" : ", ",
         graph.links[graph.factors[factor].first_link + static_cast<std::size_t>(i)]);
   }
-  return refusal(FactorGraphError::no_start, where, flyball::detail::format("factor {}", factor))
+  return refusal(FactorGraphError::no_start, in_factor_graph,
+                 flyball::detail::format("factor {}", factor))
       .got(flyball::detail::format("a residual or a derivative that is not finite, of the "
                                    "variables {}",
                                    of))
@@ -76,7 +78,7 @@ Refusal not_finite(const GraphFunctions& graph, std::size_t factor) {
 
 Refusal not_determined(const NormalEquations& equations, Index entry) {
   const int variable = equations.variable_of(entry);
-  return refusal(FactorGraphError::not_determined, where,
+  return refusal(FactorGraphError::not_determined, in_factor_graph,
                  flyball::detail::format("variable {}", variable))
       .got("a direction in which no residual changes")
       .expected("every direction seen by a residual")
@@ -105,7 +107,7 @@ double graph_cost(const GraphFunctions& graph) {
 }
 
 Expected<FactorGraphResult> solve_graph(GraphFunctions& graph, const FactorGraphOptions& options) {
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_factor_graph)
                     .within(options.max_iterations, 0, 1e9, "max_iterations")
                     .positive(options.tolerance, "tolerance"));
   FLYBALL_CHECK(check_graph(graph));

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include <flyball/core/argument.hpp>
 #include <flyball/core/random.hpp>
 
+#include "core/constants.hpp"
 #include "core/error_rows.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
@@ -17,8 +17,6 @@ namespace flyball::optimization {
 
 namespace {
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr double infinity = std::numeric_limits<double>::infinity();
 /// In the linearised problem, so small that only directions without any effect are held by it.
 constexpr double no_damping = 1e-22;
 /// A change of the cost that is smaller than this share of it is not told from rounding.
@@ -34,9 +32,9 @@ struct Point {
 };
 
 /// The iteration, from a point to the next.
-class Iteration {
+class LevenbergMarquardt {
  public:
-  Iteration(const LeastSquaresProblem& problem, const LeastSquaresOptions& options)
+  LevenbergMarquardt(const LeastSquaresProblem& problem, const LeastSquaresOptions& options)
       : evaluator_(problem),
         options_(options),
         largest_norms_(VectorXd::Zero(evaluator_.parameters())) {}
@@ -75,14 +73,15 @@ class Iteration {
 
  private:
   Refusal no_start(const VectorXd& start) const {
-    const std::string block = evaluator_.problem().blocks.size() == 1
-                                  ? std::string()
-                                  : detail::format(" of block {}", evaluator_.failed_block + 1);
+    const std::string block =
+        evaluator_.problem().blocks.size() == 1
+            ? std::string()
+            : flyball::detail::format(" of block {}", evaluator_.failed_block + 1);
     const bool undefined = evaluator_.failed_residual < 0;
     return refusal(LeastSquaresError::no_start, "solve_least_squares",
-                   undefined ? detail::format("the start{}", block)
-                             : detail::format("residual {}{} at the start",
-                                              evaluator_.failed_residual + 1, block))
+                   undefined ? flyball::detail::format("the start{}", block)
+                             : flyball::detail::format("residual {}{} at the start",
+                                                       evaluator_.failed_residual + 1, block))
         .got(undefined ? "outside of where the residuals are defined"
                        : "not finite, or its derivatives are not")
         .expected("finite, with finite derivatives")
@@ -223,7 +222,7 @@ Expected<LeastSquaresResult> solve_least_squares(const LeastSquaresProblem& prob
   constexpr std::string_view where = "solve_least_squares";
   FLYBALL_CHECK(check_options(options, where));
   FLYBALL_CHECK(check_problem(problem, where));
-  return Iteration(problem, options).run();
+  return LevenbergMarquardt(problem, options).run();
 }
 
 Expected<MultiStartResult> solve_from_several_starts(const LeastSquaresProblem& problem,

@@ -8,14 +8,13 @@
 #include <flyball/math/probability/distributions.hpp>
 #include <flyball/optimization/least_squares_statistics.hpp>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "optimization/evaluation.hpp"
 
 namespace flyball::optimization {
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// The least cost with one parameter at a value, from the point where it last was.
 class Profile {

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <flyball/core/argument.hpp>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -15,11 +15,10 @@ namespace flyball::optimization {
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
 /// A⁻¹ of an upper triangle without zeros on its diagonal.
 MatrixXd inverse_of(const MatrixXd& R) {
-  return R.rows() == 0 ? R : detail::solve_linear(R, MatrixXd::Identity(R.rows(), R.cols()));
+  return R.rows() == 0 ? R
+                       : flyball::detail::solve_linear(R, MatrixXd::Identity(R.rows(), R.cols()));
 }
 
 /// The columns of factors put back in their places, without inverting more than triangles.
@@ -166,8 +165,9 @@ Expected<Covariance> covariance_of(const LeastSquaresProblem& problem,
   made.freedom = static_cast<double>(at.residuals - at.rank);
   if (!options.scale_is_known && !(made.freedom > 0.0)) {
     return refusal(ArgumentError::out_of_range, where, "the number of residuals")
-        .got(detail::format("{}", at.residuals))
-        .expected(detail::format("more than the {} parameters that they determine", at.rank))
+        .got(flyball::detail::format("{}", at.residuals))
+        .expected(
+            flyball::detail::format("more than the {} parameters that they determine", at.rank))
         .hint("take more data, or fix parameters");
   }
   std::vector<char> free;

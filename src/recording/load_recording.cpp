@@ -18,7 +18,7 @@ namespace flyball::recording {
 
 namespace {
 
-constexpr std::string_view where = "recording";
+constexpr std::string_view in_recording = "recording";
 
 }  // namespace
 
@@ -40,7 +40,7 @@ ExpectedAll<LoadedRecording> recording_from_log(const Log& log, const LogSelecti
   for (const auto& [scale, name] :
        {std::pair{selection.scale, "scale"}, {selection.voltage_scale, "voltage_scale"}}) {
     if (!std::isfinite(scale) || scale == 0.0) {
-      return refusal(ArgumentError::out_of_range, where, name)
+      return refusal(ArgumentError::out_of_range, in_recording, name)
           .got(fmt::format("{}", scale))
           .expected("a finite number other than zero");
     }

@@ -13,6 +13,7 @@
 #include <flyball/io/file.hpp>
 #include <flyball/io/motion/pathplanner.hpp>
 
+#include "core/constants.hpp"
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "recording/finish_trajectory.hpp"
@@ -23,8 +24,6 @@ namespace flyball {
 namespace {
 
 using Eigen::Vector2d;
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
 
 std::string at(const std::string& source, const Place& place) {
   return fmt::format("{}:{}:{}", source, place.line, place.column);
@@ -67,7 +66,7 @@ void differentiate_places(RobotTrajectory& trajectory) {
 void differentiate_headings(RobotTrajectory& trajectory) {
   const auto slope = slopes(
       trajectory.samples, [](const MotionSample& s) { return s.pose.angle(); },
-      [](double b, double a) { return std::remainder(b - a, two_pi); });
+      [](double b, double a) { return std::remainder(b - a, full_turn); });
   for (std::size_t i = 0; i < slope.size(); ++i) {
     trajectory.samples[i].omega = slope[i];
   }
@@ -421,7 +420,7 @@ std::vector<double> continuous_headings(const RobotTrajectory& trajectory) {
     const double angle = sample.pose.angle();
     headings.push_back(headings.empty()
                            ? angle
-                           : headings.back() + std::remainder(angle - headings.back(), two_pi));
+                           : headings.back() + std::remainder(angle - headings.back(), full_turn));
   }
   return headings;
 }

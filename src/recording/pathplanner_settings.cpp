@@ -1,7 +1,6 @@
 // PathPlanner's settings.json: a robot, field by field.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -11,6 +10,7 @@
 #include <flyball/io/file.hpp>
 #include <flyball/recording/trajectory_file.hpp>
 
+#include "core/constants.hpp"
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "recording/json_objects.hpp"
@@ -20,8 +20,6 @@ namespace flyball {
 namespace {
 
 using nlohmann::json;
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 /// A number of the file, and what it is in SI.
 struct NumberField {
@@ -36,8 +34,9 @@ constexpr std::array numbers{
     NumberField{"robotLength", &PathPlannerSettings::robot_length, 1.0, true},
     NumberField{"defaultMaxVel", &PathPlannerSettings::max_velocity, 1.0, true},
     NumberField{"defaultMaxAccel", &PathPlannerSettings::max_acceleration, 1.0, true},
-    NumberField{"defaultMaxAngVel", &PathPlannerSettings::max_angular_velocity, degree, true},
-    NumberField{"defaultMaxAngAccel", &PathPlannerSettings::max_angular_acceleration, degree, true},
+    NumberField{"defaultMaxAngVel", &PathPlannerSettings::max_angular_velocity, one_degree, true},
+    NumberField{"defaultMaxAngAccel", &PathPlannerSettings::max_angular_acceleration, one_degree,
+                true},
     NumberField{"defaultNominalVoltage", &PathPlannerSettings::nominal_voltage, 1.0, true},
     NumberField{"robotMass", &PathPlannerSettings::mass, 1.0, true},
     NumberField{"robotMOI", &PathPlannerSettings::moment_of_inertia, 1.0, true},

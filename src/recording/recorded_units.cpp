@@ -1,13 +1,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include <fmt/format.h>
 
 #include <flyball/core/argument.hpp>
 #include <flyball/core/text.hpp>
 
+#include "core/constants.hpp"
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "recording/channel_names.hpp"
@@ -21,8 +21,6 @@ namespace {
 using identification::TestRun;
 using mechanisms::MechanismKind;
 
-constexpr double two_pi = 2.0 * std::numbers::pi;
-constexpr double degree = two_pi / 360.0;
 constexpr double inch = 0.0254;
 constexpr double foot = 12.0 * inch;
 
@@ -37,12 +35,12 @@ struct KnownUnit {
 };
 constexpr std::array<KnownUnit, 8> known_units{
     {{"rotations",
-      two_pi,
+      full_turn,
       false,
       {"rot", "rots", "rotation", "rotations", "rev", "revs", "revolutions", "turns"},
       ""},
      {"rad", 1.0, false, {"rad", "rads", "radian", "radians"}, ""},
-     {"deg", degree, false, {"deg", "degs", "degree", "degrees"}, ""},
+     {"deg", one_degree, false, {"deg", "degs", "degree", "degrees"}, ""},
      {"m", 1.0, true, {"meter", "meters", "metre", "metres"}, "m"},
      {"cm", 0.01, true, {"cm", "centimeters", "centimetres"}, ""},
      {"mm", 0.001, true, {"mm", "millimeters", "millimetres"}, ""},
@@ -113,10 +111,10 @@ struct NamedRatio {
 const std::array<NamedRatio, 8>& named_ratios() {
   static constexpr std::array<NamedRatio, 8> ratios{
       {{60.0, "the seconds in a minute"},
-       {two_pi, "2π, the radians in a rotation"},
+       {full_turn, "2π, the radians in a rotation"},
        {360.0, "the degrees in a rotation"},
-       {360.0 / two_pi, "the degrees in a radian"},
-       {60.0 / two_pi, "rotations a minute in a radian a second"},
+       {360.0 / full_turn, "the degrees in a radian"},
+       {60.0 / full_turn, "rotations a minute in a radian a second"},
        {6.0, "degrees a second in a rotation a minute"},
        {100.0, "the centimetres in a metre"},
        {1000.0, "the milli- in a unit"}}};

@@ -1,11 +1,11 @@
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include <flyball/io/log.hpp>
 
+#include "core/constants.hpp"
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "recording/drivetrain.hpp"
@@ -18,8 +18,6 @@ using identification::TestRun;
 using mechanisms::MechanismKind;
 
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
 
 /// The tests of a mechanism, or of a drivetrain's left side.
 std::vector<TestRun> runs_of(const SysIdJson& sysid) {
@@ -78,7 +76,7 @@ double units_per_row(const SysIdJson& sysid, std::optional<double> ratio,
                      std::optional<MechanismKind> kind, const RecordedUnit& unit,
                      std::vector<Diagnostic>& notes) {
   const double said = sysid.units_per_rotation.value_or(1.0);
-  const double of_rotations = two_pi / unit.factor;
+  const double of_rotations = full_turn / unit.factor;
   if (unit.linear || std::abs(said / of_rotations - 1.0) < 0.01) {
     return said;
   }

@@ -38,7 +38,7 @@ struct Read {
 };
 
 /// "trajectory.json:3:17".
-std::string at(const std::string& source, const Place& place) {
+std::string place_in(const std::string& source, const Place& place) {
   // Samples of waypoints stand in no line.
   return place.line == 0 ? source : fmt::format("{}:{}:{}", source, place.line, place.column);
 }
@@ -201,7 +201,7 @@ Expected<void> check_times(const RobotTrajectory& trajectory) {
   const auto& samples = trajectory.samples;
   for (std::size_t i = 1; i < samples.size(); ++i) {
     if (!(samples[i].time > samples[i - 1].time)) {
-      return refusal(TrajectoryFileError::time_order, at(trajectory.source, samples[i].place),
+      return refusal(TrajectoryFileError::time_order, place_in(trajectory.source, samples[i].place),
                      fmt::format("the time of sample {}", i + 1))
           .got(fmt::format("{} s after {} s", format_number(samples[i].time, 9),
                            format_number(samples[i - 1].time, 9)))
@@ -242,7 +242,7 @@ Expected<void> recording::check_samples(const RobotTrajectory& trajectory) {
           {std::abs(sample.omega), "turning rate", "rad/s"},
           {std::abs(sample.time), "time", "s"}}) {
       if (!(value <= most)) {
-        return refusal(TrajectoryFileError::wrong_sample, at(trajectory.source, sample.place),
+        return refusal(TrajectoryFileError::wrong_sample, place_in(trajectory.source, sample.place),
                        fmt::format("the {} of sample {}", name, i + 1))
             .got(fmt::format("{} {}", format_number(value), unit))
             .expected(fmt::format("at most 1e6 {}", unit))
@@ -311,10 +311,10 @@ Expected<RobotTrajectory> parse_trajectory(std::string_view text, const std::str
   std::size_t repeated = 0;
   for (const json& element : list) {
     const Place place = places.of(index);
-    FLYBALL_TRY(Read read, sample_of(element, at(source, place)));
+    FLYBALL_TRY(Read read, sample_of(element, place_in(source, place)));
     read.sample.place = place;
     if (!all.empty() && read.velocity.has_value() != all.front().velocity.has_value()) {
-      return refusal(TrajectoryFileError::wrong_sample, at(source, place), "velocity")
+      return refusal(TrajectoryFileError::wrong_sample, place_in(source, place), "velocity")
           .got("of another layout than in the first sample")
           .expected("a number in all samples, or an object in all");
     }
@@ -356,7 +356,7 @@ Expected<void> check_reach(const RobotTrajectory& trajectory, const DrivetrainRe
     const MotionSample& sample = trajectory.samples[i];
     const double v = sample.velocity.norm();
     const double fastest = v + half * std::abs(sample.omega);
-    const std::string where = at(trajectory.source, sample.place);
+    const std::string where = place_in(trajectory.source, sample.place);
     const std::string which =
         fmt::format("sample {} (t = {} s)", i + 1, format_number(sample.time, 5));
     const double across = std::abs(sample.velocity(1) * sample.pose.rotation().cos() -

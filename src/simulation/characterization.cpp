@@ -22,14 +22,14 @@ using identification::TestKind;
 using identification::TestRun;
 using mechanisms::MechanismKind;
 
-constexpr std::string_view where = "record_characterization";
+constexpr std::string_view in_record_characterization = "record_characterization";
 constexpr double step = 0.25e-3;        // s, gravity and friction are constant over it
 constexpr double sensor_memory = 0.5;   // s of rest before the first row that sensors may look at
 constexpr double max_duration = 120.0;  // s, of one test
 
 Expected<void> check_options(const CharacterizationOptions& options) {
   const bool travels = !controls_velocity(options.mechanism);
-  return Checks(where)
+  return Checks(in_record_characterization)
       .not_negative(options.kS, "kS", "V")
       .positive(options.kV, "kV")
       .positive(options.kA, "kA")
@@ -63,14 +63,15 @@ Expected<void> check_options(const CharacterizationOptions& options) {
         if (options.defects.headroom > 0.0) {
           return {};
         }
-        return refusal(ArgumentError::not_positive, where, "defects.headroom")
+        return refusal(ArgumentError::not_positive, in_record_characterization, "defects.headroom")
             .got(detail::format("{} V", options.defects.headroom));
       })
       .also([&] {
-        return travels ? check_positive(
-                             options.travel_high - options.travel_low - 2.0 * options.travel_margin,
-                             where, "travel_high - travel_low - 2 travel_margin")
-                       : Expected<void>{};
+        return travels
+                   ? check_positive(
+                         options.travel_high - options.travel_low - 2.0 * options.travel_margin,
+                         in_record_characterization, "travel_high - travel_low - 2 travel_margin")
+                   : Expected<void>{};
       });
 }
 

@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr std::string_view where = "simulate_closed_loop";
+constexpr std::string_view in_simulate_closed_loop = "simulate_closed_loop";
 
 Index size_of(const std::vector<Coordinate>& coordinates) {
   return static_cast<Index>(coordinates.size());
@@ -30,18 +30,19 @@ const std::vector<Coordinate>& referred(const ModelDescription& plant, const Clo
 Expected<void> check_count(std::size_t count, std::size_t most, std::string_view name,
                            std::string_view of) {
   return count <= most ? Expected<void>{}
-                       : refusal(ArgumentError::wrong_shape, where, name)
+                       : refusal(ArgumentError::wrong_shape, in_simulate_closed_loop, name)
                              .got(detail::format("{}", count))
                              .expected(detail::format("at most one for each {}, {}", of, most));
 }
 
 Expected<void> check_actuator(const ActuatorModel& actuator, const Coordinate& input) {
   if (!(actuator.min < actuator.max)) {
-    return refusal(ArgumentError::out_of_range, where, "the lower limit of " + input.name)
+    return refusal(ArgumentError::out_of_range, in_simulate_closed_loop,
+                   "the lower limit of " + input.name)
         .got(format_number(actuator.min))
         .expected("below the upper, which is " + format_number(actuator.max));
   }
-  return Checks(where)
+  return Checks(in_simulate_closed_loop)
       .not_negative(actuator.delay.si(), "the delay of " + input.name, "s")
       .not_negative(actuator.noise, "the noise of " + input.name, input.unit);
 }
@@ -50,17 +51,17 @@ Expected<void> check_loop(const ModelDescription& plant, const ClosedLoop& loop)
   const MatrixXd& r = loop.reference;
   FLYBALL_CHECK(check_count(loop.sensors.size(), plant.outputs.size(), "sensors", "output"));
   FLYBALL_CHECK(check_count(loop.actuators.size(), plant.inputs.size(), "actuators", "input"));
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_simulate_closed_loop)
                     .positive(loop.period.si(), "period", "s")
                     .positive(loop.record_step.si(), "record_step", "s"));
   if (r.cols() == 0) {
-    return refusal(ArgumentError::empty, where, "the reference")
+    return refusal(ArgumentError::empty, in_simulate_closed_loop, "the reference")
         .got("empty")
         .expected("one column a period");
   }
   if (r.rows() > 0) {
     const bool states = loop.reference_of == ReferenceOf::states;
-    FLYBALL_CHECK(Checks(where)
+    FLYBALL_CHECK(Checks(in_simulate_closed_loop)
                       .shape(r, size_of(referred(plant, loop)), r.cols(), "the reference",
                              states ? "states x periods" : "outputs x periods")
                       .finite(r, "the reference"));
@@ -75,7 +76,7 @@ Expected<void> check_command(const LoopCommand& command, const ModelDescription&
                              double time) {
   const auto refuse = [&](ArgumentError code, std::string about, std::string got,
                           std::string expected) {
-    return refusal(code, where, about)
+    return refusal(code, in_simulate_closed_loop, about)
         .got(std::move(got) + detail::format(" at t = {} s", format_number(time)))
         .expected(std::move(expected))
         .with("t", time);
@@ -269,7 +270,7 @@ Expected<ClosedLoopResult> simulate_closed_loop(SimulatedPlant& plant, ControlLa
     const double time = static_cast<double>(k) * T;
     plant.output(actuators.applied(), y);
     FLYBALL_CHECK(detail::check_answer("output", description.outputs, y, plant.state(),
-                                       actuators.applied(), where, time));
+                                       actuators.applied(), in_simulate_closed_loop, time));
     measured = y;
     for (std::size_t i = 0; i < sensors.size(); ++i) {
       measured(static_cast<Index>(i)) = sensors[i].read();

@@ -11,6 +11,7 @@
 #include <flyball/math/integration/butcher_tableau.hpp>
 #include <flyball/math/search/roots.hpp>
 
+#include "core/constants.hpp"
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 
@@ -22,8 +23,7 @@ using mechanisms::GearedLoad;
 using mechanisms::MotorPoint;
 using mechanisms::PowerBound;
 
-constexpr std::string_view where = "fastest_travel";
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr std::string_view in_fastest_travel = "fastest_travel";
 
 /// Position, velocity, °C above ambient, J taken, J returned, J of heat.
 using State = Eigen::Matrix<double, 6, 1>;
@@ -213,20 +213,20 @@ Error never_there(const TravelJob& job, const Phase& phase) {
   const State& y = phase.rows.back().y;
   const std::string unit(unit_of(job));
   if (phase.end == End::too_long) {
-    return refusal(TravelError::too_long, where, "the motion")
+    return refusal(TravelError::too_long, in_fastest_travel, "the motion")
         .got("at " + format_number(job.speed ? y(velocity) : y(position), 4) + " " + unit +
              " after " + format_number(job.longest, 4) + " s")
         .expected("to " + format_number(job.end, 4) + " " + unit)
         .hint("give it longer, more motors, a way that is shorter or a load that is less");
   }
   if (job.speed) {
-    return refusal(TravelError::never_there, where, "the speed")
+    return refusal(TravelError::never_there, in_fastest_travel, "the speed")
         .got("at most " + format_number(y(velocity), 4) + " " + unit + " with this gearing")
         .expected(format_number(job.end, 4) + " " + unit)
         .hint("gear higher (fewer motor turns a turn), or raise the voltage")
         .with("top_speed", y(velocity));
   }
-  return refusal(TravelError::never_there, where, "the motion")
+  return refusal(TravelError::never_there, in_fastest_travel, "the motion")
       .got("at rest at " + format_number(y(position), 4) + " " + unit +
            ", where gravity and friction are stronger than the motors")
       .expected("to " + format_number(job.end, 4) + " " + unit)
@@ -235,9 +235,9 @@ Error never_there(const TravelJob& job, const Phase& phase) {
 }
 
 Expected<void> check(const TravelJob& job) {
-  FLYBALL_CHECK(mechanisms::check_load(job.load, where));
-  FLYBALL_CHECK(mechanisms::check_limits(job.limits, where));
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(mechanisms::check_load(job.load, in_fastest_travel));
+  FLYBALL_CHECK(mechanisms::check_limits(job.limits, in_fastest_travel));
+  FLYBALL_CHECK(Checks(in_fastest_travel)
                     .finite(job.start, "start")
                     .finite(job.end, "end")
                     .positive(job.longest, "the longest time", "s")
@@ -245,19 +245,19 @@ Expected<void> check(const TravelJob& job) {
                     .finite(job.winding.ambient, "the ambient temperature")
                     .not_negative(job.winding.copper, "the copper's coefficient", "1/K"));
   if (!(job.winding.heat_capacity > 0.0) || !(job.winding.thermal_resistance > 0.0)) {
-    return refusal(ArgumentError::not_positive, where, "the winding")
+    return refusal(ArgumentError::not_positive, in_fastest_travel, "the winding")
         .got(format_number(job.winding.heat_capacity) + " J/K and " +
              format_number(job.winding.thermal_resistance) + " K/W")
         .expected("positive");
   }
   if (job.start == job.end) {
-    return refusal(ArgumentError::out_of_range, where, "the end")
+    return refusal(ArgumentError::out_of_range, in_fastest_travel, "the end")
         .got("where it starts, at " + format_number(job.end) + " " + std::string(unit_of(job)))
         .expected("somewhere else");
   }
   if (job.speed &&
       (job.end == 0.0 || job.start * job.end < 0.0 || std::abs(job.end) < std::abs(job.start))) {
-    return refusal(ArgumentError::out_of_range, where, "the speed at the end")
+    return refusal(ArgumentError::out_of_range, in_fastest_travel, "the speed at the end")
         .got(format_number(job.end) + " from " + format_number(job.start))
         .expected("faster than at the start, in the same direction");
   }
@@ -276,7 +276,7 @@ Expected<void> check_holds(const TravelJob& job) {
   if (weight > 0.0 && held >= most) {
     const std::string n =
         load.motor.count == 1 ? "one motor" : std::to_string(load.motor.count) + " motors";
-    return refusal(TravelError::cannot_hold, where, "the load")
+    return refusal(TravelError::cannot_hold, in_fastest_travel, "the load")
         .got("held by " + format_number(held, 4) + " A of " + n + " together")
         .expected("below the " + format_number(most, 4) +
                   " A that the limits allow at a standstill")
@@ -294,7 +294,7 @@ Expected<Found> find(const TravelJob& job, const Motion& motion) {
   const double a = motion.way() * motion.derivative(start.y, 1)(velocity);
   if (!(a > 0.0)) {
     const bool moves = job.speed && job.start != 0.0;
-    return refusal(moves ? TravelError::never_there : TravelError::cannot_start, where,
+    return refusal(moves ? TravelError::never_there : TravelError::cannot_start, in_fastest_travel,
                    "the strongest push")
         .got("not enough to " + std::string(moves ? "gain speed" : "set off"))
         .expected("above friction and gravity at the start")
@@ -326,13 +326,13 @@ Expected<Found> find(const TravelJob& job, const Motion& motion) {
   const auto root =
       find_root(past, 0.0, last, {.absolute_tolerance = 1e-15 * last, .relative_tolerance = 1e-14});
   if (!root) {
-    return tl::unexpected(Error(root.error()).in(std::string(where)));
+    return tl::unexpected(Error(root.error()).in(std::string(in_fastest_travel)));
   }
   const Row at = pushed_until(root->x);
   found.brake = motion.run(at, -1);
   const double off = motion.past_end(found.brake.rows.back().y);
   if (found.brake.end != End::there || !(std::abs(off) < 1e-6 * std::abs(job.end - job.start))) {
-    return refusal(TravelError::cannot_stop, where, "the strongest brake")
+    return refusal(TravelError::cannot_stop, in_fastest_travel, "the strongest brake")
         .got("weaker than gravity within the limits")
         .expected("able to stop it before its end")
         .hint("gear lower, add motors or raise the stator limit");
@@ -395,7 +395,7 @@ Expected<Travel> fastest_travel(const TravelJob& job) {
 }
 
 Expected<TimeSeries> record_travel(const TravelJob& job, int rows) {
-  FLYBALL_CHECK(check_within(rows, 2, 1e6, where, "rows"));
+  FLYBALL_CHECK(check_within(rows, 2, 1e6, in_fastest_travel, "rows"));
   const Motion motion(job);
   FLYBALL_TRY(const Found found, find(job, motion));
   const double switching = found.push.rows.back().t;

@@ -12,40 +12,43 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "simulate_linear";
+constexpr std::string_view in_simulate_linear = "simulate_linear";
 
 Expected<void> check_loop(const LinearLoop& loop, const MatrixRef& r) {
-  FLYBALL_CHECK(check_system(loop.plant, where));
+  FLYBALL_CHECK(check_system(loop.plant, in_simulate_linear));
   const Eigen::Index n = loop.plant.A.rows();
   const Eigen::Index m = loop.plant.B.cols();
   const Eigen::Index p = loop.plant.C.rows();
-  FLYBALL_CHECK(Checks(where)
-                    .shape(loop.K, m, n, "K", "inputs x states")
-                    .also([&] {
-                      return loop.K_e
-                                 ? check_shape(*loop.K_e, n, p, where, "K_e", "states x outputs")
-                                 : Expected<void>{};
-                    })
-                    .also([&] {
-                      return loop.u_min.size() == 0
-                                 ? Expected<void>{}
-                                 : check_shape(loop.u_min, m, 1, where, "u_min", "inputs x 1");
-                    })
-                    .also([&] {
-                      return loop.u_max.size() == 0
-                                 ? Expected<void>{}
-                                 : check_shape(loop.u_max, m, 1, where, "u_max", "inputs x 1");
-                    })
-                    .also([&] {
-                      return loop.x0.size() == 0
-                                 ? Expected<void>{}
-                                 : check_shape(loop.x0, n, 1, where, "x0", "states x 1");
-                    })
-                    .shape(r, n, r.cols(), "r", "states x samples"));
-  return Checks(where)
+  FLYBALL_CHECK(
+      Checks(in_simulate_linear)
+          .shape(loop.K, m, n, "K", "inputs x states")
+          .also([&] {
+            return loop.K_e
+                       ? check_shape(*loop.K_e, n, p, in_simulate_linear, "K_e", "states x outputs")
+                       : Expected<void>{};
+          })
+          .also([&] {
+            return loop.u_min.size() == 0
+                       ? Expected<void>{}
+                       : check_shape(loop.u_min, m, 1, in_simulate_linear, "u_min", "inputs x 1");
+          })
+          .also([&] {
+            return loop.u_max.size() == 0
+                       ? Expected<void>{}
+                       : check_shape(loop.u_max, m, 1, in_simulate_linear, "u_max", "inputs x 1");
+          })
+          .also([&] {
+            return loop.x0.size() == 0
+                       ? Expected<void>{}
+                       : check_shape(loop.x0, n, 1, in_simulate_linear, "x0", "states x 1");
+          })
+          .shape(r, n, r.cols(), "r", "states x samples"));
+  return Checks(in_simulate_linear)
       .finite(loop.K, "K")
       .finite(loop.x0, "x0")
-      .also([&] { return loop.K_e ? check_finite(*loop.K_e, where, "K_e") : Expected<void>{}; })
+      .also([&] {
+        return loop.K_e ? check_finite(*loop.K_e, in_simulate_linear, "K_e") : Expected<void>{};
+      })
       .finite(r, "r");
 }
 

@@ -16,22 +16,22 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr std::string_view where = "simulate_mechanism";
+constexpr std::string_view in_simulate_mechanism = "simulate_mechanism";
 
 Expected<void> check_loop(const MechanismLoop& loop) {
   if (loop.reference.empty()) {
-    return refusal(ArgumentError::empty, where, "the reference")
+    return refusal(ArgumentError::empty, in_simulate_mechanism, "the reference")
         .got("empty")
         .expected("one row a period");
   }
   for (std::size_t k = 0; k < loop.reference.size(); ++k) {
     const std::string row = detail::format("reference {}", k);
-    FLYBALL_CHECK(Checks(where)
+    FLYBALL_CHECK(Checks(in_simulate_mechanism)
                       .finite(loop.reference[k].position, row)
                       .finite(loop.reference[k].velocity, row));
   }
   const MechanismTruth& truth = loop.truth;
-  return Checks(where)
+  return Checks(in_simulate_mechanism)
       .finite(loop.initial.position, "initial position")
       .finite(loop.initial.velocity, "initial velocity")
       .positive(truth.battery.open_circuit_voltage, "open_circuit_voltage", "V")
@@ -40,7 +40,8 @@ Expected<void> check_loop(const MechanismLoop& loop) {
       .also([&] {
         return std::isinf(truth.motor_resistance)
                    ? Expected<void>{}
-                   : check_positive(truth.motor_resistance, where, "motor_resistance", "Ohm");
+                   : check_positive(truth.motor_resistance, in_simulate_mechanism,
+                                    "motor_resistance", "Ohm");
       })
       .not_negative(truth.actuation_delay.si(), "actuation_delay", "s")
       .not_negative(truth.voltage_noise, "voltage_noise", "V");

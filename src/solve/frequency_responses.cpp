@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -17,6 +16,7 @@
 #include <flyball/systems/discretize.hpp>
 #include <flyball/systems/norms.hpp>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -36,8 +36,6 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// A system told as a transfer function or as matrices, continuous or with the period dt.
 struct Told {
@@ -230,7 +228,7 @@ Outcome solve_sampled_margins(const Problem& problem, JsonWriter& answer) {
 }
 
 /// What all loops have.
-void write_margins(const LoopMargins& margins, JsonWriter& answer) {
+void write_loop_margins(const LoopMargins& margins, JsonWriter& answer) {
   answer.add("unstable_poles", count_of_poles(margins.unstable_poles));
   answer.list("gain_margins", margins.phase_crossings, [&](const classical::PhaseCrossing& at) {
     answer.object([&] { answer.add({{"w", at.frequency}, {"gm", at.gain_margin}}); });
@@ -293,7 +291,7 @@ Outcome solve_margins(const Problem& problem, JsonWriter& answer) {
                               }));
     answer.add("stable", margins.stable);
     answer.add("disk_margin", margins.disk_margin);
-    write_margins(margins, answer);
+    write_loop_margins(margins, answer);
     write_peak("sensitivity_peak", margins.sensitivity, answer);
     return {};
   }

@@ -6,6 +6,7 @@
 #include <flyball/core/text.hpp>
 #include <flyball/io/json_writer.hpp>
 
+#include "core/constants.hpp"
 #include "solve/json_value.hpp"
 
 namespace flyball::solve {
@@ -71,7 +72,6 @@ bool read_number(JsonValue value, double& number) {
   }
   if (value.is_string()) {
     const std::string_view text = value.text();
-    constexpr double infinity = std::numeric_limits<double>::infinity();
     if (text == "inf" || text == "-inf") {
       number = text[0] == '-' ? -infinity : infinity;
       return true;

@@ -1,9 +1,9 @@
-#include <limits>
 #include <vector>
 
 #include <flyball/math/regression/bounded_least_squares.hpp>
 #include <flyball/math/regression/least_squares.hpp>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "solve/row.hpp"
 
@@ -68,7 +68,6 @@ Outcome solve_least_squares(const Problem& problem, JsonWriter& answer) {
 }
 
 Outcome solve_bounded(const Problem& problem, JsonWriter& answer) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   const Index p = problem.matrix("X").cols();
   const auto bounds = [&](std::string_view name, double otherwise) {
     return problem.has(name) ? VectorXd(problem.matrix(name)) : VectorXd::Constant(p, otherwise);

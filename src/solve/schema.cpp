@@ -10,24 +10,24 @@ namespace flyball::solve {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-Json reference(std::string_view name) {
+OrderedJson reference(std::string_view name) {
   return {{"$ref", fmt::format("#/$defs/{}", name)}};
 }
 
-Json list_of(Json items) {
+OrderedJson list_of(OrderedJson items) {
   return {{"type", "array"}, {"items", std::move(items)}};
 }
 
-Json object_of(const std::vector<Field>& fields, bool problem);
+OrderedJson object_of(const std::vector<Field>& fields, bool problem);
 
-Json any_of(Json one, Json other) {
-  return {{"anyOf", Json::array({std::move(one), std::move(other)})}};
+OrderedJson any_of(OrderedJson one, OrderedJson other) {
+  return {{"anyOf", OrderedJson::array({std::move(one), std::move(other)})}};
 }
 
 /// @param problem  Whether short forms that problems may use are allowed.
-Json type_of(const Field& field, bool problem) {
+OrderedJson type_of(const Field& field, bool problem) {
   switch (field.type) {
     case FieldType::number:
       return reference("number");
@@ -54,14 +54,14 @@ Json type_of(const Field& field, bool problem) {
       return list_of(reference("matrix"));
     case FieldType::record:
     case FieldType::records: {
-      Json properties = Json::object();
+      OrderedJson properties = OrderedJson::object();
       for (const std::string_view name : text::split(field.choices, " ")) {
         properties[std::string(name)] = reference("number");
       }
-      Json record = {{"type", "object"},
-                     {"properties", std::move(properties)},
-                     {"required", text::split(field.choices, " ")},
-                     {"additionalProperties", false}};
+      OrderedJson record = {{"type", "object"},
+                            {"properties", std::move(properties)},
+                            {"required", text::split(field.choices, " ")},
+                            {"additionalProperties", false}};
       return field.type == FieldType::record ? record : list_of(std::move(record));
     }
     case FieldType::system:
@@ -76,18 +76,18 @@ Json type_of(const Field& field, bool problem) {
   return {};
 }
 
-std::string description_of(const Field& field) {
+std::string schema_description(const Field& field) {
   const std::string shape = shape_of(field);
   return fmt::format("{}{}{}", field.help, shape.empty() ? "" : fmt::format(" ({})", shape),
                      field.unit.empty() ? "" : fmt::format(" [{}]", field.unit));
 }
 
-Json object_of(const std::vector<Field>& fields, bool problem) {
-  Json properties = Json::object();
-  Json required = Json::array();
+OrderedJson object_of(const std::vector<Field>& fields, bool problem) {
+  OrderedJson properties = OrderedJson::object();
+  OrderedJson required = OrderedJson::array();
   for (const Field& field : fields) {
-    Json property = type_of(field, problem);
-    property["description"] = description_of(field);
+    OrderedJson property = type_of(field, problem);
+    property["description"] = schema_description(field);
     if (problem && field.absent == Absent::number) {
       property["default"] = field.otherwise;
     } else if (problem && field.absent == Absent::first_choice) {
@@ -107,30 +107,32 @@ Json object_of(const std::vector<Field>& fields, bool problem) {
 }  // namespace
 
 std::string json_schema() {
-  const Json matrix = any_of(reference("matrix"), reference("number"));
-  const auto object_with = [&](Json properties, Json required) {
-    return Json{{"type", "object"},
-                {"properties", std::move(properties)},
-                {"required", std::move(required)},
-                {"additionalProperties", false}};
+  const OrderedJson matrix = any_of(reference("matrix"), reference("number"));
+  const auto object_with = [&](OrderedJson properties, OrderedJson required) {
+    return OrderedJson{{"type", "object"},
+                       {"properties", std::move(properties)},
+                       {"required", std::move(required)},
+                       {"additionalProperties", false}};
   };
   // With states, or a static gain.
-  Json system = any_of(object_with({{"A", matrix}, {"B", matrix}, {"C", matrix}, {"D", matrix}},
-                                   Json::array({"A", "B"})),
-                       object_with({{"D", matrix}}, Json::array({"D"})));
-  const Json coefficients = list_of(reference("number"));
-  const Json number = reference("number");
-  Json transfer = {
+  OrderedJson system =
+      any_of(object_with({{"A", matrix}, {"B", matrix}, {"C", matrix}, {"D", matrix}},
+                         OrderedJson::array({"A", "B"})),
+             object_with({{"D", matrix}}, OrderedJson::array({"D"})));
+  const OrderedJson coefficients = list_of(reference("number"));
+  const OrderedJson number = reference("number");
+  OrderedJson transfer = {
       {"anyOf",
-       Json::array(
+       OrderedJson::array(
            {object_with(
                 {{"num", coefficients}, {"den", coefficients}, {"dt", number}, {"delay", number}},
-                Json::array({"num", "den"})),
+                OrderedJson::array({"num", "den"})),
             object_with({{"expr", {{"type", "string"}}}, {"dt", number}, {"delay", number}},
-                        Json::array({"expr"})),
+                        OrderedJson::array({"expr"})),
             {{"type", "string"}}})}};
-  Json definitions = {
-      {"number", any_of({{"type", "number"}}, {{"enum", Json::array({"inf", "-inf", nullptr})}})},
+  OrderedJson definitions = {
+      {"number",
+       any_of({{"type", "number"}}, {{"enum", OrderedJson::array({"inf", "-inf", nullptr})}})},
       {"complex",
        {{"type", "array"}, {"items", reference("number")}, {"minItems", 2}, {"maxItems", 2}}},
       {"matrix", list_of(list_of(reference("number")))},
@@ -143,25 +145,25 @@ std::string json_schema() {
           {"error",
            {{"type", "object"},
             {"properties", {{"code", {{"type", "string"}}}, {"message", {{"type", "string"}}}}},
-            {"required", Json::array({"code", "message"})}}}}},
-        {"required", Json::array({"error"})},
+            {"required", OrderedJson::array({"code", "message"})}}}}},
+        {"required", OrderedJson::array({"error"})},
         {"additionalProperties", false}}}};
   for (const Kind& kind : kinds()) {
-    const auto with_id = [](Json object) {
-      Json properties = {{"id", true}};
+    const auto with_id = [](OrderedJson object) {
+      OrderedJson properties = {{"id", true}};
       properties.update(object["properties"]);
       object["properties"] = std::move(properties);
       return object;
     };
-    Json problem = with_id(object_of(kind.fields, true));
+    OrderedJson problem = with_id(object_of(kind.fields, true));
     problem["description"] = kind.help;
-    problem["examples"] = Json::array({Json::parse(kind.example)});
+    problem["examples"] = OrderedJson::array({OrderedJson::parse(kind.example)});
     definitions[fmt::format("{}.problem", kind.name)] = std::move(problem);
     definitions[fmt::format("{}.answer", kind.name)] = with_id(object_of(kind.answer, false));
   }
-  const Json schema = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
-                       {"title", "Problems and answers of flyball solve"},
-                       {"$defs", std::move(definitions)}};
+  const OrderedJson schema = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
+                              {"title", "Problems and answers of flyball solve"},
+                              {"$defs", std::move(definitions)}};
   return schema.dump(1) + '\n';
 }
 

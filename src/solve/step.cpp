@@ -82,7 +82,7 @@ Outcome solve_step_of(const classical::DelaySystem& system, const Problem& probl
   return {};
 }
 
-Outcome solve_step(const Problem& problem, JsonWriter& answer) {
+Outcome solve_model_step(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const auto system, transfer_system_of(problem, "step"));
   return std::visit([&](const auto& one) { return solve_step_of(one, problem, answer); }, system);
 }
@@ -105,7 +105,7 @@ std::vector<Kind> step_kinds() {
                 "10 to 90 %, 2 %, percent of the final value; exact in time, null where there "
                 "is none")},
            R"({"num": [100], "den": [1, 2, 100], "duration": 3})",
-           &solve_step}};
+           &solve_model_step}};
 }
 
 }  // namespace flyball::solve

@@ -332,7 +332,7 @@ Outcome solve_closed_loop_poles(const Problem& problem, JsonWriter& answer) {
   return {};
 }
 
-Outcome solve_steady_state(const Problem& problem, JsonWriter& answer) {
+Outcome solve_transfer_steady_state(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const TransferFunction L, transfer_of(problem, "steady-state-error"));
   FLYBALL_TRY(const auto error, classical::steady_state_error(L));
   answer.add("type", error.type);
@@ -445,7 +445,7 @@ std::vector<Kind> transfer_algebra_kinds() {
         unbounded(number("ramp", "", "for r = t")),
         unbounded(number("parabola", "", "for r = t²/2"))},
        R"({"num": [5], "den": [1, 1, 0]})",
-       &solve_steady_state},
+       &solve_transfer_steady_state},
   };
 }
 

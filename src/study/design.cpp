@@ -25,7 +25,7 @@ namespace {
 
 using mechanisms::MechanismKind;
 
-constexpr std::string_view where = "design";
+constexpr std::string_view in_design = "design";
 
 void fill_defaults(DesignJob& job, std::vector<Diagnostic>& diagnostics) {
   if (!job.controller.delay) {
@@ -105,7 +105,7 @@ Expected<void> check_prediction(const DesignJob& job) {
   if (!predicts_delay(job) || *job.controller.delay <= most_periods * T) {
     return {};
   }
-  return refusal(ArgumentError::out_of_range, where, "controller.delay")
+  return refusal(ArgumentError::out_of_range, in_design, "controller.delay")
       .got(fmt::format("{} with controller.predict_delay", text::seconds(*job.controller.delay)))
       .expected(fmt::format("at most {} periods, {}, to be predicted over",
                             format_number(most_periods), text::seconds(most_periods * T)))
@@ -143,12 +143,12 @@ Expected<void> simulate_response(DesignResult& result) {
 
 /// @param result  What is there when it fails tells what was noticed.
 Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
-  FLYBALL_CHECK(check_ranges(project_of(requested), where));
+  FLYBALL_CHECK(check_ranges(project_of(requested), in_design));
   result.job = requested;
   DesignJob& job = result.job;
   result.diagnostics = job.plant.doubts;
   fill_defaults(job, result.diagnostics);
-  FLYBALL_CHECK(check_delay(*job.controller.delay, job.controller.period, where));
+  FLYBALL_CHECK(check_delay(*job.controller.delay, job.controller.period, in_design));
   FLYBALL_CHECK(check_prediction(job));
 
   FLYBALL_TRY(auto motion, fastest_motion(job));
@@ -173,7 +173,7 @@ Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
               chosen ? search_tolerances(model, job, job.controller.state_tolerance)
                      : design_loop(model, job, job.controller.state_tolerance));
   if (!loop.stable) {
-    return refusal(DesignError::margins_lost, where, "the loop")
+    return refusal(DesignError::margins_lost, in_design, "the loop")
         .got(fmt::format("unstable with its delay of {} ms",
                          format_number(1e3 * job.controller.delay.value_or(0.0), 3)))
         .hint("loosen controller.state_tolerance, or leave it out to have it chosen")
@@ -256,7 +256,7 @@ ErrorInfo error_info(DesignError code) {
 ExpectedAll<DesignResult> design(const DesignJob& job) {
   DesignResult result;
   if (auto done = design_into(result, job); !done) {
-    return refused(where, std::move(done).error(), std::move(result.diagnostics));
+    return refused(in_design, std::move(done).error(), std::move(result.diagnostics));
   }
   return result;
 }

@@ -25,7 +25,7 @@ namespace flyball::study {
 
 namespace {
 
-constexpr std::string_view where = "design";
+constexpr std::string_view in_design_model = "design";
 
 std::string values_of(const std::vector<Coordinate>& names, const Eigen::VectorXd& values) {
   std::vector<std::string> parts;
@@ -188,16 +188,16 @@ namespace {
 
 /// @param noticed  So far; there too when it fails.
 Expected<ModelRegulator> regulator_of(const ModelJob& job, std::vector<Diagnostic>& noticed) {
-  FLYBALL_CHECK(check_delay(job.delay, job.period, where));
+  FLYBALL_CHECK(check_delay(job.delay, job.period, in_design_model));
   const AnyModel& model = job.model;
   if (model.inputs() == 0) {
-    return refusal(ArgumentError::empty, where, "inputs")
+    return refusal(ArgumentError::empty, in_design_model, "inputs")
         .got("empty")
         .expected("at least one, for a controller to act with");
   }
   FLYBALL_TRY(auto point, operating_point(job));
   if (!point.is_equilibrium) {
-    return refusal(ArgumentError::out_of_range, where, "the point")
+    return refusal(ArgumentError::out_of_range, in_design_model, "the point")
         .got(describe(point, model.names()))
         .hint("give that one in [point], or write find_equilibrium = true")
         .with("derivative", std::vector<double>(point.derivative.begin(), point.derivative.end()));
@@ -254,7 +254,7 @@ ExpectedAll<ModelRegulator> regulate(const ModelJob& job) {
   std::vector<Diagnostic> noticed;
   auto regulator = regulator_of(job, noticed);
   if (!regulator) {
-    return refused(where, std::move(regulator).error(), std::move(noticed));
+    return refused(in_design_model, std::move(regulator).error(), std::move(noticed));
   }
   regulator->diagnostics = std::move(noticed);
   return *std::move(regulator);

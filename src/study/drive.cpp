@@ -31,7 +31,7 @@ using Eigen::Vector2d;
 using Eigen::VectorXd;
 using mechanisms::ChassisSpeeds;
 
-constexpr std::string_view where = "drive";
+constexpr std::string_view in_drive = "drive";
 constexpr double gone = 1.0;  ///< m, from the reference: lost.
 
 /// Poses over time, for who gets them late.
@@ -308,7 +308,7 @@ void tell_reserve(const DriveJob& job, std::vector<Diagnostic>& diagnostics) {
 
 Expected<void> check_job(const DriveJob& job) {
   const DisturbanceSection& off = job.disturbance;
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_drive)
                     .positive(job.period, "controller.period", "s")
                     .positive(job.max_voltage, "controller.max_voltage", "V")
                     .positive(job.battery.open_circuit_voltage, "open_circuit_voltage", "V")
@@ -321,14 +321,14 @@ Expected<void> check_job(const DriveJob& job) {
                     .not_negative(job.settle, "the time after the end", "s")
                     .within(job.accuracy, 1e-13, 1e-3, "accuracy"));
   if (job.trajectory.samples.size() < 2) {
-    return refusal(ArgumentError::empty, where, "the trajectory")
+    return refusal(ArgumentError::empty, in_drive, "the trajectory")
         .got(fmt::format("of {} samples", job.trajectory.samples.size()))
         .expected("two samples or more");
   }
   constexpr double longest = 600.0;
   const double duration = job.trajectory.duration();
   if (!(duration > 0.0 && duration <= longest) || (duration + job.settle) / job.period > 1e6) {
-    return refusal(ArgumentError::out_of_range, where, "the trajectory")
+    return refusal(ArgumentError::out_of_range, in_drive, "the trajectory")
         .got(fmt::format("{} s long", format_number(duration)))
         .expected("at most 600 s, and a million periods");
   }

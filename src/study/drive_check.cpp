@@ -23,22 +23,22 @@ namespace {
 using Eigen::Vector2d;
 
 /// From the smallest toy to what lifts ships: beyond it a unit or a power of ten is wrong.
-struct Size {
+struct BodySize {
   std::string_view key;
   double least;
   double most;
   std::string_view unit;
 };
-constexpr std::array sizes{Size{"mass", 0.01, 1e6, "kg"},
-                           Size{"moment_of_inertia", 1e-6, 1e7, "kg m^2"},
-                           Size{"trackwidth", 0.01, 100.0, "m"},
-                           Size{"wheelbase", 0.01, 100.0, "m"},
-                           Size{"wheel_radius", 1e-3, 10.0, "m"},
-                           Size{"gearing", 1e-2, 1e4, ""},
-                           Size{"steer_gearing", 1e-2, 1e4, ""},
-                           Size{"wheel_inertia", 1e-7, 1e5, "kg m^2"},
-                           Size{"steer_inertia", 1e-7, 1e5, "kg m^2"},
-                           Size{"grip", 1e-3, 10.0, ""}};
+constexpr std::array sizes{BodySize{"mass", 0.01, 1e6, "kg"},
+                           BodySize{"moment_of_inertia", 1e-6, 1e7, "kg m^2"},
+                           BodySize{"trackwidth", 0.01, 100.0, "m"},
+                           BodySize{"wheelbase", 0.01, 100.0, "m"},
+                           BodySize{"wheel_radius", 1e-3, 10.0, "m"},
+                           BodySize{"gearing", 1e-2, 1e4, ""},
+                           BodySize{"steer_gearing", 1e-2, 1e4, ""},
+                           BodySize{"wheel_inertia", 1e-7, 1e5, "kg m^2"},
+                           BodySize{"steer_inertia", 1e-7, 1e5, "kg m^2"},
+                           BodySize{"grip", 1e-3, 10.0, ""}};
 
 class Check {
  public:
@@ -214,7 +214,7 @@ Expected<std::vector<double>> quantities_of(const std::string& text,
 
 Expected<void> check_drive_size(std::string_view key, double value) {
   const auto size =
-      std::find_if(sizes.begin(), sizes.end(), [&](const Size& one) { return one.key == key; });
+      std::find_if(sizes.begin(), sizes.end(), [&](const BodySize& one) { return one.key == key; });
   if (size == sizes.end() || (value >= size->least && value <= size->most)) {
     return {};
   }

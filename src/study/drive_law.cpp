@@ -91,9 +91,9 @@ class LtvDriveLaw final : public DriveLaw {
   LtvDriveFollower follower_;
 };
 
-using Made = Expected<std::unique_ptr<DriveLaw>>;
+using MadeLaw = Expected<std::unique_ptr<DriveLaw>>;
 
-Made differential_law(const DriveJob& job) {
+MadeLaw differential_law(const DriveJob& job) {
   FLYBALL_TRY(const auto model, differential_model(job.robot));
   if (job.follower == DriveFollower::ltv_drive) {
     FLYBALL_TRY(auto follower, LtvDriveFollower::create(model, Length(job.robot.trackwidth),

@@ -142,11 +142,11 @@ class PlantOf final : public DrivePlant {
   std::vector<Rolling> wheels_;
 };
 
-using Made = Expected<std::unique_ptr<DrivePlant>>;
+using MadePlant = Expected<std::unique_ptr<DrivePlant>>;
 
 template <class Model>
-Made powered(Model model, std::vector<Rolling> wheels, const DriveRobot& robot,
-             const mechanisms::Battery& battery) {
+MadePlant powered(Model model, std::vector<Rolling> wheels, const DriveRobot& robot,
+                  const mechanisms::Battery& battery) {
   std::array<mechanisms::CurrentLimits, static_cast<std::size_t>(Model::inputs())> limits;
   limits.fill({.stator = robot.stator_limit, .supply = robot.supply_limit});
   if constexpr (requires { Model::modules; }) {  // those limits are of the motors that drive
@@ -172,7 +172,7 @@ mechanisms::DriveShaft shaft_of(const DriveRobot& robot) {
 }
 
 template <std::size_t W>
-Made differential(const DriveRobot& robot, const mechanisms::Battery& battery) {
+MadePlant differential(const DriveRobot& robot, const mechanisms::Battery& battery) {
   const mechanisms::SlippingDifferentialParameters parameters{
       .body = body_of(robot),
       .side = shaft_of(robot),
@@ -187,7 +187,7 @@ Made differential(const DriveRobot& robot, const mechanisms::Battery& battery) {
                  battery);
 }
 
-Made mecanum(const DriveRobot& robot, const mechanisms::Battery& battery) {
+MadePlant mecanum(const DriveRobot& robot, const mechanisms::Battery& battery) {
   FLYBALL_TRY(auto model,
               mechanisms::slipping_mecanum_drive({.body = body_of(robot),
                                                   .wheel = shaft_of(robot),
@@ -205,7 +205,7 @@ Made mecanum(const DriveRobot& robot, const mechanisms::Battery& battery) {
   return powered(std::move(model), std::move(wheels), robot, battery);
 }
 
-Made swerve(const DriveRobot& robot, const mechanisms::Battery& battery) {
+MadePlant swerve(const DriveRobot& robot, const mechanisms::Battery& battery) {
   mechanisms::SwerveDynamicsParameters<4> parameters{.body = body_of(robot)};
   parameters.positions = robot.modules;
   parameters.wheel_radius = Length(robot.wheel_radius);

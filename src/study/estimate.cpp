@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <fmt/format.h>
 
 #include <flyball/core/argument.hpp>
 #include <flyball/math/probability/distributions.hpp>
 
+#include "core/constants.hpp"
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "core/wording.hpp"
@@ -27,7 +27,6 @@ using Eigen::VectorXd;
 using identification::ExperimentRun;
 
 constexpr std::string_view job = "estimate";
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 Expected<void> check_noise(const ModelDescription& names, const VectorXd& noise) {
   for (Index i = 0; i < noise.size(); ++i) {
@@ -111,18 +110,19 @@ std::vector<std::string> unobserved_states(const EstimatePass& pass,
   };
   MatrixXd open = scaled(pass.P_end_unmeasured);
   open.diagonal().array() += 1e-9;  // of combinations that are known
-  const auto L = detail::cholesky_of(detail::symmetrized(open));
+  const auto L = flyball::detail::cholesky_of(flyball::detail::symmetrized(open));
   if (!L) {
     return names;
   }
-  const MatrixXd left = detail::solve_linear(*L, scaled(pass.P_end));
-  const auto system = detail::symmetric_eigensystem_of(
-      detail::symmetrized(detail::solve_linear(*L, left.transpose())));
+  const MatrixXd left = flyball::detail::solve_linear(*L, scaled(pass.P_end));
+  const auto system = flyball::detail::symmetric_eigensystem_of(
+      flyball::detail::symmetrized(flyball::detail::solve_linear(*L, left.transpose())));
   const Index last = size.size() - 1;
   if (!(system.values(last) > hardly)) {
     return names;
   }
-  const VectorXd form = detail::solve_linear(L->transpose(), system.vectors.col(last)).cwiseAbs();
+  const VectorXd form =
+      flyball::detail::solve_linear(L->transpose(), system.vectors.col(last)).cwiseAbs();
   for (Index i = 0; i <= last; ++i) {
     if (size(i) > 0.0 && form(i) >= part * form.maxCoeff()) {
       names.push_back(states[static_cast<std::size_t>(i)].name);

@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include <flyball/estimation/state_limits.hpp>
 #include <flyball/estimation/unscented_kalman_filter.hpp>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "study/estimate_pass.hpp"
@@ -20,10 +20,9 @@ using Eigen::VectorXd;
 using identification::ExperimentRun;
 using identification::InputHold;
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 /// RK4's error stays below 1e-5 of a state's change where |λ| dt is below it.
 constexpr double longest_step = 0.25;
-constexpr int most_steps = 1000;
+constexpr int most_substeps = 1000;
 
 /// A state's estimates given the limits of the states: the Gaussian with the moments of the cut
 /// one. What the filter carries on is not cut: a limit that is told at each sample is the same
@@ -90,9 +89,9 @@ class Pass {
     steps.reserve(run_.time.size());
     for (Index k = 0; k < count; ++k) {
       FLYBALL_TRY(FilterStep<> step, advance(k, pass));
-      pass.P_end_unmeasured =
-          detail::product_transposed(detail::product(step.F, pass.P_end_unmeasured), step.F) +
-          step.Q;
+      pass.P_end_unmeasured = flyball::detail::product_transposed(
+                                  flyball::detail::product(step.F, pass.P_end_unmeasured), step.F) +
+                              step.Q;
       correct(k, guard ? &*guard : nullptr, pass);
       pass.limited += is_limited_ && bring_inside() ? 1 : 0;
       step.x = filter_.x_hat();
@@ -147,19 +146,19 @@ class Pass {
     step.Q = MatrixXd::Zero(n, n);
     if (k > 0) {
       const SampleStep sample = sample_step(filter_.model(), run_, k, filter_.x_hat(), hold_);
-      pass.is_stiff = pass.is_stiff || sample.count == most_steps;
+      pass.is_stiff = pass.is_stiff || sample.count == most_substeps;
       const MatrixXd P = filter_.P();
       for (int i = 0; i < sample.count; ++i) {
         pass.not_moved += filter_.predict(sample.u, sample.dt) ? 0 : 1;
         const MatrixXd& F = filter_.F();
-        step.Q = detail::product_transposed(detail::product(F, step.Q), F) +
+        step.Q = flyball::detail::product_transposed(flyball::detail::product(F, step.Q), F) +
                  step_noise(F, density_, sample.dt);
-        step.F = detail::product(F, step.F);
+        step.F = flyball::detail::product(F, step.F);
       }
       if (settings_.is_unscented) {
         // What the straight line through the points leaves counts as noise.
-        FLYBALL_TRY(
-            step, statistical_linearization(detail::product_transposed(P, step.F), P, filter_.P()));
+        FLYBALL_TRY(step, statistical_linearization(flyball::detail::product_transposed(P, step.F),
+                                                    P, filter_.P()));
       }
     }
     step.x_prior = filter_.x_hat();
@@ -217,9 +216,9 @@ SampleStep sample_step(const AnyModel& model, const ExperimentRun& run, Index k,
   MatrixXd A(x.size(), x.size());
   MatrixXd B(x.size(), step.u.size());
   model.jacobians(x, step.u, A, B);
-  const double fastest = detail::eigenvalues_of(A).cwiseAbs().maxCoeff();
+  const double fastest = flyball::detail::eigenvalues_of(A).cwiseAbs().maxCoeff();
   const double wanted = std::ceil(apart * fastest / longest_step);
-  step.count = wanted > 1.0 ? static_cast<int>(std::min<double>(wanted, most_steps)) : 1;
+  step.count = wanted > 1.0 ? static_cast<int>(std::min<double>(wanted, most_substeps)) : 1;
   step.dt = apart / step.count;
   return step;
 }

@@ -2,6 +2,7 @@
 
 #include <flyball/core/argument.hpp>
 
+#include "core/constants.hpp"
 #include "core/wording.hpp"
 #include "study/estimate_project.hpp"
 #include "study/named_values.hpp"
@@ -9,8 +10,6 @@
 namespace flyball::study {
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 class EstimateReader : private NamedValues {
  public:

@@ -59,17 +59,18 @@ class Linearization {
       MatrixXd F(n, n);
       MatrixXd* const no_inputs = nullptr;
       for (int i = 0; i < sample.count; ++i) {
-        detail::rk4_with_jacobians(model_, x, sample.u, sample.dt, next, F, no_inputs);
+        flyball::detail::rk4_with_jacobians(model_, x, sample.u, sample.dt, next, F, no_inputs);
         x = next;
         for (std::size_t s = 0; s < noisy_.size(); ++s) {
           MatrixXd density = MatrixXd::Zero(n, n);
           density(noisy_[s], noisy_[s]) = 1.0;
-          step.G[s] = detail::product_transposed(detail::product(F, step.G[s]), F) +
-                      step_noise(F, density, sample.dt);
+          step.G[s] =
+              flyball::detail::product_transposed(flyball::detail::product(F, step.G[s]), F) +
+              step_noise(F, density, sample.dt);
         }
-        step.A = detail::product(F, step.A);
+        step.A = flyball::detail::product(F, step.A);
       }
-      step.input = x - detail::product(step.A, before);
+      step.input = x - flyball::detail::product(step.A, before);
     }
     measure(k, step);
     return step;
@@ -93,7 +94,7 @@ class Linearization {
         step.y(i) = std::numeric_limits<double>::quiet_NaN();
       }
     }
-    step.y += detail::product(step.C, x);
+    step.y += flyball::detail::product(step.C, x);
   }
 
   const AnyModel& model_;

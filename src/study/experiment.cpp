@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <flyball/core/argument.hpp>
@@ -11,6 +10,7 @@
 #include <flyball/simulation/characterization.hpp>
 #include <flyball/study/tune.hpp>
 
+#include "core/constants.hpp"
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 
@@ -23,8 +23,7 @@ using identification::GainEstimate;
 using identification::Recording;
 using mechanisms::MechanismKind;
 
-constexpr std::string_view where = "plan_experiment";
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr std::string_view in_plan_experiment = "plan_experiment";
 constexpr double least_voltage = 0.5;  ///< V, of a step beyond friction and gravity.
 constexpr int most_repeats = 6;
 constexpr double usual_friction = 0.15;  ///< V, of a mechanism of which none is known.
@@ -215,14 +214,14 @@ Expected<Experiment> carry_out(const ExperimentJob& job, const Choice& choice) {
 
 Expected<void> check_job(const ExperimentJob& job) {
   const ExperimentLimits& limits = job.limits;
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_plan_experiment)
                     .positive(job.plant.gains.kV, "kV")
                     .positive(inertia(job.plant), "kA")
                     .positive(limits.voltage, "voltage", "V")
                     .positive(limits.duration, "duration", "s"));
   const double needed = job.plant.gains.kS + std::abs(job.plant.gains.kG) + least_voltage;
   if (limits.voltage < needed) {
-    return refusal(ArgumentError::out_of_range, where, "the voltage")
+    return refusal(ArgumentError::out_of_range, in_plan_experiment, "the voltage")
         .got(format_number(limits.voltage) + " V")
         .expected("at least " + format_number(needed, 3) +
                   " V: friction, gravity and half a volt to move with");
@@ -231,12 +230,12 @@ Expected<void> check_job(const ExperimentJob& job) {
     return {};
   }
   if (!limits.travel_low || !limits.travel_high) {
-    return refusal(ArgumentError::out_of_range, where, "the travel")
+    return refusal(ArgumentError::out_of_range, in_plan_experiment, "the travel")
         .got("not said")
         .expected("both ends of it: --travel-low and --travel-high");
   }
   if (!(*limits.travel_low < *limits.travel_high)) {
-    return refusal(ArgumentError::out_of_range, where, "the travel")
+    return refusal(ArgumentError::out_of_range, in_plan_experiment, "the travel")
         .got(format_number(*limits.travel_low) + " to " + format_number(*limits.travel_high) + " " +
              job.plant.unit)
         .expected("from its lower to its higher end");
@@ -303,7 +302,7 @@ Expected<ExperimentResult> plan_experiment(const ExperimentJob& given) {
         std::min_element(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) {
           return (a.one > 0.0 ? a.one : infinity) < (b.one > 0.0 ? b.one : infinity);
         });
-    return refusal(ArgumentError::out_of_range, where, "the limits")
+    return refusal(ArgumentError::out_of_range, in_plan_experiment, "the limits")
         .got("such that no test that was tried tells the gains")
         .expected(shortest->one > job.limits.duration
                       ? "a duration of at least " + format_number(std::ceil(shortest->one)) +

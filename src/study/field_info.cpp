@@ -18,8 +18,8 @@ namespace flyball::study {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
-using Names = std::span<const std::string_view>;
+using OrderedJson = nlohmann::ordered_json;
+using NameSpan = std::span<const std::string_view>;
 
 /// 0.02 s is "20 ms".
 std::string readable(double value, Dimension dimension) {
@@ -104,7 +104,7 @@ std::string typed(const Field& field) {
 }
 
 /// Sections, or single keys of them.
-Names sections_of(JobKind job) {
+NameSpan sections_of(JobKind job) {
   static constexpr std::array<std::string_view, 9> all{"log",       "mechanism", "controller",
                                                        "estimator", "sensor",    "battery",
                                                        "profile",   "mechanism", "gains"};
@@ -144,7 +144,7 @@ Names sections_of(JobKind job) {
     case JobKind::design:
       return design;
     case JobKind::tune:
-      return Names(all).first(7);
+      return NameSpan(all).first(7);
     case JobKind::analyze:
       return analyze;
     case JobKind::simulate:
@@ -153,13 +153,13 @@ Names sections_of(JobKind job) {
   return {};
 }
 
-Json schema_of(const Field& field, const std::string& description) {
-  Json schema = {{"description", description}};
+OrderedJson schema_of(const Field& field, const std::string& description) {
+  OrderedJson schema = {{"description", description}};
   const bool plain = field.dimension.of == FieldDimension::fixed &&
                      field.dimension.dimension == Dimension::dimensionless;
-  Json quantity = {{"type", "string"},
-                   {"pattern", field.range < Range::not_negative ? "^\\s*[-+]?\\.?[0-9]"
-                                                                 : "^\\s*\\+?\\.?[0-9]"}};
+  OrderedJson quantity = {{"type", "string"},
+                          {"pattern", field.range < Range::not_negative ? "^\\s*[-+]?\\.?[0-9]"
+                                                                        : "^\\s*\\+?\\.?[0-9]"}};
   switch (field.type) {
     case FieldType::quantity:
       if (plain) {
@@ -204,9 +204,9 @@ Json schema_of(const Field& field, const std::string& description) {
   return schema;
 }
 
-Json schema_of(const Section& section) {
-  Json properties = Json::object();
-  Json required = Json::array();
+OrderedJson schema_of(const Section& section) {
+  OrderedJson properties = OrderedJson::object();
+  OrderedJson required = OrderedJson::array();
   for (const Field& field : section.fields) {
     const std::string absent = if_absent(section, field);
     properties[field.key] = schema_of(field, absent.empty() || field.required
@@ -264,18 +264,18 @@ std::string project_markdown() {
 }
 
 std::string project_schema() {
-  Json properties = Json::object();
+  OrderedJson properties = OrderedJson::object();
   for (const Section& section : project_document().sections) {
     const std::size_t dot = section.name.find('.');
     if (dot == std::string_view::npos) {
       properties[section.name] = schema_of(section);
     } else {  // a key of another section may be a section
-      Json& key =
+      OrderedJson& key =
           properties[section.name.substr(0, dot)]["properties"][section.name.substr(dot + 1)];
       key = {{"anyOf", {key, schema_of(section)}}};
     }
   }
-  const Json schema = {
+  const OrderedJson schema = {
       {"$schema", "https://json-schema.org/draft/2020-12/schema"},
       {"title", "A Flyball project file"},
       {"type", "object"},

@@ -1,20 +1,18 @@
 #include <algorithm>
 #include <array>
-#include <limits>
 
 #include <fmt/format.h>
 
 #include <flyball/core/text.hpp>
 #include <flyball/core/unit_algebra.hpp>
 
+#include "core/constants.hpp"
 #include "study/fit_project.hpp"
 #include "study/named_values.hpp"
 
 namespace flyball::study {
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 std::string trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(' ');

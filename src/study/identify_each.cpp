@@ -147,7 +147,7 @@ ExpectedAll<IdentifyResult> identify_bytes(std::string bytes, const std::string&
 }  // namespace
 
 ErrorInfo error_info(LogRowsError code) {
-  static constexpr detail::ErrorRow rows[] = {
+  static constexpr flyball::detail::ErrorRow rows[] = {
       {"took_too_long", "the log took more time than a log may take", ErrorKind::environment},
       {"took_too_much_memory", "the log took more memory than a log may take",
        ErrorKind::environment},
@@ -156,7 +156,7 @@ ErrorInfo error_info(LogRowsError code) {
       {"rows_differ", "the rows are not of one whole", ErrorKind::misuse},
       {"rows_missing", "parts are missing", ErrorKind::misuse},
   };
-  return detail::info_of(code, "log_rows", rows);
+  return flyball::detail::info_of(code, "log_rows", rows);
 }
 
 std::string settings_of(const recording::LogSelection& selection) {

@@ -1,12 +1,11 @@
 #include <flyball/study/identify_model.hpp>
 
-#include <limits>
-
 #include <fmt/format.h>
 
 #include <flyball/io/csv.hpp>
 #include <flyball/io/file.hpp>
 
+#include "core/constants.hpp"
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "core/wording.hpp"
@@ -20,8 +19,7 @@ namespace {
 using Eigen::Index;
 using identification::ExperimentRun;
 
-constexpr std::string_view job = "identify";
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr std::string_view this_job = "identify";
 
 /// Parameters whose own value is not in their range, which is where the search starts.
 void notice_starts(const ModelJob& of, std::vector<Diagnostic>& all) {
@@ -92,7 +90,7 @@ Expected<Log> read_model_log(const std::string& path, const Project& project) {
 
 ExpectedAll<ModelIdentification> identify_model(const Log& log, const Project& project) {
   std::vector<Diagnostic> diagnostics = log.diagnostics;
-  const auto refuse = [&](Error error) { return refused(job, std::move(error), diagnostics); };
+  const auto refuse = [&](Error error) { return refused(this_job, std::move(error), diagnostics); };
   if (!project.model_job) {
     return refuse(refusal(ArgumentError::empty, {}, "the project").got("without a [model]"));
   }
@@ -108,7 +106,7 @@ ExpectedAll<ModelIdentification> identify_model(const Log& log, const Project& p
                                   : of.model.names().parameters.front().name)));
   }
   notice_starts(of, diagnostics);
-  RunCutter cutter(log, of, job, diagnostics);
+  RunCutter cutter(log, of, this_job, diagnostics);
   const bool other_channels = !of.fit.validation_channels.empty();
   const bool keeps_aside = other_channels || said.validation_from || said.validation_to;
   const Stretch validation{said.validation_from.value_or(-infinity),

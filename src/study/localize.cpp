@@ -17,7 +17,7 @@ namespace flyball::study {
 
 namespace {
 
-constexpr std::string_view where = "localize";
+constexpr std::string_view in_localize = "localize";
 constexpr double gyro_bias_std = 0.05;  // rad/s, 3 °/s: what cheap ones have before they are warm.
 
 /// Constants that no sensor in m, s and rad has: a unit, a sense or a clock is wrong.
@@ -154,7 +154,7 @@ Expected<LocalizeResult> localize(const LocalizeJob& job) {
                      options, result.diagnostics);
   const LocalizedPath& best = result.smoother ? result.smoother->path : result.filter.path;
   if (best.time.empty()) {
-    return refusal(LocalizationError::too_few_sightings, where, "the path")
+    return refusal(LocalizationError::too_few_sightings, in_localize, "the path")
         .got("no time of the odometry at which the pose is known")
         .expected("sightings that begin before the odometry ends");
   }

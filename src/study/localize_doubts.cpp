@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <array>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "core/constants.hpp"
 #include "study/localize_doubts.hpp"
 
 namespace flyball::study {
@@ -12,7 +12,6 @@ namespace flyball::study {
 namespace {
 
 constexpr double most_nees = 3.0;  // Of neighbouring poses, whose errors are alike.
-constexpr double degree = std::numbers::pi / 180.0;
 
 /// A log as it would be in another convention.
 struct Reading {
@@ -24,9 +23,9 @@ constexpr std::array readings{
     Reading{"bearings of the other sign",
             "bearings are measured counter-clockwise from the robot's forward axis", 1.0, -1.0},
     Reading{"turn rates of the other sign", "turn rates are positive counter-clockwise", -1.0, 1.0},
-    Reading{"turn rates in degrees", "turn rates are in rad/s", degree, 1.0},
+    Reading{"turn rates in degrees", "turn rates are in rad/s", one_degree, 1.0},
     Reading{"turn rates in clockwise degrees",
-            "turn rates are in rad/s and positive counter-clockwise", -degree, 1.0}};
+            "turn rates are in rad/s and positive counter-clockwise", -one_degree, 1.0}};
 
 LandmarkLog read_as(const Reading& reading, LandmarkLog log) {
   for (OdometrySample& sample : log.odometry) {

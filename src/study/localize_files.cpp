@@ -20,7 +20,7 @@ namespace flyball::study {
 
 namespace {
 
-constexpr std::string_view where = "localize";
+constexpr std::string_view in_localize_files = "localize";
 
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
@@ -72,7 +72,7 @@ Expected<std::vector<std::string>> files_of(const LocalizeJob& job) {
       }
     }
     if (error) {
-      return refusal(ArgumentError::empty, where, path)
+      return refusal(ArgumentError::empty, in_localize_files, path)
           .got("a folder that cannot be read: " + error.message())
           .expected("the files of a drive");
     }
@@ -91,7 +91,7 @@ Expected<DriveFiles> sort_out(const LocalizeJob& job) {
       FLYBALL_CHECK(read_file(path));  // Why it cannot be read.
     }
     if (member == nullptr) {
-      return refusal(ArgumentError::unknown_name, where, path)
+      return refusal(ArgumentError::unknown_name, in_localize_files, path)
           .got("a name that does not say what it holds")
           .expected(
               "\"odometry\", \"wheel\", \"gyro\", \"measurement\" or \"sighting\", \"landmark\", "
@@ -103,7 +103,7 @@ Expected<DriveFiles> sort_out(const LocalizeJob& job) {
       continue;
     }
     if (!(drive.*member).empty()) {
-      return refusal(ArgumentError::ambiguous_name, where, path)
+      return refusal(ArgumentError::ambiguous_name, in_localize_files, path)
           .got("a second file of its kind beside " + drive.*member)
           .expected("one")
           .hint(one_robots ? "name the robot, as its files do: --robot Robot1"
@@ -112,13 +112,13 @@ Expected<DriveFiles> sort_out(const LocalizeJob& job) {
     drive.*member = path;
   }
   if (!drive.wheels.empty() && !drive.odometry.empty()) {
-    return refusal(ArgumentError::ambiguous_name, where, drive.wheels)
+    return refusal(ArgumentError::ambiguous_name, in_localize_files, drive.wheels)
         .got("beside " + drive.odometry)
         .expected("the odometry once")
         .hint("leave one of them out");
   }
   if (!drive.gyro.empty() && drive.wheels.empty()) {
-    return refusal(ArgumentError::empty, where, drive.gyro)
+    return refusal(ArgumentError::empty, in_localize_files, drive.gyro)
         .got("without the wheels' distances")
         .expected("a file whose name says \"wheel\" (time, left, right) beside it")
         .hint("a gyro's turn rate beside a speed is odometry (time, speed, turn rate)");
@@ -129,7 +129,7 @@ Expected<DriveFiles> sort_out(const LocalizeJob& job) {
         std::pair(&drive.sightings, "sightings (time, landmark, range, bearing)"),
         std::pair(&drive.landmarks, "landmarks (number, x, y)")}) {
     if (path->empty()) {
-      return refusal(ArgumentError::empty, where, "the list of files")
+      return refusal(ArgumentError::empty, in_localize_files, "the list of files")
           .got(fmt::format("without the {}", what))
           .expected(
               "a file whose name says \"odometry\" or \"wheel\", one that says \"measurement\" or "
@@ -193,7 +193,7 @@ Expected<Drive> read_odometry(const DriveFiles& files, const LocalizeJob& job,
       drive.wheels.gyro.push_back({row[0], row[1]});
     }
   } else if (!job.track_width) {
-    return refusal(ArgumentError::empty, where, "the track width")
+    return refusal(ArgumentError::empty, in_localize_files, "the track width")
         .got("not given")
         .expected(
             "about how far apart the left and the right wheels are, in m, since no gyro is "

@@ -21,7 +21,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::string_view schema = "flyball.log_row/1";
+constexpr std::string_view log_rows_schema = "flyball.log_row/1";
 constexpr std::size_t most_logs = 100'000'000;
 
 /// A member of that type, if the object has it.
@@ -49,7 +49,7 @@ std::optional<Line> parse_line(std::string_view text) {
   const Json object = Json::parse(text, nullptr, /*allow_exceptions=*/false);
   // Where the row's own members begin in what `to_json_line` writes.
   const std::size_t begin = text.find("\"path\":");
-  if (!object.is_object() || member<std::string>(object, "schema") != schema ||
+  if (!object.is_object() || member<std::string>(object, "schema") != log_rows_schema ||
       begin == std::string_view::npos || text.back() != '}') {
     return std::nullopt;
   }
@@ -108,8 +108,8 @@ Refusal differing(const std::string& path, const std::string& got, const std::st
 }  // namespace
 
 std::string to_json_line(const NumberedRow& row, std::size_t logs) {
-  return fmt::format("{{\"schema\":\"{}\",\"log\":{},\"logs\":{},{}}}\n", schema, row.number, logs,
-                     row.row.members);
+  return fmt::format("{{\"schema\":\"{}\",\"log\":{},\"logs\":{},{}}}\n", log_rows_schema,
+                     row.number, logs, row.row.members);
 }
 
 Expected<LogRows> read_log_rows(std::string_view text, const std::string& source, bool cut) {

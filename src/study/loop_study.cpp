@@ -70,7 +70,7 @@ Expected<DelaySystem> as_delay_system(const TransferSystem& system) {
   return DelaySystem::create(std::get<TransferFunction>(system));
 }
 
-std::vector<double> list(const auto& values) {
+std::vector<double> listed(const auto& values) {
   return {values.begin(), values.end()};
 }
 
@@ -79,7 +79,7 @@ Expected<LoopResponse> late_response(const DelaySystem& system, bool impulse,
                                      const std::optional<ResponseTimes>& times) {
   FLYBALL_TRY(const auto found, impulse ? classical::impulse_response(system, 0, times)
                                         : classical::step_response(system, 0, times));
-  LoopResponse response{.time = list(found.time), .value = list(found.y.col(0)), .metrics = {}};
+  LoopResponse response{.time = listed(found.time), .value = listed(found.y.col(0)), .metrics = {}};
   if (!impulse) {
     FLYBALL_TRY(response.metrics, classical::step_metrics(system, 0, 0));
   }
@@ -99,7 +99,7 @@ Expected<LoopResponse> rational_response(const TransferFunction& transfer, bool 
     FLYBALL_TRY(found,
                 impulse ? impulse_response(system, 0, times) : step_response(system, 0, times));
   }
-  LoopResponse response{.time = list(found.time), .value = list(found.y.col(0)), .metrics = {}};
+  LoopResponse response{.time = listed(found.time), .value = listed(found.y.col(0)), .metrics = {}};
   if (const double delay = transfer.delay(); delay > 0.0) {
     for (double& time : response.time) {
       time += delay;
@@ -455,7 +455,7 @@ std::vector<double> LoopFindings::delays() const {
   if (const TransferFunction* transfer = rational()) {
     return transfer->delay() > 0.0 ? std::vector{transfer->delay()} : std::vector<double>{};
   }
-  std::vector<double> all = list(std::get<DelaySystem>(system).delays());
+  std::vector<double> all = listed(std::get<DelaySystem>(system).delays());
   std::sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
   return all;

@@ -109,7 +109,7 @@ constexpr std::array<std::string_view, 2> elevator_may{"stages", "counterbalance
 constexpr std::array<std::string_view, 5> arm_needs{"motor", "gearing", "moment_of_inertia", "mass",
                                                     "center_of_mass"};
 
-constexpr std::array rows{
+constexpr std::array part_rows{
     MechanismRow{
         MechanismKind::flywheel,
         {flywheel_states, angular_velocity, angular_acceleration, angular_acceleration, torque},
@@ -177,11 +177,11 @@ void doubt_arm(const MechanismParts& parts, std::vector<Diagnostic>& doubts) {
 }
 
 std::span<const MechanismRow> mechanism_rows() {
-  return rows;
+  return part_rows;
 }
 
 const MechanismRow& mechanism_row(MechanismKind kind) {
-  return *std::find_if(rows.begin(), rows.end(),
+  return *std::find_if(part_rows.begin(), part_rows.end(),
                        [&](const MechanismRow& row) { return row.kind == kind; });
 }
 

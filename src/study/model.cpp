@@ -52,7 +52,7 @@ Expected<std::vector<Coordinate>> read_coordinates(const std::vector<std::string
 }
 
 /// What a model in JSON has.
-std::span<const solve::Field> model_fields() {
+std::span<const solve::Field> formula_fields() {
   namespace field = solve::field;
   static const std::vector<solve::Field> fields{
       field::A,
@@ -69,7 +69,7 @@ std::span<const solve::Field> model_fields() {
 
 ExpectedAll<ModelFile> parse_matrices(std::string_view text, const std::string& name) {
   FLYBALL_TRY(const solve::JsonTree object, solve::parse_object(text, name, "model"));
-  FLYBALL_TRY(const auto fields, solve::Problem::read(object.root(), model_fields(), name));
+  FLYBALL_TRY(const auto fields, solve::Problem::read(object.root(), formula_fields(), name));
   ModelFile model;
   model.path = name;
   model.system = fields.system();

@@ -10,6 +10,7 @@
 #include <flyball/math/expression/formula.hpp>
 #include <flyball/systems/formula_model.hpp>
 
+#include "core/constants.hpp"
 #include "study/estimate_project.hpp"
 #include "study/fit_project.hpp"
 #include "study/model_project.hpp"
@@ -19,7 +20,6 @@ namespace flyball::study {
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 using Coordinates = std::vector<Coordinate>;

@@ -8,6 +8,7 @@
 #include <flyball/core/text.hpp>
 #include <flyball/core/unit_algebra.hpp>
 
+#include "core/constants.hpp"
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "core/wording.hpp"
@@ -31,8 +32,6 @@ namespace {
 using Eigen::Index;
 using identification::ExperimentRun;
 using identification::InputHold;
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// Times within the part, and what is usually between two of them.
 struct Clock {

@@ -23,7 +23,7 @@ using Eigen::VectorXd;
 using expression::Operation;
 using expression::Slot;
 
-constexpr std::string_view where = "swing_up";
+constexpr std::string_view in_swing_up = "swing_up";
 
 /// Of the equations' tape the derivatives alone.
 expression::Tape derivatives_of(const ModelJob& job) {
@@ -173,7 +173,7 @@ bool wants_region(const ModelJob& job, const ModelRegulator& regulator) {
   if (job.equations.tape.size() > most_operations) {
     return false;
   }
-  const Eigen::VectorXcd poles = detail::eigenvalues_of(regulator.linear.A);
+  const Eigen::VectorXcd poles = flyball::detail::eigenvalues_of(regulator.linear.A);
   return job.equations.tape.outputs() > 0 && job.limit.allFinite() && job.model.states() >= 2 &&
          job.model.states() <= 6 && std::any_of(poles.begin(), poles.end(), [](const auto& pole) {
            return pole.real() > 1e-9;
@@ -182,7 +182,7 @@ bool wants_region(const ModelJob& job, const ModelRegulator& regulator) {
 
 Expected<ModelRegion> region_of(const ModelJob& job, const ModelRegulator& regulator) {
   if (!job.limit.allFinite()) {
-    return refusal(ArgumentError::empty, where, "controller.limit")
+    return refusal(ArgumentError::empty, in_swing_up, "controller.limit")
         .got("missing")
         .expected("how much each input can do, such as limit = { u = \"6 N m\" }");
   }
@@ -344,7 +344,7 @@ Expected<SwingUpRunResult> swing_up(const ModelJob& job, const ModelRegulator& r
   }
   result.scale = 0.5 * (highest - lowest);
   if (!std::isfinite(result.energy) || !(result.scale > 0.0) || !std::isfinite(result.scale)) {
-    return refusal(ArgumentError::out_of_range, where, "swing_up.energy")
+    return refusal(ArgumentError::out_of_range, in_swing_up, "swing_up.energy")
         .got(turn.empty() ? "for a model without angles"
                           : fmt::format("{} to {} over all angles", format_number(lowest),
                                         format_number(highest)))

@@ -25,16 +25,16 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr std::string_view where = "motor-curves";
+constexpr std::string_view in_motor_curves = "motor-curves";
 
-std::string lower(std::string text) {
+std::string lower_case(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return text;
 }
 
 /// A column in SI, by its row.
-struct Column {
+struct CurveColumn {
   std::string name;
   std::map<Index, double> rows{};
 
@@ -43,10 +43,10 @@ struct Column {
 
 /// The first column whose name has one of the words, in SI; none where there is no such name.
 /// @param dimension  Of its unit, if any; nothing where the unit has none that is known (W, %).
-Expected<Column> column_of(const Log& log, std::initializer_list<std::string_view> words,
-                           std::optional<Dimension> dimension, double factor_if_bare) {
+Expected<CurveColumn> column_of(const Log& log, std::initializer_list<std::string_view> words,
+                                std::optional<Dimension> dimension, double factor_if_bare) {
   for (const Signal& signal : log.signals) {
-    const std::string name = lower(signal.name);
+    const std::string name = lower_case(signal.name);
     if (std::none_of(words.begin(), words.end(),
                      [&](std::string_view word) { return name.find(word) != std::string::npos; })) {
       continue;
@@ -55,13 +55,14 @@ Expected<Column> column_of(const Log& log, std::initializer_list<std::string_vie
     if (dimension && !signal.unit.empty()) {
       const auto unit = parse_unit(signal.unit);
       if (!unit || unit->dimension != *dimension) {
-        return refusal(ArgumentError::wrong_unit, where, "the column \"" + signal.name + "\"")
+        return refusal(ArgumentError::wrong_unit, in_motor_curves,
+                       "the column \"" + signal.name + "\"")
             .got("in \"" + signal.unit + "\"")
             .expected(fmt::format("a {}", to_string(*dimension)));
       }
       factor = unit->factor;
     }
-    Column column{.name = signal.name};
+    CurveColumn column{.name = signal.name};
     for (std::size_t k = 0; k < signal.value.size(); ++k) {
       // The rows' times are their numbers.
       column.rows.emplace(static_cast<Index>(std::lround(signal.time[k])),
@@ -69,21 +70,21 @@ Expected<Column> column_of(const Log& log, std::initializer_list<std::string_vie
     }
     return column;
   }
-  return Column{};
+  return CurveColumn{};
 }
 
 /// The rows that all columns have.
-std::vector<VectorXd> rows_of(std::initializer_list<const Column*> columns) {
+std::vector<VectorXd> rows_of(std::initializer_list<const CurveColumn*> columns) {
   std::vector<Index> common;
   for (const auto& [row, value] : (*columns.begin())->rows) {
-    if (std::all_of(columns.begin(), columns.end(), [row = row](const Column* column) {
+    if (std::all_of(columns.begin(), columns.end(), [row = row](const CurveColumn* column) {
           return column->rows.find(row) != column->rows.end();
         })) {
       common.push_back(row);
     }
   }
   std::vector<VectorXd> all;
-  for (const Column* column : columns) {
+  for (const CurveColumn* column : columns) {
     VectorXd values(static_cast<Index>(common.size()));
     for (std::size_t k = 0; k < common.size(); ++k) {
       values(static_cast<Index>(k)) = column->rows.at(common[k]);
@@ -98,7 +99,7 @@ Error no_column(std::string_view what, const Log& log) {
   for (const Signal& signal : log.signals) {
     names.push_back("\"" + signal.name + "\"");
   }
-  return Error(refusal(ArgumentError::empty, where, std::string(what))
+  return Error(refusal(ArgumentError::empty, in_motor_curves, std::string(what))
                    .got(names.size() < 2
                             ? std::string("not there: this is no table of numbers")
                             : fmt::format("not there, among {}", fmt::join(names, ", ")))
@@ -109,11 +110,11 @@ Error no_column(std::string_view what, const Log& log) {
 /// The motor of the table whose name the file's begins with.
 std::optional<mechanisms::DcMotor> motor_of_file(const std::string& path) {
   const std::size_t slash = path.find_last_of('/');
-  const std::string name = lower(slash == std::string::npos ? path : path.substr(slash + 1));
+  const std::string name = lower_case(slash == std::string::npos ? path : path.substr(slash + 1));
   std::optional<mechanisms::DcMotor> found;
   std::size_t longest = 0;
   for (const mechanisms::MotorTableEntry& entry : mechanisms::motor_table()) {
-    const std::string known = lower(std::string(entry.name));
+    const std::string known = lower_case(std::string(entry.name));
     if (known.size() > longest && name.starts_with(known)) {
       longest = known.size();
       found = mechanisms::motor(entry.name).value();
@@ -122,12 +123,12 @@ std::optional<mechanisms::DcMotor> motor_of_file(const std::string& path) {
   return found;
 }
 
-Expected<void> fit_curve(const Log& log, const Column& speed, const Column& torque,
-                         const Column& current, const MotorCurvesJob& job, MotorCurveFile& file,
-                         std::vector<Diagnostic>& diagnostics) {
+Expected<void> fit_curve(const Log& log, const CurveColumn& speed, const CurveColumn& torque,
+                         const CurveColumn& current, const MotorCurvesJob& job,
+                         MotorCurveFile& file, std::vector<Diagnostic>& diagnostics) {
   const auto rows = rows_of({&speed, &torque, &current});
   identification::MotorCurve curve{0.0, rows[0], rows[1], rows[2]};
-  FLYBALL_TRY(const Column power,
+  FLYBALL_TRY(const CurveColumn power,
               column_of(log, {"supplied power", "input power"}, std::nullopt, 1.0));
   if (job.voltage) {
     curve.voltage = *job.voltage;
@@ -158,11 +159,11 @@ Expected<void> fit_curve(const Log& log, const Column& speed, const Column& torq
   return {};
 }
 
-Expected<void> fit_locked(const Log& log, const Column& torque, const Column& current,
+Expected<void> fit_locked(const Log& log, const CurveColumn& torque, const CurveColumn& current,
                           MotorCurveFile& file, std::vector<Diagnostic>& diagnostics) {
-  FLYBALL_TRY(const Column time, column_of(log, {"time"}, Dimension::time, 1.0));
-  FLYBALL_TRY(Column voltage, column_of(log, {"volt"}, Dimension::voltage, 1.0));
-  FLYBALL_TRY(const Column output, column_of(log, {"output"}, std::nullopt, 0.01));
+  FLYBALL_TRY(const CurveColumn time, column_of(log, {"time"}, Dimension::time, 1.0));
+  FLYBALL_TRY(CurveColumn voltage, column_of(log, {"volt"}, Dimension::voltage, 1.0));
+  FLYBALL_TRY(const CurveColumn output, column_of(log, {"output"}, std::nullopt, 0.01));
   if (time.empty() || voltage.empty()) {
     return tl::unexpected(
         no_column(time.empty() ? "a column of time" : "a column of voltage", log));
@@ -209,9 +210,10 @@ Expected<MotorCurveFile> fit_file(const std::string& path, const MotorCurvesJob&
     FLYBALL_TRY(file.known, mechanisms::motor(job.motor));
   }
   const double rpm = parse_unit("rpm").value().factor;
-  FLYBALL_TRY(const Column speed, column_of(log, {"speed"}, Dimension::angular_velocity, rpm));
-  FLYBALL_TRY(const Column torque, column_of(log, {"torque"}, Dimension::torque, 1.0));
-  FLYBALL_TRY(const Column current, column_of(log, {"current", "amps"}, Dimension::current, 1.0));
+  FLYBALL_TRY(const CurveColumn speed, column_of(log, {"speed"}, Dimension::angular_velocity, rpm));
+  FLYBALL_TRY(const CurveColumn torque, column_of(log, {"torque"}, Dimension::torque, 1.0));
+  FLYBALL_TRY(const CurveColumn current,
+              column_of(log, {"current", "amps"}, Dimension::current, 1.0));
   if (torque.empty() || current.empty()) {
     return tl::unexpected(
         no_column(torque.empty() ? "a column of torque" : "a column of current", log));
@@ -225,10 +227,10 @@ Expected<MotorCurveFile> fit_file(const std::string& path, const MotorCurvesJob&
 
 Expected<MotorCurvesResult> fit_motor_curves(const MotorCurvesJob& job) {
   if (job.paths.empty()) {
-    return refusal(ArgumentError::empty, where, "the files").expected("at least one");
+    return refusal(ArgumentError::empty, in_motor_curves, "the files").expected("at least one");
   }
   if (job.voltage) {
-    FLYBALL_CHECK(Checks(where).positive(*job.voltage, "--voltage", "V"));
+    FLYBALL_CHECK(Checks(in_motor_curves).positive(*job.voltage, "--voltage", "V"));
   }
   MotorCurvesResult result;
   for (const std::string& path : job.paths) {

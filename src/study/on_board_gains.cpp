@@ -3,16 +3,14 @@
 #include <cmath>
 #include <complex>
 #include <limits>
-#include <numbers>
 #include <optional>
 
+#include "core/constants.hpp"
 #include "study/design_steps.hpp"
 
 namespace flyball::study {
 
 namespace {
-
-using std::numbers::pi;
 
 struct PdMargins {
   double gain = std::numeric_limits<double>::infinity();   ///< Ratio.

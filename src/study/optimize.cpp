@@ -11,14 +11,14 @@
 namespace flyball::study {
 
 ErrorInfo error_info(OptimizeError code) {
-  static constexpr detail::ErrorRow rows[] = {
+  static constexpr flyball::detail::ErrorRow rows[] = {
       {"no_waypoints", "the file does not say where to go", ErrorKind::misuse},
       {"no_robot", "nothing says what the robot is", ErrorKind::misuse},
       {"unknown_kind", "there is no such constraint", ErrorKind::misuse},
       {"contradiction", "the constraints cannot all be kept", ErrorKind::no_answer},
       {"not_found", "no trajectory was found", ErrorKind::no_answer},
   };
-  return detail::info_of(code, "optimize", rows);
+  return flyball::detail::info_of(code, "optimize", rows);
 }
 
 Expected<OptimizeResult> optimize(const OptimizeJob& job) {

@@ -20,12 +20,12 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double gravity = 9.80665;
+constexpr double standard_gravity = 9.80665;
 
 /// The comma-separated parts of a row of a key, and what is wrong with it.
-class Row {
+class TomlRow {
  public:
-  Row(const Project& project, std::string key, std::size_t number, const std::string& text)
+  TomlRow(const Project& project, std::string key, std::size_t number, const std::string& text)
       : path_(project.path), name_(fmt::format("optimize.{}[{}]", key, number)), text_(text) {
     for (const std::string_view part : text::split(text_, ",")) {
       parts_.emplace_back(part);
@@ -83,7 +83,7 @@ class Row {
 Expected<void> take_waypoints(const Project& project, DriveProblem& problem) {
   const auto& rows = project.optimize.waypoints;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    Row row(project, "waypoints", i, rows[i]);
+    TomlRow row(project, "waypoints", i, rows[i]);
     DriveWaypoint w;
     const bool end = i == 0 || i + 1 == rows.size();
     const bool guess = row.take_word("guess");
@@ -112,7 +112,7 @@ Expected<void> take_areas(const Project& project, const std::string& key,
                           const std::vector<std::string>& rows, bool inside,
                           DriveProblem& problem) {
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Row row(project, key, i, rows[i]);
+    const TomlRow row(project, key, i, rows[i]);
     DriveConstraint c{.from = 0, .to = -1};
     std::vector<double> values;
     for (std::size_t j = 0; j < row.size(); ++j) {
@@ -156,7 +156,7 @@ Expected<void> take_rows(const Project& project, DriveProblem& problem) {
   const OptimizeSection& said = project.optimize;
   const std::size_t count = problem.waypoints.size();
   for (std::size_t i = 0; i < said.lanes.size(); ++i) {
-    const Row row(project, "lanes", i, said.lanes[i]);
+    const TomlRow row(project, "lanes", i, said.lanes[i]);
     if (row.size() != 3) {
       return tl::unexpected(row.wrong_count("from, to, tolerance"));
     }
@@ -168,7 +168,7 @@ Expected<void> take_rows(const Project& project, DriveProblem& problem) {
     problem.constraints.push_back(std::move(c));
   }
   for (std::size_t i = 0; i < said.point_at.size(); ++i) {
-    const Row row(project, "point_at", i, said.point_at[i]);
+    const TomlRow row(project, "point_at", i, said.point_at[i]);
     if (row.size() != 5) {
       return tl::unexpected(row.wrong_count("from, to, x, y, tolerance"));
     }
@@ -211,7 +211,8 @@ DriveModel model_of(const DriveJob& job) {
   const double limited =
       std::isfinite(robot.stator_limit) ? motor.Kt * robot.stator_limit * arm : model.stall_force;
   model.max_force = std::min(model.stall_force, limited);
-  model.friction = robot.grip * robot.mass * gravity / static_cast<double>(model.wheel_count());
+  model.friction =
+      robot.grip * robot.mass * standard_gravity / static_cast<double>(model.wheel_count());
   const double x = 0.5 * robot.length;
   const double y = 0.5 * robot.width;
   model.corners = {Vector2d(x, y), Vector2d(-x, y), Vector2d(-x, -y), Vector2d(x, -y)};

@@ -76,7 +76,7 @@ std::optional<ChoreoSides> sides_of(const PathResult& result) {
 }
 
 /// Of what was read, without folder and ending.
-std::string name_of(const PathJob& job) {
+std::string job_name(const PathJob& job) {
   return stem(job.files.empty() ? job.project : job.files.front());
 }
 
@@ -102,7 +102,7 @@ ExpectedAll<std::string> written(PathResult& result) {
     if (sides && result.trajectory.holonomic) {
       return cannot_write(job, "of a robot that moves sideways", "one that looks where it goes");
     }
-    return to_choreo(to_choreo_trajectory(result.trajectory, name_of(job), sides));
+    return to_choreo(to_choreo_trajectory(result.trajectory, job_name(job), sides));
   }
   if (job.to == "wpilib") {
     return to_wpilib(to_wpilib_trajectory(result.trajectory));
@@ -111,7 +111,7 @@ ExpectedAll<std::string> written(PathResult& result) {
   if (job.to == "csv") {
     return to_csv(table);
   }
-  return exports::motion_table(table, "path", "A trajectory of " + name_of(job),
+  return exports::motion_table(table, "path", "A trajectory of " + job_name(job),
                                exports::motion_rates);
 }
 

@@ -29,7 +29,7 @@ Expected<void> check_format(const std::string& text) {
       .hint(near.empty() ? "" : "did you mean \"" + near + "\"?");
 }
 
-const std::array rows{
+const std::array path_rows{
     text("to", at<&PathJob::to>(), "\"choreo\"",
          "Write it in this format, to --out or the terminal")
         .one_of("choreo, wpilib, csv, c++, pathplanner")
@@ -85,13 +85,13 @@ const std::array rows{
              "Of the field, to flip and mirror")
         .without("8.052 m, that of 2025")};
 
-constexpr std::string_view section_name = "path";
+constexpr std::string_view path_section_name = "path";
 
-std::optional<SignalDimensions> dimensions_of(const void*) {
+std::optional<SignalDimensions> path_dimensions_of(const void*) {
   return SignalDimensions{{}, length, Dimension::velocity, Dimension::acceleration};
 }
 
-std::string example_of(const Field& field) {
+std::string path_example_of(const Field& field) {
   std::string example(field.example);
   std::erase(example, '"');
   return example.find(' ') == std::string::npos ? example : "'" + example + "'";
@@ -121,13 +121,13 @@ std::string value_of(const Field& field) {
 
 std::vector<FieldInfo> path_fields() {
   std::vector<FieldInfo> all;
-  for (const Field& field : rows) {
-    all.push_back({.section = std::string(section_name),
+  for (const Field& field : path_rows) {
+    all.push_back({.section = std::string(path_section_name),
                    .key = std::string(field.key),
                    .option = option_of(field),
                    .value = value_of(field),
                    .help = std::string(field.help),
-                   .example = example_of(field),
+                   .example = path_example_of(field),
                    .absent = std::string(field.absent)});
   }
   return all;
@@ -135,10 +135,10 @@ std::vector<FieldInfo> path_fields() {
 
 ExpectedAll<PathJob> path_job(const std::vector<std::string>& files,
                               std::span<const Override> given) {
-  const std::array sections{Section{section_name, rows,
+  const std::array sections{Section{path_section_name, path_rows,
                                     [](void* document, bool) { return document; },
                                     "What is asked of a path."}};
-  const Document table{sections, dimensions_of};
+  const Document table{sections, path_dimensions_of};
   TomlDocument document("", "");
   document.apply(given, sections);
   PathJob job;

@@ -1,11 +1,11 @@
 // Files of planning tools with the field turned or mirrored.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "core/constants.hpp"
 #include "study/path_route.hpp"
 
 namespace flyball::study {
@@ -13,8 +13,6 @@ namespace flyball::study {
 namespace {
 
 using Eigen::Vector2d;
-
-constexpr double pi = std::numbers::pi;
 
 /// A number with the expression that says it.
 void set(ExpressedNumber& number, double value, std::string_view unit) {

@@ -8,6 +8,7 @@
 
 #include <flyball/core/argument.hpp>
 
+#include "core/constants.hpp"
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "study/path_route.hpp"
@@ -18,7 +19,6 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double degree = std::numbers::pi / 180.0;
 constexpr double none = std::numeric_limits<double>::infinity();
 
 SplineSegment bezier(const Vector2d& a, const Vector2d& b, const Vector2d& c, const Vector2d& d) {
@@ -43,8 +43,8 @@ RouteLimits limits_of(const PathPlannerConstraints& from) {
           // A module's force does not know along from across.
           .acceleration = from.max_acceleration,
           .centripetal = none,
-          .angular_velocity = degree * from.max_angular_velocity,
-          .angular_acceleration = degree * from.max_angular_acceleration,
+          .angular_velocity = one_degree * from.max_angular_velocity,
+          .angular_acceleration = one_degree * from.max_angular_acceleration,
           .place = from.origin.place()};
 }
 
@@ -89,7 +89,7 @@ Expected<RouteShape> shape_of(const PathPlannerPath& path, const std::string& so
         shape.stops.push_back(at);
       }
       if (holonomic && waypoint.holonomic_angle) {
-        shape.headings.push_back({at, degree * *waypoint.holonomic_angle});
+        shape.headings.push_back({at, one_degree * *waypoint.holonomic_angle});
       }
       if (waypoint.velocity_override && *waypoint.velocity_override > 0.0) {
         RouteLimits limits{none, none, none, none, none};
@@ -116,18 +116,18 @@ Expected<RouteShape> shape_of(const PathPlannerPath& path, const std::string& so
   const std::optional<PathPlannerState>& start =
       path.ideal_starting_state ? path.ideal_starting_state : path.preview_starting_state;
   const double goal = path.goal_end_state ? path.goal_end_state->rotation : 0.0;
-  shape.headings.push_back({0.0, degree * (start ? start->rotation : goal)});
+  shape.headings.push_back({0.0, one_degree * (start ? start->rotation : goal)});
   for (const PathPlannerRotation& target : path.rotation_targets) {
-    shape.headings.push_back({std::clamp(target.position, 0.0, last), degree * target.degrees});
+    shape.headings.push_back({std::clamp(target.position, 0.0, last), one_degree * target.degrees});
   }
   std::stable_sort(
       shape.headings.begin(), shape.headings.end(),
       [](const RouteHeading& a, const RouteHeading& b) { return a.position < b.position; });
-  shape.headings.push_back({last, degree * goal});
+  shape.headings.push_back({last, one_degree * goal});
   for (const PathPlannerPointing& pointing : path.pointing) {
     shape.pointing.push_back({std::clamp(pointing.from, 0.0, last),
                               std::clamp(pointing.to, 0.0, last), of(pointing.place),
-                              degree * pointing.rotation_offset});
+                              one_degree * pointing.rotation_offset});
   }
   return shape;
 }

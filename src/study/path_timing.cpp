@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,6 +10,7 @@
 #include <flyball/planning/path/edit_path.hpp>
 #include <flyball/planning/trajectory/path_trajectory.hpp>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "study/path_geometry.hpp"
 #include "study/path_route.hpp"
@@ -20,8 +20,6 @@ namespace flyball::study {
 namespace {
 
 using Eigen::Vector2d;
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
 
 TravelLimits travel(const RouteLimits& limits) {
   return {.velocity = limits.velocity,
@@ -105,22 +103,24 @@ Expected<void> check_limits(const RouteShape& shape) {
 /// looks, or backs after a cusp.
 class FacingHeading {
  public:
-  explicit FacingHeading(bool reversed) : offset_(reversed ? std::numbers::pi : 0.0) {}
+  explicit FacingHeading(bool reversed) : offset_(reversed ? pi : 0.0) {}
 
   void begin_part(double way) {
-    if (heading_) {
-      const double step = std::remainder(way - *heading_, two_pi);
-      offset_ = std::abs(step) > 0.5 * std::numbers::pi ? std::numbers::pi : 0.0;
+    if (begun_) {
+      const double step = std::remainder(way - heading_, full_turn);
+      offset_ = std::abs(step) > 0.5 * pi ? pi : 0.0;
     }
   }
   double at(double way) {
+    begun_ = true;
     heading_ = way + offset_;
-    return *heading_;
+    return heading_;
   }
 
  private:
   double offset_;
-  std::optional<double> heading_;
+  double heading_ = 0.0;
+  bool begun_ = false;
 };
 
 /// Even times of a part's motion. @param rests  Whether it does at its start, at its end.

@@ -20,7 +20,7 @@ namespace flyball::study {
 
 namespace {
 
-using Names = std::vector<std::string_view>;
+using NameList = std::vector<std::string_view>;
 
 /// Reads one file and keeps all that is wrong with it.
 class PlanReader {
@@ -110,7 +110,7 @@ class PlanReader {
         node.source(),
         Error(ProjectError::wrong_type).about(name).got("another type").expected(std::move(what)));
   }
-  void known(const toml::table& table, const std::string& what, const Names& names) {
+  void known(const toml::table& table, const std::string& what, const NameList& names) {
     for (const auto& [key, value] : table) {
       if (std::find(names.begin(), names.end(), key.str()) == names.end()) {
         const std::string nearest = nearest_name(key.str(), names);
@@ -314,7 +314,7 @@ class PlanReader {
     return to;
   }
   int axis_index(const toml::table& table, std::string_view key, std::string_view name) {
-    Names names;
+    NameList names;
     for (std::size_t k = 0; k < axes_.size(); ++k) {
       if (axes_[k].name == name) {
         return static_cast<int>(k);
@@ -332,7 +332,7 @@ class PlanReader {
 
   // Regions.
   std::optional<Region> region(const toml::table& table, bool named) {
-    Names names{"box", "half_space", "polygon", "any", "all", "not"};
+    NameList names{"box", "half_space", "polygon", "any", "all", "not"};
     if (named) {
       names.insert(names.end(), {"name", "rule"});
     }
@@ -448,7 +448,7 @@ class PlanReader {
 
   // The mechanism.
   int joint_index(const toml::table& table, std::string_view key, const std::string& name) {
-    Names names;
+    NameList names;
     for (std::size_t j = 0; j < mechanism_.joints.size(); ++j) {
       if (mechanism_.joints[j].name == name) {
         return static_cast<int>(j);

@@ -16,21 +16,25 @@ namespace flyball::study {
 
 namespace {
 
-constexpr std::string_view where = "profile";
+constexpr std::string_view in_profile = "profile";
 
 Expected<std::optional<MotorMotionLimits>> motor_of(const ProfileJob& job) {
   if (!job.kV) {
     if (job.kA) {
-      return refusal(ArgumentError::empty, where, "kV").got("left out").expected("given with kA");
+      return refusal(ArgumentError::empty, in_profile, "kV")
+          .got("left out")
+          .expected("given with kA");
     }
     return std::optional<MotorMotionLimits>{};
   }
   if (!job.kA) {
-    return refusal(ArgumentError::empty, where, "kA").got("left out").expected("given with kV");
+    return refusal(ArgumentError::empty, in_profile, "kA")
+        .got("left out")
+        .expected("given with kV");
   }
   MotorMotionLimits motor{
       .kV = *job.kV, .kA = *job.kA, .voltage = job.voltage.si(), .kS = job.kS, .kG = job.kG};
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_profile)
                     .positive(motor.kV, "kV")
                     .positive(motor.kA, "kA")
                     .positive(motor.voltage, "voltage", "V")
@@ -38,7 +42,7 @@ Expected<std::optional<MotorMotionLimits>> motor_of(const ProfileJob& job) {
                     .finite(motor.kG, "kG"));
   if (job.current) {
     if (!job.resistance) {
-      return refusal(ArgumentError::empty, where, "resistance")
+      return refusal(ArgumentError::empty, in_profile, "resistance")
           .got("left out")
           .expected("given with current");
     }
@@ -50,7 +54,7 @@ Expected<std::optional<MotorMotionLimits>> motor_of(const ProfileJob& job) {
   const double held = std::abs(motor.kG) + motor.kS;
   const double most = std::min(motor.voltage, motor.current_voltage);
   if (held >= most) {
-    return refusal(ArgumentError::out_of_range, where, "friction and gravity")
+    return refusal(ArgumentError::out_of_range, in_profile, "friction and gravity")
         .got(fmt::format("{} V together", format_number(held)))
         .expected(fmt::format("below the {} V that the motor has at rest", format_number(most)))
         .hint("add motors, gear lower or counterbalance");
@@ -73,7 +77,7 @@ Expected<MotionLimits> limits_of(const ProfileJob& job,
   for (const auto& [value, name, unit] : {std::tuple(limits.velocity, "velocity", "/s"),
                                           {limits.acceleration, "acceleration", "/s²"}}) {
     if (!(value > 0.0)) {
-      return refusal(ArgumentError::empty, where, name)
+      return refusal(ArgumentError::empty, in_profile, name)
           .got("left out")
           .expected(fmt::format("a limit such as --{} \"2 {}{}\", or a motor by --kv and --ka",
                                 name, job.angle ? "rad" : "m", unit));
@@ -93,7 +97,7 @@ Expected<void> tabulate(const Profile& profile, ProfileResult& result) {
   const double period = result.job.period.si();
   constexpr double most_rows = 1e6;
   if (!(end / period < most_rows)) {
-    return refusal(ArgumentError::out_of_range, where, "the profile")
+    return refusal(ArgumentError::out_of_range, in_profile, "the profile")
         .got(fmt::format("{} s long, {:.3g} periods", format_number(end), end / period))
         .expected("at most a million periods long")
         .hint("raise the limits or --period");
@@ -142,7 +146,7 @@ Expected<void> plan(ProfileResult& result, const std::optional<MotorMotionLimits
     case ProfileKind::minimum_jerk: {
       const MinimumJerkProfile profile(limits, from, to);
       if (!profile.keeps_limits()) {
-        return refusal(ArgumentError::out_of_range, where, "a fifth-degree polynomial")
+        return refusal(ArgumentError::out_of_range, in_profile, "a fifth-degree polynomial")
             .got("beyond the limits at every duration")
             .expected("ends within the limits")
             .hint("s-curve goes between all states");
@@ -176,12 +180,12 @@ Expected<ProfileResult> plan_profile(const ProfileJob& job) {
                                     {result.limits.velocity, "velocity"},
                                     {result.limits.acceleration, "acceleration"}}) {
     if (!(std::abs(value) <= largest)) {
-      return refusal(ArgumentError::out_of_range, where, name)
+      return refusal(ArgumentError::out_of_range, in_profile, name)
           .got(format_number(value))
           .expected("a size up to 1e30");
     }
   }
-  FLYBALL_CHECK(Checks(where).positive(job.period.si(), "period", "s"));
+  FLYBALL_CHECK(Checks(in_profile).positive(job.period.si(), "period", "s"));
 
   double jump = job.jump;
   if (job.kind.empty() && motor && !(job.velocity > 0.0) && !(job.acceleration > 0.0)) {
@@ -211,7 +215,7 @@ Expected<ProfileResult> plan_profile(const ProfileJob& job) {
     FLYBALL_TRY(result.kind, parse_profile_kind(job.kind));
   }
   if (result.kind == ProfileKind::exponential && !motor) {
-    return refusal(ArgumentError::empty, where, "the motor")
+    return refusal(ArgumentError::empty, in_profile, "the motor")
         .got("left out")
         .expected("--kv and --ka of an exponential profile");
   }

@@ -14,12 +14,12 @@ namespace {
 using enum Dimension;
 using enum Range;
 
-constexpr FieldDimension place = FieldDimension::output;
+constexpr FieldDimension in_place = FieldDimension::output;
 constexpr FieldDimension rate = FieldDimension::rate;
 constexpr FieldDimension change = FieldDimension::acceleration;
 constexpr const char* per_si = "NUMBER";
 
-const std::array rows{
+const std::array profile_rows{
     text("kind", at<&ProfileJob::kind>(), "\"s-curve\"", "The profile")
         .takes("KIND")
         .one_of("trapezoid, s-curve, exponential, parabolic, stepper, minimum-jerk")
@@ -28,11 +28,11 @@ const std::array rows{
         .without("false: lengths"),
     flag("continuous", at<&ProfileJob::continuous>(), "true", "It may go either way round a circle")
         .without("false"),
-    quantity("from", at<&ProfileJob::from, &MotionState::position>(), place, any, "\"0.2 m\"",
+    quantity("from", at<&ProfileJob::from, &MotionState::position>(), in_place, any, "\"0.2 m\"",
              "Where it is")
         .takes("POSITION")
         .without("0"),
-    quantity("to", at<&ProfileJob::to, &MotionState::position>(), place, any, "\"1.4 m\"",
+    quantity("to", at<&ProfileJob::to, &MotionState::position>(), in_place, any, "\"1.4 m\"",
              "Where it is to be")
         .takes("POSITION")
         .without("0"),
@@ -116,15 +116,15 @@ const std::array rows{
              "Time between two rows of the table")
         .without("20 ms")};
 
-constexpr std::string_view section_name = "profile";
+constexpr std::string_view profile_section_name = "profile";
 
-std::optional<SignalDimensions> dimensions_of(const void* document) {
+std::optional<SignalDimensions> profile_dimensions_of(const void* document) {
   const bool turns = static_cast<const ProfileJob*>(document)->angle;
   return turns ? SignalDimensions{{}, Dimension::angle, angular_velocity, angular_acceleration}
                : SignalDimensions{{}, length, Dimension::velocity, Dimension::acceleration};
 }
 
-std::string example_of(const Field& field) {
+std::string profile_example_of(const Field& field) {
   std::string example(field.example);
   std::erase(example, '"');
   return example.find(' ') == std::string::npos ? example : "'" + example + "'";
@@ -134,7 +134,7 @@ std::string example_of(const Field& field) {
 
 std::vector<FieldInfo> profile_fields() {
   std::vector<FieldInfo> all;
-  for (const Field& field : rows) {
+  for (const Field& field : profile_rows) {
     const std::string value = !field.metavar.empty()                   ? std::string(field.metavar)
                               : field.type == FieldType::flag          ? ""
                               : field.dimension.dimension == time      ? "TIME"
@@ -142,22 +142,22 @@ std::vector<FieldInfo> profile_fields() {
                               : field.dimension.dimension == Dimension::voltage ? "VOLTAGE"
                               : field.dimension.dimension == Dimension::current ? "CURRENT"
                                                                                 : "RESISTANCE";
-    all.push_back({.section = std::string(section_name),
+    all.push_back({.section = std::string(profile_section_name),
                    .key = std::string(field.key),
                    .option = option_of(field),
                    .value = value,
                    .help = std::string(field.help),
-                   .example = example_of(field),
+                   .example = profile_example_of(field),
                    .absent = std::string(field.absent)});
   }
   return all;
 }
 
 ExpectedAll<ProfileJob> profile_job(std::span<const Override> given) {
-  const std::array sections{Section{section_name, rows,
+  const std::array sections{Section{profile_section_name, profile_rows,
                                     [](void* document, bool) { return document; },
                                     "What is asked of a profile."}};
-  const Document table{sections, dimensions_of};
+  const Document table{sections, profile_dimensions_of};
   TomlDocument document("", "");
   document.apply(given, sections);
   ProfileJob job;

@@ -77,12 +77,12 @@ Expected<void> check_motor(const std::string& text) {
   return mechanisms::motor(text).map([](const auto&) {});
 }
 
-constexpr std::string_view kinds =
+constexpr std::string_view kind_words =
     "elevator, arm, flywheel, roller, turret, swerve steer, swerve drive";
 
 constexpr std::array mechanism_fields{
     text("type", at<&MechanismParts::type>(), "\"elevator\"", "What it is")
-        .one_of(kinds)
+        .one_of(kind_words)
         .checked(check_kind)
         .must()
         .no_option(),

@@ -26,7 +26,7 @@ namespace flyball::study {
 
 namespace {
 
-constexpr std::string_view where = "simulate";
+constexpr std::string_view in_simulate = "simulate";
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -177,14 +177,16 @@ Expected<Simulation> mechanism_open_loop(const Project& project) {
     const double t = rows.time[static_cast<std::size_t>(k)];
     rows.x.col(k) << state.position, state.velocity;
     rows.u.col(k) = run.input(t);
-    FLYBALL_CHECK(flyball::detail::check_point(names, rows.x.col(k), rows.u.col(k), where, t));
+    FLYBALL_CHECK(
+        flyball::detail::check_point(names, rows.x.col(k), rows.u.col(k), in_simulate, t));
     const double step =
         k + 1 < rows.x.cols() ? rows.time[static_cast<std::size_t>(k) + 1] - t : 0.0;
     const double parts = std::ceil(step / longest - 1e-9);
     for (double i = 0.0; i < parts; ++i) {
       const double middle = t + (i + 0.5) * step / parts;
       const VectorXd voltage = run.input(middle);
-      FLYBALL_CHECK(flyball::detail::check_point(names, rows.x.col(k), voltage, where, middle));
+      FLYBALL_CHECK(
+          flyball::detail::check_point(names, rows.x.col(k), voltage, in_simulate, middle));
       state = truth.step(state, voltage(0), step / parts);
     }
   }
@@ -205,7 +207,7 @@ ExpectedAll<Simulation> mechanism_closed_loop(const Project& project) {
                    .initial = mechanism_state(run),
                    .duration = run.duration_is_given ? std::optional(run.duration) : std::nullopt});
     if (!tried) {
-      return refused(where, std::move(tried).error(), std::move(designed.diagnostics));
+      return refused(in_simulate, std::move(tried).error(), std::move(designed.diagnostics));
     }
     designed.response = std::move(tried->series);
   }
@@ -259,7 +261,7 @@ Expected<Simulation> simulate_open_loop(const ModelJob& job) {
     initial = or_else(run.initial, point.x);
   }
   FLYBALL_TRY(Rows rows, rows_of(model.names(), run));
-  FLYBALL_CHECK(model.check(initial, run.input(0.0), where, 0.0));
+  FLYBALL_CHECK(model.check(initial, run.input(0.0), in_simulate, 0.0));
   constexpr double most_of_the_run = 0.02;  // so that no step jumps over a pulse of an input
   constexpr double most_numbers = 4e6;      // that the steps may keep
   const double most_steps =
@@ -270,7 +272,7 @@ Expected<Simulation> simulate_open_loop(const ModelJob& job) {
                                    .max_steps = static_cast<int>(most_steps)};
   auto solution = integrate(with_input(model, run.input), 0.0, initial, run.duration, options);
   if (!solution) {
-    Error error = explained(std::move(solution).error(), model, run.input, where);
+    Error error = explained(std::move(solution).error(), model, run.input, in_simulate);
     if (error.is(IntegrationError::too_many_steps)) {
       error = std::move(error)
                   .about("the end of the simulation")
@@ -285,7 +287,7 @@ Expected<Simulation> simulate_open_loop(const ModelJob& job) {
     rows.u.col(k) = run.input(t);
     rows.y.col(k) = model.output(rows.x.col(k), rows.u.col(k));
     if (!rows.y.col(k).allFinite()) {
-      FLYBALL_CHECK(model.check(rows.x.col(k), rows.u.col(k), where, t));
+      FLYBALL_CHECK(model.check(rows.x.col(k), rows.u.col(k), in_simulate, t));
     }
   }
   return recorded(described(model.names(), job.path, run, job.outputs_are_states), std::move(rows));
@@ -295,7 +297,7 @@ Expected<Simulation> simulate_with(const ModelJob& job, const ModelRegulator& re
                                    const ModelRun& run, ControlLaw law) {
   const AnyModel& model = job.model;
   if (run.duration < job.period) {
-    return refusal(ArgumentError::out_of_range, where, "simulation.duration")
+    return refusal(ArgumentError::out_of_range, in_simulate, "simulation.duration")
         .got(fmt::format("{} s", format_number(run.duration)))
         .expected(
             fmt::format("at least a period of the controller, {} s", format_number(job.period)));
@@ -317,7 +319,7 @@ Expected<Simulation> simulate_with(const ModelJob& job, const ModelRegulator& re
                                              {.accuracy = run.accuracy}));
   auto looped = flyball::simulate_closed_loop(plant, law, loop);
   if (!looped) {
-    return tl::unexpected(std::move(looped).error().in(std::string(where)));
+    return tl::unexpected(std::move(looped).error().in(std::string(in_simulate)));
   }
   Simulation result = described(model.names(), job.path, run, job.outputs_are_states);
   result.closed_loop = true;
@@ -343,7 +345,7 @@ ExpectedAll<Simulation> simulate_closed_loop(const ModelJob& job, const ModelReg
   if (auto simulation = closed_loop(job, regulator)) {
     return *std::move(simulation);
   } else {
-    return refused(where, std::move(simulation).error(), regulator.diagnostics);
+    return refused(in_simulate, std::move(simulation).error(), regulator.diagnostics);
   }
 }
 
@@ -406,7 +408,7 @@ ExpectedAll<ModelDesign> design_model(const ModelJob& job) {
     if (region) {
       result.region = *std::move(region);
     } else if (afar) {
-      return refused(where, std::move(region).error(), made.diagnostics);
+      return refused(in_simulate, std::move(region).error(), made.diagnostics);
     } else {
       note(result.regulator.diagnostics, "no_region", "no region of attraction is proven: {}",
            to_string(region.error()));
@@ -415,7 +417,7 @@ ExpectedAll<ModelDesign> design_model(const ModelJob& job) {
   if (afar) {
     auto swung = swing_up(job, made, *result.region);
     if (!swung) {
-      return refused(where, std::move(swung).error(), made.diagnostics);
+      return refused(in_simulate, std::move(swung).error(), made.diagnostics);
     }
     result.swing_up = *std::move(swung);
     doubt_energy(job, made, result.regulator.diagnostics);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,6 +10,7 @@
 #include <flyball/core/progress.hpp>
 #include <flyball/math/search/minimum.hpp>
 
+#include "core/constants.hpp"
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "core/wording.hpp"
@@ -24,7 +24,6 @@ using mechanisms::PowerBound;
 using text::number;
 using text::percent;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double within = 1.02;  ///< Of the least time: what is as good as the best.
 
 /// Of the integrations of what is drawn or only compared.

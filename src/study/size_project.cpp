@@ -23,7 +23,7 @@ namespace {
 using mechanisms::GearedLoad;
 using mechanisms::MechanismKind;
 
-Error wrong(const Project& project, std::string_view key, std::string got) {
+Error wrong_size(const Project& project, std::string_view key, std::string got) {
   return Error(ProjectError::wrong_value)
       .in(project.path)
       .about(fmt::format("size.{}", key))
@@ -144,7 +144,7 @@ void take_motion(const Project& project, TravelJob& travel, std::vector<Diagnost
   }
 }
 
-std::string beside(const std::string& project, const std::string& file) {
+std::string beside_project(const std::string& project, const std::string& file) {
   const std::size_t slash = project.find_last_of('/');
   return file.starts_with('/') || slash == std::string::npos ? file
                                                              : project.substr(0, slash + 1) + file;
@@ -158,18 +158,19 @@ Expected<Winding> winding_of(const Project& project, std::vector<Diagnostic>& di
   if (said.locked_rotor.empty()) {
     return winding;
   }
-  MotorCurvesJob curves{.paths = {beside(project.path, said.locked_rotor)}};
+  MotorCurvesJob curves{.paths = {beside_project(project.path, said.locked_rotor)}};
   FLYBALL_TRY(const auto found, fit_motor_curves(curves));
   const MotorCurveFile& file = found.files.front();
   if (!file.locked || !file.locked->heat_capacity.determined) {
     return tl::unexpected(
-        wrong(project, "locked_rotor",
-              file.locked
-                  ? fmt::format("a run in which the resistance does not rise beyond its scatter "
-                                "({} over {})",
-                                text::percent(file.locked->R_rise, 2),
-                                text::count(static_cast<std::size_t>(file.locked->rows), "row"))
-                  : "a motor curve, in which the motor turns")
+        wrong_size(
+            project, "locked_rotor",
+            file.locked
+                ? fmt::format("a run in which the resistance does not rise beyond its scatter "
+                              "({} over {})",
+                              text::percent(file.locked->R_rise, 2),
+                              text::count(static_cast<std::size_t>(file.locked->rows), "row"))
+                : "a motor curve, in which the motor turns")
             .expected("a locked rotor whose windings warm")
             .hint("say winding_heat_capacity in place of it, in J/K"));
   }

@@ -20,21 +20,21 @@ namespace flyball::study {
 
 namespace {
 
-constexpr std::string_view where = "states";
+constexpr std::string_view in_states = "states";
 constexpr std::size_t most_moves = 200'000;
 
-using Place = std::vector<double>;
+using StatePlace = std::vector<double>;
 
-std::string shown(const std::string& name) {
+std::string quoted_state(const std::string& name) {
   return cut(printable(name), 60);
 }
 
 /// "height = 0.5 m, arm = 1.2 rad".
-std::string place_text(const ConfigurationSpace& space, const Place& q) {
+std::string place_text(const ConfigurationSpace& space, const StatePlace& q) {
   std::vector<std::string> words;
   for (std::size_t i = 0; i < q.size(); ++i) {
     const SpaceAxis& axis = space.axes()[i];
-    words.push_back(fmt::format("{} = {}{}{}", shown(axis.name), text::number(q[i]),
+    words.push_back(fmt::format("{} = {}{}{}", quoted_state(axis.name), text::number(q[i]),
                                 axis.unit.empty() ? "" : " ", axis.unit));
   }
   return fmt::format("{}", fmt::join(words, ", "));
@@ -50,7 +50,7 @@ struct SetSpace {
 struct Judged {
   bool free = true;
   double share = 1.0;  ///< Of its way.
-  Place at{};
+  StatePlace at{};
   std::string broken{};
 };
 
@@ -83,20 +83,20 @@ class Machine {
   }
 
   /// The corners of a transition's way from a place.
-  [[nodiscard]] std::vector<Place> way(const Place& from,
-                                       const MachineTransition& transition) const {
-    std::vector<Place> corners{from};
-    std::vector<Place> goals = transition.via;
+  [[nodiscard]] std::vector<StatePlace> way(const StatePlace& from,
+                                            const MachineTransition& transition) const {
+    std::vector<StatePlace> corners{from};
+    std::vector<StatePlace> goals = transition.via;
     goals.push_back(job_->states[state_of(transition.to)].at);
-    for (const Place& goal : goals) {
-      const Place difference = job_->space.difference(corners.back(), goal);
+    for (const StatePlace& goal : goals) {
+      const StatePlace difference = job_->space.difference(corners.back(), goal);
       if (transition.order.empty()) {
         corners.push_back(sum(corners.back(), difference));
         continue;
       }
       std::vector<bool> moved(goal.size(), false);
       for (std::size_t k = 0; k < transition.order.size(); ++k) {
-        Place next = corners.back();
+        StatePlace next = corners.back();
         const auto move = [&](std::size_t i) {
           next[i] += difference[i];
           moved[i] = true;
@@ -116,15 +116,15 @@ class Machine {
   }
 
   /// A place on a way. @param share  Of its length.
-  [[nodiscard]] Place along(const std::vector<Place>& corners, double share) const {
+  [[nodiscard]] StatePlace along(const std::vector<StatePlace>& corners, double share) const {
     const double whole = length(corners);
     double left = share * whole;
     for (std::size_t i = 1; i < corners.size(); ++i) {
-      const Place step = subtract(corners[i], corners[i - 1]);
+      const StatePlace step = subtract(corners[i], corners[i - 1]);
       const double l = job_->space.length(step);
       if (left <= l || i + 1 == corners.size()) {
         const double s = l > 0.0 ? std::min(left / l, 1.0) : 1.0;
-        Place at = corners[i - 1];
+        StatePlace at = corners[i - 1];
         for (std::size_t k = 0; k < at.size(); ++k) {
           at[k] += s * step[k];
         }
@@ -135,19 +135,19 @@ class Machine {
     return corners.back();
   }
 
-  [[nodiscard]] Judged judge(const std::vector<Place>& corners,
+  [[nodiscard]] Judged judge(const std::vector<StatePlace>& corners,
                              const std::vector<std::string>& within) const {
     const double whole = length(corners);
     double done = 0.0;
     for (std::size_t i = 1; i < corners.size(); ++i) {
-      const Place step = subtract(corners[i], corners[i - 1]);
+      const StatePlace step = subtract(corners[i], corners[i - 1]);
       const double l = job_->space.length(step);
       Judged first;
       const auto look = [&](const ConfigurationSpace& space, const std::string& set) {
         const MoveCheck check = space.check_move(corners[i - 1], step);
         const double share = whole > 0.0 ? (done + check.at * l) / whole : 0.0;
         if (!check.free && (first.free || share < first.share)) {
-          Place at = corners[i - 1];
+          StatePlace at = corners[i - 1];
           for (std::size_t k = 0; k < at.size(); ++k) {
             at[k] += check.at * step[k];
           }
@@ -166,26 +166,26 @@ class Machine {
     return {};
   }
 
-  [[nodiscard]] bool is_within(const Place& q, const std::string& set) const {
+  [[nodiscard]] bool is_within(const StatePlace& q, const std::string& set) const {
     return set_space(set).valid(q);
   }
 
  private:
   explicit Machine(const StatesJob& job) : job_(&job) {}
 
-  static Place sum(Place a, const Place& b) {
+  static StatePlace sum(StatePlace a, const StatePlace& b) {
     for (std::size_t i = 0; i < a.size(); ++i) {
       a[i] += b[i];
     }
     return a;
   }
-  static Place subtract(Place a, const Place& b) {
+  static StatePlace subtract(StatePlace a, const StatePlace& b) {
     for (std::size_t i = 0; i < a.size(); ++i) {
       a[i] -= b[i];
     }
     return a;
   }
-  [[nodiscard]] double length(const std::vector<Place>& corners) const {
+  [[nodiscard]] double length(const std::vector<StatePlace>& corners) const {
     double whole = 0.0;
     for (std::size_t i = 1; i < corners.size(); ++i) {
       whole += job_->space.length(subtract(corners[i], corners[i - 1]));
@@ -198,15 +198,15 @@ class Machine {
         ->space;
   }
 
-  Expected<void> check_place(const Place& q, const std::string& name) const {
+  Expected<void> check_place(const StatePlace& q, const std::string& name) const {
     if (q.size() != static_cast<std::size_t>(job_->space.dimension())) {
-      return refusal(ArgumentError::wrong_shape, where, name)
+      return refusal(ArgumentError::wrong_shape, in_states, name)
           .got(fmt::format("of {} numbers", q.size()))
           .expected(fmt::format("one a coordinate: {}", job_->space.dimension()));
     }
     for (const double value : q) {
       if (!std::isfinite(value)) {
-        return refusal(ArgumentError::not_finite, where, name)
+        return refusal(ArgumentError::not_finite, in_states, name)
             .got(fmt::format("{}", value))
             .expected("finite");
       }
@@ -233,32 +233,33 @@ class Machine {
                                        const std::string& of,
                                        const std::vector<std::string_view>& known) {
     const std::string near = nearest_name(name, known);
-    return refusal(ArgumentError::unknown_name, where, fmt::format("\"{}\" of {}", shown(name), of))
+    return refusal(ArgumentError::unknown_name, in_states,
+                   fmt::format("\"{}\" of {}", quoted_state(name), of))
         .got(fmt::format("not there as {}", what))
         .expected(fmt::format("one of {}", cut(fmt::format("{}", fmt::join(known, ", ")), 200)))
-        .hint(near.empty() ? "" : fmt::format("did you mean \"{}\"?", shown(near)));
+        .hint(near.empty() ? "" : fmt::format("did you mean \"{}\"?", quoted_state(near)));
   }
 
   Expected<void> check() {
     if (job_->states.empty()) {
-      return refusal(ArgumentError::empty, where, "the machine").got("without states");
+      return refusal(ArgumentError::empty, in_states, "the machine").got("without states");
     }
     if (job_->depth < 1 || job_->depth > 100) {
-      return refusal(ArgumentError::out_of_range, where, "depth")
+      return refusal(ArgumentError::out_of_range, in_states, "depth")
           .got(fmt::format("{}", job_->depth))
           .expected("from 1 to 100");
     }
     if (job_->interrupts < 0 || job_->interrupts > 20) {
-      return refusal(ArgumentError::out_of_range, where, "interrupts")
+      return refusal(ArgumentError::out_of_range, in_states, "interrupts")
           .got(fmt::format("{}", job_->interrupts))
           .expected("from 0 to 20");
     }
     std::vector<std::string_view> names;
     for (std::size_t i = 0; i < job_->states.size(); ++i) {
       const MachineState& state = job_->states[i];
-      const std::string called = fmt::format("state \"{}\"", shown(state.name));
+      const std::string called = fmt::format("state \"{}\"", quoted_state(state.name));
       if (state.name.empty() || state.name == "*" || !states_.emplace(state.name, i).second) {
-        return refusal(ArgumentError::ambiguous_name, where, called)
+        return refusal(ArgumentError::ambiguous_name, in_states, called)
             .got("there twice, empty or \"*\"")
             .expected("a name of its own");
       }
@@ -271,8 +272,9 @@ class Machine {
     }
     std::set<std::string> events;
     for (const MachineTransition& transition : job_->transitions) {
-      const std::string called = fmt::format("the transition of \"{}\" by \"{}\"",
-                                             shown(transition.from), shown(transition.event));
+      const std::string called =
+          fmt::format("the transition of \"{}\" by \"{}\"", quoted_state(transition.from),
+                      quoted_state(transition.event));
       if (transition.from != "*" && states_.count(transition.from) == 0) {
         return unknown(transition.from, "a state", called, names);
       }
@@ -280,18 +282,18 @@ class Machine {
         return unknown(transition.to, "a state", called, names);
       }
       if (!transitions_.emplace(std::pair(transition.from, transition.event), &transition).second) {
-        return refusal(ArgumentError::ambiguous_name, where, called)
+        return refusal(ArgumentError::ambiguous_name, in_states, called)
             .got("there twice")
             .expected("one transition of a state and an event");
       }
-      for (const Place& place : transition.via) {
+      for (const StatePlace& place : transition.via) {
         FLYBALL_CHECK(check_place(place, called));
       }
       std::set<int> order;
       for (const int coordinate : transition.order) {
         if (coordinate < 0 || coordinate >= job_->space.dimension() ||
             !order.insert(coordinate).second) {
-          return refusal(ArgumentError::out_of_range, where, called)
+          return refusal(ArgumentError::out_of_range, in_states, called)
               .got("with an order of coordinates that are not there, or twice")
               .expected("each coordinate at most once");
         }
@@ -301,10 +303,10 @@ class Machine {
     }
     events_.assign(events.begin(), events.end());
     for (const MachineSequence& sequence : job_->sequences) {
-      const std::string called = fmt::format("sequence \"{}\"", shown(sequence.name));
+      const std::string called = fmt::format("sequence \"{}\"", quoted_state(sequence.name));
       FLYBALL_CHECK(check_sets(sequence.within, called));
       if (!sequence.states.empty() && sequence.states.size() != sequence.events.size()) {
-        return refusal(ArgumentError::wrong_shape, where, called)
+        return refusal(ArgumentError::wrong_shape, in_states, called)
             .got(fmt::format("of {} events and {} states", sequence.events.size(),
                              sequence.states.size()))
             .expected("a state after each event");
@@ -321,8 +323,8 @@ class Machine {
         }
       }
     }
-    return job_->space.check(job_->states[states_.at(job_->start)].at, where,
-                             fmt::format("the start, \"{}\",", shown(job_->start)));
+    return job_->space.check(job_->states[states_.at(job_->start)].at, in_states,
+                             fmt::format("the start, \"{}\",", quoted_state(job_->start)));
   }
 
   const StatesJob* job_;
@@ -335,7 +337,7 @@ class Machine {
 /// A place in which the machine can be, and how it got there.
 struct Node {
   std::size_t state = 0;
-  Place at{};
+  StatePlace at{};
   std::size_t parent = 0;
   const MachineTransition* by = nullptr;
   double share = 1.0;  ///< Of the way of `by` at which the next event comes.
@@ -349,19 +351,20 @@ std::string explain(const StatesJob& job, const MachineViolation& violation) {
           ? std::string("the start")
           : fmt::format("{}",
                         fmt::join(violation.events.begin(), violation.events.end() - 1, ", then ")),
-      shown(violation.events.back()), shown(violation.from), shown(violation.to));
+      quoted_state(violation.events.back()), quoted_state(violation.from),
+      quoted_state(violation.to));
   if (!violation.arrived.empty() && violation.arrived.back() < 1.0) {
     text += fmt::format(" while the move before is at {}", text::percent(violation.arrived.back()));
   }
   text += fmt::format(": {} of the way on, at {}, {} is broken", text::percent(violation.share),
-                      place_text(job.space, violation.at), shown(violation.broken));
+                      place_text(job.space, violation.at), quoted_state(violation.broken));
   return printable(text) + ".";
 }
 
 /// What is wrong with a move or with where it ends.
 std::optional<MachineViolation> violation_of(const StatesJob& job, const Machine& machine,
-                                             const std::vector<Place>& corners, std::size_t from,
-                                             const MachineTransition& transition,
+                                             const std::vector<StatePlace>& corners,
+                                             std::size_t from, const MachineTransition& transition,
                                              std::vector<std::string> more_within) {
   more_within.insert(more_within.end(), transition.within.begin(), transition.within.end());
   const Judged judged = machine.judge(corners, more_within);
@@ -389,7 +392,7 @@ SequenceResult replay(const StatesJob& job, const Machine& machine,
                       const MachineSequence& sequence) {
   SequenceResult result{.name = sequence.name, .states = {job.start}};
   std::size_t state = machine.state_of(job.start);
-  Place at = job.states[state].at;
+  StatePlace at = job.states[state].at;
   result.way.push_back(at);
   for (std::size_t k = 0; k < sequence.events.size(); ++k) {
     const std::string& event = sequence.events[k];
@@ -398,7 +401,7 @@ SequenceResult replay(const StatesJob& job, const Machine& machine,
         sequence.events.begin(), sequence.events.begin() + static_cast<std::ptrdiff_t>(k) + 1);
     const std::string before = job.states[state].name;
     if (transition != nullptr) {
-      const std::vector<Place> corners = machine.way(at, *transition);
+      const std::vector<StatePlace> corners = machine.way(at, *transition);
       if (auto violation =
               violation_of(job, machine, corners, state, *transition, sequence.within)) {
         violation->events = so_far;
@@ -426,11 +429,12 @@ SequenceResult replay(const StatesJob& job, const Machine& machine,
           .share = 1.0,
           .sequence = sequence.name};
       violation.explanation =
-          unknown ? fmt::format("\"{}\" comes in {}, which has no transition for it.", shown(event),
-                                shown(before))
-                  : fmt::format("After \"{}\" in {} the machine is in {}, not in {}.", shown(event),
-                                shown(before), shown(job.states[state].name),
-                                shown(sequence.states[k]));
+          unknown
+              ? fmt::format("\"{}\" comes in {}, which has no transition for it.",
+                            quoted_state(event), quoted_state(before))
+              : fmt::format("After \"{}\" in {} the machine is in {}, not in {}.",
+                            quoted_state(event), quoted_state(before),
+                            quoted_state(job.states[state].name), quoted_state(sequence.states[k]));
       result.violation = std::move(violation);
       return result;
     }
@@ -439,7 +443,7 @@ SequenceResult replay(const StatesJob& job, const Machine& machine,
 }
 
 /// Places that are one.
-std::vector<long long> key_of(std::size_t state, const Place& at) {
+std::vector<long long> key_of(std::size_t state, const StatePlace& at) {
   constexpr double grain = 1e-9;
   std::vector<long long> key{static_cast<long long>(state)};
   for (const double value : at) {
@@ -475,7 +479,8 @@ void explore(const StatesJob& job, const Machine& machine, StatesResult& result)
         return std::pair(events, arrived);
       };
       if (transition == nullptr) {
-        ignored.insert(fmt::format("{} in {}", shown(event), shown(job.states[node.state].name)));
+        ignored.insert(fmt::format("{} in {}", quoted_state(event),
+                                   quoted_state(job.states[node.state].name)));
         if (job.strict) {
           MachineViolation violation{.from = job.states[node.state].name,
                                      .to = job.states[node.state].name,
@@ -485,7 +490,7 @@ void explore(const StatesJob& job, const Machine& machine, StatesResult& result)
                                      .share = 0.0};
           std::tie(violation.events, violation.arrived) = events_to();
           violation.explanation = fmt::format("\"{}\" comes in {}, which has no transition for it.",
-                                              shown(event), shown(violation.from));
+                                              quoted_state(event), quoted_state(violation.from));
           result.violation = std::move(violation);
           return;
         }
@@ -496,7 +501,7 @@ void explore(const StatesJob& job, const Machine& machine, StatesResult& result)
         break;
       }
       ++result.moves;
-      const std::vector<Place> corners = machine.way(node.at, *transition);
+      const std::vector<StatePlace> corners = machine.way(node.at, *transition);
       if (result.ways.size() < most_ways) {
         result.ways.push_back(corners);
       }
@@ -510,7 +515,7 @@ void explore(const StatesJob& job, const Machine& machine, StatesResult& result)
       reached.insert(to);
       for (int k = 1; k <= job.interrupts + 1; ++k) {
         const double share = static_cast<double>(k) / (job.interrupts + 1);
-        Place at = k == job.interrupts + 1 ? corners.back() : machine.along(corners, share);
+        StatePlace at = k == job.interrupts + 1 ? corners.back() : machine.along(corners, share);
         if (known.insert(key_of(to, at)).second) {
           nodes.push_back({to, std::move(at), n, transition, share, node.depth + 1});
         }

@@ -15,15 +15,15 @@ namespace {
 
 /// Shortest digits that read back to the same number, and TOML's mark of a number that is not
 /// whole.
-std::string number(double value) {
+std::string shortest(double value) {
   std::string text = fmt::format("{}", value);
   return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
 }
 
 std::string quantity(double value, Dimension dimension) {
   return dimension == Dimension::dimensionless
-             ? number(value)
-             : fmt::format("\"{} {}\"", number(value), si_unit(dimension));
+             ? shortest(value)
+             : fmt::format("\"{} {}\"", shortest(value), si_unit(dimension));
 }
 
 std::string toml_text(std::string_view text) {

@@ -6,6 +6,7 @@
 
 #include <flyball/math/equations/matrix_equation.hpp>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -25,9 +26,6 @@ using detail::product;
 using detail::transposed_product;
 using Eigen::Index;
 using Eigen::MatrixXd;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// |v_i w_i| of each eigenvalue, independent of the states' units.
 std::vector<Eigen::VectorXd> participations(const MatrixXd& A, Eigen::VectorXcd& values) {

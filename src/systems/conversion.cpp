@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -13,6 +12,7 @@
 #include <flyball/math/exponential/matrix_function.hpp>
 #include <flyball/systems/discretize.hpp>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "systems/matched_poles.hpp"
@@ -26,7 +26,6 @@ using detail::product;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr std::array<std::string_view, 6> names{
     "zoh", "foh", "tustin", "forward-euler", "backward-euler", "matched"};
 

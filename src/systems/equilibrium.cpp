@@ -9,7 +9,7 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "find_equilibrium";
+constexpr std::string_view in_find_equilibrium = "find_equilibrium";
 
 /// The model about a point.
 struct Local {
@@ -55,7 +55,7 @@ bool is_equilibrium(const AnyModel& model, const MatrixRef& x, const MatrixRef& 
 
 Expected<ModelEquilibrium> find_equilibrium(const AnyModel& model, const MatrixRef& x,
                                             const MatrixRef& u, EquilibriumBy by) {
-  FLYBALL_CHECK(model.check(Eigen::VectorXd(x), Eigen::VectorXd(u), where));
+  FLYBALL_CHECK(model.check(Eigen::VectorXd(x), Eigen::VectorXd(u), in_find_equilibrium));
   constexpr int most_iterations = 100;
   constexpr double tolerance = 1e-13;
   constexpr double shortest = 1e-10;
@@ -63,7 +63,7 @@ Expected<ModelEquilibrium> find_equilibrium(const AnyModel& model, const MatrixR
   ModelEquilibrium at{.x = x, .u = u};
   const Eigen::Index n = at.x.size();
   const auto refuse = [&](SearchError code, const Eigen::VectorXd& f) {
-    return refusal(code, where, "the search")
+    return refusal(code, in_find_equilibrium, "the search")
         .got("without an equilibrium near the point")
         .hint("begin nearer to one, or with other inputs")
         .with("x", list(at.x))

@@ -1,13 +1,13 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include <flyball/core/text.hpp>
 #include <flyball/systems/system_error.hpp>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "systems/matched_poles.hpp"
 #include "systems/zero_pole_gain.hpp"
@@ -18,8 +18,6 @@ namespace {
 
 using Complex = std::complex<double>;
 using Eigen::MatrixXd;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 Expected<void> check_single(const MatrixXd& D, std::string_view where) {
   if (D.rows() == 1 && D.cols() == 1) {

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "core/constants.hpp"
 #include "math/dense/dense.hpp"
 #include "systems/mode_distance.hpp"
 
@@ -12,8 +12,6 @@ namespace {
 using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 template <class Scalar>
 using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;

@@ -1,7 +1,6 @@
 #include <flyball/systems/model_reduction.hpp>
 
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -12,6 +11,7 @@
 #include <flyball/systems/norms.hpp>
 #include <flyball/systems/realization.hpp>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -30,8 +30,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Continuous = ContinuousSystem<>;
 using Discrete = DiscreteSystem<>;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 /// sign(A) by Newton's iteration, scaled; nothing where it does not end.
 std::optional<MatrixXd> sign_of(MatrixXd S) {

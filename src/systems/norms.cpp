@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -11,6 +10,7 @@
 #include <flyball/systems/analysis.hpp>
 #include <flyball/systems/conversion.hpp>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/dense_reduction.hpp"
@@ -26,8 +26,6 @@ using detail::product;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double relative_accuracy = 1e-10;
 
 ContinuousSystem<> scaled(const ContinuousSystem<>& system) {

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 
 namespace flyball {
@@ -12,7 +12,6 @@ namespace flyball {
 namespace {
 
 using Complex = std::complex<double>;
-constexpr double pi = std::numbers::pi;
 
 Expected<void> check(Time period, int points, std::string_view where) {
   FLYBALL_CHECK(check_positive(period.si(), where, "period", "s"));

@@ -2,9 +2,9 @@
 
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <string>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
@@ -28,8 +28,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Continuous = ContinuousSystem<>;
 using Discrete = DiscreteSystem<>;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 Expected<Continuous> transform(const Continuous& system, const MatrixRef& T) {
   constexpr std::string_view where = "similarity_transform";

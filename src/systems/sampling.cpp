@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 
 namespace flyball {
@@ -12,8 +11,6 @@ namespace flyball {
 namespace {
 
 using Complex = std::complex<double>;
-constexpr double pi = std::numbers::pi;
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 Expected<void> check(double frequency, Time period, std::string_view where) {
   return Checks(where).positive(period.si(), "period", "s").finite(frequency, "frequency");

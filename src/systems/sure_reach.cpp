@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/constants.hpp"
 #include "math/dense/dense.hpp"
 #include "systems/sure_reach.hpp"
 
@@ -12,8 +13,6 @@ namespace {
 using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 bool alike(double a, double b, double tolerance) {
   return std::abs(a / 2.0 - b / 2.0) <= tolerance * std::max(std::abs(a / 2.0), std::abs(b / 2.0));

@@ -105,7 +105,7 @@ ContinuousSystem<> reduced(ContinuousSystem<> s, double tolerance) {
   }
 }
 
-ContinuousSystem<> dual(const ContinuousSystem<>& s) {
+ContinuousSystem<> transposed(const ContinuousSystem<>& s) {
   return {s.A.transpose(), s.C.transpose(), s.B.transpose(), s.D.transpose()};
 }
 
@@ -125,7 +125,7 @@ Expected<TransmissionZeros> zeros_of(const ContinuousSystem<>& given, double tol
                               : 100.0 * std::numeric_limits<double>::epsilon() *
                                     static_cast<double>(std::max<Index>(1, given.A.rows())));
   // First what the outputs determine, then what the inputs do.
-  const ContinuousSystem<> s = dual(reduced(dual(reduced(scaled, small)), small));
+  const ContinuousSystem<> s = transposed(reduced(transposed(reduced(scaled, small)), small));
   TransmissionZeros found;
   found.normal_rank = s.D.rows();
   const Index n = s.A.rows();

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/constants.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/spectral_blocks.hpp"
 #include "systems/balance.hpp"
@@ -14,8 +15,6 @@ namespace {
 using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 /// Two poles, or one, and up to as many zeros.
 struct Section {

@@ -3,7 +3,7 @@
 
 #include "run.hpp"
 
-namespace flyball::test {
+namespace flyball::test::analyze_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -188,4 +188,4 @@ TEST_F(AnalyzeCommand, WhatNoControllerCanDo) {
 }
 
 }  // namespace
-}  // namespace flyball::test
+}  // namespace flyball::test::analyze_command_test

@@ -7,7 +7,7 @@
 #include "run.hpp"
 #include "support/sanitizer.hpp"
 
-namespace flyball::test {
+namespace flyball::test::bad_input_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -376,4 +376,4 @@ TEST_F(BadInput, ARefusedDesignTellsWhatWasNoticed) {
 }
 
 }  // namespace
-}  // namespace flyball::test
+}  // namespace flyball::test::bad_input_test

@@ -2,7 +2,7 @@
 
 #include "run.hpp"
 
-namespace flyball::test {
+namespace flyball::test::command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -120,4 +120,4 @@ TEST_F(Command, Motors) {
 }
 
 }  // namespace
-}  // namespace flyball::test
+}  // namespace flyball::test::command_test

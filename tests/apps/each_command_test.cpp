@@ -5,7 +5,7 @@
 
 #include "run.hpp"
 
-namespace flyball::test {
+namespace flyball::test::each_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -208,4 +208,4 @@ TEST_F(Each, AFolderWithoutLogs) {
 }
 
 }  // namespace
-}  // namespace flyball::test
+}  // namespace flyball::test::each_command_test

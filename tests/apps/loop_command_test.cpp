@@ -4,7 +4,7 @@
 
 #include "run.hpp"
 
-namespace flyball::test {
+namespace flyball::test::loop_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -260,4 +260,4 @@ TEST_F(LoopCommand, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball::test
+}  // namespace flyball::test::loop_command_test

@@ -5,7 +5,7 @@
 
 #include "run.hpp"
 
-namespace flyball::test {
+namespace flyball::test::model_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -197,4 +197,4 @@ TEST_F(Command, TellsAllMistakesOfAModelByFormula) {
 }
 
 }  // namespace
-}  // namespace flyball::test
+}  // namespace flyball::test::model_command_test

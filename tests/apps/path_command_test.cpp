@@ -4,7 +4,7 @@
 
 #include "run.hpp"
 
-namespace flyball::test {
+namespace flyball::test::path_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -75,4 +75,4 @@ TEST_F(StatesCommand, SaysWhetherAMachineIsSafe) {
 }
 
 }  // namespace
-}  // namespace flyball::test
+}  // namespace flyball::test::path_command_test

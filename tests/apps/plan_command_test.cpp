@@ -4,7 +4,7 @@
 
 #include "run.hpp"
 
-namespace flyball::test {
+namespace flyball::test::plan_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -79,4 +79,4 @@ TEST_F(PlanCommand, TellsWhatIsWrongWithAFile) {
 }
 
 }  // namespace
-}  // namespace flyball::test
+}  // namespace flyball::test::plan_command_test

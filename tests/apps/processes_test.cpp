@@ -12,7 +12,7 @@
 
 #include "processes.hpp"
 
-namespace flyball::app {
+namespace flyball::app::processes_test {
 namespace {
 
 using End = Outcome::End;
@@ -110,4 +110,4 @@ TEST(Processes, MemoryIsBounded) {
 }
 
 }  // namespace
-}  // namespace flyball::app
+}  // namespace flyball::app::processes_test

@@ -4,7 +4,7 @@
 
 #include "run.hpp"
 
-namespace flyball::test {
+namespace flyball::test::profile_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -76,4 +76,4 @@ TEST_F(ProfileCommand, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace flyball::test
+}  // namespace flyball::test::profile_command_test

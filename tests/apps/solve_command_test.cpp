@@ -4,7 +4,7 @@
 
 #include "run.hpp"
 
-namespace flyball::test {
+namespace flyball::test::solve_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -265,4 +265,4 @@ TEST_F(SolveCommand, ManyAndLongLines) {
 }
 
 }  // namespace
-}  // namespace flyball::test
+}  // namespace flyball::test::solve_command_test

@@ -6,7 +6,7 @@
 #include "support/sanitizer.hpp"
 
 // Streams, signals and folders: what a shell and a terminal see of the command.
-namespace flyball::test {
+namespace flyball::test::streams_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -253,4 +253,4 @@ TEST_F(Streams, ATimeInMicrosecondsNeedsNoMemory) {
 }
 
 }  // namespace
-}  // namespace flyball::test
+}  // namespace flyball::test::streams_test

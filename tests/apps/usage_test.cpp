@@ -6,7 +6,7 @@
 
 #include "run.hpp"
 
-namespace flyball::test {
+namespace flyball::test::usage_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -202,4 +202,4 @@ TEST_F(Usage, ManualPage) {
 }
 
 }  // namespace
-}  // namespace flyball::test
+}  // namespace flyball::test::usage_test

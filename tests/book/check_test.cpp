@@ -5,7 +5,7 @@
 
 #include "book/reference.hpp"
 
-namespace flyball::book {
+namespace flyball::book::check_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -213,4 +213,4 @@ TEST(ParseReference, RefusesWhatIsMalformed) {
 }
 
 }  // namespace
-}  // namespace flyball::book
+}  // namespace flyball::book::check_test

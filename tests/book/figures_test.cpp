@@ -8,7 +8,7 @@
 
 #include "book/figures.hpp"
 
-namespace flyball::book {
+namespace flyball::book::figures_test {
 namespace {
 
 std::string read(const std::filesystem::path& path) {
@@ -212,4 +212,4 @@ TEST(Figures, AFolderThatCannotBeMadeIsAnEnvironmentError) {
 }
 
 }  // namespace
-}  // namespace flyball::book
+}  // namespace flyball::book::figures_test

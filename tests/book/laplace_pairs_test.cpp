@@ -8,7 +8,7 @@
 
 // Table E.1 the other way around: each transform, inverted by a contour integral, is its signal
 // again.
-namespace flyball::book {
+namespace flyball::book::laplace_pairs_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -51,4 +51,4 @@ TEST(LaplacePairs, TransformBackToTheirSignals) {
 }
 
 }  // namespace
-}  // namespace flyball::book
+}  // namespace flyball::book::laplace_pairs_test

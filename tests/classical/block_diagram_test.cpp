@@ -9,7 +9,7 @@
 #include "classical/transfer_cases.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::block_diagram_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -181,4 +181,4 @@ TEST(BlockDiagram, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::block_diagram_test

@@ -9,7 +9,7 @@
 
 #include "classical/transfer_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::compensators_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -211,4 +211,4 @@ TEST(Compensators, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::compensators_test

@@ -13,7 +13,7 @@
 
 #include "classical/transfer_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::delay_margins_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -247,4 +247,4 @@ TEST(DelayMargins, Bandwidth) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::delay_margins_test

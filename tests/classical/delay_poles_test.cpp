@@ -16,7 +16,7 @@
 #include "classical/transfer_cases.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::delay_poles_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -272,4 +272,4 @@ TEST(DelayPoles, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::delay_poles_test

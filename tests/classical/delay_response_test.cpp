@@ -9,7 +9,7 @@
 #include "classical/transfer_cases.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::delay_response_test {
 namespace {
 
 using Eigen::Index;
@@ -262,4 +262,4 @@ TEST(DelayResponse, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::delay_response_test

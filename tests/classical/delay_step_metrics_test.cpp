@@ -8,7 +8,7 @@
 
 #include "classical/transfer_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::delay_step_metrics_test {
 namespace {
 
 using test::transfer;
@@ -122,4 +122,4 @@ TEST(DelayStepMetrics, OfADiscreteLoopItsSamples) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::delay_step_metrics_test

@@ -10,7 +10,7 @@
 #include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::delay_system_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -307,4 +307,4 @@ TEST(DelaySystem, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::delay_system_test

@@ -10,7 +10,7 @@
 
 #include "classical/transfer_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::describing_function_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -224,4 +224,4 @@ TEST(CompareDiscretizations, OfALag) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::describing_function_test

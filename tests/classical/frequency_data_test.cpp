@@ -10,7 +10,7 @@
 
 #include "classical/transfer_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::frequency_data_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -169,4 +169,4 @@ TEST(FrequencyData, Refuses) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::frequency_data_test

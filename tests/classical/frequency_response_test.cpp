@@ -12,7 +12,7 @@
 #include "classical/transfer_cases.hpp"
 #include "math/extended/double_double.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::frequency_response_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -407,4 +407,4 @@ TEST(FrequencyResponse, Refuses) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::frequency_response_test

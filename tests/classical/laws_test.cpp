@@ -2,7 +2,7 @@
 
 #include "classical/laws.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::laws_test {
 namespace {
 
 // bench/classical tries them on ten thousand systems each.
@@ -15,4 +15,4 @@ TEST(Laws, HoldOnASample) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::laws_test

@@ -9,7 +9,7 @@
 
 #include "classical/transfer_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::loop_margins_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -443,4 +443,4 @@ TEST(LoopMargins, NothingToCross) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::loop_margins_test

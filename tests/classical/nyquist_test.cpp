@@ -11,7 +11,7 @@
 
 #include "classical/transfer_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::nyquist_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -182,4 +182,4 @@ TEST(Nyquist, Refuses) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::nyquist_test

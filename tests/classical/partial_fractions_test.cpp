@@ -9,7 +9,7 @@
 
 #include "classical/transfer_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::partial_fractions_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -221,4 +221,4 @@ TEST(PartialFractions, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::partial_fractions_test

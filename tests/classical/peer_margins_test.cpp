@@ -14,7 +14,7 @@
 
 // Margins that python-control (0.10, control/tests/margin_test.py) holds itself to, and MATLAB
 // where it says so: the numbers of its loops, to the tolerance that it asks of itself.
-namespace flyball::classical {
+namespace flyball::classical::peer_margins_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -210,4 +210,4 @@ TEST(PeerMargins, OfMeasuredPoints) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::peer_margins_test

@@ -12,7 +12,7 @@
 
 #include "classical/transfer_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::response_margins_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -268,4 +268,4 @@ TEST(LInfinity, OfUnstableSystems) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::response_margins_test

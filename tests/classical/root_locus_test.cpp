@@ -10,7 +10,7 @@
 
 #include "classical/transfer_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::root_locus_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -422,4 +422,4 @@ TEST(RootLocus, ThirtyPoles) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::root_locus_test

@@ -9,7 +9,7 @@
 
 #include "classical/transfer_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::steady_state_test {
 namespace {
 
 using Eigen::VectorXd;
@@ -97,4 +97,4 @@ TEST(SteadyState, ValueTheorems) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::steady_state_test

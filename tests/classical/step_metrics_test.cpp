@@ -6,7 +6,7 @@
 
 #include "classical/transfer_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::step_metrics_test {
 namespace {
 
 using test::transfer;
@@ -137,4 +137,4 @@ TEST(StepMetrics, WhatDoesNotSettle) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::step_metrics_test

@@ -11,7 +11,7 @@
 
 #include "classical/transfer_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::transfer_expression_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -429,4 +429,4 @@ TEST(TransferExpression, Products) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::transfer_expression_test

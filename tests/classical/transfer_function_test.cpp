@@ -11,7 +11,7 @@
 #include "classical/transfer_cases.hpp"
 #include "support/oracle.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::transfer_function_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -254,4 +254,4 @@ TEST(TransferFunction, DelayOfADiscreteOneIsWholePeriods) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::transfer_function_test

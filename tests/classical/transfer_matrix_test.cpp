@@ -13,7 +13,7 @@
 #include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::transfer_matrix_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -195,4 +195,4 @@ TEST(TransferMatrix, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::transfer_matrix_test

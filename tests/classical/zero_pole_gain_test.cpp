@@ -11,7 +11,7 @@
 
 #include "classical/transfer_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::zero_pole_gain_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -201,4 +201,4 @@ TEST(ZeroPoleGain, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::zero_pole_gain_test

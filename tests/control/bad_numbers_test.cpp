@@ -14,7 +14,7 @@
 
 // Single bad numbers that once broke a run-time object, and what each says of them.
 // `run_time_objects_test.cpp` tries all of them on all objects.
-namespace flyball {
+namespace flyball::bad_numbers_test {
 namespace {
 
 using namespace flyball::literals;
@@ -142,4 +142,4 @@ TEST(BadNumbers, ComeBackFromALongDropOut) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::bad_numbers_test

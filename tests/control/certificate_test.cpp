@@ -9,7 +9,7 @@
 #include "math/dense/dense.hpp"
 #include "math/extended/double_double.hpp"
 
-namespace flyball {
+namespace flyball::certificate_test {
 namespace {
 
 using namespace test;
@@ -360,4 +360,4 @@ TEST(Certificate, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::certificate_test

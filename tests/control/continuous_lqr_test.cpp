@@ -13,7 +13,7 @@
 
 #include "support/oracle.hpp"
 
-namespace flyball {
+namespace flyball::continuous_lqr_test {
 namespace {
 
 using namespace flyball::literals;
@@ -145,4 +145,4 @@ TEST(ContinuousLqr, IntegralsOfWhatCannotBeHeld) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::continuous_lqr_test

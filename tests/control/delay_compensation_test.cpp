@@ -14,7 +14,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::delay_compensation_test {
 namespace {
 
 using namespace flyball::literals;
@@ -216,4 +216,4 @@ TEST(DelayCompensation, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::delay_compensation_test

@@ -13,7 +13,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::feedforward_test {
 namespace {
 
 using namespace flyball::literals;
@@ -169,4 +169,4 @@ TEST(SimpleFeedforward, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::feedforward_test

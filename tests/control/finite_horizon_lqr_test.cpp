@@ -9,7 +9,7 @@
 
 #include "support/oracle.hpp"
 
-namespace flyball {
+namespace flyball::finite_horizon_lqr_test {
 namespace {
 
 using namespace flyball::literals;
@@ -210,4 +210,4 @@ TEST(FiniteHorizonLqr, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::finite_horizon_lqr_test

@@ -6,7 +6,7 @@
 
 #include "control/appendix_b_plant.hpp"
 
-namespace flyball {
+namespace flyball::implicit_model_following_test {
 namespace {
 
 using namespace flyball::literals;
@@ -80,4 +80,4 @@ TEST(ImplicitModel, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::implicit_model_following_test

@@ -16,7 +16,7 @@
 #include "support/allocation_count.hpp"
 #include "support/oracle.hpp"
 
-namespace flyball {
+namespace flyball::integral_control_test {
 namespace {
 
 using namespace flyball::literals;
@@ -194,4 +194,4 @@ TEST(IntegralStateFeedback, FixedIsDynamicAndAllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::integral_control_test

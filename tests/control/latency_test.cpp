@@ -10,7 +10,7 @@
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/systems/discretize.hpp>
 
-namespace flyball {
+namespace flyball::latency_test {
 namespace {
 
 using namespace flyball::literals;
@@ -73,4 +73,4 @@ TEST(CompensateLatency, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::latency_test

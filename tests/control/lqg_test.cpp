@@ -14,7 +14,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::lqg_test {
 namespace {
 
 using namespace flyball::literals;
@@ -176,4 +176,4 @@ TEST(Lqg, AllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::lqg_test

@@ -18,7 +18,7 @@
 #include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::lqr_test {
 namespace {
 
 using namespace flyball::literals;
@@ -313,4 +313,4 @@ TEST(Lqr, GainIsItsFormula) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::lqr_test

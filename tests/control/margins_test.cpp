@@ -17,7 +17,7 @@
 
 #include "control/regulated_plant.hpp"
 
-namespace flyball {
+namespace flyball::margins_test {
 namespace {
 
 using namespace flyball::literals;
@@ -367,4 +367,4 @@ TEST(StabilityMargins, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::margins_test

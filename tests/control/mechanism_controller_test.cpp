@@ -12,7 +12,7 @@
 #include "control/mechanism_designs.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::mechanism_controller_test {
 namespace {
 
 using test::cases;
@@ -253,4 +253,4 @@ TEST(MechanismController, AllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::mechanism_controller_test

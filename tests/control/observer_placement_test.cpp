@@ -13,7 +13,7 @@
 
 #include "support/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::observer_placement_test {
 namespace {
 
 using namespace flyball::literals;
@@ -141,4 +141,4 @@ TEST(SeparationPrinciple, OfTheJointLoop) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::observer_placement_test

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::parameter_ellipsoid_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -102,4 +102,4 @@ TEST(ParameterEllipsoid, RefusesWhatIsNoCovariance) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::parameter_ellipsoid_test

@@ -7,7 +7,7 @@
 
 #include <flyball/core/random.hpp>
 
-namespace flyball {
+namespace flyball::pid_design_test {
 namespace {
 
 using classical::TransferFunction;
@@ -404,4 +404,4 @@ TEST(PidDesign, DominantPolesAreWhereTheyWerePlaced) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::pid_design_test

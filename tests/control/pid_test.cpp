@@ -16,7 +16,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::pid_test {
 namespace {
 
 using namespace flyball::literals;
@@ -298,4 +298,4 @@ TEST(Pid, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::pid_test

@@ -15,7 +15,7 @@
 #include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::pole_placement_property_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -317,4 +317,4 @@ TEST(PlaceProperty, TurnedAndScaledReferences) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::pole_placement_property_test

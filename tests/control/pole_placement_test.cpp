@@ -14,7 +14,7 @@
 #include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::pole_placement_test {
 namespace {
 
 using namespace flyball::literals;
@@ -403,4 +403,4 @@ TEST(Place, ALargeInputDoesNotHideAModeThatIsNotReached) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::pole_placement_test

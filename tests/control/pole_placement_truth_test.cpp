@@ -5,7 +5,7 @@
 #include <flyball/control/pole_placement.hpp>
 #include <flyball/core/random.hpp>
 
-namespace flyball {
+namespace flyball::pole_placement_truth_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -202,4 +202,4 @@ TEST(PlaceTruth, AnEntryOfNoWeightChangesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::pole_placement_truth_test

@@ -14,7 +14,7 @@
 #include "control/regulated_plant.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::predicting_lqg_test {
 namespace {
 
 using Scalar = Eigen::Matrix<double, 1, 1>;
@@ -196,4 +196,4 @@ TEST(PredictingLqg, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::predicting_lqg_test

@@ -9,7 +9,7 @@
 
 #include "control/appendix_b_plant.hpp"
 
-namespace flyball {
+namespace flyball::quadratic_cost_test {
 namespace {
 
 using test::appendix_b_plant;
@@ -84,4 +84,4 @@ TEST(OutputCost, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::quadratic_cost_test

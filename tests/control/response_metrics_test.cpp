@@ -9,7 +9,7 @@
 
 #include <flyball/core/argument.hpp>
 
-namespace flyball {
+namespace flyball::response_metrics_test {
 namespace {
 
 struct Samples {
@@ -123,4 +123,4 @@ TEST(ResponseMetrics, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::response_metrics_test

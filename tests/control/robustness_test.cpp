@@ -9,7 +9,7 @@
 
 #include "control/regulated_plant.hpp"
 
-namespace flyball {
+namespace flyball::robustness_test {
 namespace {
 
 using namespace flyball::literals;
@@ -84,4 +84,4 @@ TEST(RobustnessGrid, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::robustness_test

@@ -31,7 +31,7 @@
 // Every run-time object under the worst numbers there are: its outputs stay finite and within the
 // limits, and when the numbers are ordinary again it goes back to the answers of its twin that
 // never saw them.
-namespace flyball {
+namespace flyball::run_time_objects_test {
 namespace {
 
 using namespace flyball::literals;
@@ -384,4 +384,4 @@ TEST(RunTimeObjects, ForgetWhatIsNotAMeasurement) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::run_time_objects_test

@@ -11,7 +11,7 @@
 #include "control/regulated_plant.hpp"
 #include "support/oracle.hpp"
 
-namespace flyball {
+namespace flyball::running_loop_test {
 namespace {
 
 using namespace test;
@@ -157,4 +157,4 @@ TEST(RunningLoop, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::running_loop_test

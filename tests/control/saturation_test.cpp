@@ -10,7 +10,7 @@
 #include <flyball/mechanisms/elevator.hpp>
 #include <flyball/systems/discretize.hpp>
 
-namespace flyball {
+namespace flyball::saturation_test {
 namespace {
 
 using namespace flyball::literals;
@@ -129,4 +129,4 @@ TEST(Saturation, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::saturation_test

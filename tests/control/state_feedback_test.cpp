@@ -10,7 +10,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::state_feedback_test {
 namespace {
 
 using Scalar = Eigen::Matrix<double, 1, 1>;
@@ -98,4 +98,4 @@ TEST(VoltageCompensation, DoesNotBelieveABrokenSensor) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::state_feedback_test

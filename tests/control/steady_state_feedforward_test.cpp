@@ -9,7 +9,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/systems/discretize.hpp>
 
-namespace flyball {
+namespace flyball::steady_state_feedforward_test {
 namespace {
 
 using namespace flyball::literals;
@@ -199,4 +199,4 @@ TEST(QrWeightedInversion, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::steady_state_feedforward_test

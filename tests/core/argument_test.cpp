@@ -9,7 +9,7 @@
 #include <rapidcheck.h>
 #include <rapidcheck/gtest.h>
 
-namespace flyball {
+namespace flyball::argument_test {
 namespace {
 
 constexpr double inf = std::numeric_limits<double>::infinity();
@@ -167,4 +167,4 @@ RC_GTEST_PROP(FormatNumber, SeventeenDigitsReadBackTheSame, (double value)) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::argument_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::coordinate_test {
 namespace {
 
 TEST(Coordinate, LabelCarriesTheUnit) {
@@ -27,4 +27,4 @@ TEST(Coordinate, ALabelReadsBack) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::coordinate_test

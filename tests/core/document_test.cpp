@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::document_test {
 namespace {
 
 TEST(Document, AQuantityIsTextAndData) {
@@ -49,4 +49,4 @@ TEST(Document, DiagnosticsStandBySeverityAndEqualOnesOnce) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::document_test

@@ -9,7 +9,7 @@
 
 #include "core/plain_format.hpp"
 
-namespace flyball::detail {
+namespace flyball::detail::plain_format_test {
 namespace {
 
 template <class... T>
@@ -41,4 +41,4 @@ TEST(PlainFormat, WritesWhatFmtWrites) {
 }
 
 }  // namespace
-}  // namespace flyball::detail
+}  // namespace flyball::detail::plain_format_test

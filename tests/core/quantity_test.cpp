@@ -11,7 +11,7 @@
 #include <rapidcheck.h>
 #include <rapidcheck/gtest.h>
 
-namespace flyball {
+namespace flyball::quantity_test {
 namespace {
 
 using namespace flyball::literals;
@@ -334,4 +334,4 @@ RC_GTEST_PROP(ParseQuantity, NeverAnswersWithANumberThatIsNotFinite,
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::quantity_test

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::random_test {
 namespace {
 
 // Made with an independent implementation in Python's unbounded integers:
@@ -176,4 +176,4 @@ TEST(Random, ASplitIsUncorrelatedWithItsParent) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::random_test

@@ -8,7 +8,7 @@
 #include <rapidcheck.h>
 #include <rapidcheck/gtest.h>
 
-namespace flyball {
+namespace flyball::text_test {
 namespace {
 
 TEST(EditDistance, OfTextbookPairs) {
@@ -91,4 +91,4 @@ TEST(Ascii, SpellsWhatItCan) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::text_test

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::time_series_test {
 namespace {
 
 TEST(TimeSeries, StartsEmpty) {
@@ -62,4 +62,4 @@ TEST(TimeSeries, RoomThatIsReservedIsNotTakenAgain) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::time_series_test

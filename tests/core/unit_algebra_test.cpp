@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::unit_algebra_test {
 namespace {
 
 struct Case {
@@ -143,4 +143,4 @@ TEST(UnitAlgebra, TakesQuantitiesApart) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::unit_algebra_test

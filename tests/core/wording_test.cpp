@@ -6,7 +6,7 @@
 
 #include "core/wording.hpp"
 
-namespace flyball::text {
+namespace flyball::text::wording_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -84,4 +84,4 @@ TEST(Wording, HostileTextIsHarmless) {
 }
 
 }  // namespace
-}  // namespace flyball::text
+}  // namespace flyball::text::wording_test

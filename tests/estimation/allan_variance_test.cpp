@@ -9,7 +9,7 @@
 
 #include <flyball/core/random.hpp>
 
-namespace flyball {
+namespace flyball::allan_variance_test {
 namespace {
 
 double at(const std::vector<AllanPoint>& points, double tau) {
@@ -102,4 +102,4 @@ TEST(AllanDeviation, RefusesWhatItCannotUse) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::allan_variance_test

@@ -10,7 +10,7 @@
 
 #include "filter_cases.hpp"
 
-namespace flyball {
+namespace flyball::autocovariance_test {
 namespace {
 
 using Eigen::Index;
@@ -230,4 +230,4 @@ TEST(Autocovariance, WhatDoesNotTellIsRefused) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::autocovariance_test

@@ -17,7 +17,7 @@
 // squared (NEES) and of the normalised innovation squared (NIS) at ten times is within the bounds
 // that hold jointly with 99 % (Bonferroni: each with 99.95 %). Source: Bar-Shalom, Li, Kirubarajan,
 // "Estimation with Applications to Tracking and Navigation" (2001), section 5.4.
-namespace flyball {
+namespace flyball::consistency_test {
 namespace {
 
 constexpr int runs = 500;
@@ -182,4 +182,4 @@ TEST(FilterConsistency, OfTheSquareRootUnscentedFilter) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::consistency_test

@@ -7,7 +7,7 @@
 
 #include <flyball/math/riccati/riccati.hpp>
 
-namespace flyball {
+namespace flyball::continuous_kalman_gain_test {
 namespace {
 
 using namespace flyball::literals;
@@ -58,4 +58,4 @@ TEST(ContinuousKalmanGain, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::continuous_kalman_gain_test

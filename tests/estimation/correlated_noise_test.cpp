@@ -6,7 +6,7 @@
 
 #include "filter_cases.hpp"
 
-namespace flyball {
+namespace flyball::correlated_noise_test {
 namespace {
 
 // Three steps as one Gaussian vector: x_3 given y_0, y_1, y_2, all of them linear in the
@@ -78,4 +78,4 @@ TEST(CorrelatedNoise, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::correlated_noise_test

@@ -7,7 +7,7 @@
 
 #include <flyball/systems/discretize.hpp>
 
-namespace flyball {
+namespace flyball::covariance_test {
 namespace {
 
 // diag(0.05², 1²)
@@ -41,4 +41,4 @@ TEST(Covariance, IsNotADensity) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::covariance_test

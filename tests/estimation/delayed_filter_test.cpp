@@ -14,7 +14,7 @@
 #include "field_drive.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::delayed_filter_test {
 namespace {
 
 using Filter = ExtendedKalmanFilter<test::FieldDrive>;
@@ -228,4 +228,4 @@ TEST(DelayedFilter, AllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::delayed_filter_test

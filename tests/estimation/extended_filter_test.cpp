@@ -10,7 +10,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::extended_filter_test {
 namespace {
 
 using Vector1 = Eigen::Matrix<double, 1, 1>;
@@ -253,4 +253,4 @@ TEST(ExtendedKalmanFilter, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::extended_filter_test

@@ -16,7 +16,7 @@
 #include "estimation/smoother_cases.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::fixed_lag_smoother_test {
 namespace {
 
 using namespace flyball::test;
@@ -279,4 +279,4 @@ TEST(FixedLagSmoother, TakesOnlyWhatIsFiniteAndAllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::fixed_lag_smoother_test

@@ -10,7 +10,7 @@
 
 // The covariance of the Kalman filter, which is symmetric and positive semidefinite whatever P0, Q
 // and R are to each other.
-namespace flyball {
+namespace flyball::kalman_covariance_test {
 namespace {
 
 using Scalar = Eigen::Matrix<double, 1, 1>;
@@ -239,4 +239,4 @@ TEST(KalmanCovariance, FactorsAreTheMatrix) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::kalman_covariance_test

@@ -11,7 +11,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::kalman_filter_test {
 namespace {
 
 DiscreteSystem<2, 1, 1> cart() {
@@ -244,4 +244,4 @@ TEST(KalmanFilter, AllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::kalman_filter_test

@@ -15,7 +15,7 @@
 #include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::kalman_gain_test {
 namespace {
 
 using test::random_matrix;
@@ -390,4 +390,4 @@ TEST(KalmanGain, TellsTheLargerResidual) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::kalman_gain_test

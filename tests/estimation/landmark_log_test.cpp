@@ -9,7 +9,7 @@
 #include <flyball/estimation/localization/localize.hpp>
 
 // Logs that are hardly any, and clocks that are wrong.
-namespace flyball {
+namespace flyball::landmark_log_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -106,4 +106,4 @@ TEST(LandmarkLog, AStartThatIsNoneIsRefused) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::landmark_log_test

@@ -14,7 +14,7 @@
 #include "estimation/localization/residuals.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::localization_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -468,4 +468,4 @@ TEST(LandmarkLog, WhatDoesNotFitIsRefusedWithItsRow) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::localization_test

@@ -14,7 +14,7 @@
 #include "support/allocation_count.hpp"
 
 // Filters whose state is a rotation or a pose.
-namespace flyball {
+namespace flyball::manifold_filter_test {
 namespace {
 
 using Eigen::Matrix3d;
@@ -362,4 +362,4 @@ TEST(ManifoldFilter, AllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::manifold_filter_test

@@ -10,7 +10,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::multiple_model_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -271,4 +271,4 @@ TEST(MultipleModelFilter, DynamicSizesAreTheSameAndMustAgree) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::multiple_model_test

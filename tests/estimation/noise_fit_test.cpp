@@ -11,7 +11,7 @@
 #include <flyball/estimation/smoother.hpp>
 #include <flyball/systems/discretize.hpp>
 
-namespace flyball {
+namespace flyball::noise_fit_test {
 namespace {
 
 using Eigen::Index;
@@ -246,4 +246,4 @@ TEST(StepNoise, IsTheIntegralOfTheDensity) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::noise_fit_test

@@ -9,7 +9,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::observer_test {
 namespace {
 
 DiscreteSystem<2, 1, 1> cart() {
@@ -189,4 +189,4 @@ TEST(FilterGain, IsTheOtherFormOfL) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::observer_test

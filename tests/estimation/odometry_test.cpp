@@ -13,7 +13,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::odometry_test {
 namespace {
 
 using namespace flyball::literals;
@@ -209,4 +209,4 @@ TEST(Odometry, AllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::odometry_test

@@ -10,7 +10,7 @@
 
 #include "filter_cases.hpp"
 
-namespace flyball {
+namespace flyball::outlier_guard_test {
 namespace {
 
 using Vector1 = Eigen::Matrix<double, 1, 1>;
@@ -228,4 +228,4 @@ TEST(MeasurementNoise, RefusesWhatIsNone) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::outlier_guard_test

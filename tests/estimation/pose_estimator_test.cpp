@@ -13,7 +13,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::pose_estimator_test {
 namespace {
 
 using Eigen::Matrix3d;
@@ -574,4 +574,4 @@ TEST(PoseEstimator, AllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::pose_estimator_test

@@ -15,7 +15,7 @@
 #include <flyball/geometry/se3.hpp>
 #include <flyball/optimization/factor_graph.hpp>
 
-namespace flyball {
+namespace flyball::pose_graph_test {
 namespace {
 
 using Eigen::Matrix3d;
@@ -179,4 +179,4 @@ TEST(PoseGraph, ManhattanFromOdometry) {
 #endif
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::pose_graph_test

@@ -11,7 +11,7 @@
 #include <flyball/math/equations/matrix_equation.hpp>
 #include <flyball/math/probability/gaussian_vector.hpp>
 
-namespace flyball {
+namespace flyball::shaping_filter_test {
 namespace {
 
 using namespace flyball::literals;
@@ -145,4 +145,4 @@ TEST(ShapingFilter, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::shaping_filter_test

@@ -10,7 +10,7 @@
 
 #include "estimation/smoother_cases.hpp"
 
-namespace flyball {
+namespace flyball::smoother_test {
 namespace {
 
 using namespace flyball::test;
@@ -334,4 +334,4 @@ TEST(Smoother, OfAnExtendedFiltersHistory) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::smoother_test

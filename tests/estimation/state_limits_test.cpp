@@ -15,7 +15,7 @@
 #include "filter_cases.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::state_limits_test {
 namespace {
 
 using Eigen::Matrix3d;
@@ -219,4 +219,4 @@ TEST(StateLimits, AllocateNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::state_limits_test

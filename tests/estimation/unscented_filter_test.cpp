@@ -8,7 +8,7 @@
 #include "field_drive.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::unscented_filter_test {
 namespace {
 
 using Eigen::Matrix3d;
@@ -304,4 +304,4 @@ TEST(CholeskyFactor, GoesUpAndDown) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::unscented_filter_test

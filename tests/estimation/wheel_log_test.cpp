@@ -7,7 +7,7 @@
 
 #include "estimation/landmark_drive.hpp"
 
-namespace flyball {
+namespace flyball::wheel_log_test {
 namespace {
 
 using test::DriveSettings;
@@ -144,4 +144,4 @@ TEST(TrackWidth, OfARobotThatNeverTurnedIsUnknown) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::wheel_log_test

@@ -16,7 +16,7 @@
 
 #include <flyball/export/drive_constants.hpp>
 
-namespace flyball::exports {
+namespace flyball::exports::constants_test {
 namespace {
 
 using mechanisms::MechanismKind;
@@ -327,4 +327,4 @@ TEST(Constants, LeaveOutWhatThereAreNoGainsFor) {
 }
 
 }  // namespace
-}  // namespace flyball::exports
+}  // namespace flyball::exports::constants_test

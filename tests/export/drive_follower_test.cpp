@@ -15,7 +15,7 @@
 
 #include <flyball/core/random.hpp>
 
-namespace flyball::exports {
+namespace flyball::exports::drive_follower_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -253,4 +253,4 @@ TEST(DriveFollowerHeader, ScheduledLtvDrive) {
 }
 
 }  // namespace
-}  // namespace flyball::exports
+}  // namespace flyball::exports::drive_follower_test

@@ -18,7 +18,7 @@
 
 #include "control/mechanism_designs.hpp"
 
-namespace flyball::exports {
+namespace flyball::exports::generated_loop_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -543,4 +543,4 @@ TEST(GeneratedLoop, RefusesWhatTheControllerRefuses) {
 }
 
 }  // namespace
-}  // namespace flyball::exports
+}  // namespace flyball::exports::generated_loop_test

@@ -14,6 +14,7 @@
 
 #include "control/mpc/mpc_problems.hpp"
 
+namespace linear_mpc_test {
 namespace {
 
 using namespace flyball;
@@ -139,3 +140,4 @@ TEST(LinearMpcHeader, SaysWhatItIs) {
 }
 
 }  // namespace
+}  // namespace linear_mpc_test

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-namespace flyball::exports {
+namespace flyball::exports::motion_table_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -111,4 +111,4 @@ TEST(MotionTable, TellsWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace flyball::exports
+}  // namespace flyball::exports::motion_table_test

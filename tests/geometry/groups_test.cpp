@@ -2,7 +2,7 @@
 
 #include "geometry/groups.hpp"
 
-namespace flyball {
+namespace flyball::groups_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -140,4 +140,4 @@ TEST(Groups, NotANumberStaysOne) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::groups_test

@@ -8,7 +8,7 @@
 #include "geometry/groups.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball::test {
+namespace flyball::test::mean_test {
 namespace {
 
 template <class G>
@@ -96,4 +96,4 @@ TEST(Mean, WithoutAnAnswerItEnds) {
 }
 
 }  // namespace
-}  // namespace flyball::test
+}  // namespace flyball::test::mean_test

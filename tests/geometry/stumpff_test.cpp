@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball::detail {
+namespace flyball::detail::stumpff_test {
 namespace {
 
 /// Σ (-s)^k/(2k + M)! in extended precision; s up to 40 loses 6 digits of 19.
@@ -53,4 +53,4 @@ TEST(Stumpff, InverseJacobianCoefficient) {
 }
 
 }  // namespace
-}  // namespace flyball::detail
+}  // namespace flyball::detail::stumpff_test

@@ -6,6 +6,7 @@
 
 #include "recordings.hpp"
 
+namespace defects_test {
 namespace {
 
 using namespace flyball::identification;
@@ -276,3 +277,4 @@ TEST(Plausibility, UnusualSpeedsAreTold) {
 }
 
 }  // namespace
+}  // namespace defects_test

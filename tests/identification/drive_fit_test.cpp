@@ -12,7 +12,7 @@
 #include "drive_sessions.hpp"
 #include "identification/drive_preparation.hpp"
 
-namespace flyball::identification {
+namespace flyball::identification::drive_fit_test {
 namespace {
 
 const Diagnostic* find(const std::vector<Diagnostic>& all, std::string_view code) {
@@ -314,4 +314,4 @@ TEST(DriveModes, SidesOnOneClock) {
 }
 
 }  // namespace
-}  // namespace flyball::identification
+}  // namespace flyball::identification::drive_fit_test

@@ -4,6 +4,7 @@
 
 #include "recordings.hpp"
 
+namespace feedforward_fit_test {
 namespace {
 
 using namespace flyball::identification;
@@ -453,3 +454,4 @@ TEST(FeedforwardFit, NeverHangsOnNoise) {
 }
 
 }  // namespace
+}  // namespace feedforward_fit_test

@@ -11,7 +11,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/identification/identification_error.hpp>
 
-namespace flyball::identification {
+namespace flyball::identification::frequency_fit_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -215,4 +215,4 @@ TEST(FrequencyFit, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball::identification
+}  // namespace flyball::identification::frequency_fit_test

@@ -12,7 +12,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball::identification {
+namespace flyball::identification::gain_estimator_test {
 namespace {
 
 using mechanisms::FeedforwardGains;
@@ -226,4 +226,4 @@ TEST(GainEstimator, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball::identification
+}  // namespace flyball::identification::gain_estimator_test

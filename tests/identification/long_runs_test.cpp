@@ -8,6 +8,7 @@
 #include "identification/long_runs.hpp"
 #include "recordings.hpp"
 
+namespace long_runs_test {
 namespace {
 
 using namespace flyball::identification;
@@ -188,3 +189,4 @@ TEST(LongRuns, OfVeryManyTestsSomeAreFitted) {
 }
 
 }  // namespace
+}  // namespace long_runs_test

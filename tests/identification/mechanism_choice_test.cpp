@@ -2,6 +2,7 @@
 
 #include "recordings.hpp"
 
+namespace mechanism_choice_test {
 namespace {
 
 using namespace flyball::identification;
@@ -169,3 +170,4 @@ TEST(MechanismChoice, RefusesWhatGivesNoGains) {
 }
 
 }  // namespace
+}  // namespace mechanism_choice_test

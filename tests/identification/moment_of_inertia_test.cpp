@@ -11,7 +11,7 @@
 #include <flyball/mechanisms/differential_drive.hpp>
 #include <flyball/mechanisms/flywheel.hpp>
 
-namespace flyball::identification {
+namespace flyball::identification::moment_of_inertia_test {
 namespace {
 
 using namespace flyball::literals;
@@ -116,4 +116,4 @@ TEST(InertiaFromStep, Refuses) {
 }
 
 }  // namespace
-}  // namespace flyball::identification
+}  // namespace flyball::identification::moment_of_inertia_test

@@ -6,6 +6,7 @@
 
 #include "scenarios.hpp"
 
+namespace monte_carlo_test {
 namespace {
 
 using flyball::identification::fit_feedforward;
@@ -88,3 +89,4 @@ TEST(CleanSessions, HaveNoBacklash) {
 INSTANTIATE_TEST_SUITE_P(Mechanisms, MonteCarlo, testing::Range<std::size_t>(0, 6));
 
 }  // namespace
+}  // namespace monte_carlo_test

@@ -9,7 +9,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/identification/identification_error.hpp>
 
-namespace flyball::identification {
+namespace flyball::identification::motor_curve_test {
 namespace {
 
 using Eigen::VectorXd;
@@ -168,4 +168,4 @@ TEST(MotorCurve, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball::identification
+}  // namespace flyball::identification::motor_curve_test

@@ -6,6 +6,7 @@
 
 #include "recordings.hpp"
 
+namespace one_step_fit_test {
 namespace {
 
 using namespace flyball::identification;
@@ -89,3 +90,4 @@ TEST(OneStepFit, RefusesOneDirectionOfAnElevator) {
 }
 
 }  // namespace
+}  // namespace one_step_fit_test

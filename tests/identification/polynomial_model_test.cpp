@@ -8,7 +8,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/identification/identification_error.hpp>
 
-namespace flyball::identification {
+namespace flyball::identification::polynomial_model_test {
 namespace {
 
 using Eigen::Index;
@@ -339,4 +339,4 @@ TEST(PolynomialModel, NormalEquationsOfArx) {
 }
 
 }  // namespace
-}  // namespace flyball::identification
+}  // namespace flyball::identification::polynomial_model_test

@@ -11,7 +11,7 @@
 
 #include "identification/model_simulation.hpp"
 
-namespace flyball::identification {
+namespace flyball::identification::prediction_error_test {
 namespace {
 
 using Eigen::Index;
@@ -375,4 +375,4 @@ TEST(PredictionError, WhatDoesNotFitTogetherIsRefused) {
 }
 
 }  // namespace
-}  // namespace flyball::identification
+}  // namespace flyball::identification::prediction_error_test

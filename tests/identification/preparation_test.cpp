@@ -5,6 +5,7 @@
 
 #include "recordings.hpp"
 
+namespace preparation_test {
 namespace {
 
 using namespace flyball::identification;
@@ -388,3 +389,4 @@ TEST(Prepare, VoltagesThatTheMotorsDoNotGetAreLimited) {
 }
 
 }  // namespace
+}  // namespace preparation_test

@@ -16,6 +16,7 @@
 #include "recordings.hpp"
 
 // Other people's SysId recordings: the truth is not known, but physics and repeats are.
+namespace real_logs_test {
 namespace {
 
 using namespace flyball::identification;
@@ -169,3 +170,4 @@ TEST(RealLogs, AnInvertedEncoderIsNamed) {
 }
 
 }  // namespace
+}  // namespace real_logs_test

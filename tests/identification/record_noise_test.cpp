@@ -9,6 +9,7 @@
 #include "identification/start.hpp"
 #include "scenarios.hpp"
 
+namespace record_noise_test {
 namespace {
 
 using namespace flyball::identification;
@@ -104,3 +105,4 @@ TEST(RecordNoise, StepsAgesSumToNothing) {
 }
 
 }  // namespace
+}  // namespace record_noise_test

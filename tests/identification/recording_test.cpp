@@ -2,6 +2,7 @@
 
 #include <flyball/identification/identification_error.hpp>
 
+namespace recording_test {
 namespace {
 
 using namespace flyball::identification;
@@ -48,3 +49,4 @@ TEST(IdentificationError, AreAnswersNotMisuse) {
 }
 
 }  // namespace
+}  // namespace recording_test

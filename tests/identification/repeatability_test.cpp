@@ -5,6 +5,7 @@
 #include "drive_sessions.hpp"
 #include "recordings.hpp"
 
+namespace repeatability_test {
 namespace {
 
 using namespace flyball::identification;
@@ -167,3 +168,4 @@ TEST(Repeatability, LogsOfADrivetrain) {
 }
 
 }  // namespace
+}  // namespace repeatability_test

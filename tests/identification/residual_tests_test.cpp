@@ -7,7 +7,7 @@
 
 #include <flyball/core/random.hpp>
 
-namespace flyball::identification {
+namespace flyball::identification::residual_tests_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -69,4 +69,4 @@ TEST(ResidualTests, MissingOnesAndEndsOfRunsMakeNoPairs) {
 }
 
 }  // namespace
-}  // namespace flyball::identification
+}  // namespace flyball::identification::residual_tests_test

@@ -6,6 +6,7 @@
 
 #include "identification/response.hpp"
 
+namespace response_test {
 namespace {
 
 using namespace flyball::identification;
@@ -224,3 +225,4 @@ TEST(Response, SensitivitiesAreDerivatives) {
 }
 
 }  // namespace
+}  // namespace response_test

@@ -8,6 +8,7 @@
 
 #include "recordings.hpp"
 
+namespace streamed_one_step_test {
 namespace {
 
 using namespace flyball::identification;
@@ -63,3 +64,4 @@ TEST(StreamedOneStep, RefusesWhatTellsNothing) {
 }
 
 }  // namespace
+}  // namespace streamed_one_step_test

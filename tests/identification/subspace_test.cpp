@@ -11,7 +11,7 @@
 
 #include "identification/subspace_data.hpp"
 
-namespace flyball::identification {
+namespace flyball::identification::subspace_test {
 namespace {
 
 using Eigen::Index;
@@ -313,4 +313,4 @@ TEST(Subspace, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball::identification
+}  // namespace flyball::identification::subspace_test

@@ -11,7 +11,7 @@
 #include "io/examples.hpp"
 #include "io/temporary_folder.hpp"
 
-namespace flyball {
+namespace flyball::csv_test {
 namespace {
 
 using namespace std::string_literals;
@@ -275,4 +275,4 @@ TEST(Csv, WritesAFile) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::csv_test

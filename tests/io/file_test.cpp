@@ -13,7 +13,7 @@
 #include "io/examples.hpp"
 #include "io/temporary_folder.hpp"
 
-namespace flyball {
+namespace flyball::file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -117,4 +117,4 @@ TEST(WriteFileAtomically, LeavesNothingBehindOnAnError) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::file_test

@@ -17,7 +17,7 @@
 
 /// Mutants of well-formed files: each must be read or refused; what is read keeps the promises of
 /// Log. The address-sanitized build of the same test looks at every access.
-namespace flyball {
+namespace flyball::fuzz_test {
 namespace {
 
 std::size_t below(Random& random, std::size_t bound) {
@@ -174,4 +174,4 @@ TEST(Fuzz, ManyChannelsAreBounded) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::fuzz_test

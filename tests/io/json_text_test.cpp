@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::json_text_test {
 namespace {
 
 TEST(PlaceOf, CountsLinesAndCharacters) {
@@ -55,4 +55,4 @@ TEST(ScalarMember, IsAsItStands) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::json_text_test

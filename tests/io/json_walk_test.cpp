@@ -11,7 +11,7 @@
 
 #include "io/json_walk.hpp"
 
-namespace flyball::io {
+namespace flyball::io::json_walk_test {
 namespace {
 
 /// Writes down what it is told; numbers as doubles.
@@ -187,4 +187,4 @@ TEST(JsonWalk, ManyKeysAndDeepBracketsTakeNoMoreThanTheirBytes) {
 }
 
 }  // namespace
-}  // namespace flyball::io
+}  // namespace flyball::io::json_walk_test

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <rapidcheck/gtest.h>
 
-namespace flyball {
+namespace flyball::json_writer_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -135,4 +135,4 @@ TEST(JsonWriter, ADiagnostic) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::json_writer_test

@@ -9,7 +9,7 @@
 
 #include "temporary_folder.hpp"
 
-namespace flyball {
+namespace flyball::log_files_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -59,4 +59,4 @@ TEST(Checksum, IsFnv1a) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::log_files_test

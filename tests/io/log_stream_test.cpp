@@ -12,7 +12,7 @@
 
 #include "temporary_folder.hpp"
 
-namespace flyball {
+namespace flyball::log_stream_test {
 namespace {
 
 /// Keeps everything, by name.
@@ -190,4 +190,4 @@ TEST(LogStream, WhatOnlyAWholeFileTellsIsLeft) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::log_stream_test

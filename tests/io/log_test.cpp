@@ -12,7 +12,7 @@
 #include "io/examples.hpp"
 #include "io/temporary_folder.hpp"
 
-namespace flyball {
+namespace flyball::log_test {
 namespace {
 
 using namespace std::string_view_literals;
@@ -94,4 +94,4 @@ TEST(LogErrorInfo, NamesEveryCode) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::log_test

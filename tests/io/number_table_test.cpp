@@ -5,7 +5,7 @@
 
 #include <flyball/io/log_error.hpp>
 
-namespace flyball {
+namespace flyball::number_table_test {
 namespace {
 
 Expected<NumberTable> parse(std::string_view text, std::size_t columns) {
@@ -69,4 +69,4 @@ TEST(NumberTable, AnyBytesAreAnsweredOrRefused) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::number_table_test

@@ -14,7 +14,7 @@
 
 #include "io/temporary_folder.hpp"
 
-namespace flyball {
+namespace flyball::output_folder_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -335,4 +335,4 @@ TEST(OutputFolder, WhoIsToldToEndLeavesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::output_folder_test

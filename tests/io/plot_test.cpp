@@ -18,7 +18,7 @@
 #include "io/plot_script.hpp"
 #include "io/temporary_folder.hpp"
 
-namespace flyball {
+namespace flyball::plot_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -454,4 +454,4 @@ TEST(Ticks, OfALogarithmicAxis) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::plot_test

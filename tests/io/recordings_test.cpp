@@ -13,7 +13,7 @@
 /// Other people's recordings, where they are. Counts and sums were taken from the files by an
 /// independent reader: Python's json module for SysId, and for WPILOG forty lines of Python over
 /// struct.unpack.
-namespace flyball {
+namespace flyball::recordings_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -125,4 +125,4 @@ TEST(Recordings, ARecordingSurvivesOurWriter) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::recordings_test

@@ -4,7 +4,7 @@
 
 #include "io/svg.hpp"
 
-namespace flyball::io {
+namespace flyball::io::svg_test {
 namespace {
 
 TEST(PlainSvg, DrawsAndDoesNothingElse) {
@@ -50,4 +50,4 @@ TEST(PlainSvg, DrawsAndDoesNothingElse) {
 }
 
 }  // namespace
-}  // namespace flyball::io
+}  // namespace flyball::io::svg_test

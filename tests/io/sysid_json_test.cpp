@@ -11,7 +11,7 @@
 #include "io/examples.hpp"
 #include "io/temporary_folder.hpp"
 
-namespace flyball {
+namespace flyball::sysid_json_test {
 namespace {
 
 using Layout = SysIdJson::Layout;
@@ -251,4 +251,4 @@ TEST(SysIdJson, WritesAFile) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::sysid_json_test

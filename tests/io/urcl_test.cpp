@@ -9,7 +9,7 @@
 #include <flyball/io/wpilog.hpp>
 
 /// Frames that are put together bit by bit, as REV's specification of its CAN frames lays them out.
-namespace flyball {
+namespace flyball::urcl_test {
 namespace {
 
 template <class T>
@@ -187,4 +187,4 @@ TEST(Urcl, AgreesWithAdvantageScopesDecoder) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::urcl_test

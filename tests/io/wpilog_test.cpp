@@ -15,7 +15,7 @@
 #include "io/examples.hpp"
 #include "io/temporary_folder.hpp"
 
-namespace flyball {
+namespace flyball::wpilog_test {
 namespace {
 
 using namespace std::string_view_literals;
@@ -354,4 +354,4 @@ TEST(Wpilog, WritesPosesInSpaceWithTheirSchemas) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::wpilog_test

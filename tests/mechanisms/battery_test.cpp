@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::battery_test {
 namespace {
 
 // Stalled at full duty the battery's and the motor's resistances divide the voltage:
@@ -35,4 +35,4 @@ TEST(Battery, DoesNotSagWithoutResistanceOrMotor) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::battery_test

@@ -15,7 +15,7 @@
 #include <flyball/systems/linearize.hpp>
 #include <flyball/systems/model_step.hpp>
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::cart_pole_test {
 namespace {
 
 using namespace flyball::literals;
@@ -180,4 +180,4 @@ TEST(MechanismModel, GainsAreItsParameters) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::cart_pole_test

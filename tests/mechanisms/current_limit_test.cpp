@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::current_limit_test {
 namespace {
 
 // 775pro at 500 rad/s, 40 A: I = 100.019 A at 12 V, limited to 6.6251 V; the book's snippet in
@@ -50,4 +50,4 @@ TEST(CurrentLimit, IsFiniteWhateverComes) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::current_limit_test

@@ -8,7 +8,7 @@
 
 #include <flyball/systems/discretize.hpp>
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::differential_drive_test {
 namespace {
 
 using namespace flyball::literals;
@@ -224,4 +224,4 @@ TEST(DifferentialDrive, RefusesWhatIsNoDrive) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::differential_drive_test

@@ -9,7 +9,7 @@
 #include <flyball/mechanisms/gravity.hpp>
 #include <flyball/mechanisms/motor.hpp>
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::friction_test {
 namespace {
 
 TEST(Friction, AgainstTheMotionAndNoneAtRest) {
@@ -93,4 +93,4 @@ TEST(Motor, TorqueOverAGenericScalar) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::friction_test

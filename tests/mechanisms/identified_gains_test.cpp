@@ -14,7 +14,7 @@
 
 #include "mechanisms/expect_model.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::identified_gains_test {
 namespace {
 
 using namespace flyball::literals;
@@ -174,4 +174,4 @@ TEST(IdentifiedGains, VelocityServo) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::identified_gains_test

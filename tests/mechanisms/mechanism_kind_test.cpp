@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::mechanism_kind_test {
 namespace {
 
 TEST(MechanismKind, TextAndBack) {
@@ -62,4 +62,4 @@ TEST(MechanismKind, Properties) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::mechanism_kind_test

@@ -13,7 +13,7 @@
 
 #include "mechanisms/expect_model.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::models_test {
 namespace {
 
 using namespace flyball::literals;
@@ -349,4 +349,4 @@ TEST(Models, RefuseParametersWhoseModelOverflows) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::models_test

@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::motor_test {
 namespace {
 
 using namespace flyball::literals;
@@ -327,4 +327,4 @@ TEST(MotorName, AnUnknownNameIsAnsweredWithTheNearest) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::motor_test

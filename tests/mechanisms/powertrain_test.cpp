@@ -8,7 +8,7 @@
 #include <flyball/core/errors.hpp>
 #include <flyball/mechanisms/gravity.hpp>
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::powertrain_test {
 namespace {
 
 /// Whether a current is allowed, by the definitions: the rail of P = u I is the larger root of
@@ -161,4 +161,4 @@ TEST(GearedLoad, WhatCannotBeIsRefused) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::powertrain_test

@@ -11,6 +11,7 @@
 #include <flyball/math/expression/formula.hpp>
 #include <flyball/optimization/ocp/continuous_solution.hpp>
 
+namespace continuous_problem_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -470,3 +471,4 @@ TEST(ContinuousProblem, SaysWhatCannotBeDone) {
 }
 
 }  // namespace
+}  // namespace continuous_problem_test

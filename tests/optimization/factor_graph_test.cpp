@@ -8,7 +8,7 @@
 
 #include <flyball/core/random.hpp>
 
-namespace flyball::optimization {
+namespace flyball::optimization::factor_graph_test {
 namespace {
 
 using Eigen::Index;
@@ -318,4 +318,4 @@ TEST(FactorGraph, TheCapIsKept) {
 }
 
 }  // namespace
-}  // namespace flyball::optimization
+}  // namespace flyball::optimization::factor_graph_test

@@ -24,6 +24,7 @@
 // value, it is a local minimum (2, 16, 20, 44, 55, 59, 97, 98, 108), or the cost at a start where
 // all derivatives vanish (25).
 
+namespace hock_schittkowski_test {
 namespace {
 
 using namespace flyball;
@@ -151,3 +152,4 @@ TEST(HockSchittkowski, SolvedToThePublishedOptima) {
 }
 
 }  // namespace
+}  // namespace hock_schittkowski_test

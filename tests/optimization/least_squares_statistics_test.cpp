@@ -9,7 +9,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/math/probability/distributions.hpp>
 
-namespace flyball::optimization {
+namespace flyball::optimization::least_squares_statistics_test {
 namespace {
 
 using Eigen::Index;
@@ -258,4 +258,4 @@ TEST(LeastSquaresStatistics, ResidualsThatDependOnEachOtherAreDrawnTogether) {
 }
 
 }  // namespace
-}  // namespace flyball::optimization
+}  // namespace flyball::optimization::least_squares_statistics_test

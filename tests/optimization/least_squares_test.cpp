@@ -8,7 +8,7 @@
 
 #include <flyball/core/random.hpp>
 
-namespace flyball::optimization {
+namespace flyball::optimization::least_squares_test {
 namespace {
 
 using Eigen::Index;
@@ -461,4 +461,4 @@ TEST(LeastSquares, TheCapEndsTheIterationAndIsSaid) {
 }
 
 }  // namespace
-}  // namespace flyball::optimization
+}  // namespace flyball::optimization::least_squares_test

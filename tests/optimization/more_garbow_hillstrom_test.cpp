@@ -9,7 +9,7 @@
 
 #include "optimization/formula_residuals.hpp"
 
-namespace flyball::optimization {
+namespace flyball::optimization::more_garbow_hillstrom_test {
 namespace {
 
 using Eigen::Index;
@@ -261,4 +261,4 @@ TEST(MoreGarbowHillstrom, LinearFunctionsOfRankOneSaySo) {
 }
 
 }  // namespace
-}  // namespace flyball::optimization
+}  // namespace flyball::optimization::more_garbow_hillstrom_test

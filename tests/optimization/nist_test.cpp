@@ -10,7 +10,7 @@
 
 #include "optimization/formula_residuals.hpp"
 
-namespace flyball::optimization {
+namespace flyball::optimization::nist_test {
 namespace {
 
 using Eigen::Index;
@@ -128,4 +128,4 @@ TEST(NistReference, SeveralStartsMeetTheHardOnes) {
 }
 
 }  // namespace
-}  // namespace flyball::optimization
+}  // namespace flyball::optimization::nist_test

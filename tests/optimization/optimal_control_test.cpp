@@ -15,6 +15,7 @@
 #include "optimization/cart_pole.hpp"
 #include "support/allocation_count.hpp"
 
+namespace optimal_control_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -432,3 +433,4 @@ TEST(OptimalControl, MisuseIsRefused) {
 }
 
 }  // namespace
+}  // namespace optimal_control_test

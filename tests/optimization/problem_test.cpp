@@ -10,6 +10,7 @@
 
 #include <flyball/core/random.hpp>
 
+namespace problem_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -483,3 +484,4 @@ TEST(Problem, LimitsAreHonoured) {
 }
 
 }  // namespace
+}  // namespace problem_test

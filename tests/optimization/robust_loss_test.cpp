@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball::optimization {
+namespace flyball::optimization::robust_loss_test {
 namespace {
 
 constexpr std::array all{Loss::squared, Loss::soft_l1, Loss::huber, Loss::cauchy, Loss::tukey};
@@ -39,4 +39,4 @@ TEST(RobustLoss, ValuesAreTheFormulas) {
 }
 
 }  // namespace
-}  // namespace flyball::optimization
+}  // namespace flyball::optimization::robust_loss_test

@@ -8,7 +8,7 @@
 
 #include <flyball/io/log.hpp>
 
-namespace flyball::recording {
+namespace flyball::recording::load_recording_test {
 namespace {
 
 using identification::TestKind;
@@ -639,4 +639,4 @@ TEST(Recording, SilenceEndsARun) {
 }
 
 }  // namespace
-}  // namespace flyball::recording
+}  // namespace flyball::recording::load_recording_test

@@ -9,7 +9,7 @@
 #include <flyball/io/csv.hpp>
 #include <flyball/io/file.hpp>
 
-namespace flyball {
+namespace flyball::motion_file_test {
 namespace {
 
 /// x = t², y = 0, heading = t/2: accelerated along x at 2 m/s², turning at 0.5 rad/s.
@@ -164,4 +164,4 @@ TEST(MotionFile, RealFilesAreMotions) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::motion_file_test

@@ -6,7 +6,7 @@
 #include <flyball/core/errors.hpp>
 #include <flyball/recording/trajectory_file.hpp>
 
-namespace flyball {
+namespace flyball::real_trajectories_test {
 namespace {
 
 TEST(TrajectoryFile, ARealOneOfPathPlanner2023) {
@@ -36,4 +36,4 @@ TEST(PathPlannerSettings, ARealOne) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::real_trajectories_test

@@ -8,7 +8,7 @@
 
 #include <flyball/core/errors.hpp>
 
-namespace flyball {
+namespace flyball::trajectory_file_test {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
@@ -268,4 +268,4 @@ TEST(PathPlannerSettings, ExchangedModulesAreRefused) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::trajectory_file_test

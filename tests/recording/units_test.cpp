@@ -7,7 +7,7 @@
 #include <flyball/io/log.hpp>
 #include <flyball/recording/load_recording.hpp>
 
-namespace flyball::recording {
+namespace flyball::recording::units_test {
 namespace {
 
 using mechanisms::MechanismKind;
@@ -326,4 +326,4 @@ TEST(Units, SysIdsRadiansAreNoMetres) {
 }
 
 }  // namespace
-}  // namespace flyball::recording
+}  // namespace flyball::recording::units_test

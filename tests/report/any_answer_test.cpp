@@ -8,7 +8,7 @@
 #include <flyball/report/terminal.hpp>
 #include <flyball/report/write_report.hpp>
 
-namespace flyball::report {
+namespace flyball::report::any_answer_test {
 namespace {
 
 Answer pendulum() {
@@ -94,4 +94,4 @@ TEST(AnyAnswer, AsAPageWithItsFilesBesideIt) {
 }
 
 }  // namespace
-}  // namespace flyball::report
+}  // namespace flyball::report::any_answer_test

@@ -12,7 +12,7 @@
 #include "fixtures.hpp"
 #include "report/format.hpp"
 
-namespace flyball::report {
+namespace flyball::report::diagnostics_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -222,4 +222,4 @@ TEST(Diagnostics, OfAFittedModelReachEveryReader) {
 }
 
 }  // namespace
-}  // namespace flyball::report
+}  // namespace flyball::report::diagnostics_test

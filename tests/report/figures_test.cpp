@@ -12,7 +12,7 @@
 #include "study/answer/drawing.hpp"
 #include "study/answer/mechanism_animation.hpp"
 
-namespace flyball::report {
+namespace flyball::report::figures_test {
 namespace {
 
 const Figure& named(const Answer& answer, const std::string& name) {
@@ -388,4 +388,4 @@ TEST(Figures, ASimulationsPlotsShareAClockAndItsStatesAPlane) {
 }
 
 }  // namespace
-}  // namespace flyball::report
+}  // namespace flyball::report::figures_test

@@ -2,7 +2,7 @@
 
 #include "report/format.hpp"
 
-namespace flyball::report {
+namespace flyball::report::format_test {
 namespace {
 
 TEST(Format, WrapKeepsTheWidthAndEveryWord) {
@@ -24,4 +24,4 @@ TEST(Format, TextCannotBecomeMarkup) {
 }
 
 }  // namespace
-}  // namespace flyball::report
+}  // namespace flyball::report::format_test

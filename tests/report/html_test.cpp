@@ -8,7 +8,7 @@
 #include "fixtures.hpp"
 #include "report/page_parts.hpp"
 
-namespace flyball::report {
+namespace flyball::report::html_test {
 namespace {
 
 /// The page without its scripts: the two that are its own and the data of its plots, which hold no
@@ -215,4 +215,4 @@ TEST(Html, NoNaNIsPrintedAsANumber) {
 }
 
 }  // namespace
-}  // namespace flyball::report
+}  // namespace flyball::report::html_test

@@ -8,7 +8,7 @@
 
 #include "report/plot_data.hpp"
 
-namespace flyball::report {
+namespace flyball::report::plot_data_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -143,4 +143,4 @@ TEST(PlotData, AnAnimationsPartsNameTheirColumns) {
 }
 
 }  // namespace
-}  // namespace flyball::report
+}  // namespace flyball::report::plot_data_test

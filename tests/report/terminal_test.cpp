@@ -12,7 +12,7 @@
 #include "fixtures.hpp"
 #include "report/format.hpp"
 
-namespace flyball::report {
+namespace flyball::report::terminal_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -291,4 +291,4 @@ TEST(Motors, TableHasEveryMotorWithItsNumbers) {
 }
 
 }  // namespace
-}  // namespace flyball::report
+}  // namespace flyball::report::terminal_test

@@ -17,7 +17,7 @@
 #include "fixtures.hpp"
 #include "report/pictures.hpp"
 
-namespace flyball::report {
+namespace flyball::report::write_report_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -234,4 +234,4 @@ TEST_F(WriteReport, AnEarlierReportIsReplacedAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace flyball::report
+}  // namespace flyball::report::write_report_test

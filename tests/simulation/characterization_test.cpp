@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+namespace characterization_test {
 namespace {
 
 using namespace flyball;
@@ -302,3 +303,4 @@ TEST(RecordCharacterization, RefusesNonsense) {
 }
 
 }  // namespace
+}  // namespace characterization_test

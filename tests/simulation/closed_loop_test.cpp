@@ -12,7 +12,7 @@
 #include <flyball/systems/discretize.hpp>
 #include <flyball/systems/linearize.hpp>
 
-namespace flyball {
+namespace flyball::closed_loop_test {
 namespace {
 
 using namespace flyball::literals;
@@ -332,4 +332,4 @@ TEST(SimulateClosedLoop, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::closed_loop_test

@@ -9,7 +9,7 @@
 #include <flyball/core/errors.hpp>
 #include <flyball/mechanisms/gravity.hpp>
 
-namespace flyball {
+namespace flyball::fastest_travel_test {
 namespace {
 
 using mechanisms::MechanismKind;
@@ -257,4 +257,4 @@ TEST(FastestTravel, AnArmThatGetsStuckIsToldWhere) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::fastest_travel_test

@@ -12,7 +12,7 @@
 #include <flyball/planning/profiles/generate_trapezoid_profile.hpp>
 #include <flyball/systems/discretize.hpp>
 
-namespace flyball {
+namespace flyball::linear_loop_test {
 namespace {
 
 using namespace flyball::literals;
@@ -149,4 +149,4 @@ TEST(SimulateLinear, AnExactObserverStaysWithThePlant) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::linear_loop_test

@@ -13,7 +13,7 @@
 #include <flyball/planning/profiles/trapezoid_profile.hpp>
 #include <flyball/systems/discretize.hpp>
 
-namespace flyball {
+namespace flyball::mechanism_loop_test {
 namespace {
 
 using namespace flyball::literals;
@@ -290,4 +290,4 @@ TEST(SimulateMechanism, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::mechanism_loop_test

@@ -7,7 +7,7 @@
 
 #include <flyball/core/random.hpp>
 
-namespace flyball {
+namespace flyball::mechanism_plant_test {
 namespace {
 
 using mechanisms::FeedforwardGains;
@@ -179,4 +179,4 @@ TEST(MechanismPlant, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::mechanism_plant_test

@@ -6,7 +6,7 @@
 
 #include <flyball/simulation/closed_loop.hpp>
 
-namespace flyball {
+namespace flyball::plant_test {
 namespace {
 
 using namespace flyball::literals;
@@ -121,4 +121,4 @@ TEST(ModelPlant, NamesTheStateThatRunsAway) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::plant_test

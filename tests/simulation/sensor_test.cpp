@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::sensor_test {
 namespace {
 
 Sensor sensor(const SensorModel& model, double step = 1e-3) {
@@ -108,4 +108,4 @@ TEST(Sensor, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::sensor_test

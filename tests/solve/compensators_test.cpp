@@ -2,7 +2,7 @@
 
 #include "answers.hpp"
 
-namespace flyball::solve {
+namespace flyball::solve::compensators_test {
 namespace {
 
 // Skogestad and Postlethwaite's (2.62) with their weights of section 2.8.2: 1.37.
@@ -86,4 +86,4 @@ TEST(SolveCompensators, Reduce) {
 }
 
 }  // namespace
-}  // namespace flyball::solve
+}  // namespace flyball::solve::compensators_test

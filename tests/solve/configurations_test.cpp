@@ -2,7 +2,7 @@
 
 #include "answers.hpp"
 
-namespace flyball::solve {
+namespace flyball::solve::configurations_test {
 namespace {
 
 // Figure 16.4: the way leads by both corners of what is forbidden.
@@ -38,4 +38,4 @@ TEST(SolveConfigurations, LinksAmongDiscs) {
 }
 
 }  // namespace
-}  // namespace flyball::solve
+}  // namespace flyball::solve::configurations_test

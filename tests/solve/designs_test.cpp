@@ -3,7 +3,7 @@
 
 #include "answers.hpp"
 
-namespace flyball::solve {
+namespace flyball::solve::designs_test {
 namespace {
 
 // The public functions' own words.
@@ -344,4 +344,4 @@ TEST(SolveDesigns, PurePursuit) {
 }
 
 }  // namespace
-}  // namespace flyball::solve
+}  // namespace flyball::solve::designs_test

@@ -11,7 +11,7 @@
 #include "answers.hpp"
 
 // The table of kinds: its examples, its documentation and its schema.
-namespace flyball::solve {
+namespace flyball::solve::documentation_test {
 namespace {
 
 std::string file(const std::string& path) {
@@ -286,4 +286,4 @@ TEST(SolveTable, SchemaFitsProblemsAnswersAndRefusals) {
 }
 
 }  // namespace
-}  // namespace flyball::solve
+}  // namespace flyball::solve::documentation_test

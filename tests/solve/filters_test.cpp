@@ -3,7 +3,7 @@
 
 #include "solve/answers.hpp"
 
-namespace flyball::solve {
+namespace flyball::solve::filters_test {
 namespace {
 
 // SciPy 1.10.1: iirfilter(7, 20 T/π, rp=0.5, rs=60, btype='highpass', ftype='ellip', output='zpk').
@@ -70,4 +70,4 @@ TEST(Filters, SignalsInOtherBases) {
 }
 
 }  // namespace
-}  // namespace flyball::solve
+}  // namespace flyball::solve::filters_test

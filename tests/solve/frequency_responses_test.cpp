@@ -4,7 +4,7 @@
 
 #include "answers.hpp"
 
-namespace flyball::solve {
+namespace flyball::solve::frequency_responses_test {
 namespace {
 
 // 2/(s + 1) + 3 as a transfer function and as matrices, at 1 rad/s: 4 - j.
@@ -99,4 +99,4 @@ TEST(SolveFrequencyResponses, NormAndDiscretizations) {
 }
 
 }  // namespace
-}  // namespace flyball::solve
+}  // namespace flyball::solve::frequency_responses_test

@@ -6,7 +6,7 @@
 #include "answers.hpp"
 
 // Regressions, spectra and models from records.
-namespace flyball::solve {
+namespace flyball::solve::identification_test {
 namespace {
 
 // The line of `tests/math/regression/least_squares_test.cpp`.
@@ -103,4 +103,4 @@ TEST(SolveIdentification, FrequencyResponse) {
 }
 
 }  // namespace
-}  // namespace flyball::solve
+}  // namespace flyball::solve::identification_test

@@ -3,7 +3,7 @@
 
 #include "answers.hpp"
 
-namespace flyball::solve {
+namespace flyball::solve::paths_test {
 namespace {
 
 // The natural cubic through (0, 0), (1, 1), (2, 0) at even knots: y'' = -3 in the middle, so that
@@ -76,4 +76,4 @@ TEST(SolvePaths, TheFastestMotion) {
 }
 
 }  // namespace
-}  // namespace flyball::solve
+}  // namespace flyball::solve::paths_test

@@ -6,7 +6,7 @@
 // Numbers that python-control's tests hold (margin_test, timeresp_test, sysnorm_test,
 // statefbk_test, modelsimp_test, nyquist_test, bdalg_test; most of them made with MATLAB), to the
 // digits that they have. Where those come from samples of a response, the exact ones stand here.
-namespace flyball::solve {
+namespace flyball::solve::peer_numbers_test {
 namespace {
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
@@ -214,4 +214,4 @@ TEST(PeerNumbers, BlockDiagrams) {
 }
 
 }  // namespace
-}  // namespace flyball::solve
+}  // namespace flyball::solve::peer_numbers_test

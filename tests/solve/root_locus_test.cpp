@@ -2,7 +2,7 @@
 
 #include "answers.hpp"
 
-namespace flyball::solve {
+namespace flyball::solve::root_locus_test {
 namespace {
 
 // s(s + 1)(s + 2) + k: branches meet at -1 + 1/√3 for k = 2/(3√3), and cross the axis at √2 for 6.
@@ -34,4 +34,4 @@ TEST(SolveStep, FirstOrder) {
 }
 
 }  // namespace
-}  // namespace flyball::solve
+}  // namespace flyball::solve::root_locus_test

@@ -3,7 +3,7 @@
 
 #include "answers.hpp"
 
-namespace flyball::solve {
+namespace flyball::solve::solver_test {
 namespace {
 
 // x² - 4x - 1 = 0 and 2x - x² + 1 = 0.
@@ -164,4 +164,4 @@ TEST(Solve, SurvivesLongAndDeepText) {
 }
 
 }  // namespace
-}  // namespace flyball::solve
+}  // namespace flyball::solve::solver_test

@@ -2,7 +2,7 @@
 
 #include "answers.hpp"
 
-namespace flyball::solve {
+namespace flyball::solve::systems_test {
 namespace {
 
 // 1/(s + 1): ∫e^{-2t} dt = 1/2. 4/(s² + 2s + 4): ω/(4ζ) = 1. x⁺ = x/2 + u: Σ 4^{-k} = 4/3.
@@ -311,4 +311,4 @@ TEST(SolveSystems, MarginsOfALoopInTinyPeriods) {
 }
 
 }  // namespace
-}  // namespace flyball::solve
+}  // namespace flyball::solve::systems_test

@@ -2,7 +2,7 @@
 
 #include "solve/answers.hpp"
 
-namespace flyball::solve {
+namespace flyball::solve::transfer_algebra_test {
 namespace {
 
 // (s + 3)/((s + 1)(s + 2)) and back.
@@ -91,4 +91,4 @@ TEST(SolveTransferAlgebra, ClosedLoops) {
 }
 
 }  // namespace
-}  // namespace flyball::solve
+}  // namespace flyball::solve::transfer_algebra_test

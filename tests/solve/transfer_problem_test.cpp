@@ -7,7 +7,7 @@
 
 #include "solve/answers.hpp"
 
-namespace flyball::solve {
+namespace flyball::solve::transfer_problem_test {
 namespace {
 
 /// The same problem, once in words and once in lists.
@@ -293,4 +293,4 @@ TEST(SolveTransferProblem, WeightsOfTheOutput) {
 }
 
 }  // namespace
-}  // namespace flyball::solve
+}  // namespace flyball::solve::transfer_problem_test

@@ -6,7 +6,7 @@
 
 #include <flyball/study/answer.hpp>
 
-namespace flyball::study {
+namespace flyball::study::analyze_test {
 namespace {
 
 // dx/dt = -2x + 3u: y = 1.5 (1 - e^{-2t}), gain 1.5 at every frequency's start, H2 norm 3/√4.
@@ -133,4 +133,4 @@ TEST(Analyze, RefusesBadModels) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::analyze_test

@@ -9,7 +9,7 @@
 #include <flyball/io/csv.hpp>
 #include <flyball/study/identify_model.hpp>
 
-namespace flyball::study {
+namespace flyball::study::benchmark_models_test {
 namespace {
 
 const std::string folder = FLYBALL_TEST_DATA "/benchmarks/";
@@ -99,4 +99,4 @@ TEST(BenchmarkModels, WienerHammersteinFromAGenericStart) {
       0.3e-3);
 }
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::benchmark_models_test

@@ -12,7 +12,7 @@
 #include <flyball/control/followers/ltv_drive.hpp>
 #include <flyball/study/project.hpp>
 
-namespace flyball::study {
+namespace flyball::study::design_drive_test {
 namespace {
 
 const std::string robot =
@@ -142,4 +142,4 @@ TEST(DesignDrive, WhatIsNoDifferentialDriveIsRefused) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::design_drive_test

@@ -17,7 +17,7 @@
 #include "study/drive_law.hpp"
 #include "study/drive_wheel.hpp"
 
-namespace flyball::study {
+namespace flyball::study::design_holonomic_test {
 namespace {
 
 std::string robot(const std::string& type) {
@@ -206,4 +206,4 @@ TEST(DesignHolonomic, TheHeaderIsTheLawThatIsSimulated) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::design_holonomic_test

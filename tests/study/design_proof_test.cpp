@@ -9,7 +9,7 @@
 
 #include "study/design_steps.hpp"
 
-namespace flyball::study {
+namespace flyball::study::design_proof_test {
 namespace {
 
 using mechanisms::MechanismKind;
@@ -172,4 +172,4 @@ TEST(DesignProof, ManyStatesAreNotTried) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::design_proof_test

@@ -10,7 +10,7 @@
 
 #include "support/oracle.hpp"
 
-namespace flyball::study {
+namespace flyball::study::design_test {
 namespace {
 
 using mechanisms::MechanismKind;
@@ -350,4 +350,4 @@ TEST(Design, GainsForMotorControllersKeepTheirMarginWithTheDelay) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::design_test

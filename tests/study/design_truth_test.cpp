@@ -13,7 +13,7 @@
 #include <flyball/study/answer.hpp>
 #include <flyball/study/simulate_design.hpp>
 
-namespace flyball::study {
+namespace flyball::study::design_truth_test {
 namespace {
 
 using mechanisms::MechanismKind;
@@ -350,4 +350,4 @@ TEST(DesignTruth, SaysThatThereIsNoFeedbackAndWhy) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::design_truth_test

@@ -19,7 +19,7 @@
 
 #include "study/drive_plant.hpp"
 
-namespace flyball::study {
+namespace flyball::study::drive_test {
 namespace {
 
 using Eigen::VectorXd;
@@ -492,4 +492,4 @@ TEST(DriveJob, WhatIsMissingOrCannotBeIsToldWithTheMend) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::drive_test

@@ -13,7 +13,7 @@
 #include <flyball/io/wpilog.hpp>
 #include <flyball/math/probability/truncated_normal.hpp>
 
-namespace flyball::study {
+namespace flyball::study::estimate_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -464,4 +464,4 @@ TEST(Estimate, TheAnswerHoldsTheEstimates) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::estimate_test

@@ -10,7 +10,7 @@
 
 #include "session_file.hpp"
 
-namespace flyball::study {
+namespace flyball::study::experiment_test {
 namespace {
 
 using mechanisms::MechanismKind;
@@ -159,4 +159,4 @@ TEST(PlanExperiment, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::experiment_test

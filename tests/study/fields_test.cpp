@@ -12,7 +12,7 @@
 #include "study/mechanism_parts.hpp"
 #include "study/read_value.hpp"
 
-namespace flyball::study {
+namespace flyball::study::fields_test {
 namespace {
 
 double any_number() {
@@ -293,4 +293,4 @@ TEST(Fields, TheSchemaIsTheTable) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::fields_test

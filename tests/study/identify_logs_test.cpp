@@ -9,7 +9,7 @@
 
 #include "session_file.hpp"
 
-namespace flyball::study {
+namespace flyball::study::identify_logs_test {
 namespace {
 
 CharacterizationOptions elevator(std::uint64_t seed, double kV = 2.0) {
@@ -119,4 +119,4 @@ TEST(IdentifyLogs, AMechanismThatTheDataTellWaitsForItsConfirmation) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::identify_logs_test

@@ -11,7 +11,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/io/csv.hpp>
 
-namespace flyball::study {
+namespace flyball::study::identify_model_test {
 namespace {
 
 /// x' = (gain u - x)/lag, the rest of the file behind it.
@@ -275,4 +275,4 @@ TEST(IdentifyModel, TheAnswerHoldsWhatWasFound) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::identify_model_test

@@ -17,7 +17,7 @@
 
 #include "session_file.hpp"
 
-namespace flyball::study {
+namespace flyball::study::identify_streamed_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -302,4 +302,4 @@ TEST(IdentifyStreamed, ADrivetrainIsReadWhole) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::identify_streamed_test

@@ -22,7 +22,7 @@
 
 #include "io/temporary_folder.hpp"
 
-namespace flyball::study {
+namespace flyball::study::localize_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -378,4 +378,4 @@ TEST_F(Localize, TheUtiasRobotIsFound) {
 #endif
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::localize_test

@@ -11,7 +11,7 @@
 #include "session_file.hpp"
 
 /// Turrets, rollers and swerve modules from a project file or a log to an answer.
-namespace flyball::study {
+namespace flyball::study::mechanism_kinds_test {
 namespace {
 
 using mechanisms::MechanismKind;
@@ -102,4 +102,4 @@ TEST(MechanismKinds, ATurretsLogIsTuned) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::mechanism_kinds_test

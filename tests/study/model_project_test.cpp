@@ -10,7 +10,7 @@
 #include <flyball/study/answer.hpp>
 #include <flyball/study/simulate.hpp>
 
-namespace flyball::study {
+namespace flyball::study::model_project_test {
 namespace {
 
 const std::string pendulum = R"([model]
@@ -369,4 +369,4 @@ TEST(AnalyzeModel, NothingToActWithIsNamed) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::model_project_test

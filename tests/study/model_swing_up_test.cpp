@@ -14,7 +14,7 @@
 
 #include "compiled.hpp"
 
-namespace flyball::study {
+namespace flyball::study::model_swing_up_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -209,4 +209,4 @@ TEST(ModelSwingUp, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::model_swing_up_test

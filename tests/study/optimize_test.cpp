@@ -10,7 +10,7 @@
 
 #include <flyball/study/project.hpp>
 
-namespace flyball::study {
+namespace flyball::study::optimize_test {
 namespace {
 
 const std::string robot =
@@ -179,4 +179,4 @@ TEST(Optimize, RealFilesOfChoreoAreNotSlower) {
 #endif
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::optimize_test

@@ -11,7 +11,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/io/file.hpp>
 
-namespace flyball::study {
+namespace flyball::study::path_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -471,4 +471,4 @@ TEST(Path, RealFiles) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::path_test

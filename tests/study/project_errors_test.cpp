@@ -7,7 +7,7 @@
 
 #include <flyball/study/project.hpp>
 
-namespace flyball::study {
+namespace flyball::study::project_errors_test {
 namespace {
 
 std::vector<std::string> messages(const Errors& errors) {
@@ -182,4 +182,4 @@ TEST(ProjectErrors, WhatALogSuppliesIsNotMissingBesideIt) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::project_errors_test

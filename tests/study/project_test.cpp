@@ -6,7 +6,7 @@
 
 #include <flyball/mechanisms/elevator.hpp>
 
-namespace flyball::study {
+namespace flyball::study::project_test {
 namespace {
 
 constexpr const char* elevator_text = R"([mechanism]
@@ -281,4 +281,4 @@ TEST(Project, AFileWithoutAMechanismIsRefused) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::project_test

@@ -9,7 +9,7 @@
 #include <flyball/study/identify_logs.hpp>
 #include <flyball/study/tune.hpp>
 
-namespace flyball::study {
+namespace flyball::study::real_logs_test {
 namespace {
 
 using mechanisms::MechanismKind;
@@ -210,4 +210,4 @@ TEST(RealLogDrivetrains, AreAskedForTheirSides) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::real_logs_test

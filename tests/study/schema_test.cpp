@@ -5,7 +5,7 @@
 
 #include <flyball/study/answer.hpp>
 
-namespace flyball::study {
+namespace flyball::study::schema_test {
 namespace {
 
 using identification::FeedforwardFit;
@@ -76,4 +76,4 @@ TEST(Schema, BytesThatAreNotUtf8DoNotThrow) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::schema_test

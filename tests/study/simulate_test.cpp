@@ -8,7 +8,7 @@
 
 #include <flyball/study/answer.hpp>
 
-namespace flyball::study {
+namespace flyball::study::simulate_test {
 namespace {
 
 /// What is wrong with a file, with its excerpts.
@@ -287,4 +287,4 @@ TEST(Simulate, WhatTakesTooLongIsRefusedInThePersonsWords) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::simulate_test

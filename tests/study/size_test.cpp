@@ -13,7 +13,7 @@
 #include <flyball/mechanisms/lift/elevator_arm.hpp>
 #include <flyball/study/project.hpp>
 
-namespace flyball::study {
+namespace flyball::study::size_test {
 namespace {
 
 using mechanisms::MechanismKind;
@@ -319,4 +319,4 @@ TEST(Size, ExamplesAreAnswered) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::size_test

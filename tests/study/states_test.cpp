@@ -7,7 +7,7 @@
 #include <flyball/planning/configuration/configuration_space.hpp>
 #include <flyball/study/project.hpp>
 
-namespace flyball::study {
+namespace flyball::study::states_test {
 namespace {
 
 /// An elevator with an arm that must not be low while the elevator is.
@@ -249,4 +249,4 @@ TEST(States, TellsWhatIsWrongAndWhere) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::states_test

@@ -13,7 +13,7 @@
 #include "drive_sessions.hpp"
 #include "session_file.hpp"
 
-namespace flyball::study {
+namespace flyball::study::tune_drive_test {
 namespace {
 
 /// A drivetrain's session as a SysId JSON, removed with it.
@@ -156,4 +156,4 @@ TEST(TuneDrive, SeveralLogsAreComparedAndFittedTogether) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::tune_drive_test

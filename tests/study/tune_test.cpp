@@ -12,7 +12,7 @@
 
 #include "session_file.hpp"
 
-namespace flyball::study {
+namespace flyball::study::tune_test {
 namespace {
 
 using mechanisms::MechanismKind;
@@ -252,4 +252,4 @@ TEST(Identify, ShowsWhatAPersonTrimmed) {
 }
 
 }  // namespace
-}  // namespace flyball::study
+}  // namespace flyball::study::tune_test

@@ -13,7 +13,7 @@
 #include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::analysis_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -221,4 +221,4 @@ TEST(Analysis, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::analysis_test

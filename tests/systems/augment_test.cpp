@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::augment_test {
 namespace {
 
 ContinuousSystem<2, 1, 1> cart() {
@@ -114,4 +114,4 @@ TEST(Augment, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::augment_test

@@ -8,7 +8,7 @@
 #include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::controllability_test {
 namespace {
 
 using Eigen::Index;
@@ -256,4 +256,4 @@ TEST(Controllability, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::controllability_test

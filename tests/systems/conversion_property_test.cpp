@@ -11,7 +11,7 @@
 #include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::conversion_property_test {
 namespace {
 
 using Eigen::Index;
@@ -359,4 +359,4 @@ TEST(ConversionProperties, SampledCost) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::conversion_property_test

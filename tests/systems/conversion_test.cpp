@@ -13,7 +13,7 @@
 #include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::conversion_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -368,4 +368,4 @@ TEST(Conversion, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::conversion_test

@@ -10,7 +10,7 @@
 #include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::descriptor_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -169,4 +169,4 @@ TEST(Descriptor, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::descriptor_test

@@ -9,7 +9,7 @@
 #include <flyball/math/integration/adaptive.hpp>
 #include <flyball/math/integration/quadrature.hpp>
 
-namespace flyball {
+namespace flyball::discretize_test {
 namespace {
 
 // Double integrator: A_d = [1 T; 0 1], B_d = [T²/2; T]; A has no inverse.
@@ -176,4 +176,4 @@ TEST(Discretize, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::discretize_test

@@ -14,7 +14,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::formula_model_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -260,4 +260,4 @@ TEST(Equilibrium, WhereTheModelGivesNoNumberIsRefused) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::formula_model_test

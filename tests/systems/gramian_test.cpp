@@ -12,7 +12,7 @@
 #include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::gramian_test {
 namespace {
 
 using Eigen::Index;
@@ -247,4 +247,4 @@ TEST(Norms, OfALoopWhoseInputMovesOneState) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::gramian_test

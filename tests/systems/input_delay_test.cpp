@@ -7,7 +7,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/systems/discretize.hpp>
 
-namespace flyball {
+namespace flyball::input_delay_test {
 namespace {
 
 Eigen::MatrixXd scalar(double value) {
@@ -96,4 +96,4 @@ TEST(InputDelay, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::input_delay_test

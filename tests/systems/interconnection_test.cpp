@@ -15,7 +15,7 @@
 #include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::interconnection_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -233,4 +233,4 @@ TEST(Interconnection, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::interconnection_test

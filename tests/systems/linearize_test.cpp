@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace flyball {
+namespace flyball::linearize_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -102,4 +102,4 @@ TEST(Linearize, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::linearize_test

@@ -10,7 +10,7 @@
 #include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::model_reduction_test {
 namespace {
 
 using Eigen::Index;
@@ -142,4 +142,4 @@ TEST(ModelReduction, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::model_reduction_test

@@ -10,7 +10,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::model_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -340,4 +340,4 @@ TEST(Model, AnglesGoTheShorterWayRound) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::model_test

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::plane_curves_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -64,4 +64,4 @@ TEST(PlaneCurves, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::plane_curves_test

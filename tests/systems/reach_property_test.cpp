@@ -13,7 +13,7 @@
 #include "systems/random_systems.hpp"
 #include "systems/staircase.hpp"
 
-namespace flyball {
+namespace flyball::reach_property_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -390,4 +390,4 @@ TEST(ReachProperties, HiddenModesAreFound) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::reach_property_test

@@ -9,7 +9,7 @@
 #include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::reach_units_test {
 namespace {
 
 using Eigen::Index;
@@ -244,4 +244,4 @@ TEST(ReachUnits, ModesOfExtremeEntries) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::reach_units_test

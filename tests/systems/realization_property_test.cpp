@@ -10,7 +10,7 @@
 #include "support/laws.hpp"
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::realization_property_test {
 namespace {
 
 using Eigen::Index;
@@ -248,4 +248,4 @@ TEST(RealizationProperties, ToleranceIsWhatTheAnswerMayDifferBy) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::realization_property_test

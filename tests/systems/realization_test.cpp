@@ -11,7 +11,7 @@
 #include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::realization_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -256,4 +256,4 @@ TEST(Realization, SimilarityTransformOfLargeInputs) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::realization_test

@@ -10,7 +10,7 @@
 #include "support/laws.hpp"
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::response_test {
 namespace {
 
 using Eigen::Index;
@@ -168,4 +168,4 @@ TEST(Response, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::response_test

@@ -11,7 +11,7 @@
 #include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::sampled_cost_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -116,4 +116,4 @@ TEST(SampledCost, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::sampled_cost_test

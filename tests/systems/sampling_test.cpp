@@ -10,7 +10,7 @@
 
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::sampling_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -89,4 +89,4 @@ TEST(Sampling, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::sampling_test

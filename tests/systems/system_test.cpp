@@ -8,7 +8,7 @@
 #include <flyball/systems/controllability.hpp>
 #include <flyball/systems/response.hpp>
 
-namespace flyball {
+namespace flyball::system_test {
 namespace {
 
 // s² + 2 s + 5: -1 ± 2j.
@@ -93,4 +93,4 @@ TEST(System, ChecksShapes) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::system_test

@@ -11,7 +11,7 @@
 #include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::transmission_zeros_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -138,4 +138,4 @@ TEST(TransmissionZeros, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::transmission_zeros_test

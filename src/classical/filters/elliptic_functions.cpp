@@ -1,15 +1,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "classical/filters/elliptic_functions.hpp"
+#include "core/constants.hpp"
 
 namespace flyball::classical::detail {
 
 namespace {
-
-using std::numbers::pi;
 
 /// The arithmetic-geometric mean of 1 and x.
 double mean_with_one(double x) {

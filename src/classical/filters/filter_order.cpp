@@ -5,7 +5,9 @@
 
 #include <flyball/classical/filters/iir_design.hpp>
 
+#include "classical/filters/bands.hpp"
 #include "classical/filters/elliptic_functions.hpp"
+#include "core/constants.hpp"
 #include "core/try.hpp"
 
 namespace flyball::classical {
@@ -13,26 +15,21 @@ namespace flyball::classical {
 namespace {
 
 using std::numbers::ln10;
-using std::numbers::pi;
 
-constexpr std::string_view where = "filter_order";
+constexpr std::string_view in_filter_order = "filter_order";
 
 /// 10^(dB/10) - 1.
 double loss(double decibels) {
   return std::expm1(decibels * ln10 / 10.0);
 }
 
-bool is_band(FilterBand band) {
-  return band == FilterBand::band_pass || band == FilterBand::band_stop;
-}
-
 Expected<void> check_edges(FilterBand band, const FilterSpecification& wanted, double nyquist) {
-  const bool two = is_band(band);
+  const bool two = has_two_edges(band);
   for (std::size_t i = 0; i < (two ? 2U : 1U); ++i) {
     for (const auto& [edges, name] : {std::pair{&wanted.pass, "pass"}, {&wanted.stop, "stop"}}) {
-      FLYBALL_CHECK(check_positive((*edges)[i], where, name, "rad/s"));
+      FLYBALL_CHECK(check_positive((*edges)[i], in_filter_order, name, "rad/s"));
       if (!((*edges)[i] < nyquist)) {
-        return refusal(ArgumentError::out_of_range, where, name)
+        return refusal(ArgumentError::out_of_range, in_filter_order, name)
             .got(format_number((*edges)[i]) + " rad/s")
             .expected("below half the sample rate, which is " + format_number(nyquist) + " rad/s");
       }
@@ -47,7 +44,7 @@ Expected<void> check_edges(FilterBand band, const FilterSpecification& wanted, d
   if (in_order) {
     return {};
   }
-  return refusal(ArgumentError::out_of_range, where, "edges")
+  return refusal(ArgumentError::out_of_range, in_filter_order, "edges")
       .got("not in the order of a " + std::string(to_string(band)) + " filter")
       .expected(band == FilterBand::low_pass    ? "pass below stop"
                 : band == FilterBand::high_pass ? "stop below pass"
@@ -106,18 +103,18 @@ Expected<FilterOrder> filter_order(FilterFamily family, FilterBand band,
                                    const FilterSpecification& wanted, std::optional<Time> period) {
   const double T = period ? period->si() : 0.0;
   if (period) {
-    FLYBALL_CHECK(check_positive(T, where, "period", "s"));
+    FLYBALL_CHECK(check_positive(T, in_filter_order, "period", "s"));
   }
   if (family == FilterFamily::bessel) {
-    return refusal(ArgumentError::malformed, where, "family")
+    return refusal(ArgumentError::malformed, in_filter_order, "family")
         .got("bessel")
         .expected("one with a stop band: butterworth, chebyshev1, chebyshev2, elliptic");
   }
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_filter_order)
                     .within(wanted.ripple, 1e-12, 300.0, "ripple", "dB")
                     .within(wanted.attenuation, 1e-12, 3000.0, "attenuation", "dB"));
   if (!(wanted.attenuation > wanted.ripple)) {
-    return refusal(ArgumentError::out_of_range, where, "attenuation")
+    return refusal(ArgumentError::out_of_range, in_filter_order, "attenuation")
         .got(format_number(wanted.attenuation) + " dB")
         .expected("above the ripple, which is " + format_number(wanted.ripple) + " dB");
   }
@@ -128,7 +125,7 @@ Expected<FilterOrder> filter_order(FilterFamily family, FilterBand band,
               warped(wanted.stop[1])};
   const double stop = transition(band, edges);
   if (!(stop > 1.0)) {
-    return refusal(ArgumentError::out_of_range, where, "edges")
+    return refusal(ArgumentError::out_of_range, in_filter_order, "edges")
         .got("so near each other that nothing lies between")
         .expected("farther apart");
   }
@@ -156,7 +153,7 @@ Expected<FilterOrder> filter_order(FilterFamily family, FilterBand band,
   const double order = std::max(1.0, std::ceil(exact * (1.0 - 1e-12)));
   constexpr double most = 20.0;
   if (!(order <= most)) {
-    return refusal(ArgumentError::out_of_range, where, "the order")
+    return refusal(ArgumentError::out_of_range, in_filter_order, "the order")
         .got(format_number(exact))
         .expected("at most 20; another family, or a wider transition, needs less");
   }

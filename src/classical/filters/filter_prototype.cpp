@@ -8,6 +8,7 @@
 #include "classical/filters/elliptic_functions.hpp"
 #include "classical/filters/root_sections.hpp"
 #include "classical/polynomial.hpp"
+#include "core/constants.hpp"
 #include "core/try.hpp"
 
 namespace flyball::classical {
@@ -18,7 +19,6 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::VectorXcd;
 using std::numbers::ln10;
-using std::numbers::pi;
 
 /// √(10^(dB/10) - 1): how far a loss is from none.
 double excess(double decibels) {

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string>
 
 #include <flyball/classical/filters/room.hpp>
 #include <flyball/core/signal.hpp>
 
+#include "classical/filters/bands.hpp"
+#include "core/constants.hpp"
 #include "core/try.hpp"
 
 namespace flyball::classical {
@@ -17,11 +18,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-using std::numbers::pi;
-
-bool is_band(FilterBand band) {
-  return band == FilterBand::band_pass || band == FilterBand::band_stop;
-}
 bool passes_half(FilterBand band) {
   return band == FilterBand::high_pass || band == FilterBand::band_stop;
 }
@@ -46,7 +42,7 @@ Expected<void> check_design(const FirDesign& design, Time period) {
         .got(std::to_string(design.taps))
         .expected("odd: with an even number half the sample rate cannot pass");
   }
-  const bool band = is_band(design.band);
+  const bool band = has_two_edges(design.band);
   if (band && !(design.upper_frequency > design.frequency)) {
     return refusal(ArgumentError::out_of_range, where, "upper_frequency")
         .got(design.upper_frequency == 0.0 ? "missing"

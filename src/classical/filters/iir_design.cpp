@@ -1,10 +1,11 @@
 #include <flyball/classical/filters/iir_design.hpp>
 
 #include <cmath>
-#include <numbers>
 #include <string>
 
+#include "classical/filters/bands.hpp"
 #include "classical/filters/root_sections.hpp"
+#include "core/constants.hpp"
 #include "core/try.hpp"
 
 namespace flyball::classical {
@@ -15,15 +16,9 @@ using Eigen::VectorXcd;
 
 namespace {
 
-using std::numbers::pi;
-
-bool is_band(FilterBand band) {
-  return band == FilterBand::band_pass || band == FilterBand::band_stop;
-}
-
 Expected<void> check_edges(const IirDesign& design, std::string_view where) {
   return Checks(where).positive(design.frequency, "frequency", "rad/s").also([&]() {
-    return !is_band(design.band) || design.upper_frequency > design.frequency
+    return !has_two_edges(design.band) || design.upper_frequency > design.frequency
                ? check_finite(design.upper_frequency, where, "upper_frequency")
                : Expected<void>(refusal(ArgumentError::out_of_range, where, "upper_frequency")
                                     .got(design.upper_frequency == 0.0
@@ -49,11 +44,11 @@ AnalogFilter moved(const AnalogFilter& prototype, FilterBand band, double low, d
   const Index n = prototype.poles.size();
   const Index missing = n - prototype.zeros.size();
   const bool inverted = band == FilterBand::high_pass || band == FilterBand::band_stop;
-  const double width = is_band(band) ? high - low : low;
+  const double width = has_two_edges(band) ? high - low : low;
 
   // Of one root: ω_c p, ω_c/p; for bands the roots of s² - (width p) s + ω₁ω₂.
   const auto map = [&](const VectorXcd& roots, Index at_infinity) {
-    const Index each = is_band(band) ? 2 : 1;
+    const Index each = has_two_edges(band) ? 2 : 1;
     // Infinity stays there with a low pass; a high pass brings it to zero, a band pass one of each
     // pair, a band stop to ±j√(ω₁ω₂).
     const Index more = band == FilterBand::low_pass    ? 0
@@ -63,7 +58,7 @@ AnalogFilter moved(const AnalogFilter& prototype, FilterBand band, double low, d
     Index next = 0;
     for (const Complex root : roots) {
       const Complex p = width * (inverted ? 1.0 / root : root);
-      if (is_band(band)) {
+      if (has_two_edges(band)) {
         const auto [first, second] = quadratic_roots(p, low * high);
         out(next++) = first;
         out(next++) = second;
@@ -167,7 +162,7 @@ Expected<DigitalFilter> design_filter(const IirDesign& design, Time period) {
                  filter_prototype(design.family, design.order, design.ripple, design.attenuation));
   FLYBALL_CHECK(check_positive(period.si(), where, "period", "s"));
   FLYBALL_CHECK(check_edges(design, where));
-  const bool band = is_band(design.band);
+  const bool band = has_two_edges(design.band);
   const double top = band ? design.upper_frequency : design.frequency;
   if (!(top * period.si() < pi)) {
     return refusal(ArgumentError::out_of_range, where, band ? "upper_frequency" : "frequency")

@@ -66,17 +66,17 @@ T take(std::vector<T>& from, Key key) {
 }
 
 /// 1 - (r₁ + r₂) z⁻¹ + r₁ r₂ z⁻², or of one root, or of none: coefficients of z⁻¹ and z⁻².
-struct Factor {
+struct RootFactor {
   int degree = 0;
   double first = 0.0;
   double second = 0.0;
 };
 
-Factor of_pair(Complex root) {
+RootFactor of_pair(Complex root) {
   return {2, -2.0 * root.real(), std::norm(root)};
 }
-Factor of_real(double a, std::optional<double> b) {
-  return b ? Factor{2, -(a + *b), a * *b} : Factor{1, -a, 0.0};
+RootFactor of_real(double a, std::optional<double> b) {
+  return b ? RootFactor{2, -(a + *b), a * *b} : RootFactor{1, -a, 0.0};
 }
 
 double from_circle(Complex root) {
@@ -86,7 +86,7 @@ double from_circle(Complex root) {
 /// The zeros of a section whose poles are near a point.
 /// @param degree  Of the section. @param later  Sections of second order that still come: they take
 /// all pairs that are left.
-Factor take_zeros(RealRoots& zeros, Complex near, int degree, std::size_t later) {
+RootFactor take_zeros(RealRoots& zeros, Complex near, int degree, std::size_t later) {
   const auto distance = [&](Complex zero) { return std::abs(zero - near); };
   if (degree == 2 && !zeros.pairs.empty()) {
     const bool real = zeros.real.size() >= 2 && zeros.pairs.size() <= later &&
@@ -128,7 +128,7 @@ Expected<std::vector<Biquad>> paired_sections(const VectorXcd& zeros, const Vect
   // Poles, in the order in which they choose: of pairs and real ones the nearest to the circle; a
   // real one that is left over last.
   struct Place {
-    Factor factor;
+    RootFactor factor;
     Complex near;
   };
   std::vector<Place> places;
@@ -153,7 +153,7 @@ Expected<std::vector<Biquad>> paired_sections(const VectorXcd& zeros, const Vect
   std::vector<Biquad> sections;
   for (const Place& place : places) {
     later -= place.factor.degree == 2 ? 1 : 0;
-    const Factor top = take_zeros(from_zeros, place.near, place.factor.degree, later);
+    const RootFactor top = take_zeros(from_zeros, place.near, place.factor.degree, later);
     // In z: z^m over z^n, so that what is missing is a delay.
     Biquad section{.a1 = place.factor.first, .a2 = place.factor.second};
     const std::array<double, 3> b{1.0, top.first, top.second};

@@ -9,6 +9,7 @@
 
 #include <flyball/classical/filters/fir_design.hpp>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 
 namespace flyball::classical {
@@ -18,8 +19,6 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 namespace {
-
-using std::numbers::pi;
 
 double decibels(Complex response) {
   return -20.0 * std::log10(std::abs(response));

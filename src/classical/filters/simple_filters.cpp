@@ -1,9 +1,9 @@
 #include <flyball/classical/filters/simple_filters.hpp>
 
 #include <cmath>
-#include <numbers>
 
 #include "classical/filters/root_sections.hpp"
+#include "core/constants.hpp"
 #include "core/try.hpp"
 
 namespace flyball::classical {
@@ -12,8 +12,6 @@ using Complex = std::complex<double>;
 using Eigen::VectorXcd;
 
 namespace {
-
-using std::numbers::pi;
 
 /// The notch's or the peak's zeros over z² - 2 b cos(θ) z + 2b - 1, b = 1/(1 + tan(Δ/2)).
 Expected<DigitalFilter> resonance(double frequency, double bandwidth, Time period, bool notch,

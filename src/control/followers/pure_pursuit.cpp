@@ -14,16 +14,16 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "PurePursuitFollower";
+constexpr std::string_view in_pure_pursuit_follower = "PurePursuitFollower";
 
 Expected<void> check_settings(const PurePursuitSettings& settings) {
   const auto positive_or_infinite = [](double value, std::string_view name) {
     return value == std::numeric_limits<double>::infinity()
                ? Expected<void>()
-               : check_positive(value, where, name, "m/s²");
+               : check_positive(value, in_pure_pursuit_follower, name, "m/s²");
   };
   FLYBALL_CHECK(
-      Checks(where)
+      Checks(in_pure_pursuit_follower)
           .positive(settings.velocity, "velocity", "m/s")
           .within(settings.velocity, 0.0, largest_signal, "velocity", "m/s")
           .also([&] { return positive_or_infinite(settings.acceleration, "acceleration"); })
@@ -35,9 +35,11 @@ Expected<void> check_settings(const PurePursuitSettings& settings) {
           .not_negative(settings.heading_gain, "heading_gain", "1/s")
           .positive(settings.tolerance, "tolerance", "m")
           .positive(settings.period.si(), "period", "s")
-          .also([&] { return detail::check_speed_limits(settings.limits, where); }));
+          .also([&] {
+            return detail::check_speed_limits(settings.limits, in_pure_pursuit_follower);
+          }));
   if (settings.reversed && settings.drive == PursuitDrive::in_any_direction) {
-    return refusal(ArgumentError::out_of_range, where, "reversed")
+    return refusal(ArgumentError::out_of_range, in_pure_pursuit_follower, "reversed")
         .got("true for a robot that moves in any direction")
         .expected("false")
         .hint("give the path's poses the headings that the robot is to have");
@@ -51,7 +53,7 @@ Expected<PurePursuitFollower> PurePursuitFollower::create(std::span<const PathPo
                                                           const PurePursuitSettings& settings) {
   FLYBALL_CHECK(check_settings(settings));
   if (path.size() < 2) {
-    return refusal(ArgumentError::empty, where, "path")
+    return refusal(ArgumentError::empty, in_pure_pursuit_follower, "path")
         .got(detail::format("{} points", path.size()))
         .expected("two points or more");
   }
@@ -59,7 +61,7 @@ Expected<PurePursuitFollower> PurePursuitFollower::create(std::span<const PathPo
   for (std::size_t i = 0; i < path.size(); ++i) {
     const std::string name = detail::format("point {}", i + 1);
     if (!detail::known(path[i].pose) || !is_signal(path[i].curvature)) {
-      return refusal(ArgumentError::not_finite, where, name)
+      return refusal(ArgumentError::not_finite, in_pure_pursuit_follower, name)
           .got(detail::format("({:.6g}, {:.6g}), heading {:.6g}, curvature {:.6g}",
                               path[i].pose.x(), path[i].pose.y(), path[i].pose.angle(),
                               path[i].curvature))
@@ -68,7 +70,7 @@ Expected<PurePursuitFollower> PurePursuitFollower::create(std::span<const PathPo
     if (i > 0) {
       const double length = (path[i].pose.translation() - path[i - 1].pose.translation()).norm();
       if (!(length > 0.0)) {
-        return refusal(ArgumentError::out_of_range, where, name)
+        return refusal(ArgumentError::out_of_range, in_pure_pursuit_follower, name)
             .got("where the one before it is")
             .expected("somewhere else");
       }

@@ -3,12 +3,11 @@
 #include <cmath>
 
 #include "control/lyapunov/loop_enclosure.hpp"
+#include "core/constants.hpp"
 
 namespace flyball::detail {
 
 namespace {
-
-constexpr double infinite = std::numeric_limits<double>::infinity();
 
 Interval clamped(const Interval& u, double low, double high) noexcept {
   return {std::clamp(u.low, low, high), std::clamp(u.high, low, high)};
@@ -23,10 +22,10 @@ Interval clamp_slope(const Interval& u, double low, double high) noexcept {
 }
 
 double low_limit(const SaturatedLoop& loop, int input) noexcept {
-  return loop.u_min.size() > 0 ? loop.u_min(input) : -infinite;
+  return loop.u_min.size() > 0 ? loop.u_min(input) : -infinity;
 }
 double high_limit(const SaturatedLoop& loop, int input) noexcept {
-  return loop.u_max.size() > 0 ? loop.u_max(input) : infinite;
+  return loop.u_max.size() > 0 ? loop.u_max(input) : infinity;
 }
 
 std::size_t at(int i) noexcept {
@@ -219,7 +218,7 @@ CellBound LoopEnclosure::bound(const RegionCell& cell) noexcept {
   // of what it is with the one and with the other.
   constexpr std::array all{Regime::linear, Regime::low, Regime::high};
   CellBound result;
-  result.high = -infinite;
+  result.high = -infinity;
   Regimes regimes{};
   std::array<std::size_t, most_region_states> choice{};
   for (bool more = true; more;) {
@@ -313,21 +312,21 @@ double LoopEnclosure::core_rate(double half) noexcept {
   std::fill_n(box.begin(), n_, half);
   evaluate_centre({});
   evaluate_jacobian(box);
-  double worst = -infinite;
+  double worst = -infinity;
   for (int i = 0; i < n_; ++i) {  // Gershgorin
     double row = 2.0 * F_[at(i)][at(i)].high;
     double beside = 0.0;
     for (int j = 0; j < n_; ++j) {
       if (j != i) {
         if (!is_bounded(F_[at(i)][at(j)]) || !is_bounded(F_[at(j)][at(i)])) {
-          return infinite;
+          return infinity;
         }
         beside += (F_[at(i)][at(j)] + F_[at(j)][at(i)]).magnitude();
       }
     }
     row = rounded_up(row + beside * inflation);
-    if (!(row < infinite)) {
-      return infinite;
+    if (!(row < infinity)) {
+      return infinity;
     }
     worst = std::max(worst, row);
   }
@@ -342,7 +341,7 @@ double LoopEnclosure::rest() noexcept {
     Interval f_z;
     for (int j = 0; j < n_; ++j) {
       if (!is_bounded(f[at(j)])) {
-        return infinite;
+        return infinity;
       }
       f_z = f_z + W_[at(i)][at(j)] * f[at(j)];
     }

@@ -10,6 +10,7 @@
 
 #include "control/lyapunov/loop_enclosure.hpp"
 #include "control/lyapunov/saturated_loop.hpp"
+#include "core/constants.hpp"
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -31,8 +32,7 @@ using detail::CellBound;
 using detail::LoopEnclosure;
 using detail::RegionCell;
 
-constexpr std::string_view where = "certify_region";
-constexpr double infinite = std::numeric_limits<double>::infinity();
+constexpr std::string_view in_certify_region = "certify_region";
 
 /// A number with few digits, no less than x: halved often it stays exact.
 double short_above(double x) {
@@ -54,24 +54,26 @@ Expected<Frame> frame_of(const SaturatedLoop& loop, const RegionOptions& options
   const Eigen::MatrixXd closed = linear.A - linear.B * loop.K;
   Frame frame;
   if (options.P.size() > 0) {
-    FLYBALL_CHECK(Checks(where)
+    FLYBALL_CHECK(Checks(in_certify_region)
                       .shape(options.P, n, n, "P", "states x states")
                       .finite(options.P, "P")
                       .symmetric(options.P, "P"));
     frame.P = detail::symmetrized(options.P);
   } else {
     const Eigen::MatrixXd Q = options.Q.size() > 0 ? options.Q : Eigen::MatrixXd::Identity(n, n);
-    FLYBALL_CHECK(
-        Checks(where).shape(Q, n, n, "Q", "states x states").finite(Q, "Q").symmetric(Q, "Q"));
+    FLYBALL_CHECK(Checks(in_certify_region)
+                      .shape(Q, n, n, "Q", "states x states")
+                      .finite(Q, "Q")
+                      .symmetric(Q, "Q"));
     if (!detail::cholesky_of(Q)) {
-      return refusal(ArgumentError::not_positive, where, "Q")
+      return refusal(ArgumentError::not_positive, in_certify_region, "Q")
           .got("not positive definite")
           .expected("positive definite");
     }
     const Eigen::VectorXcd poles = detail::eigenvalues_of(closed);
     for (const std::complex<double>& pole : poles) {
       if (!(pole.real() < 0.0)) {
-        return refusal(RegionError::not_stable, where, "A - B K")
+        return refusal(RegionError::not_stable, in_certify_region, "A - B K")
             .got("not stable")
             .hint("give a K that stabilises the linearisation")
             .with("pole", {pole.real(), pole.imag()});
@@ -83,18 +85,19 @@ Expected<Frame> frame_of(const SaturatedLoop& loop, const RegionOptions& options
   const auto L = detail::cholesky_of(frame.P);
   if (!L) {
     if (options.P.size() > 0) {
-      return refusal(ArgumentError::not_positive, where, "P")
+      return refusal(ArgumentError::not_positive, in_certify_region, "P")
           .got("not positive definite")
           .expected("positive definite");
     }
-    return refusal(RegionError::not_stable, where, "A - B K").got("not stable beyond rounding");
+    return refusal(RegionError::not_stable, in_certify_region, "A - B K")
+        .got("not stable beyond rounding");
   }
   const Eigen::MatrixXd upper = L->transpose();
   const Eigen::MatrixXd T = detail::solve_linear(upper, Eigen::MatrixXd::Identity(n, n));
   const Eigen::MatrixXd F = T.transpose() * frame.P * closed * T;
   const auto rates = detail::symmetric_eigensystem_of(Eigen::MatrixXd(F + F.transpose()));
   if (!(rates.values(n - 1) < 0.0)) {
-    return refusal(RegionError::not_stable, where, "V = (x - x*)ᵀP(x - x*)")
+    return refusal(RegionError::not_stable, in_certify_region, "V = (x - x*)ᵀP(x - x*)")
         .got("growing in a direction of the linearised loop")
         .expected("falling in all")
         .hint("leave P out, or take that of the regulator's Riccati equation")
@@ -107,7 +110,7 @@ Expected<Frame> frame_of(const SaturatedLoop& loop, const RegionOptions& options
 /// The largest V that the reach, and half a turn of each angle, leave.
 double level_within_reach(const SaturatedLoop& loop, const RegionOptions& options,
                           const Eigen::MatrixXd& T, double slack) {
-  double level = infinite;
+  double level = infinity;
   const auto hold = [&](Eigen::Index i, double reach) {
     const double per_level = T.row(i).squaredNorm();
     if (std::isfinite(reach) && per_level > 0.0) {
@@ -125,10 +128,10 @@ double level_within_reach(const SaturatedLoop& loop, const RegionOptions& option
 
 /// The V at which an input first meets its limit.
 double level_of_limits(const SaturatedLoop& loop, const Eigen::MatrixXd& T) {
-  double level = infinite;
+  double level = infinity;
   for (Eigen::Index i = 0; i < loop.model.inputs; ++i) {
     const double slope = (loop.K.row(i) * T).norm();
-    double room = infinite;
+    double room = infinity;
     if (loop.u_min.size() > 0) {
       room = std::min(room, loop.u(i) - loop.u_min(i));
     }
@@ -226,12 +229,12 @@ void prove_level(LoopEnclosure& enclosure, double radius, double core_half,
     return true;
   };
   const double goal = std::min(ceiling, region.refuted);
-  region.limit = region.refuted < ceiling ? RegionLimit::rate : RegionLimit::reach;
+  region.limit = region.refuted < ceiling ? AttractionLimit::rate : AttractionLimit::reach;
   while (!open.empty()) {
     const OpenCell next = open.top();
-    const double wanted = region.limit == RegionLimit::rate ? options.closeness * goal : goal;
+    const double wanted = region.limit == AttractionLimit::rate ? options.closeness * goal : goal;
     if (next.least >= wanted || region.cells >= options.most_cells) {
-      region.limit = next.least >= wanted ? region.limit : RegionLimit::work;
+      region.limit = next.least >= wanted ? region.limit : AttractionLimit::work;
       region.level = std::min(next.least, goal);
       return;
     }
@@ -255,7 +258,7 @@ void prove_level(LoopEnclosure& enclosure, double radius, double core_half,
     }
     const double half = 0.5 * next.cell.half[split];
     if (next.cell.centre[split] + half == next.cell.centre[split]) {
-      region.limit = RegionLimit::work;
+      region.limit = AttractionLimit::work;
       region.level = next.least;
       return;
     }
@@ -298,15 +301,16 @@ double CertifiedRegion::volume() const {
 }
 
 Expected<CertifiedRegion> certify_region(const SaturatedLoop& loop, const RegionOptions& options) {
-  FLYBALL_CHECK(detail::check_saturated_loop(loop, where));
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(detail::check_saturated_loop(loop, in_certify_region));
+  FLYBALL_CHECK(Checks(in_certify_region)
                     .within(options.closeness, 0.0, 1.0, "closeness")
                     .within(options.most_cells, 1.0, 1e8, "most_cells"));
   if (options.reach.size() > 0) {
-    FLYBALL_CHECK(Checks(where).shape(options.reach, loop.model.states, 1, "reach", "states x 1"));
+    FLYBALL_CHECK(Checks(in_certify_region)
+                      .shape(options.reach, loop.model.states, 1, "reach", "states x 1"));
     for (const double reach : options.reach) {
       if (!(reach > 0.0)) {
-        return refusal(ArgumentError::not_positive, where, "reach")
+        return refusal(ArgumentError::not_positive, in_certify_region, "reach")
             .got(format_number(reach))
             .expected("positive, infinite for a state without an end");
       }
@@ -345,7 +349,7 @@ Expected<CertifiedRegion> certify_region(const SaturatedLoop& loop, const Region
     }
   }
   if (core_half == 0.0) {
-    return refusal(RegionError::not_enclosed, where, "the loop near its equilibrium")
+    return refusal(RegionError::not_enclosed, in_certify_region, "the loop near its equilibrium")
         .got("not seen to contract, however near")
         .hint("a limit or a kink at the point itself leaves no linear loop there")
         .with("what is left of the equilibrium", {rest});

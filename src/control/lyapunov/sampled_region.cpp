@@ -72,7 +72,7 @@ Expected<SampledRegion> sample_region(const SaturatedLoop& loop, const Certified
         .expected("two different states, or none");
   }
   SampledRegion result{.starts = starts_of(loop, half, options)};
-  detail::LoopMotion motion(loop);
+  detail::SaturatedMotion motion(loop);
   const auto steps = static_cast<int>(std::ceil(options.duration / options.step));
   constexpr int between_looks = 10;
   int attracted = 0;
@@ -124,7 +124,7 @@ Expected<std::vector<Eigen::MatrixXd>> backward_rings(const SaturatedLoop& loop,
   }
   constexpr double step = 1e-3;
   constexpr double far = 1e6;
-  detail::LoopMotion motion(loop);
+  detail::SaturatedMotion motion(loop);
   std::vector<Eigen::MatrixXd> rings(times.size(), Eigen::MatrixXd(2, points));
   std::vector<std::size_t> order(times.size());
   for (std::size_t k = 0; k < order.size(); ++k) {

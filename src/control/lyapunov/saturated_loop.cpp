@@ -72,7 +72,7 @@ Expected<void> check_saturated_loop(const SaturatedLoop& loop, std::string_view 
     return refusal(ArgumentError::not_finite, where, "a derivative of the model at x");
   }
   Eigen::VectorXd rate(n);
-  LoopMotion(loop).derivative(loop.x, rate);
+  SaturatedMotion(loop).derivative(loop.x, rate);
   // As far as rounding of x moves it.
   constexpr double rounding = 1e-9;
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -103,7 +103,7 @@ LinearPart linear_part(const SaturatedLoop& loop) {
   return {J.leftCols(n), J.rightCols(m)};
 }
 
-LoopMotion::LoopMotion(const SaturatedLoop& loop)
+SaturatedMotion::SaturatedMotion(const SaturatedLoop& loop)
     : loop_(loop),
       values_(loop.model.f.size()),
       in_(static_cast<std::size_t>(loop.model.states + loop.model.inputs)),
@@ -114,7 +114,7 @@ LoopMotion::LoopMotion(const SaturatedLoop& loop)
   }
 }
 
-void LoopMotion::derivative(const Eigen::VectorXd& x, Eigen::VectorXd& dxdt) {
+void SaturatedMotion::derivative(const Eigen::VectorXd& x, Eigen::VectorXd& dxdt) {
   const Eigen::Index n = loop_.model.states;
   std::copy(x.begin(), x.end(), in_.begin());
   for (Eigen::Index i = 0; i < loop_.model.inputs; ++i) {
@@ -137,7 +137,7 @@ void LoopMotion::derivative(const Eigen::VectorXd& x, Eigen::VectorXd& dxdt) {
   loop_.model.f.evaluate<double>(in_, {dxdt.data(), static_cast<std::size_t>(n)}, values_);
 }
 
-void LoopMotion::step(Eigen::VectorXd& x, double dt) {
+void SaturatedMotion::step(Eigen::VectorXd& x, double dt) {
   derivative(x, k_[0]);
   at_ = x + 0.5 * dt * k_[0];
   derivative(at_, k_[1]);

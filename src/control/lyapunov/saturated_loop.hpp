@@ -19,9 +19,9 @@ struct LinearPart {
 [[nodiscard]] LinearPart linear_part(const SaturatedLoop& loop);
 
 /// The loop's motion, in plain floating point.
-class LoopMotion {
+class SaturatedMotion {
  public:
-  explicit LoopMotion(const SaturatedLoop& loop);
+  explicit SaturatedMotion(const SaturatedLoop& loop);
 
   /// dx/dt under the loop's input. @param x, dxdt  n.
   void derivative(const Eigen::VectorXd& x, Eigen::VectorXd& dxdt);

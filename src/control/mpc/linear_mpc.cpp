@@ -2,13 +2,13 @@
 #include <flyball/control/mpc/linear_mpc.hpp>
 
 #include <algorithm>
-#include <limits>
 #include <string>
 
 #include <flyball/control/lqr.hpp>
 
 #include "control/mpc/mpc_limits.hpp"
 #include "control/mpc/mpc_parts.hpp"
+#include "core/constants.hpp"
 #include "core/try.hpp"
 
 namespace flyball::detail {
@@ -77,7 +77,6 @@ bool MpcCore::Parts::finish() {
     copy(settings.du_max, qp.rate_upper());
   }
   if (qp.qp().has_states) {
-    constexpr double infinity = std::numeric_limits<double>::infinity();
     std::fill_n(qp.x_lower(1), n + rates, -infinity);
     std::fill_n(qp.x_upper(1), n + rates, infinity);
     copy(settings.x_min, qp.x_lower(1));

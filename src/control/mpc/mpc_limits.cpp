@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include "control/mpc/mpc_limits.hpp"
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
@@ -17,7 +17,6 @@ using optimization::detail::StageQpSolver;
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int longest_horizon = 1000;
 
 /// Limits of one kind: of their size, ordered, with nothing that is NaN.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "control/robust/member_search.hpp"
+#include "core/constants.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball::detail {
@@ -18,7 +19,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr Complex j(0.0, 1.0);
 
 /// The power of two that makes a size one of 1 to 2, in which squares and quotients have all of

@@ -1,11 +1,11 @@
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <string>
 
 #include <flyball/systems/controllability.hpp>
 
 #include "control/robust/synthesis.hpp"
+#include "core/constants.hpp"
 #include "core/error_rows.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
@@ -41,8 +41,6 @@ namespace {
 using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 /// s = (z - 1)/(z + 1), back.
 Complex told(Complex s, bool discrete) {

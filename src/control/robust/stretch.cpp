@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "control/robust/stretch.hpp"
+#include "core/constants.hpp"
 #include "math/dense/dense.hpp"
 
 namespace flyball::detail {
@@ -14,9 +15,7 @@ using Eigen::VectorXcd;
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr Complex j(0.0, 1.0);
+constexpr Complex imaginary_unit(0.0, 1.0);
 
 MatrixXcd times(const MatrixXcd& A, const MatrixXcd& B) {
   return A.lazyProduct(B);
@@ -29,7 +28,7 @@ struct ComplexSystem {
 
 MatrixXcd shifted(const ContinuousSystem<>& system, double frequency) {
   MatrixXcd jw_A = -system.A.cast<Complex>();
-  jw_A.diagonal().array() += j * frequency;
+  jw_A.diagonal().array() += imaginary_unit * frequency;
   return jw_A;
 }
 
@@ -102,7 +101,7 @@ MatrixXcd response_at(const ContinuousSystem<>& system, double frequency) {
 MatrixXcd response_slope(const ContinuousSystem<>& system, double frequency) {
   const MatrixXcd jw_A = shifted(system, frequency);
   const MatrixXcd X = solve_complex(jw_A, solve_complex(jw_A, system.B.cast<Complex>()));
-  return -j * times(system.C.cast<Complex>(), X);
+  return -imaginary_unit * times(system.C.cast<Complex>(), X);
 }
 
 Stretch stretch_around(const ContinuousSystem<>& system, double frequency,
@@ -117,7 +116,7 @@ Stretch stretch_around(const ContinuousSystem<>& system, double frequency,
   const MatrixXcd DC = times(scaling.D_out, M.C);
   const MatrixXcd GC = times(scaling.G, M.C);
   const MatrixXcd Q = -times(M.C.adjoint(), DC);
-  const MatrixXcd S_adjoint = -times(M.D.adjoint(), DC) - j * GC;
+  const MatrixXcd S_adjoint = -times(M.D.adjoint(), DC) - imaginary_unit * GC;
   const MatrixXcd R = structured_form(M.D, scaling, beta * beta);
   const Index m = R.rows();
   MatrixXcd right(m, 2 * n);

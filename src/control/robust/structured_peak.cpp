@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <flyball/control/robust/structured_singular_value.hpp>
@@ -9,6 +8,7 @@
 
 #include "control/robust/scaled_point.hpp"
 #include "control/robust/stretch.hpp"
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "systems/balance.hpp"
@@ -26,7 +26,6 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 /// How far above the largest bound at a frequency the proven level is.
 constexpr double above_all = 1.0002;
 /// A bound this far below the level holds over a good stretch, and need not be the least.

@@ -12,7 +12,7 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "design_swing_up";
+constexpr std::string_view in_design_swing_up = "design_swing_up";
 constexpr double upright = std::numbers::pi;
 
 /// The balance about a state, and the region in which it works.
@@ -27,7 +27,7 @@ Expected<Balanced> balanced(const M& model, const Eigen::VectorXd& x,
                             const std::vector<double>& tolerances, double share,
                             std::vector<Eigen::Index> angles, const Eigen::VectorXd& reach,
                             const SwingUpOptions& options) {
-  FLYBALL_CHECK(Checks(where).positive(options.limit, "limit"));
+  FLYBALL_CHECK(Checks(in_design_swing_up).positive(options.limit, "limit"));
   const Eigen::VectorXd rest = Eigen::VectorXd::Zero(1);
   FLYBALL_TRY(const auto linear, linearize(AnyModel(model), x, rest));
   FLYBALL_TRY(const auto design,
@@ -59,7 +59,7 @@ Expected<SwingUpDesign<Shaper, N>> together(const Shaper& shaper, Balanced balan
 
 Expected<SwingUpDesign<PendulumShaper, 2>> design_swing_up(const mechanisms::Pendulum& model,
                                                            const SwingUpOptions& options) {
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_design_swing_up)
                     .positive(model.mass, "mass", "kg")
                     .positive(model.length, "length", "m")
                     .positive(model.gravity, "gravity", "m/s²")
@@ -73,13 +73,13 @@ Expected<SwingUpDesign<PendulumShaper, 2>> design_swing_up(const mechanisms::Pen
 
 Expected<SwingUpDesign<CartPoleShaper, 4>> design_swing_up(const mechanisms::CartPole& model,
                                                            const SwingUpOptions& options) {
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_design_swing_up)
                     .positive(model.cart_mass, "cart_mass", "kg")
                     .positive(model.pole_mass, "pole_mass", "kg")
                     .positive(model.pole_length, "pole_length", "m")
                     .positive(model.gravity, "gravity", "m/s²"));
   if (!(options.track > 0.0)) {
-    return refusal(ArgumentError::not_positive, where, "track")
+    return refusal(ArgumentError::not_positive, in_design_swing_up, "track")
         .got(format_number(options.track) + " m")
         .expected("positive, infinite for none");
   }
@@ -103,7 +103,7 @@ Expected<SwingUpDesign<CartPoleShaper, 4>> design_swing_up(const mechanisms::Car
 
 Expected<SwingUpDesign<AcrobotShaper, 4>> design_swing_up(const mechanisms::Acrobot& model,
                                                           const SwingUpOptions& options) {
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_design_swing_up)
                     .positive(model.links.b, "the second link's inertia", "kg m²")
                     .positive(model.energy_upright(), "the energy upright", "J"));
   const mechanisms::TwoLink& links = model.links;

@@ -39,11 +39,11 @@ const SensorCalibration::Name& SensorCalibration::name(int index) {
 
 namespace {
 
-constexpr std::string_view where = "landmark log";
+constexpr std::string_view in_landmark_log = "landmark log";
 
 Refusal bad_row(ArgumentError code, std::string_view list, std::size_t row, std::string got,
                 std::string expected) {
-  return refusal(code, where, detail::format("{} {}", list, row + 1))
+  return refusal(code, in_landmark_log, detail::format("{} {}", list, row + 1))
       .got(std::move(got))
       .expected(std::move(expected));
 }

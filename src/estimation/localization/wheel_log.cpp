@@ -13,14 +13,14 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "wheel_odometry";
+constexpr std::string_view in_wheel_odometry = "wheel_odometry";
 
 template <class Sample, class Value>
 Expected<void> check_rows(const std::vector<Sample>& rows, std::string_view list,
                           const Value& value) {
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto refused = [&](ArgumentError code) {
-      return refusal(code, where, detail::format("{} row {}", list, i + 1));
+      return refusal(code, in_wheel_odometry, detail::format("{} row {}", list, i + 1));
     };
     if (!std::isfinite(rows[i].time) || !std::isfinite(value(rows[i]))) {
       return refused(ArgumentError::not_finite).got("what is no number").expected("numbers");
@@ -78,12 +78,12 @@ Expected<std::vector<OdometrySample>> wheel_odometry(const WheelLog& log, double
       check_rows(log.wheels, "wheels", [](const WheelSample& s) { return s.left + s.right; }));
   FLYBALL_CHECK(check_rows(log.gyro, "gyro", [](const TurnRateSample& s) { return s.turn_rate; }));
   if (log.wheels.size() < 2 || !(log.wheels.back().time > log.wheels.front().time)) {
-    return refusal(ArgumentError::empty, where, "the wheels")
+    return refusal(ArgumentError::empty, in_wheel_odometry, "the wheels")
         .got(detail::format("{} readings", log.wheels.size()))
         .expected("readings of two times or more");
   }
   if (log.gyro.empty()) {
-    FLYBALL_CHECK(Checks(where).positive(track_width, "track_width", "m"));
+    FLYBALL_CHECK(Checks(in_wheel_odometry).positive(track_width, "track_width", "m"));
   }
   const Turned turned(log.gyro);
   std::vector<OdometrySample> odometry;

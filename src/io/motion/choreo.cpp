@@ -20,7 +20,7 @@ using io::JsonNode;
 using io::JsonTree;
 
 /// As Choreo's own formatter: a blank a level, and what stands in a list on one line.
-constexpr io::JsonStyle style{.indent = 1, .rows = true, .colon = ":"};
+constexpr io::JsonStyle choreo_style{.indent = 1, .rows = true, .colon = ":"};
 
 struct DescribeSample {
   template <class A, class S>
@@ -202,7 +202,7 @@ struct DescribeGenerated {
   }
 };
 
-struct DescribeTrajectory {
+struct DescribeChoreoTrajectory {
   template <class A, class T>
   void operator()(A& a, T& t) const {
     if (t.is_2024) {
@@ -327,7 +327,7 @@ ExpectedAll<ChoreoTrajectory> parse_choreo_trajectory(std::string_view text,
                       project ? "that is a project (.chor): give one of its .traj files" : "");
   }
   FLYBALL_TRY(trajectory,
-              io::read_document(tree, source, std::move(trajectory), DescribeTrajectory{}));
+              io::read_document(tree, source, std::move(trajectory), DescribeChoreoTrajectory{}));
   if (!trajectory.is_2024) {
     look_at_version(trajectory.version, ChoreoTrajectory::newest, trajectory.diagnostics);
   }
@@ -360,11 +360,11 @@ ExpectedAll<ChoreoProject> read_choreo_project(const std::string& path) {
 }
 
 Expected<std::string> to_choreo(const ChoreoTrajectory& trajectory) {
-  return io::checked_text(io::write_document(trajectory, DescribeTrajectory{}, style));
+  return io::checked_text(io::write_document(trajectory, DescribeChoreoTrajectory{}, choreo_style));
 }
 
 Expected<std::string> to_choreo(const ChoreoProject& project) {
-  return io::checked_text(io::write_document(project, DescribeProject{}, style));
+  return io::checked_text(io::write_document(project, DescribeProject{}, choreo_style));
 }
 
 Expected<void> write_choreo(const std::string& path, const ChoreoTrajectory& trajectory) {

@@ -20,7 +20,7 @@ using io::JsonNode;
 using io::JsonTree;
 
 /// As Dart's encoder indents.
-constexpr io::JsonStyle style{.indent = 2, .rows = false, .colon = ": "};
+constexpr io::JsonStyle pathplanner_style{.indent = 2, .rows = false, .colon = ": "};
 
 struct DescribePoint {
   template <class A, class P>
@@ -30,7 +30,7 @@ struct DescribePoint {
   }
 };
 
-struct DescribeWaypoint {
+struct DescribePathPlannerWaypoint {
   template <class A, class W>
   void operator()(A& a, W& w) const {
     a.object("anchor", w.anchor, DescribePoint{});
@@ -67,7 +67,7 @@ struct DescribeConstraints {
   }
 };
 
-struct DescribeRotation {
+struct DescribeRotationTarget {
   template <class A, class R>
   void operator()(A& a, R& r) const {
     a("waypointRelativePos", r.position);
@@ -114,7 +114,7 @@ struct DescribeMarker2023 {
   }
 };
 
-struct DescribeState {
+struct DescribePathPlannerState {
   template <class A, class S>
   void operator()(A& a, S& s) const {
     a("velocity", s.velocity);
@@ -143,16 +143,16 @@ struct DescribePath {
       return;
     }
     a.id("version", p.version);
-    a.list("waypoints", p.waypoints, DescribeWaypoint{});
-    a.list("rotationTargets", p.rotation_targets, DescribeRotation{}, false);
+    a.list("waypoints", p.waypoints, DescribePathPlannerWaypoint{});
+    a.list("rotationTargets", p.rotation_targets, DescribeRotationTarget{}, false);
     a.list("constraintZones", p.zones, DescribeZone{}, false);
     a.list("pointTowardsZones", p.pointing, DescribePointing{}, false);
     a.list("eventMarkers", p.markers, DescribeMarker{}, false);
     a.object("globalConstraints", p.constraints, DescribeConstraints{});
-    a.object("goalEndState", p.goal_end_state, DescribeState{});
+    a.object("goalEndState", p.goal_end_state, DescribePathPlannerState{});
     a("reversed", p.reversed);
     a.nullable("folder", p.folder);
-    a.object("idealStartingState", p.ideal_starting_state, DescribeState{});
+    a.object("idealStartingState", p.ideal_starting_state, DescribePathPlannerState{});
     a.object("previewStartingState", p.preview_starting_state, DescribePreview{});
     a("useDefaultConstraints", p.use_default_constraints);
   }
@@ -336,16 +336,16 @@ ExpectedAll<PathPlannerAuto> read_pathplanner_auto(const std::string& path) {
 }
 
 Expected<std::string> to_pathplanner(const PathPlannerPath& path) {
-  return io::checked_text(io::write_document(path, DescribePath{}, style));
+  return io::checked_text(io::write_document(path, DescribePath{}, pathplanner_style));
 }
 Expected<std::string> to_pathplanner(const PathPlannerAuto& routine) {
-  return io::checked_text(io::write_document(routine, DescribeAuto{}, style));
+  return io::checked_text(io::write_document(routine, DescribeAuto{}, pathplanner_style));
 }
 Expected<std::string> to_pathplanner(const PathPlannerSettingsFile& settings) {
-  return io::checked_text(io::write_document(settings, DescribeSettings{}, style));
+  return io::checked_text(io::write_document(settings, DescribeSettings{}, pathplanner_style));
 }
 Expected<std::string> to_pathplanner(const PathPlannerGrid& grid) {
-  return io::checked_text(io::write_document(grid, DescribeGrid{}, style));
+  return io::checked_text(io::write_document(grid, DescribeGrid{}, pathplanner_style));
 }
 
 Expected<void> write_pathplanner(const std::string& path, const PathPlannerPath& contents) {

@@ -13,7 +13,7 @@ using io::JsonKind;
 using io::JsonNode;
 
 /// All on one line, as WPILib writes.
-constexpr io::JsonStyle style{.indent = 0, .rows = true, .colon = ":"};
+constexpr io::JsonStyle wpilib_style{.indent = 0, .rows = true, .colon = ":"};
 
 struct DescribeTranslation {
   template <class A, class S>
@@ -116,10 +116,10 @@ ExpectedAll<WpilibTrajectory> parse_wpilib_trajectory(std::string_view text,
 
 Expected<std::string> to_wpilib(const WpilibTrajectory& trajectory) {
   if (trajectory.is_object) {
-    return io::checked_text(io::write_document(trajectory, DescribeTrajectory{}, style));
+    return io::checked_text(io::write_document(trajectory, DescribeTrajectory{}, wpilib_style));
   }
   const JsonOrigin& origin = trajectory.origin;
-  const auto spot = io::JsonSpot{.style = style, .row = true}.of(origin);
+  const auto spot = io::JsonSpot{.style = wpilib_style, .row = true}.of(origin);
   std::string text = io::JsonMembersOut::list_text(spot, trajectory.states, DescribeState{false});
   if (const JsonNode* root = origin.node()) {
     const io::JsonTree& tree = *origin.tree();

@@ -6,6 +6,7 @@
 #include <Eigen/QR>
 #include <Eigen/SVD>
 
+#include "core/constants.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
 #include "math/dense/schur_kernel.hpp"
@@ -53,7 +54,6 @@ Eigensystem eigensystem_of(const MatrixRef& A) {
   const Balanced balanced(A);
   Eigen::EigenSolver<MatrixXd> solver(A.rows());
   if (!balanced.M.allFinite() || solver.compute(balanced.M).info() != Eigen::Success) {
-    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     return {Eigen::VectorXcd::Constant(A.rows(), nan),
             Eigen::MatrixXcd::Constant(A.rows(), A.cols(), nan)};
   }

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
@@ -18,8 +18,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 Expected<void> check_symmetric_matrix(const MatrixRef& S, std::string_view where) {
   FLYBALL_CHECK(check_square(S, where, "S"));

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/constants.hpp"
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 
@@ -16,8 +17,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 Refusal not_finite(std::string_view where, Index variable, const VectorXd& x) {
   return refusal(DifferentiationError::not_finite, where, "f(x)")

@@ -4,6 +4,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/constants.hpp"
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -23,9 +24,6 @@ using detail::times_powers;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// An answer that leaves more of an entry of the equation than this share of its terms is none.
 constexpr double largest_backward_error = 1e-11;

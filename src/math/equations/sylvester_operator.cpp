@@ -1,10 +1,10 @@
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <vector>
 
 #include <flyball/math/equations/matrix_equation.hpp>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/equations/sylvester_operator.hpp"
@@ -18,8 +18,6 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 bool is_triangular(const MatrixXd& M) {
   for (Index j = 0; j + 1 < M.cols(); ++j) {

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
+#include "core/constants.hpp"
 #include "math/dense/dense.hpp"
 #include "math/exponential/triangular_function.hpp"
 
@@ -14,8 +14,6 @@ namespace {
 using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXcd;
-
-constexpr double pi = std::numbers::pi;
 
 double norm1_of(const MatrixXcd& M) {
   return M.cwiseAbs().colwise().sum().maxCoeff();

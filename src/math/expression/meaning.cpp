@@ -125,7 +125,7 @@ class Checker {
                            : std::nullopt);
       case UnitRule::plain:
       case UnitRule::arc:
-        require_plain(node, 0, detail::format("which {} takes", node.function->name));
+        require_plain(node, 0, flyball::detail::format("which {} takes", node.function->name));
         return number_in(rule == UnitRule::arc ? si_dimension(Dimension::angle) : SiDimension{});
       default:
         return number_in(SiDimension{});
@@ -188,12 +188,12 @@ class Checker {
                                      : operation == Operation::subtract ? "minus"
                                      : binary && node.count == 2        ? "compared with"
                                                                         : "beside";
-    complaints_.add(
-        Error(ExpressionError::unit_mismatch)
-            .about(complaints_.quote(node.place))
-            .got(detail::format("{} {} {}", words(of(node, one)), between, words(of(node, other))))
-            .expected("in one unit"),
-        binary && node.count == 2 ? node.mark : place(node, other));
+    complaints_.add(Error(ExpressionError::unit_mismatch)
+                        .about(complaints_.quote(node.place))
+                        .got(flyball::detail::format("{} {} {}", words(of(node, one)), between,
+                                                     words(of(node, other))))
+                        .expected("in one unit"),
+                    binary && node.count == 2 ? node.mark : place(node, other));
   }
 
   std::optional<SiDimension> raised(const SyntaxNode& node) {
@@ -207,8 +207,8 @@ class Checker {
       complaints_.add(Error(ExpressionError::unit_mismatch)
                           .about(complaints_.quote(place(node, 1)))
                           .got("an exponent that varies")
-                          .expected(detail::format("a number, since what it raises is in {}",
-                                                   words(of(node, 0)))),
+                          .expected(flyball::detail::format(
+                              "a number, since what it raises is in {}", words(of(node, 0)))),
                       place(node, 1));
       return std::nullopt;
     }

@@ -93,7 +93,7 @@ class Parser {
   std::uint32_t expression(int weakest) {
     if (++depth_ > deepest) {
       complaints_.add(Error(ExpressionError::too_deep)
-                          .got(detail::format("more than {} levels", deepest))
+                          .got(flyball::detail::format("more than {} levels", deepest))
                           .hint("name an inner part as a definition of its own"),
                       here().place);
       complaints_.stop();
@@ -133,8 +133,8 @@ class Parser {
         complaints_.add(Error(ExpressionError::missing_operand)
                             .hint(token.kind == TokenKind::end
                                       ? "write a value at the end"
-                                      : detail::format("write a value before {}",
-                                                       complaints_.quote(token.place))),
+                                      : flyball::detail::format("write a value before {}",
+                                                                complaints_.quote(token.place))),
                         token.place);
         return mistake({token.place.offset, 0});
     }
@@ -220,8 +220,8 @@ class Parser {
             .got("two values without an operator between them")
             .hint(word == "if" || word == "else"
                       ? std::string("write if(condition, a, b) or condition ? a : b")
-                      : detail::format("write \"{}*{}\" for the product", shortened(before.place),
-                                       shortened(token.place))),
+                      : flyball::detail::format("write \"{}*{}\" for the product",
+                                                shortened(before.place), shortened(token.place))),
         token.place);
   }
   [[nodiscard]] std::string shortened(Place place) const {
@@ -246,17 +246,18 @@ class Parser {
       complaints_.add(Error(ExpressionError::wrong_arity)
                           .about(complaints_.quote(token.place))
                           .got("a function without arguments")
-                          .hint(detail::format("write {}(...)", word)),
+                          .hint(flyball::detail::format("write {}(...)", word)),
                       token.place);
     } else {
       const std::string nearest = symbols_.nearest(word, false);
-      complaints_.add(Error(ExpressionError::unknown_name)
-                          .about(complaints_.quote(token.place))
-                          .got("not known")
-                          .expected("a variable, a parameter or a definition")
-                          .hint(nearest.empty() ? std::string("declare it, or check its spelling")
-                                                : detail::format("did you mean \"{}\"?", nearest)),
-                      token.place);
+      complaints_.add(
+          Error(ExpressionError::unknown_name)
+              .about(complaints_.quote(token.place))
+              .got("not known")
+              .expected("a variable, a parameter or a definition")
+              .hint(nearest.empty() ? std::string("declare it, or check its spelling")
+                                    : flyball::detail::format("did you mean \"{}\"?", nearest)),
+          token.place);
     }
     return mistake(token.place);
   }
@@ -305,29 +306,31 @@ class Parser {
     const Place place = token.place.to(tokens_[at_ - 1].place);
     if (function == nullptr) {
       const std::string nearest = symbols_.nearest(word, true);
-      complaints_.add(Error(ExpressionError::unknown_function)
-                          .about(complaints_.quote(token.place))
-                          .got("not a function")
-                          .hint(nearest.empty() ? std::string("write a product with *")
-                                                : detail::format("did you mean \"{}\"?", nearest)),
-                      token.place);
+      complaints_.add(
+          Error(ExpressionError::unknown_function)
+              .about(complaints_.quote(token.place))
+              .got("not a function")
+              .hint(nearest.empty() ? std::string("write a product with *")
+                                    : flyball::detail::format("did you mean \"{}\"?", nearest)),
+          token.place);
       return mistake(place);
     }
     const int count = static_cast<int>(arguments.size());
     if (count < function->fewest || (function->most > 0 && count > function->most)) {
-      complaints_.add(Error(ExpressionError::wrong_arity)
-                          .about(detail::format("\"{}\"", word))
-                          .got(detail::format("given {}", count_of(count)))
-                          .expected(detail::format("given {}{}{}", count_of(function->fewest),
-                                                   function->most == 0 ? " or more" : "",
-                                                   word == "if" ? ": if(condition, a, b)" : "")),
-                      place);
+      complaints_.add(
+          Error(ExpressionError::wrong_arity)
+              .about(flyball::detail::format("\"{}\"", word))
+              .got(flyball::detail::format("given {}", count_of(count)))
+              .expected(flyball::detail::format("given {}{}{}", count_of(function->fewest),
+                                                function->most == 0 ? " or more" : "",
+                                                word == "if" ? ": if(condition, a, b)" : "")),
+          place);
       return mistake(place);
     }
     return call(*function, token.place, place, arguments);
   }
   static std::string count_of(int count) {
-    return detail::format("{} argument{}", count, count == 1 ? "" : "s");
+    return flyball::detail::format("{} argument{}", count, count == 1 ? "" : "s");
   }
 
   std::string_view text_;

@@ -84,7 +84,8 @@ class Writer {
       const bool computed = operand_count(node.operation) > 0;
       if (computed &&
           (uses_[i] > 1 || named_[i] || (inner_[i] && texts_[i].text.size() > longest))) {
-        const std::string name = detail::format("{}{}", prefix_, result_.definitions.size() + 1);
+        const std::string name =
+            flyball::detail::format("{}{}", prefix_, result_.definitions.size() + 1);
         result_.definitions.push_back({name, std::move(texts_[i].text), is_truth(node.operation)});
         texts_[i] = {name, whole};
       }
@@ -150,7 +151,7 @@ class Writer {
                  ? infinite
                  : Text{"-" + infinite.text, infinite.strength == whole ? minus_sign : product};
     }
-    std::string digits = detail::format("{}", value);
+    std::string digits = flyball::detail::format("{}", value);
     if (!own() && digits.find_first_of(".e") == std::string::npos) {
       digits += ".0";
     }
@@ -163,8 +164,9 @@ class Writer {
     if (!is_truth(tape_.nodes()[slot.index].operation)) {
       return text;
     }
-    return own() ? Text{detail::format("if({}, 1, 0)", text.text)}
-                 : Text{detail::format("{} ? 1.0 : 0.0", at_least(text, disjunction)), choice};
+    return own() ? Text{flyball::detail::format("if({}, 1, 0)", text.text)}
+                 : Text{flyball::detail::format("{} ? 1.0 : 0.0", at_least(text, disjunction)),
+                        choice};
   }
 
   /// An operand as a truth, a number being true where it is not 0.
@@ -172,7 +174,8 @@ class Writer {
     const Text text = texts_[slot.index];
     return is_truth(tape_.nodes()[slot.index].operation)
                ? text
-               : Text{detail::format("{} != {}", at_least(text, sum), literal(0.0).text), relation};
+               : Text{flyball::detail::format("{} != {}", at_least(text, sum), literal(0.0).text),
+                      relation};
   }
 
   static std::string at_least(const Text& text, int strength) {
@@ -180,13 +183,13 @@ class Writer {
   }
 
   Text infix(const Node& node, std::string_view symbol, Strength strength) {
-    return {detail::format("{}{}{}", at_least(number({node.a}), strength), symbol,
-                           at_least(number({node.b}), strength + 1)),
+    return {flyball::detail::format("{}{}{}", at_least(number({node.a}), strength), symbol,
+                                    at_least(number({node.b}), strength + 1)),
             strength};
   }
   Text logic(const Node& node, std::string_view symbol, Strength strength) {
-    return {detail::format("{} {} {}", at_least(truth({node.a}), strength), symbol,
-                           at_least(truth({node.b}), strength + 1)),
+    return {flyball::detail::format("{} {} {}", at_least(truth({node.a}), strength), symbol,
+                                    at_least(truth({node.b}), strength + 1)),
             strength};
   }
 
@@ -225,11 +228,12 @@ class Writer {
         return {(own() ? "not " : "!") + at_least(truth({node.a}), whole),
                 own() ? conjunction : minus_sign};
       case select:
-        return own() ? Text{detail::format("if({}, {}, {})", truth({node.a}).text,
-                                           number({node.b}).text, number({node.c}).text)}
-                     : Text{detail::format("{} ? {} : {}", at_least(truth({node.a}), disjunction),
-                                           at_least(number({node.b}), disjunction),
-                                           at_least(number({node.c}), choice)),
+        return own() ? Text{flyball::detail::format("if({}, {}, {})", truth({node.a}).text,
+                                                    number({node.b}).text, number({node.c}).text)}
+                     : Text{flyball::detail::format("{} ? {} : {}",
+                                                    at_least(truth({node.a}), disjunction),
+                                                    at_least(number({node.b}), disjunction),
+                                                    at_least(number({node.c}), choice)),
                             choice};
       default:
         return call(node);
@@ -240,19 +244,19 @@ class Writer {
     const std::string a = number({node.a}).text;
     const std::string b = operand_count(node.operation) > 1 ? number({node.b}).text : "";
     if (own() && node.operation == power) {
-      return {detail::format("{}^{}", at_least(number({node.a}), whole),
-                             at_least(number({node.b}), whole)),
+      return {flyball::detail::format("{}^{}", at_least(number({node.a}), whole),
+                                      at_least(number({node.b}), whole)),
               exponent};
     }
     if (repeats_operands(node.operation, language_)) {
       return repeated(node);
     }
     if (language_ == Language::java && node.operation == Operation::log2) {
-      return {detail::format("Math.log({})/Math.log(2.0)", a), product};
+      return {flyball::detail::format("Math.log({})/Math.log(2.0)", a), product};
     }
     const std::string name = function_name(node.operation, language_);
-    return {b.empty() ? detail::format("{}({})", name, a)
-                      : detail::format("{}({}, {})", name, a, b)};
+    return {b.empty() ? flyball::detail::format("{}({})", name, a)
+                      : flyball::detail::format("{}({}, {})", name, a, b)};
   }
 
   /// Functions that the language lacks, from those that it has.
@@ -260,24 +264,24 @@ class Writer {
     const std::string a = at_least(number({node.a}), whole);
     switch (node.operation) {
       case Operation::sign:
-        return {detail::format("{0} > 0.0 ? 1.0 : {0} < 0.0 ? -1.0 : {0}", a), choice};
+        return {flyball::detail::format("{0} > 0.0 ? 1.0 : {0} < 0.0 ? -1.0 : {0}", a), choice};
       case modulo: {
         const std::string b = at_least(number({node.b}), whole);
-        return {detail::format("{0} - {1}*{2}({0}/{1})", a, b,
-                               function_name(Operation::floor, language_)),
+        return {flyball::detail::format("{0} - {1}*{2}({0}/{1})", a, b,
+                                        function_name(Operation::floor, language_)),
                 sum};
       }
       case Operation::asinh:
         return {
-            detail::format("Math.copySign(Math.log1p(Math.abs({0}) + "
-                           "{0}*{0}/(1.0 + Math.hypot(1.0, {0}))), {0})",
-                           a)};
+            flyball::detail::format("Math.copySign(Math.log1p(Math.abs({0}) + "
+                                    "{0}*{0}/(1.0 + Math.hypot(1.0, {0}))), {0})",
+                                    a)};
       case Operation::acosh:
-        return {detail::format("Math.log({0} + Math.sqrt(({0} - 1.0)*({0} + 1.0)))", a)};
+        return {flyball::detail::format("Math.log({0} + Math.sqrt(({0} - 1.0)*({0} + 1.0)))", a)};
       case Operation::atanh:
-        return {detail::format("0.5*Math.log1p(2.0*{0}/(1.0 - {0}))", a), product};
+        return {flyball::detail::format("0.5*Math.log1p(2.0*{0}/(1.0 - {0}))", a), product};
       default:  // round
-        return {detail::format("Math.copySign(Math.floor(Math.abs({0}) + 0.5), {0})", a)};
+        return {flyball::detail::format("Math.copySign(Math.floor(Math.abs({0}) + 0.5), {0})", a)};
     }
   }
 
@@ -303,8 +307,8 @@ Expected<SourceText> source_text(const Tape& tape, std::span<const std::string> 
       return {};
     }
     return refusal(ArgumentError::wrong_shape, "source_text", what)
-        .got(detail::format("{} names", got))
-        .expected(detail::format("{}, one for each", wanted));
+        .got(flyball::detail::format("{} names", got))
+        .expected(flyball::detail::format("{}, one for each", wanted));
   };
   FLYBALL_CHECK(check("inputs", inputs.size(), tape.inputs()));
   FLYBALL_CHECK(check("parameters", parameters.size(), tape.parameters()));

@@ -20,22 +20,22 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr std::string_view where = "integrate";
+constexpr std::string_view in_integrate = "integrate";
 
 Expected<VectorXd> tolerances_of(const IntegrationOptions& options, Index states) {
   constexpr double least = 100.0 * std::numeric_limits<double>::epsilon();
   if (!(options.relative_tolerance >= least) || !std::isfinite(options.relative_tolerance)) {
-    return refusal(ArgumentError::out_of_range, where, "relative_tolerance")
+    return refusal(ArgumentError::out_of_range, in_integrate, "relative_tolerance")
         .got(format_number(options.relative_tolerance))
         .expected("at least 2.3e-14");
   }
   if (options.absolute_tolerances.size() == 0) {
-    return check_positive(options.absolute_tolerance, where, "absolute_tolerance").map([&] {
+    return check_positive(options.absolute_tolerance, in_integrate, "absolute_tolerance").map([&] {
       return VectorXd(VectorXd::Constant(states, options.absolute_tolerance));
     });
   }
   FLYBALL_CHECK(
-      Checks(where)
+      Checks(in_integrate)
           .shape(options.absolute_tolerances, states, 1, "absolute_tolerances", "states x 1")
           .finite(options.absolute_tolerances, "absolute_tolerances")
           .positive(options.absolute_tolerances.minCoeff(), "absolute_tolerances"));
@@ -45,18 +45,21 @@ Expected<VectorXd> tolerances_of(const IntegrationOptions& options, Index states
 Expected<void> check_arguments(double t0, const Eigen::Ref<const VectorXd>& x0, double t1,
                                const IntegrationOptions& options) {
   if (x0.size() == 0) {
-    return refusal(ArgumentError::empty, where, "x0");
+    return refusal(ArgumentError::empty, in_integrate, "x0");
   }
   if (std::isnan(options.max_step) || options.max_step <= 0.0) {
-    return refusal(ArgumentError::not_positive, where, "max_step")
+    return refusal(ArgumentError::not_positive, in_integrate, "max_step")
         .got(format_number(options.max_step));
   }
-  return Checks(where).finite(t0, "t0").finite(t1, "t1").finite(x0, "x0").not_negative(
-      options.initial_step, "initial_step", "s");
+  return Checks(in_integrate)
+      .finite(t0, "t0")
+      .finite(t1, "t1")
+      .finite(x0, "x0")
+      .not_negative(options.initial_step, "initial_step", "s");
 }
 
 Refusal not_finite(std::string about, double t, const VectorXd& x) {
-  return refusal(IntegrationError::not_finite, where, about)
+  return refusal(IntegrationError::not_finite, in_integrate, about)
       .got("NaN or infinite")
       .with("t", t)
       .with("x", std::vector<double>(x.data(), x.data() + x.size()));

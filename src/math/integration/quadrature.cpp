@@ -2,19 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <vector>
 
 #include <flyball/core/argument.hpp>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 
 namespace flyball {
 
 namespace {
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 // Positive nodes of the Kronrod rule with its weights; every second one is a node of Gauss's rule.
 constexpr double nodes[] = {

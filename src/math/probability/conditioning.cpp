@@ -1,8 +1,8 @@
 #include <cmath>
-#include <limits>
 
 #include <Eigen/QR>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -12,8 +12,6 @@
 namespace flyball::detail {
 
 namespace {
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 /// What is rounding of sums of so many terms.
 double rounding_of(Eigen::Index terms) {

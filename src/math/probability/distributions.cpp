@@ -1,16 +1,14 @@
 #include <flyball/math/probability/distributions.hpp>
 
 #include <cmath>
-#include <limits>
 #include <numbers>
+
+#include "core/constants.hpp"
 
 namespace flyball {
 
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr double tiny = 1e-290;
 constexpr int most_terms = 100'000;
 

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+
+#include "core/constants.hpp"
 
 namespace flyball {
 
@@ -12,17 +13,17 @@ namespace {
 constexpr std::size_t half = 10;
 /// The positive nodes of Gauss and Legendre's rule of 20 points on [-1, 1], and their weights
 /// (Newton's method on P₂₀ in 40 digits).
-constexpr std::array<double, half> nodes{
+constexpr std::array<double, half> legendre_nodes{
     0.07652652113349734, 0.22778585114164507, 0.37370608871541955, 0.5108670019508271,
     0.636053680726515,   0.7463319064601508,  0.8391169718222188,  0.912234428251326,
     0.9639719272779138,  0.9931285991850949};
-constexpr std::array<double, half> weights{
+constexpr std::array<double, half> legendre_weights{
     0.15275338713072584, 0.14917298647260374, 0.14209610931838204, 0.13168863844917664,
     0.11819453196151841, 0.10193011981724044, 0.08327674157670475, 0.06267204833410907,
     0.04060142980038694, 0.017614007139152118};
 
 /// The mass of a density around its mode, at up to 80 places.
-class Mass {
+class NormalMass {
  public:
   /// One side of the mode, from `begin` deviations off the middle over `width` of them: the density
   /// e^(-(begin t + t²/2)) at begin + t, where it is more than e⁻⁴⁰.
@@ -32,9 +33,9 @@ class Mass {
     for (const double from : {0.0, 0.5 * reach}) {
       for (std::size_t i = 0; i < half; ++i) {
         for (const double side : {-1.0, 1.0}) {
-          const double t = from + 0.25 * reach * (1.0 + side * nodes[i]);
+          const double t = from + 0.25 * reach * (1.0 + side * legendre_nodes[i]);
           place_[count_] = sign * t;
-          mass_[count_] = 0.25 * reach * weights[i] * std::exp(-t * (begin + 0.5 * t));
+          mass_[count_] = 0.25 * reach * legendre_weights[i] * std::exp(-t * (begin + 0.5 * t));
           ++count_;
         }
       }
@@ -65,7 +66,6 @@ class Mass {
 }  // namespace
 
 Moments truncated_normal(double mean, double variance, double lower, double upper) noexcept {
-  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   const bool usable = std::isfinite(mean) && variance > 0.0 && std::isfinite(variance) &&
                       lower <= upper && !(std::isinf(lower) && lower > 0.0) &&
                       !(std::isinf(upper) && upper < 0.0);
@@ -82,7 +82,7 @@ Moments truncated_normal(double mean, double variance, double lower, double uppe
   if (!(b > a)) {
     return {lower, 0.0};
   }
-  Mass mass;
+  NormalMass mass;
   double mode = mean;
   if (a >= 0.0) {
     mode = lower;

@@ -1,8 +1,8 @@
 #include <flyball/math/regression/bounded_least_squares.hpp>
 
 #include <cmath>
-#include <limits>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -17,17 +17,19 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr std::string_view where = "bounded_least_squares";
+constexpr std::string_view in_bounded_least_squares = "bounded_least_squares";
 
 Expected<VectorXd> bounds_of(const VectorXd& given, Index p, std::string_view name) {
   VectorXd bounds = given.size() == 1 ? VectorXd::Constant(p, given(0)) : given;
   if (bounds.size() != p) {
-    return refusal(ArgumentError::wrong_shape, where, name)
+    return refusal(ArgumentError::wrong_shape, in_bounded_least_squares, name)
         .got(detail::format("of {}", given.size()))
         .expected(detail::format("of {}, one a coefficient, or of 1", p));
   }
   if (bounds.array().isNaN().any()) {
-    return refusal(ArgumentError::not_finite, where, name).got("NaN").expected("numbers");
+    return refusal(ArgumentError::not_finite, in_bounded_least_squares, name)
+        .got("NaN")
+        .expected("numbers");
   }
   return bounds;
 }
@@ -172,18 +174,20 @@ class ActiveSet {
 
 Expected<BoundedLeastSquares> bounded_least_squares(const MatrixRef& X, const MatrixRef& y,
                                                     const VectorXd& lower, const VectorXd& upper) {
-  FLYBALL_CHECK(
-      Checks(where).finite(X, "X").shape(y, X.rows(), 1, "y", "rows of X").finite(y, "y"));
+  FLYBALL_CHECK(Checks(in_bounded_least_squares)
+                    .finite(X, "X")
+                    .shape(y, X.rows(), 1, "y", "rows of X")
+                    .finite(y, "y"));
   const Index p = X.cols();
   if (X.size() == 0) {
-    return refusal(ArgumentError::empty, where, "X").expected("rows x coefficients");
+    return refusal(ArgumentError::empty, in_bounded_least_squares, "X")
+        .expected("rows x coefficients");
   }
   FLYBALL_TRY(const VectorXd low, bounds_of(lower, p, "lower"));
   FLYBALL_TRY(const VectorXd high, bounds_of(upper, p, "upper"));
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   for (Index j = 0; j < p; ++j) {
     if (!(low(j) <= high(j)) || low(j) == infinity || high(j) == -infinity) {
-      return refusal(ArgumentError::out_of_range, where,
+      return refusal(ArgumentError::out_of_range, in_bounded_least_squares,
                      detail::format("the bounds of coefficient {}", j))
           .got(detail::format("from {} to {}", low(j), high(j)))
           .expected("increasing, with a number between them");
@@ -196,7 +200,7 @@ Expected<BoundedLeastSquares> bounded_least_squares(const MatrixRef& X, const Ma
   ActiveSet search(R.leftCols(p), R.col(p), low.cwiseQuotient(units), high.cwiseQuotient(units));
   const int most = 30 * static_cast<int>(p) + 100;
   if (!search.solve(most)) {
-    return refusal(RegressionError::no_convergence, where)
+    return refusal(RegressionError::no_convergence, in_bounded_least_squares)
         .hint("leave out columns that depend on each other")
         .with("changes", static_cast<double>(search.iterations()));
   }

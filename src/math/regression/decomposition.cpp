@@ -6,6 +6,7 @@
 
 #include <flyball/math/probability/distributions.hpp>
 
+#include "core/constants.hpp"
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -114,7 +115,6 @@ VectorXd refined_solution(const MatrixRef& X, const MatrixRef& y,
 void tell_intervals(Regression& regression, double confidence) {
   const Index p = regression.coefficients.size();
   const auto freedom = static_cast<double>(regression.degrees_of_freedom);
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   const double width =
       freedom > 0.0 ? student_quantile(0.5 * (1.0 + confidence), freedom) : infinity;
   regression.standard_errors.resize(p);

@@ -18,27 +18,29 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr std::string_view where = "least_squares";
+constexpr std::string_view in_least_squares = "least_squares";
 
 Expected<void> check(const MatrixRef& X, const MatrixRef& y, const LeastSquaresOptions& options) {
-  FLYBALL_CHECK(
-      Checks(where).finite(X, "X").shape(y, X.rows(), 1, "y", "rows of X").finite(y, "y"));
+  FLYBALL_CHECK(Checks(in_least_squares)
+                    .finite(X, "X")
+                    .shape(y, X.rows(), 1, "y", "rows of X")
+                    .finite(y, "y"));
   if (X.size() == 0) {
-    return refusal(ArgumentError::empty, where, "X").expected("rows x coefficients");
+    return refusal(ArgumentError::empty, in_least_squares, "X").expected("rows x coefficients");
   }
-  FLYBALL_CHECK(detail::check_confidence(options.confidence, options.tolerance, where));
+  FLYBALL_CHECK(detail::check_confidence(options.confidence, options.tolerance, in_least_squares));
   if (options.weights) {
-    FLYBALL_CHECK(Checks(where)
+    FLYBALL_CHECK(Checks(in_least_squares)
                       .shape(*options.weights, X.rows(), 1, "weights", "rows of X")
                       .finite(*options.weights, "weights"));
     if (Index i = 0; options.weights->minCoeff(&i) < 0.0) {
-      return refusal(ArgumentError::out_of_range, where, detail::format("weight {}", i))
+      return refusal(ArgumentError::out_of_range, in_least_squares, detail::format("weight {}", i))
           .got(format_number((*options.weights)(i)))
           .expected("not negative");
     }
   }
   if (options.equality) {
-    FLYBALL_CHECK(Checks(where)
+    FLYBALL_CHECK(Checks(in_least_squares)
                       .shape(options.equality->C, options.equality->C.rows(), X.cols(), "C",
                              "constraints x coefficients")
                       .finite(options.equality->C, "C")
@@ -46,7 +48,7 @@ Expected<void> check(const MatrixRef& X, const MatrixRef& y, const LeastSquaresO
                       .finite(options.equality->d, "d"));
   }
   if (options.lags && *options.lags < 0) {
-    return refusal(ArgumentError::out_of_range, where, "lags")
+    return refusal(ArgumentError::out_of_range, in_least_squares, "lags")
         .got(std::to_string(*options.lags))
         .expected("not negative");
   }
@@ -80,7 +82,7 @@ Expected<Feasible> feasible(const MatrixRef& X, const EqualityConstraint& equali
   const VectorXd offset = detail::solve_least_squares(C, d);
   const double gap = (C * offset - d).norm();
   if (gap > 1e-10 * std::max(d.norm(), offset.norm())) {
-    return refusal(RegressionError::infeasible, where, "C β = d")
+    return refusal(RegressionError::infeasible, in_least_squares, "C β = d")
         .hint("give equations that hold together")
         .with("distance", gap);
   }
@@ -113,7 +115,8 @@ Expected<MatrixXd> covariance_of(const MatrixXd& Q, const VectorXd& e, const Vec
   if (options.errors == ErrorModel::hc2 || options.errors == ErrorModel::hc3) {
     Index row = 0;
     if (leverage.maxCoeff(&row) > 1.0 - 1e-10) {
-      return refusal(RegressionError::leverage_one, where, detail::format("row {} of X", row))
+      return refusal(RegressionError::leverage_one, in_least_squares,
+                     detail::format("row {} of X", row))
           .hint("take hc1, or leave the row and its coefficient out")
           .with("row", static_cast<double>(row));
     }

@@ -45,7 +45,7 @@ Expected<void> check_values(const MatrixRef& A, const MatrixRef& B, const Matrix
 }
 
 /// The largest magnitude; not a number where one is not, infinite where one is.
-double largest(const double* values, int count) {
+double largest_of(const double* values, int count) {
   double most = 0.0;
   double sum = 0.0;
   for (int k = 0; k < count; ++k) {
@@ -188,13 +188,13 @@ Expected<void> solve_riccati_within(const RiccatiData& data, RiccatiAnswer& answ
   constexpr double nearly_nothing = 0x1p-800;
   const int n = data.states;
   const int m = data.inputs;
-  const double size_A = largest(data.A, n * n);
+  const double size_A = largest_of(data.A, n * n);
   const bool ordinary =
       (is_ordinary(size_A) ||
        (size_A < 1.0 && !data.continuous && !(size_A > 0.0 && size_A < nearly_nothing))) &&
-      is_ordinary(largest(data.B, n * m)) && is_ordinary(largest(data.Q, n * n)) &&
-      is_ordinary(largest(data.R, m * m)) &&
-      (data.N == nullptr || is_ordinary(largest(data.N, n * m)));
+      is_ordinary(largest_of(data.B, n * m)) && is_ordinary(largest_of(data.Q, n * n)) &&
+      is_ordinary(largest_of(data.R, m * m)) &&
+      (data.N == nullptr || is_ordinary(largest_of(data.N, n * m)));
   if (ordinary && symmetric(data.Q, n) && symmetric(data.R, m) &&
       (solve_in_balanced_units(data, answer) || solve_riccati_quickly(data, answer))) {
     if (!in_units_far_apart(answer.X, n)) {

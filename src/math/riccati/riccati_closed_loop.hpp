@@ -3,6 +3,7 @@
 // Part of riccati_kernel_body.hpp, compiled with it once for each instruction set: the Lyapunov
 // operator of a closed loop, by which the kernel judges and corrects what it found.
 
+#include "core/constants.hpp"
 #include "math/dense/gauss_jordan.hpp"
 #include "math/dense/small_matrix.hpp"
 #include "math/riccati/riccati_two_states.hpp"
@@ -46,7 +47,6 @@ class ClosedLoop {
   /// signs else (Hutchinson); infinite where the powers of A do not fade within so many steps, or
   /// grow beyond `most` times their squared size.
   double gain(double most = std::numeric_limits<double>::infinity(), int steps = 2000) {
-    constexpr double infinity = std::numeric_limits<double>::infinity();
     if (!valid_) {
       return infinity;
     }

@@ -4,6 +4,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/riccati/riccati_robust.hpp"
@@ -14,8 +15,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 /// An eigenvalue, or a part of one, in the units of the caller.
 double in_units(const RiccatiProblem& p, double value) {

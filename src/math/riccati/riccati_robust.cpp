@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <flyball/core/random.hpp>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
@@ -17,8 +17,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 /// x = D z with powers of two D such that z's A, G and H have comparable rows, columns and
 /// entries: minimises Σ A_ij² t_j/t_i + ½ Σ G_ij²/(t_i t_j) + ½ Σ H_ij² t_i t_j over t = D², which

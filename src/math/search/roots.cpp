@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/constants.hpp"
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "math/search/search.hpp"
@@ -60,7 +61,6 @@ Expected<Root> find_root(FunctionRef<double(double)> f, double a, double b,
 Expected<Root> find_root(FunctionRef<double(double)> f, double a, double b, double f_a, double f_b,
                          const SearchOptions& options) {
   constexpr std::string_view where = "find_root";
-  constexpr double epsilon = std::numeric_limits<double>::epsilon();
   FLYBALL_CHECK(detail::check_search(a, b, options, where));
   if (std::isnan(f_a) || std::isnan(f_b)) {
     return tl::unexpected(detail::not_a_number(std::isnan(f_a) ? a : b, where));

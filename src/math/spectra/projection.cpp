@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string>
 
 #include <flyball/math/spectra/fft.hpp>
 
+#include "core/constants.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 
@@ -19,8 +19,6 @@ using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
 namespace {
-
-using std::numbers::pi;
 
 Expected<void> check_record(const MatrixRef& x, Time period, std::string_view where) {
   if (x.size() == 0) {
@@ -39,13 +37,13 @@ bool independent(const MatrixRef& columns) {
 
 /// ∫₀¹ e^{-pτ} dτ = (1 - e^{-p})/p and ∫₀¹ τ e^{-pτ} dτ = (1 - (1 + p) e^{-p})/p², by their series
 /// where the quotients lose digits.
-struct Moments {
+struct PulseMoments {
   Complex zeroth;
   Complex first;
 };
-Moments moments(Complex p) {
+PulseMoments moments(Complex p) {
   if (std::abs(p) < 0.5) {
-    Moments m{0.0, 0.0};
+    PulseMoments m{0.0, 0.0};
     Complex term = 1.0;  // (-p)^k/k!
     for (int k = 0; k < 18; ++k) {
       m.zeroth += term / (k + 1.0);
@@ -113,7 +111,7 @@ Expected<VectorXcd> laplace_transform(const MatrixRef& x, Time period, const Vec
     }
     const Complex p = s(i) * T;
     const Complex step = std::exp(-p);
-    const Moments m = moments(p);
+    const PulseMoments m = moments(p);
     // Horner's rule from the end on, so that nothing grows; where e^{-st} grows, from the start.
     const auto sum = [&](auto&& segment, Index count) {
       Complex total = 0.0;

@@ -10,7 +10,7 @@ namespace flyball::mechanisms::detail {
 
 namespace {
 
-constexpr std::string_view where = "lagrangian_model";
+constexpr std::string_view in_lagrangian_model = "lagrangian_model";
 
 std::vector<double> as_list(const Eigen::VectorXd& values) {
   return {values.begin(), values.end()};
@@ -20,7 +20,9 @@ std::vector<double> as_list(const Eigen::VectorXd& values) {
 
 Expected<void> check_mechanics(const MechanicsSample& sample) {
   const auto refused = [&](ArgumentError code, std::string_view what) {
-    return refusal(code, where, what).with("q", as_list(sample.q)).with("v", as_list(sample.v));
+    return refusal(code, in_lagrangian_model, what)
+        .with("q", as_list(sample.q))
+        .with("v", as_list(sample.v));
   };
   if (!std::isfinite(sample.potential) || !sample.forces.allFinite()) {
     return refused(ArgumentError::not_finite, "the potential energy, or a force of it,")

@@ -9,7 +9,7 @@ namespace flyball::mechanisms {
 
 namespace {
 
-constexpr std::string_view where = "cascade_elevator";
+constexpr std::string_view in_cascade_elevator = "cascade_elevator";
 
 }  // namespace
 
@@ -45,8 +45,9 @@ Expected<Elevator> CascadeElevator::elevator() const {
 
 Expected<CascadeElevator> cascade_elevator(const CascadeElevatorParameters& parameters) {
   const auto& [drive, drum_radius, carriage, stages, spring] = parameters;
-  FLYBALL_TRY(const detail::Shaft shaft, detail::checked_shaft(drive, where, "shaft", true));
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_TRY(const detail::Shaft shaft,
+              detail::checked_shaft(drive, in_cascade_elevator, "shaft", true));
+  FLYBALL_CHECK(Checks(in_cascade_elevator)
                     .positive(drum_radius.si(), "drum_radius", "m")
                     .positive(carriage.si(), "carriage", "kg")
                     .not_negative(spring.force.si(), "the counterbalance's force", "N")
@@ -55,7 +56,7 @@ Expected<CascadeElevator> cascade_elevator(const CascadeElevatorParameters& para
   double inertia = carriage.si();
   double weight = carriage.si() * standard_gravity;
   for (std::size_t k = 0; k < stages.size(); ++k) {
-    FLYBALL_CHECK(check_not_negative(stages[k].si(), where,
+    FLYBALL_CHECK(check_not_negative(stages[k].si(), in_cascade_elevator,
                                      flyball::detail::format("the mass of stage {}", k + 1), "kg"));
     const double share = static_cast<double>(k + 1) / n;
     inertia += stages[k].si() * share * share;
@@ -64,7 +65,7 @@ Expected<CascadeElevator> cascade_elevator(const CascadeElevatorParameters& para
   double pulled = 1.0;
   if (spring.stage != Counterbalance::carriage) {
     if (spring.stage >= stages.size()) {
-      return refusal(ArgumentError::out_of_range, where, "the counterbalance's stage")
+      return refusal(ArgumentError::out_of_range, in_cascade_elevator, "the counterbalance's stage")
           .got(std::to_string(spring.stage))
           .expected(flyball::detail::format(
               "below {}, the number of stages, or left out for the carriage", stages.size()));
@@ -73,7 +74,7 @@ Expected<CascadeElevator> cascade_elevator(const CascadeElevatorParameters& para
   }
   const double arm = n * drum_radius.si();
   inertia += shaft.inertia / (arm * arm);
-  FLYBALL_CHECK(check_finite(inertia, where, "the inertia"));
+  FLYBALL_CHECK(check_finite(inertia, in_cascade_elevator, "the inertia"));
   return CascadeElevator(shaft, arm, inertia, weight, spring.force.si() * pulled,
                          spring.stiffness * pulled * pulled, drive.motor.nominal_voltage);
 }

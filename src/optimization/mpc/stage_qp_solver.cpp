@@ -1,14 +1,12 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "core/constants.hpp"
 #include "optimization/mpc/stage_qp_solver.hpp"
 
 namespace flyball::optimization::detail {
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 struct Kernels {
   QpEnd (*solve)(StageQp&) noexcept;
@@ -16,7 +14,7 @@ struct Kernels {
   void (*sweep)(StageQp&) noexcept;
 };
 
-Kernels choose() {
+Kernels choose_kernels() {
 #ifdef FLYBALL_WIDE_VECTORS
   if (__builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
       __builtin_cpu_supports("avx512vl") != 0) {
@@ -30,7 +28,7 @@ Kernels choose() {
 }
 
 const Kernels& kernels() {
-  static const Kernels chosen = choose();
+  static const Kernels chosen = choose_kernels();
   return chosen;
 }
 

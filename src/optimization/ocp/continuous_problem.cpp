@@ -7,6 +7,7 @@
 
 #include <flyball/core/argument.hpp>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "optimization/ocp/continuous_data.hpp"
 
@@ -21,7 +22,6 @@ using VectorRef = Eigen::Ref<const VectorXd>;
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int largest_size = 200;
 constexpr int most_phases = 1000;
 

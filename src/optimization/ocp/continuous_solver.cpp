@@ -24,7 +24,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr std::string_view where = "optimal control";
+constexpr std::string_view in_optimal_control = "optimal control";
 
 /// A phase's derivative in numbers.
 class Slope {
@@ -176,18 +176,18 @@ Expected<void> check(const ContinuousData& data, const TranscriptionOptions& opt
     const ContinuousPhase& phase = data.phases[i];
     if (!phase.derivative) {
       return tl::unexpected(Error(ArgumentError::empty)
-                                .in(std::string(where))
+                                .in(std::string(in_optimal_control))
                                 .about(flyball::detail::format("the derivative of phase {}", i))
                                 .hint("call set_derivative"));
     }
     if (phase.shared_with < 0 && !(phase.most > 0.0)) {
       return tl::unexpected(Error(ArgumentError::empty)
-                                .in(std::string(where))
+                                .in(std::string(in_optimal_control))
                                 .about(flyball::detail::format("the duration of phase {}", i))
                                 .hint("call set_duration or free_duration"));
     }
   }
-  return Checks(where)
+  return Checks(in_optimal_control)
       .within(options.intervals, 1, options.max_intervals, "the intervals of a phase")
       .within(options.shooting_steps, 1, 1000, "the steps of an interval")
       .not_negative(options.error_tolerance, "the error tolerance")
@@ -312,7 +312,8 @@ Expected<ContinuousSolution> solve(const ContinuousProblem& problem,
       detail::set_start(transcribed, layout, found_state, found_input, durations);
       solver_options.first_barrier = 1e-2;
     }
-    FLYBALL_TRY_IN(where, OptimalControlSolver solver, OptimalControlSolver::make(transcribed));
+    FLYBALL_TRY_IN(in_optimal_control, OptimalControlSolver solver,
+                   OptimalControlSolver::make(transcribed));
     const OptimalControlSolution found = solver.solve(solver_options);
     result.phases = detail::trajectory_of(data, layout, found);
     result.cost = found.cost;

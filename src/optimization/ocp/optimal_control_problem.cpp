@@ -1,10 +1,10 @@
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <flyball/core/argument.hpp>
 #include <flyball/optimization/ocp/optimal_control.hpp>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "optimization/ocp/optimal_control_data.hpp"
 
@@ -19,8 +19,7 @@ using VectorRef = Eigen::Ref<const VectorXd>;
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr int largest_size = 1000;
+constexpr int most_entries = 1000;
 constexpr int most_intervals = 10'000'000;
 
 constexpr ButcherTableau<4> runge_kutta_4{
@@ -128,11 +127,11 @@ OptimalControlProblem::OptimalControlProblem(int states, int inputs, int interva
     : data_(std::make_unique<OptimalControlData>()) {
   OptimalControlData& d = *data_;
   for (const auto& [value, name, least, most] :
-       {std::tuple{states, "states", 1, largest_size},
-        std::tuple{inputs, "inputs", 0, largest_size},
+       {std::tuple{states, "states", 1, most_entries},
+        std::tuple{inputs, "inputs", 0, most_entries},
         std::tuple{intervals, "intervals", 1, most_intervals},
-        std::tuple{parameters, "parameters", 0, largest_size},
-        std::tuple{data, "data", 0, largest_size}}) {
+        std::tuple{parameters, "parameters", 0, most_entries},
+        std::tuple{data, "data", 0, most_entries}}) {
     if (value < least || value > most) {
       refuse(d, Error(ArgumentError::out_of_range)
                     .about(flyball::detail::format("the number of {}", name))

@@ -31,7 +31,7 @@ namespace {
 /// The barrier's first weight where none is given: large, so that the first steps look for a
 /// trajectory rather than for its last digits.
 constexpr double first_barrier = 30.0;
-constexpr std::size_t most_violations = 10;
+constexpr std::size_t most_named = 10;
 
 Lagrangian nothing(const OptimalControlData& data) {
   expression::TapeBuilder builder(static_cast<std::size_t>(data.size() + data.data_size));
@@ -194,8 +194,8 @@ void OptimalControlSolver::Parts::report_violations(OptimalControlSolution& solu
   }
   std::stable_sort(solution.violations.begin(), solution.violations.end(),
                    [](const Violation& a, const Violation& b) { return a.amount > b.amount; });
-  if (solution.violations.size() > most_violations) {
-    solution.violations.resize(most_violations);
+  if (solution.violations.size() > most_named) {
+    solution.violations.resize(most_named);
   }
 }
 

@@ -11,9 +11,9 @@ using expression::LaneTape;
 
 namespace {
 
-constexpr std::size_t lanes = LaneTape::lanes;
+constexpr std::size_t stage_lanes = LaneTape::lanes;
 /// What stands for 0 on the diagonal of an equality's multiplier.
-constexpr double regularization = 1e-8;
+constexpr double stage_regularization = 1e-8;
 
 }  // namespace
 
@@ -122,14 +122,14 @@ void StageProgram::gather(const Compiled& /*kind*/, const LaneTape& tape, const 
                           std::size_t count, const double* w, double* work) const {
   double* const to = tape.input(0, work);
   const auto numbers = static_cast<std::size_t>(problem_.data.rows());
-  for (std::size_t l = 0; l < lanes; ++l) {
+  for (std::size_t l = 0; l < stage_lanes; ++l) {
     const std::size_t k = stages[std::min(l, count - 1)];
     for (std::size_t i = 0; i < size_; ++i) {
-      to[i * lanes + l] = w[k * size_ + i];
+      to[i * stage_lanes + l] = w[k * size_ + i];
     }
     const double* const data = problem_.data.data() + k * numbers;
     for (std::size_t i = 0; i < numbers; ++i) {
-      to[(size_ + i) * lanes + l] = data[i];
+      to[(size_ + i) * stage_lanes + l] = data[i];
     }
   }
 }
@@ -144,8 +144,8 @@ bool StageProgram::values(const Eigen::VectorXd& w, double& f, Eigen::VectorXd& 
     const bool dynamics = problem_.kinds[batch.kind].has_dynamics;
     const std::size_t cost_row = dynamics ? n : 0;
     double* const work = kind.value_work.data();
-    for (std::size_t first = 0; first < batch.stages.size(); first += lanes) {
-      const std::size_t count = std::min(lanes, batch.stages.size() - first);
+    for (std::size_t first = 0; first < batch.stages.size(); first += stage_lanes) {
+      const std::size_t count = std::min(stage_lanes, batch.stages.size() - first);
       const std::size_t* const stages = batch.stages.data() + first;
       gather(kind, kind.values, stages, count, w.data(), work);
       kind.values.evaluate(work);
@@ -188,19 +188,19 @@ bool StageProgram::derivatives(const Eigen::VectorXd& w, const Eigen::VectorXd& 
     const std::size_t function_rows = problem_.kinds[batch.kind].functions.rows;
     double* const work = kind.derivative_work.data();
     const std::size_t first_weight = size_ + static_cast<std::size_t>(problem_.data.rows());
-    for (std::size_t first = 0; first < batch.stages.size(); first += lanes) {
-      const std::size_t count = std::min(lanes, batch.stages.size() - first);
+    for (std::size_t first = 0; first < batch.stages.size(); first += stage_lanes) {
+      const std::size_t count = std::min(stage_lanes, batch.stages.size() - first);
       const std::size_t* const stages = batch.stages.data() + first;
       gather(kind, tape, stages, count, w.data(), work);
       double* const mu = tape.input(first_weight, work);
-      for (std::size_t l = 0; l < lanes; ++l) {
+      for (std::size_t l = 0; l < stage_lanes; ++l) {
         const std::size_t k = stages[std::min(l, count - 1)];
         for (std::size_t i = 0; i < cost_row; ++i) {
-          mu[i * lanes + l] = lambda.data()[k * n + i];
+          mu[i * stage_lanes + l] = lambda.data()[k * n + i];
         }
-        mu[cost_row * lanes + l] = weight;
+        mu[cost_row * stage_lanes + l] = weight;
         for (std::size_t i = cost_row + 1; i < function_rows; ++i) {
-          mu[i * lanes + l] = row_multipliers[first_row_[k] + i - cost_row - 1];
+          mu[i * stage_lanes + l] = row_multipliers[first_row_[k] + i - cost_row - 1];
         }
       }
       tape.evaluate(work);
@@ -317,7 +317,7 @@ bool StageProgram::factor(const Eigen::VectorXd& diagonal, const Eigen::VectorXd
     soft = soft || D.data()[i] > 0.0;
   }
   for (std::size_t i = 0; i < defects(); ++i) {
-    D_[i] = std::max(D.data()[i], regularization);
+    D_[i] = std::max(D.data()[i], stage_regularization);
   }
   for (std::size_t r = 0; r < slack_.size(); ++r) {
     const double d = D.data()[defects() + r];
@@ -329,7 +329,7 @@ bool StageProgram::factor(const Eigen::VectorXd& diagonal, const Eigen::VectorXd
       slack_diagonal_(static_cast<Eigen::Index>(r)) = s;
       weight_[r] = s / (1.0 + d * s);
     } else {
-      weight_[r] = 1.0 / std::max(d, regularization);
+      weight_[r] = 1.0 / std::max(d, stage_regularization);
     }
   }
   StageSystem system;
@@ -413,8 +413,8 @@ StageProgram::Fault StageProgram::find_fault(const Eigen::VectorXd& w) {
   for (const Batch& batch : batches_) {
     Compiled& kind = compiled_[batch.kind];
     double* const work = kind.value_work.data();
-    for (std::size_t first = 0; first < batch.stages.size(); first += lanes) {
-      const std::size_t count = std::min(lanes, batch.stages.size() - first);
+    for (std::size_t first = 0; first < batch.stages.size(); first += stage_lanes) {
+      const std::size_t count = std::min(stage_lanes, batch.stages.size() - first);
       gather(kind, kind.values, batch.stages.data() + first, count, w.data(), work);
       kind.values.evaluate(work);
       for (std::size_t l = 0; l < count; ++l) {
@@ -437,13 +437,13 @@ StageProgram::Fault StageProgram::find_derivative_fault(const Eigen::VectorXd& w
     const expression::Lagrangian& functions = problem_.kinds[batch.kind].functions;
     double* const work = kind.derivative_work.data();
     const std::size_t first_weight = size_ + static_cast<std::size_t>(problem_.data.rows());
-    for (std::size_t first = 0; first < batch.stages.size(); first += lanes) {
-      const std::size_t count = std::min(lanes, batch.stages.size() - first);
+    for (std::size_t first = 0; first < batch.stages.size(); first += stage_lanes) {
+      const std::size_t count = std::min(stage_lanes, batch.stages.size() - first);
       gather(kind, tape, batch.stages.data() + first, count, w.data(), work);
       for (std::size_t row = 0; row < functions.rows; ++row) {
         double* const mu = tape.input(first_weight, work);
-        std::fill_n(mu, functions.rows * lanes, 0.0);
-        std::fill_n(mu + row * lanes, lanes, 1.0);
+        std::fill_n(mu, functions.rows * stage_lanes, 0.0);
+        std::fill_n(mu + row * stage_lanes, stage_lanes, 1.0);
         tape.evaluate(work);
         for (std::size_t e = functions.rows; e < tape.outputs(); ++e) {
           const std::size_t entry = e - functions.rows;

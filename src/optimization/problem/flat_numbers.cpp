@@ -1,16 +1,14 @@
 // Bounds, and other numbers of a flat problem whose parameters have changed.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "core/constants.hpp"
 #include "optimization/problem/flat_problem.hpp"
 #include "optimization/problem/flat_walk.hpp"
 
 namespace flyball::optimization::detail {
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 void note_impossible(FlatProblem& flat, int number, double by) {
   if (flat.impossible < 0) {

@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <unordered_map>
 #include <utility>
 
 #include <flyball/math/expression/tape_builder.hpp>
 
+#include "core/constants.hpp"
 #include "optimization/problem/flat_problem.hpp"
 #include "optimization/problem/flat_walk.hpp"
 
@@ -17,8 +17,6 @@ using expression::Slot;
 using expression::TapeBuilder;
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// Codes of a key beside those of operations.
 enum Code : std::uint32_t { of_variable = 2000, of_number };

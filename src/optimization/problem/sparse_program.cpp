@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
+#include "core/constants.hpp"
 #include "optimization/problem/sparse_program.hpp"
 
 namespace flyball::optimization::detail {
@@ -14,7 +14,6 @@ using expression::LaneTape;
 namespace {
 
 constexpr std::size_t lanes = LaneTape::lanes;
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 

@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "core/constants.hpp"
 #include "optimization/solver/interior_point.hpp"
 #include "optimization/solver/restoration.hpp"
 
@@ -11,8 +12,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/constants.hpp"
 #include "optimization/solver/interior_point.hpp"
 
 namespace flyball::optimization::detail {
@@ -11,8 +12,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 

@@ -1,8 +1,8 @@
 // Where the interior-point method begins after a change of the program's numbers.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "core/constants.hpp"
 #include "optimization/solver/interior_point.hpp"
 
 namespace flyball::optimization::detail {
@@ -10,8 +10,6 @@ namespace flyball::optimization::detail {
 namespace {
 
 using Eigen::Index;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 

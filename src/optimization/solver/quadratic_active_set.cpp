@@ -12,7 +12,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-double largest(const VectorXd& v) {
+double largest_magnitude(const VectorXd& v) {
   return v.size() > 0 ? v.lpNorm<Eigen::Infinity>() : 0.0;
 }
 
@@ -66,7 +66,7 @@ bool QuadraticMethod::settle(const SolverOptions& options) {
       for (Index i = 0; i < w_.size(); ++i) {
         rw_(i) = side(i) != 0.0 ? 0.0 : rd_(i);
       }
-      if (std::max(largest(rw_), largest(c_)) <= 1e-2 * options.tolerance) {
+      if (std::max(largest_magnitude(rw_), largest_magnitude(c_)) <= 1e-2 * options.tolerance) {
         break;
       }
       program_.solve(rw_, c_, dw_, dl_);
@@ -86,7 +86,7 @@ bool QuadraticMethod::settle(const SolverOptions& options) {
       continue;
     }
     residuals();
-    if (rolls > 0 && largest(rd_) > 1e4 * size_) {
+    if (rolls > 0 && largest_magnitude(rd_) > 1e4 * size_) {
       return false;  // no point keeps all that was kept, as where a last state is given
     }
     int changes = 0;

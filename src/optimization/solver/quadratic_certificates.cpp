@@ -1,8 +1,8 @@
 // Proofs that a quadratic program has no solution (Farkas's lemma).
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "core/constants.hpp"
 #include "optimization/solver/quadratic_method.hpp"
 
 namespace flyball::optimization::detail {
@@ -12,16 +12,14 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-double largest(const VectorXd& v) {
+double largest_entry(const VectorXd& v) {
   return v.size() > 0 ? v.lpNorm<Eigen::Infinity>() : 0.0;
 }
 
 }  // namespace
 
 bool QuadraticMethod::proves_infeasible() {
-  const double size = largest(lambda_);
+  const double size = largest_entry(lambda_);
   if (!(size > 1e3) || last_.infeasibility < 1e-6) {
     return false;
   }
@@ -50,12 +48,12 @@ bool QuadraticMethod::proves_infeasible() {
 }
 
 bool QuadraticMethod::proves_unbounded() {
-  const double size = largest(w_);
+  const double size = largest_entry(w_);
   if (!(size > 1e4)) {
     return false;
   }
   for (const VectorXd* direction : {&w_, &affine_w_}) {
-    const double length = largest(*direction);
+    const double length = largest_entry(*direction);
     if (!(length > 0.0)) {
       continue;
     }
@@ -63,13 +61,13 @@ bool QuadraticMethod::proves_unbounded() {
     fix_c_.setZero();
     program_.multiply(fix_w_, fix_c_, residual_w_, residual_c_);
     const double slope = g_.dot(fix_w_);
-    double left = largest(residual_c_);
+    double left = largest_entry(residual_c_);
     for (Index i = 0; i < w_.size(); ++i) {
       left = std::max(left, std::abs(residual_w_(i)));
       left = std::max(left, program_.lower(i) > -infinity ? -fix_w_(i) : 0.0);
       left = std::max(left, program_.upper(i) < infinity ? fix_w_(i) : 0.0);
     }
-    if (slope < -1e-6 && left <= 1e-4 * -slope / std::max(1.0, largest(g_)) && left < 1e-6) {
+    if (slope < -1e-6 && left <= 1e-4 * -slope / std::max(1.0, largest_entry(g_)) && left < 1e-6) {
       certificate_.head(w_.size()) = fix_w_;
       return true;
     }

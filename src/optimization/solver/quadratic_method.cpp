@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 
+#include "core/constants.hpp"
 #include "optimization/solver/quadratic_method.hpp"
 
 namespace flyball::optimization::detail {
@@ -12,7 +12,6 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 /// How far the complementarity falls before a run keeps where the next one may begin.
 constexpr double middle = 1e-2;
 

@@ -31,7 +31,7 @@ ErrorInfo error_info(ConfigurationError code) {
 
 namespace {
 
-constexpr std::string_view where = "configuration space";
+constexpr std::string_view in_configuration_space = "configuration space";
 
 /// What rounding may make of a margin of 0, in shares of the axes' scales.
 constexpr double touch = 1e-11;
@@ -128,7 +128,7 @@ Expected<void> ConfigurationSpace::forbid(std::string name, const Region& region
 
 Expected<void> ConfigurationSpace::attach(const PlanarMechanism& mechanism) {
   if (model_->mechanism) {
-    return refusal(ArgumentError::ambiguous_name, where, "mechanism")
+    return refusal(ArgumentError::ambiguous_name, in_configuration_space, "mechanism")
         .got("attached twice")
         .expected("once")
         .hint("joints without a parent make several mechanisms one");
@@ -143,21 +143,22 @@ Expected<void> ConfigurationSpace::attach(const PlanarMechanism& mechanism) {
 
 Expected<ConfigurationSpace> ConfigurationSpace::with_buffer(std::span<const double> error) const {
   if (error.size() != model_->axes.size()) {
-    return refusal(ArgumentError::wrong_shape, where, "buffer")
+    return refusal(ArgumentError::wrong_shape, in_configuration_space, "buffer")
         .got(detail::format("{} entries", error.size()))
         .expected(detail::format("one for each of the {} axes", model_->axes.size()));
   }
   auto model = std::make_shared<SpaceModel>(*model_);
   for (std::size_t k = 0; k < error.size(); ++k) {
     SpaceAxis& axis = model->axes[k];
-    FLYBALL_CHECK(check_not_negative(error[k], where, "buffer of " + axis.name, axis.unit));
+    FLYBALL_CHECK(
+        check_not_negative(error[k], in_configuration_space, "buffer of " + axis.name, axis.unit));
     model->buffer[k] += error[k];
     if (!axis.wraps) {
       axis.low += error[k];
       axis.high -= error[k];
     }
     if (!(axis.low < axis.high)) {
-      return refusal(ArgumentError::out_of_range, where, "buffer of " + axis.name)
+      return refusal(ArgumentError::out_of_range, in_configuration_space, "buffer of " + axis.name)
           .got(format_number(error[k]) + (axis.unit.empty() ? "" : " " + axis.unit))
           .expected("less than half of the way between its stops");
     }

@@ -108,8 +108,8 @@ bool passes(const ConfigurationSpace& space, const Point& from, const std::vecto
 
 }  // namespace
 
-std::optional<Path> corner_path(const ConfigurationSpace& space, const double* start,
-                                const double* goal, WorkBound& bound, bool& complete) {
+std::optional<ConfigurationPath> corner_path(const ConfigurationSpace& space, const double* start,
+                                             const double* goal, WorkBound& bound, bool& complete) {
   complete = false;
   const SpaceModel& model = space.model();
   std::vector<Side> sides;
@@ -187,7 +187,7 @@ std::optional<Path> corner_path(const ConfigurationSpace& space, const double* s
       }
     }
   }
-  Path path;
+  ConfigurationPath path;
   for (std::size_t i = 1; i != 0; i = from[i]) {
     path.push_back({corners[i][0], corners[i][1]});
   }
@@ -196,8 +196,9 @@ std::optional<Path> corner_path(const ConfigurationSpace& space, const double* s
   return path;
 }
 
-std::optional<Path> space_grid_path(Judge& judge, const double* start, const double* goal,
-                                    int cells, double clearance, WorkBound& bound) {
+std::optional<ConfigurationPath> space_grid_path(Judge& judge, const double* start,
+                                                 const double* goal, int cells, double clearance,
+                                                 WorkBound& bound) {
   const SpaceModel& model = judge.model();
   OccupancyGrid grid{cells, cells, {}};
   grid.blocked.assign(static_cast<std::size_t>(cells) * static_cast<std::size_t>(cells), 0);
@@ -274,7 +275,7 @@ std::optional<Path> space_grid_path(Judge& judge, const double* start, const dou
   if (!found || !*found) {
     return std::nullopt;
   }
-  Path path{{start[0], start[1]}};
+  ConfigurationPath path{{start[0], start[1]}};
   for (const auto& cell : (*found)->cells) {
     path.push_back(middle(cell));
   }
@@ -317,8 +318,8 @@ void Roadmap::grow(Judge& judge, Random& random, int nodes, WorkBound& bound) {
   }
 }
 
-std::optional<Path> Roadmap::way(Judge& judge, const double* start, const double* goal,
-                                 WorkBound& bound) {
+std::optional<ConfigurationPath> Roadmap::way(Judge& judge, const double* start, const double* goal,
+                                              WorkBound& bound) {
   const int n = judge.dimension();
   std::array<Configuration, 2> ends{};
   for (int k = 0; k < n; ++k) {
@@ -386,7 +387,7 @@ std::optional<Path> Roadmap::way(Judge& judge, const double* start, const double
   if (!done[static_cast<std::size_t>(target)]) {
     return std::nullopt;
   }
-  Path path;
+  ConfigurationPath path;
   for (int i = target; i >= 0; i = from[static_cast<std::size_t>(i)]) {
     const Configuration& q = place(i);
     path.emplace_back(q.begin(), q.begin() + n);

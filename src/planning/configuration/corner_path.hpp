@@ -9,21 +9,22 @@ namespace flyball::detail {
 /// The shortest path among regions of two axes: from corner to corner of their boundaries. Nothing
 /// if there is none, more than 600 corners, or no work left.
 /// @param complete  Whether nothing means that there is none but between regions that touch.
-[[nodiscard]] std::optional<Path> corner_path(const ConfigurationSpace& space, const double* start,
-                                              const double* goal, WorkBound& bound, bool& complete);
+[[nodiscard]] std::optional<ConfigurationPath> corner_path(const ConfigurationSpace& space,
+                                                           const double* start, const double* goal,
+                                                           WorkBound& bound, bool& complete);
 
 /// A* over a grid of two axes whose cells are proven free, then any angle.
-[[nodiscard]] std::optional<Path> space_grid_path(Judge& judge, const double* start,
-                                                  const double* goal, int cells, double clearance,
-                                                  WorkBound& bound);
+[[nodiscard]] std::optional<ConfigurationPath> space_grid_path(Judge& judge, const double* start,
+                                                               const double* goal, int cells,
+                                                               double clearance, WorkBound& bound);
 
 /// Least-cost way over a graph whose edges are judged when they are needed.
 class Roadmap {
  public:
   /// Adds random valid configurations until there are `nodes`.
   void grow(Judge& judge, Random& random, int nodes, WorkBound& bound);
-  [[nodiscard]] std::optional<Path> way(Judge& judge, const double* start, const double* goal,
-                                        WorkBound& bound);
+  [[nodiscard]] std::optional<ConfigurationPath> way(Judge& judge, const double* start,
+                                                     const double* goal, WorkBound& bound);
   [[nodiscard]] int size() const noexcept { return static_cast<int>(nodes_.size()); }
 
  private:

@@ -11,9 +11,7 @@
 namespace flyball::detail {
 
 /// A box of the binary tree: halves of halves along one axis after the other.
-namespace {
-
-struct Box {
+struct DecompositionBox {
   std::array<std::uint32_t, 8> low;  ///< In units of 2^-20 of each axis.
   std::array<std::uint8_t, 8> cuts;  ///< How often each axis has been halved.
   BoxState state;
@@ -22,6 +20,10 @@ struct Box {
   int child;             ///< The first of two.
   int parent;            ///< -1 for the whole.
 };
+
+namespace {
+
+using Box = DecompositionBox;
 
 constexpr std::uint32_t whole = 1U << 20;
 constexpr int most_dimension = 8;
@@ -384,7 +386,7 @@ class BoxTree::Boxes {
   }
 
   /// Through free boxes alone, from middle to middle of what they share; nothing if there is none.
-  std::optional<Path> path() {
+  std::optional<ConfigurationPath> path() {
     // The ends' own boxes may be mixed.
     const int source = leaf_at(start_, 0);
     const int target = leaf_at(goal_, 0);
@@ -415,7 +417,7 @@ class BoxTree::Boxes {
       way.push_back(i);
     }
     std::reverse(way.begin(), way.end());
-    Path path{std::vector<double>(start_, start_ + n_)};
+    ConfigurationPath path{std::vector<double>(start_, start_ + n_)};
     for (std::size_t i = 0; i + 1 < way.size(); ++i) {
       const Box& a = boxes_[static_cast<std::size_t>(way[i])];
       const Box& b = boxes_[static_cast<std::size_t>(way[i + 1])];

@@ -10,9 +10,9 @@ namespace flyball::detail {
 
 /// What boxes say of a query.
 struct BoxAnswer {
-  std::optional<Path> path{};  ///< Through free boxes, or by what `along` grew.
-  bool grown = false;          ///< Whether `along` found it.
-  bool proven = false;         ///< Whether it is proven that there is no path.
+  std::optional<ConfigurationPath> path{};  ///< Through free boxes, or by what `along` grew.
+  bool grown = false;                       ///< Whether `along` found it.
+  bool proven = false;                      ///< Whether it is proven that there is no path.
   long boxes = 0;
   double finest = 1.0;  ///< The smallest box, as a share of the space along an axis.
 };

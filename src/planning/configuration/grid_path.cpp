@@ -15,7 +15,7 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "grid_path";
+constexpr std::string_view in_grid_path = "grid_path";
 
 Expected<void> check_cell(const OccupancyGrid& grid, std::array<int, 2> cell,
                           std::string_view name) {
@@ -23,7 +23,7 @@ Expected<void> check_cell(const OccupancyGrid& grid, std::array<int, 2> cell,
   if (!inside ||
       grid.blocked[static_cast<std::size_t>(cell[1]) * static_cast<std::size_t>(grid.columns) +
                    static_cast<std::size_t>(cell[0])] != 0) {
-    return refusal(ArgumentError::out_of_range, where, name)
+    return refusal(ArgumentError::out_of_range, in_grid_path, name)
         .got(detail::format("({}, {}), {}", cell[0], cell[1],
                             inside ? "which is blocked" : "outside of the grid"))
         .expected("a free cell");
@@ -32,9 +32,9 @@ Expected<void> check_cell(const OccupancyGrid& grid, std::array<int, 2> cell,
 }
 
 /// The grid with a border, so that neighbours need no bounds.
-class Search {
+class GridSearch {
  public:
-  explicit Search(const OccupancyGrid& grid)
+  explicit GridSearch(const OccupancyGrid& grid)
       : width_(grid.columns + 2),
         grid_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(grid.rows + 2),
               Cell{1, 0, 0}) {
@@ -219,13 +219,13 @@ Expected<std::optional<GridPath>> grid_path(const OccupancyGrid& grid, std::arra
   const double cells = static_cast<double>(grid.columns) * grid.rows;
   if (grid.columns < 1 || grid.rows < 1 || cells > most ||
       grid.blocked.size() != static_cast<std::size_t>(cells)) {
-    return refusal(ArgumentError::wrong_shape, where, "grid")
+    return refusal(ArgumentError::wrong_shape, in_grid_path, "grid")
         .got(detail::format("{} x {} with {} cells", grid.columns, grid.rows, grid.blocked.size()))
         .expected("columns x rows cells, 1 to 2^28");
   }
   FLYBALL_CHECK(check_cell(grid, start, "start"));
   FLYBALL_CHECK(check_cell(grid, goal, "goal"));
-  return Search(grid).run(start, goal);
+  return GridSearch(grid).run(start, goal);
 }
 
 }  // namespace flyball

@@ -18,7 +18,7 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "move_along";
+constexpr std::string_view in_move_along = "move_along";
 
 using States = std::vector<MotionState>;
 
@@ -151,27 +151,27 @@ Expected<void> check_options(const ConfigurationSpace& space,
                              const PathMotionOptions& options) {
   const std::size_t n = space.axes().size();
   if (options.limits.size() != n) {
-    return refusal(ArgumentError::wrong_shape, where, "limits")
+    return refusal(ArgumentError::wrong_shape, in_move_along, "limits")
         .got(detail::format("{} entries", options.limits.size()))
         .expected(detail::format("one for each of the {} axes", n));
   }
   for (std::size_t k = 0; k < n; ++k) {
     const MotionLimits all = options.limits[k].both_ways();
     const std::string& name = space.axes()[k].name;
-    FLYBALL_CHECK(Checks(where)
+    FLYBALL_CHECK(Checks(in_move_along)
                       .positive(all.velocity, name + ": velocity")
                       .positive(all.acceleration, name + ": acceleration")
                       .positive(all.deceleration, name + ": deceleration")
                       .positive(all.reverse_velocity, name + ": reverse velocity"));
     if (!(all.jerk > 0.0)) {
-      return refusal(ArgumentError::not_positive, where, name + ": jerk")
+      return refusal(ArgumentError::not_positive, in_move_along, name + ": jerk")
           .got(format_number(all.jerk))
           .expected("positive, or infinite");
     }
   }
-  FLYBALL_CHECK(check_positive(options.period, where, "period", "s"));
+  FLYBALL_CHECK(check_positive(options.period, in_move_along, "period", "s"));
   if (path.size() < 2) {
-    return refusal(ArgumentError::empty, where, "path")
+    return refusal(ArgumentError::empty, in_move_along, "path")
         .got(detail::format("{} waypoints", path.size()))
         .expected("two or more");
   }
@@ -249,7 +249,7 @@ Expected<void> tabulate(const ConfigurationSpace& space, const std::vector<Part>
                         const PathMotionOptions& options, PathMotion& motion) {
   constexpr double most_rows = 1e6;
   if (!(motion.duration / options.period < most_rows)) {
-    return refusal(ArgumentError::out_of_range, where, "the motion")
+    return refusal(ArgumentError::out_of_range, in_move_along, "the motion")
         .got(format_number(motion.duration) + " s long")
         .expected("at most a million periods long")
         .hint("raise the limits or the period");
@@ -304,10 +304,10 @@ Expected<PathMotion> move_along(const ConfigurationSpace& space,
                                 const PathMotionOptions& options) {
   FLYBALL_CHECK(check_options(space, path, options));
   const std::vector<double> none(space.axes().size(), 0.0);
-  FLYBALL_TRY_IN(where, const ConfigurationSpace tight,
+  FLYBALL_TRY_IN(in_move_along, const ConfigurationSpace tight,
                  space.with_buffer(options.error.empty() ? none : options.error));
   for (std::size_t i = 0; i < path.size(); ++i) {
-    FLYBALL_CHECK(tight.check(path[i], where, detail::format("waypoint {}", i + 1)));
+    FLYBALL_CHECK(tight.check(path[i], in_move_along, detail::format("waypoint {}", i + 1)));
   }
   for (std::size_t i = 0; i + 1 < path.size(); ++i) {
     std::vector<double> by = path[i + 1];
@@ -316,7 +316,7 @@ Expected<PathMotion> move_along(const ConfigurationSpace& space,
     }
     const MoveCheck move = tight.check_move(path[i], by);
     if (!move.free) {
-      return refusal(ConfigurationError::blocked_move, where,
+      return refusal(ConfigurationError::blocked_move, in_move_along,
                      detail::format("the move from waypoint {} to {}", i + 1, i + 2))
           .got("stopped by " + move.constraint + detail::format(" after {:.3g} of it", move.at))
           .expected("free with what tracking may be off")

@@ -18,15 +18,13 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "plan";
-
-using detail::Path;
+constexpr std::string_view in_plan = "plan";
 
 constexpr std::array<const char*, 8> names{"automatic",   "straight", "corners", "grid",
                                            "rrt-connect", "rrt-star", "roadmap", "decomposition"};
 
 Expected<void> check_search(const PathSearch& search) {
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_plan)
                     .positive(search.seconds, "seconds", "s")
                     .not_negative(search.clearance, "clearance"));
   const std::array<std::tuple<long, long, long, const char*>, 3> counts{
@@ -35,7 +33,7 @@ Expected<void> check_search(const PathSearch& search) {
        {search.nodes, 2, 1'000'000, "nodes"}}};
   for (const auto& [value, low, high, name] : counts) {
     if (value < low || value > high) {
-      return refusal(ArgumentError::out_of_range, where, name)
+      return refusal(ArgumentError::out_of_range, in_plan, name)
           .got(detail::format("{}", value))
           .expected(high < std::numeric_limits<long>::max()
                         ? detail::format("from {} to {}", low, high)
@@ -62,7 +60,7 @@ Expected<PathMethod> parse_path_method(std::string_view name) {
   for (const char* one : names) {
     all += (all.empty() ? "" : ", ") + std::string(one);
   }
-  return refusal(ArgumentError::unknown_name, where, "method")
+  return refusal(ArgumentError::unknown_name, in_plan, "method")
       .got('"' + std::string(name) + '"')
       .expected("one of " + all);
 }
@@ -94,15 +92,15 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
                                               const PathSearch& search) {
   FLYBALL_CHECK(check_search(search));
   const ConfigurationSpace& space = state_->space;
-  FLYBALL_CHECK(space.check(start, where, "the start"));
-  FLYBALL_CHECK(space.check(goal, where, "the goal"));
+  FLYBALL_CHECK(space.check(start, in_plan, "the start"));
+  FLYBALL_CHECK(space.check(goal, in_plan, "the goal"));
   detail::Judge& judge = state_->judge;
   judge.use_wide(search.wide);
   judge.moves = 0;
   Random random(search.seed);
   detail::WorkBound bound(search.work, search.seconds);
   ConfigurationPath result;
-  const auto done = [&](Path path, PathMethod method) {
+  const auto done = [&](detail::ConfigurationPath path, PathMethod method) {
     detail::lift(space.model(), path);
     const bool is_random = method == PathMethod::rrt_connect || method == PathMethod::rrt_star ||
                            method == PathMethod::roadmap || method == PathMethod::decomposition;
@@ -141,7 +139,7 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
     }
     if (method == PathMethod::straight) {
       const MoveCheck move = space.check_move(start, by);
-      return refusal(ConfigurationError::blocked_move, where, "the straight move")
+      return refusal(ConfigurationError::blocked_move, in_plan, "the straight move")
           .got("stopped by " + move.constraint + detail::format(" after {:.3g} of it", move.at))
           .expected("free")
           .hint("let another method look for a way around");
@@ -149,7 +147,7 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
   }
   if ((method == PathMethod::corners && !(flat && regions_only)) ||
       (method == PathMethod::grid && !(flat && !space.axes()[0].wraps && !space.axes()[1].wraps))) {
-    return refusal(ArgumentError::out_of_range, where, "method")
+    return refusal(ArgumentError::out_of_range, in_plan, "method")
         .got(to_string(method))
         .expected(method == PathMethod::corners ? "for two axes without a mechanism"
                                                 : "for two axes that do not wrap")
@@ -163,7 +161,7 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
       return done(*std::move(path), PathMethod::corners);
     }
     if (complete) {
-      return refusal(ConfigurationError::no_path, where, "the goal")
+      return refusal(ConfigurationError::no_path, in_plan, "the goal")
           .got("cut off from the start: no way leads from corner to corner of what is forbidden")
           .expected("in reach of the start without breaking a constraint")
           .hint("move an end, or relax a constraint or the buffer");
@@ -197,7 +195,7 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
     note(detail::format("RRT* of {} nodes", state_->a.size()));
   }
   const bool trees = any || method == PathMethod::rrt_connect;
-  const auto grow = [&](long work) -> std::optional<Path> {
+  const auto grow = [&](long work) -> std::optional<detail::ConfigurationPath> {
     auto path = detail::rrt_connect(judge, state_->a, state_->b, start.data(), goal.data(), random,
                                     work, bound);
     result.nodes = state_->a.size() + state_->b.size();
@@ -230,7 +228,7 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
                   boxes.grown ? PathMethod::rrt_connect : PathMethod::decomposition);
     }
     if (boxes.proven) {
-      return refusal(ConfigurationError::no_path, where, "the goal")
+      return refusal(ConfigurationError::no_path, in_plan, "the goal")
           .got(detail::format("cut off from the start: {} boxes prove it", boxes.boxes))
           .expected("in reach of the start without breaking a constraint")
           .hint("move an end, or relax a constraint or the buffer");
@@ -245,7 +243,7 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
     }
     note(detail::format("random trees of {} and {} nodes", state_->a.size(), state_->b.size()));
   }
-  return refusal(ConfigurationError::undecided, where, "the way to the goal")
+  return refusal(ConfigurationError::undecided, in_plan, "the way to the goal")
       .got(detail::format("neither found nor proven not to exist: {} moves were judged; tried {}",
                           judge.moves, tried))
       .expected("decided within the bounds")

@@ -165,9 +165,9 @@ std::vector<double> doubles(const float* q, int dimension) {
 }
 
 /// The waypoints of two ways that met, with their ends as they were given.
-Path join(const Tree& a, int at_a, const Tree& b, int at_b, int dimension, const double* start,
-          const double* goal, bool swapped) {
-  Path path;
+ConfigurationPath join(const Tree& a, int at_a, const Tree& b, int at_b, int dimension,
+                       const double* start, const double* goal, bool swapped) {
+  ConfigurationPath path;
   Configuration q{};
   for (const int i : a.way_to(at_a)) {
     a.get(i, q.data());
@@ -190,9 +190,9 @@ Path join(const Tree& a, int at_a, const Tree& b, int at_b, int dimension, const
 
 }  // namespace
 
-std::optional<Path> rrt_connect(Judge& judge, Tree& a, Tree& b, const double* start,
-                                const double* goal, Random& random, long work, WorkBound& bound,
-                                const Channel* channel) {
+std::optional<ConfigurationPath> rrt_connect(Judge& judge, Tree& a, Tree& b, const double* start,
+                                             const double* goal, Random& random, long work,
+                                             WorkBound& bound, const Channel* channel) {
   const int n = judge.dimension();
   constexpr double share_of_channel = 0.85;
   Configuration q{};
@@ -264,8 +264,9 @@ std::optional<Path> rrt_connect(Judge& judge, Tree& a, Tree& b, const double* st
   return std::nullopt;
 }
 
-std::optional<Path> rrt_star(Judge& judge, Tree& tree, const double* start, const double* goal,
-                             Random& random, int nodes, WorkBound& bound) {
+std::optional<ConfigurationPath> rrt_star(Judge& judge, Tree& tree, const double* start,
+                                          const double* goal, Random& random, int nodes,
+                                          WorkBound& bound) {
   const int n = judge.dimension();
   Configuration q{};
   Configuration by{};
@@ -351,7 +352,7 @@ std::optional<Path> rrt_star(Judge& judge, Tree& tree, const double* start, cons
   if (arrived < 0) {
     return std::nullopt;
   }
-  Path path;
+  ConfigurationPath path;
   for (const int i : tree.way_to(arrived)) {
     tree.get(i, near.data());
     path.push_back(doubles(near.data(), n));
@@ -361,7 +362,7 @@ std::optional<Path> rrt_star(Judge& judge, Tree& tree, const double* start, cons
   return path;
 }
 
-void lift(const SpaceModel& model, Path& path) {
+void lift(const SpaceModel& model, ConfigurationPath& path) {
   for (std::size_t i = 1; i < path.size(); ++i) {
     for (std::size_t k = 0; k < model.axes.size(); ++k) {
       if (model.axes[k].wraps) {
@@ -372,7 +373,7 @@ void lift(const SpaceModel& model, Path& path) {
   }
 }
 
-void shorten(Judge& judge, Path& path, Random& random, int rounds) {
+void shorten(Judge& judge, ConfigurationPath& path, Random& random, int rounds) {
   const int n = judge.dimension();
   Configuration from{};
   Configuration by{};

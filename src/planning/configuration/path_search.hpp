@@ -17,7 +17,7 @@
 namespace flyball::detail {
 
 using Configuration = std::array<float, most_axes>;
-using Path = std::vector<std::vector<double>>;
+using ConfigurationPath = std::vector<std::vector<double>>;
 
 /// Counts the work of a search and says when it is over.
 class WorkBound {
@@ -152,23 +152,25 @@ struct Channel {
   std::vector<Configuration> halves{};
 };
 /// Looks for a path along a channel with so many moves.
-using GrowAlong = std::function<std::optional<Path>(const Channel& channel, long work)>;
+using GrowAlong =
+    std::function<std::optional<ConfigurationPath>(const Channel& channel, long work)>;
 
 /// Random trees from both ends. @return The waypoints; nothing when the work is done.
 /// @param work  Moves of this call, within `bound`. @param channel  Where most samples are taken
 /// from; null for anywhere.
-std::optional<Path> rrt_connect(Judge& judge, Tree& a, Tree& b, const double* start,
-                                const double* goal, Random& random, long work, WorkBound& bound,
-                                const Channel* channel = nullptr);
+std::optional<ConfigurationPath> rrt_connect(Judge& judge, Tree& a, Tree& b, const double* start,
+                                             const double* goal, Random& random, long work,
+                                             WorkBound& bound, const Channel* channel = nullptr);
 
 /// The way of RRT*, if one was found when its nodes or its work are there.
-std::optional<Path> rrt_star(Judge& judge, Tree& tree, const double* start, const double* goal,
-                             Random& random, int nodes, WorkBound& bound);
+std::optional<ConfigurationPath> rrt_star(Judge& judge, Tree& tree, const double* start,
+                                          const double* goal, Random& random, int nodes,
+                                          WorkBound& bound);
 
 /// Makes angles that wrap go on from waypoint to waypoint.
-void lift(const SpaceModel& model, Path& path);
+void lift(const SpaceModel& model, ConfigurationPath& path);
 
 /// Takes detours out: moves over waypoints, then over parts of moves.
-void shorten(Judge& judge, Path& path, Random& random, int rounds);
+void shorten(Judge& judge, ConfigurationPath& path, Random& random, int rounds);
 
 }  // namespace flyball::detail

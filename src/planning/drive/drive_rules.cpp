@@ -71,7 +71,7 @@ namespace drive_rules {
 
 namespace {
 
-constexpr std::string_view where = "drive trajectory";
+constexpr std::string_view in_drive_trajectory = "drive trajectory";
 constexpr int most_waypoints = 200;
 constexpr double farthest = 1e4;  // m
 
@@ -128,7 +128,7 @@ Expected<void> check_polygon(const std::vector<Vector2d>& polygon, const std::st
   }
   if (!convex || !(area_of(polygon) > 1e-6)) {
     return tl::unexpected(Error(ArgumentError::out_of_range)
-                              .in(std::string(where))
+                              .in(std::string(in_drive_trajectory))
                               .about(flyball::detail::format("the polygon of {}", name))
                               .expected("3 to 20 corners, convex and counter-clockwise")
                               .got(flyball::detail::format("{} corners, area {}", polygon.size(),
@@ -138,7 +138,7 @@ Expected<void> check_polygon(const std::vector<Vector2d>& polygon, const std::st
 }
 
 Expected<void> check_model(const DriveModel& model) {
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_drive_trajectory)
                     .positive(model.mass, "the mass", "kg")
                     .positive(model.moment_of_inertia, "the moment of inertia", "kg m²")
                     .positive(model.max_force, "the wheels' largest force", "N")
@@ -147,19 +147,21 @@ Expected<void> check_model(const DriveModel& model) {
                     .not_negative(model.free_speed, "the motors' free speed", "m/s")
                     .not_negative(model.stall_force, "the motors' stall force", "N"));
   if (model.free_speed > 0.0) {
-    FLYBALL_CHECK(check_positive(model.stall_force, where, "the motors' stall force", "N"));
+    FLYBALL_CHECK(
+        check_positive(model.stall_force, in_drive_trajectory, "the motors' stall force", "N"));
   }
   if (model.drivetrain == Drivetrain::differential) {
-    FLYBALL_CHECK(check_positive(model.trackwidth, where, "the track width", "m"));
+    FLYBALL_CHECK(check_positive(model.trackwidth, in_drive_trajectory, "the track width", "m"));
   } else {
     double turn = 0.0;
     for (std::size_t i = 0; i < 4; ++i) {
-      FLYBALL_CHECK(check_finite(model.wheels[i], where, "a wheel's place"));
+      FLYBALL_CHECK(check_finite(model.wheels[i], in_drive_trajectory, "a wheel's place"));
       turn = std::max(turn, model.drivetrain == Drivetrain::mecanum
                                 ? std::abs(drive_body::mecanum_row(model, i)[2])
                                 : model.wheels[i].norm());
     }
-    FLYBALL_CHECK(check_positive(turn, where, "the wheels' distance from the middle", "m"));
+    FLYBALL_CHECK(
+        check_positive(turn, in_drive_trajectory, "the wheels' distance from the middle", "m"));
   }
   if (!model.corners.empty()) {
     FLYBALL_CHECK(check_polygon(model.corners, "the bumpers"));
@@ -176,7 +178,7 @@ Expected<void> check_constraint(const DriveProblem& problem, std::size_t number)
       span.to < span.from) {
     return tl::unexpected(
         Error(ArgumentError::out_of_range)
-            .in(std::string(where))
+            .in(std::string(in_drive_trajectory))
             .about(flyball::detail::format("the waypoints of {}", name))
             .expected(flyball::detail::format("from 0 to {}, or -1 for the last, in order", last))
             .got(flyball::detail::format("{}{}", c.from,
@@ -185,7 +187,7 @@ Expected<void> check_constraint(const DriveProblem& problem, std::size_t number)
   const auto of = [&](std::string_view what) {
     return flyball::detail::format("{} of {}", what, name);
   };
-  Checks checks(where);
+  Checks checks(in_drive_trajectory);
   const std::string x = of("x"), y = of("y"), limit = of("the limit"), radius = of("the radius"),
                     tolerance = of("the tolerance"), width = of("the width"),
                     height = of("the height");
@@ -211,10 +213,11 @@ Expected<void> check_constraint(const DriveProblem& problem, std::size_t number)
           .within(c.y, -farthest, farthest, y, "m")
           .positive(c.radius, radius, "m");
     case DriveConstraintKind::keep_in_lane: {
-      FLYBALL_CHECK(check_not_negative(c.tolerance, where, tolerance, "m"));
+      FLYBALL_CHECK(check_not_negative(c.tolerance, in_drive_trajectory, tolerance, "m"));
       const DriveWaypoint& a = problem.waypoints[static_cast<std::size_t>(span.from)];
       const DriveWaypoint& b = problem.waypoints[static_cast<std::size_t>(span.to)];
-      return check_positive(std::hypot(b.x - a.x, b.y - a.y), where, of("the length"), "m");
+      return check_positive(std::hypot(b.x - a.x, b.y - a.y), in_drive_trajectory, of("the length"),
+                            "m");
     }
     case DriveConstraintKind::keep_in_polygon:
     case DriveConstraintKind::keep_out_polygon:
@@ -421,7 +424,7 @@ Expected<void> check(const DriveProblem& problem) {
   FLYBALL_CHECK(check_model(problem.model));
   if (problem.waypoints.size() < 2 || problem.waypoints.size() > most_waypoints) {
     return tl::unexpected(Error(ArgumentError::empty)
-                              .in(std::string(where))
+                              .in(std::string(in_drive_trajectory))
                               .about("the waypoints")
                               .expected(flyball::detail::format("2 to {}", most_waypoints))
                               .got(flyball::detail::format("{}", problem.waypoints.size())));
@@ -432,14 +435,14 @@ Expected<void> check(const DriveProblem& problem) {
     const std::string y = flyball::detail::format("y of waypoint {}", i);
     const std::string heading = flyball::detail::format("the heading of waypoint {}", i);
     const std::string intervals = flyball::detail::format("the intervals of waypoint {}", i);
-    FLYBALL_CHECK(Checks(where)
+    FLYBALL_CHECK(Checks(in_drive_trajectory)
                       .within(w.x, -farthest, farthest, x, "m")
                       .within(w.y, -farthest, farthest, y, "m")
                       .within(w.heading, -1e4, 1e4, heading, "rad")
                       .within(w.intervals, 0, 10000, intervals));
   }
-  FLYBALL_CHECK(
-      check_within(problem.target_interval, 1e-4, 10.0, where, "the target interval", "s"));
+  FLYBALL_CHECK(check_within(problem.target_interval, 1e-4, 10.0, in_drive_trajectory,
+                             "the target interval", "s"));
   for (std::size_t i = 0; i < problem.constraints.size(); ++i) {
     FLYBALL_CHECK(check_constraint(problem, i));
   }

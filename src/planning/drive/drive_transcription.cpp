@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "planning/drive/drive_body.hpp"
 #include "planning/drive/drive_rules.hpp"
@@ -20,8 +20,6 @@ using optimization::OptimalControlProblem;
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double shortest = 1e-4;  // s, of a segment
 /// s a unit (m, m/s, rad) that a constraint gives way by: more than what any of them could win.
 constexpr double elastic_price = 300.0;

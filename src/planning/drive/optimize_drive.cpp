@@ -28,7 +28,7 @@ using optimization::SolveStatus;
 
 namespace {
 
-constexpr std::string_view where = "drive trajectory";
+constexpr std::string_view in_optimize_drive = "drive trajectory";
 constexpr int most_tightenings = 5;
 constexpr int coarse = 10;    // instants of an interval that are looked at while solving
 constexpr double bar = 1e-3;  // m, rad and shares of limits that a simulation may be off by
@@ -265,7 +265,7 @@ class Search {
         drive_transcription::transcribe(problem_, layout, guess);
     const auto start = drive_transcription::start_of(problem_, layout, guess);
     ocp.set_start(start.states, start.inputs);
-    FLYBALL_TRY_IN(where, OptimalControlSolver solver, OptimalControlSolver::make(ocp));
+    FLYBALL_TRY_IN(in_optimize_drive, OptimalControlSolver solver, OptimalControlSolver::make(ocp));
     return Attempt{std::move(layout), std::move(solver)};
   }
 
@@ -275,7 +275,7 @@ class Search {
     Layout layout(problem_, intervals, true);
     layout.longest = options_.longest_segment;
     FLYBALL_TRY_IN(
-        where, OptimalControlSolver solver,
+        in_optimize_drive, OptimalControlSolver solver,
         OptimalControlSolver::make(drive_transcription::transcribe(problem_, layout, guess)));
     const auto start = drive_transcription::start_of(problem_, layout, guess);
     FLYBALL_CHECK(solver.set_start(start.states, start.inputs));
@@ -372,7 +372,7 @@ Expected<DriveSolution> optimize_drive(const DriveProblem& problem, const DriveO
 Expected<DriveSolution> optimize_drive(const DriveProblem& problem, const DriveOptions& options,
                                        FunctionRef<bool(const DriveProgress&)> watch) {
   FLYBALL_CHECK(drive_rules::check(problem));
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_optimize_drive)
                     .positive(options.tolerance, "the tolerance")
                     .within(options.max_iterations, 1, 100000, "the most iterations")
                     .positive(options.time_limit, "the time limit", "s")

@@ -13,7 +13,7 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "Path::join";
+constexpr std::string_view in_path_join = "Path::join";
 constexpr Eigen::Index most_columns = 21;
 /// Of the extent, between the end of a piece and the beginning of the next.
 constexpr double gap_tolerance = 1e-9;
@@ -36,7 +36,7 @@ Path::Path(std::vector<PathPiece> pieces, int coordinates)
 
 Expected<Path> Path::join(std::vector<PathPiece> pieces) {
   if (pieces.empty()) {
-    return refusal(ArgumentError::empty, where, "pieces").expected("one or more");
+    return refusal(ArgumentError::empty, in_path_join, "pieces").expected("one or more");
   }
   const Eigen::Index n = pieces.front().coefficients.rows();
   double extent = 0.0;
@@ -47,37 +47,38 @@ Expected<Path> Path::join(std::vector<PathPiece> pieces) {
     const std::string name = detail::format("piece {}", i + 1);
     const Eigen::MatrixXd& c = piece.coefficients;
     if (c.rows() != n || n < 1 || n > max_path_coordinates || c.cols() < 1) {
-      return refusal(ArgumentError::wrong_shape, where, name)
+      return refusal(ArgumentError::wrong_shape, in_path_join, name)
           .got(detail::format("of {} coordinates and {} coefficients", c.rows(), c.cols()))
           .expected(n < 1 || n > max_path_coordinates
                         ? detail::format("of 1 to {} coordinates", max_path_coordinates)
                         : detail::format("of {} coordinates as the first", n));
     }
     if (c.cols() > most_columns) {
-      return refusal(ArgumentError::out_of_range, where, name)
+      return refusal(ArgumentError::out_of_range, in_path_join, name)
           .got(detail::format("of degree {}", c.cols() - 1))
           .expected(detail::format("of degree {} or less", most_columns - 1))
           .hint("split it into pieces");
     }
-    FLYBALL_CHECK(
-        Checks(where).finite(c, name).positive(piece.span, detail::format("span {}", i + 1)));
+    FLYBALL_CHECK(Checks(in_path_join)
+                      .finite(c, name)
+                      .positive(piece.span, detail::format("span {}", i + 1)));
     extent = std::max(extent, c.cwiseAbs().maxCoeff());
     travel = std::max(travel, c.cols() > 1 ? c.rightCols(c.cols() - 1).cwiseAbs().maxCoeff() : 0.0);
     total += piece.span;
   }
   if (!(travel > 0.0)) {
-    return refusal(ArgumentError::out_of_range, where, "the path")
+    return refusal(ArgumentError::out_of_range, in_path_join, "the path")
         .got("all in one place")
         .expected("one that moves");
   }
   if (!std::isfinite(total)) {
-    return refusal(ArgumentError::not_finite, where, "the sum of the spans");
+    return refusal(ArgumentError::not_finite, in_path_join, "the sum of the spans");
   }
   for (std::size_t i = 1; i < pieces.size(); ++i) {
     const Eigen::VectorXd end = pieces[i - 1].coefficients.rowwise().sum();
     const double gap = (pieces[i].coefficients.col(0) - end).cwiseAbs().maxCoeff();
     if (!(gap <= gap_tolerance * extent)) {
-      return refusal(ArgumentError::out_of_range, where, detail::format("piece {}", i + 1))
+      return refusal(ArgumentError::out_of_range, in_path_join, detail::format("piece {}", i + 1))
           .got(detail::format("{:.4g} away from the end of the one before it", gap))
           .expected("one that begins there")
           .hint("move its first point, or join them by a line");

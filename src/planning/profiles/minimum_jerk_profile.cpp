@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/constants.hpp"
 #include "planning/profiles/s_curve_problem.hpp"
 
 namespace flyball {
@@ -260,7 +261,6 @@ MinimumJerkProfile::MinimumJerkProfile(const MotionLimits& limits, const MotionS
 MinimumJerkProfile MinimumJerkProfile::with_duration(double duration, const MotionState& start,
                                                      const MotionState& goal) noexcept {
   MinimumJerkProfile profile;
-  const double infinity = std::numeric_limits<double>::infinity();
   profile.limits_ = {infinity, infinity, infinity, infinity, infinity};
   profile.goal_ = goal;
   profile.c_[0] = goal.position;

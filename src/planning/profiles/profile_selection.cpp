@@ -17,9 +17,9 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "select_profile";
-constexpr std::array<const char*, 6> names{"trapezoid", "s-curve", "exponential",
-                                           "parabolic", "stepper", "minimum-jerk"};
+constexpr std::string_view in_select_profile = "select_profile";
+constexpr std::array<const char*, 6> profile_names{"trapezoid", "s-curve", "exponential",
+                                                   "parabolic", "stepper", "minimum-jerk"};
 
 [[gnu::noinline]] void say(ProfileAdvice& advice, std::string_view reason) {
   advice.reasons.emplace_back(reason);
@@ -51,7 +51,7 @@ double longest_ramp(const MotionLimits& limits, double distance) {
 
 Expected<void> check(const ProfileNeeds& needs) {
   const MotionLimits all = needs.limits.both_ways();
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_select_profile)
                     .positive(all.velocity, "limits.velocity")
                     .positive(all.acceleration, "limits.acceleration")
                     .positive(all.deceleration, "limits.deceleration")
@@ -60,18 +60,19 @@ Expected<void> check(const ProfileNeeds& needs) {
                     .not_negative(needs.damping_ratio, "damping_ratio")
                     .not_negative(needs.patience, "patience", "s"));
   if (needs.damping_ratio > 1.0) {
-    return refusal(ArgumentError::out_of_range, where, "damping_ratio")
+    return refusal(ArgumentError::out_of_range, in_select_profile, "damping_ratio")
         .got(detail::format("{}", needs.damping_ratio))
         .expected("from 0 to 1");
   }
   if (needs.resonance) {
-    FLYBALL_CHECK(Checks(where).positive(*needs.resonance, "resonance", "Hz"));
+    FLYBALL_CHECK(Checks(in_select_profile).positive(*needs.resonance, "resonance", "Hz"));
   }
   if (needs.resonant_velocity) {
-    FLYBALL_CHECK(Checks(where).positive(*needs.resonant_velocity, "resonant_velocity"));
+    FLYBALL_CHECK(
+        Checks(in_select_profile).positive(*needs.resonant_velocity, "resonant_velocity"));
   }
   if (needs.motor) {
-    FLYBALL_CHECK(Checks(where)
+    FLYBALL_CHECK(Checks(in_select_profile)
                       .positive(needs.motor->kV, "motor.kV")
                       .positive(needs.motor->kA, "motor.kA")
                       .positive(needs.motor->voltage, "motor.voltage", "V"));
@@ -91,16 +92,16 @@ bool rings(const ProfileNeeds& needs) {
 }  // namespace
 
 const char* to_string(ProfileKind kind) noexcept {
-  return names[static_cast<std::size_t>(kind)];
+  return profile_names[static_cast<std::size_t>(kind)];
 }
 
 Expected<ProfileKind> parse_profile_kind(std::string_view name) {
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (name == names[i]) {
+  for (std::size_t i = 0; i < profile_names.size(); ++i) {
+    if (name == profile_names[i]) {
       return static_cast<ProfileKind>(i);
     }
   }
-  const std::vector<std::string_view> known(names.begin(), names.end());
+  const std::vector<std::string_view> known(profile_names.begin(), profile_names.end());
   const std::string nearest = nearest_name(name, known);
   auto no = refusal(ArgumentError::unknown_name, "profile", "the kind")
                 .got(detail::format("\"{}\"", name))

@@ -9,7 +9,7 @@ namespace flyball::detail {
 namespace {
 
 /// What a cubic is off between its points is made larger by this, as in `collocated_rows`.
-constexpr double caution = 1.25;
+constexpr double jerk_caution = 1.25;
 
 /// ±⅔ P √x̄ + x/(3 x̄)
 double held(double side, double P, double x, double about) {
@@ -110,7 +110,7 @@ bool JerkRows::verify(const TimingCell& cell, std::size_t i, const Values& about
     }
     // Of the motion that comes next, which is near this one.
     room_[i * count_ + r] =
-        most_apart > allowed ? std::max(least_room, 1.0 - caution * most_apart) : 1.0;
+        most_apart > allowed ? std::max(least_room, 1.0 - jerk_caution * most_apart) : 1.0;
   }
   return within;
 }

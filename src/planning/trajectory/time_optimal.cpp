@@ -25,7 +25,7 @@ using detail::TimingCell;
 using detail::TimingPasses;
 using detail::TimingRows;
 
-constexpr std::string_view where = "time_optimal";
+constexpr std::string_view in_time_optimal = "time_optimal";
 /// Into how many one is cut at most, each time.
 constexpr int most_parts = 8;
 constexpr std::size_t most_cells = 200'000;
@@ -38,7 +38,7 @@ Expected<void> check_limited(const Path& path, const std::vector<TimingCell>& ce
     if (!(rows.idle[i] < unlimited)) {
       const double span = path.pieces()[cells[i].piece].span;
       const double from = path.breaks()[cells[i].piece] + cells[i].from * span;
-      return refusal(ArgumentError::out_of_range, where, "constraints")
+      return refusal(ArgumentError::out_of_range, in_time_optimal, "constraints")
           .got(detail::format("none on the velocity from parameter {:.4g} to {:.4g}", from,
                               from + cells[i].width))
           .expected("a limit of each motion of the path")
@@ -114,7 +114,7 @@ class Timing {
         cut([&](std::size_t i) { return off_[i] > far_off ? std::sqrt(off_[i] / far_off) : 0.0; });
       }
     }
-    return refusal(ArgumentError::out_of_range, where, "constraints")
+    return refusal(ArgumentError::out_of_range, in_time_optimal, "constraints")
         .got("limits that jump along the path")
         .expected("limits that a motion can keep to")
         .hint("smooth the path, or raise the limits");
@@ -227,7 +227,7 @@ double end_rate(const Path& path, double parameter, double velocity) {
 }
 
 Refusal end_refusal(std::string_view name, double wanted, double possible) {
-  return refusal(ArgumentError::out_of_range, where, name)
+  return refusal(ArgumentError::out_of_range, in_time_optimal, name)
       .got(format_number(wanted))
       .expected("at most " + format_number(possible) + " under the limits")
       .hint("lower it, or raise the limits");
@@ -311,7 +311,7 @@ Expected<std::vector<PathTrajectory::Span>> spans_of(const Path& path,
                      1.0 / path.pieces()[cell.piece].span});
     t += duration;
     if (!std::isfinite(t)) {
-      return refusal(ArgumentError::out_of_range, where, "constraints")
+      return refusal(ArgumentError::out_of_range, in_time_optimal, "constraints")
           .got("limits that let nothing move")
           .expected("limits that a motion can keep to")
           .with("parameter", path.breaks()[cell.piece] + spans.back().parameter);
@@ -324,15 +324,15 @@ Expected<std::vector<PathTrajectory::Span>> spans_of(const Path& path,
 
 Expected<PathTrajectory> time_optimal(const Path& path, std::span<const PathConstraint> constraints,
                                       const TimingOptions& options) {
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_time_optimal)
                     .not_negative(options.start_velocity, "start velocity")
                     .not_negative(options.end_velocity, "end velocity")
                     .within(options.tolerance, 1e-6, 0.1, "tolerance"));
   if (constraints.empty()) {
-    return refusal(ArgumentError::empty, where, "constraints").expected("one or more");
+    return refusal(ArgumentError::empty, in_time_optimal, "constraints").expected("one or more");
   }
   const std::vector<PathConstraint> bounded = with_reachable_velocity(path, constraints, options);
-  FLYBALL_TRY(auto limits, detail::motion_limits(path, bounded, where));
+  FLYBALL_TRY(auto limits, detail::motion_limits(path, bounded, in_time_optimal));
   bool cubic = bounded.size() == 1 && std::holds_alternative<CoordinateLimits>(bounded[0]);
   for (const PathPiece& piece : path.pieces()) {
     cubic = cubic && piece.coefficients.cols() <= 4;
@@ -395,7 +395,7 @@ Expected<PathTrajectory> time_optimal(const Path& path, std::span<const PathCons
 
   std::vector<PathTrajectory::Span> spans;
   if (jerks) {
-    FLYBALL_TRY(const auto held, detail::motion_limits(path, bounded, where));
+    FLYBALL_TRY(const auto held, detail::motion_limits(path, bounded, in_time_optimal));
     FLYBALL_TRY(spans, detail::jerk_limited(path, *making, held, cells, passes.b,
                                             {first, last, options.tolerance, !rules.bends}));
   } else {

@@ -13,7 +13,7 @@ namespace flyball {
 
 namespace {
 
-constexpr std::string_view where = "time_path";
+constexpr std::string_view in_time_path = "time_path";
 
 /// The highest velocity at a point, whatever comes before and after it.
 double velocity_cap(const PathPoint& point, const PathLimits& limits) {
@@ -35,7 +35,7 @@ void reach(Velocities first, std::size_t count, Lengths length, double accelerat
 }
 
 Refusal end_velocity_refusal(std::string_view name, double wanted, double possible) {
-  return refusal(ArgumentError::out_of_range, where, name)
+  return refusal(ArgumentError::out_of_range, in_time_path, name)
       .got(detail::format("{:.4g} m/s", wanted))
       .expected(detail::format("at most {:.4g} m/s under the limits", possible));
 }
@@ -43,18 +43,18 @@ Refusal end_velocity_refusal(std::string_view name, double wanted, double possib
 }  // namespace
 
 Expected<Trajectory> time_path(std::span<const PathPoint> path, const PathLimits& limits) {
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_time_path)
                     .positive(limits.velocity, "limits.velocity", "m/s")
                     .positive(limits.acceleration, "limits.acceleration", "m/s²")
                     .not_negative(limits.start_velocity, "limits.start_velocity", "m/s")
                     .not_negative(limits.end_velocity, "limits.end_velocity", "m/s"));
   if (!(limits.centripetal > 0.0)) {
-    return refusal(ArgumentError::not_positive, where, "limits.centripetal")
+    return refusal(ArgumentError::not_positive, in_time_path, "limits.centripetal")
         .got(format_number(limits.centripetal) + " m/s²")
         .expected("positive, or infinite");
   }
   if (path.size() < 2) {
-    return refusal(ArgumentError::empty, where, "path")
+    return refusal(ArgumentError::empty, in_time_path, "path")
         .got(detail::format("{} points", path.size()))
         .expected("two points or more");
   }
@@ -69,12 +69,13 @@ Expected<Trajectory> time_path(std::span<const PathPoint> path, const PathLimits
   for (std::size_t i = 0; i < n; ++i) {
     const PathPoint& point = points[i];
     const std::string name = detail::format("point {}", i + 1);
-    FLYBALL_CHECK(Checks(where).finite(point.pose.matrix(), name).finite(point.curvature, name));
+    FLYBALL_CHECK(
+        Checks(in_time_path).finite(point.pose.matrix(), name).finite(point.curvature, name));
     v.push_back(velocity_cap(point, limits));
     if (i > 0) {
       length.push_back((point.pose.translation() - points[i - 1].pose.translation()).norm());
       if (!(length.back() > 0.0)) {
-        return refusal(ArgumentError::out_of_range, where, name)
+        return refusal(ArgumentError::out_of_range, in_time_path, name)
             .got("where the one before it is")
             .expected("somewhere else");
       }

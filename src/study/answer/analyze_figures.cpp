@@ -9,12 +9,11 @@
 #include "study/answer/drawing.hpp"
 #include "study/answer/frequency_figures.hpp"
 #include "study/answer/parts.hpp"
+#include "study/answer/rules_of_thumb.hpp"
 
 namespace flyball::study {
 
 namespace {
-
-constexpr std::size_t most_panels = 8;  ///< Of a picture that is looked at.
 
 Figure pole_figure(const std::string& section, const ModalAnalysis& modes, bool continuous) {
   PolePlotGroup group;

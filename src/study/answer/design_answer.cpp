@@ -10,6 +10,7 @@
 
 #include "core/wording.hpp"
 #include "study/answer/parts.hpp"
+#include "study/answer/rules_of_thumb.hpp"
 
 namespace flyball::study {
 
@@ -17,8 +18,6 @@ namespace {
 
 using mechanisms::MechanismKind;
 
-constexpr double thin_gain_margin = 1.7;    ///< Below the classical rules of thumb 2 and 30°.
-constexpr double thin_phase_margin = 30.0;  ///< deg
 constexpr double large_overshoot = 0.25;
 
 void write_feedforward(JsonWriter& json, const DesignResult& result) {

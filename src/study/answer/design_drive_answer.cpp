@@ -20,7 +20,7 @@ namespace {
 
 using text::number;
 
-constexpr const char* schema = "flyball.design_drive/1";
+constexpr const char* design_drive_schema = "flyball.design_drive/1";
 
 bool answers_volts(const FollowerDesign& design) {
   return design.job.follower == DriveFollower::ltv_drive;
@@ -232,7 +232,7 @@ std::string to_json(const FollowerDesign& design) {
   const double half = 0.5 * robot.trackwidth;
   JsonWriter json;
   json.object([&] {
-    json.add("schema", schema);
+    json.add("schema", design_drive_schema);
     json.add("drivetrain", to_string(robot.kind));
     json.add("follower", to_string(job.follower));
     json.add("motor", robot.motor.name);
@@ -283,7 +283,7 @@ std::string to_json(const FollowerDesign& design) {
 
 Answer answer_of(const FollowerDesign& design) {
   const DriveJob& job = design.job;
-  Answer answer{.schema = schema, .json = to_json(design)};
+  Answer answer{.schema = design_drive_schema, .json = to_json(design)};
   Document& document = answer.document;
   document.title = fmt::format("A follower for a {} drive", to_string(job.robot.kind));
   document.verdict.line = fmt::format(

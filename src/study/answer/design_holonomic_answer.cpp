@@ -19,7 +19,7 @@ namespace {
 
 using text::number;
 
-constexpr const char* schema = "flyball.design_holonomic/1";
+constexpr const char* design_holonomic_schema = "flyball.design_holonomic/1";
 
 bool is_swerve(const HolonomicDesign& design) {
   return design.job.robot.kind == DriveKind::swerve;
@@ -199,7 +199,7 @@ std::string to_json(const HolonomicDesign& design) {
   const DriveRobot& robot = job.robot;
   JsonWriter json;
   json.object([&] {
-    json.add("schema", schema);
+    json.add("schema", design_holonomic_schema);
     json.add("drivetrain", to_string(robot.kind));
     json.add("follower", to_string(job.follower));
     json.add("motor", robot.motor.name);
@@ -247,7 +247,7 @@ std::string to_json(const HolonomicDesign& design) {
 
 Answer answer_of(const HolonomicDesign& design) {
   const DriveJob& job = design.job;
-  Answer answer{.schema = schema, .json = to_json(design)};
+  Answer answer{.schema = design_holonomic_schema, .json = to_json(design)};
   Document& document = answer.document;
   document.title = fmt::format("A follower for a {} drive", to_string(job.robot.kind));
   document.verdict.line = fmt::format(

@@ -6,6 +6,7 @@
 
 #include "study/answer/frequency_figures.hpp"
 #include "study/answer/model_parts.hpp"
+#include "study/answer/rules_of_thumb.hpp"
 
 namespace flyball::study {
 
@@ -14,9 +15,6 @@ namespace {
 using text::complex_number;
 using text::matrix;
 using text::number;
-
-constexpr double thin_gain_margin = 1.7;    ///< Below the classical rules of thumb 2 and 30°.
-constexpr double thin_phase_margin = 30.0;  ///< deg
 
 /// A gain, each row and each column under its coordinate's name and unit.
 Table gain_table(std::string caption, std::string corner, const Eigen::MatrixXd& gain,

@@ -9,6 +9,7 @@
 #include "core/wording.hpp"
 #include "study/answer/drawing.hpp"
 #include "study/answer/parts.hpp"
+#include "study/answer/rules_of_thumb.hpp"
 
 namespace flyball::study {
 
@@ -19,8 +20,6 @@ using identification::DriveReport;
 using identification::DriveRun;
 using identification::FeedforwardFit;
 using identification::FittedDriveRun;
-
-constexpr double poor_fit = 0.9;  ///< R² below which the overlay deserves a look.
 
 std::string run_name(std::string_view prefix, std::size_t index, const DriveRun& run) {
   return fmt::format("{}_{}_{}", prefix, index + 1, to_string(run.kind));
@@ -36,8 +35,6 @@ PlotPanel compared(const Coordinate& shown, const FittedDriveRun& run,
   }
   return panel(shown, std::move(lines));
 }
-
-constexpr const char* not_used = "not used by the fit";
 
 /// Marks the rows of a run before and after those that the fit used, and shows what is recorded of
 /// them, as far as the axis of the others reaches.

@@ -21,7 +21,7 @@ using text::number;
 using text::percent;
 using text::seconds;
 
-double largest(const std::vector<double>& values) {
+double largest_magnitude_of(const std::vector<double>& values) {
   double size = 0.0;
   for (const double value : values) {
     size = std::max(size, std::abs(value));
@@ -57,9 +57,12 @@ Table runs_table(const DriveReport& report) {
     table.rows.push_back(
         {std::string(to_string(run.kind)), driven, fmt::to_string(run.time.size()),
          cell(run.time.empty() ? 0.0 : run.time.back() - run.time.front(), "s"),
-         cell(largest(run.left.voltage), "V"), cell(largest(run.right.voltage), "V"),
-         run.left.velocity.empty() ? Value("") : cell(largest(run.left.velocity), rate),
-         run.right.velocity.empty() ? Value("") : cell(largest(run.right.velocity), rate),
+         cell(largest_magnitude_of(run.left.voltage), "V"),
+         cell(largest_magnitude_of(run.right.voltage), "V"),
+         run.left.velocity.empty() ? Value("")
+                                   : cell(largest_magnitude_of(run.left.velocity), rate),
+         run.right.velocity.empty() ? Value("")
+                                    : cell(largest_magnitude_of(run.right.velocity), rate),
          run.heading.empty() ? Value("") : cell(turned(run.heading), "rad"),
          used ? Value("yes", Tone::good) : Value("no", Tone::caution)});
   }

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
@@ -10,6 +9,7 @@
 #include <flyball/io/csv.hpp>
 #include <flyball/io/json_writer.hpp>
 
+#include "core/constants.hpp"
 #include "core/wording.hpp"
 #include "study/answer/driven_parts.hpp"
 #include "study/answer/parts.hpp"
@@ -22,8 +22,7 @@ using text::number;
 using text::percent;
 using text::seconds;
 
-constexpr const char* schema = "flyball.drive/1";
-constexpr double degree = std::numbers::pi / 180.0;
+constexpr const char* driven_schema = "flyball.drive/1";
 constexpr double brownout = 6.75;  // V
 
 std::string centimetres(double metres) {
@@ -31,8 +30,8 @@ std::string centimetres(double metres) {
   return fmt::format("{} cm", number(std::abs(metres) < seen ? 0.0 : 100.0 * metres, 3));
 }
 
-std::string degrees(double angle) {
-  return fmt::format("{}°", number(angle / degree, 3));
+std::string degrees_text(double angle) {
+  return fmt::format("{}°", number(angle / one_degree, 3));
 }
 
 Facts robot_facts(const DriveResult& result) {
@@ -60,7 +59,7 @@ std::string disturbances(const DriveResult& result) {
   if (off.ahead.si() != 0.0 || off.left.si() != 0.0 || off.turned.si() != 0.0) {
     words.push_back(fmt::format("a start {} ahead, {} to the left and {} turned",
                                 centimetres(off.ahead.si()), centimetres(off.left.si()),
-                                degrees(off.turned.si())));
+                                degrees_text(off.turned.si())));
   }
   if (off.latency.si() > 0.0) {
     words.push_back(fmt::format("poses {} old", seconds(off.latency.si())));
@@ -83,7 +82,7 @@ std::string disturbances(const DriveResult& result) {
   }
   if (off.position_noise.si() > 0.0 || off.heading_noise.si() > 0.0) {
     words.push_back(fmt::format("noise of {} and {}", centimetres(off.position_noise.si()),
-                                degrees(off.heading_noise.si())));
+                                degrees_text(off.heading_noise.si())));
   }
   return text::enumerate(words);
 }
@@ -94,7 +93,7 @@ Section errors_section(const DriveResult& result) {
   table.header = {"error", "largest", "at the end"};
   table.rows = {{"across the way", centimetres(e.largest_across), centimetres(e.final_across)},
                 {"along the way", centimetres(e.largest_along), centimetres(e.final_along)},
-                {"heading", degrees(e.largest_heading), degrees(e.final_heading)}};
+                {"heading", degrees_text(e.largest_heading), degrees_text(e.final_heading)}};
   Facts facts;
   facts.add("distance, root mean square", centimetres(e.rms));
   facts.add("saturated", percent(result.saturated_share, 2),
@@ -108,7 +107,7 @@ Section errors_section(const DriveResult& result) {
 }
 
 /// The largest of a vector whose parts are columns.
-double largest(const DriveResult& result, std::initializer_list<const char*> columns) {
+double largest_of(const DriveResult& result, std::initializer_list<const char*> columns) {
   double most = 0.0;
   for (std::size_t i = 0; i < result.series.rows(); ++i) {
     double square = 0.0;
@@ -167,7 +166,7 @@ std::string to_json(const DriveResult& result) {
   const TrackingErrors& e = result.errors;
   JsonWriter json;
   json.object([&] {
-    json.add("schema", schema);
+    json.add("schema", driven_schema);
     json.add("drivetrain", to_string(robot.kind));
     json.add("follower", to_string(result.job.follower));
     json.add("motor", robot.motor.name);
@@ -211,7 +210,7 @@ std::string to_json(const DriveResult& result) {
 }
 
 Answer answer_of(const DriveResult& result) {
-  Answer answer{.schema = schema, .json = to_json(result)};
+  Answer answer{.schema = driven_schema, .json = to_json(result)};
   Document& document = answer.document;
   document.title = fmt::format("A {} drive follows a trajectory", to_string(result.job.robot.kind));
   document.verdict = verdict_of(result);
@@ -227,8 +226,8 @@ Answer answer_of(const DriveResult& result) {
        "Speeds",
        {Paragraph{fmt::format("At most {} m/s and {} rad/s; data/drive.csv of the report has every "
                               "period.",
-                              number(largest(result, {"vx", "vy"}), 3),
-                              number(largest(result, {"omega"}), 3))}}},
+                              number(largest_of(result, {"vx", "vy"}), 3),
+                              number(largest_of(result, {"omega"}), 3))}}},
       {"voltages",
        "Voltages",
        {Paragraph{fmt::format("Asked for within ± {} V; data/drive.wpilog is for "

@@ -30,9 +30,9 @@ std::string bytes_of(std::initializer_list<double> values) {
   return bytes;
 }
 
-class Log {
+class DriveLogText {
  public:
-  explicit Log(const DriveResult& result) : result_(result), writer_("Flyball drive") {}
+  explicit DriveLogText(const DriveResult& result) : result_(result), writer_("Flyball drive") {}
 
   std::string text() && {
     add_poses("/Flyball/Drive/Pose", "x", "y", "heading");
@@ -147,7 +147,7 @@ class Log {
 }  // namespace
 
 AnswerFile driven_log_file(const DriveResult& result) {
-  return {"data/drive.wpilog", Log(result).text()};
+  return {"data/drive.wpilog", DriveLogText(result).text()};
 }
 
 }  // namespace flyball::study

@@ -16,11 +16,11 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Row = std::vector<double>;
+using SignalRow = std::vector<double>;
 
 constexpr double band = 2.0;  ///< Standard deviations that are shown.
 
-Row row(const MatrixXd& M, Index i) {
+SignalRow row(const MatrixXd& M, Index i) {
   const Eigen::VectorXd values = M.row(i);
   return {values.begin(), values.end()};
 }
@@ -63,7 +63,7 @@ Figure states_figure(const Estimation& result, const EstimatedRun& run) {
                             result.model.names().name,
                             is_smoothed(run) ? ", of the filter and of the smoother" : ""));
   const std::vector<Coordinate>& states = result.model.names().states;
-  const Row time = since(run.time.front(), run.time);
+  const SignalRow time = since(run.time.front(), run.time);
   figure.plot.clock = run.name;
   for (std::size_t i = 0; i < states.size(); ++i) {
     const auto k = static_cast<Index>(i);
@@ -141,10 +141,11 @@ void for_each_column(const Estimation& result, const EstimatedRun& run, const Ad
 
 AnswerFile csv_of(const Estimation& result, const EstimatedRun& run) {
   TimeSeries series(run.time);
-  for_each_column(result, run, [&](const std::string& name, const std::string& unit, Row values) {
-    // As many as there are times, so that none is refused.
-    static_cast<void>(series.add(name, unit, std::move(values)));
-  });
+  for_each_column(result, run,
+                  [&](const std::string& name, const std::string& unit, SignalRow values) {
+                    // As many as there are times, so that none is refused.
+                    static_cast<void>(series.add(name, unit, std::move(values)));
+                  });
   return {"data/" + file_name(run.name) + ".csv", to_csv(series)};
 }
 
@@ -152,21 +153,22 @@ AnswerFile csv_of(const Estimation& result, const EstimatedRun& run) {
 std::vector<AnswerFile> wpilog_of(const Estimation& result) {
   Log log;
   for (const EstimatedRun& run : result.runs) {
-    for_each_column(result, run, [&](const std::string& name, const std::string& unit, Row values) {
-      const std::string channel = "flyball/" + name;
-      auto found = std::find_if(log.signals.begin(), log.signals.end(),
-                                [&](const Signal& signal) { return signal.name == channel; });
-      if (found == log.signals.end()) {
-        log.signals.push_back({channel, unit, {}, {}});
-        found = log.signals.end() - 1;
-      }
-      for (std::size_t k = 0; k < values.size(); ++k) {
-        if (!std::isnan(values[k])) {
-          found->time.push_back(run.time[k]);
-          found->value.push_back(values[k]);
-        }
-      }
-    });
+    for_each_column(
+        result, run, [&](const std::string& name, const std::string& unit, SignalRow values) {
+          const std::string channel = "flyball/" + name;
+          auto found = std::find_if(log.signals.begin(), log.signals.end(),
+                                    [&](const Signal& signal) { return signal.name == channel; });
+          if (found == log.signals.end()) {
+            log.signals.push_back({channel, unit, {}, {}});
+            found = log.signals.end() - 1;
+          }
+          for (std::size_t k = 0; k < values.size(); ++k) {
+            if (!std::isnan(values[k])) {
+              found->time.push_back(run.time[k]);
+              found->value.push_back(values[k]);
+            }
+          }
+        });
   }
   // Times that the format cannot hold (negative ones) leave the CSV files as they are.
   auto bytes = to_wpilog(log);

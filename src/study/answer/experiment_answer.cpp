@@ -18,7 +18,7 @@ using text::number;
 using text::percent;
 using text::seconds;
 
-constexpr const char* schema = "flyball.experiment/1";
+constexpr const char* experiment_schema = "flyball.experiment/1";
 
 std::string voltage_text(const PlannedTest& test) {
   return test.ramp_rate > 0.0 ? fmt::format("from 0 V by {} V/s, to {} V at most",
@@ -149,7 +149,7 @@ void write_experiment(JsonWriter& json, std::string_view name, const Experiment&
 std::string to_json(const ExperimentResult& result) {
   JsonWriter json;
   json.object([&] {
-    json.add("schema", schema);
+    json.add("schema", experiment_schema);
     json.add("mechanism", to_string(result.job.plant.kind));
     json.add("unit", result.job.plant.unit);
     write_experiment(json, "experiment", result.best);
@@ -160,7 +160,7 @@ std::string to_json(const ExperimentResult& result) {
 }
 
 Answer answer_of(const ExperimentResult& result) {
-  Answer answer{.schema = schema, .json = to_json(result)};
+  Answer answer{.schema = experiment_schema, .json = to_json(result)};
   Document& document = answer.document;
   const std::string kind(to_string(result.job.plant.kind));
   document.title = fmt::format("Tests of {} {}", kind == "flywheel" ? "a" : "an", kind);

@@ -2,11 +2,11 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "core/constants.hpp"
 #include "core/wording.hpp"
 #include "study/answer/drawing.hpp"
 #include "study/answer/frequency_figures.hpp"
@@ -15,9 +15,7 @@ namespace flyball::study {
 
 namespace {
 
-using std::numbers::pi;
-
-double degrees(double radians) {
+double in_degrees(double radians) {
   return radians * 180.0 / pi;
 }
 
@@ -75,7 +73,7 @@ void add_response(Plot& bode, const std::vector<FrequencyPoint>& response, std::
     const bool shown = point.gain > rounding * largest;
     gains.x.push_back(point.frequency);
     gains.y.push_back(shown ? 20.0 * std::log10(point.gain) : NAN);
-    phases.y.push_back(shown ? degrees(point.phase) : NAN);
+    phases.y.push_back(shown ? in_degrees(point.phase) : NAN);
   }
   phases.x = gains.x;
   bode.panels[0].lines.push_back(std::move(gains));
@@ -102,7 +100,7 @@ Figure bode_figure(const OpenedLoop& loop) {
     phase.marks.push_back(
         {*loop.crossover,
          loop.phase_margin
-             ? fmt::format("phase margin {}°", text::number(degrees(*loop.phase_margin), 3))
+             ? fmt::format("phase margin {}°", text::number(in_degrees(*loop.phase_margin), 3))
              : "",
          true});
     gain.marks.push_back({*loop.crossover, "", true});

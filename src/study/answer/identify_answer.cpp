@@ -8,14 +8,13 @@
 
 #include "core/wording.hpp"
 #include "study/answer/parts.hpp"
+#include "study/answer/rules_of_thumb.hpp"
 
 namespace flyball::study {
 
 namespace {
 
 using identification::GainEstimate;
-
-constexpr double poor_fit = 0.9;  ///< R² below which the overlay deserves a look.
 
 }  // namespace
 

@@ -19,8 +19,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr const char* schema = "flyball.identify_each/1";
-constexpr std::size_t most_shown = 200;
+constexpr const char* identify_each_schema = "flyball.identify_each/1";
+constexpr std::size_t most_logs_shown = 200;
 
 constexpr std::array<const char*, 9> gains{
     "kS", "kV", "kA", "kG", "angle_offset", "kS_angular", "kV_angular", "kA_angular", "trackwidth"};
@@ -46,7 +46,7 @@ std::string in_quotes(const std::string& text) {
 }
 
 /// A number of a row's JSON as it stands there; empty for null.
-std::string number(const Json& value) {
+std::string number_text(const Json& value) {
   return value.is_number_float()     ? json_number(value.get<double>())
          : value.is_number_integer() ? value.dump()
          : value.is_string()         ? value.get<std::string>()
@@ -68,10 +68,10 @@ bool determined(const Json& gain) {
 void add_gain(std::string& line, const Json* gain) {
   std::array<std::string, 3> cells;
   if (gain != nullptr && determined(*gain)) {
-    cells = {number((*gain)["value"]), number((*gain)["interval"][0]),
-             number((*gain)["interval"][1])};
+    cells = {number_text((*gain)["value"]), number_text((*gain)["interval"][0]),
+             number_text((*gain)["interval"][1])};
   } else if (gain != nullptr) {
-    cells[2] = number(gain->value("upper_bound", Json()));
+    cells[2] = number_text(gain->value("upper_bound", Json()));
   }
   for (const std::string& cell : cells) {
     line += "," + cell;
@@ -261,7 +261,7 @@ Summary summary_of(const LogRows& rows) {
   summary.table.words = {0, 1, 6, 8};
   for (const NumberedRow& numbered : rows.rows) {
     const Json row = parsed(numbered);
-    if (summary.table.rows.size() < most_shown) {
+    if (summary.table.rows.size() < most_logs_shown) {
       summary.table.rows.push_back(table_row(numbered.row.path.substr(folder.size()), row));
     }
     if (const auto error = row.find("error"); error != row.end()) {
@@ -323,7 +323,7 @@ Answer answer_of(const LogRows& rows, std::size_t passed_over) {
   const std::string folder = common_folder(rows);
   JsonWriter json;
   json.object([&] {
-    json.add("schema", schema);
+    json.add("schema", identify_each_schema);
     json.add("logs", rows.logs);
     json.add("rows", rows.rows.size());
     json.add("with_gains", summary.with_gains);
@@ -332,17 +332,17 @@ Answer answer_of(const LogRows& rows, std::size_t passed_over) {
     summary.errors.write(json, "errors");
     summary.warnings.write(json, "warnings");
   });
-  Answer answer{.schema = schema, .json = std::move(json).text()};
+  Answer answer{.schema = identify_each_schema, .json = std::move(json).text()};
   Document& document = answer.document;
   document.title = text::count(rows.rows.size(), "log") + ", each by itself";
   document.verdict = verdict_of(rows, summary, passed_over);
   Section logs{"logs", "Logs", {}};
   logs.blocks.emplace_back(std::move(summary.table));
-  if (rows.rows.size() > most_shown) {
+  if (rows.rows.size() > most_logs_shown) {
     logs.blocks.emplace_back(Paragraph{
         fmt::format("The first {} of {}; all are in logs.csv and logs.jsonl of a report (--out), "
                     "and in the lines of --json.",
-                    most_shown, rows.rows.size())});
+                    most_logs_shown, rows.rows.size())});
   }
   document.sections.push_back(std::move(logs));
   if (!summary.errors.empty()) {

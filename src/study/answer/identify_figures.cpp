@@ -11,6 +11,7 @@
 #include "core/wording.hpp"
 #include "study/answer/drawing.hpp"
 #include "study/answer/parts.hpp"
+#include "study/answer/rules_of_thumb.hpp"
 
 namespace flyball::study {
 
@@ -59,8 +60,6 @@ std::vector<std::size_t> compared_rows(const PreparedRun& prepared, const Fitted
                [&](std::size_t row) { return run.time[row] >= run.time.front() + settling; });
   return rows;
 }
-
-constexpr const char* not_used = "not used by the fit";
 
 /// The rows of a velocity that the fit did not use, as far as the axis of the used ones shows them:
 /// where a mechanism stalls or falls, they would leave nothing of the others.
@@ -142,20 +141,20 @@ Figure recorded_figure(const IdentifyResult& result, const PreparedRun& prepared
                             "Voltage, velocity and position as the log has them; time counts from "
                             "the start of the test.");
   const std::vector<double> time = since(beginning(prepared), run.time);
-  const auto add = [&](const Coordinate& shown, const std::vector<double>& values, int color) {
+  const auto add_run = [&](const Coordinate& shown, const std::vector<double>& values, int color) {
     if (!values.empty()) {
       figure.plot.panels.push_back(panel(shown, {line("", time, values, color)}));
     }
   };
-  add({"Voltage", "V"}, run.voltage, voltage_color);
-  add({"Velocity", result.unit + "/s"}, run.velocity, measured_color);
-  add({"Position", result.unit}, run.position, measured_color);
+  add_run({"Voltage", "V"}, run.voltage, voltage_color);
+  add_run({"Velocity", result.unit + "/s"}, run.velocity, measured_color);
+  add_run({"Position", result.unit}, run.position, measured_color);
   return figure;
 }
 
 /// Adds a column if it fits the clock; runs without a channel have an empty one.
-void add(TimeSeries& series, std::string name, std::string unit,
-         const std::vector<double>& values) {
+void add_run(TimeSeries& series, std::string name, std::string unit,
+             const std::vector<double>& values) {
   if (values.size() == series.rows() && !values.empty()) {
     static_cast<void>(series.add(std::move(name), std::move(unit), values));
   }
@@ -164,20 +163,20 @@ void add(TimeSeries& series, std::string name, std::string unit,
 std::string run_csv(const FittedRun& run, const std::string& unit) {
   TimeSeries series(run.time);
   const std::string rate = unit + "/s";
-  add(series, "voltage", "V", run.voltage);
-  add(series, "velocity", rate, run.velocity);
-  add(series, "velocity_simulated", rate, run.velocity_hat);
-  add(series, "velocity_residual", rate, run.velocity_residual);
-  add(series, "position", unit, run.position);
-  add(series, "position_simulated", unit, run.position_hat);
+  add_run(series, "voltage", "V", run.voltage);
+  add_run(series, "velocity", rate, run.velocity);
+  add_run(series, "velocity_simulated", rate, run.velocity_hat);
+  add_run(series, "velocity_residual", rate, run.velocity_residual);
+  add_run(series, "position", unit, run.position);
+  add_run(series, "position_simulated", unit, run.position_hat);
   return to_csv(series);
 }
 
 std::string run_csv(const TestRun& run, const std::string& unit) {
   TimeSeries series(run.time);
-  add(series, "voltage", "V", run.voltage);
-  add(series, "velocity", unit + "/s", run.velocity);
-  add(series, "position", unit, run.position);
+  add_run(series, "voltage", "V", run.voltage);
+  add_run(series, "velocity", unit + "/s", run.velocity);
+  add_run(series, "position", unit, run.position);
   return to_csv(series);
 }
 

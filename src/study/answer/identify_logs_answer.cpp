@@ -21,7 +21,7 @@ using identification::GainComparison;
 using identification::GainEstimate;
 using text::with_half_width;
 
-constexpr const char* schema = "flyball.identify_logs/1";
+constexpr const char* identify_logs_schema = "flyball.identify_logs/1";
 
 double half_width(const GainEstimate& gain) {
   return 0.5 * (gain.interval[1] - gain.interval[0]);
@@ -169,7 +169,7 @@ Verdict verdict_of_logs(const IdentifyLogsResult& result) {
 std::string to_json(const IdentifyLogsResult& result) {
   JsonWriter json;
   json.object([&] {
-    json.add("schema", schema);
+    json.add("schema", identify_logs_schema);
     if (!has_joint_gains(result)) {
       json.add("error", joint_refusal(result));
     } else if (result.joint.drive) {
@@ -203,7 +203,7 @@ std::string to_json(const IdentifyLogsResult& result) {
 }
 
 Answer answer_of(const IdentifyLogsResult& result) {
-  Answer answer{.schema = schema, .json = to_json(result)};
+  Answer answer{.schema = identify_logs_schema, .json = to_json(result)};
   Document& document = answer.document;
   document.title = title_of(kind_of(result.joint), "", result.joint.source.path);
   document.verdict = verdict_of_logs(result);

@@ -11,10 +11,10 @@ namespace flyball::study {
 
 namespace {
 
-constexpr std::size_t most_rows = 2000;
+constexpr std::size_t most_moments = 2000;
 
 /// Moves a part along poses; headings go on where they wrap.
-void place(MovingPart& part, const std::vector<Pose2d>& poses) {
+void put(MovingPart& part, const std::vector<Pose2d>& poses) {
   const double turn = 2.0 * std::numbers::pi;
   for (const Pose2d& pose : poses) {
     part.to_x.push_back(pose.x());
@@ -32,7 +32,7 @@ std::vector<Animation> localize_animation(const LocalizeResult& result, std::str
   if (path.time.size() < 2) {
     return {};
   }
-  const std::size_t stride = (path.time.size() + most_rows - 1) / most_rows;
+  const std::size_t stride = (path.time.size() + most_moments - 1) / most_moments;
   const double begin = result.log.odometry.front().time;
   Animation animation{.section = std::move(section),
                       .name = "animation",
@@ -85,11 +85,11 @@ std::vector<Animation> localize_animation(const LocalizeResult& result, std::str
     outline.label = "truth";
     outline.style = PartStyle::outlined;
     outline.color = simulated_color;
-    place(outline, truths);
+    put(outline, truths);
   }
   robot.label = result.smoother ? "smoother" : "filter";
   robot.color = measured_color;
-  place(robot, poses);
+  put(robot, poses);
   animation.values = {
       {"x", "m", robot.to_x}, {"y", "m", robot.to_y}, {"heading", "rad", robot.angle}};
   animation.parts.push_back(std::move(robot));

@@ -21,8 +21,8 @@ namespace {
 using text::number;
 using text::percent;
 
-constexpr const char* schema = "flyball.localize/1";
-constexpr const char* drive_clock = "drive";  ///< Of its pictures over time.
+constexpr const char* localize_schema = "flyball.localize/1";
+constexpr const char* localize_clock = "drive";  ///< Of its pictures over time.
 
 /// The paths that there are, the best last.
 struct NamedPath {
@@ -59,7 +59,7 @@ double spread(const Eigen::Matrix3d& P) {
 std::string to_json(const LocalizeResult& result) {
   JsonWriter json;
   json.object([&] {
-    json.add("schema", schema);
+    json.add("schema", localize_schema);
     json.list("files", result.files, [&](const std::string& file) { json.write(file); });
     json.add("filter", name_of(result.method));
     json.object("sightings", [&] {
@@ -256,7 +256,7 @@ Figure error_figure(const LocalizeResult& result) {
   Figure figure{.section = "path",
                 .name = known ? "errors" : "uncertainty",
                 .title = known ? "Distance from the truth" : "Standard deviation of the position"};
-  figure.plot = {.title = figure.title, .x_label = "Time (s)", .clock = drive_clock};
+  figure.plot = {.title = figure.title, .x_label = "Time (s)", .clock = localize_clock};
   const double begin = result.log.odometry.front().time;
   const auto add = [&](const LocalizedPath& path, const char* name, int color) {
     PlotPanel panel{.y_label = fmt::format("{} (m)", name)};
@@ -296,7 +296,7 @@ Figure error_figure(const LocalizeResult& result) {
 
 Figure sightings_figure(const LocalizeResult& result) {
   Figure figure{.section = "sightings", .name = "sightings", .title = "Sightings"};
-  figure.plot = {.title = "Sightings", .x_label = "Time (s)", .clock = drive_clock};
+  figure.plot = {.title = "Sightings", .x_label = "Time (s)", .clock = localize_clock};
   const double begin = result.log.odometry.front().time;
   PlotPanel panel{.y_label = "off, in assumed σ"};
   PlotLine taken{.label = "taken", .style = LineStyle::points, .color = 0};
@@ -359,7 +359,7 @@ Verdict verdict_of(const LocalizeResult& result) {
 }  // namespace
 
 Answer answer_of(const LocalizeResult& result) {
-  Answer answer{.schema = schema, .json = to_json(result)};
+  Answer answer{.schema = localize_schema, .json = to_json(result)};
   answer.document.title = "Where the robot was";
   answer.document.verdict = verdict_of(result);
   answer.document.sections = {
@@ -376,7 +376,7 @@ Answer answer_of(const LocalizeResult& result) {
     answer.document.origins.add("file", Value(file));
   }
   answer.figures = {map_figure(result), error_figure(result), sightings_figure(result)};
-  answer.animations = localize_animation(result, "path", drive_clock);
+  answer.animations = localize_animation(result, "path", localize_clock);
   for (const NamedPath& named : paths_of(result)) {
     answer.files.push_back({fmt::format("data/{}.csv", named.name), csv_of(*named.path)});
   }

@@ -17,7 +17,6 @@ namespace flyball::study {
 
 namespace {
 
-using classical::LoopMargins;
 using text::number;
 using enum LoopView;
 
@@ -31,24 +30,24 @@ Value or_none(const std::optional<double>& value, const std::string& unit, doubl
 }
 
 /// "62.7°"
-Value degrees(double angle) {
+Value degrees_value(double angle) {
   Value value = quantity(angle, "°");
   value.text = number(angle) + "°";
   return value;
 }
 
-Value gain_margin(const LoopMargins& margins) {
+Value gain_margin(const classical::LoopMargins& margins) {
   if (!margins.gain_margin) {
     return margins.stable ? Value("∞") : Value("none", Tone::quiet);
   }
   return quantity(decibels(*margins.gain_margin), "dB");
 }
 
-Value phase_margin(const LoopMargins& margins) {
+Value phase_margin(const classical::LoopMargins& margins) {
   if (!margins.phase_margin) {
     return margins.stable ? Value("∞") : Value("none", Tone::quiet);
   }
-  return degrees(*margins.phase_margin);
+  return degrees_value(*margins.phase_margin);
 }
 
 /// What becomes of the closed loop.
@@ -72,7 +71,7 @@ Section margins_section(const LoopResult& result) {
                            "disk margin", "max |S|"},
                 .words = {0, 1}};
     for (const LoopFindings& loop : result.loops) {
-      const LoopMargins& m = *loop.margins;
+      const classical::LoopMargins& m = *loop.margins;
       table.rows.push_back({short_name(loop),
                             m.stable ? Value("stable", Tone::good) : Value("unstable", Tone::bad),
                             gain_margin(m), phase_margin(m), quantity(m.delay_margin, "s"),
@@ -82,7 +81,7 @@ Section margins_section(const LoopResult& result) {
     return section;
   }
   const LoopFindings& loop = result.loops.front();
-  const LoopMargins& m = *loop.margins;
+  const classical::LoopMargins& m = *loop.margins;
   Facts facts;
   facts.add("closed loop", stability_of(loop));
   facts.add("gain margin", gain_margin(m));
@@ -103,7 +102,7 @@ Section margins_section(const LoopResult& result) {
                 .words = {1}};
     for (const auto& at : m.gain_crossings) {
       table.rows.push_back(
-          {quantity(at.frequency, "rad/s", 5, false), "|L| = 1", degrees(at.phase_margin)});
+          {quantity(at.frequency, "rad/s", 5, false), "|L| = 1", degrees_value(at.phase_margin)});
     }
     for (const auto& at : m.phase_crossings) {
       table.rows.push_back({quantity(at.frequency, "rad/s", 5, false), "L < 0",
@@ -425,7 +424,7 @@ Verdict verdict_of(const LoopResult& result) {
     return verdict;
   }
   if (first.margins) {
-    const LoopMargins& m = *first.margins;
+    const classical::LoopMargins& m = *first.margins;
     verdict.tone = m.stable ? Tone::good : Tone::bad;
     verdict.line = m.stable
                        ? fmt::format("The closed loop is stable: phase margin {}, gain margin {}",

@@ -1,14 +1,13 @@
 // Bode, Nyquist and Nichols plots, root loci and responses of loops.
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include <flyball/core/text.hpp>
 
+#include "core/constants.hpp"
 #include "core/wording.hpp"
 #include "study/answer/drawing.hpp"
 #include "study/answer/loop_study_parts.hpp"
@@ -21,11 +20,9 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using enum LoopView;
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double pi = std::numbers::pi;
 constexpr const char* frequency_clock = "frequency";
 
-double decibels(double gain) {
+double in_decibels(double gain) {
   return 20.0 * std::log10(gain);
 }
 
@@ -91,7 +88,7 @@ Figure bode_figure(const LoopResult& result) {
     PlotLine phases = gains;
     phases.color = is_single(result) ? quiet_color : color_of(i);
     for (Index k = 0; k < result.frequency.size(); ++k) {
-      gains.y.push_back(decibels(loop.bode->gain(k)));
+      gains.y.push_back(in_decibels(loop.bode->gain(k)));
       phases.y.push_back(loop.bode->phase(k));
       lowest = std::min(lowest, loop.bode->phase(k));
       highest = std::max(highest, loop.bode->phase(k));
@@ -117,7 +114,7 @@ Figure bode_figure(const LoopResult& result) {
     if (const auto* at = least_gain(margins); at != nullptr && is_drawn(at->frequency)) {
       gain.marks.push_back(
           {at->frequency,
-           fmt::format("gain margin {} dB", text::number(decibels(at->gain_margin), 3)), true});
+           fmt::format("gain margin {} dB", text::number(in_decibels(at->gain_margin), 3)), true});
       phase.marks.push_back({at->frequency, "", true});
     }
   }
@@ -224,7 +221,7 @@ Figure nichols_figure(const LoopResult& result) {
     const LoopFindings& loop = result.loops[i];
     PlotLine curve{.label = label_of(result, loop), .color = color_of(i)};
     for (Index k = 0; k < result.frequency.size(); ++k) {
-      const double gain = decibels(loop.bode->gain(k));
+      const double gain = in_decibels(loop.bode->gain(k));
       const bool shown = gain >= floor && gain <= roof;
       if (!shown && (curve.x.empty() || std::isnan(curve.x.back()))) {
         continue;
@@ -254,7 +251,7 @@ Figure nichols_figure(const LoopResult& result) {
         const Complex T = std::polar(M, 2.0 * pi * (k + 0.001) / 240.0);
         const Complex L = T / (1.0 - T);
         double angle = std::arg(-L) * 180.0 / pi;  // about the cross
-        const double gain = decibels(std::abs(L));
+        const double gain = in_decibels(std::abs(L));
         const bool jumps = k > 0 && std::abs(angle - before) > 180.0;
         before = angle;
         angle += center;
@@ -277,7 +274,7 @@ Figure nichols_figure(const LoopResult& result) {
             : beside ? M * (std::sqrt(1.0 - 0.5 * M * M) - M * std::sqrt(0.5)) / (1.0 - M * M)
                      : M / (1.0 + M);
         panel.notes.push_back(
-            {center + (beside ? 45.0 : 0.0), decibels(at), fmt::format("{} dB", closed)});
+            {center + (beside ? 45.0 : 0.0), in_decibels(at), fmt::format("{} dB", closed)});
       }
       panel.lines.push_back(std::move(guide));
     }
@@ -519,7 +516,7 @@ std::vector<AnswerFile> data_files(const LoopResult& result) {
     for (const LoopFindings& loop : result.loops) {
       std::vector<double> gains;
       for (const double gain : loop.bode->gain) {
-        gains.push_back(decibels(gain));
+        gains.push_back(in_decibels(gain));
       }
       columns.emplace_back("gain of " + loop.name + " (dB)", std::move(gains));
       columns.emplace_back("phase of " + loop.name + " (deg)",

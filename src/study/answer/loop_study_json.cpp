@@ -11,14 +11,12 @@ namespace flyball::study {
 
 namespace {
 
-using classical::LoopMargins;
-
-double decibels(double gain) {
+double gain_in_decibels(double gain) {
   return 20.0 * std::log10(gain);
 }
 
 void write_margins(JsonWriter& json, const LoopFindings& loop) {
-  const LoopMargins& m = *loop.margins;
+  const classical::LoopMargins& m = *loop.margins;
   json.object("margins", [&] {
     json.add("stable", m.stable);
     if (m.unstable_poles == std::numeric_limits<int>::max()) {
@@ -150,7 +148,7 @@ std::string to_json(const LoopResult& result) {
         if (loop.bode) {
           std::vector<double> gains;
           for (const double gain : loop.bode->gain) {
-            gains.push_back(decibels(gain));
+            gains.push_back(gain_in_decibels(gain));
           }
           json.add("gain_db", gains);
           json.add("phase_deg", loop.bode->phase);

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <numbers>
 #include <utility>
 
+#include "core/constants.hpp"
 #include "core/wording.hpp"
 #include "study/answer/mechanism_animation.hpp"
 
@@ -14,15 +14,14 @@ namespace flyball::study {
 namespace {
 
 using mechanisms::MechanismKind;
-using std::numbers::pi;
-using Column = std::vector<double>;
+using SignalColumn = std::vector<double>;
 
 /// Rows of an animation: between two of them all moves evenly, so that more show nothing more.
-constexpr std::size_t most_rows = 2000;
+constexpr std::size_t most_frames = 2000;
 
 /// The rows that are shown of a simulation: each, or evenly some of them and the last.
 std::vector<std::size_t> shown_rows(std::size_t count) {
-  const std::size_t stride = (count + most_rows - 1) / most_rows;
+  const std::size_t stride = (count + most_frames - 1) / most_frames;
   std::vector<std::size_t> rows;
   for (std::size_t i = 0; i < count; i += stride) {
     rows.push_back(i);
@@ -33,21 +32,21 @@ std::vector<std::size_t> shown_rows(std::size_t count) {
   return rows;
 }
 
-Column picked(const Column& values, const std::vector<std::size_t>& rows) {
-  Column chosen(rows.size());
+SignalColumn picked(const SignalColumn& values, const std::vector<std::size_t>& rows) {
+  SignalColumn chosen(rows.size());
   std::transform(rows.begin(), rows.end(), chosen.begin(),
                  [&](std::size_t row) { return values[row]; });
   return chosen;
 }
 
 template <class Of>
-Column mapped(const Column& values, const Of& of) {
-  Column made(values.size());
+SignalColumn mapped(const SignalColumn& values, const Of& of) {
+  SignalColumn made(values.size());
   std::transform(values.begin(), values.end(), made.begin(), of);
   return made;
 }
 
-double largest(const Column& values) {
+double largest_value(const SignalColumn& values) {
   double found = 0.0;
   for (const double value : values) {
     found = std::isfinite(value) ? std::max(found, std::abs(value)) : found;
@@ -94,16 +93,16 @@ void draw_arc(MovingPart& part, double x, double y, double radius, double from =
 /// What a drawing is made of: the truth and, where there is one, the reference, along the rows
 /// that are shown.
 struct Motion {
-  Column time;
-  Column position, velocity;
-  Column reference_position, reference_velocity;  ///< Empty: an open loop.
+  SignalColumn time;
+  SignalColumn position, velocity;
+  SignalColumn reference_position, reference_velocity;  ///< Empty: an open loop.
 };
 
 /// The same outline where the reference is, behind, and where the mechanism is.
 void add_twice(Animation& animation, const MovingPart& outline, const std::string& name,
-               const auto& place_by, const Column& truth, const Column& reference) {
+               const auto& place_by, const SignalColumn& truth, const SignalColumn& reference) {
   const auto add = [&](const std::string& label, PartStyle style, int color,
-                       const Column& coordinate) {
+                       const SignalColumn& coordinate) {
     MovingPart placed = outline;
     placed.label = label;
     placed.style = style;
@@ -120,7 +119,7 @@ void add_twice(Animation& animation, const MovingPart& outline, const std::strin
 void draw_elevator(Animation& animation, const Motion& motion) {
   double low = 0.0;
   double high = 0.0;
-  for (const Column* heights : {&motion.position, &motion.reference_position}) {
+  for (const SignalColumn* heights : {&motion.position, &motion.reference_position}) {
     for (const double height : *heights) {
       low = std::min(low, height);
       high = std::max(high, height);
@@ -190,7 +189,7 @@ void draw_wheel(Animation& animation, const Motion& motion, double radius) {
   }
   animation.parts.push_back(std::move(scale));
   const double full =
-      std::max({largest(motion.velocity), largest(motion.reference_velocity), 1e-12});
+      std::max({largest_value(motion.velocity), largest_value(motion.reference_velocity), 1e-12});
   const auto needle_angle = [&](double velocity) { return pi / 2.0 - end * velocity / full; };
   MovingPart needle;
   draw(needle, {{-0.12, -0.05}, {0.88, 0.0}, {-0.12, 0.05}, {-0.12, -0.05}});
@@ -223,8 +222,8 @@ std::string what_is_drawn(MechanismKind kind, bool reference) {
 
 std::vector<Animation> mechanism_animation(const DrawnMechanism& mechanism,
                                            const TimeSeries& series) {
-  const Column* position = series.find("position");
-  const Column* velocity = series.find("velocity");
+  const SignalColumn* position = series.find("position");
+  const SignalColumn* velocity = series.find("velocity");
   if (position == nullptr || velocity == nullptr || series.rows() < 2) {
     return {};
   }
@@ -232,12 +231,12 @@ std::vector<Animation> mechanism_animation(const DrawnMechanism& mechanism,
   const std::string controlled = moves_by_velocity ? "velocity" : "position";
   const std::vector<std::size_t> rows = shown_rows(series.rows());
   const auto column = [&](const std::string& name) {
-    const Column* values = series.find(name);
-    return values == nullptr ? Column() : picked(*values, rows);
+    const SignalColumn* values = series.find(name);
+    return values == nullptr ? SignalColumn() : picked(*values, rows);
   };
   const Motion motion{picked(series.time(), rows), picked(*position, rows), picked(*velocity, rows),
                       column("reference_position"), column("reference_velocity")};
-  const Column& reference =
+  const SignalColumn& reference =
       moves_by_velocity ? motion.reference_velocity : motion.reference_position;
   Animation animation{.section = mechanism.section,
                       .name = "animation",

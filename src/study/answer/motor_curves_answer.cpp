@@ -18,7 +18,7 @@ using identification::GainEstimate;
 using text::number;
 using text::percent;
 
-constexpr const char* schema = "flyball.motor-curves/1";
+constexpr const char* motor_curves_schema = "flyball.motor-curves/1";
 constexpr double rpm = 30.0 / std::numbers::pi;
 
 void write_gain(JsonWriter& json, std::string_view name, const GainEstimate& gain) {
@@ -30,7 +30,7 @@ void write_gain(JsonWriter& json, std::string_view name, const GainEstimate& gai
 std::string to_json(const MotorCurvesResult& result) {
   JsonWriter json;
   json.object([&] {
-    json.add("schema", schema);
+    json.add("schema", motor_curves_schema);
     json.list("files", result.files, [&](const MotorCurveFile& file) {
       json.object([&] {
         json.add("file", file.source);
@@ -80,7 +80,7 @@ void add_number(Table& table, std::string name, double value, const char* unit,
                         known ? Value(percent(value / *known - 1.0)) : Value(""), unit});
 }
 
-Section section_of(const MotorCurveFile& file, std::size_t index) {
+Section file_section(const MotorCurveFile& file, std::size_t index) {
   Table table;
   table.header = {"constant", "measured", "95 %", "the table", "off", "unit"};
   table.words = {0, 5};
@@ -126,10 +126,10 @@ Section section_of(const MotorCurveFile& file, std::size_t index) {
 }  // namespace
 
 Answer answer_of(const MotorCurvesResult& result) {
-  Answer answer{.schema = schema, .json = to_json(result)};
+  Answer answer{.schema = motor_curves_schema, .json = to_json(result)};
   answer.document.title = "Constants of motors";
   for (std::size_t i = 0; i < result.files.size(); ++i) {
-    answer.document.sections.push_back(section_of(result.files[i], i));
+    answer.document.sections.push_back(file_section(result.files[i], i));
   }
   if (!result.diagnostics.empty()) {
     answer.document.sections.push_back(diagnostics_section(result.diagnostics));

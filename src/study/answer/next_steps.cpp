@@ -18,7 +18,7 @@ using identification::TestKind;
 using text::number;
 using text::seconds;
 
-Section section_of(std::vector<std::string> steps) {
+Section steps_section(std::vector<std::string> steps) {
   return {"next", "What to do next", {Steps{std::move(steps)}}};
 }
 
@@ -105,7 +105,7 @@ Section next_steps(const IdentifyResult& result, const DesignResult* design, boo
   std::vector<std::string> steps;
   const bool fitted = result.drive ? result.drive->fit.has_value() : result.report.fit.has_value();
   if (!fitted) {
-    return section_of(
+    return steps_section(
         {"Read the reason in the first line: it names what the log lacks.",
          "Look at the runs as they were recorded, under Data: does the mechanism move when there "
          "is a voltage, in the direction that the voltage asks for, and are the units right?",
@@ -123,13 +123,13 @@ Section next_steps(const IdentifyResult& result, const DesignResult* design, boo
         "Design the controller: flyball tune with the same log, or flyball design with gains.toml "
         "of this report's folder.");
   }
-  return section_of(std::move(steps));
+  return steps_section(std::move(steps));
 }
 
 Section next_steps(const DesignResult& result) {
   std::vector<std::string> steps;
   add_design_steps(steps, result);
-  return section_of(std::move(steps));
+  return steps_section(std::move(steps));
 }
 
 }  // namespace flyball::study

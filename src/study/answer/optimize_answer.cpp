@@ -21,7 +21,7 @@ namespace {
 using text::number;
 using text::seconds;
 
-constexpr const char* schema = "flyball.optimize/1";
+constexpr const char* optimize_schema = "flyball.optimize/1";
 
 /// A name as part of a file's.
 std::string file_name(const OptimizeResult& result, std::size_t task) {
@@ -150,11 +150,11 @@ std::vector<DriveViolation> seen(const DriveSolution& s) {
   return some;
 }
 
-Section section_of(const OptimizeResult& result, std::size_t i) {
+Section run_section(const OptimizeResult& result, std::size_t i) {
   const OptimizeTask& task = result.job.tasks[i];
   const DriveSolution& s = result.solutions[i];
   const DriveModel& model = task.problem.model;
-  Section section{section_name(i), task.name, {}};
+  Section section{section_title(i), task.name, {}};
   Facts facts;
   facts.add("duration", seconds(s.duration), s.solved ? Tone::good : Tone::bad);
   if (task.given_duration) {
@@ -235,7 +235,7 @@ Verdict verdict_of(const OptimizeResult& result) {
 std::string to_json(const OptimizeResult& result) {
   JsonWriter json;
   json.object([&] {
-    json.add("schema", schema);
+    json.add("schema", optimize_schema);
     std::size_t i = 0;
     json.list("trajectories", result.solutions, [&](const DriveSolution& solution) {
       json.object([&] { write(json, result.job.tasks[i], solution); });
@@ -247,7 +247,7 @@ std::string to_json(const OptimizeResult& result) {
 }
 
 Answer answer_of(const OptimizeResult& result) {
-  Answer answer{.schema = schema, .json = to_json(result)};
+  Answer answer{.schema = optimize_schema, .json = to_json(result)};
   Document& document = answer.document;
   document.title =
       result.solutions.size() == 1 ? "The fastest trajectory" : "The fastest trajectories";
@@ -255,7 +255,7 @@ Answer answer_of(const OptimizeResult& result) {
   for (std::size_t i = 0; i < result.solutions.size(); ++i) {
     const OptimizeTask& task = result.job.tasks[i];
     const DriveSolution& solution = result.solutions[i];
-    document.sections.push_back(section_of(result, i));
+    document.sections.push_back(run_section(result, i));
     if (solution.samples.size() < 2) {
       continue;
     }

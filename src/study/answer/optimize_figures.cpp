@@ -119,7 +119,7 @@ Outline areas_of(const DriveProblem& problem, bool inside) {
 }
 
 Figure field_figure(const OptimizeTask& task, const DriveSolution& solution, std::size_t number) {
-  Figure figure{section_name(number),
+  Figure figure{section_title(number),
                 fmt::format("field_{}", number + 1),
                 fmt::format("{}: the field from above", task.name),
                 "The way of the robot's middle, waypoints, and the areas to stay in and out of; "
@@ -191,7 +191,7 @@ void mark(const OptimizeTask& task, const DriveSolution& solution, Plot& plot) {
 }
 
 Figure speeds_figure(const OptimizeTask& task, const DriveSolution& solution, std::size_t number) {
-  Figure figure = over_time(section_name(number), fmt::format("speeds_{}", number + 1),
+  Figure figure = over_time(section_title(number), fmt::format("speeds_{}", number + 1),
                             fmt::format("{}: speeds", task.name),
                             "Speeds of the robot's middle and of its fastest wheel.");
   figure.plot.clock = clock_of(number);
@@ -232,7 +232,7 @@ Figure speeds_figure(const OptimizeTask& task, const DriveSolution& solution, st
 }
 
 Figure forces_figure(const OptimizeTask& task, const DriveSolution& solution, std::size_t number) {
-  Figure figure = over_time(section_name(number), fmt::format("forces_{}", number + 1),
+  Figure figure = over_time(section_title(number), fmt::format("forces_{}", number + 1),
                             fmt::format("{}: forces", task.name),
                             "What each wheel pushes with; forces are held between two points.");
   figure.plot.clock = clock_of(number);
@@ -264,7 +264,7 @@ Figure forces_figure(const OptimizeTask& task, const DriveSolution& solution, st
 
 }  // namespace
 
-std::string section_name(std::size_t number) {
+std::string section_title(std::size_t number) {
   return fmt::format("trajectory_{}", number + 1);
 }
 
@@ -282,7 +282,7 @@ std::vector<Figure> optimize_figures(const OptimizeTask& task, const DriveSoluti
 
 Animation optimize_animation(const OptimizeTask& task, const DriveSolution& solution,
                              std::size_t number) {
-  Animation animation{.section = section_name(number),
+  Animation animation{.section = section_title(number),
                       .name = fmt::format("animation_{}", number + 1),
                       .title = "The robot on the field",
                       .description =

@@ -16,7 +16,7 @@ namespace flyball::study {
 [[nodiscard]] Animation optimize_animation(const OptimizeTask& task, const DriveSolution& solution,
                                            std::size_t number);
 /// "trajectory_1": a trajectory's section of the document.
-[[nodiscard]] std::string section_name(std::size_t number);
+[[nodiscard]] std::string section_title(std::size_t number);
 /// "front_left", "left".
 [[nodiscard]] std::string wheel_name(Drivetrain drivetrain, std::size_t wheel);
 

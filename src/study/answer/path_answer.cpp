@@ -21,7 +21,7 @@ namespace {
 
 using text::number;
 
-constexpr const char* schema = "flyball.path/1";
+constexpr const char* path_schema = "flyball.path/1";
 
 /// The largest of what samples have.
 struct Peaks {
@@ -42,7 +42,7 @@ std::string to_json(const PathResult& result) {
   const Peaks peaks = peaks_of(result);
   JsonWriter json;
   json.object([&] {
-    json.add("schema", schema);
+    json.add("schema", path_schema);
     json.add("files", result.parts);
     json.add("timed", result.timed);
     json.add("holonomic", result.trajectory.holonomic);
@@ -108,14 +108,14 @@ Table binding_table(const PathResult& result) {
   return table;
 }
 
-std::string name_of(const std::string& file) {
+std::string stem_of(const std::string& file) {
   return std::filesystem::path(file).filename().string();
 }
 
 }  // namespace
 
 Answer answer_of(const PathResult& result) {
-  Answer answer{.schema = schema, .json = to_json(result)};
+  Answer answer{.schema = path_schema, .json = to_json(result)};
   Document& document = answer.document;
   document.title = "Path";
   const double duration = result.trajectory.duration();
@@ -180,7 +180,7 @@ Answer answer_of(const PathResult& result) {
   }
   std::vector<std::string> names;
   for (const std::string& part : result.parts) {
-    names.push_back(name_of(part));
+    names.push_back(stem_of(part));
   }
   document.origins.add(names.size() > 1 ? "files" : "file", text::enumerate(names));
   answer.figures = path_figures(result);

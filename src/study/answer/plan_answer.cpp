@@ -20,7 +20,7 @@ namespace {
 using text::exact;
 using text::number;
 
-constexpr const char* schema = "flyball.plan/1";
+constexpr const char* plan_schema = "flyball.plan/1";
 
 bool is_timed(const PlanResult& result) {
   return result.motion.table.rows() > 0;
@@ -29,7 +29,7 @@ bool is_timed(const PlanResult& result) {
 std::string to_json(const PlanResult& result) {
   JsonWriter json;
   json.object([&] {
-    json.add("schema", schema);
+    json.add("schema", plan_schema);
     json.add("method", to_string(result.path.method));
     json.list("axes", result.job.space.axes(), [&](const SpaceAxis& axis) {
       json.object([&] {
@@ -190,7 +190,7 @@ Section motion_section(const PlanResult& result) {
 }  // namespace
 
 Answer answer_of(const PlanResult& result) {
-  Answer answer{.schema = schema, .json = to_json(result)};
+  Answer answer{.schema = plan_schema, .json = to_json(result)};
   Document& document = answer.document;
   document.title = "Path through a configuration space";
   const std::size_t moves = result.path.waypoints.size() - 1;

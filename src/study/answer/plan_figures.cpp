@@ -15,7 +15,7 @@ namespace flyball::study {
 
 namespace {
 
-constexpr std::size_t most_rows = 600;
+constexpr std::size_t most_points = 600;
 
 std::string label_of(const SpaceAxis& axis) {
   return axis.unit.empty() ? axis.name : axis.name + " (" + axis.unit + ")";
@@ -78,7 +78,7 @@ std::vector<std::vector<double>> way_of(const PlanResult& result) {
   if (table.rows() == 0) {
     return result.path.waypoints;
   }
-  const std::size_t stride = (table.rows() + most_rows - 1) / most_rows;
+  const std::size_t stride = (table.rows() + most_points - 1) / most_points;
   for (std::size_t i = 0; i < table.rows(); i += stride) {
     std::vector<double> q;
     for (std::size_t k = 0; k < result.job.space.axes().size(); ++k) {
@@ -164,7 +164,7 @@ Figure way_figure(const PlanResult& result) {
   const std::vector<std::vector<double>> way = way_of(result);
   std::vector<double> x;
   if (timed) {
-    const std::size_t stride = (table.rows() + most_rows - 1) / most_rows;
+    const std::size_t stride = (table.rows() + most_points - 1) / most_points;
     for (std::size_t i = 0; i < table.rows(); i += stride) {
       x.push_back(table.time()[i]);
     }
@@ -310,7 +310,7 @@ std::vector<Animation> plan_animation(const PlanResult& result) {
     animation.parts.push_back(obstacle_part(obstacle, extent));
   }
   const std::vector<std::vector<double>> way = way_of(result);
-  const std::size_t stride = (table.rows() + most_rows - 1) / most_rows;
+  const std::size_t stride = (table.rows() + most_points - 1) / most_points;
   for (std::size_t i = 0; i < table.rows(); i += stride) {
     animation.time.push_back(table.time()[i]);
   }

@@ -17,12 +17,12 @@ namespace {
 using text::exact;
 using text::number;
 
-constexpr const char* schema = "flyball.profile/1";
+constexpr const char* profile_schema = "flyball.profile/1";
 
 std::string to_json(const ProfileResult& result) {
   JsonWriter json;
   json.object([&] {
-    json.add("schema", schema);
+    json.add("schema", profile_schema);
     json.add("kind", to_string(result.kind));
     json.add("unit", result.unit);
     json.add("reasons", result.reasons);
@@ -110,7 +110,7 @@ Figure figure_of(const ProfileResult& result) {
 
 Answer answer_of(const ProfileResult& result) {
   const std::string& unit = result.unit;
-  Answer answer{.schema = schema, .json = to_json(result)};
+  Answer answer{.schema = profile_schema, .json = to_json(result)};
   Document& document = answer.document;
   document.title = "Motion profile";
   const bool vowel = result.kind == ProfileKind::exponential || result.kind == ProfileKind::s_curve;

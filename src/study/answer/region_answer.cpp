@@ -16,13 +16,13 @@ using text::number;
 
 constexpr double hysteresis = 1.5;
 
-std::string_view limit_words(RegionLimit limit) {
+std::string_view limit_words(AttractionLimit limit) {
   switch (limit) {
-    case RegionLimit::rate:
+    case AttractionLimit::rate:
       return "beyond it V = (x − x*)ᵀP(x − x*) does not fall everywhere";
-    case RegionLimit::reach:
+    case AttractionLimit::reach:
       return "the reach, or half a turn";
-    case RegionLimit::work:
+    case AttractionLimit::work:
       return "the work that is allowed for the proof";
   }
   return "";
@@ -198,9 +198,9 @@ void write_region(JsonWriter& json, const ModelDesign& result) {
         }
         return extent;
       }());
-      json.add("limit", certified.limit == RegionLimit::rate    ? "rate"
-                        : certified.limit == RegionLimit::reach ? "reach"
-                                                                : "work");
+      json.add("limit", certified.limit == AttractionLimit::rate    ? "rate"
+                        : certified.limit == AttractionLimit::reach ? "reach"
+                                                                    : "work");
       json.add("missed", result.region->sampled.missed());
     });
   }

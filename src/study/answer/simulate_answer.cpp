@@ -7,12 +7,11 @@
 
 #include "study/answer/mechanism_animation.hpp"
 #include "study/answer/model_parts.hpp"
+#include "study/answer/rules_of_thumb.hpp"
 
 namespace flyball::study {
 
 namespace {
-
-constexpr std::size_t most_panels = 8;  ///< Of a picture that is looked at.
 
 /// Of all of its pictures over time.
 constexpr const char* simulation_clock = "simulation";

@@ -21,7 +21,7 @@ using text::number;
 using text::percent;
 using text::seconds;
 
-constexpr const char* schema = "flyball.size/1";
+constexpr const char* size_schema = "flyball.size/1";
 
 /// A row for each number of a choice; beside it that of the given gearing.
 Table choices_table(const SizeResult& result) {
@@ -346,7 +346,7 @@ std::string motion_in_words(const SizeResult& result) {
 std::string to_json(const SizeResult& result) {
   JsonWriter json;
   json.object([&] {
-    json.add("schema", schema);
+    json.add("schema", size_schema);
     json.add("mechanism", to_string(result.job.travel.load.kind));
     json.add("motor", result.job.travel.load.motor.name);
     json.add("motor_count", result.job.travel.load.motor.count);
@@ -411,7 +411,7 @@ std::string to_json(const SizeResult& result) {
 }
 
 Answer answer_of(const SizeResult& result) {
-  Answer answer{.schema = schema, .json = to_json(result)};
+  Answer answer{.schema = size_schema, .json = to_json(result)};
   Document& document = answer.document;
   document.title =
       fmt::format("{} with {}", text::capitalized(to_string(result.job.travel.load.kind)),

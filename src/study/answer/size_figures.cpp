@@ -1,11 +1,11 @@
 // Pictures of a mechanism that is sized.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include <fmt/format.h>
 
+#include "core/constants.hpp"
 #include "core/wording.hpp"
 #include "study/answer/drawing.hpp"
 #include "study/answer/size_parts.hpp"
@@ -15,7 +15,6 @@ namespace flyball::study {
 namespace {
 
 using Number = double (*)(const SizeChoice& choice);
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// A number of each point that gets there, over the points' values.
 PlotLine over(const std::vector<SizePoint>& points, std::optional<SizeChoice> SizePoint::* of,

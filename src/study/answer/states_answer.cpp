@@ -17,9 +17,9 @@ namespace flyball::study {
 
 namespace {
 
-constexpr const char* schema = "flyball.states/1";
+constexpr const char* states_schema = "flyball.states/1";
 
-using Place = std::vector<double>;
+using StateValues = std::vector<double>;
 
 std::string shown(const std::string& name) {
   return cut(printable(name), 60);
@@ -42,7 +42,7 @@ void write(JsonWriter& json, const MachineViolation& violation) {
 std::string to_json(const StatesResult& result) {
   JsonWriter json;
   json.object([&] {
-    json.add("schema", schema);
+    json.add("schema", states_schema);
     json.list("coordinates", result.job.space.axes(), [&](const SpaceAxis& axis) {
       json.object([&] {
         json.add("name", axis.name);
@@ -111,7 +111,7 @@ Figure space_figure(const StatesResult& result, std::size_t i, std::size_t j) {
                 "allowed.",
                 {}};
   const MachineViolation* violation = first_of(result);
-  Place at = violation != nullptr ? violation->at : result.job.states.front().at;
+  StateValues at = violation != nullptr ? violation->at : result.job.states.front().at;
   Plot& plot = figure.plot;
   plot.title = figure.title;
   plot.x_label = axis_label(across);
@@ -123,7 +123,7 @@ Figure space_figure(const StatesResult& result, std::size_t i, std::size_t j) {
   constexpr int rows = 45;
   for (int a = 0; a <= columns; ++a) {
     for (int b = 0; b <= rows; ++b) {
-      Place q = at;
+      StateValues q = at;
       q[i] = across.low + (across.high - across.low) * a / columns;
       q[j] = up.low + (up.high - up.low) * b / rows;
       if (!space.valid(q)) {
@@ -136,8 +136,8 @@ Figure space_figure(const StatesResult& result, std::size_t i, std::size_t j) {
     panel.lines.push_back(std::move(forbidden));
   }
   PlotLine ways{.label = "moves", .style = LineStyle::guide, .color = measured_color};
-  for (const std::vector<Place>& way : result.ways) {
-    for (const Place& corner : way) {
+  for (const std::vector<StateValues>& way : result.ways) {
+    for (const StateValues& corner : way) {
       ways.x.push_back(corner[i]);
       ways.y.push_back(corner[j]);
     }
@@ -200,7 +200,7 @@ void add_violation(Section& section, const StatesResult& result,
 }  // namespace
 
 Answer answer_of(const StatesResult& result) {
-  Answer answer{.schema = schema, .json = to_json(result)};
+  Answer answer{.schema = states_schema, .json = to_json(result)};
   Document& document = answer.document;
   document.title = "State machine";
   const MachineViolation* first = first_of(result);

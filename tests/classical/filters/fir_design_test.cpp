@@ -10,7 +10,7 @@
 
 #include "classical/filters/filter_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::fir_design_test {
 namespace {
 
 using namespace flyball::literals;
@@ -376,4 +376,4 @@ TEST(FirDesign, Refuses) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::fir_design_test

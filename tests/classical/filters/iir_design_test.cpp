@@ -8,7 +8,7 @@
 #include "classical/filters/elliptic_functions.hpp"
 #include "classical/filters/filter_cases.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::iir_design_test {
 namespace {
 
 using namespace flyball::literals;
@@ -453,4 +453,4 @@ TEST(IirDesign, Refuses) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::iir_design_test

@@ -21,7 +21,7 @@
 #include "classical/filters/filter_cases.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball::classical {
+namespace flyball::classical::run_time_filters_test {
 namespace {
 
 using namespace flyball::literals;
@@ -364,4 +364,4 @@ TEST(RunTimeFilters, Refuse) {
 }
 
 }  // namespace
-}  // namespace flyball::classical
+}  // namespace flyball::classical::run_time_filters_test

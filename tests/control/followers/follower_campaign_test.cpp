@@ -6,7 +6,7 @@
 // 1 m and 1.5 rad of the path's, sides moving at up to 1 m/s either way; the robot's mass, inertia,
 // motors and trackwidth off by up to 20 %, its wheels on tires that slip, what is measured 40 ms
 // late.
-namespace flyball::follower_campaign {
+namespace flyball::follower_campaign::follower_campaign_test {
 namespace {
 
 TEST(FollowerCampaign, RandomStartsConvergeOrSaySo) {
@@ -41,4 +41,4 @@ TEST(FollowerCampaign, FarStartsAreSeen) {
 }
 
 }  // namespace
-}  // namespace flyball::follower_campaign
+}  // namespace flyball::follower_campaign::follower_campaign_test

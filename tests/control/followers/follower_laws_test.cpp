@@ -19,7 +19,7 @@
 
 // The laws of every follower: finite and within the limits whatever comes; no error, no feedback;
 // the same wherever the field's origin is; angles are of whole turns; no allocation.
-namespace flyball {
+namespace flyball::follower_laws_test {
 namespace {
 
 static_assert(PoseFollower<RamseteFollower>);
@@ -318,4 +318,4 @@ TEST(SpeedLimits, KeepTheArc) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::follower_laws_test

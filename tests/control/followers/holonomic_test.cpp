@@ -7,7 +7,7 @@
 
 #include <flyball/control/lqr.hpp>
 
-namespace flyball {
+namespace flyball::holonomic_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -87,4 +87,4 @@ TEST(Holonomic, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::holonomic_test

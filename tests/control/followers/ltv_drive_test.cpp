@@ -14,7 +14,7 @@
 
 #include "book_drive.hpp"
 
-namespace flyball {
+namespace flyball::ltv_drive_test {
 namespace {
 
 using test::book_drive;
@@ -209,4 +209,4 @@ TEST(LtvDrive, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::ltv_drive_test

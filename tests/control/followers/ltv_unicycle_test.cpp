@@ -9,7 +9,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/systems/discretize.hpp>
 
-namespace flyball {
+namespace flyball::ltv_unicycle_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -120,4 +120,4 @@ TEST(LtvUnicycle, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::ltv_unicycle_test

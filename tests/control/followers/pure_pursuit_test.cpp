@@ -9,7 +9,7 @@
 
 #include <flyball/core/random.hpp>
 
-namespace flyball {
+namespace flyball::pure_pursuit_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -207,4 +207,4 @@ TEST(PurePursuit, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::pure_pursuit_test

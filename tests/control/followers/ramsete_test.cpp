@@ -9,7 +9,7 @@
 #include <flyball/core/unit_algebra.hpp>
 #include <flyball/math/integration/fixed_step.hpp>
 
-namespace flyball {
+namespace flyball::ramsete_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -127,4 +127,4 @@ TEST(Ramsete, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::ramsete_test

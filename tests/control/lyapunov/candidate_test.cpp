@@ -7,7 +7,7 @@
 
 #include <flyball/control/lyapunov/region_plot.hpp>
 
-namespace flyball {
+namespace flyball::candidate_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -100,4 +100,4 @@ TEST(RegionPlot, ShowsWhatIsKnown) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::candidate_test

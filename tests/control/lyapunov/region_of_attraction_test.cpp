@@ -15,7 +15,7 @@
 #include <flyball/systems/any_model.hpp>
 #include <flyball/systems/linearize.hpp>
 
-namespace flyball {
+namespace flyball::region_of_attraction_test {
 namespace {
 
 using namespace flyball::literals;
@@ -53,7 +53,7 @@ TEST(RegionOfAttraction, CubicIsKnown) {
   EXPECT_NEAR(region.refuted, 0.5, 1e-9);
   EXPECT_GE(region.level, 0.999 * 0.5);
   EXPECT_LE(region.level, 0.5);
-  EXPECT_EQ(region.limit, RegionLimit::rate);
+  EXPECT_EQ(region.limit, AttractionLimit::rate);
   EXPECT_NEAR(std::abs(region.limiting_state(0)), 1.0, 1e-9);
   EXPECT_NEAR(region.extent(0), 1.0, 1e-3);
   EXPECT_NEAR(region.volume(), 2.0, 2e-3);
@@ -73,7 +73,7 @@ TEST(RegionOfAttraction, SaturatedIntegrator) {
   loop.u_min = VectorXd();
   loop.u_max = VectorXd();
   const auto whole = certify_region(loop).value();
-  EXPECT_EQ(whole.limit, RegionLimit::reach);
+  EXPECT_EQ(whole.limit, AttractionLimit::reach);
   EXPECT_EQ(whole.refuted, std::numeric_limits<double>::infinity());
   EXPECT_GT(whole.extent(0), 1e3);
   // As far as the track goes.
@@ -182,7 +182,7 @@ TEST(RegionOfAttraction, PendulumWithLimitedTorque) {
                0.4 * 9.81, {0.1, 0.3}, {0}, S);
   const auto region = certify_region(loop, {.P = S}).value();
   expect_true(loop, region, 5.0);
-  EXPECT_EQ(region.limit, RegionLimit::rate);
+  EXPECT_EQ(region.limit, AttractionLimit::rate);
   EXPECT_GT(region.extent(0), 0.15);
   EXPECT_LT(region.extent(0), std::asin(0.4));
   // A turn more is the same state.
@@ -275,7 +275,7 @@ TEST(RegionOfAttraction, Errors) {
                   .is(RegionError::not_stable));
   // Work that does not suffice leaves a smaller region, not a wrong one.
   const auto little = certify_region(oscillator, {.most_cells = 30}).value();
-  EXPECT_EQ(little.limit, RegionLimit::work);
+  EXPECT_EQ(little.limit, AttractionLimit::work);
   EXPECT_LT(little.level, 2.2);
   const auto region = certify_region(oscillator).value();
   EXPECT_TRUE(
@@ -293,4 +293,4 @@ TEST(RegionOfAttraction, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::region_of_attraction_test

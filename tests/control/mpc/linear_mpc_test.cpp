@@ -10,6 +10,7 @@
 #include "control/mpc/mpc_problems.hpp"
 #include "support/allocation_count.hpp"
 
+namespace linear_mpc_test {
 namespace {
 
 using namespace flyball;
@@ -300,3 +301,4 @@ TEST(LinearMpc, RefusesWhatMakesNoSense) {
 }
 
 }  // namespace
+}  // namespace linear_mpc_test

@@ -12,6 +12,7 @@
 #include "control/mpc/mpc_problems.hpp"
 #include "support/allocation_count.hpp"
 
+namespace nonlinear_mpc_test {
 namespace {
 
 using namespace flyball;
@@ -181,3 +182,4 @@ TEST(NonlinearMpc, RefusesWhatMakesNoSense) {
 }
 
 }  // namespace
+}  // namespace nonlinear_mpc_test

@@ -12,7 +12,7 @@
 #include "control/followers/book_drive.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::drive_observer_test {
 namespace {
 
 using mechanisms::EncoderDrive;
@@ -92,4 +92,4 @@ TEST(DriveObserver, RunTime) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::drive_observer_test

@@ -10,7 +10,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::feedback_linearization_test {
 namespace {
 
 /// A mass on a telescope: x = [r, φ, dr/dt, dφ/dt], u = [force along r, torque about the pivot].
@@ -154,4 +154,4 @@ TEST(FeedbackLinearization, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::feedback_linearization_test

@@ -13,7 +13,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::trajectory_lqr_test {
 namespace {
 
 /// A pendulum with a torque at its pivot: θ from hanging, 1 kg at 0.5 m.
@@ -213,4 +213,4 @@ TEST(TrajectoryLqr, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::trajectory_lqr_test

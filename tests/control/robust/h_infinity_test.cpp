@@ -12,7 +12,7 @@
 #include "math/matrices_json.hpp"
 #include "support/oracle.hpp"
 
-namespace flyball {
+namespace flyball::h_infinity_test {
 namespace {
 
 using Eigen::Index;
@@ -312,4 +312,4 @@ TEST(HInfinity, DiscreteMixedSensitivity) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::h_infinity_test

@@ -10,7 +10,7 @@
 #include "math/matrices_json.hpp"
 #include "support/oracle.hpp"
 
-namespace flyball {
+namespace flyball::loop_shaping_test {
 namespace {
 
 using Eigen::Index;
@@ -127,4 +127,4 @@ TEST(LoopShaping, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::loop_shaping_test

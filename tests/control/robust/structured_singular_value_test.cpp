@@ -12,7 +12,7 @@
 #include "control/robust/structured_bound.hpp"
 #include "math/dense/dense.hpp"
 
-namespace flyball {
+namespace flyball::structured_singular_value_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -382,4 +382,4 @@ TEST(StructuredPeak, RefusesAnUnstableSystem) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::structured_singular_value_test

@@ -9,7 +9,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::swing_up_test {
 namespace {
 
 using namespace flyball::literals;
@@ -155,4 +155,4 @@ TEST(SwingUp, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::swing_up_test

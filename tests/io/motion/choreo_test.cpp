@@ -8,7 +8,7 @@
 
 #include <flyball/io/file.hpp>
 
-namespace flyball {
+namespace flyball::choreo_test {
 namespace {
 
 /// Every version's layout in little, with members that nobody knows and odd blanks and numbers.
@@ -292,4 +292,4 @@ TEST(Choreo, RealFilesOfAllVersions) {
 #endif
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::choreo_test

@@ -6,7 +6,7 @@
 
 #include <flyball/io/file.hpp>
 
-namespace flyball {
+namespace flyball::pathplanner_test {
 namespace {
 
 const std::string path_2025 = R"({
@@ -263,4 +263,4 @@ TEST(PathPlanner, RealFiles) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::pathplanner_test

@@ -6,7 +6,7 @@
 
 #include <flyball/io/file.hpp>
 
-namespace flyball {
+namespace flyball::wpilib_trajectory_test {
 namespace {
 
 const std::string list_text =
@@ -77,4 +77,4 @@ TEST(WpilibTrajectory, RealFiles) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::wpilib_trajectory_test

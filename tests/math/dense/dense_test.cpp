@@ -9,7 +9,7 @@
 #include "math/dense/spectral_norm.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::dense_test {
 namespace {
 
 using Eigen::MatrixXcd;
@@ -84,4 +84,4 @@ TEST(Dense, SpectralNormIsTheLargestSingularValue) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::dense_test

@@ -10,7 +10,7 @@
 #include "math/extended/double_double.hpp"
 #include "math/extended/twice_product.hpp"
 
-namespace flyball::detail {
+namespace flyball::detail::gemm_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -151,4 +151,4 @@ TEST(TwiceProduct, OfTransposedFactors) {
 }
 
 }  // namespace
-}  // namespace flyball::detail
+}  // namespace flyball::detail::gemm_test

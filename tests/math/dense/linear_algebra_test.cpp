@@ -8,7 +8,7 @@
 
 #include <flyball/core/random.hpp>
 
-namespace flyball {
+namespace flyball::linear_algebra_test {
 namespace {
 
 using Eigen::Index;
@@ -228,4 +228,4 @@ TEST(LinearAlgebra, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::linear_algebra_test

@@ -4,7 +4,7 @@
 
 #include "math/dense/panels.hpp"
 
-namespace flyball::detail {
+namespace flyball::detail::panels_test {
 namespace {
 
 using Eigen::Index;
@@ -84,4 +84,4 @@ TEST(Panels, LeadingModes) {
 }
 
 }  // namespace
-}  // namespace flyball::detail
+}  // namespace flyball::detail::panels_test

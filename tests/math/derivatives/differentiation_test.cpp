@@ -8,7 +8,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::differentiation_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -341,4 +341,4 @@ TEST(Differentiation, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::differentiation_test

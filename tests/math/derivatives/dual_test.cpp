@@ -7,7 +7,7 @@
 
 #include <flyball/math/derivatives/differentiation.hpp>
 
-namespace flyball {
+namespace flyball::dual_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -181,4 +181,4 @@ TEST(Dual, ComparesByValue) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::dual_test

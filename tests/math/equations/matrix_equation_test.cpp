@@ -9,7 +9,7 @@
 #include "support/laws.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::matrix_equation_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -299,4 +299,4 @@ TEST(MatrixEquation, AnyFiniteEntries) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::matrix_equation_test

@@ -12,7 +12,7 @@
 #include "math/matrices_json.hpp"
 #include "support/laws.hpp"
 
-namespace flyball {
+namespace flyball::matrix_exponential_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -213,4 +213,4 @@ TEST(MatrixExponential, IntegratorBesideStiffModes) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::matrix_exponential_test

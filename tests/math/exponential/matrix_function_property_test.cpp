@@ -10,7 +10,7 @@
 #include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::matrix_function_property_test {
 namespace {
 
 using Eigen::Index;
@@ -191,4 +191,4 @@ TEST(MatrixFunctionProperties, PowersAreRootsAndProducts) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::matrix_function_property_test

@@ -11,7 +11,7 @@
 
 #include "math/matrices_json.hpp"
 
-namespace flyball {
+namespace flyball::matrix_function_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -304,4 +304,4 @@ TEST(MatrixLogarithm, OfAnySize) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::matrix_function_test

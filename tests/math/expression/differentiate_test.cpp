@@ -15,7 +15,7 @@
 #include "math/expression/formula_text.hpp"
 #include "math/expression/random_tree.hpp"
 
-namespace flyball::expression {
+namespace flyball::expression::differentiate_test {
 namespace {
 
 constexpr double inf = std::numeric_limits<double>::infinity();
@@ -306,4 +306,4 @@ TEST(Differentiate, AFormulaModelHasTheJacobianOfTheCompiledModel) {
 }
 
 }  // namespace
-}  // namespace flyball::expression
+}  // namespace flyball::expression::differentiate_test

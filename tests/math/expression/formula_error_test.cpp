@@ -6,7 +6,7 @@
 
 #include "math/expression/formula_text.hpp"
 
-namespace flyball::expression {
+namespace flyball::expression::formula_error_test {
 namespace {
 
 struct Case {
@@ -216,4 +216,4 @@ TEST(FormulaErrors, RandomTextIsAnswered) {
 }
 
 }  // namespace
-}  // namespace flyball::expression
+}  // namespace flyball::expression::formula_error_test

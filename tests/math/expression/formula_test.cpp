@@ -5,7 +5,7 @@
 
 #include "math/expression/formula_text.hpp"
 
-namespace flyball::expression {
+namespace flyball::expression::formula_test {
 namespace {
 
 struct Case {
@@ -187,4 +187,4 @@ TEST(Formula, DefinitionsAndParameters) {
 }
 
 }  // namespace
-}  // namespace flyball::expression
+}  // namespace flyball::expression::formula_test

@@ -2,7 +2,7 @@
 
 #include "math/expression/formula_text.hpp"
 
-namespace flyball::expression {
+namespace flyball::expression::formula_unit_test {
 namespace {
 
 struct Case {
@@ -110,4 +110,4 @@ TEST(FormulaUnits, OfDefinitionsAreCarriedOn) {
 }
 
 }  // namespace
-}  // namespace flyball::expression
+}  // namespace flyball::expression::formula_unit_test

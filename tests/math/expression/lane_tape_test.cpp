@@ -11,6 +11,7 @@
 #include <flyball/math/expression/lagrangian.hpp>
 #include <flyball/math/expression/tape_builder.hpp>
 
+namespace lane_tape_test {
 namespace {
 
 using namespace flyball;
@@ -224,3 +225,4 @@ TEST(Lagrangian, Stacked) {
 }
 
 }  // namespace
+}  // namespace lane_tape_test

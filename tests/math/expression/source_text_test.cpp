@@ -10,7 +10,7 @@
 #include "math/expression/formula_text.hpp"
 #include "math/expression/random_tree.hpp"
 
-namespace flyball::expression {
+namespace flyball::expression::source_text_test {
 namespace {
 
 const std::vector<std::string> names{"x", "y", "z"};
@@ -117,4 +117,4 @@ TEST(SourceText, OfAFormulaReadsBack) {
 }
 
 }  // namespace
-}  // namespace flyball::expression
+}  // namespace flyball::expression::source_text_test

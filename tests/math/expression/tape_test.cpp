@@ -15,7 +15,7 @@
 #include "math/expression/random_tree.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball::expression {
+namespace flyball::expression::tape_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -134,4 +134,4 @@ TEST(Tape, OfARandomFormulaComputesWhatTheFormulaSays) {
 }
 
 }  // namespace
-}  // namespace flyball::expression
+}  // namespace flyball::expression::tape_test

@@ -7,7 +7,7 @@
 
 #include "math/extended/extended_eigenvalues.hpp"
 
-namespace flyball {
+namespace flyball::extended_eigenvalues_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -94,4 +94,4 @@ TEST(ExtendedEigenvalues, Edges) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::extended_eigenvalues_test

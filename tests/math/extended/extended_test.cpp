@@ -14,7 +14,7 @@
 // The types against sums without rounding. The bounds are a few units in the last place that a sum
 // of two (106 bits) or four doubles (212 bits) has: an error term or a product that is left out is
 // 2^53 larger than they are.
-namespace flyball::detail {
+namespace flyball::detail::extended_test {
 namespace {
 
 using Eigen::Index;
@@ -298,4 +298,4 @@ TEST(WideMatrix, KeepsEveryExponent) {
 }
 
 }  // namespace
-}  // namespace flyball::detail
+}  // namespace flyball::detail::extended_test

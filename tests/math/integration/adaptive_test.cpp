@@ -7,7 +7,7 @@
 #include <flyball/math/derivatives/differentiation.hpp>
 #include <flyball/math/integration/fixed_step.hpp>
 
-namespace flyball {
+namespace flyball::adaptive_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -321,4 +321,4 @@ TEST(AdaptiveIntegration, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::adaptive_test

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace flyball {
+namespace flyball::butcher_tableau_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -138,4 +138,4 @@ TEST(ButcherTableau, ResidualOfAnAlteredTableau) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::butcher_tableau_test

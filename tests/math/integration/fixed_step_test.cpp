@@ -6,7 +6,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::fixed_step_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -158,4 +158,4 @@ TEST(Integration, LinearRefusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::fixed_step_test

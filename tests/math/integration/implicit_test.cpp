@@ -6,7 +6,7 @@
 #include <flyball/math/derivatives/differentiation.hpp>
 #include <flyball/math/integration/fixed_step.hpp>
 
-namespace flyball {
+namespace flyball::implicit_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -106,4 +106,4 @@ TEST(ImplicitIntegration, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::implicit_test

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::quadrature_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -45,4 +45,4 @@ TEST(Quadrature, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::quadrature_test

@@ -9,7 +9,7 @@
 #include <flyball/math/probability/distributions.hpp>
 #include <flyball/math/probability/gaussian_vector.hpp>
 
-namespace flyball {
+namespace flyball::density_test {
 namespace {
 
 // Uniform on [a, b]: mean (a + b)/2, variance (b - a)²/12. Exponential of rate 2: 1/2, 1/4.
@@ -165,4 +165,4 @@ TEST(CentralLimitTheorem, MeansOfExponentialSamplesAreNearlyNormal) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::density_test

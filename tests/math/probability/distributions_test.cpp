@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::distributions_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -85,4 +85,4 @@ TEST(Distributions, WhatIsNoProbabilityIsNoNumber) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::distributions_test

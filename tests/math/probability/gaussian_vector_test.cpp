@@ -9,7 +9,7 @@
 #include <flyball/math/probability/density.hpp>
 #include <flyball/math/probability/distributions.hpp>
 
-namespace flyball {
+namespace flyball::gaussian_vector_test {
 namespace {
 
 using Eigen::Index;
@@ -291,4 +291,4 @@ TEST(GaussianVector, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::gaussian_vector_test

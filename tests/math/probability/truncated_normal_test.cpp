@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::truncated_normal_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -64,4 +64,4 @@ TEST(TruncatedNormal, WhatIsNoDistributionIsNoNumber) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::truncated_normal_test

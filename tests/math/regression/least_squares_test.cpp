@@ -9,7 +9,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/math/regression/bounded_least_squares.hpp>
 
-namespace flyball {
+namespace flyball::least_squares_test {
 namespace {
 
 using Eigen::Index;
@@ -297,4 +297,4 @@ TEST(BoundedLeastSquares, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::least_squares_test

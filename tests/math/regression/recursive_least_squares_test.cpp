@@ -10,7 +10,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::recursive_least_squares_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -135,4 +135,4 @@ TEST(RecursiveLeastSquares, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::recursive_least_squares_test

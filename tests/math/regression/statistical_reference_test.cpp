@@ -9,7 +9,7 @@
 
 // Statistical Reference Datasets of the National Institute of Standards and Technology, linear
 // regression: certified to 15 digits from computations with 500.
-namespace flyball {
+namespace flyball::statistical_reference_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -210,4 +210,4 @@ TEST(StatisticalReference, Filip) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::statistical_reference_test

@@ -9,7 +9,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::streamed_least_squares_test {
 namespace {
 
 using Eigen::Index;
@@ -125,4 +125,4 @@ TEST(StreamedLeastSquares, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::streamed_least_squares_test

@@ -9,7 +9,7 @@
 #include "math/matrices_json.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::care_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -166,4 +166,4 @@ TEST(Care, RefusesMisuse) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::care_test

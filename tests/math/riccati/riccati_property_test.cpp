@@ -8,7 +8,7 @@
 #include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::riccati_property_test {
 namespace {
 
 using Eigen::Index;
@@ -209,4 +209,4 @@ TEST(RiccatiProperties, Discrete) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::riccati_property_test

@@ -12,7 +12,7 @@
 #include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::riccati_test {
 namespace {
 
 using Eigen::Index;
@@ -373,4 +373,4 @@ TEST(Riccati, TwoStatesAgreeWithTheGeneralKernel) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::riccati_test

@@ -9,7 +9,7 @@
 #include "support/laws.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::riccati_units_test {
 namespace {
 
 using Eigen::Index;
@@ -322,4 +322,4 @@ TEST(RiccatiUnits, WhatIsLostIsRefused) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::riccati_units_test

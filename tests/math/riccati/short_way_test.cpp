@@ -10,7 +10,7 @@
 #include "math/riccati/riccati_kernel.hpp"
 #include "support/random_systems.hpp"
 
-namespace flyball {
+namespace flyball::short_way_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -189,4 +189,4 @@ TEST(ShortWay, HeatThatHasGone) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::short_way_test

@@ -8,7 +8,7 @@
 
 #include <flyball/core/random.hpp>
 
-namespace flyball {
+namespace flyball::minimum_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -69,4 +69,4 @@ TEST(FindMinimum, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::minimum_test

@@ -8,7 +8,7 @@
 
 #include <flyball/core/random.hpp>
 
-namespace flyball {
+namespace flyball::roots_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -90,4 +90,4 @@ TEST(FindRoot, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::roots_test

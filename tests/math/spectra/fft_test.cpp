@@ -10,7 +10,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::fft_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -120,4 +120,4 @@ TEST(Fft, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::fft_test

@@ -8,7 +8,7 @@
 
 #include <flyball/core/random.hpp>
 
-namespace flyball {
+namespace flyball::projection_test {
 namespace {
 
 using namespace flyball::literals;
@@ -197,4 +197,4 @@ TEST(Projections, Refuse) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::projection_test

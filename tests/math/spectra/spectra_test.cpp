@@ -9,7 +9,7 @@
 #include <flyball/math/spectra/fft.hpp>
 #include <flyball/math/spectra/welch.hpp>
 
-namespace flyball {
+namespace flyball::spectra_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -275,4 +275,4 @@ TEST(Excitation, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::spectra_test

@@ -7,7 +7,7 @@
 
 #include "math/verified/interval_tape.hpp"
 
-namespace flyball::detail {
+namespace flyball::detail::interval_tape_test {
 namespace {
 
 using expression::Operation;
@@ -87,4 +87,4 @@ TEST(IntervalTape, SquaresAndParameters) {
 }
 
 }  // namespace
-}  // namespace flyball::detail
+}  // namespace flyball::detail::interval_tape_test

@@ -8,7 +8,7 @@
 
 #include "math/verified/taylor_tape.hpp"
 
-namespace flyball::detail {
+namespace flyball::detail::taylor_tape_test {
 namespace {
 
 using expression::Operation;
@@ -93,4 +93,4 @@ TEST(TaylorTape, UpperBoundIsSharp) {
 }
 
 }  // namespace
-}  // namespace flyball::detail
+}  // namespace flyball::detail::taylor_tape_test

@@ -6,7 +6,7 @@
 #include "math/verified/common_lyapunov.hpp"
 #include "math/verified/contraction.hpp"
 
-namespace flyball::detail {
+namespace flyball::detail::verified_test {
 namespace {
 
 using Random = std::mt19937_64;
@@ -218,4 +218,4 @@ TEST(CommonLyapunov, IsFoundIfThereIsOne) {
 }
 
 }  // namespace
-}  // namespace flyball::detail
+}  // namespace flyball::detail::verified_test

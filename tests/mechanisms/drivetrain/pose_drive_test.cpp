@@ -14,7 +14,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::pose_drive_test {
 namespace {
 
 using namespace flyball::literals;
@@ -278,4 +278,4 @@ TEST(PoseDrive, RefusesWhatIsNoDrive) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::pose_drive_test

@@ -14,7 +14,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::swerve_dynamics_test {
 namespace {
 
 using namespace flyball::literals;
@@ -293,4 +293,4 @@ TEST(SwerveDynamics, RefusesImpossibleRobots) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::swerve_dynamics_test

@@ -15,7 +15,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::wheeled_drive_test {
 namespace {
 
 using namespace flyball::literals;
@@ -382,4 +382,4 @@ TEST(WheeledDrive, RefusesImpossibleRobots) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::wheeled_drive_test

@@ -8,7 +8,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/mechanisms/kinematics/saturation.hpp>
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::chassis_accelerations_test {
 namespace {
 
 using namespace flyball::literals;
@@ -134,4 +134,4 @@ TEST(ChassisAccelerations, OfFixedWheels) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::chassis_accelerations_test

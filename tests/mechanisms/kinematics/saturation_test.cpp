@@ -11,7 +11,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::saturation_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -211,4 +211,4 @@ TEST(Saturated, IsWithinTheLimitWhateverComes) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::saturation_test

@@ -9,7 +9,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::swerve_kinematics_test {
 namespace {
 
 using Four = std::array<Eigen::Vector2d, 4>;
@@ -143,4 +143,4 @@ TEST(SwerveKinematics, AllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::swerve_kinematics_test

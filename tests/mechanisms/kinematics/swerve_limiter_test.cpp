@@ -10,7 +10,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::swerve_limiter_test {
 namespace {
 
 using namespace flyball::literals;
@@ -380,4 +380,4 @@ TEST(SwerveLimiter, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::swerve_limiter_test

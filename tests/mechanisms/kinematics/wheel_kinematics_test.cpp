@@ -11,7 +11,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::wheel_kinematics_test {
 namespace {
 
 using namespace flyball::literals;
@@ -189,4 +189,4 @@ TEST(WheelKinematics, AllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::wheel_kinematics_test

@@ -15,7 +15,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::lagrangian_model_test {
 namespace {
 
 using namespace flyball::literals;
@@ -222,4 +222,4 @@ TEST(LagrangianModel, Errors) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::lagrangian_model_test

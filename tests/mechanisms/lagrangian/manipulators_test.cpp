@@ -18,7 +18,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::manipulators_test {
 namespace {
 
 using namespace flyball::literals;
@@ -276,4 +276,4 @@ TEST(UndampedPendulums, KeepTheirEnergy) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::manipulators_test

@@ -15,7 +15,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::lift_test {
 namespace {
 
 using namespace flyball::literals;
@@ -278,4 +278,4 @@ TEST(CascadeElevator, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::lift_test

@@ -12,7 +12,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::metered_test {
 namespace {
 
 using namespace flyball::literals;
@@ -134,4 +134,4 @@ TEST(Metered, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::metered_test

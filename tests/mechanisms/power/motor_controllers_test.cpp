@@ -12,7 +12,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::motor_controllers_test {
 namespace {
 
 using namespace flyball::literals;
@@ -120,4 +120,4 @@ TEST(MotorControllers, AreFiniteAndAllocateNothing) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::motor_controllers_test

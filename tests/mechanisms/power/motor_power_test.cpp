@@ -8,7 +8,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/mechanisms/current_limit.hpp>
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::motor_power_test {
 namespace {
 
 // A CIM at 12 V: at free speed nothing comes out of it and I_free is drawn; stalled all is heat.
@@ -102,4 +102,4 @@ TEST(PeakCurrentLimit, LetsAPeakPass) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::motor_power_test

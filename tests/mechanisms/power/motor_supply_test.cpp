@@ -10,7 +10,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball::mechanisms {
+namespace flyball::mechanisms::motor_supply_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -196,4 +196,4 @@ TEST(Brownout, HoldsOffUntilTheBatteryHasRecovered) {
 }
 
 }  // namespace
-}  // namespace flyball::mechanisms
+}  // namespace flyball::mechanisms::motor_supply_test

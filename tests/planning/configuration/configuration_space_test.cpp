@@ -10,7 +10,7 @@
 
 #include "planning/configuration/scenes.hpp"
 
-namespace flyball {
+namespace flyball::configuration_space_test {
 namespace {
 
 using test::random_configuration;
@@ -328,4 +328,4 @@ TEST(ConfigurationSpace, WhatCannotBeASpaceIsRefused) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::configuration_space_test

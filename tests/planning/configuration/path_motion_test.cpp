@@ -8,7 +8,7 @@
 
 #include "planning/configuration/scenes.hpp"
 
-namespace flyball {
+namespace flyball::path_motion_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -156,4 +156,4 @@ TEST(PathMotion, WhatCannotBeTimedIsRefused) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::path_motion_test

@@ -10,7 +10,7 @@
 
 #include "planning/configuration/scenes.hpp"
 
-namespace flyball {
+namespace flyball::path_planner_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -364,4 +364,4 @@ TEST(PathPlanner, KeepsWhatBoxesProve) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::path_planner_test

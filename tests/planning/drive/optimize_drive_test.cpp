@@ -10,6 +10,7 @@
 
 #include <flyball/core/random.hpp>
 
+namespace optimize_drive_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -427,3 +428,4 @@ TEST(OptimizeDrive, CanBeStoppedAndWatched) {
 }
 
 }  // namespace
+}  // namespace optimize_drive_test

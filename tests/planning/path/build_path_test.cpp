@@ -7,7 +7,7 @@
 
 #include <flyball/core/random.hpp>
 
-namespace flyball {
+namespace flyball::build_path_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -200,4 +200,4 @@ TEST(BuildPath, RefusesBadPoints) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::build_path_test

@@ -8,7 +8,7 @@
 #include <flyball/core/random.hpp>
 #include <flyball/planning/path/build_path.hpp>
 
-namespace flyball {
+namespace flyball::edit_path_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -138,4 +138,4 @@ TEST(EditPath, CornersAndCusps) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::edit_path_test

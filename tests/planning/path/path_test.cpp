@@ -11,7 +11,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::path_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -169,4 +169,4 @@ TEST(Path, RefusesWhatIsNone) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::path_test

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flyball {
+namespace flyball::generate_trapezoid_profile_test {
 namespace {
 
 // Figure 15.1: max_v 7, 2 s to it, 50 m, at 50 ms; a = 3.5, cruise ends at 50/7 s, end 9.142857 s.
@@ -68,4 +68,4 @@ TEST(GenerateTrapezoidProfile, RefusesWhatMakesNoProfile) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::generate_trapezoid_profile_test

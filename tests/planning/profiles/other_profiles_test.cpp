@@ -13,7 +13,7 @@
 #include "planning/profiles/profile_laws.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::other_profiles_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -305,4 +305,4 @@ TEST(OtherProfiles, AllocateNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::other_profiles_test

@@ -15,7 +15,7 @@
 #include <flyball/planning/profiles/s_curve_profile.hpp>
 #include <flyball/planning/profiles/trapezoid_profile.hpp>
 
-namespace flyball {
+namespace flyball::profile_edges_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -188,4 +188,4 @@ TEST(ProfileEdges, NoLimitOfTheVelocity) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::profile_edges_test

@@ -10,7 +10,7 @@
 #include <flyball/planning/profiles/s_curve_profile.hpp>
 #include <flyball/planning/profiles/trapezoid_profile.hpp>
 
-namespace flyball {
+namespace flyball::profile_selection_test {
 namespace {
 
 const MotionLimits limits{.velocity = 1.5, .acceleration = 3.0};
@@ -129,4 +129,4 @@ TEST(GenerateSCurveProfile, RefusesWhatMakesNoProfile) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::profile_selection_test

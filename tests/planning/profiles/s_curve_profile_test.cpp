@@ -12,7 +12,7 @@
 #include "planning/profiles/profile_laws.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::s_curve_profile_test {
 namespace {
 
 // The book's Figure 15.2: v 7, a 3.5 within 1 s, over 50. T = d/v + v/a + a/j.
@@ -338,4 +338,4 @@ TEST(SCurveProfile, AllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::s_curve_profile_test

@@ -11,7 +11,7 @@
 #include "planning/profiles/profile_laws.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::synchronized_motion_test {
 namespace {
 
 using Three = SynchronizedMotion<3>;
@@ -171,4 +171,4 @@ TEST(SynchronizedMotion, AllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::synchronized_motion_test

@@ -12,7 +12,7 @@
 #include "planning/profiles/profile_laws.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::trapezoid_profile_test {
 namespace {
 
 // Rest to rest over 50 with v 7, a 3.5: 2 s up, 5.142857 s cruise, 2 s down.
@@ -180,4 +180,4 @@ TEST(TrapezoidProfile, AllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::trapezoid_profile_test

@@ -8,7 +8,7 @@
 
 #include <flyball/core/random.hpp>
 
-namespace flyball {
+namespace flyball::spline_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -163,4 +163,4 @@ TEST(Spline, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::spline_test

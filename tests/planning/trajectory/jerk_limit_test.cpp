@@ -10,7 +10,7 @@
 #include <flyball/planning/profiles/s_curve_profile.hpp>
 #include <flyball/planning/trajectory/path_trajectory.hpp>
 
-namespace flyball {
+namespace flyball::jerk_limit_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -266,4 +266,4 @@ TEST(JerkLimit, RefusesWhatIsNoLimit) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::jerk_limit_test

@@ -12,7 +12,7 @@
 #include "planning/trajectory/plain_reachability.hpp"
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::time_optimal_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -562,4 +562,4 @@ TEST(TimeOptimal, AsATrajectoryOfThePlane) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::time_optimal_test

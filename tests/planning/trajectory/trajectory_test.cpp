@@ -7,7 +7,7 @@
 
 #include "support/allocation_count.hpp"
 
-namespace flyball {
+namespace flyball::trajectory_test {
 namespace {
 
 std::vector<PathPoint> reference_path() {
@@ -154,4 +154,4 @@ TEST(TimePath, Refusals) {
 }
 
 }  // namespace
-}  // namespace flyball
+}  // namespace flyball::trajectory_test

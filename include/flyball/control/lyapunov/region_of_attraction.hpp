@@ -46,7 +46,7 @@ struct RegionOptions {
 };
 
 /// What ends a region.
-enum class RegionLimit {
+enum class AttractionLimit {
   rate,   ///< V does not fall at `limiting_state`.
   reach,  ///< It touches the reach that was given.
   work,   ///< The cells that were allowed.
@@ -61,7 +61,7 @@ struct CertifiedRegion {
   double core_rate = 0.0;
   double refuted = std::numeric_limits<double>::infinity();  ///< V of `limiting_state`.
   Eigen::VectorXd limiting_state{};  ///< n, where V does not fall; empty if none was found.
-  RegionLimit limit = RegionLimit::rate;
+  AttractionLimit limit = AttractionLimit::rate;
   int cells = 0;                       ///< That were looked at.
   std::vector<Eigen::Index> angles{};  ///< Of the loop.
 

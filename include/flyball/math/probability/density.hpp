@@ -6,6 +6,7 @@
 
 #include <flyball/core/argument.hpp>
 #include <flyball/core/function_ref.hpp>
+#include <flyball/math/probability/moments.hpp>
 
 /// Expectations of random variables: of densities by quadrature, and of data (sections 9.3.1 to
 /// 9.3.14).
@@ -20,12 +21,6 @@ using JointDensity = FunctionRef<double(double, double)>;
 struct Support {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
-};
-
-/// What a random variable is like on the whole.
-struct Moments {
-  double mean = 0.0;      ///< E[x].
-  double variance = 0.0;  ///< E[(x - E[x])²].
 };
 
 /// What two random variables are like together.

@@ -1,12 +1,8 @@
 #pragma once
 
-namespace flyball {
+#include <flyball/math/probability/moments.hpp>
 
-/// The mean and the variance of a distribution.
-struct Moments {
-  double mean = 0.0;
-  double variance = 0.0;
-};
+namespace flyball {
 
 /// Of a normal distribution that is cut off at two limits, N(mean, variance) given lower ≤ x ≤
 /// upper: E[x] and Var[x], to a relative 1e-12 also where the limits are a thousand deviations away
