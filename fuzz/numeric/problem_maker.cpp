@@ -403,7 +403,48 @@ class Maker {
 
 }  // namespace
 
+namespace {
+
+/// A motion along a curve: limits of its coordinates are there and positive, those of the way are
+/// positive, most of the time; what is asked of others is that they are refused.
+json timing_problem(const solve::Kind& kind, Choices& choices) {
+  static constexpr std::string_view coordinates[] = {"velocity", "acceleration"};
+  static constexpr std::string_view ends[] = {"start_velocity", "end_velocity", "slow",
+                                              "tolerance"};
+  static constexpr std::string_view of_the_way[] = {
+      "travel_velocity",    "travel_acceleration", "centripetal",
+      "total_acceleration", "angular_velocity",    "angular_acceleration",
+      "start_velocity",     "end_velocity",        "tolerance"};
+  if (choices.once_in(8)) {
+    return Maker(choices).object(kind.fields);
+  }
+  const bool at_rest = choices.below(3) > 0;
+  json made = at_rest ? Maker(choices).object(kind.fields, coordinates, ends)
+                      : Maker(choices).object(kind.fields, coordinates);
+  const auto positive = [](const json& value) {
+    const double size = std::abs(value.get<double>());
+    return size > 0.0 ? size : 1.0;
+  };
+  for (const std::string_view name : coordinates) {
+    for (json& limit : made[std::string(name)]) {
+      limit = positive(limit);
+    }
+  }
+  for (const std::string_view name : of_the_way) {
+    if (const auto limit = made.find(name); limit != made.end()) {
+      *limit = positive(*limit);
+    }
+  }
+  made["samples"] = choices.one_of({2, 11, 51, 101, 201});
+  return made;
+}
+
+}  // namespace
+
 json make_problem(const solve::Kind& kind, Choices& choices) {
+  if (kind.name == "path-parameterization") {
+    return timing_problem(kind, choices);
+  }
   if (kind.name == "mu") {
     static constexpr std::string_view constant[] = {"M"};
     static constexpr std::string_view parts[] = {"M", "M_imag"};
