@@ -409,12 +409,14 @@ namespace {
 /// positive, most of the time; what is asked of others is that they are refused.
 json timing_problem(const solve::Kind& kind, Choices& choices) {
   static constexpr std::string_view coordinates[] = {"velocity", "acceleration"};
+  static constexpr std::string_view of_coordinates[] = {"velocity", "acceleration", "jerk"};
   static constexpr std::string_view ends[] = {"start_velocity", "end_velocity", "slow",
                                               "tolerance"};
-  static constexpr std::string_view of_the_way[] = {
-      "travel_velocity",    "travel_acceleration", "centripetal",
-      "total_acceleration", "angular_velocity",    "angular_acceleration",
-      "start_velocity",     "end_velocity",        "tolerance"};
+  static constexpr std::string_view of_the_way[] = {"travel_velocity",  "travel_acceleration",
+                                                    "centripetal",      "total_acceleration",
+                                                    "angular_velocity", "angular_acceleration",
+                                                    "travel_jerk",      "start_velocity",
+                                                    "end_velocity",     "tolerance"};
   if (choices.once_in(8)) {
     return Maker(choices).object(kind.fields);
   }
@@ -425,9 +427,11 @@ json timing_problem(const solve::Kind& kind, Choices& choices) {
     const double size = std::abs(value.get<double>());
     return size > 0.0 ? size : 1.0;
   };
-  for (const std::string_view name : coordinates) {
-    for (json& limit : made[std::string(name)]) {
-      limit = positive(limit);
+  for (const std::string_view name : of_coordinates) {
+    if (const auto limits = made.find(name); limits != made.end()) {
+      for (json& limit : *limits) {
+        limit = positive(limit);
+      }
     }
   }
   for (const std::string_view name : of_the_way) {

@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
 #include <flyball/planning/path/build_path.hpp>
 #include <flyball/planning/trajectory/path_trajectory.hpp>
 
+#include "core/format.hpp"
 #include "core/try.hpp"
 #include "solve/paths.hpp"
 
@@ -58,6 +60,22 @@ Outcome solve_spline(const Problem& problem, JsonWriter& answer) {
     for (Index k = 1; k < c.cols(); ++k) {
       power /= piece.span;
       c.col(k) *= power;
+    }
+    // Σ c_k spanᵏ as it is answered: beside large spans the powers leave the range of doubles.
+    for (Index j = 0; j < c.rows(); ++j) {
+      double back = 0.0;
+      for (Index k = c.cols() - 1; k > 0; --k) {
+        back = (back + c(j, k)) * piece.span;
+      }
+      const auto moves = piece.coefficients.row(j).tail(c.cols() - 1);
+      constexpr double lost = 1e-12;
+      if (!(std::abs(back - moves.sum()) <=
+            lost * moves.cwiseAbs().sum() + std::numeric_limits<double>::min())) {
+        return refusal(ArgumentError::out_of_range, "spline", "a coefficient")
+            .got(detail::format("beyond the range of doubles, over a span of {:.4g}", piece.span))
+            .expected("coordinates whose sizes are not so far apart")
+            .hint("scale the larger coordinates, or space the knots uniformly");
+      }
     }
     coefficients.push_back(std::move(c));
   }

@@ -76,18 +76,30 @@ struct Knots {
 Expected<Knots> knots_of(const MatrixRef& waypoints, KnotSpacing spacing, std::string_view where) {
   FLYBALL_CHECK(check_points(waypoints, 2, where, "waypoints"));
   Knots knots{waypoints, {}};
-  const double extent = waypoints.cwiseAbs().maxCoeff();
+  const VectorXd extent = waypoints.cwiseAbs().rowwise().maxCoeff();
   Index count = 1;
+  double parameter = 0.0;
   for (Index i = 1; i < waypoints.cols(); ++i) {
-    const double d = (waypoints.col(i) - knots.points.col(count - 1)).stableNorm();
-    // Nearer than the coordinates' digits tell places apart is one place.
-    if (!(d > 1e-14 * extent)) {
+    const VectorXd way = waypoints.col(i) - knots.points.col(count - 1);
+    // Nearer than the digits of each coordinate tell places apart is one place.
+    if (!(way.array().abs() > 1e-14 * extent.array()).any()) {
       continue;
     }
+    const double d = way.stableNorm();
     knots.points.col(count++) = waypoints.col(i);
-    knots.spans.push_back(spacing == KnotSpacing::uniform ? 1.0
-                          : spacing == KnotSpacing::chord ? d
-                                                          : std::sqrt(d));
+    // The distance of the knots as doubles tell it: beside far larger ones it has few digits.
+    const double next = parameter + (spacing == KnotSpacing::uniform ? 1.0
+                                     : spacing == KnotSpacing::chord ? d
+                                                                     : std::sqrt(d));
+    if (!(next > parameter)) {
+      return refusal(ArgumentError::out_of_range, where, detail::format("waypoint {}", i + 1))
+          .got(detail::format("{:.4g} from the one before it", d))
+          .expected(
+              detail::format("a distance that doubles tell beside the {:.4g} before it", parameter))
+          .hint("space the knots uniformly, or scale the larger coordinates");
+    }
+    knots.spans.push_back(next - parameter);
+    parameter = next;
   }
   if (count < 2) {
     return refusal(ArgumentError::out_of_range, where, "waypoints")

@@ -17,6 +17,8 @@ constexpr std::string_view in_path_join = "Path::join";
 constexpr Eigen::Index most_columns = 21;
 /// Of the extent, between the end of a piece and the beginning of the next.
 constexpr double gap_tolerance = 1e-9;
+/// Of a piece, where such a gap is none.
+constexpr double rounding = 1e-12;
 
 int counted(const PathState& state, int along) noexcept {
   const int all = static_cast<int>(state.position.size());
@@ -64,7 +66,14 @@ Expected<Path> Path::join(std::vector<PathPiece> pieces) {
                       .positive(piece.span, detail::format("span {}", i + 1)));
     extent = std::max(extent, c.cwiseAbs().maxCoeff());
     travel = std::max(travel, c.cols() > 1 ? c.rightCols(c.cols() - 1).cwiseAbs().maxCoeff() : 0.0);
+    const double before = total;
     total += piece.span;
+    if (!(total > before)) {
+      return refusal(ArgumentError::out_of_range, where, detail::format("span {}", i + 1))
+          .got(format_number(piece.span))
+          .expected(detail::format("one that can be told beside {:.4g}, all before it", before))
+          .hint("space the knots uniformly, or scale what is larger");
+    }
   }
   if (!(travel > 0.0)) {
     return refusal(ArgumentError::out_of_range, in_path_join, "the path")
@@ -76,14 +85,22 @@ Expected<Path> Path::join(std::vector<PathPiece> pieces) {
   }
   for (std::size_t i = 1; i < pieces.size(); ++i) {
     const Eigen::VectorXd end = pieces[i - 1].coefficients.rowwise().sum();
-    const double gap = (pieces[i].coefficients.col(0) - end).cwiseAbs().maxCoeff();
+    auto begin = pieces[i].coefficients.col(0);
+    const double gap = (begin - end).cwiseAbs().maxCoeff();
     if (!(gap <= gap_tolerance * extent)) {
       return refusal(ArgumentError::out_of_range, in_path_join, detail::format("piece {}", i + 1))
           .got(detail::format("{:.4g} away from the end of the one before it", gap))
           .expected("one that begins there")
           .hint("move its first point, or join them by a line");
     }
-    pieces[i].coefficients.col(0) = end;
+    // Where a gap is rounding of this piece, too, there is none; rounding of a far longer one
+    // before it would move all that follows.
+    for (Eigen::Index j = 0; j < n; ++j) {
+      if (std::abs(end(j) - begin(j)) <=
+          rounding * pieces[i].coefficients.row(j).cwiseAbs().maxCoeff()) {
+        begin(j) = end(j);
+      }
+    }
   }
   return Path(std::move(pieces), static_cast<int>(n));
 }

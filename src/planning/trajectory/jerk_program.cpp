@@ -218,7 +218,7 @@ double JerkProgram::largest_share(const std::vector<double>& of,
   return share;
 }
 
-bool JerkProgram::solve(double gap) {
+bool JerkProgram::solve(double gap, double& work) {
   const std::size_t n = cells.size();
   const std::size_t rows = alpha_.size();
   slack_.resize(rows);
@@ -261,6 +261,10 @@ bool JerkProgram::solve(double gap) {
     }
     if (worst <= kept && sum <= gap * time && change <= gap * time) {
       return true;
+    }
+    work -= static_cast<double>(rows);
+    if (work < 0.0) {
+      return false;
     }
     assemble();
     if (!factor()) {

@@ -39,8 +39,10 @@ class JerkProgram {
   /// Interior-Point Methods", 1997, chapter 10). The normal matrix has two bands beside its
   /// diagonal.
   /// @param gap  How far the time may be from the least, relative.
-  /// @return Whether all rows are kept to. Cost: ten to forty passes over the rows.
-  [[nodiscard]] bool solve(double gap);
+  /// @param work  What is left of it, in rows of each step; less by what this takes.
+  /// @return Whether all rows are kept to; not where the work was not enough. Cost: ten to forty
+  /// passes over the rows.
+  [[nodiscard]] bool solve(double gap, double& work);
 
  private:
   using Symmetric = std::array<double, 6>;  ///< 00, 01, 02, 11, 12, 22

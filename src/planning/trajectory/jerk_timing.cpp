@@ -19,6 +19,8 @@ namespace flyball::detail {
 namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
+/// No finer mesh than of that many intervals is asked for.
+constexpr std::size_t most_cells = 3'000;
 
 /// The way s = j t³/6 from rest over a width w, or to rest: with y = j^{2/3} at its end
 ///
@@ -48,7 +50,12 @@ class JerkTiming {
  public:
   JerkTiming(const Path& path, CellRows& limits,
              const std::vector<std::unique_ptr<MotionLimit>>& all, const JerkEnds& ends)
-      : path_(path), limits_(limits), all_(all), jerks_(path, all), ends_(ends) {
+      : path_(path),
+        limits_(limits),
+        all_(all),
+        jerks_(path, all),
+        ends_(ends),
+        work_(7e6 + 5e5 * static_cast<double>(path.pieces().size())) {
     constexpr double finest = 5e-5;  // of the time: where rounding of the jerks is felt
     ends_.tolerance = std::max(ends_.tolerance, finest);
   }
@@ -70,7 +77,6 @@ class JerkTiming {
   /// @return Whether a motion was found that keeps to all limits.
   bool solve() {
     constexpr int most_meshes = 7;
-    constexpr std::size_t most_cells = 3'000;
     double best = infinite;
     std::vector<TimingCell> cells;
     std::vector<Bezier2> b;
@@ -426,7 +432,7 @@ class JerkTiming {
       bool solved = true;
       for (Segment& segment : segments_) {
         add_rows(segment);
-        solved = solved && segment.program.solve((round < 2 ? 0.2 : 0.02) * ends_.tolerance);
+        solved = solved && segment.program.solve((round < 2 ? 0.2 : 0.02) * ends_.tolerance, work_);
         for (std::size_t i = segment.begin; i < segment.end; ++i) {
           b_[i] = segment.program.points(i - segment.begin);
         }
@@ -482,7 +488,6 @@ class JerkTiming {
   bool cut(double time) {
     constexpr double most_parts = 4.0;
     constexpr double finest = 1e5;
-    bool any = false;
     const std::size_t n = cells_.size();
     std::vector<double> left(n);
     for (std::size_t i = 0; i < n; ++i) {
@@ -499,8 +504,9 @@ class JerkTiming {
       const bool fine = jerks_.rounding(cells_[i], i, b_[i]) > finest;
       parts[i] =
           fine ? 1 : 1 + static_cast<int>(std::min(most_parts - 1.0, std::sqrt(loss / of_each)));
-      any = any || parts[i] > 1;
     }
+    share_out(parts, 2 * most_cells);
+    const bool any = std::any_of(parts.begin(), parts.end(), [](int part) { return part > 1; });
     std::size_t at = 0;
     for (Segment& segment : segments_) {
       const std::size_t begin = at;
@@ -520,6 +526,7 @@ class JerkTiming {
   const std::vector<std::unique_ptr<MotionLimit>>& all_;
   JerkRows jerks_;
   JerkEnds ends_;
+  double work_;  ///< What is left of it, in rows of an interior point step.
   std::vector<TimingCell> cells_;
   std::vector<Bezier2> b_;
   std::vector<JerkRows::Values> about_;

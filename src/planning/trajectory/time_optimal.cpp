@@ -28,7 +28,13 @@ using detail::TimingRows;
 constexpr std::string_view in_time_optimal = "time_optimal";
 /// Into how many one is cut at most, each time.
 constexpr int most_parts = 8;
-constexpr std::size_t most_cells = 200'000;
+/// Intervals of a path in the end, at most, of `coarse` to begin with: what is left of the time
+/// falls with the square of their number. Twice what any of 340 motions of the tests and benchmarks
+/// takes; limits that no number of intervals uses up (of 1e-300 beside 1) would take all there are.
+std::size_t most_intervals(std::size_t coarse, double tolerance) {
+  return static_cast<std::size_t>((2'000.0 + 30.0 * static_cast<double>(coarse)) *
+                                  std::sqrt(TimingOptions{}.tolerance / tolerance));
+}
 
 /// @errors ArgumentError::out_of_range where nothing limits the velocity.
 Expected<void> check_limited(const Path& path, const std::vector<TimingCell>& cells,
@@ -58,7 +64,8 @@ class Timing {
         cells(std::move(coarse)),
         first_(first),
         last_(last),
-        tolerance_(tolerance) {}
+        tolerance_(tolerance),
+        most_cells_(most_intervals(cells.size(), std::min(tolerance, TimingOptions{}.tolerance))) {}
 
   /// @errors ArgumentError::out_of_range where nothing limits the velocity, or where limits that
   /// jump are not kept to.
@@ -72,7 +79,7 @@ class Timing {
     }
     bool again = true;  // a cut was not as fine as asked for
     bool slow = false;
-    for (int round = 0; round < most_refinements && cells.size() < most_cells; ++round) {
+    for (int round = 0; round < most_refinements && cells.size() < most_cells_; ++round) {
       if (round > 0 && !again && tolerance_ >= one_round) {
         break;
       }
@@ -109,7 +116,7 @@ class Timing {
         return {};
       }
       // Polynomials that are far off ask for shorter intervals, the others for some room.
-      if (round < most_cuts && cells.size() < most_cells &&
+      if (round < most_cuts && cells.size() < most_cells_ &&
           *std::max_element(off_.begin(), off_.end()) > far_off) {
         cut([&](std::size_t i) { return off_[i] > far_off ? std::sqrt(off_[i] / far_off) : 0.0; });
       }
@@ -138,7 +145,8 @@ class Timing {
     detail::pass_back(cells, rows, last_, passes);
     detail::pass_forward(cells, rows, first_, passes);
   }
-  /// Each interval into one part and as many more as `more` says, up to `most_parts`.
+  /// Each interval into one part and as many more as `more` says, up to `most_parts`, and of all no
+  /// more than there may be: then each into a share of what it asks for.
   /// @return The most that it says.
   template <class More>
   double cut(const More& more) {
@@ -149,6 +157,7 @@ class Timing {
       most = std::max(most, wanted);
       parts[i] = 1 + static_cast<int>(std::min<double>(most_parts - 1, wanted));
     }
+    detail::share_out(parts, most_cells_);
     std::vector<Bezier2> motion;
     if (limits_.is_put_about()) {
       motion = passes.b;
@@ -170,6 +179,7 @@ class Timing {
   double first_;
   double last_;
   double tolerance_;
+  std::size_t most_cells_;
   std::vector<double> off_;
 };
 

@@ -133,6 +133,21 @@ Bezier2 part_of(const Bezier2& b, double from, double to) noexcept {
   return {blossom(from, from), blossom(from, to), blossom(to, to)};
 }
 
+void share_out(std::vector<int>& parts, std::size_t most) {
+  std::size_t more = 0;
+  for (const int part : parts) {
+    more += static_cast<std::size_t>(part - 1);
+  }
+  if (parts.size() + more <= most) {
+    return;
+  }
+  const double allowed = most > parts.size() ? static_cast<double>(most - parts.size()) : 0.0;
+  const double share = allowed / static_cast<double>(more);
+  for (int& part : parts) {
+    part = 1 + static_cast<int>(share * (part - 1));
+  }
+}
+
 void refine(std::vector<TimingCell>& cells, std::vector<Bezier2>& motion,
             const std::vector<int>& parts) {
   std::vector<TimingCell> finer;

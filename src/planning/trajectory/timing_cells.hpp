@@ -34,6 +34,9 @@ struct JointRules {
 /// The part of a parabola between two shares of its interval.
 [[nodiscard]] Bezier2 part_of(const Bezier2& b, double from, double to) noexcept;
 
+/// Parts of intervals, made fewer in one proportion where they are more than `most` in all.
+void share_out(std::vector<int>& parts, std::size_t most);
+
 /// Intervals cut into parts, and a motion on them.
 void refine(std::vector<TimingCell>& cells, std::vector<Bezier2>& motion,
             const std::vector<int>& parts);

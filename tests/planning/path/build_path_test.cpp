@@ -92,6 +92,27 @@ TEST(BuildPath, WaypointsThatCoincideOrLineUp) {
   }
 }
 
+// Each coordinate has units of its own: a place that is nothing beside another coordinate's is one,
+// and what rounding leaves at the end of a far piece does not move the pieces after it.
+TEST(BuildPath, NoCoordinateHidesTheOthers) {
+  const MatrixXd hidden{{-1e154, 1.5, -1.25, 1.75}, {0.5, 0.25, 1.0, -2.0}};
+  const Path uniform = natural_cubic_path(hidden, KnotSpacing::uniform).value();
+  ASSERT_EQ(uniform.pieces().size(), 3u);
+  EXPECT_NEAR(uniform.position(3.0)(1), -2.0, 1e-15);
+  EXPECT_NEAR(uniform.position(2.0)(1), 1.0, 1e-15);
+  // By their distances the last knots cannot be told from the first.
+  const auto chord = natural_cubic_path(hidden, KnotSpacing::chord);
+  ASSERT_FALSE(chord);
+  EXPECT_TRUE(chord.error().is(ArgumentError::out_of_range));
+  EXPECT_NE(to_string(chord.error()).find("waypoint 3 is "), std::string::npos)
+      << to_string(chord.error());
+
+  const MatrixXd far{{-1e20, 0.0, 0.0}, {-1.25, 1e8, -1e-20}};
+  const Path back = natural_cubic_path(far, KnotSpacing::centripetal).value();
+  const MatrixXd& last = back.pieces().back().coefficients;
+  EXPECT_LE(std::abs(last.row(0).sum()), 1e-12 * last.row(0).cwiseAbs().sum());
+}
+
 TEST(BuildPath, HermitePolynomialsMeetTheirEnds) {
   Random random(2);
   const MatrixXd p = random_points(random, 2, 4);
