@@ -10,6 +10,7 @@
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "systems/algebraic_loop.hpp"
 #include "systems/balance.hpp"
 
 namespace flyball::classical {
@@ -44,24 +45,10 @@ Expected<void> check_count(Index got, Index expected, std::string_view where,
 
 Expected<MatrixXd> solve_loop(const MatrixXd& L, const MatrixXd& R, std::string_view where,
                               std::string_view subject) {
-  const Index m = L.rows();
-  if (L.isZero(0.0)) {
-    return R;
-  }
-  const VectorXd d = flyball::detail::balance_of(L);
-  const MatrixXd units = d.cwiseInverse().asDiagonal() * L * d.asDiagonal();
-  double rcond = 0.0;
-  MatrixXd solved =
-      d.asDiagonal() * flyball::detail::solve_linear(MatrixXd::Identity(m, m) - units,
-                                                     d.cwiseInverse().asDiagonal() * R, &rcond);
-  if (!(rcond > 10.0 * std::numeric_limits<double>::epsilon()) || !solved.allFinite()) {
-    return refusal(SystemError::algebraic_loop, where, subject)
-        .got("singular")
-        .expected("invertible")
-        .hint("give one of the paths dynamics or dead time: no loop acts instantly")
-        .with("reciprocal condition", rcond);
-  }
-  return solved;
+  return flyball::detail::solve_algebraic_loop(
+      {L, MatrixXd(), -1.0, subject,
+       "give one of the paths dynamics or dead time: no loop acts instantly"},
+      R, where);
 }
 
 }  // namespace detail

@@ -16,6 +16,7 @@
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/spectral_norm.hpp"
+#include "systems/algebraic_loop.hpp"
 
 namespace flyball::classical {
 
@@ -23,6 +24,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 
 namespace {
+
+constexpr std::string_view no_output =
+    "take a path that acts instantly out of it: no output satisfies it at infinite frequency";
 
 /// The same system with other matrices.
 template <class System>
@@ -43,18 +47,13 @@ template <class System>
 Expected<System> closed(const System& loop, double of_error, double of_output,
                         std::string_view where) {
   const Index m = loop.B.cols();
-  double rcond = 0.0;
   const MatrixXd one = MatrixXd::Identity(m, m);
   // e = (I + D)⁻¹(r - C x)
   MatrixXd right(m, m + loop.A.rows());
   right << one, loop.C;
-  const MatrixXd solved = flyball::detail::solve_linear(one + loop.D, right, &rcond);
-  if (!(rcond > 1e-15) || !solved.allFinite()) {
-    return refusal(SystemError::algebraic_loop, where, "I + D")
-        .got("singular")
-        .expected("invertible: no output satisfies the loop at infinite frequency")
-        .with("reciprocal condition", rcond);
-  }
+  FLYBALL_TRY(const MatrixXd solved,
+              flyball::detail::solve_algebraic_loop({loop.D, MatrixXd(), 1.0, "I + D", no_output},
+                                                    right, where));
   const MatrixXd M = solved.leftCols(m);
   const MatrixXd MC = solved.rightCols(loop.A.rows());
   using flyball::detail::product;
@@ -98,18 +97,16 @@ Expected<System> opened_at(const System& loop, Index channel, std::string_view w
   }
   const Index rest = m - 1;
   const Index n = loop.A.rows();
-  double rcond = 0.0;
   // e₂ = -(I + D₂₂)⁻¹(C₂ x + D₂₁ e₁)
   MatrixXd right(rest, n + 1);
   right << C.bottomRows(rest), D.bottomLeftCorner(rest, 1);
-  const MatrixXd solved = flyball::detail::solve_linear(
-      MatrixXd::Identity(rest, rest) + D.bottomRightCorner(rest, rest), right, &rcond);
-  if (!(rcond > 1e-15) || !solved.allFinite()) {
-    return refusal(SystemError::algebraic_loop, where, "I + D without one channel")
-        .got("singular")
-        .expected("invertible")
-        .with("channel", static_cast<double>(channel));
+  auto opened = flyball::detail::solve_algebraic_loop(
+      {D.bottomRightCorner(rest, rest), MatrixXd(), 1.0, "I + D without one channel", no_output},
+      right, where);
+  if (!opened) {
+    return tl::unexpected(std::move(opened).error().with("channel", static_cast<double>(channel)));
   }
+  const MatrixXd& solved = *opened;
   using flyball::detail::product;
   const MatrixXd by_x = solved.leftCols(n);
   const MatrixXd by_e = solved.rightCols(1);

@@ -2,11 +2,11 @@
 
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <string>
 
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "systems/algebraic_loop.hpp"
 #include "systems/balance.hpp"
 #include "systems/timed.hpp"
 
@@ -97,18 +97,12 @@ Expected<Continuous> connect_feedback(const Continuous& forward, const Continuou
   const Index k = back.A.rows();
   const Index m = forward.B.cols();
   // e = u - s y₂ and y₂ = C₂x₂ + D₂(C₁x₁ + D₁e): (I + s D₂D₁) e = u - s (C₂x₂ + D₂C₁x₁).
-  const MatrixXd loop = MatrixXd::Identity(m, m) + s * product(back.D, forward.D);
   MatrixXd right(m, n + k + m);
   right << -s * product(back.D, forward.C), -s * back.C, MatrixXd::Identity(m, m);
-  double rcond = 0.0;
-  const MatrixXd e = detail::solve_linear(loop, right, &rcond);
-  if (!(rcond > 10.0 * std::numeric_limits<double>::epsilon()) || !e.allFinite()) {
-    return refusal(SystemError::algebraic_loop, where, s > 0.0 ? "I + D1 D2" : "I - D1 D2")
-        .got("singular")
-        .expected("invertible")
-        .hint("give one of the paths dynamics: no loop acts instantly")
-        .with("reciprocal condition", rcond);
-  }
+  FLYBALL_TRY(const MatrixXd e, detail::solve_algebraic_loop(
+                                    {back.D, forward.D, s, s > 0.0 ? "I + D1 D2" : "I - D1 D2",
+                                     "give one of the paths dynamics: no loop acts instantly"},
+                                    right, where));
   Continuous loop_system;
   const MatrixXd y_x1 = forward.C + product(forward.D, e.leftCols(n));
   const MatrixXd y_x2 = product(forward.D, e.middleCols(n, k));

@@ -196,6 +196,51 @@ TEST(Interconnection, StaticGains) {
   EXPECT_EQ(minimal_realization(gain(2.0)).value().system.D(0, 0), 2.0);
 }
 
+// Whether a loop is algebraic does not hang on the units of its signals: with y' = S y and u' = W u
+// the loop matrix is W(I + D₂D₁)W⁻¹, and what closes it, in those units, stays the same.
+TEST(Interconnection, AlgebraicLoopsDoNotDependOnUnits) {
+  const auto gain = [](const MatrixXd& D) {
+    return ContinuousSystem<>{MatrixXd(0, 0), MatrixXd(0, D.cols()), MatrixXd(D.rows(), 0), D};
+  };
+  Random random(10);
+  for (int trial = 0; trial < 400; ++trial) {
+    const Eigen::Index m = 1 + trial % 5;
+    const Eigen::Index p = 1 + trial / 3 % 4;
+    MatrixXd first = test::random_matrix(random, p, m);
+    MatrixXd second = test::random_matrix(random, m, p);
+    const bool singular = trial % 2 == 1;
+    if (singular) {
+      // second first v = -v for v = (1, …, 1)
+      const Eigen::VectorXd v = Eigen::VectorXd::Ones(m);
+      const Eigen::VectorXd w = first * v;
+      second -= (second * w + v) * w.transpose() / w.squaredNorm();
+    }
+    const auto plain = feedback(gain(first), gain(second));
+    ASSERT_EQ(plain.has_value(), !singular) << trial;
+    const auto units = [&](Eigen::Index n) {
+      return Eigen::VectorXd::NullaryExpr(
+                 n, [&] { return std::pow(10.0, random.uniform(-100.0, 100.0)); })
+          .eval();
+    };
+    const Eigen::VectorXd S = units(p);
+    const Eigen::VectorXd W = units(m);
+    const MatrixXd first_in_units = S.asDiagonal() * first * W.cwiseInverse().asDiagonal();
+    const MatrixXd second_in_units = W.asDiagonal() * second * S.cwiseInverse().asDiagonal();
+    const auto scaled = feedback(gain(first_in_units), gain(second_in_units));
+    ASSERT_EQ(scaled.has_value(), !singular) << trial;
+    if (scaled) {
+      const MatrixXd back = S.cwiseInverse().asDiagonal() * scaled->D * W.asDiagonal();
+      EXPECT_LT((back - plain->D).norm(), 1e-12 * plain->D.norm()) << trial;
+    } else {
+      EXPECT_TRUE(scaled.error().is(SystemError::algebraic_loop));
+    }
+  }
+  // A large gain beside a small one is no reason either, nor is one that leads on and not around.
+  EXPECT_TRUE(feedback(gain(MatrixXd{{1e20, 0.0}, {0.0, 1.0}})).has_value());
+  EXPECT_TRUE(feedback(gain(MatrixXd{{1.0, 1e30}, {0.0, 1.0}})).has_value());
+  EXPECT_FALSE(feedback(gain(MatrixXd{{1e20, 0.0}, {0.0, -1.0}})).has_value());
+}
+
 // A wrong shape is told with the matrix that it has to fit.
 TEST(Interconnection, ShapesNameWhatTheyFollowFrom) {
   ContinuousSystem<> G{MatrixXd::Zero(2, 2), MatrixXd::Zero(3, 1), MatrixXd::Zero(1, 2),

@@ -8,6 +8,7 @@
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "systems/algebraic_loop.hpp"
 
 namespace flyball {
 
@@ -150,16 +151,12 @@ Expected<Continuous> closed(const Partition& P, const Continuous& K, std::string
   const Index m2 = P.B2.cols();
   const Index q = K.A.rows();
   // u = (I - D_K D₂₂)⁻¹ (D_K C₂ x + C_K x_K + D_K D₂₁ w).
-  double rcond = 0.0;
   MatrixXd right(m2, P.n + q + P.D21.cols());
   right << product(K.D, P.C2), K.C, product(K.D, P.D21);
-  const MatrixXd U = solve_linear(MatrixXd::Identity(m2, m2) - product(K.D, P.D22), right, &rcond);
-  if (!(rcond > 1e-14) || !U.allFinite()) {
-    return refusal(SystemError::algebraic_loop, where, "I - D22 D_K")
-        .got("singular")
-        .expected("invertible")
-        .with("reciprocal condition", rcond);
-  }
+  FLYBALL_TRY(const MatrixXd U,
+              solve_algebraic_loop(
+                  {K.D, P.D22, -1.0, "I - D22 D_K", "give the path from u to y a little dynamics"},
+                  right, where));
   MatrixXd Y(P.C2.rows(), right.cols());
   Y << P.C2, MatrixXd::Zero(P.C2.rows(), q), P.D21;
   Y += product(P.D22, U);

@@ -11,6 +11,7 @@
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/pair_scaling.hpp"
+#include "systems/algebraic_loop.hpp"
 
 namespace flyball {
 
@@ -193,17 +194,12 @@ Expected<ContinuousSystem<>> denormalized(const NormalizedPlant& plant, const Co
   const MatrixXd D = product(plant.controls, product(K.D, plant.measurements));
   // u = C q + D (y - D₂₂u).
   const Index m = D.rows();
-  double rcond = 0.0;
   MatrixXd right(m, C.cols() + D.cols());
   right << C, D;
-  const MatrixXd U = solve_linear(MatrixXd::Identity(m, m) + product(D, plant.D22), right, &rcond);
-  if (!(rcond > 1e-14) || !U.allFinite()) {
-    return refusal(SystemError::algebraic_loop, where, "I + D_K D22")
-        .got("singular")
-        .expected("invertible")
-        .hint("give the path from u to y a little dynamics")
-        .with("reciprocal condition", rcond);
-  }
+  FLYBALL_TRY(const MatrixXd U,
+              solve_algebraic_loop(
+                  {D, plant.D22, 1.0, "I + D_K D22", "give the path from u to y a little dynamics"},
+                  right, where));
   const MatrixXd late = product(B, product(plant.D22, U));
   return ContinuousSystem<>{K.A - late.leftCols(C.cols()), B - late.rightCols(D.cols()),
                             U.leftCols(C.cols()), U.rightCols(D.cols())};
