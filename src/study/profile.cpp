@@ -11,6 +11,7 @@
 #include <flyball/planning/profiles/parabolic_profile.hpp>
 
 #include "core/try.hpp"
+#include "study/profile_parts.hpp"
 
 namespace flyball::study {
 
@@ -86,10 +87,6 @@ Expected<MotionLimits> limits_of(const ProfileJob& job,
   return limits;
 }
 
-double default_ramp(const MotionLimits& limits) {
-  return 0.25 * limits.velocity / limits.acceleration;
-}
-
 /// Each period, then the end.
 template <MotionProfile Profile>
 Expected<void> tabulate(const Profile& profile, ProfileResult& result) {
@@ -103,29 +100,33 @@ Expected<void> tabulate(const Profile& profile, ProfileResult& result) {
         .hint("raise the limits or --period");
   }
   result.duration = end;
-  std::vector<double> time;
-  std::vector<double> x;
-  std::vector<double> v;
-  std::vector<double> a;
-  const auto add = [&](double t) {
-    const MotionState at = profile.sample(t);
-    time.push_back(t);
-    x.push_back(at.position);
-    v.push_back(at.velocity);
-    a.push_back(at.acceleration);
-    result.peak_velocity = std::max(result.peak_velocity, std::abs(at.velocity));
-    result.peak_acceleration = std::max(result.peak_acceleration, std::abs(at.acceleration));
+  const auto series = [&](std::vector<double> time) -> Expected<TimeSeries> {
+    std::vector<double> x;
+    std::vector<double> v;
+    std::vector<double> a;
+    for (const double t : time) {
+      const MotionState at = profile.sample(t);
+      x.push_back(at.position);
+      v.push_back(at.velocity);
+      a.push_back(at.acceleration);
+      result.peak_velocity = std::max(result.peak_velocity, std::abs(at.velocity));
+      result.peak_acceleration = std::max(result.peak_acceleration, std::abs(at.acceleration));
+    }
+    TimeSeries table(std::move(time));
+    FLYBALL_CHECK(table.add("position", result.unit, std::move(x)));
+    FLYBALL_CHECK(table.add("velocity", result.unit + "/s", std::move(v)));
+    FLYBALL_CHECK(table.add("acceleration", result.unit + "/s²", std::move(a)));
+    return table;
   };
+  std::vector<double> time;
   const auto rows = static_cast<long>(end / period * (1.0 - 1e-12));
   for (long k = 0; k <= rows; ++k) {
-    add(static_cast<double>(k) * period);
+    time.push_back(static_cast<double>(k) * period);
   }
-  add(end);
-  TimeSeries table(std::move(time));
-  FLYBALL_CHECK(table.add("position", result.unit, std::move(x)));
-  FLYBALL_CHECK(table.add("velocity", result.unit + "/s", std::move(v)));
-  FLYBALL_CHECK(table.add("acceleration", result.unit + "/s²", std::move(a)));
-  result.table = std::move(table);
+  time.push_back(end);
+  FLYBALL_TRY(result.table, series(std::move(time)));
+  result.changes = changes_of(profile);
+  FLYBALL_TRY(result.curve, series(drawn_times(result.changes, end)));
   return {};
 }
 

@@ -2,7 +2,11 @@
 #include <algorithm>
 #include <array>
 
-#include <flyball/study/profile.hpp>
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <flyball/io/file.hpp>
+#include <flyball/study/axes.hpp>
 
 #include "study/field.hpp"
 #include "study/toml_document.hpp"
@@ -14,12 +18,12 @@ namespace {
 using enum Dimension;
 using enum Range;
 
-constexpr FieldDimension in_place = FieldDimension::output;
+constexpr FieldDimension place = FieldDimension::output;
 constexpr FieldDimension rate = FieldDimension::rate;
 constexpr FieldDimension change = FieldDimension::acceleration;
 constexpr const char* per_si = "NUMBER";
 
-const std::array profile_rows{
+const std::array rows{
     text("kind", at<&ProfileJob::kind>(), "\"s-curve\"", "The profile")
         .takes("KIND")
         .one_of("trapezoid, s-curve, exponential, parabolic, stepper, minimum-jerk")
@@ -28,11 +32,11 @@ const std::array profile_rows{
         .without("false: lengths"),
     flag("continuous", at<&ProfileJob::continuous>(), "true", "It may go either way round a circle")
         .without("false"),
-    quantity("from", at<&ProfileJob::from, &MotionState::position>(), in_place, any, "\"0.2 m\"",
+    quantity("from", at<&ProfileJob::from, &MotionState::position>(), place, any, "\"0.2 m\"",
              "Where it is")
         .takes("POSITION")
         .without("0"),
-    quantity("to", at<&ProfileJob::to, &MotionState::position>(), in_place, any, "\"1.4 m\"",
+    quantity("to", at<&ProfileJob::to, &MotionState::position>(), place, any, "\"1.4 m\"",
              "Where it is to be")
         .takes("POSITION")
         .without("0"),
@@ -116,15 +120,43 @@ const std::array profile_rows{
              "Time between two rows of the table")
         .without("20 ms")};
 
-constexpr std::string_view profile_section_name = "profile";
+constexpr std::string_view section_name = "profile";
 
-std::optional<SignalDimensions> profile_dimensions_of(const void* document) {
+/// The keys of one of several axes: S-curves, without what chooses another kind.
+std::vector<Field> axis_rows() {
+  std::vector<Field> all{text("name", at<&ProfileJob::name>(), "\"lift\"", "What it is called")};
+  for (const std::string_view key :
+       {"angle", "continuous", "from", "to", "start_velocity", "goal_velocity",
+        "start_acceleration", "goal_acceleration", "velocity", "acceleration", "deceleration",
+        "reverse_velocity", "ramp"}) {
+    for (const Field& field : rows) {
+      if (field.key == key) {
+        all.push_back(field);
+      }
+    }
+  }
+  return all;
+}
+
+const std::array group_rows{text("synchronize", at<&AxesJob::synchronize>(), "\"phase\"",
+                                 "Whether they arrive at once or move along a straight line")
+                                .takes("HOW")
+                                .one_of("time, phase")
+                                .without("time"),
+                            quantity("least", at<&AxesJob::least>(), time, not_negative, "\"2 s\"",
+                                     "They take at least so long")
+                                .without("as fast as they can"),
+                            quantity("period", at<&AxesJob::period>(), time, positive, "\"20 ms\"",
+                                     "Time between two rows of the table")
+                                .without("20 ms")};
+
+std::optional<SignalDimensions> dimensions_of(const void* document) {
   const bool turns = static_cast<const ProfileJob*>(document)->angle;
   return turns ? SignalDimensions{{}, Dimension::angle, angular_velocity, angular_acceleration}
                : SignalDimensions{{}, length, Dimension::velocity, Dimension::acceleration};
 }
 
-std::string profile_example_of(const Field& field) {
+std::string example_of(const Field& field) {
   std::string example(field.example);
   std::erase(example, '"');
   return example.find(' ') == std::string::npos ? example : "'" + example + "'";
@@ -134,7 +166,7 @@ std::string profile_example_of(const Field& field) {
 
 std::vector<FieldInfo> profile_fields() {
   std::vector<FieldInfo> all;
-  for (const Field& field : profile_rows) {
+  for (const Field& field : rows) {
     const std::string value = !field.metavar.empty()                   ? std::string(field.metavar)
                               : field.type == FieldType::flag          ? ""
                               : field.dimension.dimension == time      ? "TIME"
@@ -142,22 +174,22 @@ std::vector<FieldInfo> profile_fields() {
                               : field.dimension.dimension == Dimension::voltage ? "VOLTAGE"
                               : field.dimension.dimension == Dimension::current ? "CURRENT"
                                                                                 : "RESISTANCE";
-    all.push_back({.section = std::string(profile_section_name),
+    all.push_back({.section = std::string(section_name),
                    .key = std::string(field.key),
                    .option = option_of(field),
                    .value = value,
                    .help = std::string(field.help),
-                   .example = profile_example_of(field),
+                   .example = example_of(field),
                    .absent = std::string(field.absent)});
   }
   return all;
 }
 
 ExpectedAll<ProfileJob> profile_job(std::span<const Override> given) {
-  const std::array sections{Section{profile_section_name, profile_rows,
+  const std::array sections{Section{section_name, rows,
                                     [](void* document, bool) { return document; },
                                     "What is asked of a profile."}};
-  const Document table{sections, profile_dimensions_of};
+  const Document table{sections, dimensions_of};
   TomlDocument document("", "");
   document.apply(given, sections);
   ProfileJob job;
@@ -170,6 +202,126 @@ ExpectedAll<ProfileJob> profile_job(std::span<const Override> given) {
     return tl::unexpected(*std::move(errors));
   }
   return job;
+}
+
+namespace {
+
+/// The parts of a file of axes, each as a document of its own whose lines stand where they stood,
+/// so that errors have their places.
+struct AxesTexts {
+  std::string rest;  ///< What belongs to no axis.
+  std::vector<std::string>
+      axes;  ///< Each as [axis]; one more than there may be, if more are there.
+};
+
+AxesTexts texts_of(std::string_view text) {
+  AxesTexts texts;
+  std::string blank;
+  std::string* into = &texts.rest;
+  while (!text.empty() && texts.axes.size() <= most_axes) {
+    const std::size_t end = std::min(text.find('\n'), text.size() - 1);
+    std::string line(text.substr(0, end + 1));
+    text.remove_prefix(end + 1);
+    const std::size_t first = line.find_first_not_of(" \t");
+    if (first != std::string::npos && line[first] == '[') {
+      if (line.compare(first, 8, "[[axis]]") == 0) {
+        line.replace(first, 8, " [axis] ");
+        texts.axes.push_back(blank);
+        into = &texts.axes.back();
+      } else {
+        into = &texts.rest;
+      }
+    }
+    for (std::string& axis : texts.axes) {
+      if (&axis != into) {
+        axis += '\n';
+      }
+    }
+    if (into != &texts.rest) {
+      texts.rest += '\n';
+    }
+    *into += line;
+    blank += '\n';
+  }
+  return texts;
+}
+
+bool turns(const std::string& text) {
+  try {
+    const toml::table table = toml::parse(text);
+    return table["axis"]["angle"].value_or(false);
+  } catch (const toml::parse_error&) {
+    return false;  // which is told when the text is read
+  }
+}
+
+}  // namespace
+
+ExpectedAll<AxesJob> axes_job_of(std::string_view text, const std::string& path,
+                                 std::span<const Override> given) {
+  const AxesTexts texts = texts_of(text);
+  constexpr std::string_view axis_name = "axis";
+  const std::vector<Field> axis_fields = axis_rows();
+  const std::array group{Section{section_name, group_rows,
+                                 [](void* document, bool) { return document; }, "Of all axes."}};
+  const std::array axis{Section{axis_name, axis_fields,
+                                [](void* document, bool) { return document; }, "One of the axes."}};
+  AxesJob job{.path = path};
+  std::vector<QuotedError> errors;
+  const auto keep = [&](TomlDocument& document) {
+    if (auto found = document.errors()) {
+      for (QuotedError& error : found->all()) {
+        errors.push_back(std::move(error));
+      }
+    }
+  };
+  TomlDocument rest(texts.rest, path);
+  rest.apply(given, group);
+  rest.read({group, [](const void*) { return std::optional(SignalDimensions{}); }}, &job);
+  keep(rest);
+  for (const std::string& part : texts.axes) {
+    ProfileJob one;
+    one.angle = turns(part);
+    TomlDocument document(part, path);
+    document.read({axis, dimensions_of}, &one);
+    keep(document);
+    if (one.name.empty()) {
+      one.name = fmt::format("axis {}", job.axes.size() + 1);
+    }
+    job.axes.push_back(std::move(one));
+  }
+  if (texts.axes.size() > most_axes) {
+    errors.push_back({Error(ProjectError::wrong_value)
+                          .about("[[axis]]")
+                          .got("more than sixteen")
+                          .in(path)
+                          .expected(fmt::format("at most {} axes", most_axes)),
+                      {},
+                      {}});
+  }
+  if (texts.axes.empty() && errors.empty()) {
+    errors.push_back({Error(ProjectError::missing_key)
+                          .about("[[axis]]")
+                          .got("missing")
+                          .in(path)
+                          .hint("give each axis a table: [[axis]] name = \"lift\", to = \"1.2 m\", "
+                                "velocity = \"1.5 m/s\", acceleration = \"3 m/s^2\""),
+                      {},
+                      {}});
+  }
+  if (!errors.empty()) {
+    return tl::unexpected(Errors(std::move(errors)));
+  }
+  return job;
+}
+
+ExpectedAll<AxesJob> axes_job(const std::string& path, std::span<const Override> given) {
+  constexpr std::size_t most_bytes = std::size_t{4} << 20;
+  const auto text = read_file(path, most_bytes);
+  if (!text) {
+    return tl::unexpected(Errors(text.error()));
+  }
+  return axes_job_of(*text, path, given);
 }
 
 }  // namespace flyball::study

@@ -1,4 +1,6 @@
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -57,6 +59,99 @@ TEST_F(ProfileCommand, WritesPictureAndTables) {
   const std::string header = contents(work() / "lift/profile.hpp");
   EXPECT_TRUE(holds(header, "inline constexpr std::array<Row, "));
   EXPECT_TRUE(holds(header, "1.2, 0, 0}"));
+}
+
+// The picture and the JSON have the instants at which full voltage turns round, not the row after.
+TEST_F(ProfileCommand, ChangesAreExact) {
+  const Json json = answer("--to 2m --kv 4 --ka 0.4 --kind exponential");
+  const auto changes = json.at("changes").get<std::vector<double>>();
+  ASSERT_EQ(changes.size(), 2U);  // up, down: the goal is too near for a cruise
+  EXPECT_EQ(changes[0], 0.0);
+  // x'' = 10 (3 - x') up, -10 (3 + x') down: over 2 m the peak is near 3 m/s, and braking from it
+  // takes ln(2)/10 s.
+  EXPECT_NEAR(json.at("duration").get<double>() - changes[1], 0.1 * std::log(2.0), 1e-3);
+  EXPECT_NEAR(json.at("peak_acceleration").get<double>(), 60.0, 0.5);  // as braking begins
+}
+
+constexpr const char* two_axes =
+    "[[axis]]\n"
+    "name = \"lift\"\n"
+    "to = \"1.2 m\"\n"
+    "velocity = \"1.5 m/s\"\n"
+    "acceleration = \"3 m/s^2\"\n"
+    "ramp = \"0.1 s\"\n"
+    "\n"
+    "[[axis]]\n"
+    "name = \"arm\"\n"
+    "angle = true\n"
+    "to = \"30 deg\"\n"
+    "velocity = \"3 rad/s\"\n"
+    "acceleration = \"10 rad/s^2\"\n"
+    "ramp = \"0.1 s\"\n";
+
+// The lift alone takes 1.4 s (0.5 s up, 0.3 s, 0.5 s down and a ramp); the arm waits for it.
+TEST_F(ProfileCommand, SeveralAxes) {
+  write("axes.toml", two_axes);
+  const Json json = answer("axes.toml");
+  EXPECT_EQ(json.at("schema"), "flyball.axes/1");
+  EXPECT_NEAR(json.at("duration").get<double>(), 1.4, 1e-9);
+  EXPECT_EQ(json.at("slowest"), "lift");
+  EXPECT_EQ(json.at("synchronize"), "time");
+  EXPECT_LT(json.at("axes")[1].at("alone").get<double>(), 1.0);
+  EXPECT_EQ(json.at("columns").at("lift position").back().get<double>(), 1.2);
+  EXPECT_NEAR(json.at("columns").at("arm position").back().get<double>(), std::acos(-1.0) / 6.0,
+              1e-12);
+  // In phase each has at any time the same share of its way behind it.
+  const Json line = answer("axes.toml --synchronize phase --period 50ms");
+  EXPECT_EQ(line.at("synchronize"), "phase");
+  const auto lift = line.at("columns").at("lift position").get<std::vector<double>>();
+  const auto arm = line.at("columns").at("arm position").get<std::vector<double>>();
+  ASSERT_EQ(lift.size(), arm.size());
+  for (std::size_t i = 0; i < lift.size(); ++i) {
+    EXPECT_NEAR(lift[i] / 1.2, arm[i] / (std::acos(-1.0) / 6.0), 1e-9);
+  }
+  EXPECT_NEAR(answer("axes.toml --least 3s").at("duration").get<double>(), 3.0, 1e-9);
+  // Not on a line: said, and in time.
+  write("bent.toml", std::string(two_axes) + "start_velocity = \"1 rad/s\"\n");
+  const Answer bent = run("profile bent.toml --synchronize phase");
+  EXPECT_EQ(bent.status, 0) << bent.err;
+  EXPECT_TRUE(holds(bent.out, "do not lie on it")) << bent.out;
+  const Answer told = run("profile axes.toml --out axes");
+  ASSERT_EQ(told.status, 0) << told.err;
+  EXPECT_TRUE(holds(contents(work() / "axes/data/profile.csv"), "arm acceleration (rad/s²)"));
+  EXPECT_TRUE(holds(contents(work() / "axes/profile.hpp"), "inline constexpr int axes = 2;"));
+}
+
+TEST_F(ProfileCommand, SaysWhatIsWrongWithAxes) {
+  const auto refused = [&](const std::string& text, const std::string& arguments,
+                           std::string_view words) {
+    write("axes.toml", text);
+    const Answer answer = run("profile axes.toml" + arguments);
+    EXPECT_EQ(answer.status, 2) << text << "\n" << answer.err;
+    EXPECT_TRUE(holds(answer.err, words)) << text << "\n" << answer.err;
+  };
+  const std::string two = two_axes;
+  refused("", "", "[[axis]]");
+  refused("[[axis]]\nto = \"1 m\"\n", "", "velocity of axis 1");
+  refused(two + "velosity = \"1 m\"\n", "", "axes.toml:15:1");
+  refused(two + "reverse_velocity = \"1 m/s\"\n", "", "axes.toml:15:20");
+  refused(two +
+              "[[axis]]\nname = \"arm\"\nto = \"1 m\"\nvelocity = \"1 m/s\"\n"
+              "acceleration = \"1 m/s^2\"\n",
+          "", "twice");
+  refused(two + "[profile]\nsynchronize = \"space\"\n", "", "time, phase");
+  refused(two + "[axes]\nx = 1\n", "", "axes.toml:15:");
+  refused(two + "[[axis]\n", "", "axes.toml:15:");
+  refused(two, " --to 1m", "--to");
+  refused(two, " --period 1us", "a million periods");
+  std::string many;
+  for (int i = 0; i < 20; ++i) {
+    many += two;
+  }
+  refused(many, "", "sixteen");
+  const Answer alone = run(std::string("profile ") + limited + "--synchronize phase");
+  EXPECT_EQ(alone.status, 2);
+  EXPECT_TRUE(holds(alone.err, "AXES.toml")) << alone.err;
 }
 
 TEST_F(ProfileCommand, SaysWhatIsWrong) {

@@ -16,6 +16,7 @@ namespace flyball::study {
 
 /// A profile that is asked for: lengths, or angles if `angle`, in SI.
 struct ProfileJob {
+  std::string name{};  ///< Of one of several axes.
   std::string kind{};  ///< As `parse_profile_kind`; empty: chosen by `select_profile`.
   bool angle = false;
   bool continuous = false;  ///< The angle goes the short way.
@@ -51,6 +52,9 @@ struct ProfileResult {
   double duration = 0.0;
   double other_duration = 0.0;  ///< Of the trapezoid, if it is none.
   TimeSeries table{};           ///< Each period: position, velocity, acceleration; then the end.
+  /// The same for a picture: finer where it is short, and on both sides of what changes at once.
+  TimeSeries curve{};
+  std::vector<double> changes{};  ///< Where its acceleration or jerk changes at once, s, from 0.
   double peak_velocity = 0.0;
   double peak_acceleration = 0.0;
 };

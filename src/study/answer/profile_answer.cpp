@@ -40,6 +40,7 @@ std::string to_json(const ProfileResult& result) {
         json.add({{"jerk", all.jerk}});
       }
     });
+    json.add("changes", result.changes);
     json.add({{"period", result.job.period.si()}});
     json.add("time", result.table.time());
     for (const TimeSeries::Column& column : result.table.columns()) {
@@ -87,12 +88,12 @@ Figure figure_of(const ProfileResult& result) {
   figure.plot.x_label = "Time (s)";
   figure.plot.clock = "time";
   const MotionLimits all = result.limits.both_ways();
-  const auto& columns = result.table.columns();
+  const auto& columns = result.curve.columns();
   const char* const names[] = {"Position", "Velocity", "Acceleration"};
   for (std::size_t i = 0; i < 3; ++i) {
     PlotPanel panel{.y_label = fmt::format("{} ({})", names[i], columns[i].unit)};
     panel.lines.push_back({.label = names[i],
-                           .x = result.table.time(),
+                           .x = result.curve.time(),
                            .y = columns[i].values,
                            .style = LineStyle::solid,
                            .color = static_cast<int>(i)});

@@ -52,6 +52,10 @@ class ExponentialProfile {
   /// Velocity and the accelerations at rest; the motor's own limits are `motor()`.
   [[nodiscard]] MotionLimits limits() const noexcept;
   [[nodiscard]] const MotorMotionLimits& motor() const noexcept { return motor_; }
+  /// Its parts, each of one law of the acceleration.
+  [[nodiscard]] int pieces() const noexcept { return count_; }
+  /// When a part begins, s. @param i  0..pieces()-1.
+  [[nodiscard]] double piece_begin(int i) const noexcept { return pieces_[i].begin; }
   /// Never: braking is easier than accelerating.
   [[nodiscard]] bool reversible() const noexcept { return false; }
   /// The motion from another state on, within the same limits.

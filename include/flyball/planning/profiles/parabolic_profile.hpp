@@ -51,6 +51,8 @@ class StepperProfile {
   [[nodiscard]] MotionState sample(double t) const noexcept;
   [[nodiscard]] MotionLimits limits() const noexcept { return profile_.limits(); }
   [[nodiscard]] double jump() const noexcept { return jump_; }
+  /// Ends of the acceleration, the cruise and the braking, s since the start.
+  [[nodiscard]] const double (&phase_ends() const noexcept)[3] { return profile_.phase_ends(); }
   [[nodiscard]] bool reversible() const noexcept { return profile_.reversible(); }
   /// The motion from another state on, within the same limits.
   [[nodiscard]] StepperProfile replanned(const MotionState& state,
