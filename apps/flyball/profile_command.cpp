@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include <flyball/core/argument.hpp>
 #include <flyball/io/output_folder.hpp>
 #include <flyball/study/axes.hpp>
 
@@ -37,7 +38,7 @@ ExpectedAll<study::AxesJob> axes_job(const Options& options) {
   std::vector<study::Override> of_all;
   for (const study::Override& option : options.given) {
     if (option.option != "--period") {
-      return tl::unexpected(Error(study::ProjectError::wrong_value)
+      return tl::unexpected(Error(ArgumentError::malformed)
                                 .about(option.option)
                                 .got("given with " + options.path)
                                 .expected("in the file, of one of its axes"));
@@ -77,7 +78,7 @@ int run(const Options& options) {
   for (const auto& [name, value] :
        {std::pair("--synchronize", &options.synchronize), {"--least", &options.least}}) {
     if (!value->empty()) {
-      return fail(Error(study::ProjectError::wrong_value)
+      return fail(Error(ArgumentError::malformed)
                       .about(name)
                       .got("given without a file")
                       .expected("a file of several axes: flyball profile AXES.toml"),

@@ -3,11 +3,12 @@
 #include <array>
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
+#include <flyball/core/argument.hpp>
 #include <flyball/io/file.hpp>
 #include <flyball/study/axes.hpp>
 
+#include "core/try.hpp"
 #include "study/field.hpp"
 #include "study/toml_document.hpp"
 
@@ -138,10 +139,20 @@ std::vector<Field> axis_rows() {
   return all;
 }
 
+Expected<void> check_synchronization(const std::string& text) {
+  if (text == "time" || text == "phase") {
+    return {};
+  }
+  return refusal(ArgumentError::unknown_name, {}, fmt::format("\"{}\"", text))
+      .got("not one of the choices")
+      .expected("time, phase");
+}
+
 const std::array group_rows{text("synchronize", at<&AxesJob::synchronize>(), "\"phase\"",
                                  "Whether they arrive at once or move along a straight line")
                                 .takes("HOW")
                                 .one_of("time, phase")
+                                .checked(check_synchronization)
                                 .without("time"),
                             quantity("least", at<&AxesJob::least>(), time, not_negative, "\"2 s\"",
                                      "They take at least so long")
@@ -204,62 +215,8 @@ ExpectedAll<ProfileJob> profile_job(std::span<const Override> given) {
   return job;
 }
 
-namespace {
-
-/// The parts of a file of axes, each as a document of its own whose lines stand where they stood,
-/// so that errors have their places.
-struct AxesTexts {
-  std::string rest;  ///< What belongs to no axis.
-  std::vector<std::string>
-      axes;  ///< Each as [axis]; one more than there may be, if more are there.
-};
-
-AxesTexts texts_of(std::string_view text) {
-  AxesTexts texts;
-  std::string blank;
-  std::string* into = &texts.rest;
-  while (!text.empty() && texts.axes.size() <= most_axes) {
-    const std::size_t end = std::min(text.find('\n'), text.size() - 1);
-    std::string line(text.substr(0, end + 1));
-    text.remove_prefix(end + 1);
-    const std::size_t first = line.find_first_not_of(" \t");
-    if (first != std::string::npos && line[first] == '[') {
-      if (line.compare(first, 8, "[[axis]]") == 0) {
-        line.replace(first, 8, " [axis] ");
-        texts.axes.push_back(blank);
-        into = &texts.axes.back();
-      } else {
-        into = &texts.rest;
-      }
-    }
-    for (std::string& axis : texts.axes) {
-      if (&axis != into) {
-        axis += '\n';
-      }
-    }
-    if (into != &texts.rest) {
-      texts.rest += '\n';
-    }
-    *into += line;
-    blank += '\n';
-  }
-  return texts;
-}
-
-bool turns(const std::string& text) {
-  try {
-    const toml::table table = toml::parse(text);
-    return table["axis"]["angle"].value_or(false);
-  } catch (const toml::parse_error&) {
-    return false;  // which is told when the text is read
-  }
-}
-
-}  // namespace
-
 ExpectedAll<AxesJob> axes_job_of(std::string_view text, const std::string& path,
                                  std::span<const Override> given) {
-  const AxesTexts texts = texts_of(text);
   constexpr std::string_view axis_name = "axis";
   const std::vector<Field> axis_fields = axis_rows();
   const std::array group{Section{section_name, group_rows,
@@ -275,31 +232,33 @@ ExpectedAll<AxesJob> axes_job_of(std::string_view text, const std::string& path,
       }
     }
   };
-  TomlDocument rest(texts.rest, path);
+  TomlDocument rest(text, path);
+  std::vector<TomlDocument> tables = rest.take_tables(axis_name);
+  const std::size_t count = tables.size();
   rest.apply(given, group);
   rest.read({group, [](const void*) { return std::optional(SignalDimensions{}); }}, &job);
   keep(rest);
-  for (const std::string& part : texts.axes) {
+  if (count > most_axes) {
+    errors.push_back({Error(ProjectError::wrong_value)
+                          .about("[[axis]]")
+                          .got(fmt::format("there {} times", count))
+                          .in(path)
+                          .expected(fmt::format("at most {} axes", most_axes)),
+                      {},
+                      {}});
+    tables.clear();
+  }
+  for (TomlDocument& table : tables) {
     ProfileJob one;
-    one.angle = turns(part);
-    TomlDocument document(part, path);
-    document.read({axis, dimensions_of}, &one);
-    keep(document);
+    one.angle = table.says(axis_name, "angle");  // The unit of a position hangs on it.
+    table.read({axis, dimensions_of}, &one);
+    keep(table);
     if (one.name.empty()) {
       one.name = fmt::format("axis {}", job.axes.size() + 1);
     }
     job.axes.push_back(std::move(one));
   }
-  if (texts.axes.size() > most_axes) {
-    errors.push_back({Error(ProjectError::wrong_value)
-                          .about("[[axis]]")
-                          .got("more than sixteen")
-                          .in(path)
-                          .expected(fmt::format("at most {} axes", most_axes)),
-                      {},
-                      {}});
-  }
-  if (texts.axes.empty() && errors.empty()) {
+  if (count == 0 && errors.empty()) {
     errors.push_back({Error(ProjectError::missing_key)
                           .about("[[axis]]")
                           .got("missing")

@@ -34,9 +34,14 @@ inline std::vector<double> changes_of(const JerkMotion& motion) {
   return all;
 }
 inline std::vector<double> changes_of(const ExponentialProfile& profile) {
+  // Near the top speed a peak has too few digits for its way, and some 1e-14 s are cruised.
+  const double rounding = 1e-12 * profile.total_time();
   std::vector<double> all;
   for (int i = 0; i < profile.pieces(); ++i) {
-    all.push_back(profile.piece_begin(i));
+    const double end = i + 1 < profile.pieces() ? profile.piece_begin(i + 1) : profile.total_time();
+    if (end - profile.piece_begin(i) > rounding) {
+      all.push_back(profile.piece_begin(i));
+    }
   }
   return all;
 }

@@ -48,6 +48,37 @@ TomlDocument::TomlDocument(std::string_view text, std::string file)
   }
 }
 
+std::vector<TomlDocument> TomlDocument::take_tables(std::string_view name) {
+  std::vector<TomlDocument> taken;
+  toml::node* const found = root_.get(name);
+  if (found == nullptr) {
+    return taken;
+  }
+  toml::array* const list = found->as_array();
+  const auto refuse_node = [&](const toml::node& node) {
+    found_.push_back(
+        {node.source(), Error(ProjectError::wrong_type)
+                            .in(place(node.source()))
+                            .about(std::string(name))
+                            .got("no list of tables")
+                            .expected(fmt::format("tables, each written [[{}]]", name))});
+  };
+  if (list == nullptr) {
+    refuse_node(*found);
+  }
+  for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
+    if (toml::table* const keys = (*list)[i].as_table()) {
+      toml::table root;
+      root.insert(name, std::move(*keys));  // a copy would lose its places
+      taken.push_back(TomlDocument(text_, file_, std::move(root)));
+    } else {
+      refuse_node((*list)[i]);
+    }
+  }
+  root_.erase(name);
+  return taken;
+}
+
 void TomlDocument::apply(std::span<const Override> overrides, std::span<const Section> sections) {
   for (const auto& [option, text] : is_toml_ ? overrides : std::span<const Override>()) {
     std::vector<std::string> known;

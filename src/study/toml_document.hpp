@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <toml++/toml.h>
@@ -24,6 +25,10 @@ class TomlDocument {
   /// Takes the text apart. What is no TOML is an error and an empty document.
   TomlDocument(std::string_view text, std::string file);
 
+  /// Takes the tables of [[name]] out, each as a document of its own that has it as [name], with
+  /// its places in the file. What else stands there is refused.
+  [[nodiscard]] std::vector<TomlDocument> take_tables(std::string_view name);
+
   /// Puts options into the place of the file's values.
   void apply(std::span<const Override> overrides, std::span<const Section> sections);
 
@@ -41,6 +46,12 @@ class TomlDocument {
   [[nodiscard]] bool is_new(std::string_view section, std::string_view key) const;
   [[nodiscard]] bool has(std::string_view section, std::string_view key) const {
     return node(section, key) != nullptr;
+  }
+
+  /// Whether a flag is there and set.
+  [[nodiscard]] bool says(std::string_view section, std::string_view key) const {
+    const toml::node* const flag = node(section, key);
+    return flag != nullptr && flag->value_or(false);
   }
 
   /// "controller.period", or "--period" if the value is the command line's.
@@ -65,6 +76,9 @@ class TomlDocument {
   [[nodiscard]] std::optional<Errors> errors() const;
 
  private:
+  TomlDocument(std::string_view text, std::string file, toml::table root)
+      : text_(text), file_(std::move(file)), root_(std::move(root)) {}
+
   struct Found {
     toml::source_region source;
     Error error;

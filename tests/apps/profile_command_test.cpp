@@ -120,6 +120,23 @@ TEST_F(ProfileCommand, SeveralAxes) {
   ASSERT_EQ(told.status, 0) << told.err;
   EXPECT_TRUE(holds(contents(work() / "axes/data/profile.csv"), "arm acceleration (rad/s²)"));
   EXPECT_TRUE(holds(contents(work() / "axes/profile.hpp"), "inline constexpr int axes = 2;"));
+  EXPECT_TRUE(holds(contents(work() / "axes/data/profile.wpilog"), "profile/arm/acceleration"));
+}
+
+// TOML has several spellings of a list of tables.
+TEST_F(ProfileCommand, AxesAsTomlSpellsThem) {
+  write("inline.toml",
+        "axis = [{name = \"lift\", to = \"1.2 m\", velocity = \"1.5 m/s\", acceleration = "
+        "\"3 m/s^2\", ramp = \"0.1 s\"},\n"
+        "  {to = \"30 deg\", angle = true, velocity = \"3 rad/s\", acceleration = \"10 "
+        "rad/s^2\"}]\n");
+  write("spaced.toml",
+        "[profile]\nleast = \"2 s\"\n  [[ axis ]] # the lift\nname = \"\"\"\n[[axis]]\"\"\"\n"
+        "to = \"1.2 m\"\nvelocity = \"1.5 m/s\"\nacceleration = \"3 m/s^2\"\n");
+  EXPECT_NEAR(answer("inline.toml").at("duration").get<double>(), 1.4, 1e-9);
+  const Json spaced = answer("spaced.toml");
+  EXPECT_NEAR(spaced.at("duration").get<double>(), 2.0, 1e-9);
+  EXPECT_EQ(spaced.at("axes")[0].at("name"), "[[axis]]");
 }
 
 TEST_F(ProfileCommand, SaysWhatIsWrongWithAxes) {
@@ -148,7 +165,10 @@ TEST_F(ProfileCommand, SaysWhatIsWrongWithAxes) {
   for (int i = 0; i < 20; ++i) {
     many += two;
   }
-  refused(many, "", "sixteen");
+  refused(many, "", "at most 16");
+  refused(two, " --synchronize space", "time, phase");
+  refused("axis = 1\n", "", "axes.toml:1:8");
+  refused("[axis]\nto = \"1 m\"\n", "", "[[axis]]");
   const Answer alone = run(std::string("profile ") + limited + "--synchronize phase");
   EXPECT_EQ(alone.status, 2);
   EXPECT_TRUE(holds(alone.err, "AXES.toml")) << alone.err;

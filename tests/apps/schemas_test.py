@@ -266,6 +266,12 @@ def check_profile(folder):
         check_answer([*limits, *more], 0, folder)
     check_answer([*limits, "--kind", "curve"], 2, folder)
     check_answer(["profile", "--to", "1m"], 2, folder)
+    axes = examples / "axes.toml"
+    check_answer(["profile", axes], 0, folder, "axes")
+    check_answer(["profile", axes, "--synchronize", "phase", "--least", "3s"], 0, folder, "axes")
+    check_answer(["profile", axes, "--synchronize", "space"], 2, folder, "axes")
+    check_answer(["profile", axes, "--to", "1m"], 2, folder, "axes")
+    check_answer(["profile", "no_axes.toml"], 2, folder, "axes")
 
 
 def check_path(folder):

@@ -9,6 +9,7 @@
 #include <flyball/study/axes.hpp>
 
 #include "core/wording.hpp"
+#include "study/answer/profile_log.hpp"
 
 namespace flyball::study {
 
@@ -186,6 +187,9 @@ Answer answer_of(const AxesResult& result) {
   }
   answer.files.push_back({"data/profile.csv", to_csv(result.table)});
   answer.files.push_back({"profile.hpp", cpp_table(result)});
+  for (AnswerFile& file : log_of(result.table)) {
+    answer.files.push_back(std::move(file));
+  }
   return answer;
 }
 

@@ -9,6 +9,7 @@
 #include <flyball/study/profile.hpp>
 
 #include "core/wording.hpp"
+#include "study/answer/profile_log.hpp"
 
 namespace flyball::study {
 
@@ -157,6 +158,9 @@ Answer answer_of(const ProfileResult& result) {
   answer.figures.push_back(figure_of(result));
   answer.files.push_back({"data/profile.csv", to_csv(result.table)});
   answer.files.push_back({"profile.hpp", cpp_table(result)});
+  for (AnswerFile& file : log_of(result.table)) {
+    answer.files.push_back(std::move(file));
+  }
   return answer;
 }
 
