@@ -72,7 +72,7 @@ Expected<void> add_columns(TimeSeries& table, AxisResult& axis, const JerkMotion
   std::vector<double> v;
   std::vector<double> a;
   for (const double t : table.time()) {
-    const MotionState at = motion.sample(t);
+    const MotionState at = t >= table.time().back() ? motion.goal() : motion.sample(t);
     x.push_back(at.position);
     v.push_back(at.velocity);
     a.push_back(at.acceleration);

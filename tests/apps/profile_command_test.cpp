@@ -104,6 +104,7 @@ TEST_F(ProfileCommand, SeveralAxes) {
   // In phase each has at any time the same share of its way behind it.
   const Json line = answer("axes.toml --synchronize phase --period 50ms");
   EXPECT_EQ(line.at("synchronize"), "phase");
+  EXPECT_EQ(line.at("slowest"), "lift");  // whose limits are all the tighter ones
   const auto lift = line.at("columns").at("lift position").get<std::vector<double>>();
   const auto arm = line.at("columns").at("arm position").get<std::vector<double>>();
   ASSERT_EQ(lift.size(), arm.size());
@@ -120,6 +121,9 @@ TEST_F(ProfileCommand, SeveralAxes) {
   ASSERT_EQ(told.status, 0) << told.err;
   EXPECT_TRUE(holds(contents(work() / "axes/data/profile.csv"), "arm acceleration (rad/s²)"));
   EXPECT_TRUE(holds(contents(work() / "axes/profile.hpp"), "inline constexpr int axes = 2;"));
+  for (const char* picture : {"profile_angles.svg", "profile_lengths.svg"}) {
+    EXPECT_FALSE(contents(work() / "axes/pictures" / picture).empty()) << picture;
+  }
   EXPECT_TRUE(holds(contents(work() / "axes/data/profile.wpilog"), "profile/arm/acceleration"));
 }
 

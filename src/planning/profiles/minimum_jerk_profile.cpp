@@ -185,8 +185,8 @@ void MinimumJerkProfile::set(double duration, const MotionState& start,
   c_[0] = start.position;
   c_[1] = start.velocity;
   c_[2] = 0.5 * start.acceleration;
-  // What is left over the parabola of the start.
-  const double x = goal.position - (c_[0] + (c_[1] + c_[2] * T) * T);
+  // What is left over the parabola of the start; places differ by what has all of its digits.
+  const double x = (goal.position - start.position) - (c_[1] + c_[2] * T) * T;
   const double v = (goal.velocity - (c_[1] + 2.0 * c_[2] * T)) * T;
   const double a = (goal.acceleration - 2.0 * c_[2]) * T * T;
   const double per = 1.0 / (T * T * T);

@@ -274,6 +274,17 @@ bool AxisMotions::move_in_phase() noexcept {
   };
   const double speed = std::abs(start[r].velocity) + std::abs(goal[r].velocity);
   const double bend = std::abs(start[r].acceleration) + std::abs(goal[r].acceleration);
+  // An axis's limits along the line.
+  const auto own_limits = [&](int i, double k) {
+    MotionLimits own = k > 0.0 ? limits[i].both_ways() : limits[i].mirrored();
+    const double per = 1.0 / std::abs(k);
+    own.velocity *= per;
+    own.reverse_velocity *= per;
+    own.acceleration *= per;
+    own.deceleration *= per;
+    own.jerk *= per;
+    return own;
+  };
   for (int i = 0; i < count; ++i) {
     const double k = way(i) / length;
     if (!close(start[i].velocity, k * start[r].velocity, speed + line.velocity) ||
@@ -285,13 +296,12 @@ bool AxisMotions::move_in_phase() noexcept {
     if (k == 0.0) {
       continue;
     }
-    const MotionLimits own = k > 0.0 ? limits[i].both_ways() : limits[i].mirrored();
-    const double per = 1.0 / std::abs(k);
-    line.velocity = std::min(line.velocity, own.velocity * per);
-    line.reverse_velocity = std::min(line.reverse_velocity, own.reverse_velocity * per);
-    line.acceleration = std::min(line.acceleration, own.acceleration * per);
-    line.deceleration = std::min(line.deceleration, own.deceleration * per);
-    line.jerk = std::min(line.jerk, own.jerk * per);
+    const MotionLimits own = own_limits(i, k);
+    line.velocity = std::min(line.velocity, own.velocity);
+    line.reverse_velocity = std::min(line.reverse_velocity, own.reverse_velocity);
+    line.acceleration = std::min(line.acceleration, own.acceleration);
+    line.deceleration = std::min(line.deceleration, own.deceleration);
+    line.jerk = std::min(line.jerk, own.jerk);
   }
   SCurvePlan plan = detail::plan_motion(line, start[r], goal[r]);
   if (!plan.usable) {
@@ -305,7 +315,16 @@ bool AxisMotions::move_in_phase() noexcept {
     axes[i].add_plan(plan);
     axes[i].finish({goal[i].position, k * plan.goal.velocity, k * plan.goal.acceleration});
   }
-  slowest = r;
+  slowest = -1;
+  for (int i = 0; i < count && slowest < 0; ++i) {
+    const double k = way(i) / length;
+    const MotionLimits own = k == 0.0 ? MotionLimits{} : own_limits(i, k);
+    if (own.velocity == line.velocity && own.reverse_velocity == line.reverse_velocity &&
+        own.acceleration == line.acceleration && own.deceleration == line.deceleration &&
+        own.jerk == line.jerk) {
+      slowest = i;
+    }
+  }
   in_phase = true;
   return true;
 }

@@ -103,7 +103,7 @@ std::string cpp_table(const AxesResult& result) {
 Figure figure_of(const AxesResult& result, const std::string& unit, bool alone) {
   const std::string what = unit == "rad" ? "angles" : "lengths";
   Figure figure{alone ? "motion" : what,
-                "profile",
+                alone ? "profile" : "profile_" + what,
                 alone ? "The motion of all axes" : fmt::format("The motion of the {}", what),
                 "Position, velocity and acceleration of each axis.",
                 {}};
@@ -145,7 +145,8 @@ Answer answer_of(const AxesResult& result) {
   facts.add("synchronized", result.in_phase ? "in phase: along a straight line" : "in time",
             Tone::plain);
   if (result.slowest >= 0) {
-    facts.add("the others wait for", result.axes[static_cast<std::size_t>(result.slowest)].name,
+    facts.add(result.in_phase ? "limited by" : "the others wait for",
+              result.axes[static_cast<std::size_t>(result.slowest)].name,
               Tone::plain);
   }
   motion.blocks.emplace_back(std::move(facts));

@@ -217,6 +217,21 @@ TEST(MinimumJerkProfile, KeepsTheLaws) {
   EXPECT_GT(kept, 600);
 }
 
+// Ends 0.8 µm apart, which the rounding of their places would make a jerk of its own in 7 µs.
+TEST(MinimumJerkProfile, KeepsItsJerkOverAMicrometre) {
+  const MotionLimits limits{0.11408607222110141, 2.3127589835416189, 1.6619124155903815,
+                            0.13766880189669459, 0.60343794390985039};
+  test::ProfileDemand demand{limits,
+                             {-0.048125197073686912, 0.11408607222110141, 0.0},
+                             {-0.048124378817777071, 0.11408607222110141, 0.0}};
+  demand.order = 3;
+  demand.replan = false;
+  const MinimumJerkProfile profile(limits, demand.start, demand.goal);
+  EXPECT_TRUE(profile.keeps_limits());
+  EXPECT_LT(profile.total_time(), 1e-5);
+  EXPECT_EQ(test::broken_law(profile, demand), "");
+}
+
 // No shorter duration keeps the limits, be it below a gap of durations that do not.
 TEST(MinimumJerkProfile, IsTheShortest) {
   Random random(37);

@@ -28,7 +28,9 @@ struct AxisMotions {
   AxisMotion* axes;
   int count;
 
-  int slowest = 0;        ///< The axis that all wait for; -1 if none alone decides it.
+  /// The axis that all wait for, along a line the one whose limits are its; -1 if none alone
+  /// decides it.
+  int slowest = 0;
   bool in_phase = false;  ///< Whether they move along a line.
 
   /// @return The common duration, s.
@@ -78,7 +80,8 @@ class SynchronizedMotion {
   [[nodiscard]] const JerkMotion& axis(int i) const noexcept {
     return axes_[static_cast<std::size_t>(i)];
   }
-  /// The axis that the others wait for; -1 if `least` or a blocked duration decides.
+  /// The axis that the others wait for; along a line the one that has all of its limits. -1 if
+  /// none alone decides: `least`, a blocked duration, limits of several axes.
   [[nodiscard]] int slowest_axis() const noexcept { return slowest_; }
   [[nodiscard]] bool in_phase() const noexcept { return in_phase_; }
 
