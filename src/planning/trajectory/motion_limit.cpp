@@ -77,6 +77,8 @@ Eigen::Vector3d length_rates(const PathState& state) noexcept {
 /// Of a circle of accelerations a polygon of twice as many sides.
 constexpr std::size_t circle_directions = 12;
 constexpr std::size_t most_travel_rows = circle_directions + 2;
+/// The same of jerks, which are dear.
+constexpr std::size_t jerk_directions = 6;
 
 class OfTravel final : public MotionLimit {
  public:
@@ -101,11 +103,27 @@ class OfTravel final : public MotionLimit {
         circle_[i] = Vector2d(std::cos(angle), std::sin(angle)) / size;
       }
     }
+    if (std::isfinite(limits.total_jerk)) {
+      jerk_names.insert(jerk_names.end(), jerk_directions, "jerk");
+      constexpr double step = std::numbers::pi / jerk_directions;
+      const double size = std::cos(0.5 * step) * limits.total_jerk;
+      for (std::size_t i = 0; i < jerk_directions; ++i) {
+        const double angle = step * (static_cast<double>(i) + 0.5);
+        jerk_circle_[i] = Vector2d(std::cos(angle), std::sin(angle)) / size;
+      }
+    }
   }
   void evaluate_jerk(const PathState& state, double /*s*/, JerkRow* rows) const noexcept override {
     if (std::isfinite(limits_.jerk)) {
       const Eigen::Vector3d l = length_rates(state) / limits_.jerk;
-      *rows = {l(0), 3.0 * l(1), l(2)};
+      *rows++ = {l(0), 3.0 * l(1), l(2)};
+    }
+    if (std::isfinite(limits_.total_jerk)) {  // q' s⃛ + 3 q'' ṡ s̈ + q''' ṡ³
+      const PlanarMotion facing = facing_motion(state, false);
+      for (const Vector2d& normal : jerk_circle_) {
+        *rows++ = {normal.dot(facing.first), 3.0 * normal.dot(facing.second),
+                   normal.dot(facing.third)};
+      }
     }
   }
   void evaluate(const PathState& state, double /*s*/, MotionRow* rows,
@@ -141,6 +159,7 @@ class OfTravel final : public MotionLimit {
  private:
   TravelLimits limits_;
   std::array<Vector2d, circle_directions> circle_{};
+  std::array<Vector2d, jerk_directions> jerk_circle_{};
 };
 
 class OfStretch final : public MotionLimit {
@@ -221,6 +240,7 @@ Expected<void> check_travel(const TravelLimits& limits, std::string_view where) 
   FLYBALL_CHECK(check_limit(limits.total_acceleration, where, "acceleration limit", "m/s²"));
   FLYBALL_CHECK(check_limit(limits.angular_velocity, where, "angular velocity limit", "rad/s"));
   FLYBALL_CHECK(check_limit(limits.jerk, where, "jerk limit", "m/s³"));
+  FLYBALL_CHECK(check_limit(limits.total_jerk, where, "jerk limit", "m/s³"));
   return check_limit(limits.angular_acceleration, where, "angular acceleration limit", "rad/s²");
 }
 
@@ -279,7 +299,7 @@ PlanarMotion facing_motion(const PathState& state, bool backwards) noexcept {
   const auto turned = [&](const Vector2d& v) {
     return Vector2d(side * (c * v(0) + s * v(1)), side * (c * v(1) - s * v(0)));
   };
-  return {{side * sigma, 0.0, turn}, {side * along, 0.0, bend}, turned(p1), turned(p2)};
+  return {{side * sigma, 0.0, turn}, {side * along, 0.0, bend}, turned(p1), turned(p2), turned(p3)};
 }
 
 PlanarMotion holonomic_motion(const PathState& state) noexcept {
@@ -296,7 +316,8 @@ PlanarMotion holonomic_motion(const PathState& state) noexcept {
   return {{first(0), first(1), rate},
           {second(0) + rate * first(1), second(1) - rate * first(0), turns ? state.second(2) : 0.0},
           first,
-          second};
+          second,
+          turned(state.third)};
 }
 
 Expected<std::vector<std::unique_ptr<MotionLimit>>> motion_limits(

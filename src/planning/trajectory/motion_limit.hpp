@@ -67,6 +67,7 @@ struct PlanarMotion {
   Eigen::Vector3d bend;    ///< dξ/ds
   Eigen::Vector2d first;   ///< p' in its frame
   Eigen::Vector2d second;  ///< p'' in its frame
+  Eigen::Vector2d third;   ///< p''' in its frame
 };
 /// Of a robot that faces where it goes, or backwards.
 [[nodiscard]] PlanarMotion facing_motion(const PathState& state, bool backwards) noexcept;

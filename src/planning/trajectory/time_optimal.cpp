@@ -254,6 +254,16 @@ bool faces(std::span<const PathConstraint> constraints) {
   });
 }
 
+/// Whether the whole jerk of travel is limited, so that the curvature may not jump.
+bool sways(std::span<const PathConstraint> constraints) {
+  return std::any_of(constraints.begin(), constraints.end(), [](const PathConstraint& constraint) {
+    const auto* travel = std::get_if<TravelLimits>(&constraint);
+    const auto* stretch = std::get_if<StretchLimits>(&constraint);
+    return (travel != nullptr && std::isfinite(travel->total_jerk)) ||
+           (stretch != nullptr && std::isfinite(stretch->limits.total_jerk));
+  });
+}
+
 /// Whether a coordinate's jerk is limited, so that no acceleration may jump.
 bool bends(std::span<const PathConstraint> constraints) {
   return std::any_of(constraints.begin(), constraints.end(), [](const PathConstraint& constraint) {
@@ -368,8 +378,9 @@ Expected<PathTrajectory> time_optimal(const Path& path, std::span<const PathCons
       return near;
     });
   }
-  detail::JointRules rules{.accelerates = false,
-                           .faces = path.coordinates() == 2 && faces(constraints)};
+  detail::JointRules rules{
+      .accelerates = false,
+      .faces = (path.coordinates() == 2 && faces(constraints)) || sways(constraints)};
   bool jerks = false;
   for (const auto& limit : limits) {
     jerks = jerks || !limit->jerk_names.empty();

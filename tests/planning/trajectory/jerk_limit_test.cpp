@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -247,6 +248,45 @@ TEST(JerkLimit, WhereTheCurvatureJumps) {
                        .velocity = 2.0, .acceleration = 2.0, .centripetal = 2.0, .jerk = 10.0}})
           .value();
   EXPECT_GT(slowest_near(goes), 0.5);
+}
+
+// The acceleration as a vector: along a line it is the S-curve, along a bend |d³p/dt³| keeps to its
+// limit, which that along the way alone does not; into a bend from a line it stops.
+TEST(JerkLimit, OfTheWholeAcceleration) {
+  const Path line = line_path(Vector2d(0.0, 0.0), Vector2d(3.0, 0.0)).value();
+  const TravelLimits limits{.velocity = 1.5, .total_acceleration = 2.0, .total_jerk = 6.0};
+  const SCurveProfile exact({.velocity = 1.5, .acceleration = 2.0, .jerk = 6.0}, {}, {3.0});
+  const double straight = time_optimal(line, Limits{limits}).value().total_time();
+  EXPECT_GE(straight, exact.total_time() * (1.0 - 1e-9));
+  EXPECT_LE(straight, exact.total_time() * (1.0 + 2e-3));
+
+  const auto most = [](const PathTrajectory& motion) {
+    double largest = 0.0;
+    const std::vector<double> times = motion.times();
+    for (std::size_t i = 0; i + 1 < times.size(); ++i) {
+      for (int m = 1; m < 100; ++m) {
+        const double t = times[i] + (times[i + 1] - times[i]) * m / 100.0;
+        largest = std::max(largest, motion.jerk(t).head<2>().norm());
+      }
+    }
+    return largest;
+  };
+  Random random(15);
+  const PathTrajectory curve = time_optimal(random_path(random, 2, 4), Limits{limits}).value();
+  EXPECT_LE(most(curve), 6.0 * (1.0 + 1e-9));
+  EXPECT_GT(most(curve), 6.0 * 0.96);
+
+  const Path bend = arc_path({3.0, 1.0}, 1.0, -0.5 * std::numbers::pi, 1.5).value();
+  const Path both = joined(std::vector<Path>{line, bend}).value();
+  const PathTrajectory whole = time_optimal(bend, Limits{limits}).value();
+  EXPECT_LE(most(whole), 6.0 * (1.0 + 1e-9));
+  EXPECT_NEAR(time_optimal(both, Limits{limits}).value().total_time(),
+              straight + whole.total_time(), 5e-3);
+  TravelLimits along = limits;
+  along.jerk = std::exchange(along.total_jerk, TravelLimits::none);
+  const PathTrajectory faster = time_optimal(bend, Limits{along}).value();
+  EXPECT_GT(most(faster), 6.0 * 1.4);
+  EXPECT_LT(faster.total_time(), whole.total_time());
 }
 
 TEST(JerkLimit, RefusesWhatIsNoLimit) {

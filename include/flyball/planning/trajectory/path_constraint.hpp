@@ -36,6 +36,11 @@ struct TravelLimits {
   double angular_velocity = none;
   double angular_acceleration = none;  ///< rad/s², > 0, of the same.
   double jerk = none;                  ///< m/s³, > 0: |d²v/dt²|, along the path.
+  /// m/s³, > 0: |d³p/dt³|, along and across together: the acceleration as a vector changes no
+  /// faster. Places where the curvature jumps become stops. The circle as the polygon of 12 sides
+  /// within it, whose corners are ahead, behind and to both sides: there all of it is used, in
+  /// between at least 0.965.
+  double total_jerk = none;
 };
 
 /// A shape of the plane. Its border belongs to it.

@@ -128,8 +128,8 @@ struct TimingOptions {
 /// end that is passed the acceleration along the path). With s⃛ = ½ x'' √x the jerk is √x times what
 /// is linear in b, and 1/√x is convex: convex programs of all intervals together, each about the
 /// motion of the one before it and within the limits, come to a motion that no small change makes
-/// faster. Limits of coordinates' jerks make stops of places where the curvature jumps. The
-/// tolerance is then 5e-5 or more.
+/// faster. Limits of coordinates' jerks and of the whole jerk of travel make stops of places where
+/// the curvature jumps. The tolerance is then 5e-5 or more.
 ///
 /// Cost: O(intervals · limits), 10 to 40 intervals a piece; with limits of jerks some hundred to a
 /// thousand times as much. Allocates.
