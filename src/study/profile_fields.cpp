@@ -19,12 +19,12 @@ namespace {
 using enum Dimension;
 using enum Range;
 
-constexpr FieldDimension place = FieldDimension::output;
+constexpr FieldDimension in_place = FieldDimension::output;
 constexpr FieldDimension rate = FieldDimension::rate;
 constexpr FieldDimension change = FieldDimension::acceleration;
 constexpr const char* per_si = "NUMBER";
 
-const std::array rows{
+const std::array profile_rows{
     text("kind", at<&ProfileJob::kind>(), "\"s-curve\"", "The profile")
         .takes("KIND")
         .one_of("trapezoid, s-curve, exponential, parabolic, stepper, minimum-jerk")
@@ -33,11 +33,11 @@ const std::array rows{
         .without("false: lengths"),
     flag("continuous", at<&ProfileJob::continuous>(), "true", "It may go either way round a circle")
         .without("false"),
-    quantity("from", at<&ProfileJob::from, &MotionState::position>(), place, any, "\"0.2 m\"",
+    quantity("from", at<&ProfileJob::from, &MotionState::position>(), in_place, any, "\"0.2 m\"",
              "Where it is")
         .takes("POSITION")
         .without("0"),
-    quantity("to", at<&ProfileJob::to, &MotionState::position>(), place, any, "\"1.4 m\"",
+    quantity("to", at<&ProfileJob::to, &MotionState::position>(), in_place, any, "\"1.4 m\"",
              "Where it is to be")
         .takes("POSITION")
         .without("0"),
@@ -121,7 +121,7 @@ const std::array rows{
              "Time between two rows of the table")
         .without("20 ms")};
 
-constexpr std::string_view section_name = "profile";
+constexpr std::string_view profile_section_name = "profile";
 
 /// The keys of one of several axes: S-curves, without what chooses another kind.
 std::vector<Field> axis_rows() {
@@ -130,7 +130,7 @@ std::vector<Field> axis_rows() {
        {"angle", "continuous", "from", "to", "start_velocity", "goal_velocity",
         "start_acceleration", "goal_acceleration", "velocity", "acceleration", "deceleration",
         "reverse_velocity", "ramp"}) {
-    for (const Field& field : rows) {
+    for (const Field& field : profile_rows) {
       if (field.key == key) {
         all.push_back(field);
       }
@@ -161,13 +161,13 @@ const std::array group_rows{text("synchronize", at<&AxesJob::synchronize>(), "\"
                                      "Time between two rows of the table")
                                 .without("20 ms")};
 
-std::optional<SignalDimensions> dimensions_of(const void* document) {
+std::optional<SignalDimensions> profile_dimensions_of(const void* document) {
   const bool turns = static_cast<const ProfileJob*>(document)->angle;
   return turns ? SignalDimensions{{}, Dimension::angle, angular_velocity, angular_acceleration}
                : SignalDimensions{{}, length, Dimension::velocity, Dimension::acceleration};
 }
 
-std::string example_of(const Field& field) {
+std::string profile_example_of(const Field& field) {
   std::string example(field.example);
   std::erase(example, '"');
   return example.find(' ') == std::string::npos ? example : "'" + example + "'";
@@ -177,7 +177,7 @@ std::string example_of(const Field& field) {
 
 std::vector<FieldInfo> profile_fields() {
   std::vector<FieldInfo> all;
-  for (const Field& field : rows) {
+  for (const Field& field : profile_rows) {
     const std::string value = !field.metavar.empty()                   ? std::string(field.metavar)
                               : field.type == FieldType::flag          ? ""
                               : field.dimension.dimension == time      ? "TIME"
@@ -185,22 +185,22 @@ std::vector<FieldInfo> profile_fields() {
                               : field.dimension.dimension == Dimension::voltage ? "VOLTAGE"
                               : field.dimension.dimension == Dimension::current ? "CURRENT"
                                                                                 : "RESISTANCE";
-    all.push_back({.section = std::string(section_name),
+    all.push_back({.section = std::string(profile_section_name),
                    .key = std::string(field.key),
                    .option = option_of(field),
                    .value = value,
                    .help = std::string(field.help),
-                   .example = example_of(field),
+                   .example = profile_example_of(field),
                    .absent = std::string(field.absent)});
   }
   return all;
 }
 
 ExpectedAll<ProfileJob> profile_job(std::span<const Override> given) {
-  const std::array sections{Section{section_name, rows,
+  const std::array sections{Section{profile_section_name, profile_rows,
                                     [](void* document, bool) { return document; },
                                     "What is asked of a profile."}};
-  const Document table{sections, dimensions_of};
+  const Document table{sections, profile_dimensions_of};
   TomlDocument document("", "");
   document.apply(given, sections);
   ProfileJob job;
@@ -219,7 +219,7 @@ ExpectedAll<AxesJob> axes_job_of(std::string_view text, const std::string& path,
                                  std::span<const Override> given) {
   constexpr std::string_view axis_name = "axis";
   const std::vector<Field> axis_fields = axis_rows();
-  const std::array group{Section{section_name, group_rows,
+  const std::array group{Section{profile_section_name, group_rows,
                                  [](void* document, bool) { return document; }, "Of all axes."}};
   const std::array axis{Section{axis_name, axis_fields,
                                 [](void* document, bool) { return document; }, "One of the axes."}};
@@ -251,7 +251,7 @@ ExpectedAll<AxesJob> axes_job_of(std::string_view text, const std::string& path,
   for (TomlDocument& table : tables) {
     ProfileJob one;
     one.angle = table.says(axis_name, "angle");  // The unit of a position hangs on it.
-    table.read({axis, dimensions_of}, &one);
+    table.read({axis, profile_dimensions_of}, &one);
     keep(table);
     if (one.name.empty()) {
       one.name = fmt::format("axis {}", job.axes.size() + 1);
