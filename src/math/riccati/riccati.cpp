@@ -97,7 +97,9 @@ bool holds_in_given_units(const detail::RiccatiData& data, detail::RiccatiAnswer
   if (!(residual <= little)) {
     return false;
   }
-  answer.residual = std::max(answer.residual, residual);
+  // One of doubles that cancel says nothing.
+  answer.residual =
+      answer.residual <= detail::largest_residual ? std::max(answer.residual, residual) : residual;
   if (n > detail::most_states_in_twice) {
     return true;
   }
@@ -113,11 +115,10 @@ bool holds_in_given_units(const detail::RiccatiData& data, detail::RiccatiAnswer
 /// larger than its eigenvalues: doubling would take many steps, and lose as many digits, for
 /// nothing. False where the units are not so, or where the kernel does not vouch for its result.
 bool solve_in_balanced_units(const detail::RiccatiData& data, detail::RiccatiAnswer& answer) {
-  constexpr int few = 20;
   constexpr double far_larger = 64.0;
   const int n = data.states;
   const int m = data.inputs;
-  if (n <= few) {
+  if (n <= detail::kernel_few_states) {
     return false;
   }
   const ConstMap A(data.A, n, n);
@@ -197,7 +198,7 @@ Expected<void> solve_riccati_within(const RiccatiData& data, RiccatiAnswer& answ
       (data.N == nullptr || is_ordinary(largest_of(data.N, n * m)));
   if (ordinary && symmetric(data.Q, n) && symmetric(data.R, m) &&
       (solve_in_balanced_units(data, answer) || solve_riccati_quickly(data, answer))) {
-    if (!in_units_far_apart(answer.X, n)) {
+    if (answer.residual <= largest_residual && !in_units_far_apart(answer.X, n)) {
       return {};
     }
     if (holds_in_given_units(data, answer)) {

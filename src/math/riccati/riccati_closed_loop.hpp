@@ -198,15 +198,18 @@ class ClosedLoop {
       sum = advance(M_);
     }
     const double largest = most * sum;
+    double before = sum;
     for (int k = 0; k < steps; ++k) {
       const double norm = advance(A_);
       sum += norm;
       if (!(norm <= largest)) {
         break;
       }
-      if (norm < 1e-3 * sum) {
-        return 0.25 * sum * unit;
+      // What is left of a slow mode beside fast ones is a long geometric series.
+      if (norm < 1e-3 * sum && norm < before) {
+        return 0.25 * (sum + norm * norm / (before - norm)) * unit;
       }
+      before = norm;
     }
     return std::numeric_limits<double>::infinity();
   }

@@ -76,6 +76,36 @@ TEST(ShortWay, ManyStatesInUnitsFarApart) {
   }
 }
 
+// A = -I - 10¹⁰ L, L the Laplacian of a chain: AᵀX, of terms of 10¹⁰ ξ, cancels to ξ, and in
+// doubles F is mostly rounding. With e the vector of ones, B = e, Q = e eᵀ and R = 1 it is X = ξ e
+// eᵀ, n²ξ² + 2 ξ - 1 = 0.
+TEST(ShortWay, TermsThatCancelInDoubles) {
+  const int n = 40;
+  MatrixXd A = MatrixXd::Zero(n, n);
+  for (int i = 0; i + 1 < n; ++i) {
+    A(i, i + 1) = A(i + 1, i) = 1e10;
+    A(i, i) -= 1e10;
+    A(i + 1, i + 1) -= 1e10;
+  }
+  A.diagonal().array() -= 1.0;
+  const MatrixXd B = MatrixXd::Ones(n, 1);
+  const MatrixXd Q = MatrixXd::Ones(n, n);
+  const MatrixXd R = MatrixXd::Ones(1, 1);
+  MatrixXd X(n, n);
+  MatrixXd K(1, n);
+  Eigen::VectorXcd poles(n);
+  detail::RiccatiAnswer answer{X.data(), K.data(), poles.data()};
+  ASSERT_TRUE(detail::solve_riccati_quickly(
+      {n, 1, A.data(), B.data(), Q.data(), R.data(), nullptr, true}, answer));
+  EXPECT_GT(answer.residual, detail::largest_residual);
+  const double xi = (std::sqrt(1.0 + n * n) - 1.0) / (n * n);
+  EXPECT_LT((X.array() - xi).abs().maxCoeff(), 1e-13 * xi);
+  const auto solved = care(A, B, Q, R);
+  ASSERT_TRUE(solved.has_value());
+  EXPECT_EQ(solved->X, X);
+  EXPECT_LT(solved->residual, 1e-15);
+}
+
 // The residual by whole products is that by sums of two doubles, in units far apart, too.
 TEST(ShortWay, RiccatiResidual) {
   Random random(34);
