@@ -1,8 +1,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "identification/model_terms.hpp"
+#include "identification/record_noise.hpp"
+#include "math/dense/dense.hpp"
 
 namespace flyball::identification {
 namespace {
@@ -27,6 +30,23 @@ double beyond_doubt(const Term& term) {
   return 24.0 + 2.9 * static_cast<double>(term.size() - 1);
 }
 
+/// Of a term over its standard error, squared, exceeded once in twenty logs without it: χ² of as
+/// many degrees of freedom as it has parameters, of one degree of half the logs where its sign is
+/// known.
+constexpr double two_sided_95 = 3.84;
+double by_chance(const Term& term) {
+  switch (term.front()) {
+    case parameter::drag:
+    case parameter::sag:
+    case parameter::take_up:
+      return 2.71;
+    case parameter::friction_field:
+      return 12.6;
+    default:
+      return two_sided_95;
+  }
+}
+
 /// Of the evidence beyond doubt: with more, a term is fitted to see what would come of it.
 constexpr double worth_a_fit = 0.5;
 constexpr std::size_t most_fits = 3;
@@ -36,8 +56,6 @@ constexpr double widest_limit = 0.2;
 constexpr std::array take_up_times{0.005, 0.015};
 /// V, of a force: recorded voltages are not much better.
 constexpr double perceptible = 0.05;
-/// Of χ² of one degree of freedom whose sign is known, exceeded once in twenty.
-constexpr double evidence_95 = 2.7;
 /// Two terms that differ by less evidence explain the same.
 constexpr double as_good = 0.5;
 
@@ -244,8 +262,27 @@ struct Judged {
   double gain = 0.0;      ///< Of the cost.
   double evidence = 0.0;  ///< Over what is beyond doubt.
   Eigen::VectorXd moved;  ///< Of the parameters, by the term.
+  /// Of a term in doubt, over its covariance as the record's noise makes it.
+  double by_noise = std::numeric_limits<double>::infinity();
   [[nodiscard]] double chi_squared() const { return evidence * beyond_doubt(term); }
+  /// What it is worth where it is not beyond doubt. Residuals' own covariances lack of what hangs
+  /// on a step or two, and would see a sag in one plain log in six.
+  [[nodiscard]] double in_doubt() const { return std::min(chi_squared(), by_noise); }
 };
+
+/// The term over its covariance at a minimum, squared, as the noise of the record makes it.
+double over_noise(OutputErrorProblem& problem, const Bounds& bounds, const ChannelScales& scales,
+                  const Eigen::VectorXd& x, const Term& term) {
+  const RecordNoise noise = estimate_record_noise(problem, x, scales);
+  const Covariances spread =
+      covariances(problem, x, problem.free_parameters(), bounds, scales, &noise);
+  if (spread.singular) {
+    return 0.0;
+  }
+  const Eigen::VectorXd value = x(term);
+  const Eigen::VectorXd solution = detail::solve_symmetric(spread.estimates[1](term, term), value);
+  return value.dot(solution);
+}
 
 /// Fits the model with a term more, and leaves it without.
 Judged judge(OutputErrorProblem& problem, const Bounds& bounds, const ChannelScales& scales,
@@ -263,6 +300,11 @@ Judged judge(OutputErrorProblem& problem, const Bounds& bounds, const ChannelSca
     judged.fit = minimize(problem, larger.x, problem.free_parameters(), bounds, fresh, 60, 1e-2);
     const bool small = term.front() < parameter::headroom &&
                        largest_force(problem, judged.fit.x, term) < perceptible;
+    const auto of_noise = [&] {
+      extend(problem, term, true);
+      problem.refresh_forces(judged.fit.x);
+      return over_noise(problem, bounds, fresh, judged.fit.x, term);
+    };
     extend(problem, term, false);
     problem.refresh_forces(best.x);
     const RobustFit without =
@@ -277,6 +319,11 @@ Judged judge(OutputErrorProblem& problem, const Bounds& bounds, const ChannelSca
       judged.evidence = std::min(judged.evidence, worth_a_fit);
     }
     judged.moved = judged.fit.x - without.x;
+    // A limit has no standard error where there is none of it.
+    const bool open = judged.evidence < 1.0 && judged.chi_squared() > by_chance(term);
+    if (open && term.front() != parameter::headroom) {
+      judged.by_noise = of_noise();
+    }
     // So far away, and no better: another valley, not a doubt.
     if (judged.evidence < 1.0 && std::abs(judged.moved[parameter::log_time_constant]) > 0.5) {
       judged.moved.setZero();
@@ -294,10 +341,11 @@ std::vector<Judged>::iterator find(std::vector<Judged>& all, Eigen::Index term) 
 }
 
 /// That there is the term: odds of one to ten before the data, of which half is lost to what else
-/// it could have been.
+/// it could have been; beside one parameter of either sign by what is as rare without it.
 double probability(const Judged& judged) {
   constexpr double against = 20.0;
-  return 1.0 / (1.0 + against * std::exp(-0.5 * judged.chi_squared()));
+  const double beyond_chance = judged.in_doubt() - by_chance(judged.term);
+  return 1.0 / (1.0 + against * std::exp(-0.5 * (beyond_chance + two_sided_95)));
 }
 
 /// The parameters that are there without the term, as far as it would move them.
@@ -381,12 +429,14 @@ Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds, Channe
     choose_start(all, better, extension);
     if (better == all.end() || better->evidence < 1.0) {
       for (const Judged& judged : all) {
-        // No log of a step of one height tells a sagging battery from more inertia: where one log
-        // in twenty without it would show as much, with a sag a standard error larger than found.
-        const bool sags =
-            judged.term.front() == parameter::sag && judged.chi_squared() > evidence_95;
-        const double weight =
-            sags ? 1.0 + 1.0 / std::sqrt(judged.chi_squared()) : std::sqrt(probability(judged));
+        if (judged.in_doubt() <= by_chance(judged.term)) {
+          continue;
+        }
+        // No log of a step of one height tells a sagging battery from more inertia: with a sag a
+        // standard error larger than found.
+        const double weight = judged.term.front() == parameter::sag
+                                  ? 1.0 + 1.0 / std::sqrt(judged.in_doubt())
+                                  : std::sqrt(probability(judged));
         extension.doubts.push_back(doubt(judged, weight));
         extension.open.push_back(
             {static_cast<int>(judged.term.front()), judged.moved, false, weight});

@@ -14,6 +14,7 @@ constexpr int most_sweeps = 6;
 constexpr double shortest_disturbance = 0.3;  // s, of memory
 constexpr double longest_disturbance = 3.0;   // s
 constexpr double shortest_average = 1e-3;     // s, of a velocity
+constexpr double leap = 10.0;                 // standard deviations
 constexpr double settled = 0.1;               // of −2 ln likelihood, that a sweep gains
 
 /// The mechanism that the noise disturbs.
@@ -132,6 +133,18 @@ struct Belief {
     P12 = s.rho * v2;
     P22 = s.rho * s.rho * P22 + s.Q22;
   }
+  /// Where the position is, is not compared: where a run starts, and beyond a leap.
+  void place(const Miss& miss, const RecordNoise& noise) {
+    p = miss.value;
+    P01 = P02 = 0.0;
+    P00 = square(noise.position);
+  }
+  /// Whether no noise moves a position so far: a coupling that slipped, counts that were lost. It
+  /// is there for good, and what is left of it would be taken for noise of all values.
+  [[nodiscard]] bool leaps(const Miss& miss, const RecordNoise& noise) const {
+    return miss.of_position &&
+           square(miss.value - p) > square(leap) * (P00 + square(noise.position));
+  }
   /// @return  −2 ln likelihood of the value.
   double correct(const Miss& miss, const RecordNoise& noise) {
     const double k0 = miss.of_position ? P00 : P01;
@@ -176,11 +189,11 @@ double unlikelihood(const MissedRun& run, const Plant& plant, const RecordNoise&
       time = miss.time;
     }
     if (miss.of_position && !placed) {
-      // Where a run starts is not compared.
       placed = true;
-      belief.p = miss.value;
-      belief.P01 = belief.P02 = 0.0;
-      belief.P00 = square(noise.position);
+      belief.place(miss, noise);
+    } else if (belief.leaps(miss, noise)) {
+      sum += std::log(belief.P00 + square(noise.position)) + misfit(square(leap));
+      belief.place(miss, noise);
     } else {
       sum += belief.correct(miss, noise);
     }
