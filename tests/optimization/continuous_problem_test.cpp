@@ -444,8 +444,8 @@ TEST(ContinuousProblem, SaysWhatCannotBeDone) {
   problem.fix_start(Vector2d(0.0, 0.0));
   problem.fix_end(Vector2d(1.0, 0.0));
   problem.set_duration(1.0);
-  for (const Transcription method :
-       {Transcription::runge_kutta, Transcription::multiple_shooting}) {
+  for (const Transcription method : {Transcription::runge_kutta, Transcription::multiple_shooting,
+                                     Transcription::hermite_simpson, Transcription::radau}) {
     const auto s = solve(problem, {.method = method}).value();
     EXPECT_EQ(s.status, SolveStatus::infeasible) << to_string(method) << ": " << s.message;
     ASSERT_FALSE(s.violations.empty()) << to_string(method);

@@ -204,6 +204,10 @@ SolveStatus InteriorPoint::restore(const SolverOptions& options, double seconds_
     return SolveStatus::no_progress;
   }
   ++counts_.restorations;
+  // Where the filter's method leaves again and again what restorations reach, a violation cannot
+  // fall to zero nearby, or only by going all the way: the next ones end at its minimum.
+  constexpr int patience = 8;
+  const bool to_the_end = counts_.restorations > patience;
   filter_.add((1.0 - 1e-5) * theta, barrier(w_, f_) - 1e-5 * theta);
   RestorationProgram& restoring = restoration_->restoring;
   InteriorPoint& solver = restoration_->solver;
@@ -228,7 +232,7 @@ SolveStatus InteriorPoint::restore(const SolverOptions& options, double seconds_
     }
     const double t = trial_c_.lpNorm<1>();
     enough = t <= 0.9 * theta && filter_.accepts(t, barrier(trial_, trial_f_));
-    return enough;
+    return enough && !to_the_end;
   };
   SolverOptions inner = options;
   inner.first_barrier = mu;
@@ -241,7 +245,10 @@ SolveStatus InteriorPoint::restore(const SolverOptions& options, double seconds_
   if (!program_.values(trial_, trial_f_, trial_c_)) {
     return SolveStatus::not_finite;
   }
-  if (!enough && trial_c_.lpNorm<1>() <= 0.5 * theta) {
+  if (to_the_end && status == SolveStatus::solved) {
+    enough = !(trial_c_.lpNorm<Eigen::Infinity>() > 1e-6);
+    reset_filter();
+  } else if (!enough && trial_c_.lpNorm<1>() <= 0.5 * theta) {
     enough = true;  // much is won, though not by the filter's measure
     reset_filter();
   }
