@@ -26,8 +26,8 @@ constexpr int instants_of_an_interval = 100;
 constexpr std::size_t most_violations = 10;
 
 /// What a wheel may exceed.
-enum class WheelLimit : std::uint8_t { speed, force, torque, grip };
-constexpr std::size_t wheel_limits = 4;
+enum class WheelLimit : std::uint8_t { speed, force, torque, grip, power };
+constexpr std::size_t wheel_limits = 5;
 
 /// The worst of each thing: constraints by their place, then the wheels' limits.
 class Worst {
@@ -106,6 +106,10 @@ class Worst {
       case WheelLimit::grip:
         v.name = flyball::detail::format("grip of the {} side", which);
         break;
+      case WheelLimit::power:
+        v.name = flyball::detail::format("supply current of the {} motor", which);
+        v.unit = "W";
+        break;
     }
     return v;
   }
@@ -169,6 +173,13 @@ WheelShares check_wheels(const DriveModel& model, const VectorXd& x, const Vecto
       const double most = model.stall_force * (1.0 - speed / model.free_speed);
       worst.add_wheel(WheelLimit::torque, w, along - most, model.stall_force, t);
       shares.line = std::max(shares.line, (along - most) / model.stall_force);
+    }
+    if (model.supply_power > 0.0) {
+      const double drawn =
+          (f[0] * v[0] + f[1] * v[1]) * model.force() + model.copper_loss * force * force;
+      const double beyond = drawn - model.supply_power;
+      worst.add_wheel(WheelLimit::power, w, beyond, model.supply_power, t);
+      shares.line = std::max(shares.line, beyond / model.supply_power);
     }
     if (model.drivetrain == Drivetrain::differential && model.friction > 0.0) {
       const auto at = drive_body::motion<double>(model, x, u);

@@ -145,7 +145,9 @@ Expected<void> check_model(const DriveModel& model) {
                     .positive(model.max_speed, "the wheels' largest speed", "m/s")
                     .not_negative(model.friction, "the wheels' friction", "N")
                     .not_negative(model.free_speed, "the motors' free speed", "m/s")
-                    .not_negative(model.stall_force, "the motors' stall force", "N"));
+                    .not_negative(model.stall_force, "the motors' stall force", "N")
+                    .not_negative(model.supply_power, "the motors' supply power", "W")
+                    .not_negative(model.copper_loss, "the motors' copper loss", "W/N²"));
   if (model.free_speed > 0.0) {
     FLYBALL_CHECK(
         check_positive(model.stall_force, in_drive_trajectory, "the motors' stall force", "N"));
@@ -293,6 +295,17 @@ double reach_of(const DriveModel& model) {
   double reach = 0.0;
   for (const Vector2d& corner : model.corners) {
     reach = std::max(reach, corner.norm());
+  }
+  return reach;
+}
+
+double wheel_reach_of(const DriveModel& model) {
+  double reach = 0.05;
+  if (model.drivetrain == Drivetrain::differential) {
+    return std::max(reach, 0.5 * model.trackwidth);
+  }
+  for (const Vector2d& wheel : model.wheels) {
+    reach = std::max(reach, wheel.norm());
   }
   return reach;
 }

@@ -37,6 +37,8 @@ struct Disc {
 [[nodiscard]] std::vector<Eigen::Vector2d> corners_of(const DriveModel& model);
 /// How far the bumpers reach from the middle.
 [[nodiscard]] double reach_of(const DriveModel& model);
+/// How far the wheels are from the middle: what they roll by a turn of 1 rad. 5 cm at least.
+[[nodiscard]] double wheel_reach_of(const DriveModel& model);
 
 /// The way from one waypoint to another: a point, and the direction to the left of it.
 struct Lane {

@@ -59,6 +59,8 @@ struct Margins {
 struct Guess {
   std::string name{};
   Eigen::MatrixXd states{};        ///< n x (N + 1).
+  Eigen::MatrixXd inputs{};        ///< Forces over `DriveModel::force()`, m x N; empty: none.
+  Eigen::MatrixXd angles{};        ///< rad, of the obstacles' lines, a row each; empty: chosen.
   Eigen::VectorXd durations{};     ///< s, of the segments.
   std::vector<double> headings{};  ///< rad, of the waypoints: the turn that is wanted.
 };

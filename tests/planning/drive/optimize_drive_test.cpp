@@ -167,6 +167,44 @@ TEST(OptimizeDrive, MotorsPushLessAtSpeed) {
   EXPECT_LT(found, 1.01 * best);  // forces are held over intervals
 }
 
+// A wheel that draws P at most: F up to the speed P/F, then v dv/dt = n P/m, hence
+// v³ = v₁³ + 3 n P s/m, then full brakes.
+TEST(OptimizeDrive, BatteriesGiveSoMuch) {
+  DriveModel model = choreo_robot();
+  model.supply_power = 250.0;
+  const double n = 4.0;
+  const double a = n * model.max_force / model.mass;
+  const double power = n * model.supply_power / model.mass;
+  const double way = 3.0;
+  const double v1 = model.supply_power / model.max_force;
+  double low = v1;
+  double high = model.max_speed;
+  for (int i = 0; i < 100; ++i) {
+    const double v = 0.5 * (low + high);
+    const double s =
+        0.5 * v1 * v1 / a + (v * v * v - v1 * v1 * v1) / (3.0 * power) + 0.5 * v * v / a;
+    (s > way ? high : low) = v;
+  }
+  const double best = v1 / a + 0.5 * (low * low - v1 * v1) / power + low / a;
+  DriveProblem problem = from_to(model, way, 0.0, 0.0);
+  problem.target_interval = 0.02;
+  const double found = solved(problem).duration;
+  EXPECT_GT(found, best - 1e-3);
+  EXPECT_LT(found, 1.01 * best);                     // forces are held over intervals
+  EXPECT_GT(best, 1.05 * 2.0 * std::sqrt(way / a));  // and without it
+  // Windings that lose what there is leave no force beyond √(P/R').
+  problem.model.copper_loss = model.supply_power / std::pow(0.5 * model.max_force, 2);
+  const DriveSolution heated = solved(problem);
+  double most = 0.0;
+  for (const DriveSample& sample : heated.samples) {
+    if (sample.vx * sample.forces[0](0) > 0.0) {
+      most = std::max(most, sample.forces[0].norm());
+    }
+  }
+  EXPECT_LT(most, 0.501 * model.max_force);
+  EXPECT_GT(heated.duration, found);
+}
+
 // Choreo's own trajectories, re-solved from their waypoints under the same model.
 TEST(OptimizeDrive, IsNotSlowerThanChoreo) {
   EXPECT_LT(solved(choreo_swerve(pi)).duration, 1.005 * 1.19651);

@@ -22,24 +22,27 @@ enum class Drivetrain : std::uint8_t { swerve, differential, mecanum };
 /// A wheel (a swerve module, a mecanum wheel, a side of a differential drive) at the speed v over
 /// the floor pushes with at most
 ///
-///   |F| ≤ max_force,  |F| ≤ friction,  |v| ≤ max_speed,  F·v ≤ stall_force (|v| - |v|²/free_speed)
+///   |F| ≤ max_force,  |F| ≤ friction,  |v| ≤ max_speed,  F·v ≤ stall_force (|v| -
+///   |v|²/free_speed), F·v + copper_loss |F|² ≤ supply_power
 ///
-/// where the last line, the motor's torque over its speed, stands only with a free_speed. What
-/// brakes is not limited by it. A mecanum wheel's v and F are those of its tread, and its roller
-/// pushes the floor with √2 F; a side of a differential drive has grip along and across:
-/// F² + (m v ω/2)² ≤ friction².
+/// where the motor's torque over its speed stands only with a free_speed, and what it draws from
+/// the battery only with a supply_power. What brakes is not limited by the motor's line. A mecanum
+/// wheel's v and F are those of its tread, and its roller pushes the floor with √2 F; a side of a
+/// differential drive has grip along and across: F² + (m v ω/2)² ≤ friction².
 struct DriveModel {
   Drivetrain drivetrain = Drivetrain::swerve;
   double mass = 0.0;               ///< kg
   double moment_of_inertia = 0.0;  ///< kg m², about the vertical axis.
   /// m, of swerve modules and mecanum wheels: FL, FR, BL, BR.
   std::array<Eigen::Vector2d, 4> wheels{};
-  double trackwidth = 0.0;   ///< m, of a differential drive.
-  double max_force = 0.0;    ///< N, of a wheel or side: stall torque or current limit.
-  double max_speed = 0.0;    ///< m/s, of a wheel or side.
-  double stall_force = 0.0;  ///< N, of the motor's line; looked at with free_speed.
-  double free_speed = 0.0;   ///< m/s, of the motor's line; 0: force at every speed.
-  double friction = 0.0;     ///< N, of a wheel or side: μ times its load; 0: endless.
+  double trackwidth = 0.0;    ///< m, of a differential drive.
+  double max_force = 0.0;     ///< N, of a wheel or side: stall torque or current limit.
+  double max_speed = 0.0;     ///< m/s, of a wheel or side.
+  double stall_force = 0.0;   ///< N, of the motor's line; looked at with free_speed.
+  double free_speed = 0.0;    ///< m/s, of the motor's line; 0: force at every speed.
+  double friction = 0.0;      ///< N, of a wheel or side: μ times its load; 0: endless.
+  double supply_power = 0.0;  ///< W that a wheel or side draws from the battery; 0: endless.
+  double copper_loss = 0.0;   ///< W/N² that its motors' windings lose; looked at with supply_power.
   std::vector<Eigen::Vector2d> corners{};  ///< m, of the bumpers, convex; empty: a point.
 
   /// N that a wheel pushes with at most.
