@@ -33,7 +33,7 @@ double beyond_doubt(const Term& term) {
 /// Of a term over its standard error, squared, exceeded once in twenty logs without it: χ² of as
 /// many degrees of freedom as it has parameters, of one degree of half the logs where its sign is
 /// known.
-constexpr double two_sided_95 = 3.84;
+constexpr double chi_squared_95 = 3.84;
 double by_chance(const Term& term) {
   switch (term.front()) {
     case parameter::drag:
@@ -43,7 +43,7 @@ double by_chance(const Term& term) {
     case parameter::friction_field:
       return 12.6;
     default:
-      return two_sided_95;
+      return chi_squared_95;
   }
 }
 
@@ -345,7 +345,7 @@ std::vector<Judged>::iterator find(std::vector<Judged>& all, Eigen::Index term) 
 double probability(const Judged& judged) {
   constexpr double against = 20.0;
   const double beyond_chance = judged.in_doubt() - by_chance(judged.term);
-  return 1.0 / (1.0 + against * std::exp(-0.5 * (beyond_chance + two_sided_95)));
+  return 1.0 / (1.0 + against * std::exp(-0.5 * (beyond_chance + chi_squared_95)));
 }
 
 /// The parameters that are there without the term, as far as it would move them.

@@ -16,7 +16,7 @@ namespace flyball::study {
 
 namespace {
 
-constexpr std::string_view where = "profile";
+constexpr std::string_view in_axes = "profile";
 
 /// An axis's limits and ends, with what its name is in errors.
 Expected<AxisResult> axis_of(const ProfileJob& job) {
@@ -25,7 +25,7 @@ Expected<AxisResult> axis_of(const ProfileJob& job) {
   for (const auto& [value, name, unit] :
        {std::tuple(job.velocity, "velocity", "/s"), {job.acceleration, "acceleration", "/s^2"}}) {
     if (!(value > 0.0)) {
-      return refusal(ArgumentError::empty, where, fmt::format("{} of {}", name, job.name))
+      return refusal(ArgumentError::empty, in_axes, fmt::format("{} of {}", name, job.name))
           .got("left out")
           .expected(fmt::format("a limit such as {} = \"2 {}{}\"", name, axis.unit, unit));
     }
@@ -46,7 +46,7 @@ Expected<AxisResult> axis_of(const ProfileJob& job) {
                                     {axis.from.acceleration, "start_acceleration"},
                                     {axis.to.acceleration, "goal_acceleration"}}) {
     if (!(std::abs(value) <= largest)) {
-      return refusal(ArgumentError::out_of_range, where, fmt::format("{} of {}", name, job.name))
+      return refusal(ArgumentError::out_of_range, in_axes, fmt::format("{} of {}", name, job.name))
           .got(format_number(value))
           .expected("a size up to 1e30");
     }
@@ -57,7 +57,7 @@ Expected<AxisResult> axis_of(const ProfileJob& job) {
                                     {all.deceleration, "deceleration"},
                                     {all.jerk, "acceleration by ramp"}}) {
     if (!(value >= 1.0 / largest && value <= largest)) {
-      return refusal(ArgumentError::out_of_range, where, fmt::format("{} of {}", name, job.name))
+      return refusal(ArgumentError::out_of_range, in_axes, fmt::format("{} of {}", name, job.name))
           .got(format_number(value))
           .expected("a limit of 1e-30 to 1e30");
     }
@@ -98,11 +98,11 @@ Expected<TimeSeries> table_of(std::vector<double> time, std::vector<AxisResult>&
 Expected<AxesResult> plan_axes(const AxesJob& job) {
   AxesResult result{.job = job};
   if (job.axes.empty() || job.axes.size() > most_axes) {
-    return refusal(ArgumentError::out_of_range, where, "axes")
+    return refusal(ArgumentError::out_of_range, in_axes, "axes")
         .got(fmt::format("{}", job.axes.size()))
         .expected(fmt::format("1 to {}", most_axes));
   }
-  FLYBALL_CHECK(Checks(where)
+  FLYBALL_CHECK(Checks(in_axes)
                     .positive(job.period.si(), "period", "s")
                     .not_negative(job.least.si(), "least", "s"));
   std::set<std::string> names;
@@ -111,7 +111,7 @@ Expected<AxesResult> plan_axes(const AxesJob& job) {
   std::vector<MotionState> goal;
   for (const ProfileJob& one : job.axes) {
     if (!names.insert(one.name).second) {
-      return refusal(ArgumentError::out_of_range, where, "name")
+      return refusal(ArgumentError::out_of_range, in_axes, "name")
           .got('"' + one.name + "\" twice")
           .expected("a name of its own for each axis");
     }
@@ -134,7 +134,7 @@ Expected<AxesResult> plan_axes(const AxesJob& job) {
   const double period = job.period.si();
   constexpr double most_rows = 1e6;
   if (!(end / period * static_cast<double>(motions.size()) < most_rows)) {
-    return refusal(ArgumentError::out_of_range, where, "the motion")
+    return refusal(ArgumentError::out_of_range, in_axes, "the motion")
         .got(fmt::format("{} s long, {:.3g} periods", format_number(end), end / period))
         .expected("at most a million periods of all axes together")
         .hint("raise the limits or --period");

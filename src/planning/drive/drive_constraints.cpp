@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
+#include "core/constants.hpp"
 #include "planning/drive/drive_body.hpp"
 #include "planning/drive/drive_rows.hpp"
 #include "planning/drive/drive_rules.hpp"
@@ -19,8 +19,6 @@ using optimization::Expression;
 using optimization::OptimalControlProblem;
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 using Vector = optimization::ExpressionVector;
 

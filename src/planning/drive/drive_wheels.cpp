@@ -1,6 +1,6 @@
 #include <cmath>
-#include <limits>
 
+#include "core/constants.hpp"
 #include "planning/drive/drive_body.hpp"
 #include "planning/drive/drive_rows.hpp"
 #include "planning/drive/drive_rules.hpp"
@@ -14,7 +14,6 @@ using optimization::OptimalControlProblem;
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 /// s a unit (m, m/s, rad) that a constraint gives way by: more than what any of them could win.
 constexpr double elastic_price = 300.0;
 

@@ -146,8 +146,7 @@ Answer answer_of(const AxesResult& result) {
             Tone::plain);
   if (result.slowest >= 0) {
     facts.add(result.in_phase ? "limited by" : "the others wait for",
-              result.axes[static_cast<std::size_t>(result.slowest)].name,
-              Tone::plain);
+              result.axes[static_cast<std::size_t>(result.slowest)].name, Tone::plain);
   }
   motion.blocks.emplace_back(std::move(facts));
   if (result.job.synchronize == "phase" && !result.in_phase) {
