@@ -69,7 +69,7 @@ Expected<Path> Path::join(std::vector<PathPiece> pieces) {
     const double before = total;
     total += piece.span;
     if (!(total > before)) {
-      return refusal(ArgumentError::out_of_range, where, detail::format("span {}", i + 1))
+      return refusal(ArgumentError::out_of_range, in_path_join, detail::format("span {}", i + 1))
           .got(format_number(piece.span))
           .expected(detail::format("one that can be told beside {:.4g}, all before it", before))
           .hint("space the knots uniformly, or scale what is larger");
