@@ -12,6 +12,7 @@
 #include <flyball/export/motion_table.hpp>
 #include <flyball/io/csv.hpp>
 #include <flyball/io/file.hpp>
+#include <flyball/io/motion/wpilib_trajectory.hpp>
 
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
@@ -105,6 +106,12 @@ ExpectedAll<std::string> written(PathResult& result) {
     return to_choreo(to_choreo_trajectory(result.trajectory, job_name(job), sides));
   }
   if (job.to == "wpilib") {
+    if (one && result.format == MotionFormat::wpilib_trajectory && !result.timed && !job.reverse &&
+        change.none()) {
+      FLYBALL_TRY(const std::string text, read_file(job.files.front()));
+      FLYBALL_TRY(const WpilibTrajectory file, parse_wpilib_trajectory(text, job.files.front()));
+      return to_wpilib(file);
+    }
     return to_wpilib(to_wpilib_trajectory(result.trajectory));
   }
   FLYBALL_TRY(const TimeSeries table, to_table(result.trajectory));

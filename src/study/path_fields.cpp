@@ -70,7 +70,7 @@ const std::array path_rows{
              "Limit of the angular acceleration")
         .without("the file's"),
     quantity("ramp", at<&PathJob::ramp>(), Dimension::time, positive, "\"200 ms\"",
-             "Time from no to full acceleration, which limits the jerk along the path")
+             "Time from no to full acceleration, which limits the jerk along and across the path")
         .without("none: the jerk is not limited"),
     quantity("start_velocity", at<&PathJob::start_velocity>(), Dimension::velocity, not_negative,
              "\"1 m/s\"", "How fast it starts")

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
@@ -9,7 +10,6 @@
 #include <flyball/core/argument.hpp>
 #include <flyball/planning/path/edit_path.hpp>
 
-#include "core/constants.hpp"
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "study/path_geometry.hpp"
@@ -22,13 +22,14 @@ using Coefficients = SplineSegment::Coefficients;
 using Eigen::Vector2d;
 
 /// A polynomial from a place of the shape to another.
-struct PathStretch {
+struct Stretch {
   Coefficients c;
   double from = 0.0, to = 0.0;
 
   [[nodiscard]] SplineEnd at(double t) const { return SplineSegment(c).at(t); }
 };
 
+constexpr double degree = std::numbers::pi / 180.0;
 /// cos 3°: more is a corner.
 constexpr double straight = 0.9986295347545738;
 
@@ -102,12 +103,46 @@ double length_of(const Coefficients& c) {
   return sum;
 }
 
+/// Where inside of a polynomial it stands still and goes back or aside: cusps, as a waypoint that is
+/// there twice makes them.
+std::vector<double> cusps_of(const Coefficients& c) {
+  constexpr int steps = 128;
+  constexpr double still = 1e-4;
+  const SplineSegment segment(c);
+  const auto speed = [&](double t) { return segment.at(t).derivative.squaredNorm(); };
+  const double size = extent(c);
+  std::vector<double> cusps;
+  for (int i = 1; i < steps; ++i) {
+    const double middle = static_cast<double>(i) / steps;
+    double low = middle - 1.0 / steps;
+    double high = middle + 1.0 / steps;
+    if (speed(middle) > speed(low) || speed(middle) > speed(high)) {
+      continue;
+    }
+    for (int k = 0; k < 80; ++k) {  // the least speed, by thirds
+      const double third = (high - low) / 3.0;
+      if (speed(low + third) < speed(high - third)) {
+        high -= third;
+      } else {
+        low += third;
+      }
+    }
+    const double t = 0.5 * (low + high);
+    const bool inside = t > 1e-3 && t < 1.0 - 1e-3;
+    if (inside && std::sqrt(speed(t)) < still * size &&
+        (cusps.empty() || t - cusps.back() > 1e-3)) {
+      cusps.push_back(t);
+    }
+  }
+  return cusps;
+}
+
 /// @errors ArgumentError::out_of_range for what is too long, empty where nothing moves.
-Expected<std::vector<PathStretch>> stretches_of(const RouteShape& shape,
-                                                std::vector<Diagnostic>& noticed) {
+Expected<std::vector<Stretch>> stretches_of(const RouteShape& shape,
+                                            std::vector<Diagnostic>& noticed) {
   constexpr double least = 1e-6;  // m
   constexpr double most = 1e4;
-  std::vector<PathStretch> all;
+  std::vector<Stretch> all;
   for (std::size_t i = 0; i < shape.segments.size(); ++i) {
     const Coefficients& c = shape.segments[i].coefficients();
     const double length = c.allFinite() ? length_of(c) : std::nan("");
@@ -119,7 +154,18 @@ Expected<std::vector<PathStretch>> stretches_of(const RouteShape& shape,
           .hint("places are in metres");
     }
     if (length > least) {
-      all.push_back({c, static_cast<double>(i), static_cast<double>(i + 1)});
+      const auto from = static_cast<double>(i);
+      std::vector<double> cuts = cusps_of(c);
+      if (!cuts.empty()) {
+        note(noticed, "cusps", "segment {} of the path stands still inside and turns: a stop there",
+             i + 1);
+      }
+      double before = 0.0;
+      cuts.push_back(1.0);
+      for (const double cut : cuts) {
+        all.push_back({cuts.size() > 1 ? part(c, before, cut) : c, from + before, from + cut});
+        before = cut;
+      }
     } else {
       warn(noticed, "waypoints_coincide", "waypoints {} and {} are in one place", i + 1, i + 2);
     }
@@ -134,11 +180,11 @@ Expected<std::vector<PathStretch>> stretches_of(const RouteShape& shape,
 }
 
 /// Ends at which a polynomial stands still (a control point on its anchor) get a derivative.
-void start_moving(std::vector<PathStretch>& stretches, std::vector<Diagnostic>& noticed) {
+void start_moving(std::vector<Stretch>& stretches, std::vector<Diagnostic>& noticed) {
   constexpr double still = 1e-3;
   constexpr double share = 0.1;
   std::size_t count = 0;
-  for (PathStretch& stretch : stretches) {
+  for (Stretch& stretch : stretches) {
     const double size = extent(stretch.c);
     for (const bool at_end : {false, true}) {
       const Vector2d d = stretch.at(at_end ? 1.0 : 0.0).derivative;
@@ -161,16 +207,16 @@ bool stops_at(const RouteShape& shape, double position) {
 }
 
 /// Whether each begins a part: after a corner or a stop. Joints that are off by less are smoothed.
-std::vector<bool> begins_of(const RouteShape& shape, std::vector<PathStretch>& stretches,
+std::vector<bool> begins_of(const RouteShape& shape, std::vector<Stretch>& stretches,
                             std::vector<Diagnostic>& noticed) {
   std::vector<bool> begins(stretches.size(), false);
-  constexpr double told = 0.06 * one_degree;
+  constexpr double told = 0.06 * degree;
   double most = 0.0;
   std::size_t bent = 0;
   begins[0] = true;
   for (std::size_t i = 1; i < stretches.size(); ++i) {
-    PathStretch& a = stretches[i - 1];
-    PathStretch& b = stretches[i];
+    Stretch& a = stretches[i - 1];
+    Stretch& b = stretches[i];
     const Vector2d u = direction(a.c, true);
     const Vector2d v = direction(b.c, false);
     begins[i] = u.dot(v) < straight || stops_at(shape, b.from);
@@ -188,7 +234,7 @@ std::vector<bool> begins_of(const RouteShape& shape, std::vector<PathStretch>& s
   }
   if (bent > 0) {
     note(noticed, "corners_smoothed", "{} of its joints {} off by up to {:.2g} degrees: smoothed",
-         bent, bent == 1 ? "is" : "are", most / one_degree);
+         bent, bent == 1 ? "is" : "are", most / degree);
   }
   return begins;
 }
@@ -199,15 +245,15 @@ double curvature_of(const SplineEnd& end) {
          (speed * speed * speed);
 }
 
-/// What turns as it goes cannot turn at another rate at once: where the curvature jumps it changes
-/// within 20 cm on both sides.
-void round_curvature(std::vector<PathStretch>& stretches, std::vector<bool>& begins,
-                     std::vector<Diagnostic>& noticed) {
+/// What turns as it goes cannot turn at another rate at once, nor can an acceleration whose growth
+/// is limited: where the curvature jumps it changes within 20 cm on both sides.
+void round_curvature(std::vector<Stretch>& stretches, std::vector<bool>& begins,
+                     Smoothing smoothing, std::vector<Diagnostic>& noticed) {
   constexpr double within = 0.2;  // m
   constexpr double rounding = 1e-7;
   std::size_t count = 0;
   double farthest = 0.0;
-  std::vector<PathStretch> all;
+  std::vector<Stretch> all;
   std::vector<bool> first;
   // How much to change the second derivatives at both ends of each, across them.
   const std::size_t n = stretches.size();
@@ -225,7 +271,7 @@ void round_curvature(std::vector<PathStretch>& stretches, std::vector<bool>& beg
     }
   }
   for (std::size_t i = 0; i < n; ++i) {
-    const PathStretch& whole = stretches[i];
+    const Stretch& whole = stretches[i];
     const double share = std::min(0.25, within / length_of(whole.c));
     std::vector<double> cuts{0.0};
     if (change[i][0] != 0.0) {
@@ -238,9 +284,9 @@ void round_curvature(std::vector<PathStretch>& stretches, std::vector<bool>& beg
     for (std::size_t k = 0; k + 1 < cuts.size(); ++k) {
       const double a = cuts[k];
       const double b = cuts[k + 1];
-      PathStretch of{cuts.size() > 2 ? part(whole.c, a, b) : whole.c,
-                     whole.from + a * (whole.to - whole.from),
-                     whole.from + b * (whole.to - whole.from)};
+      Stretch of{cuts.size() > 2 ? part(whole.c, a, b) : whole.c,
+                 whole.from + a * (whole.to - whole.from),
+                 whole.from + b * (whole.to - whole.from)};
       for (const bool at_end : {false, true}) {
         const double by =
             at_end ? (k + 2 == cuts.size() ? change[i][1] : 0.0) : (k == 0 ? change[i][0] : 0.0);
@@ -259,9 +305,11 @@ void round_curvature(std::vector<PathStretch>& stretches, std::vector<bool>& beg
   begins = std::move(first);
   if (count > 0) {
     note(noticed, "curvature_rounded",
-         "the curvature jumps at {} of its joints, where the wheels' speeds would, too: it changes "
+         "the curvature jumps at {} of its joints, where {} would, too: it changes "
          "within 20 cm there, at most {:.2g} mm beside the path",
-         count, 1e3 * farthest);
+         count,
+         smoothing == Smoothing::wheels ? "the wheels' speeds" : "the acceleration across the path",
+         1e3 * farthest);
   }
 }
 
@@ -320,13 +368,13 @@ double RoutePath::parameter(double position) const {
   return a.parameter + share * (next->parameter - a.parameter);
 }
 
-Expected<RoutePath> path_of(const RouteShape& shape, bool smooth_curvature,
+Expected<RoutePath> path_of(const RouteShape& shape, Smoothing smoothing,
                             std::vector<Diagnostic>& noticed) {
-  FLYBALL_TRY(std::vector<PathStretch> stretches, stretches_of(shape, noticed));
+  FLYBALL_TRY(std::vector<Stretch> stretches, stretches_of(shape, noticed));
   start_moving(stretches, noticed);
   std::vector<bool> begins = begins_of(shape, stretches, noticed);
-  if (shape.headings.empty() && smooth_curvature) {
-    round_curvature(stretches, begins, noticed);
+  if (smoothing != Smoothing::none) {
+    round_curvature(stretches, begins, smoothing, noticed);
   }
   std::vector<PathPiece> pieces;
   double s = 0.0;
@@ -334,7 +382,7 @@ Expected<RoutePath> path_of(const RouteShape& shape, bool smooth_curvature,
   std::vector<RouteKnot> knots;
   std::vector<double> starts;
   for (std::size_t i = 0; i < stretches.size(); ++i) {
-    const PathStretch& stretch = stretches[i];
+    const Stretch& stretch = stretches[i];
     const double leaves = stretch.at(0.0).derivative.norm();
     const double span = leaves / (begins[i] ? 1.0 : ahead);
     if (begins[i]) {

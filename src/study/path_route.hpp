@@ -22,7 +22,7 @@ struct RouteLimits {
   double centripetal = 0.0;                               ///< m/s², across.
   double angular_velocity = 0.0;                          ///< rad/s
   double angular_acceleration = 0.0;                      ///< rad/s²
-  double jerk = std::numeric_limits<double>::infinity();  ///< m/s³, along the path.
+  double jerk = std::numeric_limits<double>::infinity();  ///< m/s³, along and across together.
   Place place{0, 0};                                      ///< In the file; line 0: nowhere.
 };
 

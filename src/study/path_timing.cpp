@@ -27,7 +27,7 @@ TravelLimits travel(const RouteLimits& limits) {
           .total_acceleration = limits.acceleration,
           .angular_velocity = limits.angular_velocity,
           .angular_acceleration = limits.angular_acceleration,
-          .jerk = limits.jerk};
+          .total_jerk = limits.jerk};
 }
 
 /// What the robot's motors, wheels and grip limit.
@@ -170,8 +170,12 @@ Expected<TimedRoute> time_route(const RouteShape& shape, const std::optional<Dri
   trajectory.holonomic = !shape.headings.empty();
   trajectory.diagnostics = shape.diagnostics;
   const bool turns_as_it_goes =
-      std::isfinite(shape.limits.angular_acceleration) || robot.has_value();
-  FLYBALL_TRY(const RoutePath route, path_of(shape, turns_as_it_goes, trajectory.diagnostics));
+      shape.headings.empty() &&
+      (std::isfinite(shape.limits.angular_acceleration) || robot.has_value());
+  const Smoothing smoothing = turns_as_it_goes                   ? Smoothing::wheels
+                              : std::isfinite(shape.limits.jerk) ? Smoothing::acceleration
+                                                                 : Smoothing::none;
+  FLYBALL_TRY(const RoutePath route, path_of(shape, smoothing, trajectory.diagnostics));
 
   std::vector<PathTrajectory> motions;
   double total = 0.0;

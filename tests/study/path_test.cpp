@@ -86,6 +86,43 @@ TEST(Path, AStraightLineIsATrapezoid) {
   EXPECT_NEAR(plan(folder, straight(), moving).trajectory.duration(), 2.0, 5e-4);
 }
 
+// A waypoint that is there twice, its control points beyond each other: the curve between goes on,
+// back past it and on again, so that it stops twice more.
+TEST(Path, AWaypointThatIsThereTwice) {
+  const Folder folder;
+  const PathResult result =
+      plan(folder, path_of({{1, 1}, {2, 1}, {2.5, 1}, {3, 1}, {3.5, 1}, {2.5, 1}, {3, 1}, {3.5, 1},
+                            {4, 1}, {5, 1}}));
+  // Out to the cubic's extremes, 1.5 t (1 - t)(1 - 2 t) at t = (1 ± 1/√3)/2: 0.144 m to both sides.
+  EXPECT_NEAR(result.length, 4.0 + 4.0 * 0.144338, 0.02);
+  EXPECT_GT(result.trajectory.duration(), 3.2);
+  EXPECT_NEAR(result.trajectory.samples.back().pose.translation().x(), 5.0, 1e-9);
+}
+
+// From a line into an arc of 1 m the acceleration across would jump by v²: with a ramp the whole
+// acceleration changes by no more than its limit in that time.
+TEST(Path, ARampHoldsAcrossThePathToo) {
+  const Folder folder;
+  const double k = 4.0 / 3.0 * std::tan(pi / 8.0);
+  const PathPlannerPath path =
+      path_of({{1, 1}, {2, 1}, {3, 1}, {4, 1}, {4 + k, 1}, {5, 2 - k}, {5, 2}});
+  PathJob job;
+  job.acceleration = Acceleration(2.0);
+  job.ramp = Time(0.25);
+  const PathResult result = plan(folder, path, job);
+  const auto& samples = result.trajectory.samples;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    ASSERT_LE((samples[i].acceleration - samples[i - 1].acceleration).norm(),
+              8.0 * (samples[i].time - samples[i - 1].time) * (1.0 + 1e-9) + 1e-9)
+        << samples[i].time;
+  }
+  for (const MotionSample& sample : samples) {  // it does not stop where the arc begins
+    if (std::abs(sample.pose.x() - 4.0) < 0.5 && sample.pose.y() < 1.5) {
+      ASSERT_GT(sample.velocity.norm(), 0.5) << sample.time;
+    }
+  }
+}
+
 TEST(Path, ACurveIsDrivenAtItsCentripetalLimit) {
   const Folder folder;
   // Nearly a half circle of 2 m: the speed is √(a r) in its middle.
@@ -245,6 +282,22 @@ TEST(Path, TurnsAndMirrorsAreUndoneByThemselves) {
   const PathResult reverse = plan(folder, path, back);
   EXPECT_NEAR(reverse.trajectory.samples.front().pose.x(), 5.0, 1e-9);
   EXPECT_NEAR(reverse.trajectory.samples.back().pose.x(), 1.0, 1e-9);
+}
+
+TEST(Path, AWpilibFileStaysAsItIs) {
+  const Folder folder;
+  const auto row = [](double time, double x) {
+    return "{\"time\":" + std::to_string(time) + ",\"pose\":{\"translation\":{\"x\":" +
+           std::to_string(x) + ",\"y\":1},\"rotation\":{\"radians\":0}},\"velocity\":1,"
+           "\"acceleration\":0,\"curvature\":0.5,\"extra\":[7]}";
+  };
+  const std::string text = "[" + row(0.0, 1.0) + ", " + row(1.0, 2.0) + "]";
+  PathJob job;
+  job.files = {folder.write("a.wpilib.json", text)};
+  job.to = "wpilib";
+  const auto result = plan_path(job);
+  ASSERT_TRUE(result) << to_string(static_cast<const Error&>(result.error()));
+  EXPECT_EQ(result->written, text);
 }
 
 TEST(Path, TranslatesToEachFormat) {
