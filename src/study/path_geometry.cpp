@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
@@ -10,6 +9,7 @@
 #include <flyball/core/argument.hpp>
 #include <flyball/planning/path/edit_path.hpp>
 
+#include "core/constants.hpp"
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "study/path_geometry.hpp"
@@ -22,14 +22,13 @@ using Coefficients = SplineSegment::Coefficients;
 using Eigen::Vector2d;
 
 /// A polynomial from a place of the shape to another.
-struct Stretch {
+struct PathStretch {
   Coefficients c;
   double from = 0.0, to = 0.0;
 
   [[nodiscard]] SplineEnd at(double t) const { return SplineSegment(c).at(t); }
 };
 
-constexpr double degree = std::numbers::pi / 180.0;
 /// cos 3°: more is a corner.
 constexpr double straight = 0.9986295347545738;
 
@@ -103,8 +102,8 @@ double length_of(const Coefficients& c) {
   return sum;
 }
 
-/// Where inside of a polynomial it stands still and goes back or aside: cusps, as a waypoint that is
-/// there twice makes them.
+/// Where inside of a polynomial it stands still and goes back or aside: cusps, as a waypoint that
+/// is there twice makes them.
 std::vector<double> cusps_of(const Coefficients& c) {
   constexpr int steps = 128;
   constexpr double still = 1e-4;
@@ -138,11 +137,11 @@ std::vector<double> cusps_of(const Coefficients& c) {
 }
 
 /// @errors ArgumentError::out_of_range for what is too long, empty where nothing moves.
-Expected<std::vector<Stretch>> stretches_of(const RouteShape& shape,
-                                            std::vector<Diagnostic>& noticed) {
+Expected<std::vector<PathStretch>> stretches_of(const RouteShape& shape,
+                                                std::vector<Diagnostic>& noticed) {
   constexpr double least = 1e-6;  // m
   constexpr double most = 1e4;
-  std::vector<Stretch> all;
+  std::vector<PathStretch> all;
   for (std::size_t i = 0; i < shape.segments.size(); ++i) {
     const Coefficients& c = shape.segments[i].coefficients();
     const double length = c.allFinite() ? length_of(c) : std::nan("");
@@ -180,11 +179,11 @@ Expected<std::vector<Stretch>> stretches_of(const RouteShape& shape,
 }
 
 /// Ends at which a polynomial stands still (a control point on its anchor) get a derivative.
-void start_moving(std::vector<Stretch>& stretches, std::vector<Diagnostic>& noticed) {
+void start_moving(std::vector<PathStretch>& stretches, std::vector<Diagnostic>& noticed) {
   constexpr double still = 1e-3;
   constexpr double share = 0.1;
   std::size_t count = 0;
-  for (Stretch& stretch : stretches) {
+  for (PathStretch& stretch : stretches) {
     const double size = extent(stretch.c);
     for (const bool at_end : {false, true}) {
       const Vector2d d = stretch.at(at_end ? 1.0 : 0.0).derivative;
@@ -207,16 +206,16 @@ bool stops_at(const RouteShape& shape, double position) {
 }
 
 /// Whether each begins a part: after a corner or a stop. Joints that are off by less are smoothed.
-std::vector<bool> begins_of(const RouteShape& shape, std::vector<Stretch>& stretches,
+std::vector<bool> begins_of(const RouteShape& shape, std::vector<PathStretch>& stretches,
                             std::vector<Diagnostic>& noticed) {
   std::vector<bool> begins(stretches.size(), false);
-  constexpr double told = 0.06 * degree;
+  constexpr double told = 0.06 * one_degree;
   double most = 0.0;
   std::size_t bent = 0;
   begins[0] = true;
   for (std::size_t i = 1; i < stretches.size(); ++i) {
-    Stretch& a = stretches[i - 1];
-    Stretch& b = stretches[i];
+    PathStretch& a = stretches[i - 1];
+    PathStretch& b = stretches[i];
     const Vector2d u = direction(a.c, true);
     const Vector2d v = direction(b.c, false);
     begins[i] = u.dot(v) < straight || stops_at(shape, b.from);
@@ -234,7 +233,7 @@ std::vector<bool> begins_of(const RouteShape& shape, std::vector<Stretch>& stret
   }
   if (bent > 0) {
     note(noticed, "corners_smoothed", "{} of its joints {} off by up to {:.2g} degrees: smoothed",
-         bent, bent == 1 ? "is" : "are", most / degree);
+         bent, bent == 1 ? "is" : "are", most / one_degree);
   }
   return begins;
 }
@@ -247,13 +246,13 @@ double curvature_of(const SplineEnd& end) {
 
 /// What turns as it goes cannot turn at another rate at once, nor can an acceleration whose growth
 /// is limited: where the curvature jumps it changes within 20 cm on both sides.
-void round_curvature(std::vector<Stretch>& stretches, std::vector<bool>& begins,
+void round_curvature(std::vector<PathStretch>& stretches, std::vector<bool>& begins,
                      Smoothing smoothing, std::vector<Diagnostic>& noticed) {
   constexpr double within = 0.2;  // m
   constexpr double rounding = 1e-7;
   std::size_t count = 0;
   double farthest = 0.0;
-  std::vector<Stretch> all;
+  std::vector<PathStretch> all;
   std::vector<bool> first;
   // How much to change the second derivatives at both ends of each, across them.
   const std::size_t n = stretches.size();
@@ -271,7 +270,7 @@ void round_curvature(std::vector<Stretch>& stretches, std::vector<bool>& begins,
     }
   }
   for (std::size_t i = 0; i < n; ++i) {
-    const Stretch& whole = stretches[i];
+    const PathStretch& whole = stretches[i];
     const double share = std::min(0.25, within / length_of(whole.c));
     std::vector<double> cuts{0.0};
     if (change[i][0] != 0.0) {
@@ -284,9 +283,9 @@ void round_curvature(std::vector<Stretch>& stretches, std::vector<bool>& begins,
     for (std::size_t k = 0; k + 1 < cuts.size(); ++k) {
       const double a = cuts[k];
       const double b = cuts[k + 1];
-      Stretch of{cuts.size() > 2 ? part(whole.c, a, b) : whole.c,
-                 whole.from + a * (whole.to - whole.from),
-                 whole.from + b * (whole.to - whole.from)};
+      PathStretch of{cuts.size() > 2 ? part(whole.c, a, b) : whole.c,
+                     whole.from + a * (whole.to - whole.from),
+                     whole.from + b * (whole.to - whole.from)};
       for (const bool at_end : {false, true}) {
         const double by =
             at_end ? (k + 2 == cuts.size() ? change[i][1] : 0.0) : (k == 0 ? change[i][0] : 0.0);
@@ -370,7 +369,7 @@ double RoutePath::parameter(double position) const {
 
 Expected<RoutePath> path_of(const RouteShape& shape, Smoothing smoothing,
                             std::vector<Diagnostic>& noticed) {
-  FLYBALL_TRY(std::vector<Stretch> stretches, stretches_of(shape, noticed));
+  FLYBALL_TRY(std::vector<PathStretch> stretches, stretches_of(shape, noticed));
   start_moving(stretches, noticed);
   std::vector<bool> begins = begins_of(shape, stretches, noticed);
   if (smoothing != Smoothing::none) {
@@ -382,7 +381,7 @@ Expected<RoutePath> path_of(const RouteShape& shape, Smoothing smoothing,
   std::vector<RouteKnot> knots;
   std::vector<double> starts;
   for (std::size_t i = 0; i < stretches.size(); ++i) {
-    const Stretch& stretch = stretches[i];
+    const PathStretch& stretch = stretches[i];
     const double leaves = stretch.at(0.0).derivative.norm();
     const double span = leaves / (begins[i] ? 1.0 : ahead);
     if (begins[i]) {

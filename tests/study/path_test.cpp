@@ -90,9 +90,16 @@ TEST(Path, AStraightLineIsATrapezoid) {
 // back past it and on again, so that it stops twice more.
 TEST(Path, AWaypointThatIsThereTwice) {
   const Folder folder;
-  const PathResult result =
-      plan(folder, path_of({{1, 1}, {2, 1}, {2.5, 1}, {3, 1}, {3.5, 1}, {2.5, 1}, {3, 1}, {3.5, 1},
-                            {4, 1}, {5, 1}}));
+  const PathResult result = plan(folder, path_of({{1, 1},
+                                                  {2, 1},
+                                                  {2.5, 1},
+                                                  {3, 1},
+                                                  {3.5, 1},
+                                                  {2.5, 1},
+                                                  {3, 1},
+                                                  {3.5, 1},
+                                                  {4, 1},
+                                                  {5, 1}}));
   // Out to the cubic's extremes, 1.5 t (1 - t)(1 - 2 t) at t = (1 ± 1/√3)/2: 0.144 m to both sides.
   EXPECT_NEAR(result.length, 4.0 + 4.0 * 0.144338, 0.02);
   EXPECT_GT(result.trajectory.duration(), 3.2);
@@ -287,8 +294,9 @@ TEST(Path, TurnsAndMirrorsAreUndoneByThemselves) {
 TEST(Path, AWpilibFileStaysAsItIs) {
   const Folder folder;
   const auto row = [](double time, double x) {
-    return "{\"time\":" + std::to_string(time) + ",\"pose\":{\"translation\":{\"x\":" +
-           std::to_string(x) + ",\"y\":1},\"rotation\":{\"radians\":0}},\"velocity\":1,"
+    return "{\"time\":" + std::to_string(time) +
+           ",\"pose\":{\"translation\":{\"x\":" + std::to_string(x) +
+           ",\"y\":1},\"rotation\":{\"radians\":0}},\"velocity\":1,"
            "\"acceleration\":0,\"curvature\":0.5,\"extra\":[7]}";
   };
   const std::string text = "[" + row(0.0, 1.0) + ", " + row(1.0, 2.0) + "]";
