@@ -370,10 +370,7 @@ Expected<std::vector<double>> phase_places(const Border& border) {
   return places;
 }
 
-}  // namespace
-
-Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
-  LoopMargins margins;
+Expected<void> check_order(const TransferFunction& loop) {
   constexpr Index most_states = 60;
   if (const double states = static_cast<double>(loop.order()) +
                             (loop.period() ? loop.delay() / loop.period()->si() : 0.0);
@@ -383,10 +380,13 @@ Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
         .expected(flyball::detail::format("at most {}", most_states))
         .hint("sample it more slowly, or leave out what is fast");
   }
-  const Border border(loop);
-  const Polynomial above = border.gain_above();
-  const Polynomial below = border.gain_below();
-  const Polynomial difference = plus(above, -1.0, below);
+  return {};
+}
+
+/// What the crossings of a loop tell, without the peaks.
+Expected<LoopMargins> crossings_of(const TransferFunction& loop, const Border& border) {
+  LoopMargins margins;
+  const Polynomial difference = plus(border.gain_above(), -1.0, border.gain_below());
   const auto unit_gain = detail::positive_roots(difference);
   if (!unit_gain) {
     return no_convergence();
@@ -475,8 +475,23 @@ Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
       margins.phase_margin = crossing.phase_margin;
     }
   }
+  return margins;
+}
 
+}  // namespace
+
+Expected<bool> detail::keeps_stable(const TransferFunction& loop) {
+  FLYBALL_CHECK(check_order(loop));
+  return crossings_of(loop, Border(loop)).map([](const LoopMargins& of) { return of.stable; });
+}
+
+Expected<LoopMargins> loop_margins(const TransferFunction& loop) {
+  FLYBALL_CHECK(check_order(loop));
+  const Border border(loop);
+  FLYBALL_TRY(LoopMargins margins, crossings_of(loop, border));
   if (border.delay() == 0.0) {
+    const Polynomial above = border.gain_above();
+    const Polynomial below = border.gain_below();
     const auto closed = detail::on_the_axis(plus(border.den(), 1.0, border.num()));
     const auto opposite = detail::on_the_axis(plus(border.den(), -1.0, border.num()));
     FLYBALL_TRY(const auto sensitivity, largest_ratio(below, square(closed)));

@@ -27,4 +27,28 @@ struct WholeMargins {
 };
 [[nodiscard]] Expected<WholeMargins> whole_margins(const FrequencyResponse& loop);
 
+/// Whether the closed loop is stable, by the loop's crossings of the unit circle: of the work
+/// of its margins the part that does not grow with the dead time.
+/// @errors As `loop_margins`.
+[[nodiscard]] Expected<bool> keeps_stable(const TransferFunction& loop);
+
+/// What the search for the crossings of one loop, or of all channels of one, may take, in
+/// multiplications and divisions of complex numbers: 5e7 and 2e5 n² for a loop of n states.
+class CrossingWork {
+ public:
+  explicit CrossingWork(Eigen::Index states)
+      : left_(5e7 + 2e5 * static_cast<double>(states) * static_cast<double>(states)) {}
+
+  bool spend(double work) noexcept {
+    left_ -= work;
+    return left_ >= 0.0;
+  }
+
+ private:
+  double left_;
+};
+/// The same within what is left. @errors Also SystemError::no_convergence once that is done.
+[[nodiscard]] Expected<WholeMargins> whole_margins(const FrequencyResponse& loop,
+                                                   CrossingWork& work);
+
 }  // namespace flyball::classical::detail

@@ -12,6 +12,7 @@
 #include <flyball/systems/interconnection.hpp>
 
 #include "classical/delay_frequency.hpp"
+#include "classical/loop_peaks.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
@@ -248,11 +249,12 @@ Expected<MimoMargins> margins_of(const System& loop) {
     margins.disk_margin = margins.stable ? 2.0 / scaled.value : 0.0;
     margins.disk_frequency = scaled.frequency;
   }
+  detail::CrossingWork work(loop.A.rows());
   for (Index channel = 0; channel < loop.B.cols(); ++channel) {
     FLYBALL_TRY(const System one, opened_at(loop, channel, where));
     FLYBALL_TRY(const auto response, frequency_response(one));
-    FLYBALL_TRY(auto alone, loop_margins(response));
-    margins.loop_at_a_time.push_back(std::move(alone));
+    FLYBALL_TRY(auto alone, detail::whole_margins(response, work));
+    margins.loop_at_a_time.push_back(std::move(alone.margins));
   }
   return margins;
 }

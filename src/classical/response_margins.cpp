@@ -37,18 +37,23 @@ constexpr Crossing phase_crossing{[](Complex L) { return std::arg(-L); },
                                   [](Complex slope) { return slope.imag(); }, &BoundedLoop::turn,
                                   &BoundedLoop::turn_curvature};
 
-/// Every zero on the range; nothing where they do not end.
+/// Every zero on the range; nothing where they do not end within the work.
 std::optional<std::vector<double>> zeros(const BoundedLoop& loop, const LoopStep& range,
-                                         const Crossing& crossing) {
+                                         const Crossing& crossing, detail::CrossingWork& work) {
   std::vector<double> found;
   std::vector<LoopStep> pending{range};
-  const auto value = [&](double w) { return crossing.value(loop.at(w)); };
   constexpr double closest = 1e-13;
-  constexpr int most_steps = 600'000;
-  constexpr int most_exact = 60'000;  // each costs as much as hundreds of the factors' values
-  int exact = 0;
-  for (int count = 0; !pending.empty(); ++count) {
-    if (count == most_steps || exact == most_exact) {
+  const auto n = static_cast<double>(loop.factors().poles.size());
+  // A bound or a value by factors, and the value itself: of a state space two solutions with its
+  // Hessenberg form, refined in 31 digits.
+  const double by_factors = 6.0 * (n + static_cast<double>(loop.factors().zeros.size())) + 10.0;
+  const double exact = 8.0 * n * n + 30.0 * n + 200.0;
+  const auto value = [&](double w) {
+    work.spend(exact);
+    return crossing.value(loop.at(w));
+  };
+  while (!pending.empty()) {
+    if (!work.spend(2.0 * by_factors)) {
       return std::nullopt;
     }
     const LoopStep step = pending.back();
@@ -59,7 +64,6 @@ std::optional<std::vector<double>> zeros(const BoundedLoop& loop, const LoopStep
     if (std::abs(at_start) > moved + 1e-6) {
       continue;
     }
-    ++exact;
     at_start = value(step.from);
     if (std::abs(at_start) > moved) {
       continue;
@@ -108,6 +112,13 @@ Expected<LoopMargins> loop_margins(const FrequencyResponse& response) {
 }
 
 Expected<detail::WholeMargins> detail::whole_margins(const FrequencyResponse& response) {
+  const auto factors = response.factors();
+  CrossingWork work(factors ? factors->poles.size() : 0);
+  return whole_margins(response, work);
+}
+
+Expected<detail::WholeMargins> detail::whole_margins(const FrequencyResponse& response,
+                                                     CrossingWork& work) {
   constexpr std::string_view where = "margins";
   FLYBALL_TRY(const NyquistData curve, nyquist(response).map_error([&](Error&& error) {
     return std::move(error).in(std::string(where));
@@ -126,12 +137,18 @@ Expected<detail::WholeMargins> detail::whole_margins(const FrequencyResponse& re
   const BoundedLoop loop(response, *std::move(factors));
   const LoopStep range = loop.range();
   double further = infinity;
-  const auto unit_gain = zeros(loop, range, gain_crossing);
-  auto places = zeros(loop, {range.from, std::min(range.to, loop.last_phase())}, phase_crossing);
-  if (!unit_gain || !places) {
-    return refusal(SystemError::no_convergence, where,
-                   !unit_gain ? "the list of gain crossings" : "the list of phase crossings")
-        .got("without end: the loop stays where it crosses");
+  const auto without_end = [&](const char* crossings) {
+    return refusal(SystemError::no_convergence, where, crossings)
+        .got("without end: the loop stays where it crosses, or crosses more often than is listed");
+  };
+  const auto unit_gain = zeros(loop, range, gain_crossing, work);
+  if (!unit_gain) {
+    return without_end("the list of gain crossings");
+  }
+  auto places =
+      zeros(loop, {range.from, std::min(range.to, loop.last_phase())}, phase_crossing, work);
+  if (!places) {
+    return without_end("the list of phase crossings");
   }
   for (const double w : *unit_gain) {
     const double margin = wrapped(180.0 + std::arg(loop.at(w)) * 180.0 / pi);

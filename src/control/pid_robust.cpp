@@ -7,6 +7,7 @@
 #include <flyball/math/search/minimum.hpp>
 #include <flyball/math/search/roots.hpp>
 
+#include "classical/loop_peaks.hpp"
 #include "control/pid_basis.hpp"
 #include "core/constants.hpp"
 #include "core/format.hpp"
@@ -270,11 +271,10 @@ Candidate climbed(const Search& search, Candidate best, bool derivative) {
   return best;
 }
 
-Expected<classical::LoopMargins> margins_of(const TransferFunction& plant, const PidGains& gains,
-                                            double tau) {
+Expected<TransferFunction> loop_of(const TransferFunction& plant, const PidGains& gains,
+                                   double tau) {
   FLYBALL_TRY(const auto controller, pid_transfer(gains, tau, plant.period()));
-  FLYBALL_TRY(const auto loop, series(controller, plant));
-  return classical::loop_margins(loop);
+  return series(controller, plant);
 }
 
 }  // namespace
@@ -363,8 +363,9 @@ Expected<PidLoop> tune_by_robustness(const TransferFunction& plant, PidForm form
       continue;
     }
     ++tried;
-    const auto margins = margins_of(plant, gains_of(finite), search.filter(finite.point));
-    if (!margins || !margins->stable) {
+    const auto stable = loop_of(plant, gains_of(finite), search.filter(finite.point))
+                            .and_then(classical::detail::keeps_stable);
+    if (!stable || !*stable) {
       continue;
     }
     ++climbs;
@@ -390,7 +391,10 @@ Expected<PidLoop> tune_by_robustness(const TransferFunction& plant, PidForm form
   const auto excess = [&](double ki) {
     Candidate trial = *best;
     trial.ki = ki;
-    const auto margins = margins_of(plant, gains_of(trial), tau);
+    const auto margins =
+        loop_of(plant, gains_of(trial), tau).and_then([](const TransferFunction& loop) {
+          return classical::loop_margins(loop);
+        });
     return margins && margins->stable ? margins->sensitivity.value - goal.sensitivity * (1.0 + 1e-9)
                                       : infinity;
   };

@@ -1,9 +1,11 @@
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include <flyball/core/argument.hpp>
 #include <flyball/planning/configuration/path_planner.hpp>
 
 #include "core/try.hpp"
@@ -131,7 +133,13 @@ Outcome solve_plan(const Problem& problem, JsonWriter& answer) {
   PathSearch search;
   search.seed =
       problem.has("seed") ? static_cast<std::uint64_t>(std::max(problem.number("seed"), 0.0)) : 1U;
-  search.seconds = problem.has("seconds") ? problem.number("seconds") : search.seconds;
+  // The work alone decides, so that an answer depends neither on the clock nor on what else runs.
+  constexpr long most_work = 1'000'000'000;
+  search.work = problem.has("work") ? problem.integer("work") : 50'000;
+  FLYBALL_CHECK(check_within(static_cast<double>(search.work), 1.0, static_cast<double>(most_work),
+                             "plan", "work"));
+  search.seconds =
+      problem.has("seconds") ? problem.number("seconds") : std::numeric_limits<double>::max();
   FLYBALL_TRY(const ConfigurationPath path,
               plan_path(space, entries(problem, "start"), entries(problem, "goal"), search));
   MatrixXd waypoints(static_cast<Index>(path.waypoints.size()), space.dimension());
@@ -179,7 +187,12 @@ std::vector<Kind> configuration_kinds() {
        space_fields() +
            std::vector{list("start", "n", "", "a configuration"), list("goal", "n", "", "another"),
                        optional(integer("seed", "of random searches; 1 if left out")),
-                       optional(number("seconds", "s", "when to give up; 10 if left out"))},
+                       optional(integer("work",
+                                        "of moves and boxes, when to give up; 50000 if left "
+                                        "out, about a second")),
+                       optional(number("seconds", "s",
+                                       "when to give up besides; never if left out, and an answer "
+                                       "then does not depend on the clock"))},
        {matrix("waypoints", "w", "n", "a waypoint a row, start and goal included"),
         number("length", "", "of the path"), number("moves", "", "judged"),
         text("method", "what found it")},
