@@ -30,21 +30,13 @@ double beyond_doubt(const Term& term) {
   return 24.0 + 2.9 * static_cast<double>(term.size() - 1);
 }
 
-/// Of a term over its standard error, squared, exceeded once in twenty logs without it: χ² of as
-/// many degrees of freedom as it has parameters, of one degree of half the logs where its sign is
-/// known.
-constexpr double chi_squared_95 = 3.84;
-double by_chance(const Term& term) {
-  switch (term.front()) {
-    case parameter::drag:
-    case parameter::sag:
-    case parameter::take_up:
-      return 2.71;
-    case parameter::friction_field:
-      return 12.6;
-    default:
-      return chi_squared_95;
-  }
+/// Of χ² of one degree of freedom whose sign is known, exceeded once in twenty.
+constexpr double one_sided_95 = 2.7;
+
+/// Whether it is a step or two that tell the term beside the inertia. Residuals' own covariances
+/// know little of so few, and see a sag in one plain log in six; the noise of the record is asked.
+bool hangs_on_steps(const Term& term) {
+  return term.front() == parameter::sag || term.front() == parameter::drag;
 }
 
 /// Of the evidence beyond doubt: with more, a term is fitted to see what would come of it.
@@ -262,11 +254,10 @@ struct Judged {
   double gain = 0.0;      ///< Of the cost.
   double evidence = 0.0;  ///< Over what is beyond doubt.
   Eigen::VectorXd moved;  ///< Of the parameters, by the term.
-  /// Of a term in doubt, over its covariance as the record's noise makes it.
+  /// Of a term in doubt that hangs on steps, over its covariance as the record's noise makes it.
   double by_noise = std::numeric_limits<double>::infinity();
   [[nodiscard]] double chi_squared() const { return evidence * beyond_doubt(term); }
-  /// What it is worth where it is not beyond doubt. Residuals' own covariances lack of what hangs
-  /// on a step or two, and would see a sag in one plain log in six.
+  /// What it is worth where it is not beyond doubt.
   [[nodiscard]] double in_doubt() const { return std::min(chi_squared(), by_noise); }
 };
 
@@ -319,9 +310,7 @@ Judged judge(OutputErrorProblem& problem, const Bounds& bounds, const ChannelSca
       judged.evidence = std::min(judged.evidence, worth_a_fit);
     }
     judged.moved = judged.fit.x - without.x;
-    // A limit has no standard error where there is none of it.
-    const bool open = judged.evidence < 1.0 && judged.chi_squared() > by_chance(term);
-    if (open && term.front() != parameter::headroom) {
+    if (hangs_on_steps(term) && judged.evidence < 1.0 && judged.chi_squared() > one_sided_95) {
       judged.by_noise = of_noise();
     }
     // So far away, and no better: another valley, not a doubt.
@@ -341,11 +330,10 @@ std::vector<Judged>::iterator find(std::vector<Judged>& all, Eigen::Index term) 
 }
 
 /// That there is the term: odds of one to ten before the data, of which half is lost to what else
-/// it could have been; beside one parameter of either sign by what is as rare without it.
+/// it could have been.
 double probability(const Judged& judged) {
   constexpr double against = 20.0;
-  const double beyond_chance = judged.in_doubt() - by_chance(judged.term);
-  return 1.0 / (1.0 + against * std::exp(-0.5 * (beyond_chance + chi_squared_95)));
+  return 1.0 / (1.0 + against * std::exp(-0.5 * judged.in_doubt()));
 }
 
 /// The parameters that are there without the term, as far as it would move them.
@@ -429,7 +417,7 @@ Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds, Channe
     choose_start(all, better, extension);
     if (better == all.end() || better->evidence < 1.0) {
       for (const Judged& judged : all) {
-        if (judged.in_doubt() <= by_chance(judged.term)) {
+        if (hangs_on_steps(judged.term) && judged.in_doubt() <= one_sided_95) {
           continue;
         }
         // No log of a step of one height tells a sagging battery from more inertia: with a sag a

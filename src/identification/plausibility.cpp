@@ -34,8 +34,11 @@ Speeds speeds_of(MechanismKind kind, bool linear) {
                                  : Speeds{0.1, 60.0, 0.01, 1000.0};
 }
 
-/// What the positions may be in truth, by how far the speed is off.
-std::string cause(double speed, const Speeds& speeds, bool linear) {
+constexpr double whole_duty = 1.05;  // Of what is a duty cycle, if it is one, with its noise.
+
+/// What positions, or a voltage that is nowhere above `largest`, may be in truth, by how far the
+/// speed is off.
+std::string cause(double speed, const Speeds& speeds, bool linear, double largest) {
   struct Mistake {
     double factor;  ///< The true speed over the one that the log says.
     const char* text;
@@ -57,6 +60,12 @@ std::string cause(double speed, const Speeds& speeds, bool linear) {
     return speed * mistake.factor >= speeds.least && speed * mistake.factor <= speeds.most;
   };
   const auto all = [&](const auto& mistakes) {
+    static constexpr Mistake duty{1.0 / nominal,
+                                  "a duty cycle from -1 to 1 that was taken for volts "
+                                  "(--voltage-scale 12)"};
+    if (largest <= whole_duty && fits(duty)) {
+      return std::string(duty.text);
+    }
     std::string text;
     for (const Mistake& mistake : mistakes) {
       if (fits(mistake)) {
@@ -91,7 +100,7 @@ Expected<void> check_plausibility(const PreparedRecording& prepared, const Feedf
         .got(detail::format("{:.4g} V", resisted))
         .expected(arm ? detail::format("below the {:.3g} V that move it", moved_it)
                       : detail::format("below the {:.3g} V that moved it in the log", largest))
-        .hint("probable cause: " + cause(speed, speeds, linear) +
+        .hint("probable cause: " + cause(speed, speeds, linear, largest) +
               "; say the unit with --unit, and --voltage-scale if the voltage is none");
   }
   if (speed < speeds.slowest || speed > speeds.fastest) {
@@ -100,13 +109,14 @@ Expected<void> check_plausibility(const PreparedRecording& prepared, const Feedf
                             fit.unit))
         .expected(detail::format("between {:.3g} and {:.3g}, as motors and gearings make it",
                                  speeds.slowest, speeds.fastest))
-        .hint("probable cause: " + cause(speed, speeds, linear) + "; say the unit with --unit");
+        .hint("probable cause: " + cause(speed, speeds, linear, largest) +
+              "; say the unit with --unit");
   }
   if (speed < speeds.least || speed > speeds.most) {
     warn(diagnostics, "unusual_speed",
          "the gains make {:.3g} {}/s at 12 V, which few mechanisms of the kind reach ({:.3g} to "
-         "{:.3g}); if that is not so, the probable cause is {} (say the unit with --unit)",
-         speed, fit.unit, speeds.least, speeds.most, cause(speed, speeds, linear));
+         "{:.3g}); if that is not so, the probable cause is {}; say the unit with --unit",
+         speed, fit.unit, speeds.least, speeds.most, cause(speed, speeds, linear, largest));
   }
   return {};
 }

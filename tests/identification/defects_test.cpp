@@ -43,6 +43,19 @@ struct Defect {
   double value;  ///< Of the term.
 };
 
+// Plain logs in which the residuals' own covariances see a sag; the noise of the record makes as
+// much of it by chance, and nothing is said.
+TEST(Doubts, PlainLogsLeaveNoSagOpen) {
+  for (const std::uint64_t seed : {14, 16, 26, 35, 39, 53}) {
+    const FitReport report = identify_feedforward(
+        flyball::record_characterization(scenarios::session(scenarios::mechanisms[0], seed))
+            .value());
+    ASSERT_TRUE(report.fit) << seed;
+    EXPECT_EQ(find(report.diagnostics, "term_in_doubt"), nullptr) << seed;
+    EXPECT_TRUE(report.fit->terms.empty()) << seed;
+  }
+}
+
 class ModelTerms : public testing::TestWithParam<Defect> {};
 
 TEST_P(ModelTerms, AreFoundAndTheGainsHoldBesideThem) {

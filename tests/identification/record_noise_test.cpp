@@ -46,6 +46,22 @@ TEST(RecordNoise, IsThatOfTheRecord) {
   }
 }
 
+// A coupling that slips in a ramp and was not put back: neither the positions nor the voltage are
+// noisier for it.
+TEST(RecordNoise, ALeapIsNoNoise) {
+  const auto options = scenarios::session(scenarios::mechanisms.at(4), 4);
+  PreparedRecording prepared = prepare(flyball::record_characterization(options).value()).value();
+  std::vector<double>& position = prepared.runs.at(0).run.position;
+  for (std::size_t row = position.size() / 2; row < position.size(); ++row) {
+    position[row] += 0.05;
+  }
+  Fitted fitted(prepared);
+  const RecordNoise noise = estimate_record_noise(fitted.problem, fitted.fit.x, fitted.scales);
+  const double quantum = options.resolution / std::sqrt(12.0);
+  EXPECT_NEAR(noise.position, quantum, 0.25 * quantum);
+  EXPECT_LT(noise.voltage, 1.5 * 0.02 * std::sqrt(5e-3));
+}
+
 // What other voltages of that noise make of the gains, against what is carried through: 30 fits'
 // spread is within 40 % of its expectation but once in 500.
 TEST(RecordNoise, IsCarriedThroughToTheGains) {
