@@ -31,7 +31,7 @@ double beyond_doubt(const Term& term) {
 }
 
 /// Of χ² of one degree of freedom whose sign is known, exceeded once in twenty.
-constexpr double one_sided_95 = 2.7;
+constexpr double evidence_95 = 2.7;
 
 /// Whether it is a step or two that tell the term beside the inertia. Residuals' own covariances
 /// know little of so few, and see a sag in one plain log in six; the noise of the record is asked.
@@ -310,7 +310,7 @@ Judged judge(OutputErrorProblem& problem, const Bounds& bounds, const ChannelSca
       judged.evidence = std::min(judged.evidence, worth_a_fit);
     }
     judged.moved = judged.fit.x - without.x;
-    if (hangs_on_steps(term) && judged.evidence < 1.0 && judged.chi_squared() > one_sided_95) {
+    if (hangs_on_steps(term) && judged.evidence < 1.0 && judged.chi_squared() > evidence_95) {
       judged.by_noise = of_noise();
     }
     // So far away, and no better: another valley, not a doubt.
@@ -417,7 +417,7 @@ Extension extend_model(OutputErrorProblem& problem, const Bounds& bounds, Channe
     choose_start(all, better, extension);
     if (better == all.end() || better->evidence < 1.0) {
       for (const Judged& judged : all) {
-        if (hangs_on_steps(judged.term) && judged.in_doubt() <= one_sided_95) {
+        if (hangs_on_steps(judged.term) && judged.in_doubt() <= evidence_95) {
           continue;
         }
         // No log of a step of one height tells a sagging battery from more inertia: with a sag a

@@ -17,7 +17,7 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using test::transfer;
+using flyball::test::transfer;
 
 /// A transfer function of order 0 to 2 with a dead time or without.
 TransferFunction random_transfer(Random& random) {

@@ -14,7 +14,7 @@ namespace {
 
 using Complex = std::complex<double>;
 using Eigen::VectorXcd;
-using test::transfer;
+using flyball::test::transfer;
 
 constexpr double pi = std::numbers::pi;
 

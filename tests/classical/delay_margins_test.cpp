@@ -19,7 +19,7 @@ namespace {
 using Complex = std::complex<double>;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using test::transfer;
+using flyball::test::transfer;
 
 DelaySystem late(const std::string& text) {
   const std::string texts[] = {text};

@@ -15,8 +15,8 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using test::random_matrix;
-using test::transfer;
+using flyball::test::random_matrix;
+using flyball::test::transfer;
 
 DelaySystem system_of(const TransferFunction& G) {
   return DelaySystem::create(G).value();

@@ -11,7 +11,7 @@
 namespace flyball::classical::delay_step_metrics_test {
 namespace {
 
-using test::transfer;
+using flyball::test::transfer;
 
 void expect_same(const StepMetrics& a, const StepMetrics& b, double scale, const char* what) {
   EXPECT_NEAR(a.final_value, b.final_value, 1e-10 * std::abs(b.final_value)) << what;

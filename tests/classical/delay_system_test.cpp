@@ -18,8 +18,8 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using test::random_matrix;
-using test::transfer;
+using flyball::test::random_matrix;
+using flyball::test::transfer;
 
 VectorXd random_delays(Random& random, Index count) {
   VectorXd delays(count);
@@ -45,7 +45,7 @@ struct Sample {
       return factors;
     };
     const MatrixXcd G =
-        test::response(rational.A, rational.B, rational.C, rational.D, Complex(0.0, w));
+        flyball::test::response(rational.A, rational.B, rational.C, rational.D, Complex(0.0, w));
     return late(out).asDiagonal() * G * late(in).asDiagonal();
   }
 };
@@ -112,8 +112,8 @@ TEST(DelaySystem, AlgebraOfBlockDiagrams) {
 // From coefficients by roots: to the last digits of ‖G‖.
 TEST(DelaySystem, OfTransferFunctions) {
   int seen = 0;
-  for (const auto& c : test::cases_of("transfer_functions.json")) {
-    const TransferFunction G = test::transfer_of(c);
+  for (const auto& c : flyball::test::cases_of("transfer_functions.json")) {
+    const TransferFunction G = flyball::test::transfer_of(c);
     const DelaySystem system = DelaySystem::create(G).value();
     EXPECT_EQ(system.states(), G.order());
     for (const auto& row : c["freqresp"]) {
@@ -138,9 +138,9 @@ TEST(DelaySystem, OfTransferFunctions) {
 // Numbers of mpmath with 50 digits.
 TEST(DelaySystem, Gold) {
   int seen = 0;
-  for (const auto& c : test::cases_of("interconnection.json")) {
+  for (const auto& c : flyball::test::cases_of("interconnection.json")) {
     const auto system = [&](const char* name) {
-      return DelaySystem::create(test::transfer_of(c[name])).value();
+      return DelaySystem::create(flyball::test::transfer_of(c[name])).value();
     };
     const DelaySystem G = system("G");
     const DelaySystem H = system("H");
@@ -217,12 +217,12 @@ TEST(DelaySystem, DiscreteDelaysAreStates) {
     const auto loop = feedback(late, gain).value();
     const DiscreteSystem<> states = loop.to_discrete().value();
     for (const double w : {0.0, 3.0, 60.0, 157.0}) {
-      const MatrixXcd expected =
-          test::response(states.A, states.B, states.C, states.D, std::polar(1.0, 0.02 * w));
+      const MatrixXcd expected = flyball::test::response(states.A, states.B, states.C, states.D,
+                                                         std::polar(1.0, 0.02 * w));
       EXPECT_LE(relative(loop.response(w), expected), 1e-11);
       EXPECT_LE(relative(loop.at(std::polar(1.1, 0.02 * w)).value(),
-                         test::response(states.A, states.B, states.C, states.D,
-                                        std::polar(1.1, 0.02 * w))),
+                         flyball::test::response(states.A, states.B, states.C, states.D,
+                                                 std::polar(1.1, 0.02 * w))),
                 1e-11);
     }
   }
@@ -236,10 +236,10 @@ TEST(DelaySystem, Pade) {
   EXPECT_EQ(rational.A.rows(), 12);
   for (const double w : {0.0, 0.5, 2.0, 6.0}) {
     const MatrixXcd expected = loop.response(w);
-    EXPECT_LE(
-        relative(test::response(rational.A, rational.B, rational.C, rational.D, Complex(0.0, w)),
-                 expected),
-        1e-12)
+    EXPECT_LE(relative(flyball::test::response(rational.A, rational.B, rational.C, rational.D,
+                                               Complex(0.0, w)),
+                       expected),
+              1e-12)
         << w;
   }
   // Of order 0 the delay is left out.

@@ -16,7 +16,7 @@ namespace {
 using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::VectorXd;
-using test::transfer;
+using flyball::test::transfer;
 
 constexpr double pi = std::numbers::pi;
 

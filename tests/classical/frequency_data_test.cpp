@@ -18,7 +18,7 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using test::transfer;
+using flyball::test::transfer;
 
 VectorXd log_grid(double low, double high, Index points) {
   VectorXd w(points);

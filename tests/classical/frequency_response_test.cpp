@@ -19,7 +19,7 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using test::transfer;
+using flyball::test::transfer;
 
 constexpr double pi = std::numbers::pi;
 

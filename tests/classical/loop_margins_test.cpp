@@ -14,14 +14,14 @@ namespace {
 
 using Complex = std::complex<double>;
 using Eigen::VectorXd;
-using test::transfer;
+using flyball::test::transfer;
 
 constexpr double pi = std::numbers::pi;
 
 TEST(LoopMargins, Gold) {
-  for (const auto& c : test::cases_of("transfer_functions.json")) {
+  for (const auto& c : flyball::test::cases_of("transfer_functions.json")) {
     const std::string name = c["name"];
-    const TransferFunction L = test::transfer_of(c);
+    const TransferFunction L = flyball::test::transfer_of(c);
     const LoopMargins m = loop_margins(L).value();
     ASSERT_EQ(m.gain_crossings.size(), c["gain_crossovers"].size()) << name;
     for (std::size_t i = 0; i < m.gain_crossings.size(); ++i) {

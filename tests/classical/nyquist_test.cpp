@@ -17,7 +17,7 @@ namespace {
 using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::VectorXd;
-using test::transfer;
+using flyball::test::transfer;
 
 NyquistData nyquist_of(const TransferFunction& L) {
   return nyquist(frequency_response(L).value()).value();

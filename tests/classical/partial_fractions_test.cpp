@@ -16,7 +16,7 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
-using test::transfer;
+using flyball::test::transfer;
 
 /// |Σ terms| must not be small beside the terms where rounding of them is not to count.
 double size_of(const PartialFractions& fractions, Complex s) {

@@ -22,7 +22,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
-using test::transfer;
+using flyball::test::transfer;
 
 using Pairs = std::vector<std::pair<double, double>>;
 

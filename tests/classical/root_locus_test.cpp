@@ -17,7 +17,7 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
-using test::transfer;
+using flyball::test::transfer;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -155,9 +155,9 @@ TEST(RootLocus, ConditionallyStable) {
 
 TEST(RootLocus, Discrete) {
   // z - 1 + k: stable for 0 < k < 2, through -1.
-  const auto L =
-      TransferFunction::create(test::vector_of({1.0}), test::vector_of({1.0, -1.0}), Time(0.1))
-          .value();
+  const auto L = TransferFunction::create(flyball::test::vector_of({1.0}),
+                                          flyball::test::vector_of({1.0, -1.0}), Time(0.1))
+                     .value();
   const auto locus = root_locus(L).value();
   ASSERT_EQ(locus.crossings.size(), 1U);
   EXPECT_NEAR(locus.crossings[0].gain, 2.0, 1e-15);
@@ -165,9 +165,10 @@ TEST(RootLocus, Discrete) {
   ASSERT_EQ(locus.stable_gains.size(), 1U);
   EXPECT_NEAR(locus.stable_gains[0].high, 2.0, 1e-15);
   // A sample late: z² - z + k has its roots on the circle for k = 1, at 60 degrees.
-  const auto late = TransferFunction::create(test::vector_of({1.0}), test::vector_of({1.0, -1.0}),
-                                             Time(0.1), Time(0.1))
-                        .value();
+  const auto late =
+      TransferFunction::create(flyball::test::vector_of({1.0}),
+                               flyball::test::vector_of({1.0, -1.0}), Time(0.1), Time(0.1))
+          .value();
   const auto with_delay = root_locus(late).value();
   EXPECT_EQ(with_delay.poles.size(), 2);
   ASSERT_GE(with_delay.crossings.size(), 1U);
@@ -375,9 +376,10 @@ TEST(RootLocus, AtADampingRatio) {
   EXPECT_NEAR(points[0].gain, 4.0, 1e-12);
   EXPECT_NEAR(std::abs(points[0].point - Complex(-1.0, std::sqrt(3.0))), 0.0, 1e-12);
   // Discrete: the pole found has that ratio by ln z.
-  const auto sampled = TransferFunction::create(test::vector_of({0.1, 0.08}),
-                                                test::vector_of({1.0, -1.6, 0.6}), Time(0.1))
-                           .value();
+  const auto sampled =
+      TransferFunction::create(flyball::test::vector_of({0.1, 0.08}),
+                               flyball::test::vector_of({1.0, -1.6, 0.6}), Time(0.1))
+          .value();
   const auto found = locus_at_damping(sampled, 0.5).value();
   ASSERT_FALSE(found.empty());
   for (const LocusPoint& point : found) {

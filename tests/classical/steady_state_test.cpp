@@ -13,7 +13,7 @@ namespace flyball::classical::steady_state_test {
 namespace {
 
 using Eigen::VectorXd;
-using test::transfer;
+using flyball::test::transfer;
 
 // (E.9): a flywheel (E.7) under P control keeps 1/(1 + K_p K/(bR + K²)), under PI control nothing.
 TEST(SteadyState, FlywheelOfE35) {

@@ -9,7 +9,7 @@
 namespace flyball::classical::step_metrics_test {
 namespace {
 
-using test::transfer;
+using flyball::test::transfer;
 
 void expect_step(const nlohmann::json& expected, const TransferFunction& G,
                  const std::string& name) {
@@ -47,9 +47,9 @@ void expect_step(const nlohmann::json& expected, const TransferFunction& G,
 }
 
 TEST(StepMetrics, Gold) {
-  for (const auto& c : test::cases_of("transfer_functions.json")) {
+  for (const auto& c : flyball::test::cases_of("transfer_functions.json")) {
     const std::string name = c["name"];
-    const TransferFunction G = test::transfer_of(c);
+    const TransferFunction G = flyball::test::transfer_of(c);
     expect_step(c["step"], G, name);
     if (c["unity_feedback"]["stable"].get<bool>()) {
       expect_step(c["unity_feedback"]["step"], unity_feedback(G).value(), name + " closed");

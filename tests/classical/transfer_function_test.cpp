@@ -16,8 +16,8 @@ namespace {
 
 using Complex = std::complex<double>;
 using Eigen::VectorXd;
-using test::transfer;
-using test::vector_of;
+using flyball::test::transfer;
+using flyball::test::vector_of;
 
 /// The largest distance of a reference root from the nearest found one, relative.
 double distance(const Eigen::VectorXcd& found, const nlohmann::json& expected) {
@@ -35,10 +35,10 @@ double distance(const Eigen::VectorXcd& found, const nlohmann::json& expected) {
 
 TEST(TransferFunction, Gold) {
   int seen = 0;
-  for (const auto& c : test::cases_of("transfer_functions.json")) {
+  for (const auto& c : flyball::test::cases_of("transfer_functions.json")) {
     ++seen;
     const std::string name = c["name"];
-    const TransferFunction G = test::transfer_of(c);
+    const TransferFunction G = flyball::test::transfer_of(c);
     const auto zeros = G.zeros().value();
     const auto poles = G.poles().value();
     ASSERT_EQ(static_cast<std::size_t>(zeros.size()), c["zeros"].size()) << name;
@@ -63,9 +63,9 @@ TEST(TransferFunction, Gold) {
 }
 
 TEST(TransferFunction, BlockDiagrams) {
-  for (const auto& c : test::cases_of("interconnection.json")) {
-    const TransferFunction G = test::transfer_of(c["G"]);
-    const TransferFunction H = test::transfer_of(c["H"]);
+  for (const auto& c : flyball::test::cases_of("interconnection.json")) {
+    const TransferFunction G = flyball::test::transfer_of(c["G"]);
+    const TransferFunction H = flyball::test::transfer_of(c["H"]);
     for (const double w : {0.01, 0.3, 1.0, 20.0, 1000.0}) {
       const Complex g = G.response(w);
       const Complex h = H.response(w);
@@ -82,7 +82,7 @@ TEST(TransferFunction, BlockDiagrams) {
 }
 
 TEST(TransferFunction, Pade) {
-  for (const auto& c : test::cases_of("pade.json")) {
+  for (const auto& c : flyball::test::cases_of("pade.json")) {
     const TransferFunction P = pade(Time(c["T"].get<double>()), c["n"].get<int>()).value();
     const VectorXd num = vector_of(c["num"]);
     const VectorXd den = vector_of(c["den"]);
@@ -126,8 +126,9 @@ TEST(TransferFunction, FromZerosToZeros) {
       EXPECT_LE(std::abs(G.response(w) - expected), 1e-10 * std::abs(expected));
       EXPECT_LE(std::abs(G.at(Complex(0.0, w)).value() - expected), 1e-10 * std::abs(expected));
       const auto s = G.to_state_space();
-      EXPECT_LE(std::abs(test::response(s.A, s.B, s.C, s.D, Complex(0.0, w))(0, 0) - expected),
-                1e-8 * std::abs(expected));
+      EXPECT_LE(
+          std::abs(flyball::test::response(s.A, s.B, s.C, s.D, Complex(0.0, w))(0, 0) - expected),
+          1e-8 * std::abs(expected));
     }
     for (const Complex& p : poles) {
       EXPECT_LE((G.poles().value().array() - p).abs().minCoeff(), 1e-8 * std::abs(p));
@@ -242,7 +243,8 @@ TEST(TransferFunction, DelayOfADiscreteOneIsWholePeriods) {
   for (const double w : {0.1, 3.0, 30.0}) {
     const Complex z = std::polar(1.0, 0.1 * w);
     const Complex expected = 1.0 / ((z - 0.5) * z * z * z);
-    EXPECT_LE(std::abs(test::response(states.A, states.B, states.C, states.D, z)(0, 0) - expected),
+    EXPECT_LE(std::abs(flyball::test::response(states.A, states.B, states.C, states.D, z)(0, 0) -
+                       expected),
               1e-14 * std::abs(expected));
   }
   EXPECT_EQ(to_string(TransferFunction::create(one, den, Time(1.0), Time(1.5)).error()),

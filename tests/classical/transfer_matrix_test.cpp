@@ -22,8 +22,8 @@ using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
-using test::random_matrix;
-using test::transfer;
+using flyball::test::random_matrix;
+using flyball::test::transfer;
 
 /// How far each of some roots is from the nearest of others, and their own sensitivity to rounding
 /// of a matrix of that size.
@@ -50,10 +50,10 @@ TEST(TransferMatrix, OfStateSpace) {
     }
     const auto G = TransferMatrix::of(s).value();
     const double w = std::exp(2.0 * random.normal());
-    const MatrixXcd expected = test::response(s.A, s.B, s.C, s.D, Complex(0.0, w));
+    const MatrixXcd expected = flyball::test::response(s.A, s.B, s.C, s.D, Complex(0.0, w));
     const MatrixXcd resolvent =
-        test::response(s.A, MatrixXd::Identity(n, n), MatrixXd::Identity(n, n),
-                       MatrixXd::Zero(n, n), Complex(0.0, w));
+        flyball::test::response(s.A, MatrixXd::Identity(n, n), MatrixXd::Identity(n, n),
+                                MatrixXd::Zero(n, n), Complex(0.0, w));
     const double size =
         s.C.norm() * s.B.norm() * resolvent.norm() * (1.0 + resolvent.norm() * s.A.norm()) +
         s.D.norm() + 1e-300;
@@ -70,7 +70,7 @@ TEST(TransferMatrix, OrderTwentyThereAndBack) {
     const Index n = 20;
     ContinuousSystem<> s{random_matrix(random, n, n), random_matrix(random, n, 1),
                          random_matrix(random, 1, n), MatrixXd::Zero(1, 1)};
-    const VectorXcd poles_before = test::eigenvalues(s.A);
+    const VectorXcd poles_before = flyball::test::eigenvalues(s.A);
     const VectorXcd zeros_before = transmission_zeros(s).value().zeros;
     const auto G = channel_of(s).value();
     ASSERT_EQ(G.poles().size(), 20);
@@ -85,7 +85,7 @@ TEST(TransferMatrix, OrderTwentyThereAndBack) {
     for (int draw = 0; draw < 3; ++draw) {
       moved.A = s.A + 1e-12 * s.A.cwiseProduct(random_matrix(random, n, n));
       condition_poles =
-          std::max(condition_poles, farthest(test::eigenvalues(moved.A), poles_before));
+          std::max(condition_poles, farthest(flyball::test::eigenvalues(moved.A), poles_before));
       condition_zeros = std::max(condition_zeros,
                                  farthest(transmission_zeros(moved).value().zeros, zeros_before));
     }
@@ -128,7 +128,8 @@ TEST(TransferMatrix, MinimalRealization) {
   ASSERT_EQ(zeros.zeros.size(), 1);
   EXPECT_LE(std::abs(zeros.zeros(0) - 1.0), 1e-12);  // 1/(s+1) = 2/(s+3) at s = 1
   for (const double w : {0.0, 1.0, 10.0}) {
-    EXPECT_LE((test::response(s.A, s.B, s.C, s.D, Complex(0.0, w)) - G.response(w)).norm(), 1e-13);
+    EXPECT_LE((flyball::test::response(s.A, s.B, s.C, s.D, Complex(0.0, w)) - G.response(w)).norm(),
+              1e-13);
   }
 }
 
@@ -159,9 +160,11 @@ TEST(TransferMatrix, Discrete) {
   const auto G = TransferMatrix::of(s).value();
   const auto back = G.to_discrete(1e-9).value();
   for (const double w : {0.0, 3.0, 20.0}) {
-    const MatrixXcd expected = test::response(s.A, s.B, s.C, s.D, std::polar(1.0, 0.1 * w));
+    const MatrixXcd expected =
+        flyball::test::response(s.A, s.B, s.C, s.D, std::polar(1.0, 0.1 * w));
     EXPECT_LE((G.response(w) - expected).norm(), 1e-12 * expected.norm());
-    EXPECT_LE((test::response(back.A, back.B, back.C, back.D, std::polar(1.0, 0.1 * w)) - expected)
+    EXPECT_LE((flyball::test::response(back.A, back.B, back.C, back.D, std::polar(1.0, 0.1 * w)) -
+               expected)
                   .norm(),
               1e-11 * expected.norm());
   }

@@ -18,7 +18,7 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
-using test::transfer;
+using flyball::test::transfer;
 
 VectorXcd roots(std::initializer_list<Complex> values) {
   return Eigen::Map<const VectorXcd>(values.begin(), static_cast<Index>(values.size()));

@@ -90,7 +90,7 @@ void state(const Case& test, Problem& problem, const ExpressionMatrix& x) {
   const auto compiled = expression::compile(set);
   ASSERT_TRUE(compiled) << to_string(compiled.error().front());
   const expression::Tape& tape = compiled->tape;
-  detail::ExpressionGraph& graph = *x(0).graph();
+  flyball::optimization::detail::ExpressionGraph& graph = *x(0).graph();
   std::vector<Expression> values;
   for (const expression::Node& node : tape.nodes()) {
     using expression::Operation;
