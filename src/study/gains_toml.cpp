@@ -8,6 +8,8 @@
 #include <flyball/core/version.hpp>
 #include <flyball/study/project.hpp>
 
+#include "study/per_unit.hpp"
+
 namespace flyball::study {
 
 namespace {
@@ -70,7 +72,9 @@ std::string one_line(std::string text) {
   return text;
 }
 
-std::vector<KeyComment> comments(const PlantDescription& plant, const FeedforwardFit* fit) {
+/// @param V  What the gains are in.
+std::vector<KeyComment> comments(const PlantDescription& plant, const FeedforwardFit* fit,
+                                 std::string_view V = "V") {
   const auto within = [](const GainEstimate* gain) {
     return gain == nullptr || !gain->determined
                ? std::string()
@@ -85,17 +89,17 @@ std::vector<KeyComment> comments(const PlantDescription& plant, const Feedforwar
   };
   const std::string kA =
       plant.kA_determined
-          ? fmt::format("V·s²/{}{}", plant.unit, of(&FeedforwardFit::kA))
+          ? fmt::format("{}·s²/{}{}", V, plant.unit, of(&FeedforwardFit::kA))
           : fmt::format(
-                "is not determined, below {} V·s²/{}{}", format_number(plant.kA_upper_bound),
+                "is not determined, below {} {}·s²/{}{}", format_number(plant.kA_upper_bound), V,
                 plant.unit,
                 fit != nullptr && !fit->kA.reason.empty() ? ": " + one_line(fit->kA.reason) : "");
   std::vector<KeyComment> all{
-      {"gains.kS", "V" + of(&FeedforwardFit::kS)},
-      {"gains.kV", fmt::format("V·s/{}{}", plant.unit, of(&FeedforwardFit::kV))},
+      {"gains.kS", std::string(V) + of(&FeedforwardFit::kS)},
+      {"gains.kV", fmt::format("{}·s/{}{}", V, plant.unit, of(&FeedforwardFit::kV))},
       {"gains.kA", kA}};
   if (has_gravity(plant.kind)) {
-    all.push_back({"gains.kG", "V" + of_some(&FeedforwardFit::kG)});
+    all.push_back({"gains.kG", std::string(V) + of_some(&FeedforwardFit::kG)});
   }
   if (plant.kind == MechanismKind::arm) {
     all.push_back({"gains.angle_offset", "true angle from horizontal less the measured one" +
@@ -126,7 +130,9 @@ std::string gains_toml(const IdentifyResult& result) {
   Project project;
   describe(plant, project);
   constexpr std::array<std::string_view, 2> sections{"mechanism", "gains"};
-  return write_project(project, heading(), sections, comments(plant, &fit));
+  const std::string mind = is_per_unit(result) ? fmt::format("\n{}", per_unit_comment) : "";
+  return write_project(project, heading() + mind, sections,
+                       comments(plant, &fit, volts_of(result)));
 }
 
 std::string gains_toml(const DesignResult& result, const FeedforwardFit* fit) {

@@ -9,6 +9,7 @@
 #include "core/wording.hpp"
 #include "study/answer/parts.hpp"
 #include "study/answer/rules_of_thumb.hpp"
+#include "study/per_unit.hpp"
 
 namespace flyball::study {
 
@@ -16,19 +17,20 @@ namespace {
 
 using identification::GainEstimate;
 
-}  // namespace
-
-void write_gains(JsonWriter& json, const identification::FeedforwardFit& fit) {
+/// @param volts  What the gains are in instead of volts.
+void write_gains(JsonWriter& json, const identification::FeedforwardFit& fit,
+                 std::string_view volts) {
+  const std::string V(volts);
   json.object("gains", [&] {
-    write_gain(json, "kS", fit.kS, "V");
-    write_gain(json, "kV", fit.kV, fmt::format("V·s/{}", fit.unit));
-    write_gain(json, "kA", fit.kA, fmt::format("V·s²/{}", fit.unit));
+    write_gain(json, "kS", fit.kS, V);
+    write_gain(json, "kV", fit.kV, fmt::format("{}·s/{}", V, fit.unit));
+    write_gain(json, "kA", fit.kA, fmt::format("{}·s²/{}", V, fit.unit));
     if (fit.kG) {
-      write_gain(json, "kG", *fit.kG, "V");
+      write_gain(json, "kG", *fit.kG, V);
     }
     if (fit.gravity_with_friction) {
       write_gain(json, fit.in_reverse ? "kG_minus_kS" : "kG_plus_kS", *fit.gravity_with_friction,
-                 "V");
+                 V);
     }
     if (fit.angle_offset) {
       write_gain(json, "angle_offset", *fit.angle_offset, "rad");
@@ -36,11 +38,25 @@ void write_gains(JsonWriter& json, const identification::FeedforwardFit& fit) {
   });
 }
 
-void write_fit(JsonWriter& json, const identification::FeedforwardFit& fit) {
+void write_terms(JsonWriter& json, const identification::FeedforwardFit& fit,
+                 std::string_view volts) {
+  if (!fit.terms.empty()) {
+    json.object("terms", [&] {
+      for (const identification::ModelTerm& term : fit.terms) {
+        const bool of_volts = term.unit.starts_with('V');
+        write_gain(json, term.name, term.value,
+                   of_volts ? std::string(volts) + term.unit.substr(1) : term.unit);
+      }
+    });
+  }
+}
+
+void write_fit(JsonWriter& json, const identification::FeedforwardFit& fit,
+               std::string_view volts) {
   json.add("mechanism", to_string(fit.mechanism));
   json.add("unit", fit.unit);
-  write_gains(json, fit);
-  write_terms(json, fit);
+  write_gains(json, fit, volts);
+  write_terms(json, fit, volts);
   json.object("fit", [&] { write_quality(json, fit); });
   if (fit.one_step) {
     json.object("one_step_regression", [&] {
@@ -53,6 +69,16 @@ void write_fit(JsonWriter& json, const identification::FeedforwardFit& fit) {
       }
     });
   }
+}
+
+}  // namespace
+
+void write_gains(JsonWriter& json, const identification::FeedforwardFit& fit) {
+  write_gains(json, fit, "V");
+}
+
+void write_fit(JsonWriter& json, const identification::FeedforwardFit& fit) {
+  write_fit(json, fit, "V");
 }
 
 namespace {
@@ -108,13 +134,7 @@ void write_gain(JsonWriter& json, std::string_view name, const GainEstimate& gai
 }
 
 void write_terms(JsonWriter& json, const identification::FeedforwardFit& fit) {
-  if (!fit.terms.empty()) {
-    json.object("terms", [&] {
-      for (const identification::ModelTerm& term : fit.terms) {
-        write_gain(json, term.name, term.value, term.unit);
-      }
-    });
-  }
+  write_terms(json, fit, "V");
 }
 
 void write_quality(JsonWriter& json, const identification::FeedforwardFit& fit) {
@@ -132,7 +152,7 @@ void write_identification(JsonWriter& json, const IdentifyResult& result) {
     if (result.drive && result.drive->fit) {
       write_drive(json, result);
     } else if (result.report.fit) {
-      write_fit(json, *result.report.fit);
+      write_fit(json, *result.report.fit, volts_of(result));
     } else {
       json.add("error", result.report.fit.error());
     }

@@ -6,6 +6,7 @@
 
 #include "core/wording.hpp"
 #include "study/answer/parts.hpp"
+#include "study/per_unit.hpp"
 
 namespace flyball::study {
 
@@ -107,13 +108,6 @@ std::string interval_text(const GainEstimate& gain) {
   const double half = 0.5 * (gain.interval[1] - gain.interval[0]);
   return fmt::format("{} to {}", in_digits_of(gain.interval[0], half),
                      in_digits_of(gain.interval[1], half));
-}
-
-/// Whether the voltage may have been a duty cycle: its gains are per unit of what was recorded.
-bool is_per_unit(const IdentifyResult& result) {
-  const std::vector<Diagnostic>& all = result.source.diagnostics;
-  return std::any_of(all.begin(), all.end(),
-                     [](const Diagnostic& found) { return found.code == "duty_cycle"; });
 }
 
 Table gains_table(const FeedforwardFit& fit, bool per_unit) {

@@ -4,6 +4,7 @@
 
 #include "study/answer/drive_design.hpp"
 #include "study/answer/parts.hpp"
+#include "study/per_unit.hpp"
 
 namespace flyball::study {
 
@@ -55,6 +56,20 @@ Verdict verdict_of(const TuneResult& result) {
   return verdict;
 }
 
+/// Into the project of a loop that may be in p.u., which a comment leaves as it reads.
+void mark_per_unit(Answer& answer) {
+  std::string comment = "# " + std::string(per_unit_comment) + "\n";
+  for (std::size_t at = comment.find('\n'); at + 1 < comment.size();
+       at = comment.find('\n', at + 1)) {
+    comment.insert(at + 1, "# ");
+  }
+  for (auto& file : answer.files) {
+    if (file.name == "gains.toml") {
+      file.contents.insert(0, comment);
+    }
+  }
+}
+
 }  // namespace
 
 std::string to_json(const TuneResult& result) {
@@ -96,6 +111,9 @@ Answer answer_of(const TuneResult& result) {
     const auto& fit = result.identification.report.fit;
     answer.files.clear();
     add_design_files(answer, *design, fit ? &*fit : nullptr);
+    if (is_per_unit(result.identification)) {
+      mark_per_unit(answer);
+    }
     append(answer.files, data_files(result.identification));
   } else if (result.design) {
     document.sections.push_back(
