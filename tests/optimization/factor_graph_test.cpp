@@ -188,6 +188,7 @@ TEST(FactorGraph, AStepThatRaisesTheCostIsDamped) {
   const auto x = graph.add(One(2.0));
   graph.add_factor(
       [](const auto& v) {
+        using std::atan2;
         return Eigen::Matrix<typename std::decay_t<decltype(v)>::Scalar, 1, 1>(atan2(v(0), 1.0));
       },
       x);
@@ -226,6 +227,7 @@ TEST(FactorGraph, TheOrderOfVariablesDoesNotMatter) {
     for (std::size_t i = 1; i < 30; ++i) {
       graph.add_factor(
           [i](const auto& u, const auto& v) {
+            using std::sin;
             return Eigen::Matrix<typename std::decay_t<decltype(u)>::Scalar, 1, 1>(
                 v(0) - u(0) - 0.1 * static_cast<double>(i) + 0.2 * sin(u(0)));
           },
@@ -307,6 +309,7 @@ TEST(FactorGraph, TheCapIsKept) {
   const auto x = graph.add(One(2.0));
   graph.add_factor(
       [](const auto& v) {
+        using std::atan2;
         return Eigen::Matrix<typename std::decay_t<decltype(v)>::Scalar, 1, 1>(atan2(v(0), 1.0));
       },
       x);
