@@ -43,7 +43,7 @@ DesignJob flywheel_job() {
 }
 
 double spectral_radius(const Eigen::MatrixXd& M) {
-  return test::eigenvalues(M).cwiseAbs().maxCoeff();
+  return flyball::test::eigenvalues(M).cwiseAbs().maxCoeff();
 }
 
 TEST(Design, ChoosesTolerancesThatKeepTheMargins) {
