@@ -155,7 +155,7 @@ TEST(DesignHolonomic, TheHeaderIsTheLawThatIsSimulated) {
       return n;
     };
     for (const Row& row : all) {
-      input += flyball::test::bits(line(row));
+      input += test::bits(line(row));
     }
     constexpr int columns = 24;
     const std::vector<double> good = line(all.front());
@@ -163,7 +163,7 @@ TEST(DesignHolonomic, TheHeaderIsTheLawThatIsSimulated) {
       for (const double bad : {nan, std::numeric_limits<double>::infinity(), 1e200}) {
         std::vector<double> n = good;
         n[static_cast<std::size_t>(k)] = bad;
-        input += flyball::test::bits(n);
+        input += test::bits(n);
       }
     }
     const std::string measured =

@@ -123,7 +123,7 @@ TEST(ModelSwingUp, TheHeaderRuns) {
   for (int k = 0; k < 400; ++k) {
     states.emplace_back(k % 2 == 0 ? pi + random.uniform(-0.2, 0.2) : random.uniform(-4.0, 4.0),
                         (k % 2 == 0 ? 0.3 : 6.0) * random.normal());
-    input += flyball::test::bits({states.back()(0), states.back()(1)});
+    input += test::bits({states.back()(0), states.back()(1)});
   }
   const std::vector<double> out =
       test::run_compiled("swing_up.hpp", file->contents, 2,
