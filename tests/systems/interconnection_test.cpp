@@ -185,6 +185,9 @@ TEST(Interconnection, StaticGains) {
   EXPECT_EQ(at(feedback(gain(3.0))), 0.75);
   EXPECT_EQ(append(gain(1.0), gain(2.0)).value().D(1, 1), 2.0);
   EXPECT_TRUE(feedback(gain(-1.0)).error().is(SystemError::algebraic_loop));
+  // Far more than rounding from singular: 2⁻⁴² is exact in 1 - 2⁻⁴².
+  EXPECT_EQ(at(feedback(gain(std::ldexp(1.0, -42) - 1.0))),
+            (std::ldexp(1.0, -42) - 1.0) / std::ldexp(1.0, -42));
   const auto sampled = convert_to_discrete(gain(2.0), Time(0.02), ConversionMethod::tustin).value();
   EXPECT_EQ(transfer_at(sampled, -1.0).value()(0, 0), 2.0);
   EXPECT_EQ(convert_to_continuous(sampled, ConversionMethod::matched).value().D(0, 0), 2.0);
