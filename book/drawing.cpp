@@ -76,7 +76,7 @@ Plot line_plot(const FigureResult& figure, const std::string& y_label,
   return {.title = figure.title, .x_label = "Time (s)", .panels = {std::move(panel)}};
 }
 
-Eigen::VectorXd step_response(const DiscreteSystem<>& system, Eigen::Index samples) {
+Eigen::VectorXd unit_step(const DiscreteSystem<>& system, Eigen::Index samples) {
   return flyball::step_response(system, 0, ResponseTimes{system.period, samples}).value().y.col(0);
 }
 

@@ -75,7 +75,7 @@ constexpr int state_color = 0;
                              const std::vector<PlotColumn>& columns);
 
 /// The output of a system at rest whose first input is 1 from the first sample on.
-[[nodiscard]] Eigen::VectorXd step_response(const DiscreteSystem<>& system, Eigen::Index samples);
+[[nodiscard]] Eigen::VectorXd unit_step(const DiscreteSystem<>& system, Eigen::Index samples);
 
 /// The reference of the book's step responses: `height` for 0.1 s <= t < 5.1 s, otherwise 0, until
 /// 10.2 s. One column a sample; the first state gets it, the others stay 0.

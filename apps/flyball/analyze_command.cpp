@@ -6,7 +6,7 @@ namespace flyball::app {
 
 namespace {
 
-ExpectedAll<Answer> run(JobInput& input) {
+ExpectedAll<Answer> run_analyze(JobInput& input) {
   const auto model = study::read_model(input.path, input.given);
   if (!model) {
     return tl::unexpected(model.error());
@@ -36,7 +36,7 @@ void add_analyze_command(CLI::App& program, Invocation& invocation) {
        .file_help = "The model; - is standard input",
        .report = "Write the report into this folder: pole map, step responses, their data",
        .reports_unasked = false,
-       .run = &run});
+       .run = &run_analyze});
 }
 
 }  // namespace flyball::app

@@ -16,9 +16,9 @@ namespace flyball::app {
 
 namespace {
 
-constexpr const char* schema = "flyball.book/1";
+constexpr const char* book_schema = "flyball.book/1";
 
-struct Options {
+struct BookOptions {
   CommonOptions common;
   std::vector<std::string> figures;
   bool list = false;
@@ -31,11 +31,11 @@ std::string name_of(const std::string& id) {
   return id.starts_with("table") ? "T" + id.substr(1) : "Figure " + id;
 }
 
-int list(const Options& options) {
+int list(const BookOptions& options) {
   if (options.common.json) {
     JsonWriter json;
     json.object([&] {
-      json.add("schema", schema);
+      json.add("schema", book_schema);
       json.list("figures", book::figures(), [&](const book::FigureEntry& entry) {
         json.object([&] {
           json.add("id", entry.id);
@@ -57,7 +57,7 @@ int list(const Options& options) {
 }
 
 // The checks of the figures that were asked for, or of all.
-Expected<std::vector<book::FigureCheck>> checks_of(const Options& options) {
+Expected<std::vector<book::FigureCheck>> checks_of(const BookOptions& options) {
   if (options.figures.empty()) {
     return book::check_figures();
   }
@@ -91,17 +91,17 @@ Document document_of(const std::vector<book::FigureCheck>& checks) {
   return {.sections = {{"checks", "", {std::move(table), sum}}}};
 }
 
-int check(const Options& options) {
+int check(const BookOptions& options) {
   const auto checks = checks_of(options);
   if (!checks) {
-    return fail(checks.error(), options.common, schema);
+    return fail(checks.error(), options.common, book_schema);
   }
   const bool passed = std::all_of(checks->begin(), checks->end(),
                                   [](const book::FigureCheck& c) { return c.passed; });
   if (options.common.json) {
     JsonWriter json;
     json.object([&] {
-      json.add("schema", schema);
+      json.add("schema", book_schema);
       json.add("passed", passed);
       json.list("checks", *checks, [&](const book::FigureCheck& c) {
         json.object([&] {
@@ -151,11 +151,11 @@ std::string text_of(const book::FigureResult& figure, const std::vector<std::str
   return text;
 }
 
-int draw(const Options& options) {
+int draw(const BookOptions& options) {
   const std::string folder = options.common.out.empty() ? "." : options.common.out;
   JsonWriter json;
   json.open('{');
-  json.add("schema", schema);
+  json.add("schema", book_schema);
   json.key("figures");
   json.open('[');
   std::size_t done = 0;
@@ -163,15 +163,15 @@ int draw(const Options& options) {
     tell_progress("draws figures", done++, options.figures.size());
     const auto entry = book::find_figure(id);
     if (!entry) {
-      return fail(entry.error(), options.common, schema);
+      return fail(entry.error(), options.common, book_schema);
     }
     const auto figure = (*entry)->compute();
     if (!figure) {
-      return fail(figure.error(), options.common, schema);
+      return fail(figure.error(), options.common, book_schema);
     }
     const auto files = book::write_figure(*figure, folder);
     if (!files) {
-      return fail(files.error(), options.common, schema);
+      return fail(files.error(), options.common, book_schema);
     }
     if (options.common.json) {
       write(json, *figure, *files);
@@ -192,7 +192,7 @@ int draw(const Options& options) {
 void add_book_command(CLI::App& program, Invocation& invocation) {
   CLI::App* command = program.add_subcommand(
       "book", "Draw figures of Controls Engineering in FRC, and check them against references");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<BookOptions>();
   command->add_option("FIGURE", options->figures, "Figures by number, such as 6.3");
   command->add_flag("--all", options->all, "Draw every figure that is there");
   command->add_flag("--list", options->list, "List the figures that are there");
@@ -217,7 +217,7 @@ void add_book_command(CLI::App& program, Invocation& invocation) {
                         .about("book")
                         .got("called without a figure")
                         .expected("a figure's number, --all, --list or --check"),
-                    options->common, schema);
+                    options->common, book_schema);
     } else {
       status = draw(*options);
     }

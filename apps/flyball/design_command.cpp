@@ -9,7 +9,7 @@ namespace flyball::app {
 
 namespace {
 
-ExpectedAll<Answer> run(JobInput& input) {
+ExpectedAll<Answer> run_design(JobInput& input) {
   const auto project = study::read_project(input.path, input.given);
   if (!project) {
     return tl::unexpected(project.error());
@@ -67,7 +67,7 @@ void add_design_command(CLI::App& program, Invocation& invocation) {
        .file_help = "The project file",
        .report = "Write the report into this folder (flyball-report if absent)",
        .reports_unasked = true,
-       .run = &run});
+       .run = &run_design});
   const auto tell = [&](const char* option, std::string (*text)(), const char* help) {
     command->add_flag_callback(
         option,

@@ -7,7 +7,7 @@ namespace flyball::app {
 
 namespace {
 
-ExpectedAll<Answer> run(JobInput& input) {
+ExpectedAll<Answer> run_drive(JobInput& input) {
   const auto job = study::drive_job(input.path, input.given);
   if (!job) {
     return tl::unexpected(job.error());
@@ -46,7 +46,7 @@ void add_drive_command(CLI::App& program, Invocation& invocation) {
        .file_help = "The project file",
        .report = "Write the report into this folder: pictures, animation, CSV and a WPILOG",
        .reports_unasked = false,
-       .run = &run});
+       .run = &run_drive});
 }
 
 }  // namespace flyball::app

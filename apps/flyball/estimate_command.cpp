@@ -7,7 +7,7 @@ namespace flyball::app {
 
 namespace {
 
-ExpectedAll<Answer> run(JobInput& input) {
+ExpectedAll<Answer> run_estimate(JobInput& input) {
   return study::read_project_beside_log(input.project, input.given)
       .and_then([&](const study::Project& project) {
         return ExpectedAll<Log>(study::read_model_log(input.path, project))
@@ -35,7 +35,7 @@ void add_estimate_command(CLI::App& program, Invocation& invocation) {
        .report = "Write a report with pictures, and the estimates as CSV and WPILOG, into this "
                  "folder",
        .reports_unasked = false,
-       .run = &run},
+       .run = &run_estimate},
       true);
   command->get_option("PROJECT")->required();
 }

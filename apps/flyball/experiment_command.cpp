@@ -7,7 +7,7 @@ namespace flyball::app {
 
 namespace {
 
-ExpectedAll<Answer> run(JobInput& input) {
+ExpectedAll<Answer> run_experiment(JobInput& input) {
   const auto job = study::experiment_job(input.path, input.given);
   if (!job) {
     return tl::unexpected(job.error());
@@ -33,7 +33,7 @@ void add_experiment_command(CLI::App& program, Invocation& invocation) {
        .file_help = "The project file or the log",
        .report = "Write the report into this folder",
        .reports_unasked = false,
-       .run = &run});
+       .run = &run_experiment});
 }
 
 }  // namespace flyball::app

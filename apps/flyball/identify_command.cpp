@@ -28,7 +28,7 @@ ExpectedAll<Answer> run_model(const JobInput& input, const study::Project& proje
       .map([](const auto& result) { return study::answer_of(result); });
 }
 
-ExpectedAll<Answer> run(JobInput& input) {
+ExpectedAll<Answer> run_identify(JobInput& input) {
   if (!input.project.empty()) {
     const auto project = study::read_project_beside_log(input.project, input.given);
     if (!project) {
@@ -84,7 +84,7 @@ void add_identify_command(CLI::App& program, Invocation& invocation) {
        .file_help = "The log, or a folder of logs",
        .report = "Write the report into this folder",
        .reports_unasked = false,
-       .run = &run,
+       .run = &run_identify,
        .several = true,
        .instead = [each](JobInput& input, const CommonOptions& common) -> std::optional<int> {
          return means_each(input, *each) ? std::optional(identify_each(input, *each, common))

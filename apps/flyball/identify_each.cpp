@@ -31,7 +31,7 @@ using study::LogRow;
 using study::LogRows;
 using study::NumberedRow;
 
-constexpr const char* schema = "flyball.identify_each/1";
+constexpr const char* identify_each_schema = "flyball.identify_each/1";
 
 /// All logs that the arguments name, sorted, each once.
 Expected<LogFiles> logs_of(const JobInput& input, const std::string& out) {
@@ -321,7 +321,7 @@ int tell_rows(const LogRows& rows, std::size_t passed_over, const CommonOptions&
     tell_progress("writes the report");
     if (const auto report = report::write_report(answer, common.out, {.command = common.typed});
         !report) {
-      return fail(report.error(), common, schema);
+      return fail(report.error(), common, identify_each_schema);
     }
   }
   if (written) {

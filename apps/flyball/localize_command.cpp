@@ -12,7 +12,7 @@ namespace flyball::app {
 
 namespace {
 
-struct Options {
+struct LocalizeOptions {
   CommonOptions common;
   study::LocalizeJob job{};
   std::vector<double> start{};
@@ -24,12 +24,12 @@ struct Options {
   bool no_smoother = false;
 };
 
-constexpr const char* schema = "flyball.localize/1";
+constexpr const char* localize_schema = "flyball.localize/1";
 
-int run(const Options& options) {
+int run_localize(const LocalizeOptions& options) {
   const auto result = study::localize(options.job);
   if (!result) {
-    return fail(result.error(), options.common, schema);
+    return fail(result.error(), options.common, localize_schema);
   }
   return tell(study::answer_of(*result), options.common, false);
 }
@@ -48,7 +48,7 @@ void add_localize_command(CLI::App& program, Invocation& invocation) {
       "(number, x, y), and where there are any \"barcode\" (number, barcode) and \"truth\" (time, "
       "x,\n"
       "y, heading), with which the paths are compared. Units are s, m, rad.");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LocalizeOptions>();
   command->add_option("FILES", options->job.paths, "The files of a drive, or their folder")
       ->required();
   command->add_option("--robot", options->job.robot,
@@ -95,8 +95,8 @@ void add_localize_command(CLI::App& program, Invocation& invocation) {
     }
     options->job.smooth = !options->no_smoother;
     options->common.typed = invocation.typed;
-    invocation.status =
-        guarded([&] { return run(*options); }, options->common, schema, options->job.paths.front());
+    invocation.status = guarded([&] { return run_localize(*options); }, options->common,
+                                localize_schema, options->job.paths.front());
   });
 }
 

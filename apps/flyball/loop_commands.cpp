@@ -13,7 +13,7 @@ namespace flyball::app {
 
 namespace {
 
-constexpr const char* schema = "flyball.loop/1";
+constexpr const char* loop_schema = "flyball.loop/1";
 
 /// A view's command.
 struct LoopCommand {
@@ -43,24 +43,24 @@ constexpr LoopCommand loop_commands[] = {
      "Write the report into this folder: Bode plot of the loop, its responses"},
 };
 
-struct Options {
+struct LoopOptions {
   CommonOptions common;
   std::vector<std::string> expressions;
   std::vector<study::Override> given;
   study::LoopView view = study::LoopView::bode;
 };
 
-int run(const Options& options) {
+int run_loop(const LoopOptions& options) {
   if (const std::string& out = options.common.out; !out.empty()) {
     if (const auto folder = OutputFolder::create(out); !folder) {
-      return fail(folder.error(), options.common, schema);
+      return fail(folder.error(), options.common, loop_schema);
     }
   }
   const auto answer = study::loop_job(options.view, options.expressions, options.given)
                           .and_then(&study::study_loops)
                           .map([](const auto& result) { return study::answer_of(result); });
   if (!answer) {
-    return fail(answer.error(), options.common, schema);
+    return fail(answer.error(), options.common, loop_schema);
   }
   const int status = tell(*answer, options.common, false);
   if (status == success && options.common.out.empty() && !options.common.json) {
@@ -89,15 +89,15 @@ void add_loop_commands(CLI::App& program, Invocation& invocation) {
         "\n  flyball " +
         std::string(to_string(of.view)) + " \"2/(s^2+3*s+2)" +
         (of.view == study::LoopView::rlocus ? "\"" : "*exp(-0.1*s)\"") + " --out report");
-    auto options = std::make_shared<Options>();
+    auto options = std::make_shared<LoopOptions>();
     options->view = of.view;
     options->common.typed = invocation.typed;
     command->add_option("EXPR", options->expressions, "Transfer functions, or JSON files of them");
     add_field_options(*command, study::loop_fields(of.view), options->given);
     add_common_options(*command, options->common, of.report);
     command->callback([options, &invocation] {
-      invocation.status =
-          guarded([&] { return run(*options); }, options->common, schema, "the transfer functions");
+      invocation.status = guarded([&] { return run_loop(*options); }, options->common, loop_schema,
+                                  "the transfer functions");
     });
   }
 }

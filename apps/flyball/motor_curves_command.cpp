@@ -10,18 +10,18 @@ namespace flyball::app {
 
 namespace {
 
-struct Options {
+struct MotorCurvesOptions {
   CommonOptions common;
   study::MotorCurvesJob job{};
   double voltage = 0.0;
 };
 
-constexpr const char* schema = "flyball.motor-curves/1";
+constexpr const char* motor_curves_schema = "flyball.motor-curves/1";
 
-int run(const Options& options) {
+int run_motor_curves(const MotorCurvesOptions& options) {
   const auto result = study::fit_motor_curves(options.job);
   if (!result) {
-    return fail(result.error(), options.common, schema);
+    return fail(result.error(), options.common, motor_curves_schema);
   }
   return tell(study::answer_of(*result), options.common, false);
 }
@@ -31,7 +31,7 @@ int run(const Options& options) {
 void add_motor_curves_command(CLI::App& program, Invocation& invocation) {
   CLI::App* command = program.add_subcommand(
       "motor-curves", "Find a motor's constants in what a dynamometer measured");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MotorCurvesOptions>();
   command
       ->add_option("FILE", options->job.paths,
                    "CSV of speed, torque and current, or of a locked rotor's time, voltage, torque "
@@ -46,8 +46,8 @@ void add_motor_curves_command(CLI::App& program, Invocation& invocation) {
     if (voltage->count() > 0) {
       options->job.voltage = options->voltage;
     }
-    invocation.status =
-        guarded([&] { return run(*options); }, options->common, schema, options->job.paths.front());
+    invocation.status = guarded([&] { return run_motor_curves(*options); }, options->common,
+                                motor_curves_schema, options->job.paths.front());
   });
 }
 

@@ -10,14 +10,14 @@ namespace flyball::app {
 
 namespace {
 
-struct Options {
+struct MotorsOptions {
   CommonOptions common;
   std::string name;
 };
 
-constexpr const char* schema = "flyball.motors/1";
+constexpr const char* motors_schema = "flyball.motors/1";
 
-int run(const Options& options) {
+int run_motors(const MotorsOptions& options) {
   std::vector<mechanisms::DcMotor> motors;
   if (options.name.empty()) {
     for (const mechanisms::MotorTableEntry& entry : mechanisms::motor_table()) {
@@ -30,7 +30,7 @@ int run(const Options& options) {
       motors.push_back(mechanisms::motor(name).value());
     }
     if (motors.empty()) {
-      return fail(motor.error(), options.common, schema);
+      return fail(motor.error(), options.common, motors_schema);
     }
   }
   return tell(study::answer_of(motors), options.common, false);
@@ -41,14 +41,14 @@ int run(const Options& options) {
 void add_motors_command(CLI::App& program, Invocation& invocation) {
   CLI::App* command =
       program.add_subcommand("motors", "List the motors by their datasheet numbers");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MotorsOptions>();
   command->add_option("NAME", options->name,
                       "A motor, or a part of several names (kraken); case, spaces and punctuation "
                       "do not matter (krakenX60foc)");
   command->add_flag("--json", options->common.json, "Answer one JSON object on one line");
   command->callback([options, &invocation] {
     invocation.status =
-        guarded([&] { return run(*options); }, options->common, schema, "the motors");
+        guarded([&] { return run_motors(*options); }, options->common, motors_schema, "the motors");
   });
 }
 

@@ -7,7 +7,7 @@ namespace flyball::app {
 
 namespace {
 
-ExpectedAll<Answer> run(JobInput& input) {
+ExpectedAll<Answer> run_optimize(JobInput& input) {
   const auto job = study::optimize_job(input.path, input.given);
   if (!job) {
     return tl::unexpected(job.error());
@@ -48,7 +48,7 @@ void add_optimize_command(CLI::App& program, Invocation& invocation) {
        .file_help = "A project file (TOML), or Choreo's .traj or .chor",
        .report = "Write the report into this folder: pictures, animation, CSV and .traj files",
        .reports_unasked = false,
-       .run = &run});
+       .run = &run_optimize});
 }
 
 }  // namespace flyball::app

@@ -14,29 +14,29 @@ namespace flyball::app {
 
 namespace {
 
-constexpr const char* schema = "flyball.path/1";
+constexpr const char* path_schema = "flyball.path/1";
 
-struct Options {
+struct PathOptions {
   CommonOptions common;
   std::vector<std::string> files;
   std::vector<study::Override> given;
 };
 
-int run(const Options& options) {
+int run_path(const PathOptions& options) {
   const auto job = study::path_job(options.files, options.given);
   if (!job) {
-    return fail(job.error(), options.common, schema);
+    return fail(job.error(), options.common, path_schema);
   }
   const std::string& out = options.common.out;
   const bool writes = !job->to.empty();
   if (!out.empty() && !writes) {
     if (const auto folder = OutputFolder::create(out); !folder) {
-      return fail(folder.error(), options.common, schema);
+      return fail(folder.error(), options.common, path_schema);
     }
   }
   const auto result = study::plan_path(*job);
   if (!result) {
-    return fail(result.error(), options.common, schema);
+    return fail(result.error(), options.common, path_schema);
   }
   if (writes) {
     if (out.empty()) {
@@ -49,7 +49,7 @@ int run(const Options& options) {
       }
     }
     if (const auto done = write_file_atomically(out, result->written); !done) {
-      return fail(done.error(), options.common, schema);
+      return fail(done.error(), options.common, path_schema);
     }
     CommonOptions told = options.common;
     told.out.clear();
@@ -73,7 +73,7 @@ void add_path_command(CLI::App& program, Invocation& invocation) {
       "\n  flyball path robot.toml Score.path --acceleration 4m/s^2"
       "\n  flyball path Out.traj Back.traj --to wpilib --out auto.json"
       "\n  flyball path Score.path --mirror-sides --to pathplanner --out Score_left.path");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PathOptions>();
   options->common.typed = invocation.typed;
   command->add_option("FILE", options->files, "Files, in the order in which they are driven")
       ->required();
@@ -82,7 +82,8 @@ void add_path_command(CLI::App& program, Invocation& invocation) {
                      "Write the report into this folder: pictures, animation, CSV, WPILib's and "
                      "Choreo's file, C++; with --to the file that is written");
   command->callback([options, &invocation] {
-    invocation.status = guarded([&] { return run(*options); }, options->common, schema, "the path");
+    invocation.status =
+        guarded([&] { return run_path(*options); }, options->common, path_schema, "the path");
   });
 }
 

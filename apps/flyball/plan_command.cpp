@@ -12,27 +12,27 @@ namespace flyball::app {
 
 namespace {
 
-constexpr const char* schema = "flyball.plan/1";
+constexpr const char* plan_schema = "flyball.plan/1";
 
-struct Options {
+struct PlanOptions {
   CommonOptions common;
   std::string path;
   study::PlanOverrides given;
 };
 
-int run(const Options& options) {
+int run_plan(const PlanOptions& options) {
   if (const std::string& out = options.common.out; !out.empty()) {
     if (const auto folder = OutputFolder::create(out); !folder) {
-      return fail(folder.error(), options.common, schema);
+      return fail(folder.error(), options.common, plan_schema);
     }
   }
   const auto job = study::plan_job(options.path, options.given);
   if (!job) {
-    return fail(job.error(), options.common, schema);
+    return fail(job.error(), options.common, plan_schema);
   }
   const auto result = study::plan(*job);
   if (!result) {
-    return fail(result.error(), options.common, schema);
+    return fail(result.error(), options.common, plan_schema);
   }
   const int status = tell(study::answer_of(*result), options.common, false);
   if (status == success && options.common.out.empty() && !options.common.json) {
@@ -74,7 +74,7 @@ void add_plan_command(CLI::App& program, Invocation& invocation) {
       "Every move is free along its whole length. A goal that cannot be reached is told as "
       "proven,\n"
       "or as undecided with what was tried (exit status 1).");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PlanOptions>();
   options->common.typed = invocation.typed;
   command->add_option("SPACE", options->path, "The file of the space")->required();
   command
@@ -100,7 +100,7 @@ void add_plan_command(CLI::App& program, Invocation& invocation) {
                      "Write the report into this folder: pictures, CSV, C++");
   command->callback([options, &invocation] {
     invocation.status =
-        guarded([&] { return run(*options); }, options->common, schema, options->path);
+        guarded([&] { return run_plan(*options); }, options->common, plan_schema, options->path);
   });
 }
 

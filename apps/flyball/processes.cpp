@@ -32,7 +32,7 @@ namespace flyball::app {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using ProcessClock = std::chrono::steady_clock;
 using End = Outcome::End;
 
 constexpr int out_of_memory = 3;  // a process's exit status
@@ -146,12 +146,12 @@ class Process {
   [[nodiscard]] bool idle() const { return !task_; }
   [[nodiscard]] bool fresh() const { return fresh_; }
   [[nodiscard]] std::size_t task() const { return *task_; }
-  [[nodiscard]] Clock::time_point begun() const { return begun_; }
+  [[nodiscard]] ProcessClock::time_point begun() const { return begun_; }
 
   /// What cannot be sent is found out when its answer is waited for.
   void give(std::size_t task) {
     task_ = task;
-    begun_ = Clock::now();
+    begun_ = ProcessClock::now();
     const std::uint64_t number = task;
     static_cast<void>(send_all(fd_, &number, sizeof number));
   }
@@ -211,7 +211,7 @@ class Process {
   pid_t pid_;
   int fd_;
   std::optional<std::size_t> task_{};
-  Clock::time_point begun_{};
+  ProcessClock::time_point begun_{};
   std::string bytes_{};
   bool fresh_ = true;
   bool timed_out_ = false;
@@ -295,7 +295,7 @@ class Pool {
         if (auto outcome = process.read()) {
           end(i, task, *std::move(outcome), again);
         }
-      } else if (Clock::now() - process.begun() >
+      } else if (ProcessClock::now() - process.begun() >
                  std::chrono::duration<double>(10.0 * bounds_.seconds)) {
         process.kill_for_time();
       }

@@ -15,10 +15,10 @@ namespace flyball::app {
 
 namespace {
 
-constexpr const char* schema = "flyball.profile/1";
+constexpr const char* profile_schema = "flyball.profile/1";
 constexpr const char* axes_schema = "flyball.axes/1";
 
-struct Options {
+struct ProfileOptions {
   CommonOptions common;
   std::string path;
   std::string synchronize;
@@ -26,7 +26,7 @@ struct Options {
   std::vector<study::Override> given;
 };
 
-int finish(int status, const Options& options) {
+int finish(int status, const ProfileOptions& options) {
   if (status == success && options.common.out.empty() && !options.common.json) {
     print("\n--out DIR draws it, with its table as CSV and as C++\n");
   }
@@ -34,7 +34,7 @@ int finish(int status, const Options& options) {
 }
 
 /// Of a file, or why the command line fits none.
-ExpectedAll<study::AxesJob> axes_job(const Options& options) {
+ExpectedAll<study::AxesJob> axes_job(const ProfileOptions& options) {
   std::vector<study::Override> of_all;
   for (const study::Override& option : options.given) {
     if (option.option != "--period") {
@@ -54,7 +54,7 @@ ExpectedAll<study::AxesJob> axes_job(const Options& options) {
   return study::axes_job(options.path, of_all);
 }
 
-int run_axes(const Options& options) {
+int run_axes(const ProfileOptions& options) {
   const auto job = axes_job(options);
   if (!job) {
     return fail(job.error(), options.common, axes_schema);
@@ -66,10 +66,10 @@ int run_axes(const Options& options) {
   return finish(tell(study::answer_of(*result), options.common, false), options);
 }
 
-int run(const Options& options) {
+int run_profile(const ProfileOptions& options) {
   if (const std::string& out = options.common.out; !out.empty()) {
     if (const auto folder = OutputFolder::create(out); !folder) {
-      return fail(folder.error(), options.common, schema);
+      return fail(folder.error(), options.common, profile_schema);
     }
   }
   if (!options.path.empty()) {
@@ -82,16 +82,16 @@ int run(const Options& options) {
                       .about(name)
                       .got("given without a file")
                       .expected("a file of several axes: flyball profile AXES.toml"),
-                  options.common, schema);
+                  options.common, profile_schema);
     }
   }
   const auto job = study::profile_job(options.given);
   if (!job) {
-    return fail(job.error(), options.common, schema);
+    return fail(job.error(), options.common, profile_schema);
   }
   const auto result = study::plan_profile(*job);
   if (!result) {
-    return fail(result.error(), options.common, schema);
+    return fail(result.error(), options.common, profile_schema);
   }
   return finish(tell(study::answer_of(*result), options.common, false), options);
 }
@@ -129,7 +129,7 @@ void add_profile_command(CLI::App& program, Invocation& invocation) {
       "\n"
       "\n  [profile]"
       "\n  synchronize = \"time\"");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ProfileOptions>();
   options->common.typed = invocation.typed;
   command->add_option("AXES", options->path, "A file of several axes, in place of the options");
   add_field_options(*command, study::profile_fields(), options->given);
@@ -142,8 +142,8 @@ void add_profile_command(CLI::App& program, Invocation& invocation) {
   add_common_options(*command, options->common,
                      "Write the report into this folder: picture, CSV, C++ table");
   command->callback([options, &invocation] {
-    invocation.status =
-        guarded([&] { return run(*options); }, options->common, schema, "the profile");
+    invocation.status = guarded([&] { return run_profile(*options); }, options->common,
+                                profile_schema, "the profile");
   });
 }
 

@@ -15,7 +15,7 @@ namespace flyball::app {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using LineClock = std::chrono::steady_clock;
 
 struct Line {
   std::mutex mutex;
@@ -29,7 +29,7 @@ Line& line() {
   return one;
 }
 
-std::string words(Clock::duration elapsed) {
+std::string words(LineClock::duration elapsed) {
   const Progress now = progress();
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(elapsed).count();
   std::string text = now.stage == nullptr ? "works" : now.stage;
@@ -42,12 +42,12 @@ std::string words(Clock::duration elapsed) {
 }
 
 void show() {
-  const auto begin = Clock::now();
+  const auto begin = LineClock::now();
   bool shown = false;
   std::unique_lock lock(line().mutex);
   auto next = std::chrono::milliseconds(1000);
   while (!line().changed.wait_for(lock, next, [] { return line().over; })) {
-    std::fputs(words(Clock::now() - begin).c_str(), stderr);
+    std::fputs(words(LineClock::now() - begin).c_str(), stderr);
     std::fflush(stderr);
     shown = true;
     next = std::chrono::milliseconds(250);

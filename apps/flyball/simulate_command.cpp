@@ -6,7 +6,7 @@ namespace flyball::app {
 
 namespace {
 
-ExpectedAll<Answer> run(JobInput& input) {
+ExpectedAll<Answer> run_simulate(JobInput& input) {
   return study::read_project(input.path, input.given)
       .and_then(&study::simulate)
       .map([](const auto& result) { return study::answer_of(result); });
@@ -40,7 +40,7 @@ void add_simulate_command(CLI::App& program, Invocation& invocation) {
        .file_help = "The project file",
        .report = "Write the report into this folder: pictures, the record as CSV",
        .reports_unasked = false,
-       .run = &run});
+       .run = &run_simulate});
 }
 
 }  // namespace flyball::app

@@ -7,7 +7,7 @@ namespace flyball::app {
 
 namespace {
 
-ExpectedAll<Answer> run(JobInput& input) {
+ExpectedAll<Answer> run_size(JobInput& input) {
   const auto job = study::size_job(input.path, input.given);
   if (!job) {
     return tl::unexpected(job.error());
@@ -46,7 +46,7 @@ void add_size_command(CLI::App& program, Invocation& invocation) {
        .file_help = "The project file",
        .report = "Write the report into this folder: pictures, the sweeps as CSV",
        .reports_unasked = false,
-       .run = &run});
+       .run = &run_size});
 }
 
 }  // namespace flyball::app

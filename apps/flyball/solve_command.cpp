@@ -135,7 +135,7 @@ int answer_all(const std::string& kind) {
   return stream.status();
 }
 
-struct Options {
+struct SolveOptions {
   std::string kind;
   bool help = false;
   bool list = false;
@@ -143,7 +143,7 @@ struct Options {
   bool schema = false;
 };
 
-int run(const Options& options, const CLI::App& command) {
+int run_solve(const SolveOptions& options, const CLI::App& command) {
   if (options.list || options.markdown || options.schema) {
     print(options.list       ? solve::list_of_kinds()
           : options.markdown ? solve::markdown()
@@ -185,7 +185,7 @@ void add_solve_command(CLI::App& program, Invocation& invocation) {
       "\n  flyball solve --list         every kind of problem\n"
       "  flyball solve dare --help    the fields of one, with an example\n"
       "\n  echo '{\"A\": [[1]], \"B\": [[1]], \"Q\": [[1]], \"R\": [[1]]}' | flyball solve dare");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SolveOptions>();
   // The help of a kind is its row's, so that the option is an ordinary one.
   command->set_help_flag();
   command->add_flag("-h,--help", options->help, "Print this help, or with KIND that of the kind");
@@ -196,7 +196,7 @@ void add_solve_command(CLI::App& program, Invocation& invocation) {
   command->add_option("KIND", options->kind, "Which kind of problem");
   command->callback([options, command, &invocation] {
     try {
-      invocation.status = run(*options, *command);
+      invocation.status = run_solve(*options, *command);
     } catch (const std::bad_alloc&) {  // while reading; a problem is answered where it is solved
       invocation.status = refuse(not_enough_memory("standard input"));
     }

@@ -12,30 +12,30 @@ namespace flyball::app {
 
 namespace {
 
-constexpr const char* schema = "flyball.states/1";
+constexpr const char* states_schema = "flyball.states/1";
 
-struct Options {
+struct StatesOptions {
   CommonOptions common;
   std::string file;
   int depth = -1;
   int interrupts = -1;
 };
 
-int run(const Options& options) {
+int run_states(const StatesOptions& options) {
   if (const std::string& out = options.common.out; !out.empty()) {
     if (const auto folder = OutputFolder::create(out); !folder) {
-      return fail(folder.error(), options.common, schema);
+      return fail(folder.error(), options.common, states_schema);
     }
   }
   auto job = study::read_states(options.file);
   if (!job) {
-    return fail(job.error(), options.common, schema);
+    return fail(job.error(), options.common, states_schema);
   }
   job->depth = options.depth >= 0 ? options.depth : job->depth;
   job->interrupts = options.interrupts >= 0 ? options.interrupts : job->interrupts;
   const auto result = study::validate_state_machine(*job);
   if (!result) {
-    return fail(result.error(), options.common, schema);
+    return fail(result.error(), options.common, states_schema);
   }
   return tell(study::answer_of(*result), options.common, false);
 }
@@ -70,7 +70,7 @@ void add_states_command(CLI::App& program, Invocation& invocation) {
       "  event = \"collect\"\n"
       "  to = \"floor\"\n"
       "  order = [\"height\", \"arm\"]");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<StatesOptions>();
   options->common.typed = invocation.typed;
   command->add_option("MACHINE", options->file, "The file of the machine (TOML)")->required();
   command
@@ -84,8 +84,8 @@ void add_states_command(CLI::App& program, Invocation& invocation) {
       ->check(CLI::Range(0, 20));
   add_common_options(*command, options->common, "Write the report into this folder");
   command->callback([options, &invocation] {
-    invocation.status =
-        guarded([&] { return run(*options); }, options->common, schema, "the state machine");
+    invocation.status = guarded([&] { return run_states(*options); }, options->common,
+                                states_schema, "the state machine");
   });
 }
 

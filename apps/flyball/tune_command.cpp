@@ -6,7 +6,7 @@ namespace flyball::app {
 
 namespace {
 
-ExpectedAll<Answer> run(JobInput& input) {
+ExpectedAll<Answer> run_tune(JobInput& input) {
   const auto job = study::tune_job(input.path, input.project, input.given);
   if (!job) {
     return tl::unexpected(job.error());
@@ -31,7 +31,7 @@ void add_tune_command(CLI::App& program, Invocation& invocation) {
        .file_help = "The log",
        .report = "Write the report into this folder (flyball-report if absent)",
        .reports_unasked = true,
-       .run = &run},
+       .run = &run_tune},
       true);
 }
 

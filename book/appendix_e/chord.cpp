@@ -14,11 +14,11 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr int samples = 50001;  // 50 ms of 1 µs
+constexpr int chord_samples = 50001;  // 50 ms of 1 µs
 
 std::vector<double> times() {
   std::vector<double> t;
-  for (int k = 0; k < samples; ++k) {
+  for (int k = 0; k < chord_samples; ++k) {
     t.push_back(k * 1e-6);
   }
   return t;

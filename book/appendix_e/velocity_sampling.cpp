@@ -15,10 +15,10 @@ using namespace flyball::literals;
 namespace {
 
 constexpr double step_height = 1.524;  // m
-constexpr double dt = 0.005;
+constexpr double fine_step = 0.005;
 constexpr double sample_period = 0.1;
-constexpr int samples = 1240;  // until 6.2 s
-constexpr int stretch = 20;    // samples of a sample period
+constexpr int pulse_samples = 1240;  // until 6.2 s
+constexpr int stretch = 20;          // samples of a sample period
 
 struct Response {
   std::vector<double> time;
@@ -31,7 +31,7 @@ struct Response {
 Response elevator_response() {
   const auto plant = discretize(model_of(case_study_elevator()), 5_ms).value();
   const auto K = lqr(plant, bryson({0.02, 0.4}), bryson({12.0})).value().K;
-  const Eigen::MatrixXd r = pulse_reference(step_height, 2, 5_ms).leftCols(samples);
+  const Eigen::MatrixXd r = pulse_reference(step_height, 2, 5_ms).leftCols(pulse_samples);
   const auto loop = simulate_linear({.plant = plant,
                                      .K = K,
                                      .u_min = Eigen::VectorXd::Constant(1, -12.0),
@@ -56,20 +56,21 @@ Discretized discretized(const std::vector<double>& f) {
   double held_line = 0.0;
   // The script's floor(k Δt/T) T/Δt, whose rounding sometimes begins a stretch one sample late.
   const auto script_place = [](int k, double further) {
-    return static_cast<int>((std::floor(k * dt / sample_period) + further) * sample_period / dt);
+    return static_cast<int>((std::floor(k * fine_step / sample_period) + further) * sample_period /
+                            fine_step);
   };
-  for (int k = 0; k < samples; ++k) {
+  for (int k = 0; k < pulse_samples; ++k) {
     const int start = k / stretch * stretch;
     const int end = start + stretch;
     const auto at = [&](int i) { return f[static_cast<std::size_t>(i)]; };
     y.forward.push_back(at(start));
-    y.backward.push_back(at(std::min(end, samples - 1)));
-    if (end < samples) {
+    y.backward.push_back(at(std::min(end, pulse_samples - 1)));
+    if (end < pulse_samples) {
       const double share = static_cast<double>(k - start) / stretch;
       held_line = (1.0 - share) * at(start) + share * at(end);
     }
     y.bilinear.push_back(held_line);
-    if (script_place(k, 1.0) < samples) {
+    if (script_place(k, 1.0) < pulse_samples) {
       held_end = at(script_place(k, 1.0));
     }
     y.script_forward.push_back(held_end);
@@ -82,9 +83,9 @@ Discretized discretized(const std::vector<double>& f) {
 std::vector<double> integral(const std::vector<double>& f, bool whole) {
   std::vector<double> sums;
   double sum = 0.0;
-  for (int k = 0; k < samples; ++k) {
-    if (whole || k / stretch * stretch + stretch < samples) {
-      sum += f[static_cast<std::size_t>(k)] * dt;
+  for (int k = 0; k < pulse_samples; ++k) {
+    if (whole || k / stretch * stretch + stretch < pulse_samples) {
+      sum += f[static_cast<std::size_t>(k)] * fine_step;
     }
     sums.push_back(sum);
   }
@@ -103,7 +104,7 @@ FigureResult figure_E_20() {
   const Response response = elevator_response();
   std::vector<double> held;
   double sample = response.position[0];
-  for (int k = 0; k < samples; ++k) {
+  for (int k = 0; k < pulse_samples; ++k) {
     if ((k + 1) % stretch == 0) {
       sample = response.position[static_cast<std::size_t>(k)];
     }

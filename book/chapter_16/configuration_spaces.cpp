@@ -11,7 +11,7 @@ namespace flyball::book {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 /// An arm on an elevator: how far each may go, whatever the other does.
 ConfigurationSpace elevator_arm() {
@@ -82,7 +82,7 @@ void add_point(FigureResult& figure, const std::string& name, const std::vector<
 }
 
 const std::vector<double> x{-1.0, 0.5};
-const std::vector<double> r{1.0, 0.5};
+const std::vector<double> goal_state{1.0, 0.5};
 
 }  // namespace
 
@@ -107,7 +107,7 @@ FigureResult figure_16_3() {
   figure.title = "Configuration space with initial state x and goal state r";
   std::get<Plot>(figure.picture).title = figure.title;
   add_point(figure, "x", x);
-  add_point(figure, "r", r);
+  add_point(figure, "r", goal_state);
   return figure;
 }
 
@@ -115,7 +115,7 @@ FigureResult figure_16_3() {
 FigureResult figure_16_4() {
   ConfigurationSpace space = elevator_arm();
   static_cast<void>(forbid_chassis(space));
-  const ConfigurationPath path = plan_path(space, x, r).value();
+  const ConfigurationPath path = plan_path(space, x, goal_state).value();
   FigureResult figure = figure_16_2();
   figure.id = "16.4";
   figure.title = "Configuration space with a path from x to r";

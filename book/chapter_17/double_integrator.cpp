@@ -42,9 +42,9 @@ DoubleIntegrator solve_double_integrator() {
   return {X.row(0).value(), X.row(1).value(), U.value(), solution.cost};
 }
 
-FigureResult figure_of(const std::string& id, const std::string& name, const std::string& unit,
-                       const std::string& label, const Eigen::RowVectorXd& values_of_name,
-                       double cost) {
+FigureResult solution_figure(const std::string& id, const std::string& name,
+                             const std::string& unit, const std::string& label,
+                             const Eigen::RowVectorXd& values_of_name, double cost) {
   FigureResult figure{.id = id, .title = "Double integrator " + name};
   std::vector<double> time;
   for (Eigen::Index k = 0; k < values_of_name.size(); ++k) {
@@ -61,16 +61,16 @@ FigureResult figure_of(const std::string& id, const std::string& name, const std
 
 FigureResult figure_17_1() {
   const DoubleIntegrator solved = solve_double_integrator();
-  return figure_of("17.1", "position", "m", "Position", solved.position, solved.cost);
+  return solution_figure("17.1", "position", "m", "Position", solved.position, solved.cost);
 }
 FigureResult figure_17_2() {
   const DoubleIntegrator solved = solve_double_integrator();
-  return figure_of("17.2", "velocity", "m/s", "Velocity", solved.velocity, solved.cost);
+  return solution_figure("17.2", "velocity", "m/s", "Velocity", solved.velocity, solved.cost);
 }
 FigureResult figure_17_3() {
   const DoubleIntegrator solved = solve_double_integrator();
-  return figure_of("17.3", "acceleration", "m/s²", "Acceleration", solved.acceleration,
-                   solved.cost);
+  return solution_figure("17.3", "acceleration", "m/s²", "Acceleration", solved.acceleration,
+                         solved.cost);
 }
 
 }  // namespace flyball::book

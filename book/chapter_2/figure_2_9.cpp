@@ -18,7 +18,7 @@ FigureResult figure_2_9() {
     const ContinuousSystem<> closed_loop{Eigen::MatrixXd{{0.0, 1.0}, {-K, -5.0}},
                                          Eigen::MatrixXd{{0.0}, {1.0}}, Eigen::MatrixXd{{1.0, 0.0}},
                                          Eigen::MatrixXd{{0.0}}};
-    Eigen::VectorXd y = step_response(discretize(closed_loop, period).value(), 60000);
+    Eigen::VectorXd y = unit_step(discretize(closed_loop, period).value(), 60000);
     return values(y / y(y.size() - 1));
   };
   std::vector<double> time;

@@ -36,7 +36,7 @@ FigureResult position_step(std::string id, std::string title, const Eigen::Matri
   FigureResult figure{.id = std::move(id), .title = std::move(title)};
   figure.columns = {{"time", "s", time},
                     {"reference", "rad", std::vector<double>(samples, 1.0)},
-                    {"position", "rad", values(step_response(discrete, samples))}};
+                    {"position", "rad", values(unit_step(discrete, samples))}};
   const Eigen::VectorXcd open = poles(A).value();
   figure.numbers = {{"slowest_electrical_pole", "1/s", open.real().minCoeff()}};
   figure.picture = line_plot(figure, "Position (rad)",

@@ -9,23 +9,21 @@ using namespace flyball::literals;
 
 namespace {
 
-constexpr int samples = 60;
+constexpr int step_samples = 60;
 
 FigureResult pole_figure(std::string id, std::string title, const DiscreteSystem<>& right,
                          const DiscreteSystem<>& left, const std::string& right_label,
                          const std::string& left_label) {
   std::vector<double> time;
-  for (int k = 0; k < samples; ++k) {
+  for (int k = 0; k < step_samples; ++k) {
     time.push_back(k * right.period.si());
   }
   FigureResult figure{.id = std::move(id), .title = std::move(title)};
   figure.columns = {{"time", "s", time},
-                    {"right_half_plane", "", values(step_response(right, samples))},
-                    {"left_half_plane", "", values(step_response(left, samples))}};
+                    {"right_half_plane", "", values(unit_step(right, step_samples))},
+                    {"left_half_plane", "", values(unit_step(left, step_samples))}};
   // What they settle at: G(1).
-  const auto settled = [](const DiscreteSystem<>& system) {
-    return step_response(system, 2000)(1999);
-  };
+  const auto settled = [](const DiscreteSystem<>& system) { return unit_step(system, 2000)(1999); };
   figure.numbers = {{"final_right", "", settled(right)}, {"final_left", "", settled(left)}};
   figure.picture =
       line_plot(figure, "Step response",

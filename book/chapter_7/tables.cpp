@@ -17,14 +17,14 @@ using namespace flyball::literals;
 
 namespace {
 
-struct Method {
+struct TabulatedMethod {
   ConversionMethod method;
   const char* name;
   const char* label;
   LineStyle line;
   LineStyle point;
 };
-constexpr Method methods[] = {
+constexpr TabulatedMethod tabulated_methods[] = {
     {ConversionMethod::zoh, "zoh", "Zero-order hold", LineStyle::solid, LineStyle::points},
     {ConversionMethod::tustin, "bilinear", "Bilinear", LineStyle::dashed, LineStyle::circles},
     {ConversionMethod::forward_euler, "forward_euler", "Forward Euler", LineStyle::dash_dot,
@@ -81,7 +81,7 @@ FigureResult table_7_2() {
   plot.title += ": the elevator\u2019s mode of velocity";
   plot.panels = {{.y_label = "Its pole, A₂₂",
                   .marks = {{.at = 1.0}, {.at = -1.0, .label = "unstable below −1"}}}};
-  for (const Method& method : methods) {
+  for (const TabulatedMethod& method : tabulated_methods) {
     const auto sampled = [&](double period) {
       return discretize(elevator, Time(period), method.method).value();
     };
@@ -121,7 +121,7 @@ FigureResult table_7_3() {
   plot.panels[0].y_label = "Coefficient";
   plot.x_step = 1.0;
   double beside = -0.12;  // equal coefficients beside each other
-  for (const Method& method : methods) {
+  for (const TabulatedMethod& method : tabulated_methods) {
     const auto sampled = convert_to_discrete(shift, 1_s, method.method).value();
     figure.columns.push_back({method.name, "", values(sampled.A.row(0))});
     PlotLine line{.label = method.label, .style = method.point};

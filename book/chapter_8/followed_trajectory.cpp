@@ -20,7 +20,7 @@ using namespace flyball::literals;
 namespace {
 
 /// From (1.330117 m, 13 m) to (10.17 m, 18 m), along x at both ends, at most 3.5 m/s and 3.5 m/s².
-Trajectory reference_trajectory() {
+Trajectory followed_reference() {
   const std::vector<Pose2d> waypoints{{1.330117, 13.0, 0.0}, {10.17, 18.0, 0.0}};
   const auto path = sample_path(quintic_spline(waypoints).value()).value();
   return time_path(path, {.velocity = 3.5, .acceleration = 3.5}).value();
@@ -73,7 +73,7 @@ mechanisms::DifferentialDrive case_study_drive() {
 
 FollowedTrajectory follow(const DriveFeedback& feedback, DriveMotion motion) {
   const FieldDrive model;
-  const Trajectory trajectory = reference_trajectory();
+  const Trajectory trajectory = followed_reference();
   const double period = drive_period.si();
   const auto samples = static_cast<Eigen::Index>(std::ceil(trajectory.total_time() / period));
   FollowedTrajectory run{Eigen::MatrixXd(5, samples), Eigen::MatrixXd(5, samples),

@@ -51,7 +51,7 @@ WallEstimates estimate_walls() {
 }
 
 template <class Entry>
-std::vector<double> each(const WallEstimates& estimates, const Entry& entry) {
+std::vector<double> each_estimate(const WallEstimates& estimates, const Entry& entry) {
   std::vector<double> result;
   for (std::size_t k = 0; k < estimates.time.size(); ++k) {
     result.push_back(entry(k));
@@ -60,11 +60,11 @@ std::vector<double> each(const WallEstimates& estimates, const Entry& entry) {
 }
 
 std::vector<double> state(const WallEstimates& estimates, Eigen::Index i) {
-  return each(estimates, [&](std::size_t k) { return estimates.x[k](i); });
+  return each_estimate(estimates, [&](std::size_t k) { return estimates.x[k](i); });
 }
 
 std::vector<double> covariance(const WallEstimates& estimates, Eigen::Index i, Eigen::Index j) {
-  return each(estimates, [&](std::size_t k) { return estimates.P[k](i, j); });
+  return each_estimate(estimates, [&](std::size_t k) { return estimates.P[k](i, j); });
 }
 
 /// The deviations that section 9.6.4 prints, 0.5188 and 0.4491, are those after 98 updates.

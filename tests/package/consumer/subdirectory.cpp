@@ -1,21 +1,23 @@
-#include <cmath>
 #include <cstdio>
+#include <string>
 
+#include <flyball/core/quantity.hpp>
+#include <flyball/core/unit_algebra.hpp>
 #include <flyball/core/version.hpp>
-#include <flyball/planning/profiles/generate_trapezoid_profile.hpp>
 
 using namespace flyball;
-using namespace flyball::literals;
 
 int main() {
-  const auto refused = generate_trapezoid_profile(-1.0, 500_ms, 20_ms, 1.0);
-  const auto profile = generate_trapezoid_profile(1.0, 500_ms, 20_ms, 1.0);
-  if (refused || !profile) {
+  const auto refused = parse_quantity<Length>("5 V", "travel");
+  const auto travel = parse_quantity<Length>("50 cm", "travel");
+  const auto unit = parse_si_unit("kg m^2");
+  if (refused || !travel || !unit) {
     return 1;
   }
   std::puts(to_string(refused.error()).c_str());
-  // Half a second up, half a second at 1 m/s, half a second down.
-  const double end = profile->time().back();
-  std::printf("Flyball %s: %g s\n", version.data(), end);
-  return std::abs(end - 1.5) < 0.021 ? 0 : 1;
+  std::printf("Flyball %s: %g m, %s\n", version.data(), travel->si(),
+              to_text(unit->dimension).c_str());
+  return travel->si() == 0.5 && unit->dimension.fits(si_dimension(Dimension::moment_of_inertia))
+             ? 0
+             : 1;
 }
