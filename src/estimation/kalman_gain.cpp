@@ -153,6 +153,14 @@ Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const
   }
   gain.P_prior = filter->covariance(filter->P);
   gain.P_posterior = filter->covariance(filter->update.P);
+  // What a measurement without noise tells has no variance left: the sign of one is its rounding.
+  for (Eigen::Index i = 0; i < A.rows(); ++i) {
+    if (gain.P_posterior(i, i) < 0.0 &&
+        gain.P_posterior(i, i) >= -largest_residual * gain.P_prior(i, i)) {
+      gain.P_posterior.row(i).setZero();
+      gain.P_posterior.col(i).setZero();
+    }
+  }
   gain.poles = *poles;
   if (constexpr double nearly_nothing = 1e-150;
       gain.K.allFinite() && gain.poles.cwiseAbs().maxCoeff() < nearly_nothing) {

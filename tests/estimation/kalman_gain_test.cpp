@@ -354,8 +354,6 @@ TEST(KalmanGain, PosteriorInTheGivenUnits) {
   EXPECT_TRUE(gain.error().is(RiccatiError::no_convergence)) << to_string(gain.error());
 }
 
-// The residual that is told is the larger of the dual equation's and of the filter's own, which
-// random plants have either way round.
 // The poles of what is answered: A (I - K C) has the trace -1e-300 · 1e16 · 1.2.
 TEST(KalmanGain, PolesBelowWhatItsUnitsHold) {
   const Eigen::MatrixXd A = (Eigen::MatrixXd(2, 2) << 1e-310, -1e-300, 0.0, 1e-310).finished();
@@ -368,6 +366,21 @@ TEST(KalmanGain, PolesBelowWhatItsUnitsHold) {
   EXPECT_NEAR(gain.poles.real().sum() / trace, 1.0, 1e-12);
 }
 
+// Two sensors whose noises cancel measure the state without an error.
+TEST(KalmanGain, NoVarianceIsNegative) {
+  const auto scalar = [](double x) { return Eigen::MatrixXd::Constant(1, 1, x); };
+  const Eigen::MatrixXd C = Eigen::Vector2d(37117.214155149355, 0.9540011137445932);
+  const Eigen::MatrixXd R = (Eigen::MatrixXd(2, 2) << 6.102726447952239, -1.442954097304636,
+                             -1.442954097304636, 0.3411780856779002)
+                                .finished();
+  const auto gain =
+      kalman_gain(scalar(0.6028441777532183), C, scalar(0.00783534690284396), R).value();
+  EXPECT_GE(gain.P_posterior(0, 0), 0.0);
+  EXPECT_LE(gain.P_posterior(0, 0), 1e-20);
+}
+
+// The residual that is told is the larger of the dual equation's and of the filter's own, which
+// random plants have either way round.
 TEST(KalmanGain, TellsTheLargerResidual) {
   Random random(151);
   bool of_filter = false;

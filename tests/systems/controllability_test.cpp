@@ -236,6 +236,71 @@ TEST(Controllability, EndsOfChainsDoNotRunAway) {
   }
 }
 
+/// Of integers, by elimination modulo a prime that no minor of theirs reaches.
+Eigen::Index exact_rank(Eigen::Matrix<long long, Eigen::Dynamic, Eigen::Dynamic> M) {
+  constexpr long long prime = 1'000'000'007;
+  const auto inverse = [](long long x) {
+    long long power = 1;
+    for (long long e = prime - 2; e > 0; e /= 2) {
+      power = e % 2 == 1 ? power * x % prime : power;
+      x = x * x % prime;
+    }
+    return power;
+  };
+  M = M.unaryExpr([](long long x) { return ((x % prime) + prime) % prime; });
+  Eigen::Index rank = 0;
+  for (Eigen::Index j = 0; j < M.cols() && rank < M.rows(); ++j) {
+    Eigen::Index pivot = rank;
+    while (pivot < M.rows() && M(pivot, j) == 0) {
+      ++pivot;
+    }
+    if (pivot == M.rows()) {
+      continue;
+    }
+    M.row(pivot).swap(M.row(rank));
+    const long long factor = inverse(M(rank, j));
+    for (Eigen::Index i = rank + 1; i < M.rows(); ++i) {
+      const long long share = M(i, j) * factor % prime;
+      for (Eigen::Index k = j; k < M.cols(); ++k) {
+        M(i, k) = ((M(i, k) - share * M(rank, k)) % prime + prime) % prime;
+      }
+    }
+    ++rank;
+  }
+  return rank;
+}
+
+// Parts that do not know of each other, inputs that move nothing, several that move the same.
+TEST(Controllability, RanksOfWholeNumbers) {
+  Random random(29);
+  const auto entry = [&](double zeros) {
+    return random.uniform() < zeros ? 0.0 : std::floor(random.uniform(-2.0, 4.0));
+  };
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Eigen::Index n = 2 + trial % 4;
+    const Eigen::Index m = 1 + trial % 3;
+    const bool apart = trial % 2 == 0;
+    MatrixXd A = MatrixXd::NullaryExpr(n, n, [&] { return entry(0.3); });
+    MatrixXd B = MatrixXd::NullaryExpr(n, m, [&] { return entry(0.2); });
+    for (Eigen::Index i = 0; apart && i < n; ++i) {
+      for (Eigen::Index j = 0; j < n; ++j) {
+        A(i, j) = (i < 2) == (j < 2) ? A(i, j) : 0.0;
+      }
+    }
+    for (Eigen::Index j = 0; j < m; ++j) {
+      if (random.uniform() < 0.3) {
+        B.col(j).setZero();
+      }
+    }
+    const Eigen::Index rank = exact_rank(controllability_matrix(A, B).value().cast<long long>());
+    const auto reach = analyze_controllability(A, B, TimeDomain::continuous);
+    const auto sight = analyze_observability(A.transpose(), B.transpose(), TimeDomain::discrete);
+    ASSERT_TRUE(reach && sight) << trial;
+    EXPECT_EQ(reach->rank, rank) << A << "\n" << B;
+    EXPECT_EQ(sight->rank, rank) << A << "\n" << B;
+  }
+}
+
 TEST(Controllability, Errors) {
   const MatrixXd I = MatrixXd::Identity(2, 2);
   EXPECT_TRUE(analyze_controllability(I, MatrixXd::Ones(3, 1), TimeDomain::continuous)

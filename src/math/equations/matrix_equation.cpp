@@ -13,6 +13,7 @@
 #include "math/equations/lyapunov_kernel.hpp"
 #include "math/equations/sylvester_kernel.hpp"
 #include "math/equations/sylvester_operator.hpp"
+#include "math/equations/wide_sylvester.hpp"
 
 namespace flyball {
 
@@ -54,10 +55,12 @@ struct Problem {
   bool coarse = false;  ///< Its first digits are what is wanted: as a correction of another.
 };
 
-/// Neither huge nor tiny: the squares of such numbers are sums' terms without a loss.
+/// Neither huge nor tiny: the squares of such numbers are sums' terms without a loss. Nor is any
+/// entry so small beside them that its products vanish.
 bool is_ordinary(const MatrixRef& M) {
   const double largest = M.cwiseAbs().maxCoeff();
-  return largest == 0.0 || (largest < 0x1p200 && largest > 0x1p-200);
+  return largest == 0.0 || (largest < 0x1p200 && largest > 0x1p-200 &&
+                            (M.array() == 0.0 || M.array().abs() > 0x1p-400).all());
 }
 
 /// The power of two of a matrix's largest entry; 0 for a matrix of zeros.
@@ -97,10 +100,19 @@ class InOtherUnits {
         problem_.B = times_powers(*p.B, -b_, b_, -time);
       }
     }
+    time_ = time;
     // The largest entry before the balance, then the one after it.
     unit_ = exponent_of(p.F) - time;
     unit_ += exponent_of(times_powers(p.F, -a_, b_, -unit_ - time));
     problem_.F = times_powers(p.F, -a_, b_, -unit_ - time);
+  }
+
+  /// Whether an entry of p has lost digits there.
+  [[nodiscard]] bool loses(const Problem& p) const {
+    const int time = p.domain == Domain::continuous ? time_ : 0;
+    return times_powers(problem_.A, a_, -a_, time) != p.A ||
+           times_powers(problem_.F, a_, -b_, unit_ + time) != p.F ||
+           (p.B && times_powers(*problem_.B, b_, -b_, time) != *p.B);
   }
 
   [[nodiscard]] const Problem& problem() const noexcept { return problem_; }
@@ -111,6 +123,7 @@ class InOtherUnits {
   Eigen::VectorXi a_;
   Eigen::VectorXi b_;
   int unit_ = 0;
+  int time_ = 0;
   Problem problem_;
 };
 
@@ -192,8 +205,47 @@ bool holds(const InOtherUnits& units, const MatrixXd& X) {
          left <= largest_residual * (products + largest(p.F));
 }
 
+Error too_far_apart(std::string_view where, double error) {
+  return Error(MatrixEquationError::not_accurate)
+      .in(std::string(where))
+      .got("entries too far apart for sixteen digits")
+      .with("backward error", error);
+}
+
+/// Of entries that no unit brings together; nothing where that takes more unknowns than are solved
+/// so, or where they have no unique solution.
+std::optional<Expected<LinearMatrixSolution>> solve_widely(const Problem& p,
+                                                           std::string_view where) {
+  const MatrixXd B = p.B ? *p.B : MatrixXd(p.A.transpose());
+  auto solved = detail::solve_sylvester_wide(p.domain, p.A, B, p.F);
+  // The share of an entry's error that is told from one of the equations' rank.
+  if (!solved || !(solved->condition < 1e-3 / epsilon)) {
+    return std::nullopt;
+  }
+  MatrixXd& X = solved->X;
+  if (!X.allFinite()) {
+    return refusal(MatrixEquationError::overflow, where);
+  }
+  if (p.symmetric) {
+    X.triangularView<Eigen::StrictlyUpper>() = X.transpose();
+  }
+  const double error = detail::wide_backward_error(p.domain, p.A, B, X, p.F);
+  if (!(error <= largest_backward_error)) {
+    return tl::unexpected(too_far_apart(where, error));
+  }
+  return LinearMatrixSolution{std::move(X), error, solved->condition};
+}
+
 Expected<LinearMatrixSolution> solve_carefully(const Problem& given, std::string_view where) {
   const InOtherUnits units(given);
+  const MatrixXd given_B = given.B ? *given.B : MatrixXd(given.A.transpose());
+  const bool wide =
+      !given.coarse && (units.loses(given) || detail::is_wide(given.A, given_B, given.F));
+  if (wide) {
+    if (auto answer = solve_widely(given, where)) {
+      return std::move(*answer);
+    }
+  }
   const Problem& p = units.problem();
   const SylvesterOperator equation =
       p.B ? SylvesterOperator(p.domain, p.A, *p.B) : SylvesterOperator(p.domain, p.A);
@@ -233,15 +285,19 @@ Expected<LinearMatrixSolution> solve_carefully(const Problem& given, std::string
     }
   }
   if (error.in_context <= largest_backward_error) {
+    if (wide) {
+      best.residual = detail::wide_backward_error(given.domain, given.A, given_B, best.X, given.F);
+      if (!(best.residual <= largest_backward_error)) {
+        return tl::unexpected(too_far_apart(where, best.residual));
+      }
+    }
     return best;
   }
   if (overflows) {
     return refusal(MatrixEquationError::overflow, where);
   }
   FLYBALL_CHECK(unique);
-  return refusal(MatrixEquationError::not_accurate, where)
-      .got("entries too far apart for sixteen digits")
-      .with("backward error", error.in_context);
+  return tl::unexpected(too_far_apart(where, error.in_context));
 }
 
 Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A, const MatrixRef& Q,

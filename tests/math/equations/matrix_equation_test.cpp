@@ -252,8 +252,48 @@ TEST(MatrixEquation, UnitsDoNotMatter) {
   }
 }
 
-// What is answered is finite and satisfies its equation, whatever the entries; formed in 64 bits
-// and 15 of exponent.
+/// Terms below a thousandth of what their row and their column have elsewhere count as that.
+LongMatrix terms_in_context(const LongMatrix& terms) {
+  LongMatrix context = terms;
+  for (int i = 0; i < terms.rows(); ++i) {
+    long double row = 0.0L;
+    for (int j = 0; j < terms.cols(); ++j) {
+      const long double column = terms.col(j).maxCoeff();
+      row = column > 0.0L ? std::max(row, terms(i, j) / column) : row;
+    }
+    for (int j = 0; j < terms.cols(); ++j) {
+      context(i, j) = std::max(terms(i, j), 1e-3L * row * terms.col(j).maxCoeff());
+    }
+  }
+  return context;
+}
+
+// Modes whose speeds differ by more than the normal doubles do, each with its own answer.
+TEST(MatrixEquation, SpeedsFarApart) {
+  const MatrixXd A = Eigen::Vector2d(1e10, 1e-310).asDiagonal();
+  const MatrixXd Q = Eigen::Vector2d(1e-5, 1e-20).asDiagonal();
+  const auto slow = lyapunov(A, Q).value();
+  EXPECT_NEAR(slow.X(0, 0), -5e-16, 1e-31);
+  EXPECT_NEAR(slow.X(1, 1) / (-0.5e-20 / 1e-310), 1.0, 1e-15);
+  EXPECT_EQ(slow.X(1, 0), 0.0);
+  const MatrixXd B = Eigen::Vector2d(1e20, 1e-300).asDiagonal();
+  const MatrixXd R = (MatrixXd(2, 2) << 0.0, -1.7e308, -1.7e308, -1.0).finished();
+  const auto far = lyapunov(B, R).value();
+  EXPECT_NEAR(far.X(1, 1) / 5e299, 1.0, 1e-15);
+  EXPECT_NEAR(far.X(0, 1) / 1.7e288, 1.0, 1e-15);
+  EXPECT_EQ(far.X(0, 1), far.X(1, 0));
+  // Less than any double is no answer.
+  EXPECT_TRUE(
+      discrete_lyapunov(scalar(1e300), scalar(3.0)).error().is(MatrixEquationError::not_accurate));
+  // a x a = x - q where a² is beyond the doubles.
+  EXPECT_NEAR(discrete_lyapunov(scalar(1e155), scalar(1e20)).value().X(0, 0) / -1e-290, 1.0, 1e-15);
+  EXPECT_NEAR(
+      discrete_sylvester(scalar(1e200), scalar(1e200), scalar(1e200)).value().X(0, 0) / -1e-200,
+      1.0, 1e-15);
+}
+
+// What is answered is finite and satisfies its equation entry by entry, whatever the entries;
+// formed in 64 bits and 15 of exponent.
 TEST(MatrixEquation, AnyFiniteEntries) {
   constexpr double palette[] = {0.0,    0.0,   1.0,     -1.0,    2.2e-16, 5e-324,   1e-310, 1e20,
                                 -1e-20, 1e154, -1e-154, 1.7e308, 3.0,     -1.7e308, 0.5};
@@ -288,7 +328,16 @@ TEST(MatrixEquation, AnyFiniteEntries) {
           continuous
               ? LongMatrix(magnitudes + magnitudes.transpose() + q.cwiseAbs())
               : LongMatrix(magnitudes * a.cwiseAbs().transpose() + X.cwiseAbs() + q.cwiseAbs());
-      // Beside the largest terms: entries that are tiny beside others may have no double.
+      // The smallest double in X is what X may be off.
+      const LongMatrix tiny = LongMatrix::Constant(n, n, 5e-324L);
+      const LongMatrix blur =
+          continuous ? LongMatrix(a.cwiseAbs() * tiny + tiny * a.cwiseAbs().transpose())
+                     : LongMatrix(a.cwiseAbs() * tiny * a.cwiseAbs().transpose() + tiny);
+      const LongMatrix size = terms_in_context(terms);
+      for (int k = 0; k < n * n; ++k) {
+        EXPECT_LE(std::abs(left(k)), 1e-11L * size(k) + blur(k))
+            << trial << (continuous ? " continuous" : " discrete");
+      }
       EXPECT_LE(left.cwiseAbs().maxCoeff(), 1e-11L * terms.maxCoeff())
           << trial << (continuous ? " continuous" : " discrete");
     };

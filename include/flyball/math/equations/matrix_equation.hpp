@@ -34,7 +34,8 @@ struct LinearMatrixSolution {
 /// condition is not ordinary, by its complex one (Bartels and Stewart), both with the residual
 /// formed in twice the working precision and corrected until it is rounding. Data that is neither
 /// is first brought to other units by powers of two; what then remains of n m <= 100 unknowns is
-/// solved as so many linear equations in twice the working precision.
+/// solved as so many linear equations in twice the working precision, with exponents of their own
+/// where no unit holds all entries.
 ///
 /// @param A  n x n, no two of whose eigenvalues add up to zero. It need not be stable.
 /// @param Q  n x n; X is symmetric where Q is.
