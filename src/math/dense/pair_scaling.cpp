@@ -198,16 +198,20 @@ PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B) {
   // It stays as it is: if it followed the entries that are brought to it, all would run away.
   const double cycle = cycle_mean_of(A);
   const double size = cycle == none ? pair.size() : cycle;
+  // Steps of all states together only change the inputs' units, whether in one sweep or in turns of
+  // several: then units are those of a sweep before, but for one factor (Brent's search).
+  Eigen::VectorXd before = pair.e;
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     pair.scale_inputs(size);
-    const Eigen::VectorXd before = pair.e;
     bool changed = false;
     for (Index k = 0; k < n; ++k) {
       changed = pair.balance(k, size) || changed;
     }
-    // One step of all states together only changes the inputs' units.
     if (!changed || ((pair.e - before).array() == pair.e(0) - before(0)).all()) {
       break;
+    }
+    if ((sweep & (sweep + 1)) == 0) {
+      before = pair.e;
     }
   }
   PairScaling scaling{Eigen::VectorXi(n), Eigen::VectorXi::Zero(B.cols()), whole(pair.size())};
