@@ -8,7 +8,8 @@
 #include <flyball/core/random.hpp>
 #include <flyball/estimation/kalman_gain.hpp>
 
-#include "filter_cases.hpp"
+#include "linear_case.hpp"
+#include "support/oracle.hpp"
 
 namespace flyball::autocovariance_test {
 namespace {
@@ -72,7 +73,7 @@ std::vector<MatrixXd> exact(const System& s, const MatrixXd& L, Index lags) {
 
 MatrixXd recorded(const System& s, Index count, Random& random, const MatrixXd& added = {}) {
   const MatrixXd root_q = MatrixXd(s.Q.diagonal().cwiseSqrt().asDiagonal());
-  const MatrixXd root_r = s.R.llt().matrixL();
+  const MatrixXd root_r = test::cholesky_factor(s.R);
   VectorXd x = VectorXd::Zero(s.A.rows());
   MatrixXd y(s.C.rows(), count);
   for (Index k = 0; k < count; ++k) {
@@ -170,7 +171,7 @@ TEST(Autocovariance, NoisesStaySemidefinite) {
           {.diagonal_process = diagonal, .diagonal_measurement = diagonal});
       ASSERT_TRUE(fit) << to_string(fit.error());
       const auto least = [](const MatrixXd& M) {
-        return Eigen::SelfAdjointEigenSolver<MatrixXd>(M).eigenvalues().minCoeff();
+        return test::symmetric_eigenvalues(M).minCoeff();
       };
       EXPECT_GE(least(fit->Q), -1e-15);
       EXPECT_GE(least(fit->R), -1e-15);

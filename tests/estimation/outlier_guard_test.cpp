@@ -8,7 +8,8 @@
 #include <flyball/core/random.hpp>
 #include <flyball/estimation/estimate.hpp>
 
-#include "filter_cases.hpp"
+#include "linear_filter.hpp"
+#include "support/oracle.hpp"
 
 namespace flyball::outlier_guard_test {
 namespace {
@@ -151,8 +152,8 @@ TEST(AdaptedNoise, GoesToTheTruth) {
     c.R *= guess;
     test::LinearFilter<JosephCovariance> filter(c);
     Eigen::Vector3d x = c.x0;
-    const Eigen::Matrix2d S = truth.llt().matrixL();
-    const Eigen::Matrix3d G = (c.Q + 1e-9 * Eigen::Matrix3d::Identity()).llt().matrixL();
+    const Eigen::Matrix2d S = test::cholesky_factor(truth);
+    const Eigen::Matrix3d G = test::cholesky_factor(c.Q + 1e-9 * Eigen::Matrix3d::Identity());
     Eigen::Matrix2d mean = Eigen::Matrix2d::Zero();
     for (int k = 0; k < 40000; ++k) {
       x = (c.plant.A * x + G * test::normal(random, 3, 1)).eval();

@@ -1,3 +1,4 @@
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 #include "support/oracle.hpp"
@@ -13,6 +14,18 @@ MatrixXd inverse(const MatrixXd& A) {
 
 MatrixXcd inverse(const MatrixXcd& A) {
   return Eigen::FullPivLU<MatrixXcd>(A).inverse();
+}
+
+double determinant(const MatrixXd& A) {
+  return Eigen::PartialPivLU<MatrixXd>(A).determinant();
+}
+
+MatrixXd cholesky_factor(const MatrixXd& P) {
+  return Eigen::LLT<MatrixXd>(P).matrixL();
+}
+
+double squared_distance(const MatrixXd& P, const Eigen::VectorXd& e) {
+  return e.dot(solve(P, e).col(0));
 }
 
 MatrixXd solve(const MatrixXd& A, const MatrixXd& B) {

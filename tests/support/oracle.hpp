@@ -33,6 +33,13 @@ struct GeneralizedEigenvalues {
 [[nodiscard]] GeneralizedEigenvalues generalized_eigenvalues(const Eigen::MatrixXd& A,
                                                              const Eigen::MatrixXd& B);
 
+[[nodiscard]] double determinant(const Eigen::MatrixXd& A);
+
+/// L of P = L Lᵀ.
+[[nodiscard]] Eigen::MatrixXd cholesky_factor(const Eigen::MatrixXd& P);
+/// eᵀP⁻¹e of a positive definite P.
+[[nodiscard]] double squared_distance(const Eigen::MatrixXd& P, const Eigen::VectorXd& e);
+
 /// A⁻¹B.
 [[nodiscard]] Eigen::MatrixXd solve(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
 [[nodiscard]] Eigen::MatrixXcd solve(const Eigen::MatrixXcd& A, const Eigen::MatrixXcd& B);
