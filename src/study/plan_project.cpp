@@ -6,33 +6,23 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <toml++/toml.h>
 
 #include <flyball/core/quantity.hpp>
-#include <flyball/core/text.hpp>
 #include <flyball/io/file.hpp>
 #include <flyball/study/plan.hpp>
 #include <flyball/study/project.hpp>
 
 #include "core/try.hpp"
+#include "study/space_reader.hpp"
 
 namespace flyball::study {
 
 namespace {
 
-using NameList = std::vector<std::string_view>;
-
-/// Reads one file and keeps all that is wrong with it.
-class PlanReader {
+/// The space, the mechanism in it and what is asked.
+class PlanReader : public SpaceReader {
  public:
-  PlanReader(std::string path, std::string_view text) : path_(std::move(path)), text_(text) {
-    try {
-      root_ = toml::parse(text);
-    } catch (const toml::parse_error& problem) {
-      refuse(problem.source(),
-             Error(ProjectError::syntax).hint(std::string(problem.description())));
-    }
-  }
+  using SpaceReader::SpaceReader;
 
   ExpectedAll<PlanJob> read(const PlanOverrides& given) {
     if (!errors_.empty()) {
@@ -74,378 +64,6 @@ class PlanReader {
   }
 
  private:
-  // Places and errors.
-  void refuse(const toml::source_region& source, Error error) {
-    constexpr std::size_t most = 20;
-    if (errors_.size() >= most) {
-      return;
-    }
-    QuotedError quoted{std::move(error).in(source.begin.line == 0
-                                               ? path_
-                                               : fmt::format("{}:{}:{}", path_, source.begin.line,
-                                                             source.begin.column)),
-                       {},
-                       {}};
-    if (source.begin.line != 0) {
-      std::size_t from = 0;
-      for (toml::source_index i = 1; i < source.begin.line && from != std::string_view::npos; ++i) {
-        from = text_.find('\n', from);
-        from = from == std::string_view::npos ? from : from + 1;
-      }
-      if (from != std::string_view::npos) {
-        std::string line(text_.substr(from, text_.find('\n', from) - from));
-        for (char& c : line) {
-          c = static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-        }
-        constexpr std::size_t widest = 200;
-        if (line.size() <= widest) {
-          quoted.excerpt = "  " + line + "\n  " + std::string(source.begin.column - 1, ' ') + "^";
-        }
-      }
-    }
-    errors_.push_back(std::move(quoted));
-  }
-  void wrong_type(const toml::node& node, const std::string& name, std::string what) {
-    refuse(
-        node.source(),
-        Error(ProjectError::wrong_type).about(name).got("another type").expected(std::move(what)));
-  }
-  void known(const toml::table& table, const std::string& what, const NameList& names) {
-    for (const auto& [key, value] : table) {
-      if (std::find(names.begin(), names.end(), key.str()) == names.end()) {
-        const std::string nearest = nearest_name(key.str(), names);
-        refuse(key.source(),
-               Error(ProjectError::unknown_key)
-                   .about(std::string(key.str()))
-                   .got("not a key of " + what)
-                   .hint(nearest.empty() ? fmt::format("it has {}", fmt::join(names, ", "))
-                                         : fmt::format("did you mean \"{}\"?", nearest)));
-      }
-    }
-  }
-
-  // Values.
-  template <class Read>
-  void each(std::string_view name, const Read& read) {
-    const toml::node* node = root_.get(name);
-    if (node == nullptr) {
-      return;
-    }
-    const toml::array* list = node->as_array();
-    if (list == nullptr) {
-      wrong_type(*node, std::string(name), fmt::format("[[{}]], one for each", name));
-      return;
-    }
-    for (const toml::node& entry : *list) {
-      if (const toml::table* table = entry.as_table()) {
-        read(*table);
-      } else {
-        wrong_type(entry, std::string(name), fmt::format("[[{}]], one for each", name));
-      }
-    }
-  }
-  std::string text(const toml::table& table, std::string_view key, std::string otherwise = {}) {
-    const toml::node* node = table.get(key);
-    if (node == nullptr) {
-      return otherwise;
-    }
-    if (!node->is_string()) {
-      wrong_type(*node, std::string(key), "a text in quotes");
-      return otherwise;
-    }
-    return *node->value_exact<std::string>();
-  }
-  bool flag(const toml::table& table, std::string_view key) {
-    const toml::node* node = table.get(key);
-    if (node != nullptr && !node->is_boolean()) {
-      wrong_type(*node, std::string(key), "true or false");
-    }
-    return node != nullptr && node->value_or(false);
-  }
-  double quantity(const toml::node& node, Dimension dimension, const std::string& name) {
-    if (node.is_number() && dimension == Dimension::dimensionless) {
-      return node.value<double>().value_or(0.0);
-    }
-    if (node.is_number() && node.value<double>().value_or(1.0) == 0.0) {
-      return 0.0;
-    }
-    if (!node.is_string()) {
-      wrong_type(node, name,
-                 fmt::format("a text with a unit, such as \"{}\"", to_text(1.0, dimension)));
-      return 0.0;
-    }
-    const auto value = parse_quantity(*node.value_exact<std::string>(), dimension, name);
-    if (!value) {
-      refuse(node.source(), value.error());
-      return 0.0;
-    }
-    return *value;
-  }
-  std::optional<double> optional_quantity(const toml::table& table, std::string_view key,
-                                          Dimension dimension) {
-    const toml::node* node = table.get(key);
-    return node == nullptr ? std::nullopt
-                           : std::optional(quantity(*node, dimension, std::string(key)));
-  }
-  double needed(const toml::table& table, std::string_view key, Dimension dimension,
-                const std::string& of) {
-    if (const auto value = optional_quantity(table, key, dimension)) {
-      return *value;
-    }
-    refuse(
-        table.source(),
-        Error(ProjectError::missing_key).about(std::string(key)).got("missing").hint("of " + of));
-    return 0.0;
-  }
-  std::array<double, 2> point(const toml::node* node, const std::string& name,
-                              Dimension first = Dimension::length,
-                              Dimension second = Dimension::length) {
-    const toml::array* list = node == nullptr ? nullptr : node->as_array();
-    if (list == nullptr || list->size() != 2) {
-      if (node != nullptr) {
-        wrong_type(*node, name, "two quantities, such as [\"1 m\", \"0.5 m\"]");
-      }
-      return {};
-    }
-    return {quantity((*list)[0], first, name), quantity((*list)[1], second, name)};
-  }
-  std::array<double, 2> needed_point(const toml::table& table, std::string_view key,
-                                     const std::string& of) {
-    if (table.get(key) == nullptr) {
-      refuse(
-          table.source(),
-          Error(ProjectError::missing_key).about(std::string(key)).got("missing").hint("of " + of));
-    }
-    return point(table.get(key), std::string(key));
-  }
-  std::vector<std::array<double, 2>> points(const toml::table& table, std::string_view key,
-                                            Dimension first = Dimension::length,
-                                            Dimension second = Dimension::length) {
-    std::vector<std::array<double, 2>> all;
-    const toml::node* node = table.get(key);
-    const toml::array* list = node == nullptr ? nullptr : node->as_array();
-    if (list == nullptr) {
-      refuse(node == nullptr ? table.source() : node->source(),
-             Error(node == nullptr ? ProjectError::missing_key : ProjectError::wrong_type)
-                 .about(std::string(key))
-                 .got(node == nullptr ? "missing" : "another type")
-                 .expected("a list of points"));
-      return all;
-    }
-    for (const toml::node& entry : *list) {
-      all.push_back(point(&entry, std::string(key), first, second));
-    }
-    return all;
-  }
-
-  // Axes.
-  static Dimension dimension_of(std::string_view unit) {
-    return unit == "rad" ? Dimension::angle
-           : unit == "m" ? Dimension::length
-                         : Dimension::dimensionless;
-  }
-  SpaceAxis axis(const toml::table& table) {
-    known(table, "[[axis]]",
-          {"name", "kind", "low", "high", "wraps", "scale", "velocity", "reverse_velocity",
-           "acceleration", "deceleration", "ramp", "error"});
-    SpaceAxis to;
-    to.name = text(table, "name", fmt::format("axis {}", axes_.size() + limits_.size() + 1));
-    const std::string kind = text(table, "kind", "angle");
-    to.unit = kind == "angle" ? "rad" : kind == "length" ? "m" : "";
-    if (kind != "angle" && kind != "length" && kind != "number") {
-      refuse(table.get("kind")->source(), Error(ProjectError::wrong_value)
-                                              .about("kind")
-                                              .got('"' + kind + '"')
-                                              .expected("angle, length or number"));
-    }
-    const Dimension place = dimension_of(to.unit);
-    const bool turns = place == Dimension::angle;
-    const bool plain = place == Dimension::dimensionless;
-    const Dimension rate = plain   ? place
-                           : turns ? Dimension::angular_velocity
-                                   : Dimension::velocity;
-    const Dimension change = plain   ? place
-                             : turns ? Dimension::angular_acceleration
-                                     : Dimension::acceleration;
-    to.wraps = flag(table, "wraps");
-    constexpr double pi = 3.14159265358979323846;
-    to.low = to.wraps ? optional_quantity(table, "low", place).value_or(-pi)
-                      : needed(table, "low", place, to.name + ", its lower stop");
-    to.high =
-        to.wraps ? to.low + 2.0 * pi : needed(table, "high", place, to.name + ", its upper stop");
-    to.scale = optional_quantity(table, "scale", place).value_or(1.0);
-    const std::size_t before = errors_.size();
-    MotionLimits limits{
-        .velocity = optional_quantity(table, "velocity", rate).value_or(0.0),
-        .acceleration = optional_quantity(table, "acceleration", change).value_or(0.0)};
-    limits.deceleration = optional_quantity(table, "deceleration", change).value_or(0.0);
-    limits.reverse_velocity = optional_quantity(table, "reverse_velocity", rate).value_or(0.0);
-    if (const auto ramp = optional_quantity(table, "ramp", Dimension::time)) {
-      if (*ramp > 0.0) {
-        limits.jerk = limits.acceleration / *ramp;
-      } else {
-        refuse(table.get("ramp")->source(), Error(ArgumentError::not_positive)
-                                                .about("ramp")
-                                                .got("not positive")
-                                                .expected("a time > 0"));
-      }
-    }
-    const bool has = table.contains("velocity") && table.contains("acceleration");
-    if (!has && (table.contains("velocity") || table.contains("acceleration"))) {
-      refuse(table.source(), Error(ProjectError::missing_key)
-                                 .about(table.contains("velocity") ? "acceleration" : "velocity")
-                                 .got("missing")
-                                 .hint("of " + to.name + ": limits come in pairs"));
-    }
-    for (const auto& [key, value] :
-         {std::pair("velocity", limits.velocity), std::pair("acceleration", limits.acceleration),
-          std::pair("deceleration", limits.deceleration),
-          std::pair("reverse_velocity", limits.reverse_velocity)}) {
-      if (table.contains(key) && !(value > 0.0) && errors_.size() == before) {
-        refuse(table.get(key)->source(), Error(ArgumentError::not_positive)
-                                             .about(to.name + ": " + key)
-                                             .got(fmt::format("{}", value))
-                                             .expected("positive"));
-      }
-    }
-    has_limits_ = has_limits_ && has;
-    limits_.push_back(limits);
-    errors_of_axes_.push_back(optional_quantity(table, "error", place).value_or(0.0));
-    return to;
-  }
-  int axis_index(const toml::table& table, std::string_view key, std::string_view name) {
-    NameList names;
-    for (std::size_t k = 0; k < axes_.size(); ++k) {
-      if (axes_[k].name == name) {
-        return static_cast<int>(k);
-      }
-      names.push_back(axes_[k].name);
-    }
-    const toml::node* node = table.get(key);
-    refuse(node == nullptr ? table.source() : node->source(),
-           Error(ArgumentError::unknown_name)
-               .about(std::string(key))
-               .got(fmt::format("\"{}\"", name))
-               .expected(fmt::format("one of the axes {}", fmt::join(names, ", "))));
-    return 0;
-  }
-
-  // Regions.
-  std::optional<Region> region(const toml::table& table, bool named) {
-    NameList names{"box", "half_space", "polygon", "any", "all", "not"};
-    if (named) {
-      names.insert(names.end(), {"name", "rule"});
-    }
-    known(table, named ? "[[region]]" : "a region", names);
-    std::optional<Region> all;
-    const auto meet = [&](const Region& one) { all = all ? *all & one : one; };
-    if (const toml::node* node = table.get("box")) {
-      if (const toml::table* box = node->as_table()) {
-        for (const auto& [key, value] : *box) {
-          const int k = axis_index(*box, key.str(), key.str());
-          const Dimension d = dimension_of(axes_[static_cast<std::size_t>(k)].unit);
-          const auto bounds = point(&value, std::string(key.str()), d, d);
-          meet(Region::interval(k, bounds[0], bounds[1]));
-        }
-      } else {
-        wrong_type(*node, "box", "bounds of axes: { arm = [\"-45 deg\", \"45 deg\"] }");
-      }
-    }
-    if (const toml::node* node = table.get("half_space")) {
-      if (const toml::table* half = node->as_table()) {
-        known(*half, "half_space", {"normal", "offset"});
-        std::vector<double> normal(axes_.size(), 0.0);
-        const toml::node* given = half->get("normal");
-        if (const toml::table* entries = given == nullptr ? nullptr : given->as_table()) {
-          for (const auto& [key, value] : *entries) {
-            normal[static_cast<std::size_t>(axis_index(*entries, key.str(), key.str()))] =
-                quantity(value, Dimension::dimensionless, std::string(key.str()));
-          }
-        } else {
-          refuse(half->source(), Error(ProjectError::missing_key)
-                                     .about("normal")
-                                     .got("missing")
-                                     .expected("{ axis = number } in SI units"));
-        }
-        meet(Region::half_space(std::move(normal), needed(*half, "offset", Dimension::dimensionless,
-                                                          "a half-space, in SI units")));
-      } else {
-        wrong_type(*node, "half_space", "{ normal = { … }, offset = … }");
-      }
-    }
-    if (const toml::node* node = table.get("polygon")) {
-      const toml::table* polygon = node->as_table();
-      const toml::array* over = polygon == nullptr ? nullptr : polygon->get_as<toml::array>("axes");
-      if (over == nullptr || over->size() != 2 || !(*over)[0].is_string() ||
-          !(*over)[1].is_string()) {
-        wrong_type(*node, "polygon", "{ axes = [\"one\", \"other\"], points = [[…], …] }");
-      } else {
-        known(*polygon, "polygon", {"axes", "points"});
-        const int i = axis_index(*polygon, "axes", (*over)[0].value_or(std::string()));
-        const int j = axis_index(*polygon, "axes", (*over)[1].value_or(std::string()));
-        meet(Region::polygon(
-            i, j,
-            points(*polygon, "points", dimension_of(axes_[static_cast<std::size_t>(i)].unit),
-                   dimension_of(axes_[static_cast<std::size_t>(j)].unit))));
-      }
-    }
-    for (const char* key : {"any", "all"}) {
-      const toml::node* node = table.get(key);
-      if (node == nullptr) {
-        continue;
-      }
-      const toml::array* list = node->as_array();
-      std::optional<Region> joined;
-      for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
-        const toml::table* part = (*list)[i].as_table();
-        const auto one = part == nullptr ? std::nullopt : region(*part, false);
-        if (one) {
-          joined = !joined                          ? *one
-                   : std::string_view(key) == "any" ? *joined | *one
-                                                    : *joined & *one;
-        }
-      }
-      if (joined) {
-        meet(*joined);
-      } else {
-        wrong_type(*node, key, "a list of regions");
-      }
-    }
-    if (const toml::node* node = table.get("not")) {
-      const toml::table* part = node->as_table();
-      const auto one = part == nullptr ? std::nullopt : region(*part, false);
-      if (one) {
-        meet(!*one);
-      } else {
-        wrong_type(*node, "not", "a region");
-      }
-    }
-    if (!all) {
-      refuse(table.source(), Error(ProjectError::missing_key)
-                                 .about("the region")
-                                 .got("without a shape")
-                                 .expected("box, half_space, polygon, any, all or not"));
-    }
-    return all;
-  }
-  void add_region(ConfigurationSpace& space, const toml::table& table) {
-    const std::string name = text(table, "name", "region");
-    const std::string rule = text(table, "rule", "forbid");
-    const std::size_t before = errors_.size();
-    const std::optional<Region> one = region(table, true);
-    if (rule != "forbid" && rule != "require") {
-      refuse(table.get("rule")->source(), Error(ProjectError::wrong_value)
-                                              .about("rule")
-                                              .got('"' + rule + '"')
-                                              .expected("forbid or require"));
-    } else if (one && errors_.size() == before) {
-      const auto added = rule == "forbid" ? space.forbid(name, *one) : space.require(name, *one);
-      if (!added) {
-        refuse(table.source(), added.error());
-      }
-    }
-  }
-
   // The mechanism.
   int joint_index(const toml::table& table, std::string_view key, const std::string& name) {
     NameList names;
@@ -464,22 +82,6 @@ class PlanReader {
             .expected(names.empty() ? "the name of a [[joint]]"
                                     : fmt::format("one of the joints {}", fmt::join(names, ", "))));
     return 0;
-  }
-  std::vector<std::string> texts(const toml::node* node, const std::string& name) {
-    std::vector<std::string> all;
-    if (node == nullptr) {
-      return all;
-    }
-    const toml::array* list = node->as_array();
-    for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
-      if ((*list)[i].is_string()) {
-        all.push_back((*list)[i].value_or(std::string()));
-      }
-    }
-    if (list == nullptr || all.size() != list->size()) {
-      wrong_type(*node, name, "a list of names");
-    }
-    return all;
   }
   void add_obstacle(const toml::table& table) {
     known(table, "[[obstacle]]",
@@ -703,15 +305,7 @@ class PlanReader {
     number("period", "", Dimension::time, [&](double value) { job.motion.period = value; });
   }
 
-  std::string path_;
-  std::string_view text_;
-  toml::table root_{};
-  std::vector<SpaceAxis> axes_{};
-  std::vector<MotionLimits> limits_{};
-  std::vector<double> errors_of_axes_{};
-  bool has_limits_ = true;
   PlanarMechanism mechanism_{};
-  std::vector<QuotedError> errors_{};
 };
 
 }  // namespace

@@ -11,6 +11,8 @@
 #include <flyball/core/random.hpp>
 #include <flyball/identification/identification_error.hpp>
 
+#include "support/oracle.hpp"
+
 namespace flyball::identification::frequency_fit_test {
 namespace {
 
@@ -25,7 +27,7 @@ MatrixXcd at(const System& system, Complex s) {
   const Index n = system.A.rows();
   const MatrixXcd resolvent = s * MatrixXcd::Identity(n, n) - system.A.template cast<Complex>();
   return system.C.template cast<Complex>() *
-             resolvent.partialPivLu().solve(system.B.template cast<Complex>()) +
+             test::solve(resolvent, MatrixXcd(system.B.template cast<Complex>())) +
          system.D.template cast<Complex>();
 }
 

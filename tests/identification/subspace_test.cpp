@@ -10,6 +10,7 @@
 #include <flyball/identification/identification_error.hpp>
 
 #include "identification/subspace_data.hpp"
+#include "support/oracle.hpp"
 
 namespace flyball::identification::subspace_test {
 namespace {
@@ -45,11 +46,12 @@ InnovationsModel random_model(Random& random, Index n, Index m, Index p) {
     }
   }
   const MatrixXd V = noise(random, n, n) + 2.0 * MatrixXd::Identity(n, n);
-  model.system = {V * A * V.inverse(), noise(random, n, m), noise(random, p, n),
+  model.system = {V * A * test::inverse(V), noise(random, n, m), noise(random, p, n),
                   noise(random, p, m), T};
   model.K = 0.1 * noise(random, n, p);
   // Else e is not what a predictor leaves.
-  while ((model.system.A - model.K * model.system.C).eigenvalues().cwiseAbs().maxCoeff() > 0.98) {
+  while (test::eigenvalues(model.system.A - model.K * model.system.C).cwiseAbs().maxCoeff() >
+         0.98) {
     model.K *= 0.5;
   }
   model.noise = MatrixXd::Identity(p, p);

@@ -9,6 +9,8 @@
 #include <flyball/core/random.hpp>
 #include <flyball/math/probability/distributions.hpp>
 
+#include "support/oracle.hpp"
+
 namespace flyball::optimization::least_squares_statistics_test {
 namespace {
 
@@ -50,7 +52,7 @@ TEST(LeastSquaresStatistics, CovarianceOfALinearModelIsTheTextbooks) {
   const auto covariance = covariance_of(fit.problem, fit.result);
   ASSERT_TRUE(covariance);
   const double s2 = fit.result.cost / 27.0;
-  const MatrixXd inverse = (fit.A.transpose() * fit.A).inverse();
+  const MatrixXd inverse = test::inverse(MatrixXd(fit.A.transpose() * fit.A));
   EXPECT_LT((covariance->matrix - s2 * inverse).norm(), 1e-13);
   EXPECT_EQ(covariance->freedom, 27.0);
   EXPECT_NEAR(covariance->sigma, std::sqrt(s2), 1e-14);
@@ -65,7 +67,7 @@ TEST(LeastSquaresStatistics, TheSandwichIsWhites) {
   const Regression fit = regression();
   VectorXd r(30);
   ASSERT_TRUE(fit.problem.blocks[0]->evaluate(fit.result.x, r, nullptr));
-  const MatrixXd inverse = (fit.A.transpose() * fit.A).inverse();
+  const MatrixXd inverse = test::inverse(MatrixXd(fit.A.transpose() * fit.A));
   const MatrixXd white = inverse * fit.A.transpose() * r.cwiseAbs2().asDiagonal() * fit.A * inverse;
   const auto covariance = covariance_of(fit.problem, fit.result, {.batch = 1});
   ASSERT_TRUE(covariance);

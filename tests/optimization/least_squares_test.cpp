@@ -8,6 +8,8 @@
 
 #include <flyball/core/random.hpp>
 
+#include "support/oracle.hpp"
+
 namespace flyball::optimization::least_squares_test {
 namespace {
 
@@ -106,7 +108,7 @@ double least_over_box(const MatrixXd& A, const VectorXd& b, const VectorXd& low,
       }
     }
     if (!free.empty()) {
-      const VectorXd solved = MatrixXd(A(Eigen::all, free)).householderQr().solve(b - A * x);
+      const VectorXd solved = test::least_squares(A(Eigen::all, free), b - A * x);
       for (std::size_t i = 0; i < free.size(); ++i) {
         x(free[i]) = solved(static_cast<Index>(i));
       }

@@ -14,6 +14,7 @@
 
 #include "optimization/cart_pole.hpp"
 #include "support/allocation_count.hpp"
+#include "support/oracle.hpp"
 
 namespace optimal_control_test {
 namespace {
@@ -154,7 +155,8 @@ TEST(OptimalControl, LeastEffortOfTheDoubleIntegrator) {
   for (int k = 0; k < N; ++k) {
     C.col(k) = Vector2d(h * h * (N - k - 0.5), h);
   }
-  const VectorXd exact = C.transpose() * (C * C.transpose()).ldlt().solve(Vector2d(1.5, 0.0));
+  const VectorXd exact =
+      C.transpose() * test::solve(MatrixXd(C * C.transpose()), MatrixXd(Vector2d(1.5, 0.0)));
   const auto solution = solve(rest_to_rest(N, 2.0, 1.5)).value();
   EXPECT_TRUE(solution.solved());
   EXPECT_LT((solution.inputs.transpose() - exact).cwiseAbs().maxCoeff(), 1e-8);

@@ -44,6 +44,11 @@ struct GeneralizedEigenvalues {
 [[nodiscard]] Eigen::MatrixXd solve(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
 [[nodiscard]] Eigen::MatrixXcd solve(const Eigen::MatrixXcd& A, const Eigen::MatrixXcd& B);
 
+/// The x of least length among those for which |A x - b| is least.
+[[nodiscard]] Eigen::VectorXd least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
+/// Moore and Penrose's.
+[[nodiscard]] Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& A);
+
 /// C (s I - A)⁻¹ B + D.
 [[nodiscard]] Eigen::MatrixXcd response(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B,
                                         const Eigen::MatrixXd& C, const Eigen::MatrixXd& D,

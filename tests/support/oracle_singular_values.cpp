@@ -1,3 +1,4 @@
+#include <Eigen/QR>
 #include <Eigen/SVD>
 
 #include "support/oracle.hpp"
@@ -13,6 +14,14 @@ Eigen::VectorXd singular_values(const MatrixXd& A) {
 
 Eigen::VectorXd singular_values(const MatrixXcd& A) {
   return Eigen::JacobiSVD<MatrixXcd>(A).singularValues();
+}
+
+Eigen::VectorXd least_squares(const MatrixXd& A, const Eigen::VectorXd& b) {
+  return Eigen::CompleteOrthogonalDecomposition<MatrixXd>(A).solve(b);
+}
+
+MatrixXd pseudo_inverse(const MatrixXd& A) {
+  return Eigen::CompleteOrthogonalDecomposition<MatrixXd>(A).pseudoInverse();
 }
 
 }  // namespace flyball::test

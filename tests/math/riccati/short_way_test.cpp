@@ -8,6 +8,7 @@
 #include "math/equations/sylvester_kernel.hpp"
 #include "math/extended/double_double.hpp"
 #include "math/riccati/riccati_kernel.hpp"
+#include "support/oracle.hpp"
 #include "support/random_systems.hpp"
 
 namespace flyball::short_way_test {
@@ -40,9 +41,9 @@ TEST(ShortWay, RiccatiEquations) {
       const MatrixXd left = continuous ? MatrixXd(S.transpose() * X + X * S + cost)
                                        : MatrixXd(S.transpose() * X * S + cost - X);
       EXPECT_LT(left.norm(), 1e-12 * X.norm());
-      const MatrixXd gain =
-          continuous ? MatrixXd(B.transpose() * X)
-                     : MatrixXd((R + B.transpose() * X * B).inverse() * B.transpose() * X * A);
+      const MatrixXd gain = continuous ? MatrixXd(B.transpose() * X)
+                                       : MatrixXd(test::solve(MatrixXd(R + B.transpose() * X * B),
+                                                              MatrixXd(B.transpose() * X * A)));
       EXPECT_LT((K - gain).norm(), 1e-12 * (1.0 + gain.norm()));
     }
   }

@@ -14,6 +14,7 @@
 #include <flyball/systems/model_step.hpp>
 
 #include "support/allocation_count.hpp"
+#include "support/oracle.hpp"
 
 namespace flyball::mechanisms::lift_test {
 namespace {
@@ -207,7 +208,7 @@ TEST(ElevatorArm, AgainstNewtonsLawsOfBothBodies) {
     b(2) = m * l * s * z(3) * z(3) - m * g;
     A.row(3) << 0.0, own + 0.05, -l * s, l * c;  // moments about its centre
     b(3) = torque;
-    const Vector4d solved = A.fullPivLu().solve(b);
+    const Vector4d solved = test::solve(Eigen::MatrixXd(A), Eigen::MatrixXd(b));
     return Vector4d(z(2), z(3), solved(0), solved(1));
   };
   const IntegrationOptions tight{.relative_tolerance = 1e-10, .absolute_tolerance = 1e-12};
