@@ -422,6 +422,15 @@ Expected<PathTrajectory> time_optimal(const Path& path, std::span<const PathCons
   } else {
     FLYBALL_TRY(spans, spans_of(path, cells, passes.b));
   }
+  // Whose square is a double: s = s0 + v t + ½ a t².
+  constexpr double longest = 1e150;
+  const double t = spans.back().start + spans.back().duration;
+  if (!(t <= longest)) {
+    return refusal(ArgumentError::out_of_range, in_time_optimal, "the motion")
+        .got("it takes " + detail::format("{:.3g} s", t))
+        .expected("at most 1e150 s")
+        .hint("measure lengths in another unit");
+  }
   return PathTrajectory(path, std::move(spans),
                         std::vector<PathConstraint>(constraints.begin(), constraints.end()));
 }

@@ -518,6 +518,11 @@ TEST(TimeOptimal, RefusesWhatIsNoLimit) {
   EXPECT_TRUE(time_optimal(arm, Limits{TravelLimits{.velocity = 1.0}})
                   .error()
                   .is(ArgumentError::wrong_shape));
+  // s = s0 + v t + ½ a t² asks for the square of the time.
+  const Path endless = line_path(Vector2d(0.0, 0.0), Vector2d(1e152, 1.0)).value();
+  EXPECT_NE(to_string(time_optimal(endless, Limits{TravelLimits{.velocity = 0.5}}).error())
+                .find("it takes 2e+152 s"),
+            std::string::npos);
 }
 
 TEST(TimeOptimal, SamplesNeedNoHeap) {
