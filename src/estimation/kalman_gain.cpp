@@ -153,15 +153,11 @@ Expected<KalmanGain<>> kalman_gain(const MatrixRef& A, const MatrixRef& C, const
   }
   gain.P_prior = filter->covariance(filter->P);
   gain.P_posterior = filter->covariance(filter->update.P);
-  // What a measurement without noise tells has no variance left: the sign of one is its rounding,
-  // and the covariances tell how much there is at least.
-  Eigen::MatrixXd& P = gain.P_posterior;
+  // Where measurements leave no variance, the sign of what is left is rounding beside the prior's.
   for (Eigen::Index i = 0; i < n; ++i) {
-    if (P(i, i) < 0.0 && P(i, i) >= -largest_residual * gain.P_prior(i, i)) {
-      P(i, i) = 0.0;
-      for (Eigen::Index j = 0; j < n; ++j) {
-        P(i, i) = P(j, j) > 0.0 ? std::max(P(i, i), P(i, j) / P(j, j) * P(i, j)) : P(i, i);
-      }
+    if (gain.P_posterior(i, i) < 0.0 &&
+        gain.P_posterior(i, i) >= -largest_residual * gain.P_prior(i, i)) {
+      gain.P_posterior(i, i) = 0.0;
     }
   }
   gain.poles = *poles;

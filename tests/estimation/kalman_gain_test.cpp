@@ -377,6 +377,28 @@ TEST(KalmanGain, NoVarianceIsNegative) {
       kalman_gain(scalar(0.6028441777532183), C, scalar(0.00783534690284396), R).value();
   EXPECT_GE(gain.P_posterior(0, 0), 0.0);
   EXPECT_LE(gain.P_posterior(0, 0), 1e-20);
+  // Whole numbers, whose R = v vᵀ is singular without rounding.
+  Random random(5);
+  const auto whole = [&](Eigen::Index rows, Eigen::Index columns) {
+    return Eigen::MatrixXd(Eigen::MatrixXd::NullaryExpr(
+        rows, columns, [&] { return std::floor(random.uniform(-3.0, 4.0)); }));
+  };
+  int answered = 0;
+  for (int trial = 0; trial < 500; ++trial) {
+    const Eigen::Index n = 1 + trial % 4;
+    const Eigen::Index p = 1 + trial % 3;
+    const Eigen::MatrixXd A = 0.25 * whole(n, n);
+    const Eigen::MatrixXd H = whole(p, n);
+    const Eigen::MatrixXd v = whole(p, 1);
+    const Eigen::MatrixXd G = whole(n, n);
+    const auto perfect =
+        kalman_gain(A, H, Covariance(G * G.transpose()), Covariance(v * v.transpose()));
+    if (perfect) {
+      ++answered;
+      EXPECT_GE(perfect->P_posterior.diagonal().minCoeff(), 0.0) << trial;
+    }
+  }
+  EXPECT_GT(answered, 300);
 }
 
 // The residual that is told is the larger of the dual equation's and of the filter's own, which
