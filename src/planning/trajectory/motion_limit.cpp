@@ -261,10 +261,17 @@ Expected<void> check_coordinate_limits(const Eigen::VectorXd& limits, const Path
 
 Expected<void> check_limit(double value, std::string_view where, std::string_view name,
                            std::string_view unit) {
-  if (value > 0.0) {
+  // Squares of limits and of their shares are formed.
+  constexpr double least = 1e-150;
+  if (value >= least) {
     return {};
   }
   const std::string after = unit.empty() ? std::string() : " " + std::string(unit);
+  if (value > 0.0) {
+    return refusal(ArgumentError::out_of_range, where, name)
+        .got(format_number(value) + after)
+        .expected("at least 1e-150, or infinite for no limit");
+  }
   return refusal(std::isnan(value) ? ArgumentError::not_finite : ArgumentError::not_positive, where,
                  name)
       .got(format_number(value) + after)

@@ -427,8 +427,8 @@ Expected<PathTrajectory> time_optimal(const Path& path, std::span<const PathCons
   const double t = spans.back().start + spans.back().duration;
   if (!(t <= longest)) {
     return refusal(ArgumentError::out_of_range, in_time_optimal, "the motion")
-        .got("it takes " + detail::format("{:.3g} s", t))
-        .expected("at most 1e150 s")
+        .got(detail::format("one of {:.3g} s", t))
+        .expected("one of at most 1e150 s")
         .hint("measure lengths in another unit");
   }
   return PathTrajectory(path, std::move(spans),

@@ -498,6 +498,7 @@ TEST(TimeOptimal, RefusesWhatIsNoLimit) {
   EXPECT_EQ(to_string(error(TravelLimits{.velocity = 0.0})),
             "time_optimal: velocity limit is 0 m/s; it must be positive, or infinite for no limit");
   EXPECT_TRUE(error(TravelLimits{.velocity = -1.0}).is(ArgumentError::not_positive));
+  EXPECT_TRUE(error(TravelLimits{.total_acceleration = 5e-324}).is(ArgumentError::out_of_range));
   EXPECT_TRUE(error(TravelLimits{.acceleration = std::nan("")}).is(ArgumentError::not_finite));
   EXPECT_TRUE(error(CoordinateLimits{Eigen::Vector3d::Ones(), {}}).is(ArgumentError::wrong_shape));
   EXPECT_TRUE(error(CoordinateLimits{Vector2d(1.0, 0.0), {}}).is(ArgumentError::not_positive));
@@ -521,7 +522,7 @@ TEST(TimeOptimal, RefusesWhatIsNoLimit) {
   // s = s0 + v t + ½ a t² asks for the square of the time.
   const Path endless = line_path(Vector2d(0.0, 0.0), Vector2d(1e152, 1.0)).value();
   EXPECT_NE(to_string(time_optimal(endless, Limits{TravelLimits{.velocity = 0.5}}).error())
-                .find("it takes 2e+152 s"),
+                .find("one of 2e+152 s"),
             std::string::npos);
 }
 
