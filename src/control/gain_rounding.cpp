@@ -80,13 +80,17 @@ std::optional<Eigen::MatrixXd> rounded_together(const MatrixRef& B, const Double
   }
   const Eigen::MatrixXd start = K.rounded();
   const Eigen::MatrixXd rest = (start - K.hi) - K.lo;
+  // A pole far below one may move by less.
+  const Eigen::VectorXd sizes = reached.wanted.cwiseAbs().unaryExpr(
+      [](double p) { return p > 0.0 ? std::min(1.0, p) : 1.0; });
   // The eigenvalues move by y_jᴴ B δK x_j: that must be small, and between two eigenvectors what
   // its square makes of it. In units of what is allowed:
   Eigen::MatrixXd allowed(n, n);
   for (Index i = 0; i < n; ++i) {
     for (Index j = 0; j < n; ++j) {
       const double apart = std::abs(reached.poles(i) - reached.poles(j));
-      allowed(i, j) = std::max(on_diagonal, off_diagonal * std::min(1.0, apart)) *
+      const double size = std::sqrt(sizes(i) * sizes(j));
+      allowed(i, j) = size * std::max(on_diagonal, off_diagonal * std::min(1.0, apart)) *
                       reached.left.row(i).norm() * reached.right.col(j).norm();
     }
   }

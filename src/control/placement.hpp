@@ -103,11 +103,13 @@ struct StateUnits {
 
 /// Where a gain puts the poles, in the order of those that were asked for.
 struct Reached {
+  Eigen::VectorXcd wanted;
   Eigen::VectorXcd poles;
   double condition = infinite;  ///< Of the unit eigenvectors, in the units that were given.
   /// The largest distance from the pole p that was asked for, with what may be wrong with it,
-  /// relative to |p|, or to the size of A and the poles where p is nothing beside it.
+  /// relative to |p|; where p = 0 to the largest of the poles, or of A where all are zero.
   double pole_error = infinite;
+  Eigen::Index worst = 0;  ///< Which pole that is.
   /// The largest of these in units of max(1, |p|) times the pole's own condition, 1/|yᴴx| for unit
   /// left and right eigenvectors: in the plant's units or in balanced ones, where it is smaller.
   double misplaced = infinite;

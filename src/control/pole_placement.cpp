@@ -157,10 +157,11 @@ std::optional<PoleCandidate> candidate_of(const Scaled& plant, const Part& part,
   detail::Reached reached = reached_with(K);
   // The bar is 1e-8; what is near it another judge of the poles may see above it.
   constexpr double near_bar = 1e-9;
-  if (reached.misplaced > near_bar && determined && form.rank > 1) {
+  if ((reached.misplaced > near_bar || !reached.accepted()) && determined && form.rank > 1) {
     if (auto together = detail::rounded_together(plant.B, exact->K, reached)) {
       detail::Reached now = reached_with(*together);
-      if (now.misplaced < reached.misplaced) {
+      if (now.accepted() == reached.accepted() ? now.misplaced < reached.misplaced
+                                               : now.accepted()) {
         K = std::move(*together);
         reached = std::move(now);
       }
@@ -205,6 +206,35 @@ bool surely_controllable(const MatrixRef& A, const MatrixRef& B) {
   return reach && reach->controllable;
 }
 
+/// @param plant  Size of A. @param time  The poles are in units of 2^time; messages are not.
+Error not_reached(const detail::Reached& reached, double plant, int time) {
+  const auto given = [&](Complex pole) {
+    return std::vector<double>{std::ldexp(pole.real(), time), std::ldexp(pole.imag(), time)};
+  };
+  // One that is far off to its own size alone, since the last digits of the gain move it.
+  constexpr double little = 1e-6;
+  const bool any = reached.poles.size() > 0;
+  const double size = any ? std::abs(reached.wanted(reached.worst)) : 0.0;
+  const double beside = any ? std::max(plant, reached.wanted.cwiseAbs().maxCoeff()) : 0.0;
+  const bool nothing = size > 0.0 && size < little * beside && reached.misplaced <= 1e-8;
+  Error error =
+      Error(PolePlacementError::not_reached)
+          .in(std::string(in_place))
+          .about("(A, B)")
+          .hint(nothing ? "beside the plant and the other poles this one is nothing: ask for 0 if "
+                          "that is meant, or for one nearer to the others"
+                        : "it is nearly uncontrollable, or these poles are nearly one: ask for "
+                          "poles nearer to those of A, or further apart")
+          .with("largest relative distance of a pole from its place", reached.pole_error)
+          .with("condition of the eigenvectors", reached.condition);
+  if (any) {
+    error = Error(std::move(error)
+                      .with("pole", given(reached.wanted(reached.worst)))
+                      .with("reached", given(reached.poles(reached.worst))));
+  }
+  return error;
+}
+
 /// The gain found with each state measured in its unit, for the plant in the units it came in.
 Expected<PolePlacement<>> place_in_units(const MatrixRef& A, const MatrixRef& B,
                                          const Eigen::VectorXcd& wanted,
@@ -227,16 +257,8 @@ Expected<PolePlacement<>> place_in_units(const MatrixRef& A, const MatrixRef& B,
         detail::weakest_mode(plant.A, plant.B, {units, time}, wanted).in(std::string(in_place)));
   }
   if (!found || !found->reached.accepted()) {
-    const detail::Reached reached = found ? found->reached : detail::Reached{};
     return tl::unexpected(
-        Error(PolePlacementError::not_reached)
-            .in(std::string(in_place))
-            .about("(A, B)")
-            .hint(
-                "it is nearly uncontrollable, or these poles are nearly one: ask for poles nearer "
-                "to those of A, or further apart")
-            .with("largest relative distance of a pole from its place", reached.pole_error)
-            .with("condition of the eigenvectors", reached.condition));
+        not_reached(found ? found->reached : detail::Reached{}, plant.A.norm(), time));
   }
   placed.K = found->K * units.cwiseInverse().asDiagonal();
   placed.poles = found->reached.poles;

@@ -17,13 +17,13 @@ double scale_of(Complex pole) {
   return std::max(1.0, std::abs(pole));
 }
 
-/// What the errors of poles are relative to: a pole that is nothing beside the plant and the other
-/// poles is judged as zero, by their size.
+/// What the errors of poles are relative to: each to itself; one at zero, which has no size, to the
+/// largest of those that were asked for, or where all are zero to the plant's.
 Eigen::VectorXd pole_scales(const Eigen::VectorXcd& wanted, const Eigen::MatrixXd& A) {
-  double size = std::max(A.norm(), wanted.cwiseAbs().maxCoeff());
-  size = size > 0.0 ? size : 1.0;
-  const double nothing = 100.0 * epsilon * static_cast<double>(wanted.size()) * size;
-  return wanted.cwiseAbs().unaryExpr([&](double p) { return p > nothing ? p : size; });
+  const double largest = wanted.cwiseAbs().maxCoeff();
+  const double plant = A.norm();
+  const double of_zero = largest > 0.0 ? largest : plant > 0.0 ? plant : 1.0;
+  return wanted.cwiseAbs().unaryExpr([&](double p) { return p > 0.0 ? p : of_zero; });
 }
 
 /// The eigenvalues of a matrix that is similar to A - B K, and how far each may be from A - B K's.
@@ -195,6 +195,7 @@ Judged judged_in(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
                           product(A.cwiseAbs(), X.rounded().cwiseAbs()) +
                               product(B.cwiseAbs(), product(K.cwiseAbs(), X.rounded().cwiseAbs()))),
                   system, rows, formed, scales);
+  reached.wanted = wanted;
   reached.poles.resize(n);
   reached.left.resize(n, n);
   reached.right.resize(n, n);
@@ -212,7 +213,10 @@ Judged judged_in(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
     const double error = std::abs(reached.poles(i) - wanted(i));
     judged.uncertainty = std::max(judged.uncertainty, spectrum.uncertainty(k) / scales(i));
     const double relative = (error + spectrum.uncertainty(k)) / scales(i);
-    reached.pole_error = std::isnan(relative) ? infinite : std::max(reached.pole_error, relative);
+    if (!(relative <= reached.pole_error)) {
+      reached.pole_error = std::isnan(relative) ? infinite : relative;
+      reached.worst = i;
+    }
     reached.misplaced = std::max(reached.misplaced, error / (scale_of(wanted(i)) * sensitivity));
   }
   // Nor one that makes a loop unstable of which stable poles were asked, in continuous time or in

@@ -131,7 +131,8 @@ std::vector<Kind> estimator_kinds() {
         complex_list("poles", "n", "where they are with this L, in the same order"),
         unbounded(number("condition", "", "how much a relative error of A - LC moves a pole")),
         number("pole_error", "",
-               "no pole is further from its place, relative to its size; at most 0.1")},
+               "no pole is further from its place, relative to itself (at 0: to the largest pole); "
+               "at most 0.1")},
        R"({"A": [[0, 1], [0, 0]], "C": [[1, 0]], "poles": [[-1, 1], [-1, -1]]})",
        &solve_place_observer},
       {"smooth",

@@ -173,7 +173,8 @@ std::vector<Kind> regulator_kinds() {
        {gain, complex_list("poles", "n", "where they are with this K, in the same order"),
         unbounded(number("condition", "", "how much a relative error of A - BK moves a pole")),
         number("pole_error", "",
-               "no pole is further from its place, relative to its size; at most 0.1")},
+               "no pole is further from its place, relative to itself (at 0: to the largest pole); "
+               "at most 0.1")},
        R"({"A": [[0, 1], [0, 0]], "B": [[0], [1]], "poles": [[-1, 1], [-1, -1]]})",
        &solve_place},
   };

@@ -32,10 +32,10 @@ struct PolePlacement {
   /// a pole. Infinite (or above 1e8) where the closed loop cannot be diagonalised.
   double condition = 0.0;
   /// The largest distance of a reached pole from the p that was asked for, relative to |p|, with
-  /// what may be wrong with the reached one: an upper bound. A p below 100 n ε of the size of A
-  /// (balanced) and of all poles is judged as zero, relative to that size. At most 0.1. It grows
-  /// with `condition`, and is the n-th root of the rounding error for a pole repeated n times in
-  /// one chain.
+  /// what may be wrong with the reached one: an upper bound, however small p is beside the plant
+  /// and the other poles. A p = 0 has no size: its distance is relative to the largest of the
+  /// poles, or to A (balanced) where all are zero. At most 0.1. It grows with `condition`, and is
+  /// the n-th root of the rounding error for a pole repeated n times in one chain.
   double pole_error = 0.0;
   /// Modes of A that no input reaches and which therefore stay: all were among the poles.
   std::vector<std::complex<double>> uncontrollable;
@@ -69,8 +69,9 @@ struct PolePlacement {
 ///         by rounding of A and B only, and the states that it lives in, if `poles` does not
 ///         contain it; not_reached if a pole of A - B K is further than 1e-8 max(1, |p|) times its
 ///         own condition (in given units or balanced ones) from its place, if `pole_error`
-///         would be above 0.1, if a pole is no longer stable, or if K is beyond the range of
-///         doubles.
+///         would be above 0.1 (as it is where rounding K moves a small pole by more than a tenth
+///         of itself: the error names the pole, and where it ends), if a pole is no longer stable,
+///         or if K is beyond the range of doubles.
 /// Cost: with several inputs O(n³) a sweep over the eigenvectors, at most 60, and O(n³ rank B)
 /// once; O(n⁴) for a triangular form (one input, poles repeated more often than rank B). Allocates.
 ///
