@@ -73,12 +73,16 @@ double top_speed(const MotorMotionLimits& m, double sign) {
 }
 
 bool is_usable(const MotorMotionLimits& m, const MotionState& start, const MotionState& goal) {
-  const auto positive = [](double x) { return x >= 1.0 / largest && x <= largest; };
+  // What is left of the voltage and of the current's is no smaller than they may be: with
+  // 1e-300 V a motion takes more seconds than a double holds.
+  constexpr double smallest = 1.0 / largest;
+  const auto positive = [](double x) { return x >= smallest && x <= largest; };
   const double held = std::abs(m.kG) + m.kS;
   return positive(m.kV) && positive(m.kA) && positive(m.voltage) && m.kS >= 0.0 &&
-         held < m.voltage && m.current_voltage > held && m.velocity > 0.0 &&
-         std::abs(start.position) <= largest && std::abs(start.velocity) <= largest &&
-         std::abs(goal.position) <= largest && std::abs(goal.velocity) <= largest;
+         positive(m.voltage - held) && m.current_voltage - held >= smallest &&
+         m.velocity >= smallest && std::abs(start.position) <= largest &&
+         std::abs(start.velocity) <= largest && std::abs(goal.position) <= largest &&
+         std::abs(goal.velocity) <= largest;
 }
 
 }  // namespace

@@ -220,7 +220,7 @@ SCurvePlan plan_motion(const MotionLimits& limits, const MotionState& start,
   SCurvePlan plan = prepared(limits, start, goal);
   if (plan.usable) {
     solve(plan, inside_first);
-    plan.usable = std::isfinite(plan.duration());
+    plan.usable = plan.duration() <= longest_motion;
   }
   return plan;
 }
@@ -231,7 +231,7 @@ SCurvePlan plan_velocity(const MotionLimits& limits, const MotionState& start,
   if (plan.usable) {
     bring_acceleration_inside(plan);
     plan.phases = fastest_velocity_change(plan.problem);
-    plan.usable = std::isfinite(plan.duration());
+    plan.usable = plan.duration() <= longest_motion;
   }
   return plan;
 }

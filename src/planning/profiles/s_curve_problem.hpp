@@ -28,6 +28,8 @@ struct SCurvePlan {
 /// The numbers that a jerk-limited profile takes: limits in 1e-30..1e30, or more than that; states
 /// up to 1e30. A jerk beyond is none (`trapezoid`).
 inline constexpr double largest_motion = 1e30;
+/// s; within it no place on the way is beyond the range of doubles.
+inline constexpr double longest_motion = 1e90;
 
 [[nodiscard]] bool is_usable(const MotionLimits& limits, const MotionState& start,
                              const MotionState& goal) noexcept;

@@ -74,8 +74,9 @@ SCurveProfile SCurveProfile::to_velocity(const MotionLimits& limits, const Motio
   SCurveProfile profile(limits);
   if (limits.jerk >= detail::largest_motion) {
     const MotionState goal{start.position, velocity, 0.0};
-    profile.begin(start);
-    if (detail::is_usable(limits, start, goal)) {
+    const bool usable = detail::is_usable(limits, start, goal);
+    profile.begin(usable ? start : resting(start));
+    if (usable) {
       const MotionLimits all = limits.both_ways();
       const double end = std::clamp(velocity, -all.reverse_velocity, all.velocity);
       const double change = end - start.velocity;

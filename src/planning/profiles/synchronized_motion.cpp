@@ -202,7 +202,7 @@ double AxisMotions::synchronize(Synchronization how, double least) noexcept {
     return axes[0].total_time();
   }
   in_phase = false;
-  double T = std::isfinite(least) ? std::max(0.0, least) : 0.0;
+  double T = least <= detail::longest_motion ? std::max(0.0, least) : 0.0;
   slowest = -1;
   for (int i = 0; i < count; ++i) {
     plans[i] = detail::plan_motion(limits[i], start[i], goal[i]);
@@ -221,7 +221,8 @@ double AxisMotions::synchronize(Synchronization how, double least) noexcept {
           plans[i] = detail::plan_motion(limits[i], start[i], goal[i], true);
         }
         const double next = allowed_duration(plans[i], T);
-        if (next > T * (1.0 + 1e-12)) {
+        plans[i].usable = next <= detail::longest_motion;
+        if (plans[i].usable && next > T * (1.0 + 1e-12)) {
           T = next;
           slowest = -1;
           settled = false;

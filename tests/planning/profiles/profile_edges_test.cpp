@@ -13,6 +13,7 @@
 #include <flyball/planning/profiles/minimum_jerk_profile.hpp>
 #include <flyball/planning/profiles/parabolic_profile.hpp>
 #include <flyball/planning/profiles/s_curve_profile.hpp>
+#include <flyball/planning/profiles/synchronized_motion.hpp>
 #include <flyball/planning/profiles/trapezoid_profile.hpp>
 
 namespace flyball::profile_edges_test {
@@ -131,6 +132,94 @@ TEST(ProfileEdges, OneBadNumberAtATime) {
         *fields[field] = value;
         ASSERT_EQ(broken_edges(d), "") << words(d);
       }
+    }
+  }
+}
+
+// A current that leaves next to no torque, and velocities far beyond what the limits brake in the
+// time that there are numbers for: a duration is finite, and none is below zero.
+TEST(ProfileEdges, ForcesOfNextToNothing) {
+  const MotorMotionLimits motor{.kV = 2.0, .kA = 0.3, .voltage = 12.0};
+  for (const double left : {5e-324, 1e-310, 1e-300, 1e-100, 1e-31, 1e-29, 1e-3}) {
+    for (const double velocity : {-2.0, 1e20, -1e30, 0.0}) {
+      MotorMotionLimits weak = motor;
+      weak.current_voltage = left;
+      const MotionState still{0.0, 0.0, 0.0};
+      const MotionState moving{1.0, velocity, 0.0};
+      ASSERT_EQ(broken_edge(ExponentialProfile(weak, still, moving), still, moving, true), "")
+          << left << " to " << velocity;
+      ASSERT_EQ(broken_edge(ExponentialProfile(weak, moving, still), moving, still, true), "")
+          << left << " from " << velocity;
+      // The same from what friction leaves of the battery.
+      MotorMotionLimits held = motor;
+      held.kS = std::nextafter(12.0, 0.0);
+      held.voltage = 12.0;
+      ASSERT_EQ(broken_edge(ExponentialProfile(held, moving, still), moving, still, true), "");
+    }
+  }
+  const Demand demands[] = {
+      {{2.0, 5.0, 1e-50, 1e-100, 50.0}, {5e-324, 1e100, 0.0}, {-2.0, 0.0, 0.0}},
+      {{1e300, 1e-100, 0.0, 1e-100, 50.0}, {0.0, 1e100, 0.0}, {1e30, 0.0, 0.0}},
+      {{2.0, 5.0, 1e-20, 0.0, 1e-30}, {0.0, 0.0, 1e30}, {1.0, 0.0, 1e-30}},
+  };
+  for (const Demand& d : demands) {
+    EXPECT_EQ(broken_edges(d), "") << words(d);
+  }
+  // A way and a velocity whose squares are no numbers.
+  const MotionLimits slow{0.5, 1e-20, 1e-50, 1e20};
+  EXPECT_GE(TrapezoidProfile(slow, {}, {1e-300, 1e-300, 0.0}).total_time(), 0.0);
+  const MotionLimits slower{2.0, 5.0, 1e-100};
+  EXPECT_GE(TrapezoidProfile(slower, {}, {1e-310, 5e-324, 0.0}).total_time(), 0.0);
+}
+
+// The two extremes of the palette in any place of any profile, the motor's numbers among them.
+TEST(ProfileEdges, FiniteForFinite) {
+  const double values[] = {1.7e308, -1.7e308, 1e154, 1e100, 1e70,   1e50,     1e30,   1e20,
+                           1e-20,   1e-30,    1e-50, 1e-70, 1e-100, 1e-310,   5e-324, 0.0,
+                           -0.0,    1.0,      -2.0,  12.0,  0.5,    infinity, nan,    -infinity};
+  constexpr double count = 24.0;
+  Random random(18);
+  for (int trial = 0; trial < 30000; ++trial) {
+    const double share = trial % 3 == 0 ? 0.1 : trial % 3 == 1 ? 0.3 : 0.7;
+    const auto pick = [&](double usual) {
+      return random.uniform() < share ? values[static_cast<std::size_t>(random.uniform(0.0, count))]
+                                      : usual;
+    };
+    const MotorMotionLimits motor{.kV = pick(2.0),
+                                  .kA = pick(0.3),
+                                  .voltage = pick(12.0),
+                                  .kS = pick(0.1),
+                                  .kG = pick(0.5),
+                                  .current_voltage = pick(10.0),
+                                  .velocity = pick(5.0)};
+    const Demand d{{pick(2.0), pick(5.0), pick(0.0), pick(0.0), pick(50.0)},
+                   {pick(0.0), pick(0.0), pick(0.0)},
+                   {pick(1.0), pick(0.0), pick(0.0)}};
+    const auto finite = [](const auto& profile) {
+      const double end = profile.total_time();
+      return end >= 0.0 && std::isfinite(end) && std::isfinite(profile.remaining_time(0.3 * end)) &&
+             is_finite(profile.sample(0.3 * end)) && is_finite(profile.sample(end)) &&
+             is_finite(profile.sample(1e9));
+    };
+    ASSERT_TRUE(finite(ExponentialProfile(motor, d.start, d.goal)))
+        << words(d) << "; motor " << motor.kV << ", " << motor.kA << ", " << motor.voltage << ", "
+        << motor.kS << ", " << motor.kG << ", " << motor.current_voltage << ", " << motor.velocity;
+    ASSERT_TRUE(finite(TrapezoidProfile(d.limits, d.start, d.goal))) << words(d);
+    ASSERT_TRUE(finite(SCurveProfile(d.limits, d.start, d.goal))) << words(d);
+    ASSERT_TRUE(
+        finite(SCurveProfile::to_velocity(d.limits, d.start, d.goal.velocity, d.goal.acceleration)))
+        << words(d);
+    ASSERT_TRUE(finite(ParabolicProfile(d.limits, d.start, d.goal))) << words(d);
+    ASSERT_TRUE(finite(StepperProfile(d.limits, pick(0.1), d.start, d.goal))) << words(d);
+    ASSERT_TRUE(finite(MinimumJerkProfile(d.limits, d.start, d.goal))) << words(d);
+    const auto how = static_cast<Synchronization>(trial % 2);
+    const SynchronizedMotion<2> both({d.limits, {2.0, 5.0, 0.0, 0.0, 50.0}},
+                                     {d.start, MotionState{}}, {d.goal, MotionState{pick(1.0)}},
+                                     how, pick(0.0));
+    const double end = both.total_time();
+    ASSERT_TRUE(end >= 0.0 && std::isfinite(both.remaining_time(0.3 * end))) << words(d);
+    for (const MotionState& s : both.sample(0.3 * end)) {
+      ASSERT_TRUE(is_finite(s)) << words(d);
     }
   }
 }

@@ -33,8 +33,9 @@ struct MotorMotionLimits {
 /// Other than a trapezoid it accelerates hard where the motor can, so that it arrives earlier with
 /// the same motor, and never asks for a voltage that is not there. Without a velocity limit it
 /// cruises a billionth below the top speed. Run-time object: noexcept, allocation-free, bounded (at
-/// most 100 iterations, about a microsecond), finite: a motor that gravity and friction hold, or
-/// numbers that are not finite, give a profile that is at the goal from the start.
+/// most 100 iterations, about a microsecond), finite: a motor that gravity and friction hold (or to
+/// which they leave less than 1e-30 V), or numbers that are not finite or beyond 1e30, give a
+/// profile that is at the goal from the start.
 /// Source: book, sections 6.10 (kV, kA) and 15.1.4; the maximum principle for x'' = a(v, ±V).
 class ExponentialProfile {
  public:

@@ -88,8 +88,8 @@ class JerkMotion {
 /// could not be come to within the limits (its velocity or acceleration is beyond them, or would
 /// have been before) has its acceleration, then its velocity, cut. Without a jerk limit it is the
 /// trapezoid. Run-time object: noexcept, allocation-free, bounded and finite for whatever it is
-/// given: limits outside of 1e-30 to infinity, or states that are not finite or beyond 1e30, give a
-/// profile that is at the goal from the start.
+/// given: limits outside of 1e-30 to infinity, or states that are not finite or beyond 1e30, or a
+/// motion of more than 1e90 s, give a profile that is at the goal from the start.
 ///
 /// Source: book, section 15.1.3 (the seven phases between states of rest). The duration is the
 /// least at which the goal lies between the two extreme motions of Pontryagin's principle,

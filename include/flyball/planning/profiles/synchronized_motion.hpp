@@ -59,7 +59,7 @@ class SynchronizedMotion {
   using Limits = std::array<MotionLimits, static_cast<std::size_t>(Axes)>;
   using States = std::array<MotionState, static_cast<std::size_t>(Axes)>;
 
-  /// @param least  s; it takes at least so long.
+  /// @param least  s; it takes at least so long. Beyond 1e90, or no number: as zero.
   SynchronizedMotion(const Limits& limits, const States& start, const States& goal,
                      Synchronization how = Synchronization::time, double least = 0.0) noexcept;
 

@@ -9,10 +9,11 @@ namespace flyball {
 ///
 /// A start above the velocity limit is braked down to it at the acceleration limit; a goal velocity
 /// above it is cut to it. Run-time object: noexcept, allocation-free, and finite for whatever it is
-/// given: limits below 1e-100, accelerations above 1e100 or states that are not finite or beyond
-/// `largest_signal` (all together) give a profile that is at the goal from the start. A velocity
-/// limit may be infinite. The jerk limit has no part in it. Planning and one sample take some ten
-/// nanoseconds, so that it may be planned anew each period. Source: book, section 15.1.3.
+/// given: limits below 1e-100, accelerations above 1e100, states that are not finite or beyond
+/// `largest_signal` (all together), or a motion of more than 1e300 s, give a profile that is at the
+/// goal from the start. A velocity limit may be infinite.
+/// The jerk limit has no part in it. Planning and one sample take some ten nanoseconds, so that it
+/// may be planned anew each period. Source: book, section 15.1.3.
 class TrapezoidProfile {
  public:
   /// @param start  Where it is (its acceleration is ignored). @param goal  Where it is to be.
@@ -128,6 +129,7 @@ inline bool TrapezoidProfile::reversible() const noexcept {
   double t_2 = 0.0;
   if (excess < 0.0) {
     c = __builtin_sqrt(larger * larger + more);
+    c = c > larger ? c : larger;  // also where its square is no number
   } else {
     t_2 = excess * per_both / v_max;
   }
@@ -150,6 +152,11 @@ inline bool TrapezoidProfile::reversible() const noexcept {
   time_[0] = t_1;
   time_[1] = t_1 + t_2;
   time_[2] = t_1 + t_2 + (c - v_g) * per_b;
+  if (!(time_[2] <= 1e300)) [[unlikely]] {
+    goal_.velocity = 0.0;
+    start_ = goal_;
+    time_[0] = time_[1] = time_[2] = cruise_ = 0.0;
+  }
 }
 
 [[gnu::always_inline]] inline MotionState TrapezoidProfile::sample(double t) const noexcept {
