@@ -1,6 +1,6 @@
 #pragma once
 
-#include <new>
+#include <exception>
 #include <optional>
 #include <span>
 #include <string>
@@ -54,6 +54,10 @@ void print(const std::string& text);
 /// @return The exit status, of the first error.
 int fail(const Errors& errors, const CommonOptions& options, const std::string& schema);
 
+/// Whether an exception says that the system has no memory left, be it for bytes, a thread or a
+/// process.
+[[nodiscard]] bool lacks_memory(const std::exception& problem) noexcept;
+
 /// What a command's `run` answers, also where there is not enough memory for its input.
 /// @return The exit status.
 template <class Run>
@@ -61,7 +65,10 @@ int guarded(const Run& run, const CommonOptions& options, const std::string& sch
             const std::string& input) {
   try {
     return run();
-  } catch (const std::bad_alloc&) {
+  } catch (const std::exception& problem) {
+    if (!lacks_memory(problem)) {
+      throw;
+    }
     return fail(not_enough_memory(input), options, schema);
   }
 }

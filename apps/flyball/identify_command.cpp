@@ -45,7 +45,8 @@ ExpectedAll<Answer> run_identify(JobInput& input) {
   }
   if (!input.more.empty()) {
     input.schema = "flyball.identify_logs/1";
-    study::IdentifyLogsJob logs{.logs = {input.path}, .selection = job->selection};
+    study::IdentifyLogsJob logs{
+        .logs = {input.path}, .selection = job->selection, .said = job->said};
     logs.logs.insert(logs.logs.end(), input.more.begin(), input.more.end());
     return study::identify_logs(logs).map(
         [](const auto& result) { return study::answer_of(result); });

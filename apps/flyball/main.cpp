@@ -213,9 +213,10 @@ int guarded_run(int argc, char** argv) {
     std::vector<std::string> texts;
     keep_coefficients(arguments, texts);
     return run(static_cast<int>(arguments.size()) - 1, arguments.data());
-  } catch (const std::bad_alloc&) {
-    return give_up_for_memory();
   } catch (const std::exception& defect) {
+    if (flyball::app::lacks_memory(defect)) {
+      return give_up_for_memory();
+    }
     flyball::app::say(std::string("a defect of Flyball: ") + defect.what());
   } catch (...) {
     flyball::app::say("a defect of Flyball");

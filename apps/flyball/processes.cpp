@@ -5,10 +5,11 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <deque>
+#include <exception>
 #include <memory>
-#include <new>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -20,6 +21,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "console.hpp"
 #include "processes.hpp"
 #ifdef __linux__
 #include <sched.h>
@@ -121,8 +123,8 @@ void allow_processor_time(double seconds) {
       if (!send_all(fd, &size, sizeof size) || !send_all(fd, answer.data(), answer.size())) {
         break;
       }
-    } catch (const std::bad_alloc&) {
-      ::_exit(out_of_memory);
+    } catch (const std::exception& problem) {
+      ::_exit(lacks_memory(problem) ? out_of_memory : EXIT_FAILURE);
     }
   }
   ::_exit(0);

@@ -2,6 +2,8 @@
 #include <condition_variable>
 #include <cstdio>
 #include <mutex>
+#include <new>
+#include <system_error>
 #include <thread>
 
 #include <fmt/format.h>
@@ -47,9 +49,12 @@ void show() {
   std::unique_lock lock(line().mutex);
   auto next = std::chrono::milliseconds(1000);
   while (!line().changed.wait_for(lock, next, [] { return line().over; })) {
-    std::fputs(words(LineClock::now() - begin).c_str(), stderr);
-    std::fflush(stderr);
-    shown = true;
+    try {
+      std::fputs(words(LineClock::now() - begin).c_str(), stderr);
+      std::fflush(stderr);
+      shown = true;
+    } catch (const std::bad_alloc&) {  // which would end all from here
+    }
     next = std::chrono::milliseconds(250);
   }
   if (shown) {
@@ -62,7 +67,10 @@ void show() {
 
 ProgressLine::ProgressLine() {
   if (::isatty(STDERR_FILENO) == 1) {
-    line().thread = std::thread(show);
+    try {
+      line().thread = std::thread(show);
+    } catch (const std::system_error&) {  // no thread to be had: it works without a word
+    }
   }
 }
 

@@ -1,6 +1,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <exception>
 #include <string>
 #include <system_error>
 #include <thread>
@@ -43,15 +44,23 @@ void begin_session() {
   }
   const sigset_t signals = ending_signals();
   ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  std::thread([signals] {
-    int signal = 0;
-    while (::sigwait(&signals, &signal) != 0) {
-    }
-    OutputFolder::abandon_all();
-    std::signal(signal, SIG_DFL);
+  try {
+    std::thread([signals] {
+      int signal = 0;
+      while (::sigwait(&signals, &signal) != 0) {
+      }
+      try {
+        OutputFolder::abandon_all();
+      } catch (const std::exception&) {  // of no memory: the next run sweeps what is left
+      }
+      std::signal(signal, SIG_DFL);
+      ::pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+      ::kill(::getpid(), signal);
+    }).detach();
+  } catch (const std::system_error&) {
+    // There is no thread to be had: a signal ends the process at once, and the next run sweeps.
     ::pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
-    ::kill(::getpid(), signal);
-  }).detach();
+  }
 }
 
 int end_session(int status) {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <new>
 #include <string>
@@ -33,15 +34,12 @@ class Stream {
     if (is_blank(problem)) {
       return;
     }
-    solve::Answer answer = solver_.solve(problem);
-    answer.json += '\n';
-    std::fwrite(answer.json.data(), 1, answer.json.size(), stdout);
-    written_ = std::fflush(stdout) == 0;  // as they come: whoever asked may wait for it
-    ++count_;
-    tell_progress("solves", count_);
-    if (!answer.solved) {
-      status_ = std::max<int>(status_, answer.kind == ErrorKind::no_answer ? no_answer : bad_input);
-    }
+    write(solver_.solve(problem));
+  }
+
+  /// Of a problem that there is no memory to read.
+  void answer_without_memory(const std::string& beginning) {
+    write(solve::Solver::without_memory(beginning));
   }
 
   [[nodiscard]] int status() const { return status_; }
@@ -50,6 +48,17 @@ class Stream {
   [[nodiscard]] bool empty() const { return count_ == 0; }
 
  private:
+  void write(const solve::Answer& answer) {
+    std::fwrite(answer.json.data(), 1, answer.json.size(), stdout);
+    std::fputc('\n', stdout);
+    written_ = std::fflush(stdout) == 0;  // as they come: whoever asked may wait for it
+    ++count_;
+    tell_progress("solves", count_);
+    if (!answer.solved) {
+      status_ = std::max<int>(status_, answer.kind == ErrorKind::no_answer ? no_answer : bad_input);
+    }
+  }
+
   const solve::Solver& solver_;
   int status_ = success;
   bool written_ = true;
@@ -92,6 +101,80 @@ int refuse(const Error& error) {
   return bad_input;
 }
 
+/// The lines of standard input. One that there is no memory for is answered with that, and passed
+/// over.
+class Lines {
+ public:
+  explicit Lines(Stream& stream) : stream_(stream) { std::cin.exceptions(std::ios::badbit); }
+
+  /// @return Whether there is one more.
+  bool next(std::string& line) {
+    for (;;) {
+      try {
+        return static_cast<bool>(std::getline(std::cin, line));
+      } catch (const std::bad_alloc&) {
+        refuse(line);
+        std::cin.clear();
+        std::cin.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+      } catch (const std::ios::failure&) {  // what is no file is read
+        return false;
+      }
+    }
+  }
+
+  /// @param line  Given back before there is an answer.
+  void refuse(std::string& line) {
+    const std::string beginning = line.substr(0, std::min(line.size(), looked_at));
+    std::string().swap(line);
+    stream_.answer_without_memory(beginning);
+  }
+
+  /// The same of an object over several lines.
+  void refuse(std::vector<std::string>& lines) {
+    std::string beginning;
+    for (const std::string& line : lines) {
+      beginning.append(line, 0, looked_at - std::min(looked_at, beginning.size())).append("\n");
+    }
+    std::vector<std::string>().swap(lines);
+    stream_.answer_without_memory(beginning);
+  }
+
+ private:
+  static constexpr std::size_t looked_at = 4096;  ///< Of its bytes, for the id.
+
+  Stream& stream_;
+};
+
+/// The first object, which may stand on several lines; those after it are one a line.
+void answer_first(Stream& stream, Lines& input) {
+  std::vector<std::string> lines(1);
+  while (input.next(lines[0]) && is_blank(lines[0])) {
+  }
+  try {
+    Brackets brackets;
+    const std::size_t begin = std::min(lines[0].find_first_not_of(" \t"), lines[0].size());
+    const bool opens = lines[0].find_first_of("{[", begin) == begin && begin < lines[0].size();
+    bool whole = !opens || brackets.closed_by(lines[0]);
+    bool one = true;
+    std::string line;
+    while (!whole && one && input.next(line)) {
+      one = continues(line);
+      whole = brackets.closed_by(line);
+      lines.push_back(std::move(line));
+    }
+    if (!one) {
+      std::for_each(lines.begin(), lines.end(),
+                    [&](const std::string& each) { stream.answer(each); });
+    } else if (lines.size() == 1) {
+      stream.answer(lines[0]);
+    } else {
+      stream.answer(fmt::format("{}", fmt::join(lines, "\n")));
+    }
+  } catch (const std::bad_alloc&) {
+    input.refuse(lines);
+  }
+}
+
 /// Answers what stands on standard input.
 int answer_all(const std::string& kind) {
   const auto solver = solve::Solver::create(kind);
@@ -100,28 +183,10 @@ int answer_all(const std::string& kind) {
   }
   std::ios::sync_with_stdio(false);
   Stream stream(*solver);
+  Lines input(stream);
+  answer_first(stream, input);
   std::string line;
-  while (std::getline(std::cin, line) && is_blank(line)) {
-  }
-  // The first object may stand on several lines; those after it are one a line.
-  std::vector<std::string> lines{line};
-  Brackets brackets;
-  const std::size_t begin = std::min(line.find_first_not_of(" \t"), line.size());
-  const bool opens = line.find_first_of("{[", begin) == begin && begin < line.size();
-  bool whole = !opens || brackets.closed_by(line);
-  bool one = true;
-  while (!whole && one && std::getline(std::cin, line)) {
-    lines.push_back(line);
-    one = continues(line);
-    whole = brackets.closed_by(line);
-  }
-  if (one) {
-    stream.answer(fmt::format("{}", fmt::join(lines, "\n")));
-  } else {
-    std::for_each(lines.begin(), lines.end(),
-                  [&](const std::string& each) { stream.answer(each); });
-  }
-  while (stream.good() && std::getline(std::cin, line)) {
+  while (stream.good() && input.next(line)) {
     stream.answer(line);
   }
   if (stream.empty()) {

@@ -4,6 +4,7 @@
 #include <iterator>
 #include <vector>
 
+#include "core/controls.hpp"
 #include "core/wording.hpp"
 
 namespace flyball {
@@ -93,18 +94,7 @@ std::string ascii(std::string_view text) {
 }
 
 std::string printable(std::string_view text) {
-  std::string out = text::valid_utf8(text);
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    const auto byte = static_cast<unsigned char>(out[i]);
-    if ((byte < 0x20 && out[i] != '\n') || byte == 0x7F) {
-      out[i] = '?';
-    } else if (byte == 0xC2 && i + 1 < out.size() &&
-               static_cast<unsigned char>(out[i + 1]) < 0xA0) {  // C1 controls, U+0080 to U+009F
-      out[i] = '?';
-      out[i + 1] = '?';
-    }
-  }
-  return out;
+  return text::without_steering(text::valid_utf8(text), true);
 }
 
 std::string shortened(std::string_view whole) {

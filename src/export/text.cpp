@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "core/controls.hpp"
 #include "export/text.hpp"
 
 namespace flyball::exports {
@@ -50,15 +51,10 @@ std::string capitalized(mechanisms::MechanismKind kind) {
 }
 
 std::string comment_text(std::string_view text) {
-  std::string line;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    line += c == '\n'                     ? ' '
-            : c == '\\'                   ? '/'  // at the end of a line it would continue it
-            : byte < 0x20 || byte == 0x7F ? '?'
-                                          : c;
-  }
-  return line;
+  std::string line(text);
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  std::replace(line.begin(), line.end(), '\\', '/');  // at the end of a line it would continue it
+  return text::without_steering(std::move(line), false);
 }
 
 std::string_view name_of(Language language) {

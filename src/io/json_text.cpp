@@ -1,10 +1,14 @@
 #include <flyball/io/json_text.hpp>
 
 #include <algorithm>
+#include <iterator>
 #include <unordered_set>
 #include <vector>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
+
+#include "core/controls.hpp"
 
 namespace flyball {
 
@@ -22,6 +26,27 @@ std::size_t end_of_string(std::string_view json, std::size_t at) {
     at += json[at] == '\\' ? 1 : 0;
   }
   return at < json.size() ? at + 1 : std::string_view::npos;
+}
+
+/// Where the value ends that a text begins with; npos if it is cut off.
+std::size_t end_of_value(std::string_view json) {
+  if (json.empty() || json[0] == '"') {
+    return json.empty() ? std::string_view::npos : end_of_string(json, 0);
+  }
+  if (json[0] != '{' && json[0] != '[') {
+    return json.find_first_of(" \t\r\n,}");
+  }
+  std::size_t depth = 0;
+  for (std::size_t at = 0; at < json.size(); ++at) {
+    if (json[at] == '"') {
+      at = end_of_string(json, at) - 1;  // npos - 1 ends the text
+    } else if (json[at] == '{' || json[at] == '[') {
+      ++depth;
+    } else if ((json[at] == '}' || json[at] == ']') && --depth == 0) {
+      return at + 1;
+    }
+  }
+  return std::string_view::npos;
 }
 
 /// What a string says: "\\u0041" is "A".
@@ -47,7 +72,7 @@ Place place_of(std::string_view text, std::size_t offset) {
   return {static_cast<std::size_t>(lines) + 1, static_cast<std::size_t>(characters) + 1};
 }
 
-std::optional<std::string_view> scalar_member(std::string_view json, std::string_view key) {
+std::optional<std::string_view> written_member(std::string_view json, std::string_view key) {
   constexpr std::string_view blank = " \t\r\n";
   int depth = 0;
   bool key_follows = false;
@@ -59,17 +84,31 @@ std::optional<std::string_view> scalar_member(std::string_view json, std::string
       if (key_follows && said_by(json.substr(at, end - at)) == key) {
         json.remove_prefix(std::min(json.find(':', end), json.size() - 1) + 1);
         json.remove_prefix(std::min(json.find_first_not_of(blank), json.size()));
-        if (json.empty() || json[0] == '{' || json[0] == '[') {
-          return std::nullopt;
-        }
-        return json.substr(
-            0, json[0] == '"' ? end_of_string(json, 0) : json.find_first_of(" \t\r\n,}"));
+        return json.substr(0, end_of_value(json));
       }
       at = end - 1;
     }
     key_follows = depth == 1 && (c == '{' || c == ',' || (key_follows && c != '"'));
   }
   return std::nullopt;
+}
+
+std::string json_escaped(std::string_view json) {
+  std::string text;
+  text.reserve(json.size());
+  for (std::size_t i = 0; i < json.size();) {
+    // Between its values a text has line ends and tabs; in them those are escaped already.
+    const std::size_t bytes =
+        static_cast<unsigned char>(json[i]) < 0x20 ? 0 : flyball::text::steering_bytes(json, i);
+    if (bytes > 0) {
+      fmt::format_to(std::back_inserter(text), "\\u{:04x}",
+                     flyball::text::steering_code(json, i, bytes));
+    } else {
+      text += json[i];
+    }
+    i += bytes > 0 ? bytes : 1;
+  }
+  return text;
 }
 
 std::optional<RepeatedKey> repeated_key(std::string_view json) {
@@ -110,6 +149,12 @@ std::optional<RepeatedKey> repeated_key(std::string_view json) {
     }
   }
   return std::nullopt;
+}
+
+std::optional<std::string_view> scalar_member(std::string_view json, std::string_view key) {
+  const auto written = written_member(json, key);
+  const bool scalar = written && !written->empty() && (*written)[0] != '{' && (*written)[0] != '[';
+  return scalar ? written : std::nullopt;
 }
 
 }  // namespace flyball

@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <flyball/io/json_text.hpp>
+
 namespace flyball {
 
 namespace {
@@ -32,21 +34,8 @@ void append_quoted(std::string& text, std::string_view value) {
     text += value;
     text += '"';
   } else {
-    const std::string quoted =
-        nlohmann::json(value).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-    for (std::size_t i = 0; i < quoted.size(); ++i) {
-      // DEL and the C1 controls, which JSON allows and a terminal may obey.
-      const auto byte = static_cast<unsigned char>(quoted[i]);
-      const auto next = static_cast<unsigned char>(i + 1 < quoted.size() ? quoted[i + 1] : '\0');
-      if (byte == 0x7F) {
-        text += "\\u007f";
-      } else if (byte == 0xC2 && next < 0xA0) {
-        fmt::format_to(std::back_inserter(text), "\\u00{:02x}", next);
-        ++i;
-      } else {
-        text += quoted[i];
-      }
-    }
+    text += json_escaped(
+        nlohmann::json(value).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
   }
 }
 

@@ -141,17 +141,19 @@ ProcessResult run_process(const std::vector<std::string>& arguments, std::string
       std::fflush(script.get()) != 0 || ::lseek(::fileno(script.get()), 0, SEEK_SET) != 0) {
     return not_started(errno == ENOENT ? EIO : errno);
   }
+  std::vector<std::string> words = arguments;
+  std::vector<std::string> environment = clean_environment();
+  const std::vector<char*> argv = pointers(words);
+  const std::vector<char*> envp = pointers(environment);
+  // The leader of the group has what is open here: no pipe of this program, nor of another's.
+  std::unique_lock start(starting());
+  expect_child();
+  const KeptGroup group;
   Pipe out;
   Pipe err;
   if (!out.ok() || !err.ok()) {
     return not_started(errno);
   }
-  std::vector<std::string> words = arguments;
-  std::vector<std::string> environment = clean_environment();
-  const std::vector<char*> argv = pointers(words);
-  const std::vector<char*> envp = pointers(environment);
-  std::unique_lock start(starting());
-  expect_child();
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   // Each takes memory.
@@ -159,14 +161,14 @@ ProcessResult run_process(const std::vector<std::string>& arguments, std::string
       std::max({posix_spawn_file_actions_adddup2(&actions, ::fileno(script.get()), STDIN_FILENO),
                 posix_spawn_file_actions_adddup2(&actions, out.writer(), STDOUT_FILENO),
                 posix_spawn_file_actions_adddup2(&actions, err.writer(), STDERR_FILENO)});
-  // A group of its own, so that what it starts is killed with it; and the signals that this process
-  // may have blocked.
+  // A group of its own, so that what it starts is killed with it, and both with this process; and
+  // the signals that this process may have blocked.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   sigset_t none;
   sigemptyset(&none);
   posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setpgroup(&attributes, 0);
+  posix_spawnattr_setpgroup(&attributes, group.id());
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETPGROUP);
   pid_t child = 0;
   if (error == 0) {
@@ -179,7 +181,8 @@ ProcessResult run_process(const std::vector<std::string>& arguments, std::string
   }
   out.close_writer();
   err.close_writer();
-  RunningChild running(child);
+  const pid_t together = group.id() > 0 ? group.id() : child;
+  RunningChild running(child, together);
   start.unlock();
   const auto deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(
                                            std::chrono::duration<double>(limits.seconds));
@@ -191,7 +194,7 @@ ProcessResult run_process(const std::vector<std::string>& arguments, std::string
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   if (result.end != ProcessResult::End::exited) {
-    ::kill(-child, SIGKILL);
+    ::kill(-together, SIGKILL);
   }
   const int status = running.wait();
   if (result.end != ProcessResult::End::exited) {

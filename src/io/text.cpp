@@ -9,6 +9,7 @@
 
 #include <flyball/io/json_text.hpp>
 
+#include "core/controls.hpp"
 #include "io/text.hpp"
 
 namespace flyball::io {
@@ -113,8 +114,7 @@ std::string printable(std::string_view text, std::size_t max_bytes) {
   std::string result;
   while (!text.empty() && result.size() < max_bytes) {
     const std::size_t length = utf8_length(text);
-    const auto first = static_cast<unsigned char>(text.front());
-    if (length == 0 || first < 0x20 || first == 0x7F) {
+    if (length == 0 || flyball::text::steering_bytes(text, 0) > 0) {
       result += '?';
     } else {
       result += text.substr(0, length);

@@ -16,10 +16,28 @@ namespace flyball::io {
 /// Before a program is started: the memory to know it, so that none is started without.
 void expect_child();
 
+/// A process group for a program and what it starts, led by a process that only waits for the end
+/// of this one, however that ends: then, as when it goes out of scope, all of the group is killed.
+class KeptGroup {
+ public:
+  /// Where there is no process for its leader the group is nobody's: `id()` is zero.
+  KeptGroup();
+  KeptGroup(const KeptGroup&) = delete;
+  KeptGroup& operator=(const KeptGroup&) = delete;
+  ~KeptGroup();
+
+  [[nodiscard]] pid_t id() const { return leader_; }
+
+ private:
+  pid_t leader_ = 0;
+  int alive_ = -1;  ///< Whose other end the leader reads: it is closed when this process ends.
+};
+
 /// A program that runs for this process, until it has ended; what was not waited for is killed.
 class RunningChild {
  public:
-  explicit RunningChild(pid_t child);
+  /// @param group  That it is in, with what it started.
+  RunningChild(pid_t child, pid_t group);
   RunningChild(const RunningChild&) = delete;
   RunningChild& operator=(const RunningChild&) = delete;
   ~RunningChild();
@@ -29,6 +47,7 @@ class RunningChild {
 
  private:
   pid_t child_;
+  pid_t group_;
   bool ended_ = false;
 };
 

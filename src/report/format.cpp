@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "core/controls.hpp"
 #include "core/wording.hpp"
 #include "report/format.hpp"
 
@@ -43,7 +44,9 @@ std::vector<std::string> wrap(std::string_view text, std::size_t width) {
 std::string escape_html(std::string_view text) {
   std::string out;
   out.reserve(text.size());
-  for (const char c : text::valid_utf8(text)) {
+  const std::string valid = text::valid_utf8(text);
+  for (std::size_t at = 0; at < valid.size(); ++at) {
+    const char c = valid[at];
     switch (c) {
       case '&':
         out += "&amp;";
@@ -61,9 +64,10 @@ std::string escape_html(std::string_view text) {
         out += "&#39;";
         break;
       default: {
-        const auto byte = static_cast<unsigned char>(c);
-        if ((byte < 0x20 && c != '\n' && c != '\t') || byte == 0x7F) {
+        const std::size_t steering = text::steering_bytes(valid, at);
+        if (steering > 0 && c != '\n' && c != '\t') {
           out += "\xEF\xBF\xBD";
+          at += steering - 1;
         } else {
           out += c;
         }

@@ -250,8 +250,16 @@ Expected<double> ProblemReader::number(const Field& field, JsonValue json) const
     return tl::unexpected(malformed(field, kind_of(json), "a number"));
   }
   FLYBALL_CHECK(check_finite(value, where_, full(field.name)));
-  if (field.type == FieldType::integer && (value != std::floor(value) || std::abs(value) > 1e9)) {
-    return tl::unexpected(malformed(field, format_number(value), "a whole number"));
+  if (field.type == FieldType::integer) {
+    constexpr double most = 1e9;
+    if (value != std::floor(value)) {
+      return tl::unexpected(malformed(field, format_number(value), "a whole number"));
+    }
+    if (std::abs(value) > most) {
+      return refusal(ArgumentError::out_of_range, where_, full(field.name))
+          .got(fmt::format("{:.10g}", value))
+          .expected("a whole number of at most 1000000000");
+    }
   }
   return value;
 }

@@ -29,15 +29,24 @@ ErrorInfo error_info(SolveError code) {
 
 namespace {
 
-/// The id of a problem as it was written, on one line; empty if it has none.
-std::string id_of(std::string_view text, JsonValue problem) {
-  if (!problem.contains("id")) {
+/// The id of a problem as it was written, on one line, and such that no terminal obeys it; empty if
+/// it has none, or if that is cut off.
+std::string id_of(std::string_view text) {
+  const auto written = written_member(text, "id");
+  if (!written || !nlohmann::json::accept(*written)) {
     return {};
   }
-  const auto written = scalar_member(text, "id");
-  return written ? std::string(*written)
-                 : nlohmann::json::parse(text)["id"].dump(-1, ' ', false,
-                                                          nlohmann::json::error_handler_t::replace);
+  const bool structured = written->starts_with('{') || written->starts_with('[');
+  return json_escaped(structured ? nlohmann::json::parse(*written).dump(
+                                       -1, ' ', false, nlohmann::json::error_handler_t::replace)
+                                 : *written);
+}
+
+/// A text whose end is missing may end in the middle of a number.
+std::string id_of_beginning(std::string_view text) {
+  const auto written = written_member(text, "id");
+  const bool whole = written && written->data() + written->size() < text.data() + text.size();
+  return whole ? id_of(text) : std::string();
 }
 
 /// A new answer, open, with the problem's id if it has one.
@@ -119,6 +128,15 @@ std::string Solver::error_json(const Error& error) {
   return refused("", error).json;
 }
 
+Answer Solver::without_memory(std::string_view beginning) {
+  std::string id;
+  try {
+    id = id_of_beginning(beginning);
+  } catch (const std::bad_alloc&) {  // not even for that
+  }
+  return refused(id, not_enough_memory("this problem"));
+}
+
 Answer Solver::solve(std::string_view text) const {
   Expected<JsonTree> object{};
   std::string id;
@@ -127,10 +145,13 @@ Answer Solver::solve(std::string_view text) const {
     if (!object) {
       return refused(id, object.error());
     }
-    id = id_of(text, object->root());
+    if (object->root().contains("id")) {
+      id = id_of(text);
+    }
     return answer_to(object->root(), id, *kind_);
   } catch (const std::bad_alloc&) {
-    return refused(id, not_enough_memory("this problem"));
+    object = {};
+    return id.empty() ? without_memory(text) : refused(id, not_enough_memory("this problem"));
   } catch (const std::exception& defect) {  // the other problems are answered all the same
     return refused(
         id,

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include <flyball/study/tune.hpp>
+#include <flyball/study/identify.hpp>
 
 #include "core/diagnose.hpp"
 

@@ -8,6 +8,7 @@
 #include <flyball/core/version.hpp>
 #include <flyball/study/project.hpp>
 
+#include "core/controls.hpp"
 #include "study/per_unit.hpp"
 
 namespace flyball::study {
@@ -66,10 +67,8 @@ void describe(const PlantDescription& plant, Project& project) {
 }
 
 std::string one_line(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(),
-      [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, ' ');
-  return text;
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text::without_steering(std::move(text), false);
 }
 
 /// @param V  What the gains are in.

@@ -99,7 +99,9 @@ ExpectedAll<IdentifyResult> identify_with(const recording::LogSelection& selecti
                         .drive = {}};
 }
 
-ExpectedAll<IdentifyResult> identify(const IdentifyJob& job) {
+namespace {
+
+ExpectedAll<IdentifyResult> identify_alone(const IdentifyJob& job) {
   std::error_code ignored;
   const auto size = std::filesystem::file_size(job.log, ignored);
   if (!ignored && size >= recording::streamed_from) {
@@ -111,6 +113,21 @@ ExpectedAll<IdentifyResult> identify(const IdentifyJob& job) {
   return identify_with(job.selection, [&](const recording::LogSelection& selection) {
     return recording::load_recording(job.log, selection);
   });
+}
+
+}  // namespace
+
+void tell_contradictions(identification::FitReport& report, const PlantDescription& said) {
+  if (report.fit) {
+    const std::vector<Diagnostic> found = contradictions(*report.fit, said);
+    report.diagnostics.insert(report.diagnostics.end(), found.begin(), found.end());
+  }
+}
+
+ExpectedAll<IdentifyResult> identify(const IdentifyJob& job) {
+  FLYBALL_TRY(auto result, identify_alone(job));
+  tell_contradictions(result.report, job.said);
+  return result;
 }
 
 ExpectedAll<IdentifyResult> identify(const Log& log, const recording::LogSelection& selection) {

@@ -10,6 +10,7 @@
 
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
+#include "study/identify_with.hpp"
 
 namespace flyball::study {
 
@@ -29,7 +30,7 @@ struct Recordings {
 /// One log by itself; its recording is kept where it has gains.
 LogOutcome outcome_of(const std::string& path, const recording::LogSelection& selection,
                       Recordings& recordings) {
-  auto found = identify({path, selection});
+  auto found = identify({.log = path, .selection = selection});
   if (!found) {
     return {.path = path, .diagnostics = {}, .fit = tl::unexpected(std::move(found).error())};
   }
@@ -256,6 +257,7 @@ ExpectedAll<IdentifyLogsResult> identify_logs(const IdentifyLogsJob& job) {
   if (auto same = check_one_speed(result); !same) {
     result.joint.report.fit = tl::unexpected(std::move(same).error());
   }
+  tell_contradictions(result.joint.report, job.said);
   tell_differences(result);
   return result;
 }

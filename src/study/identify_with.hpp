@@ -13,4 +13,7 @@ using LoadFunction =
 [[nodiscard]] ExpectedAll<IdentifyResult> identify_with(const recording::LogSelection& selection,
                                                         const LoadFunction& load);
 
+/// Adds what contradicts the project, if there are gains.
+void tell_contradictions(identification::FitReport& report, const PlantDescription& said);
+
 }  // namespace flyball::study

@@ -6,6 +6,7 @@
 #include <flyball/study/analyze.hpp>
 #include <flyball/systems/linearize.hpp>
 
+#include "core/controls.hpp"
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "solve/json_object.hpp"
@@ -28,9 +29,7 @@ Expected<std::vector<Coordinate>> read_coordinates(const std::vector<std::string
                                                    std::string_view meaning) {
   constexpr std::size_t longest = 80;
   for (const std::string& name : names) {
-    const bool control = std::any_of(name.begin(), name.end(), [](char c) {
-      return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
-    });
+    const bool control = text::without_steering(name, false) != name;
     if (name.empty() || name.size() > longest || control) {
       return refusal(ArgumentError::malformed, where, "a name of " + std::string(field))
           .got(name.empty() ? "empty"

@@ -302,6 +302,7 @@ ExpectedAll<TuneJob> tune_job(const std::string& log, const std::string& project
 ExpectedAll<IdentifyJob> identify_job(const std::string& log, const std::string& project,
                                       std::span<const Override> overrides) {
   return tune_job(log, project, overrides).map([](TuneJob job) {
+    job.identification.said = std::move(job.design.plant);
     return std::move(job.identification);
   });
 }
@@ -326,7 +327,7 @@ ExpectedAll<ExperimentJob> experiment_job(const std::string& file,
                [](const Override& given) { return !given.option.starts_with("--travel-"); });
   FLYBALL_TRY(auto first, read("", "", of_log, Source::log));
   const bool said_kind = first.log.mechanism.has_value();
-  FLYBALL_TRY(const auto identified, identify({file, std::move(first.log)}));
+  FLYBALL_TRY(const auto identified, identify({.log = file, .selection = std::move(first.log)}));
   if (!identified.report.fit) {
     return tl::unexpected(Errors(identified.report.fit.error()));
   }

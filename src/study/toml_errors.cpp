@@ -7,6 +7,7 @@
 
 #include <flyball/math/expression/formula.hpp>
 
+#include "core/controls.hpp"
 #include "study/toml_document.hpp"
 
 namespace flyball::study {
@@ -25,6 +26,11 @@ std::vector<std::string> characters(std::string_view line) {
       all.back() += c;
     } else {
       all.emplace_back(1, byte == '\t' ? ' ' : byte < 0x20 || byte == 0x7f ? '?' : c);
+    }
+  }
+  for (std::string& character : all) {
+    if (text::steering_bytes(character, 0) > 0) {
+      character = "?";
     }
   }
   return all;

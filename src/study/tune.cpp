@@ -124,7 +124,9 @@ DriveDesign design_drive(const DesignJob& said, const identification::DriveFit& 
 
 ExpectedAll<TuneResult> tune(const TuneJob& job) {
   tell_progress("reads and identifies the log");
-  FLYBALL_TRY(auto identified, identify(job.identification));
+  IdentifyJob identification = job.identification;
+  identification.said = job.design.plant;
+  FLYBALL_TRY(auto identified, identify(identification));
   TuneResult result{.identification = std::move(identified)};
   if (result.identification.drive && result.identification.drive->fit) {
     tell_progress("designs and simulates the loops of both motions");
@@ -135,9 +137,6 @@ ExpectedAll<TuneResult> tune(const TuneJob& job) {
     return result;
   }
   const identification::FeedforwardFit& fit = *result.identification.report.fit;
-  std::vector<Diagnostic> more = contradictions(fit, job.design.plant);
-  std::vector<Diagnostic>& told = result.identification.report.diagnostics;
-  told.insert(told.end(), more.begin(), more.end());
 
   DesignJob design_job = loop_job(job.design, fit);
   if (!controls_velocity(fit.mechanism) && design_job.sensor.resolution == 0.0) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <vector>
 
 #include <flyball/math/equations/matrix_equation.hpp>
 
@@ -152,13 +154,38 @@ Eigen::VectorXd in_given_units(const Eigen::VectorXd& w, const Eigen::VectorXi& 
   return length > 0.0 ? Eigen::VectorXd(given / length) : given;
 }
 
+/// The singular values of a matrix whose rows are of sizes that doubles' squares do not hold: the
+/// rows' sizes are kept apart until they are triangular, the largest first.
+Eigen::VectorXd graded_singular_values(const MatrixXd& wide) {
+  const Eigen::VectorXd sizes = wide.cwiseAbs().rowwise().maxCoeff();
+  std::vector<Index> order(static_cast<std::size_t>(wide.rows()));
+  std::iota(order.begin(), order.end(), Index{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](Index i, Index j) { return sizes(i) > sizes(j); });
+  if (!(sizes.minCoeff() > 0.0)) {
+    return Eigen::VectorXd::Unit(wide.rows(), 0) * sizes.maxCoeff();
+  }
+  MatrixXd tall(wide.cols(), wide.rows());
+  Eigen::VectorXd sorted(wide.rows());
+  for (Index k = 0; k < wide.rows(); ++k) {
+    const Index i = order[static_cast<std::size_t>(k)];
+    sorted(k) = sizes(i);
+    tall.col(k) = wide.row(i).transpose() / sizes(i);
+  }
+  return detail::singular_values_of(detail::triangle_of(tall) * sorted.asDiagonal());
+}
+
 double condition_of(MatrixXd krylov_matrix) {
   const double largest = krylov_matrix.size() > 0 ? krylov_matrix.cwiseAbs().maxCoeff() : 0.0;
   if (!krylov_matrix.allFinite() || !(largest > 0.0)) {
     return infinity;
   }
   krylov_matrix /= largest;
-  const Eigen::VectorXd sizes = detail::coarse_singular_values_of(krylov_matrix);
+  constexpr double graded = 1e-100;
+  Eigen::VectorXd sizes = detail::coarse_singular_values_of(krylov_matrix);
+  if (sizes(sizes.size() - 1) <= graded * sizes(0)) {
+    sizes = graded_singular_values(krylov_matrix);
+  }
   const double smallest = sizes(sizes.size() - 1);
   return smallest > 0.0 ? sizes(0) / smallest : infinity;
 }

@@ -355,6 +355,45 @@ TEST_F(BadInput, NotEnoughMemory) {
   json = Json::parse(solved.out, nullptr, false);
   ASSERT_FALSE(json.is_discarded()) << solved.out << solved.err;
   EXPECT_EQ(json.at("error").at("code"), "not_enough_memory");
+  EXPECT_EQ(json.at("id"), 7);
+  // Also of a line that it cannot even read; the others are answered.
+  write("lines.jsonl", "{\"id\":1,\"A\":[[0]]}\n{\"id\":[2],\"A\":[[" + zeros + "," + zeros + "," +
+                           zeros + "," + zeros + "," + zeros + "]]}\n{\"id\":3,\"A\":[[0]]}\n");
+  const Answer lines =
+      run("--version >/dev/null; ulimit -v 50000; '" FLYBALL_COMMAND "' solve expm", "lines.jsonl");
+  EXPECT_EQ(lines.status, 2);
+  std::istringstream answers(lines.out);
+  std::string line;
+  for (const char* id : {"1", "[2]", "3"}) {
+    ASSERT_TRUE(std::getline(answers, line)) << lines.out << lines.err;
+    EXPECT_TRUE(line.starts_with(std::string("{\"id\":") + id + ",")) << line;
+  }
+}
+
+// Too little for a thread or a process is too little memory: it is said, or done without.
+TEST_F(BadInput, NoMemoryForAThread) {
+  if (FLYBALL_SANITIZED) {
+    GTEST_SKIP() << "a sanitizer needs all addresses";
+  }
+  int ended = 0;
+  for (int kib = 26000; kib < 120000; kib += kib / 16) {
+    const std::string limited =
+        "--version >/dev/null; ulimit -v " + std::to_string(kib) + "; '" FLYBALL_COMMAND "' ";
+    for (const std::string& what :
+         {"analyze " + example("elevator.toml") + " --json", std::string("motors --json"),
+          "identify --json " + example("logs/elevator.json")}) {
+      const Answer answer = run(limited + what);
+      if (answer.status == 127) {
+        continue;  // the loader itself
+      }
+      ++ended;
+      EXPECT_FALSE(holds(answer.err, "defect")) << kib << what << answer.err;
+      EXPECT_TRUE(answer.status == 0 || answer.status == 2) << kib << what << answer.err;
+      EXPECT_TRUE(answer.status == 0 || holds(answer.err, "not enough memory"))
+          << kib << what << answer.err;
+    }
+  }
+  EXPECT_GT(ended, 20);
 }
 
 TEST_F(BadInput, AKeyThatStandsTwice) {

@@ -93,7 +93,7 @@ TEST_F(Streams, AnswersComeAsTheyAreAsked) {
 TEST_F(Streams, NoControlCharacterReachesATerminal) {
   const std::string evil =
       "\x1b]0;owned\x07\x1b[2J\xC2\x9B"
-      "31m";
+      "31m\u202Emoc\u2066\u200F\u061C\uFEFF";
   write("key.toml",
         "[mechanism]\ntype = \"elevator\"\n\""
         "\\u001b[2J\\u009b1m"
@@ -122,7 +122,11 @@ TEST_F(Streams, NoControlCharacterReachesATerminal) {
       for (std::size_t i = 0; i < answer.out.size(); ++i) {
         const auto byte = static_cast<unsigned char>(answer.out[i]);
         const bool c1 = byte == 0xC2 && static_cast<unsigned char>(answer.out[i + 1]) < 0xA0;
-        if ((byte < 0x20 && byte != '\n') || byte == 0x7F || c1) {
+        const std::string_view rest = std::string_view(answer.out).substr(i);
+        const bool turns = rest.starts_with("\u202E") || rest.starts_with("\u2066") ||
+                           rest.starts_with("\u200F") || rest.starts_with("\u061C") ||
+                           rest.starts_with("\uFEFF");
+        if ((byte < 0x20 && byte != '\n') || byte == 0x7F || c1 || turns) {
           ADD_FAILURE() << arguments << " at " << i << " of " << answer.out;
           break;
         }
@@ -168,6 +172,27 @@ TEST_F(Streams, SignalsLeaveNothingBehind) {
     const std::string rest = answer.out.substr(answer.out.find('\n') + 1);
     EXPECT_EQ(rest, std::to_string(128 + number) + "\nbin\nrunning\nscript\n");
   }
+}
+
+// Killed, it can do nothing more: what draws for it ends all the same, with what that started.
+TEST_F(Streams, AKillLeavesNoProgramBehind) {
+  fake_gnuplot(
+      "touch running\ntrap '' TERM INT HUP\n"
+      "(exec -a flyball-child-$PPID sleep 100) &\n"
+      "exec -a flyball-fake-$PPID sleep 100");
+  const Answer answer = shell(
+      "PATH=$PWD/bin:$PATH\n"
+      "$flyball analyze " +
+      example("elevator.toml") +
+      " --out report >/dev/null 2>&1 &\n"
+      "pid=$!\n"
+      "for k in {1..600}; do pgrep -f flyball-child-$pid >/dev/null && break; sleep 0.1; done\n"
+      "pgrep -f \"flyball-(fake|child)-$pid\" | wc -l\n"
+      "kill -KILL $pid; wait $pid 2>/dev/null; echo $?\n"
+      "for k in {1..100}; do pgrep -f \"flyball-(fake|child)-$pid\" >/dev/null || break; sleep "
+      "0.1; done\n"
+      "pgrep -f \"flyball-(fake|child)-$pid\" | wc -l");
+  EXPECT_EQ(answer.out, "2\n137\n0\n") << answer.err;
 }
 
 TEST_F(Streams, WhatAKillLeftIsSwept) {

@@ -69,6 +69,20 @@ TEST(Printable, HasNoControlCharacters) {
   EXPECT_EQ(shortened("\"\x1b[2J\" is not a motor"), "\"?[2J\" is not a motor");
 }
 
+// Marks and overrides of the direction of writing, separators of lines, byte order marks: each byte
+// a question mark. What joins letters or only looks foreign stays.
+TEST(Printable, HasNothingThatTurnsTheDirection) {
+  for (const char* steering : {"\u200E", "\u200F", "\u2028", "\u2029", "\u202A", "\u202D", "\u202E",
+                               "\u2066", "\u2069", "\u206F", "\uFEFF", "\uFFF9", "\uFFFB"}) {
+    EXPECT_EQ(printable(std::string("a") + steering + "b"), "a???b");
+  }
+  EXPECT_EQ(printable("a\u061Cb\u0080\u009F"), "a??b????");
+  for (const char* plain : {"\u00A0", "\u061B", "\u200D", "\u2010", "\u202F", "\u2065", "\u2070",
+                            "\uFEFE", "\uFFFC", "日本", "שלום"}) {
+    EXPECT_EQ(printable(plain), plain);
+  }
+}
+
 TEST(NearestName, FindsTheNameMeant) {
   EXPECT_EQ(nearest_name("drum_raduis", names), "drum_radius");
   EXPECT_EQ(nearest_name("Gearing", names), "gearing");

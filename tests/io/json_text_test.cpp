@@ -54,5 +54,23 @@ TEST(ScalarMember, IsAsItStands) {
   EXPECT_EQ(of("{}"), "nothing");
 }
 
+TEST(WrittenMember, IsWholeOrAsFarAsTheTextGoes) {
+  const auto of = [](std::string_view json) {
+    return std::string(written_member(json, "id").value_or("nothing"));
+  };
+  EXPECT_EQ(of(R"({"id": {"a": ["}", 1]} ,"A":1})"), R"({"a": ["}", 1]})");
+  EXPECT_EQ(of(R"({"A":[{"id":1}],"id":[[],2]})"), "[[],2]");
+  EXPECT_EQ(of(R"({"id":7,"A":[[1,2)"), "7");
+  EXPECT_EQ(of(R"({"id":[1,)"), "[1,");
+  EXPECT_EQ(of(R"({"id":"a)"), "\"a");
+  EXPECT_EQ(of(R"({"id)"), "nothing");
+  EXPECT_EQ(of(""), "nothing");
+}
+
+TEST(JsonEscaped, ReadsAsTheSame) {
+  EXPECT_EQ(json_escaped("{\"a\":\t\"\x7f\u009b\u202e é\"}\n"),
+            "{\"a\":\t\"\\u007f\\u009b\\u202e é\"}\n");
+}
+
 }  // namespace
 }  // namespace flyball::json_text_test

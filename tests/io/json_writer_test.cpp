@@ -122,6 +122,7 @@ TEST(JsonWriter, APlaceIsLineAndColumn) {
 // A terminal obeys C1 controls and DEL as it does ESC; JSON would let them stand.
 TEST(JsonWriter, NoControlCharacterStandsAsItIs) {
   EXPECT_EQ(json_quoted("a\x1b\x7f\xC2\x9B\xC2\xA0"), "\"a\\u001b\\u007f\\u009b\xC2\xA0\"");
+  EXPECT_EQ(json_quoted("a\u202Eb\uFEFF\u061Cω"), "\"a\\u202eb\\ufeff\\u061cω\"");
 }
 
 TEST(JsonWriter, ACoordinateIsNameAndUnit) {

@@ -92,6 +92,28 @@ TEST(Solve, EchoesTheId) {
   const Json json = answer("expm", R"({"id":{"run":[7,"a"]},"A":[[0]]})");
   EXPECT_EQ(json.at("id"), Json::parse(R"({"run":[7,"a"]})"));
   EXPECT_EQ(answer("expm", R"({"id":3})").at("id"), 3);
+  // What a terminal would obey is escaped, wherever it stands; all else is as it was.
+  const auto line = [](const std::string& id) {
+    return Solver::create("expm").value().solve("{\"id\":" + id + ",\"A\":[[0]]}").json;
+  };
+  const std::string hostile = "\"a\x7f\u009b[2J\u202e\"";
+  EXPECT_TRUE(line(hostile).starts_with(R"({"id":"a\u007f\u009b[2J\u202e",)")) << line(hostile);
+  EXPECT_EQ(Json::parse(line(hostile)).at("id"), Json::parse(hostile));
+  EXPECT_EQ(Json::parse(line("[" + hostile + "]")).at("id"), Json::parse("[" + hostile + "]"));
+  for (const char c : line("{\"k\":" + hostile + "}")) {
+    EXPECT_TRUE(c >= ' ' && c < '\x7f');
+  }
+  EXPECT_TRUE(line("\"é \\u00e9/\\/\"").starts_with("{\"id\":\"é \\u00e9/\\/\","));
+  // Of a problem that there is no memory for, as far as it was read.
+  const auto forgotten = [](const std::string& beginning) {
+    return Json::parse(Solver::without_memory(beginning).json);
+  };
+  EXPECT_EQ(forgotten(R"({"id":12,"A":[[0,)").at("id"), 12);
+  EXPECT_EQ(forgotten(R"({"id":["a"],"A":[[0,)").at("id"), Json::parse(R"(["a"])"));
+  EXPECT_EQ(forgotten(R"({"id":12,"A":[[0,)").at("error").at("code"), "not_enough_memory");
+  for (const char* open : {R"({"id":12)", R"({"id":"a)", R"({"id":[1,)", R"({"A":[[0,)", "{", ""}) {
+    EXPECT_FALSE(forgotten(open).contains("id")) << open;
+  }
 }
 
 TEST(Solve, NumbersRoundTrip) {

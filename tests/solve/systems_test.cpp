@@ -161,6 +161,13 @@ TEST(SolveSystems, Responses) {
   EXPECT_EQ(refusal("step-response", lag + R"(,"input":1})"), "out_of_range");
   EXPECT_EQ(refusal("impulse-response", lag + R"(,"input":-1})"), "out_of_range");
   EXPECT_EQ(refusal("initial-response", lag + R"(,"x0":[1,2]})"), "wrong_shape");
+  // Whole, and too large: the limit is said.
+  const Json many = answer("step-response", R"({"A":[[-1]],"B":[[1]],"T":1,"samples":2000000000})");
+  EXPECT_EQ(many.at("error").at("code"), "out_of_range");
+  EXPECT_EQ(
+      many.at("error").at("message"),
+      "step-response: samples is 2000000000; it must be a whole number of at most 1000000000");
+  EXPECT_EQ(refusal("step-response", R"({"A":[[-1]],"B":[[1]],"T":1,"samples":2.5})"), "malformed");
   EXPECT_EQ(refusal("step-response", R"({"A":[[-2]],"B":[[1]],"T":1,"samples":0})"),
             "out_of_range");
   EXPECT_EQ(refusal("step-response", R"({"A":[[-2]],"B":[[1]],"T":0,"samples":2})"),

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include <flyball/study/answer.hpp>
+#include <flyball/study/identify_logs.hpp>
 #include <flyball/study/project.hpp>
 
 #include "session_file.hpp"
@@ -96,10 +97,24 @@ TEST(Tune, ALogThatContradictsItsProjectIsWarnedOf) {
                               "2\ngearing = 10.0\nmass = \"8 kg\"\ndrum_radius = \""
                            << drum_radius << "\"\n";
     const auto job = tune_job(file.path(), project);
-    std::filesystem::remove(project);
     EXPECT_TRUE(job) << to_string(job.error());
     const auto result = tune(*job);
     EXPECT_TRUE(result) << to_string(result.error());
+    // Who only identifies is told the same.
+    const auto alone = identify_job(file.path(), project).value();
+    const auto identified = identify(alone).value();
+    const auto told = [](const IdentifyResult& of) {
+      std::string all;
+      for (const Diagnostic& found : of.diagnostics()) {
+        all += found.code == "project_contradicts_log" ? found.message : "";
+      }
+      return all;
+    };
+    EXPECT_EQ(told(identified), told(result->identification));
+    const auto logs = identify_logs(
+        {.logs = {file.path(), file.path()}, .selection = alone.selection, .said = alone.said});
+    EXPECT_TRUE(logs && told(logs->joint).empty() == told(identified).empty());
+    std::filesystem::remove(project);
     for (const Diagnostic& diagnostic : result->identification.diagnostics()) {
       if (diagnostic.code == "project_contradicts_log") {
         EXPECT_EQ(diagnostic.severity, Severity::warning);

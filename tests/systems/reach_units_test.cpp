@@ -226,6 +226,23 @@ TEST(ReachUnits, IsTotal) {
   EXPECT_GT(answered, 2900);
 }
 
+// Columns of [C; CA] whose squares no double holds: σ_max/σ_min of diag(1, 1e160) and its like.
+TEST(ReachUnits, ConditionsBeyondTheRootOfTheRange) {
+  for (const double far : {1e20, 1e120, 1e155, 1e160, 1e300}) {
+    const ContinuousSystem<> chain{MatrixXd{{0.0, far}, {0.0, 0.0}}, MatrixXd{{0.0}, {1.0}},
+                                   MatrixXd::Identity(2, 2), MatrixXd::Zero(2, 1)};
+    const auto found = analyze_structure(chain, TimeDomain::continuous).value();
+    // [B AB] = [0 far; 1 0], and [C; CA] has the columns (1, 0, 0, 0) and (0, 1, far, 0).
+    EXPECT_NEAR(found.controllability.matrix_condition / far, 1.0, 1e-12) << far;
+    EXPECT_NEAR(found.observability.matrix_condition / far, 1.0, 1e-12) << far;
+  }
+  // What is not reached has no condition at any scale.
+  const ContinuousSystem<> cut{MatrixXd{{0.0, 0.0}, {0.0, 1e160}}, MatrixXd{{0.0}, {1.0}},
+                               MatrixXd::Identity(2, 2), MatrixXd::Zero(2, 1)};
+  EXPECT_EQ(analyze_structure(cut, TimeDomain::continuous)->controllability.matrix_condition,
+            INFINITY);
+}
+
 // ±1.7e308 in one row and column meet in sums; the modes ±1 of [0 1e308; 1e-308 0] are none of
 // the entries.
 TEST(ReachUnits, ModesOfExtremeEntries) {

@@ -23,7 +23,16 @@ struct RepeatedKey {
 /// Cost: O(size) and a copy of the keys.
 [[nodiscard]] std::optional<RepeatedKey> repeated_key(std::string_view json);
 
-/// A member of the outermost object as it is written, if it is a number, a word or a string.
+/// A JSON text with what a terminal would obey in its strings (DEL, C1 controls, marks of the
+/// direction of writing, byte order marks) as \uXXXX: it reads as the same values.
+[[nodiscard]] std::string json_escaped(std::string_view json);
+
+/// A member of the outermost object as it is written; nothing where there is none.
+/// @param json  A JSON object, which may be cut off: then so may be what is found.
+[[nodiscard]] std::optional<std::string_view> written_member(std::string_view json,
+                                                             std::string_view key);
+
+/// The same, if it is a number, a word or a string.
 /// @param json  A JSON object without a mistake.
 [[nodiscard]] std::optional<std::string_view> scalar_member(std::string_view json,
                                                             std::string_view key);

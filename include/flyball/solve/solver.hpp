@@ -25,6 +25,10 @@ class Solver {
   /// Cost: that of the kernel, and of reading and writing the text.
   [[nodiscard]] Answer solve(std::string_view problem) const;
 
+  /// The answer to a problem that there is no memory for, with its id where the text has it.
+  /// @param beginning  Of the problem, as far as it was read.
+  [[nodiscard]] static Answer without_memory(std::string_view beginning);
+
   /// {"error": {…}}: how an unknown kind is answered.
   [[nodiscard]] static std::string error_json(const Error& error);
 

@@ -2,10 +2,12 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <flyball/identification/drive_fit.hpp>
 #include <flyball/identification/feedforward_fit.hpp>
 #include <flyball/recording/load_recording.hpp>
+#include <flyball/study/design.hpp>
 
 namespace flyball::study {
 
@@ -13,6 +15,8 @@ namespace flyball::study {
 struct IdentifyJob {
   std::string log{};  ///< Path.
   recording::LogSelection selection;
+  /// What a project file says of the mechanism, for `contradictions`; nothing without gains.
+  PlantDescription said{};
 };
 
 /// A log, read and fitted. A refused fit still carries everything that can be shown of the log.
@@ -31,9 +35,16 @@ struct IdentifyResult {
   [[nodiscard]] std::vector<Diagnostic> diagnostics() const;
 };
 
+/// Warnings where a log's gains are not those of the project's motor, gearing and mass, each with
+/// their ratio and its likely cause.
+/// @param said  The project's plant; without gains nothing is compared.
+[[nodiscard]] std::vector<Diagnostic> contradictions(const identification::FeedforwardFit& fit,
+                                                     const PlantDescription& said);
+
 /// Runs the job. Where neither the log nor the person say what the mechanism is, the data choose it
 /// (`identification::choose_mechanism`), and the units are those of that kind. An error means that
-/// the log could not be read as a recording at all; a fit that was refused is in `report.fit`.
+/// the log could not be read as a recording at all; a fit that was refused is in `report.fit`. What
+/// contradicts `said` is among the report's diagnostics.
 /// @errors as `recording::load_recording`; IdentificationError::unknown_mechanism where the data
 /// fit
 ///         several kinds, together with RecordingError::unit_unknown where the unit is open too.

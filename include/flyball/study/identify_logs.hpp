@@ -14,6 +14,7 @@ namespace flyball::study {
 struct IdentifyLogsJob {
   std::vector<std::string> logs{};    ///< Paths; two or more.
   recording::LogSelection selection;  ///< Of each of them.
+  PlantDescription said{};            ///< As of IdentifyJob; the joint fit is held against it.
 };
 
 /// One of the logs by itself.

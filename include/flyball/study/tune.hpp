@@ -36,12 +36,6 @@ struct TuneResult {
 /// @errors as `identify`.
 [[nodiscard]] ExpectedAll<TuneResult> tune(const TuneJob& job);
 
-/// Warnings where a log's gains are not those of the project's motor, gearing and mass, each with
-/// their ratio and its likely cause.
-/// @param said  The project's plant; without gains nothing is compared.
-[[nodiscard]] std::vector<Diagnostic> contradictions(const identification::FeedforwardFit& fit,
-                                                     const PlantDescription& said);
-
 /// The plant that a fit hands on: its gains; kA only if it is determined (else its upper bound).
 [[nodiscard]] PlantDescription plant_from_fit(const identification::FeedforwardFit& fit);
 

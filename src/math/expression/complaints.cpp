@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/controls.hpp"
 #include "core/format.hpp"
 #include "math/expression/complaints.hpp"
 
@@ -18,7 +19,7 @@ std::string shown(std::string_view text, std::size_t at, Character c) {
     const auto byte = static_cast<unsigned char>(text[at]);
     return std::string("\\x") + digits[byte >> 4U] + digits[byte & 15U];
   }
-  return std::string(text.substr(at, c.length));
+  return text::steering_bytes(text, at) > 0 ? "?" : std::string(text.substr(at, c.length));
 }
 
 }  // namespace
