@@ -12,6 +12,8 @@
 #include <flyball/report/terminal.hpp>
 #include <flyball/study/project.hpp>
 
+#include "lacks_memory.hpp"
+
 /// What every command of the program shares: where text goes and how it ends.
 namespace flyball::app {
 
@@ -53,10 +55,6 @@ void print(const std::string& text);
 /// Tells what is wrong: words on standard error and, with --json, an object on standard output.
 /// @return The exit status, of the first error.
 int fail(const Errors& errors, const CommonOptions& options, const std::string& schema);
-
-/// Whether an exception says that the system has no memory left, be it for bytes, a thread or a
-/// process.
-[[nodiscard]] bool lacks_memory(const std::exception& problem) noexcept;
 
 /// What a command's `run` answers, also where there is not enough memory for its input.
 /// @return The exit status.

@@ -21,7 +21,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "console.hpp"
+#include "lacks_memory.hpp"
 #include "processes.hpp"
 #ifdef __linux__
 #include <sched.h>

@@ -129,8 +129,7 @@ the JSON Schema of all problems and answers, [solve.schema.json](schemas/solve.s
 
 - Matrices are lists of rows; a number stands for a 1 x 1 matrix. Complex numbers are `[re, im]`, infinities `"inf"` and
   `"-inf"`. Numbers round-trip.
-- A field `id`, any JSON value, is echoed, a number or a string to the byte; but what a terminal would obey (DEL, the
-  controls U+0080 to U+009F, marks of the direction of writing) is written as `\uXXXX`, which reads as the same id.
+- A field `id`, any JSON value, is echoed, a number or a string to the byte.
 - A problem that cannot be read or solved is answered with `{"error": {"code", "message", …}}`, the evidence beside the
   message; the codes are those of [errors.md](errors.md). The others are answered all the same.
 - Exit status, after the last line: 0 all solved; 1 some problem has no answer (the mathematics says no); 2 some input was

@@ -29,17 +29,17 @@ ErrorInfo error_info(SolveError code) {
 
 namespace {
 
-/// The id of a problem as it was written, on one line, and such that no terminal obeys it; empty if
-/// it has none, or if that is cut off.
+/// The id of a problem, a number or a string to the byte, on one line; empty if it has none, or if
+/// that is cut off.
 std::string id_of(std::string_view text) {
   const auto written = written_member(text, "id");
   if (!written || !nlohmann::json::accept(*written)) {
     return {};
   }
   const bool structured = written->starts_with('{') || written->starts_with('[');
-  return json_escaped(structured ? nlohmann::json::parse(*written).dump(
-                                       -1, ' ', false, nlohmann::json::error_handler_t::replace)
-                                 : *written);
+  return structured ? json_escaped(nlohmann::json::parse(*written).dump(
+                          -1, ' ', false, nlohmann::json::error_handler_t::replace))
+                    : std::string(*written);
 }
 
 /// A text whose end is missing may end in the middle of a number.

@@ -92,12 +92,12 @@ TEST(Solve, EchoesTheId) {
   const Json json = answer("expm", R"({"id":{"run":[7,"a"]},"A":[[0]]})");
   EXPECT_EQ(json.at("id"), Json::parse(R"({"run":[7,"a"]})"));
   EXPECT_EQ(answer("expm", R"({"id":3})").at("id"), 3);
-  // What a terminal would obey is escaped, wherever it stands; all else is as it was.
+  // A text to the byte; in lists and objects what a terminal would obey is escaped.
   const auto line = [](const std::string& id) {
     return Solver::create("expm").value().solve("{\"id\":" + id + ",\"A\":[[0]]}").json;
   };
   const std::string hostile = "\"a\x7f\u009b[2J\u202e\"";
-  EXPECT_TRUE(line(hostile).starts_with(R"({"id":"a\u007f\u009b[2J\u202e",)")) << line(hostile);
+  EXPECT_TRUE(line(hostile).starts_with("{\"id\":" + hostile + ",")) << line(hostile);
   EXPECT_EQ(Json::parse(line(hostile)).at("id"), Json::parse(hostile));
   EXPECT_EQ(Json::parse(line("[" + hostile + "]")).at("id"), Json::parse("[" + hostile + "]"));
   for (const char c : line("{\"k\":" + hostile + "}")) {

@@ -210,7 +210,7 @@ TEST(SolveSystems, BalancedRealization) {
   EXPECT_NEAR(number(reduced, "error_bound"), 2.0 * (0.275 - root), 1e-15);
   EXPECT_EQ(refusal("balanced-realization", system + R"(,"order":3})"), "out_of_range");
   EXPECT_EQ(refusal("balanced-realization", system + R"(,"order":1.5})"), "malformed");
-  EXPECT_EQ(refusal("balanced-realization", system + R"(,"order":1e10})"), "malformed");
+  EXPECT_EQ(refusal("balanced-realization", system + R"(,"order":1e10})"), "out_of_range");
   EXPECT_EQ(refusal("balanced-realization", R"({"A":[[1]],"B":[[1]]})"), "not_stable");
   EXPECT_EQ(refusal("balanced-realization", R"({"A":[[-1]],"B":[[0]]})"), "not_controllable");
 }
