@@ -24,7 +24,7 @@ struct RepeatedKey {
 [[nodiscard]] std::optional<RepeatedKey> repeated_key(std::string_view json);
 
 /// A JSON text with what a terminal would obey in its strings (DEL, C1 controls, marks of the
-/// direction of writing, byte order marks) as \uXXXX: it reads as the same values.
+/// direction of writing, byte order marks) as escapes: it reads as the same values.
 [[nodiscard]] std::string json_escaped(std::string_view json);
 
 /// A member of the outermost object as it is written; nothing where there is none.
