@@ -22,6 +22,31 @@ VectorXd legendre(int count, double x) {
   return P;
 }
 
+double legendre_sum(const Eigen::Ref<const VectorXd>& modes, double x) {
+  // b_k = c_k + (2k + 1)/(k + 1) x b_{k+1} - (k + 1)/(k + 2) b_{k+2}
+  double next = 0.0;
+  double after = 0.0;
+  for (Index k = modes.size() - 1; k >= 0; --k) {
+    const auto n = static_cast<double>(k);
+    const double now =
+        modes(k) + (2.0 * n + 1.0) / (n + 1.0) * x * next - (n + 1.0) / (n + 2.0) * after;
+    after = next;
+    next = now;
+  }
+  return next;
+}
+
+VectorXd legendre_derivative(const VectorXd& modes) {
+  // P'_{k+1} = P'_{k-1} + (2k + 1) P_k
+  VectorXd slopes = VectorXd::Zero(modes.size());
+  for (Index k = modes.size() - 1; k > 0; --k) {
+    const double above =
+        k + 1 < modes.size() ? slopes(k + 1) / static_cast<double>(2 * k + 3) : 0.0;
+    slopes(k - 1) = static_cast<double>(2 * k - 1) * (modes(k) + above);
+  }
+  return slopes;
+}
+
 Collocation radau_collocation(int points) {
   const Index p = points;
   // The zeros of P_p - P_{p-1}, of which 1 is one, between the signs of a fine grid.

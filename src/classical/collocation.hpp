@@ -18,4 +18,10 @@ struct Collocation {
 /// P₀ … P_{count-1} at x.
 [[nodiscard]] Eigen::VectorXd legendre(int count, double x);
 
+/// Σ c_k P_k(x), by Clenshaw's recurrence. Cost: O(p), without allocation.
+[[nodiscard]] double legendre_sum(const Eigen::Ref<const Eigen::VectorXd>& modes, double x);
+
+/// The coefficients of the derivative of Σ c_k P_k.
+[[nodiscard]] Eigen::VectorXd legendre_derivative(const Eigen::VectorXd& modes);
+
 }  // namespace flyball::classical::detail

@@ -231,7 +231,7 @@ double Motion::delayed(Index i, double begin, double t) const {
   }
   const Segment& segment = *std::prev(next);
   const double x = std::clamp(2.0 * (at - segment.begin) / segment.length - 1.0, -1.0, 1.0);
-  return legendre(points, x).dot(segment.z.col(i));
+  return legendre_sum(segment.z.col(i), x);
 }
 
 const Propagator& Motion::propagator(double length) {

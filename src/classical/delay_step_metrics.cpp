@@ -24,26 +24,12 @@ using Eigen::VectorXd;
 constexpr double rounding = 1e-10;
 constexpr double most_step_states = 200.0;
 
-/// A polynomial by Legendre's coefficients, and its slope over [-1, 1].
+/// A polynomial by Legendre's coefficients, over [-1, 1].
 struct Piece {
   VectorXd modes;
-  [[nodiscard]] double operator()(double place) const {
-    return detail::legendre(static_cast<int>(modes.size()), place).dot(modes);
-  }
-  [[nodiscard]] double slope(double place) const {
-    // P'_{k+1} = P'_{k-1} + (2k + 1) P_k
-    const VectorXd P = detail::legendre(static_cast<int>(modes.size()), place);
-    double before = 0.0;
-    double now = 1.0;
-    double sum = modes.size() > 1 ? modes(1) : 0.0;
-    for (Index k = 1; k + 1 < modes.size(); ++k) {
-      const double next = before + static_cast<double>(2 * k + 1) * P(k);
-      sum += next * modes(k + 1);
-      before = now;
-      now = next;
-    }
-    return sum;
-  }
+  [[nodiscard]] double operator()(double place) const { return detail::legendre_sum(modes, place); }
+  /// Nothing of it is further from the mean: |P_k| ≤ 1.
+  [[nodiscard]] double reach() const { return modes.tail(modes.size() - 1).lpNorm<1>(); }
 };
 
 /// Where a function changes its sign between two places, by halving.
@@ -65,15 +51,19 @@ class JudgedPieces : public detail::OutputPieces {
 
   void add(double begin, double length, const MatrixXd& modes) override {
     const Piece y{modes.col(output_) / (final_value_ == 0.0 ? 1.0 : final_value_)};
+    if (is_no_news(y, begin + length)) {
+      return;
+    }
+    const Piece slope{detail::legendre_derivative(y.modes)};
     // A polynomial that is resolved turns between neighbours of these places once at most.
     constexpr int parts = 24;
     double from = -1.0;
-    double slope_from = y.slope(from);
+    double slope_from = slope(from);
     for (int i = 1; i <= parts; ++i) {
       const double to = -1.0 + 2.0 * i / parts;
-      const double slope_to = y.slope(to);
+      const double slope_to = slope(to);
       if ((slope_from > 0.0) != (slope_to > 0.0)) {
-        const double top = crossing([&](double place) { return y.slope(place); }, from, to);
+        const double top = crossing(slope, from, to);
         monotone(y, from, top, begin, length);
         monotone(y, top, to, begin, length);
       } else {
@@ -86,6 +76,28 @@ class JudgedPieces : public detail::OutputPieces {
   [[nodiscard]] const Judge& judge() const { return judge_; }
 
  private:
+  /// Whether a piece sets no record, reaches no level and stays within the band or outside: most
+  /// do.
+  bool is_no_news(const Piece& y, double end) {
+    const double low = y.modes(0) - y.reach();
+    const double high = y.modes(0) + y.reach();
+    if (!judge_.holds(low, high)) {
+      return false;
+    }
+    if (final_value_ == 0.0) {
+      return true;
+    }
+    if ((judge_.waits_for(0.1) && high >= 0.1) || (judge_.waits_for(0.9) && high >= 0.9)) {
+      return false;
+    }
+    const double band = judge_.band();
+    if (low > 1.0 + band || high < 1.0 - band) {
+      judge_.outside_until(end);
+      return true;
+    }
+    return low >= 1.0 - band && high <= 1.0 + band;
+  }
+
   void monotone(const Piece& y, double from, double to, double begin, double length) {
     const auto time = [&](double place) { return begin + 0.5 * (place + 1.0) * length; };
     const double y0 = y(from);

@@ -24,6 +24,8 @@ class Judge {
       least_time_ = time;
     }
   }
+  /// Whether [low, high] has neither a new peak nor a new least.
+  [[nodiscard]] bool holds(double low, double high) const { return least_ <= low && high <= peak_; }
   void reaches(double level, double time) {
     double& first = level == 0.1 ? ten_ : ninety_;
     first = std::isnan(first) ? time : first;
