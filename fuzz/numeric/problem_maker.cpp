@@ -162,6 +162,12 @@ class Maker {
       case 9:
         M = in_other_units(entries(rows, columns));
         break;
+      case 10:  // a chain that feeds back, weakly as a rule
+        if (rows > 1) {
+          M.diagonal(-1).setConstant(entry());
+        }
+        M(0, columns - 1) = entry();
+        break;
       default:
         M = entries(rows, columns);
         break;

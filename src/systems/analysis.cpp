@@ -9,6 +9,7 @@
 #include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
+#include "math/dense/balanced.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/spectral_blocks.hpp"
 #include "systems/balance.hpp"
@@ -65,45 +66,10 @@ namespace detail {
 
 namespace {
 
-/// The power of two that brings the largest entry of M between 2^low and 2^high, zero where it is
-/// there.
-int shift_into(const MatrixXd& M, int low, int high) {
-  const double largest = M.cwiseAbs().maxCoeff();
-  // What has overflowed is no number of any exponent.
-  const int exponent = largest > 0.0 && std::isfinite(largest) ? std::ilogb(largest) : low;
-  return exponent < low ? low - exponent : exponent > high ? high - exponent : 0;
-}
-
-MatrixXd shifted(const MatrixXd& M, int exponent) {
-  return exponent == 0 ? M
-                       : MatrixXd(M.unaryExpr([&](double x) { return std::ldexp(x, exponent); }));
-}
-
 Eigen::VectorXcd shifted(const Eigen::VectorXcd& values, int exponent) {
   return exponent == 0 ? values : Eigen::VectorXcd(values.unaryExpr([&](const Complex& x) {
     return Complex(std::ldexp(x.real(), exponent), std::ldexp(x.imag(), exponent));
   }));
-}
-
-}  // namespace
-
-namespace {
-
-/// A block in units in which its entries are ordinary.
-struct InUnits {
-  MatrixXd balanced;
-  int back = 0;  ///< The block's eigenvalues are those of `balanced` times 2^back.
-};
-
-InUnits in_units(const MatrixXd& given) {
-  // Sums must not overflow, nor what is small but counts vanish, before the states have their
-  // units; then products must not.
-  const int before = shift_into(given, -900, 1022 - std::ilogb(static_cast<double>(given.rows())));
-  MatrixXd balanced = shifted(given, before);
-  const Eigen::VectorXd d = balance_of(balanced);
-  balanced = d.cwiseInverse().asDiagonal() * balanced * d.asDiagonal();
-  const int after = shift_into(balanced, -300, 300);
-  return {shifted(balanced, after), -before - after};
 }
 
 bool is_triangular(const MatrixXd& M) {
@@ -118,17 +84,21 @@ bool is_triangular(const MatrixXd& M) {
 /// Adds the eigenvalues of a block and what is known of each; false where there are none.
 bool judge_block(const MatrixXd& block, TimeDomain domain, double blur, int exponent,
                  JudgedEigenvalues& judged, Index first) {
-  const auto [balanced, back] = in_units(block);
+  const BalancedMatrix in_units = balanced_of(block);
+  const MatrixXd& balanced = in_units.M;
+  const int back = in_units.unit;
   const Index n = block.rows();
   blur = std::ldexp(blur, -back);
-  const Eigensystem system = eigensystem_of(balanced);
+  // Such a matrix shows its eigenvalues without any computing, which would round them.
+  const bool exact = is_triangular(balanced) || is_triangular(balanced.transpose());
+  const Eigensystem system =
+      exact ? Eigensystem{balanced.diagonal().cast<Complex>(), Eigen::MatrixXcd::Identity(n, n)}
+            : eigensystem_of(balanced);
   judged.of_A.segment(first, n) = shifted(system.values, back);
   judged.values.segment(first, n) = shifted(system.values, back + exponent);
   if (!judged.values.segment(first, n).allFinite()) {
     return false;
   }
-  // Such a matrix shows its eigenvalues without any computing.
-  const bool exact = is_triangular(balanced) || is_triangular(balanced.transpose());
   // The condition of an eigenvalue is ‖v‖‖w‖ with wᵀ the row of V⁻¹; a defective one has none, and
   // moves by the root of rounding.
   const double rounding = 10.0 * epsilon * std::sqrt(static_cast<double>(n)) * balanced.norm();
@@ -176,7 +146,7 @@ JudgedEigenvalues judged_eigenvalues(const MatrixRef& A, TimeDomain domain, doub
   }
   const bool marginal = std::find(judged.verdicts.begin(), judged.verdicts.end(),
                                   Stability::marginal) != judged.verdicts.end();
-  const auto [balanced, back] = marginal ? in_units(A) : InUnits{};
+  const auto [balanced, d, back, far] = marginal ? balanced_far(A) : BalancedMatrix{};
   const auto value = [&](Index k) {
     return Complex(std::ldexp(judged.of_A(k).real(), -back),
                    std::ldexp(judged.of_A(k).imag(), -back));

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include <flyball/core/argument.hpp>
+#include <flyball/systems/analysis.hpp>
 #include <flyball/systems/system.hpp>
 
 namespace flyball::detail {
@@ -26,5 +27,15 @@ struct SystemScaling {
 /// The system in the scaled states x'; its inputs and outputs keep their units.
 [[nodiscard]] ContinuousSystem<> scaled_system(const ContinuousSystem<>& system,
                                                const SystemScaling& scaling);
+
+/// G(s) = 2^gain G'(s / 2^time) with G' = C'(sI - A')⁻¹B' + D' in units of states, time, inputs and
+/// outputs in which the largest entries of A' and of B' and of C' or D' are near one. Time of
+/// discrete systems stays; of continuous ones `time` is even.
+struct NormalizedSystem {
+  ContinuousSystem<> system;
+  int gain = 0;
+  int time = 0;
+};
+[[nodiscard]] NormalizedSystem normalized(const ContinuousSystem<>& system, TimeDomain domain);
 
 }  // namespace flyball::detail

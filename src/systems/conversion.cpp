@@ -15,6 +15,8 @@
 #include "core/constants.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/ordinary_units.hpp"
+#include "systems/hold_units.hpp"
 #include "systems/matched_poles.hpp"
 
 namespace flyball {
@@ -114,8 +116,7 @@ struct Holds {
   MatrixXd two;
 };
 
-/// @param B  What the last two are multiplied with.
-Expected<Holds> holds(const MatrixXd& A, const MatrixXd& B, double T) {
+Expected<Holds> holds_in_units(const MatrixXd& A, const MatrixXd& B, double T) {
   const Index n = A.rows();
   const Index m = B.cols();
   const double size = std::max(detail::norm1(A) * T, 1.0);
@@ -128,6 +129,30 @@ Expected<Holds> holds(const MatrixXd& A, const MatrixXd& B, double T) {
   FLYBALL_TRY(auto exponential, expm(block));
   return Holds{exponential.topLeftCorner(n, n), exponential.block(0, n, n, m) / scale,
                exponential.block(0, n + m, n, m) / scale};
+}
+
+/// @param B  What the last two are multiplied with.
+Expected<Holds> holds(const MatrixXd& A, const MatrixXd& B, double T, std::string_view where) {
+  if (!detail::needs_hold_units(A, B, T)) {
+    return holds_in_units(A, B, T);
+  }
+  const detail::HoldUnits units = detail::hold_units_of(A, B, T);
+  if (!units.A.allFinite()) {
+    return refusal(MatrixExponentialError::overflow, where, "A T")
+        .got("beyond the largest double")
+        .hint("shorten the period, or choose units in which the numbers are nearer to 1");
+  }
+  FLYBALL_TRY(auto there, holds_in_units(units.A, units.B, 1.0));
+  const Eigen::VectorXi& d = units.states;
+  Holds given{detail::times_powers(there.A, d, -d, 0),
+              detail::times_powers(there.one, d, -units.inputs, 0),
+              detail::times_powers(there.two, d, -units.inputs, 0)};
+  if (!given.A.allFinite() || !given.one.allFinite() || !given.two.allFinite()) {
+    return refusal(MatrixExponentialError::overflow, where, "the discrete system")
+        .got("beyond the largest double")
+        .hint("shorten the period, or choose units in which the numbers are nearer to 1");
+  }
+  return given;
 }
 
 /// A of the continuous system under zero- or first-order hold.
@@ -176,7 +201,7 @@ Expected<DiscreteSystem<>> convert_to_discrete(const ContinuousSystem<>& system,
       break;
     }
     case ConversionMethod::foh: {
-      FLYBALL_TRY(const auto parts, holds(A, B, T));
+      FLYBALL_TRY(const auto parts, holds(A, B, T, where));
       discrete.A = parts.A;
       discrete.B = parts.one - parts.two + product(parts.A, parts.two);
       discrete.D = D + product(C, parts.two);
@@ -229,7 +254,7 @@ Expected<ContinuousSystem<>> convert_to_continuous(const DiscreteSystem<>& syste
       continuous.A = d.asDiagonal() * found * d_inverse.asDiagonal();
       // B_d = T φ₁(AT) B, or T φ₁(AT)² B: φ₁ - φ₂ + eˣφ₂ = φ₁². The principal logarithm keeps φ₁
       // regular.
-      FLYBALL_TRY(const auto parts, holds(found, I, T));
+      FLYBALL_TRY(const auto parts, holds(found, I, T, where));
       MatrixXd balanced = detail::solve_linear(parts.one, d_inverse.asDiagonal() * B);
       if (method == ConversionMethod::foh) {
         balanced = T * detail::solve_linear(parts.one, balanced);

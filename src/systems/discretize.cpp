@@ -6,9 +6,58 @@
 
 #include "core/format.hpp"
 #include "core/try.hpp"
+#include "math/dense/ordinary_units.hpp"
+#include "systems/hold_units.hpp"
 #include "systems/quadratic_integral.hpp"
 
 namespace flyball {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+/// exp([A B; 0 0] T), B of A's size: its upper right block is linear in B, and a B that is scaled
+/// cannot force squarings that A does not need.
+Expected<DiscretizedMatrices> hold(const MatrixRef& A, const MatrixRef& B, double T) {
+  const Index n = A.rows();
+  const Index m = B.cols();
+  const double size_A = A.cwiseAbs().maxCoeff();
+  const double size_B = m == 0 ? 0.0 : B.cwiseAbs().maxCoeff();
+  const double target = std::max(size_A, 1.0 / T);
+  const double scale =
+      size_B > 0.0 ? std::exp2(std::round(std::log2(target) - std::log2(size_B))) : 1.0;
+  MatrixXd block = MatrixXd::Zero(n + m, n + m);
+  block.topLeftCorner(n, n) = A * T;
+  block.topRightCorner(n, m) = (B * scale) * T;
+  FLYBALL_TRY(auto exponential, expm(block));
+  return DiscretizedMatrices{exponential.topLeftCorner(n, n),
+                             exponential.topRightCorner(n, m) / scale};
+}
+
+/// The same in units in which doubles do.
+Expected<DiscretizedMatrices> hold_in_other_units(const MatrixRef& A, const MatrixRef& B, double T,
+                                                  std::string_view where) {
+  const detail::HoldUnits units = detail::hold_units_of(A, B, T);
+  const auto too_large = [&](std::string_view what) {
+    return refusal(MatrixExponentialError::overflow, where, std::string(what))
+        .got("beyond the largest double")
+        .hint("shorten the period, or choose units in which the numbers are nearer to 1");
+  };
+  if (!units.A.allFinite()) {
+    return too_large("A T");
+  }
+  FLYBALL_TRY(const auto there, hold(units.A, units.B, 1.0));
+  const Eigen::VectorXi& d = units.states;
+  DiscretizedMatrices held{detail::times_powers(there.A, d, -d, 0),
+                           detail::times_powers(there.B, d, -units.inputs, 0)};
+  if (!held.A.allFinite() || !held.B.allFinite()) {
+    return too_large(held.A.allFinite() ? "the discrete B" : "the discrete A");
+  }
+  return held;
+}
+
+}  // namespace
 
 Expected<DiscretizedMatrices> discretize_zoh(const MatrixRef& A, const MatrixRef& B, Time period) {
   constexpr std::string_view where = "discretize";
@@ -20,20 +69,11 @@ Expected<DiscretizedMatrices> discretize_zoh(const MatrixRef& A, const MatrixRef
                     .finite(A, "A")
                     .finite(B, "B")
                     .positive(period.si(), "period", "s"));
-  // exp([A B; 0 0] T) depends on the scale of B only through its upper right block, which is linear
-  // in B: with B scaled to A's size, B cannot force squarings that A does not need.
   const double T = period.si();
-  const double size_A = A.cwiseAbs().maxCoeff();
-  const double size_B = m == 0 ? 0.0 : B.cwiseAbs().maxCoeff();
-  const double target = std::max(size_A, 1.0 / T);
-  const double scale =
-      size_B > 0.0 ? std::exp2(std::round(std::log2(target) - std::log2(size_B))) : 1.0;
-  Eigen::MatrixXd block = Eigen::MatrixXd::Zero(n + m, n + m);
-  block.topLeftCorner(n, n) = A * T;
-  block.topRightCorner(n, m) = (B * scale) * T;
-  FLYBALL_TRY(auto exponential, expm(block));
-  return DiscretizedMatrices{exponential.topLeftCorner(n, n),
-                             exponential.topRightCorner(n, m) / scale};
+  if (n > 0 && detail::needs_hold_units(A, B, T)) {
+    return hold_in_other_units(A, B, T, where);
+  }
+  return hold(A, B, T);
 }
 
 Expected<Eigen::MatrixXd> discretize(const MatrixRef& A, const ProcessDensity& density,

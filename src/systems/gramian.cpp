@@ -9,9 +9,11 @@
 #include <flyball/math/equations/matrix_equation.hpp>
 
 #include "core/try.hpp"
+#include "math/dense/balanced.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/dense_reduction.hpp"
 #include "math/dense/ordinary_units.hpp"
+#include "math/dense/pair_scaling.hpp"
 #include "systems/balance.hpp"
 #include "systems/gramian_factor.hpp"
 #include "systems/modes.hpp"
@@ -108,14 +110,25 @@ namespace {
 using Eigen::MatrixXd;
 
 Expected<Gramian> gramian(const MatrixRef& A, const MatrixRef& B, TimeDomain domain) {
-  // In a unit of the inputs in which BBᵀ is a double, where W is one.
-  const int unit = detail::unit_of(B);
-  const MatrixXd in_unit = detail::times_power(B, -unit);
-  const MatrixXd BB = detail::product_transposed(in_unit, in_unit);
-  FLYBALL_TRY(auto solution,
-              domain == TimeDomain::continuous ? lyapunov(A, BB) : discrete_lyapunov(A, BB));
+  // In units of states, time and inputs in which A and BBᵀ are of doubles, where W is one.
+  const bool far = B.size() > 0 && (detail::is_far(A) || detail::is_far(B));
+  const bool continuous = domain == TimeDomain::continuous;
+  Eigen::VectorXi d = Eigen::VectorXi::Zero(A.rows());
+  int time = 0;
+  if (far) {
+    // The inputs have one unit: their sum of squares is what counts.
+    d = detail::pair_scaling_of(A, B.cwiseAbs().rowwise().maxCoeff()).states;
+    time = continuous && !A.isZero(0.0) ? detail::largest_exponent(A, -d, d) : 0;
+  }
+  const Eigen::VectorXi no_inputs = Eigen::VectorXi::Zero(B.cols());
+  const int unit =
+      far ? (B.isZero(0.0) ? 0 : detail::largest_exponent(B, -d, no_inputs)) : detail::unit_of(B);
+  const MatrixXd A_there = far ? detail::times_powers(A, -d, d, -time) : MatrixXd(A);
+  const MatrixXd B_there = detail::times_powers(B, -d, no_inputs, -unit);
+  const MatrixXd BB = detail::product_transposed(B_there, B_there);
+  FLYBALL_TRY(auto solution, continuous ? lyapunov(A_there, BB) : discrete_lyapunov(A_there, BB));
   Gramian found;
-  found.W = detail::times_power(detail::times_power(detail::symmetrized(solution.X), unit), unit);
+  found.W = detail::times_powers(detail::symmetrized(solution.X), d, d, 2 * unit - time);
   if (!found.W.allFinite()) {
     return refusal(MatrixEquationError::overflow, "the Gramian")
         .hint("measure states, inputs and outputs in units in which the entries are nearer to 1");

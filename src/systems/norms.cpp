@@ -28,10 +28,6 @@ using Eigen::MatrixXd;
 
 constexpr double relative_accuracy = 1e-10;
 
-ContinuousSystem<> scaled(const ContinuousSystem<>& system) {
-  return detail::scaled_system(system, detail::scaling_of(system.A, system.B, system.C));
-}
-
 double largest_singular_value(const MatrixXd& M) {
   return M.size() == 0 ? 0.0 : detail::singular_values_of(M)(0);
 }
@@ -118,8 +114,9 @@ class Gain {
   mutable Eigen::MatrixXcd U_, X_, G_;  // Memory for `at`.
 };
 
-/// The frequencies at which a singular value of G may be γ: eigenvalues of the Hamiltonian near the
-/// imaginary axis. Too many only cost time; `Gain` decides.
+/// The frequencies at which a singular value of G may be γ: those of the eigenvalues of the
+/// Hamiltonian on the imaginary axis. How far rounding takes them from it, nobody knows beforehand:
+/// all are told, which only costs time; `Gain` decides.
 std::vector<double> crossings(const ContinuousSystem<>& s, double gamma) {
   const Index n = s.A.rows();
   const Index m = s.B.cols();
@@ -138,11 +135,9 @@ std::vector<double> crossings(const ContinuousSystem<>& s, double gamma) {
   H.bottomLeftCorner(n, n) = -gamma * detail::transposed_product(s.C, S_C);
   H.bottomRightCorner(n, n) = -H.topLeftCorner(n, n).transpose();
   const Eigen::VectorXcd eigenvalues = detail::eigenvalues_of(H);
-  const double size = H.norm();
   std::vector<double> found;
   for (const Complex& lambda : eigenvalues) {
-    const double tolerance = std::sqrt(epsilon) * std::abs(lambda) + 100.0 * epsilon * size;
-    if (lambda.imag() >= 0.0 && std::abs(lambda.real()) <= tolerance) {
+    if (lambda.imag() >= 0.0) {
       found.push_back(lambda.imag());
     }
   }
@@ -191,7 +186,7 @@ Expected<HInfinityNorm> largest_gain(const ContinuousSystem<>& system, std::stri
   const Eigen::VectorXd sizes = poles.cwiseAbs();
   const double slowest = sizes.minCoeff();
   const double fastest = sizes.maxCoeff();
-  constexpr int grid = 48;
+  constexpr int grid = 24;
   for (int k = 0; k <= grid; ++k) {
     consider(1e-3 * slowest * std::pow(1e6 * fastest / slowest, static_cast<double>(k) / grid));
   }
@@ -202,6 +197,7 @@ Expected<HInfinityNorm> largest_gain(const ContinuousSystem<>& system, std::stri
   const bool turned = gains.at(infinity) > gains.at(0.0);
   const ContinuousSystem<> representative = turned ? inverted(system) : system;
   constexpr int most_iterations = 60;
+  double width = 1e-3;  // of the search for the peak itself
   for (best.iterations = 1; best.iterations <= most_iterations; ++best.iterations) {
     const double gamma = best.norm * (1.0 + 0.5 * relative_accuracy);
     std::vector<double> found = crossings(representative, gamma);
@@ -215,30 +211,27 @@ Expected<HInfinityNorm> largest_gain(const ContinuousSystem<>& system, std::stri
     const double before = best.norm;
     // Between neighbouring crossings the gain is above γ, or below it throughout.
     double low = 0.0;
-    for (std::size_t k = 0; k <= found.size(); ++k) {
-      if (k == found.size()) {
-        if (!found.empty()) {
-          consider(2.0 * found.back());
-        }
-        break;
-      }
-      consider(found[k]);
-      consider(0.5 * (low + found[k]));
-      low = found[k];
+    for (const double omega : found) {
+      consider(omega);
+      consider(0.5 * (low + omega));
+      low = omega;
     }
+    consider(2.0 * low);
     if (best.norm > gamma) {
       continue;
     }
-    if (found.empty() || best.norm <= before * (1.0 + relative_accuracy)) {
-      // Eigenvalues that the search cannot tell from crossings: the peak itself.
+    if (best.norm <= before * (1.0 + relative_accuracy)) {
+      // What no eigenvalue shows beyond rounding: the peak itself, and a flat hill's top.
       if (std::isfinite(best.frequency) && best.frequency > 0.0) {
-        const auto top = find_minimum([&](double omega) { return -gains.at(omega); },
-                                      best.frequency * (1.0 - 1e-3), best.frequency * (1.0 + 1e-3));
+        const auto top =
+            find_minimum([&](double omega) { return -gains.at(omega); },
+                         best.frequency * (1.0 - width), best.frequency * (1.0 + width));
         if (top && -top->value > best.norm) {
           const bool grew = -top->value > best.norm * (1.0 + 0.5 * relative_accuracy);
           best.norm = -top->value;
           best.frequency = top->x;
           if (grew) {
+            width = std::min(0.5, 4.0 * width);
             continue;
           }
         }
@@ -256,10 +249,12 @@ Expected<double> root_of_power(const ContinuousSystem<>& system, TimeDomain doma
   if (system.A.size() == 0) {
     return domain == TimeDomain::continuous ? 0.0 : system.D.norm();
   }
-  const ContinuousSystem<> s = scaled(system);
+  const auto [s, gain, time] = detail::normalized(system, domain);
   FLYBALL_TRY(auto L, detail::gramian_factor(s.A, s.B, domain, "h2_norm"));
   const double energy = product(s.C, L).norm();
-  return domain == TimeDomain::continuous ? energy : std::hypot(energy, system.D.norm());
+  // ‖G‖² = ∫ |G(jω)|² dω/2π takes the unit of time once.
+  return std::ldexp(domain == TimeDomain::continuous ? energy : std::hypot(energy, s.D.norm()),
+                    gain + time / 2);
 }
 
 }  // namespace
@@ -303,17 +298,28 @@ Expected<HInfinityNorm> gain_of_static(const MatrixXd& D) {
   return HInfinityNorm{.norm = largest_singular_value(D), .upper_bound = largest_singular_value(D)};
 }
 
+/// @param system  Without a pole on the axis.
 Expected<HInfinityNorm> norm_of(const ContinuousSystem<>& system, std::string_view where) {
-  return largest_gain(scaled(system), where);
+  const auto [s, gain, time] = detail::normalized(system, TimeDomain::continuous);
+  auto norm = largest_gain(s, where);
+  if (norm) {
+    norm->norm = std::ldexp(norm->norm, gain);
+    norm->upper_bound = std::ldexp(norm->upper_bound, gain);
+    norm->frequency = std::ldexp(norm->frequency, time);
+  }
+  return norm;
 }
 
 Expected<HInfinityNorm> norm_of(const DiscreteSystem<>& system, std::string_view where) {
   // With T = 2, s = (z - 1)/(z + 1) = j tan(ωT/2).
+  const auto [s, gain, time] =
+      detail::normalized({system.A, system.B, system.C, system.D}, TimeDomain::discrete);
   FLYBALL_TRY(auto mapped,
-              convert_to_continuous({system.A, system.B, system.C, system.D, Time(2.0)},
-                                    ConversionMethod::tustin));
-  auto norm = largest_gain(scaled(mapped), where);
+              convert_to_continuous({s.A, s.B, s.C, s.D, Time(2.0)}, ConversionMethod::tustin));
+  auto norm = norm_of(mapped, where);
   if (norm) {
+    norm->norm = std::ldexp(norm->norm, gain);
+    norm->upper_bound = std::ldexp(norm->upper_bound, gain);
     norm->frequency = 2.0 * std::atan(norm->frequency) / system.period.si();
   }
   return norm;

@@ -105,11 +105,11 @@ Expected<Continuous> companion(const Continuous& given, SystemError failure,
                        : "one column: the form is of a single input");
   }
   const detail::SystemScaling scaling = detail::scaling_of(given.A, given.B, given.C);
-  const auto [A_balanced, B, C, D] = detail::scaled_system(given, scaling);
+  auto [A_balanced, B, C, D] = detail::scaled_system(given, scaling);
   // Time in the unit of the fastest mode keeps the powers of A within range.
   const double rate =
       A_balanced.norm() > 0.0 ? std::exp2(std::round(std::log2(A_balanced.norm()))) : 1.0;
-  const MatrixXd A = A_balanced / rate;
+  MatrixXd A = A_balanced / rate;
   const double size_B = B.norm() > 0.0 ? B.norm() : 1.0;
 
   // x'₁ = qᵀx with qᵀAᵏB = 0 for k < n - 1 and 1 for the last; the others are its derivatives.
@@ -117,6 +117,15 @@ Expected<Continuous> companion(const Continuous& given, SystemError failure,
   K.col(0) = B / size_B;
   for (Index k = 1; k < n; ++k) {
     K.col(k) = product(A, K.col(k - 1));
+  }
+  // Each state in the unit in which what reaches it is near one: units make nothing unreached.
+  for (Index i = 0; i < n; ++i) {
+    const double size = K.row(i).cwiseAbs().maxCoeff();
+    const double unit = size > 0.0 && std::isfinite(size) ? std::ldexp(1.0, std::ilogb(size)) : 1.0;
+    K.row(i) /= unit;
+    A.row(i) /= unit;
+    A.col(i) *= unit;
+    C.col(i) *= unit;
   }
   double rcond = 0.0;
   const MatrixXd q =

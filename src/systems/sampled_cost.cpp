@@ -5,13 +5,43 @@
 #include <flyball/systems/discretize.hpp>
 
 #include "core/try.hpp"
+#include "math/dense/balanced.hpp"
 #include "math/dense/dense.hpp"
+#include "math/dense/ordinary_units.hpp"
+#include "systems/hold_units.hpp"
 #include "systems/quadratic_integral.hpp"
 
 namespace flyball {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+
+namespace {
+
+/// ∫₀ᵀ e^{Fᵀt} W e^{Ft} dt of F = [A B; 0 0], W = [Q N; Nᵀ R].
+Expected<MatrixXd> held_cost(const MatrixRef& A, const MatrixRef& B, const MatrixRef& W, double T) {
+  const Index n = A.rows();
+  const Index m = B.cols();
+  MatrixXd F_transposed = MatrixXd::Zero(n + m, n + m);
+  F_transposed.topLeftCorner(n, n) = A.transpose();
+  F_transposed.bottomLeftCorner(m, n) = B.transpose();
+  return detail::quadratic_integral(F_transposed, W, T);
+}
+
+/// The same in units in which doubles do: x = diag(2^states) x', u = diag(2^inputs) u'.
+Expected<MatrixXd> held_cost_in_other_units(const MatrixRef& A, const MatrixRef& B,
+                                            const MatrixRef& W, double T) {
+  const detail::HoldUnits units = detail::hold_units_of(A, B, T);
+  Eigen::VectorXi d(A.rows() + B.cols());
+  d << units.states, units.inputs;
+  const int weight = W.isZero(0.0) ? 0 : detail::largest_exponent(W, d, d);
+  FLYBALL_TRY(const auto there,
+              held_cost(units.A, units.B, detail::times_powers(W, d, d, -weight), 1.0));
+  const int power = std::ilogb(T);
+  return detail::times_powers(std::ldexp(T, -power) * there, -d, -d, weight + power);
+}
+
+}  // namespace
 
 Expected<SampledCost> sampled_cost(const MatrixRef& A, const MatrixRef& B, const MatrixRef& Q,
                                    const MatrixRef& R, const MatrixRef& N, Time period) {
@@ -33,17 +63,17 @@ Expected<SampledCost> sampled_cost(const MatrixRef& A, const MatrixRef& B, const
                     .symmetric(Q, "Q")
                     .symmetric(R, "R"));
   FLYBALL_TRY(auto held, discretize_zoh(A, B, period));
-  // Fᵀ of F = [A B; 0 0], with u in a unit in which B is of A's size.
   const double T = period.si();
+  const bool far = n > 0 && detail::needs_hold_units(A, B, T);
+  // u in a unit in which B is of A's size.
   const double size_B = detail::norm1(B);
   const double size_A = std::max(detail::norm1(A), 1.0 / T);
-  const double unit = size_B > 0.0 ? std::exp2(std::round(std::log2(size_A / size_B))) : 1.0;
-  MatrixXd F_transposed = MatrixXd::Zero(n + m, n + m);
-  F_transposed.topLeftCorner(n, n) = A.transpose();
-  F_transposed.bottomLeftCorner(m, n) = unit * B.transpose();
+  const double unit =
+      !far && size_B > 0.0 ? std::exp2(std::round(std::log2(size_A / size_B))) : 1.0;
   MatrixXd W(n + m, n + m);
   W << Q, unit * N, unit * N.transpose(), unit * unit * R;
-  FLYBALL_TRY(const auto integral, detail::quadratic_integral(F_transposed, W, T));
+  FLYBALL_TRY(const auto integral,
+              far ? held_cost_in_other_units(A, B, W, T) : held_cost(A, unit * B, W, T));
   if (!integral.allFinite()) {
     return refusal(ArgumentError::not_finite, where, "the sampled cost")
         .got("too large for a double")

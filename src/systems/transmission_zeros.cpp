@@ -7,8 +7,11 @@
 #include <vector>
 
 #include "core/try.hpp"
+#include "math/dense/balanced.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/generalized.hpp"
+#include "math/dense/ordinary_units.hpp"
+#include "math/dense/pair_scaling.hpp"
 #include "systems/balance.hpp"
 #include "systems/timed.hpp"
 
@@ -25,9 +28,35 @@ double power_of_two(double value) {
   return value > 0.0 && std::isfinite(value) ? std::exp2(std::round(std::log2(value))) : 1.0;
 }
 
+struct InUnits {
+  ContinuousSystem<> system;
+  int time = 0;  ///< Zeros of the given one are those of `system` times 2^time.
+};
+
+/// Entries that doubles may not hold in other units, brought near one by exponents alone.
+InUnits in_ordinary_units(const ContinuousSystem<>& given) {
+  const auto& [A, B, C, D] = given;
+  if (!detail::is_far(A) && !detail::is_far(B) && !detail::is_far(C) && !detail::is_far(D)) {
+    return {given};
+  }
+  // G(s) = 2^(-outputs - inputs - time) C'(s'I - A')⁻¹B' + D.
+  detail::PairScaling units = detail::pair_scaling_of(A, B, C);
+  const Eigen::VectorXi direct = (units.inputs.array() + units.time).matrix();
+  // A direct way that is larger than those through the states.
+  for (Index i = 0; i < D.rows(); ++i) {
+    if (const Eigen::RowVectorXd row = D.row(i); !row.isZero(0.0)) {
+      units.outputs(i) -=
+          std::max(0, detail::largest_exponent(row, units.outputs.segment(i, 1), direct));
+    }
+  }
+  return {{scaled_A(A, units), scaled_B(B, units), scaled_C(C, units),
+           detail::times_powers(D, units.outputs, direct, 0)},
+          units.time};
+}
+
 /// In units of states, inputs and outputs in which no row or column stands out. Zeros know none.
-ContinuousSystem<> in_balanced_units(const ContinuousSystem<>& given) {
-  ContinuousSystem<> s = given;
+InUnits in_balanced_units(const ContinuousSystem<>& given) {
+  auto [s, time] = in_ordinary_units(given);
   for (int sweep = 0; sweep < 8; ++sweep) {
     const double size = s.A.size() > 0 && !s.A.isZero(0.0) ? s.A.norm() : 1.0;
     for (Index j = 0; j < s.B.cols(); ++j) {
@@ -48,7 +77,7 @@ ContinuousSystem<> in_balanced_units(const ContinuousSystem<>& given) {
       break;
     }
   }
-  return s;
+  return {std::move(s), time};
 }
 
 Index rank_of(const Eigen::VectorXd& values, double tolerance) {
@@ -117,7 +146,7 @@ Expected<TransmissionZeros> zeros_of(const ContinuousSystem<>& given, double tol
         .got(format_number(tolerance))
         .expected("below 1");
   }
-  const ContinuousSystem<> scaled = in_balanced_units(given);
+  const auto [scaled, time] = in_balanced_units(given);
   const double size = std::sqrt(scaled.A.squaredNorm() + scaled.B.squaredNorm() +
                                 scaled.C.squaredNorm() + scaled.D.squaredNorm());
   const double small =
@@ -154,6 +183,7 @@ Expected<TransmissionZeros> zeros_of(const ContinuousSystem<>& given, double tol
   } else {
     found.zeros = detail::eigenvalues_of(A);
   }
+  found.zeros = detail::times_power(found.zeros, time);
   if (!found.zeros.allFinite()) {
     return refusal(SystemError::no_convergence, where, "the zeros")
         .got("not all finite")

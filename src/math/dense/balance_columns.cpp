@@ -36,12 +36,10 @@ void balance_columns(int n, double* A, int ld, double* d) {
       if (row < 2.0 * column && column < 2.0 * row) {
         continue;
       }
-      // Units whose ratio squared has no double would leave nothing of a quadratic form.
-      constexpr int widest = 250;
       const int unit = std::ilogb(d[i]);
       const int exponent =
           std::clamp(static_cast<int>(std::lround(0.5 * (std::log2(row) - std::log2(column)))),
-                     -widest - unit, widest - unit);
+                     -widest_unit - unit, widest_unit - unit);
       const double f = std::ldexp(1.0, exponent);
       if (exponent == 0 || column * f + row / f > 0.95 * (column + row)) {
         continue;

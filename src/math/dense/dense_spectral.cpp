@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -7,6 +8,7 @@
 #include <Eigen/SVD>
 
 #include "core/constants.hpp"
+#include "math/dense/balanced.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
 #include "math/dense/schur_kernel.hpp"
@@ -18,20 +20,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 
 namespace {
-
-/// D⁻¹AD with the powers of two d that balance it, in the unit that makes its entries ordinary.
-struct Balanced {
-  explicit Balanced(const MatrixRef& A)
-      : d(balance_of(A)), M(d.cwiseInverse().asDiagonal() * A * d.asDiagonal()), unit(unit_of(M)) {
-    if (unit != 0) {
-      M = times_power(M, -unit);
-    }
-  }
-
-  Eigen::VectorXd d;
-  MatrixXd M;
-  int unit;
-};
 
 /// Of square matrices only: what JacobiSVD prepares others by is made anew in place, and destroyed
 /// twice where memory is too short for it.
@@ -48,17 +36,40 @@ double scale_of(const MatrixRef& A) {
   return largest > 0.0 ? largest : 1.0;
 }
 
+/// Each column of D V times a power of two that leaves its largest entry near one.
+void give_units(Eigen::MatrixXcd& V, const Eigen::VectorXi& d) {
+  for (Index j = 0; j < V.cols(); ++j) {
+    int largest = std::numeric_limits<int>::min();
+    for (Index i = 0; i < V.rows(); ++i) {
+      const double size = std::abs(V(i, j));
+      largest = size > 0.0 ? std::max(largest, std::ilogb(size) + d(i)) : largest;
+    }
+    for (Index i = 0; i < V.rows(); ++i) {
+      if (V(i, j) != 0.0) {
+        V(i, j) = {std::ldexp(V(i, j).real(), d(i) - largest),
+                   std::ldexp(V(i, j).imag(), d(i) - largest)};
+      }
+    }
+  }
+}
+
 }  // namespace
 
 Eigensystem eigensystem_of(const MatrixRef& A) {
-  const Balanced balanced(A);
+  const BalancedMatrix balanced = balanced_of(A);
   Eigen::EigenSolver<MatrixXd> solver(A.rows());
   if (!balanced.M.allFinite() || solver.compute(balanced.M).info() != Eigen::Success) {
     return {Eigen::VectorXcd::Constant(A.rows(), nan),
             Eigen::MatrixXcd::Constant(A.rows(), A.cols(), nan)};
   }
-  Eigensystem system{times_power(solver.eigenvalues(), balanced.unit),
-                     balanced.d.asDiagonal() * solver.eigenvectors()};
+  Eigensystem system{times_power(solver.eigenvalues(), balanced.unit), solver.eigenvectors()};
+  if (balanced.far) {
+    give_units(system.vectors, balanced.d);
+  } else {
+    for (Index i = 0; i < A.rows(); ++i) {
+      system.vectors.row(i) *= std::ldexp(1.0, balanced.d(i));
+    }
+  }
   system.vectors.colwise().normalize();
   return system;
 }
@@ -90,7 +101,7 @@ Eigen::VectorXcd eigenvalues_of(const MatrixRef& A) {
     if (n == 0) {
       continue;
     }
-    const Balanced balanced(block);
+    const BalancedMatrix balanced = balanced_of(block);
     if (balanced.M.allFinite() && eigenvalues_quickly(balanced.M, values.segment(done, n))) {
       values.segment(done, n) = times_power(values.segment(done, n), balanced.unit);
       done += n;

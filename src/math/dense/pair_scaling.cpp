@@ -41,13 +41,14 @@ class Sum {
   double sum_ = 0.0;
 };
 
-/// A, B by their logarithms, and the units that have been found.
+/// A, B, C by their logarithms, and the units that have been found.
 struct Pair {
-  MatrixXd a, b;
-  Eigen::VectorXd e, f;
+  MatrixXd a, b, c;
+  Eigen::VectorXd e, f, g;
 
   [[nodiscard]] double A(Index i, Index j) const { return a(i, j) + e(j) - e(i); }
   [[nodiscard]] double B(Index i, Index j) const { return b(i, j) + f(j) - e(i); }
+  [[nodiscard]] double C(Index i, Index j) const { return c(i, j) + g(i) + e(j); }
 
   [[nodiscard]] double size() const {
     Sum all;
@@ -66,8 +67,16 @@ struct Pair {
     }
   }
 
+  void scale_outputs(double size) {
+    for (Index i = 0; i < c.rows(); ++i) {
+      const double largest = (c.row(i).transpose() + e).maxCoeff();
+      g(i) = largest == none ? 0.0 : size - largest;
+    }
+  }
+
   /// Each state in the unit in which what first reaches it from the inputs is of the size that
   /// cycles of one or two states show whatever the units are: far units are left behind at once.
+  /// One that nothing known reaches takes the unit in which it acts on what is known.
   void start() {
     const Index n = a.rows();
     double cycle = none;
@@ -111,10 +120,24 @@ struct Pair {
       }
       spread(from);
     }
+    const auto spread_back = [&](std::size_t from) {
+      for (std::size_t k = from; k < queue.size(); ++k) {
+        const Index j = queue[k];
+        for (Index i = 0; i < n; ++i) {
+          if (a(j, i) != none && !seen[static_cast<std::size_t>(i)]) {
+            const std::size_t found = queue.size();
+            visit(i, e(j) - a(j, i) + 2.0 * cycle);
+            spread(found);
+          }
+        }
+      }
+    };
+    spread_back(0);
     for (Index i = 0; i < n; ++i) {
       const std::size_t from = queue.size();
       visit(i, cycle);
       spread(from);
+      spread_back(from);
     }
   }
 
@@ -132,6 +155,9 @@ struct Pair {
     }
     for (Index j = 0; j < b.cols(); ++j) {
       rows = std::max(rows, B(i, j));
+    }
+    for (Index j = 0; j < c.rows(); ++j) {
+      columns = std::max(columns, C(j, i));
     }
     if (rows == none && columns == none) {
       return false;
@@ -182,27 +208,27 @@ double cycle_mean_of(const MatrixRef& A) {
   return most;
 }
 
-PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B) {
+PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C) {
   constexpr int sweeps = 200;
-  constexpr double ordinary = 100.0;
   const Index n = A.rows();
-  Pair pair{logarithms(A), logarithms(B), Eigen::VectorXd::Zero(n),
-            Eigen::VectorXd::Zero(B.cols())};
-  const auto far = [&](const MatrixXd& M) {
-    return (M.array() != none && M.array().abs() > ordinary).any();
-  };
-  if (far(pair.a) || far(pair.b)) {
-    pair.start();
-    pair.e = pair.e.array().round();
-  }
+  Pair pair{logarithms(A),
+            logarithms(B),
+            logarithms(C),
+            Eigen::VectorXd::Zero(n),
+            Eigen::VectorXd::Zero(B.cols()),
+            Eigen::VectorXd::Zero(C.rows())};
+  pair.start();
+  pair.e = pair.e.array().round();
   // It stays as it is: if it followed the entries that are brought to it, all would run away.
   const double cycle = cycle_mean_of(A);
   const double size = cycle == none ? pair.size() : cycle;
-  // Steps of all states together only change the inputs' units, whether in one sweep or in turns of
-  // several: then units are those of a sweep before, but for one factor (Brent's search).
+  // Steps of all states together only change the inputs' and the outputs' units, whether in one
+  // sweep or in turns of several: then units are those of a sweep before, but for one factor
+  // (Brent's search).
   Eigen::VectorXd before = pair.e;
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     pair.scale_inputs(size);
+    pair.scale_outputs(size);
     bool changed = false;
     for (Index k = 0; k < n; ++k) {
       changed = pair.balance(k, size) || changed;
@@ -214,7 +240,8 @@ PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B) {
       before = pair.e;
     }
   }
-  PairScaling scaling{Eigen::VectorXi(n), Eigen::VectorXi::Zero(B.cols()), whole(pair.size())};
+  PairScaling scaling{Eigen::VectorXi(n), Eigen::VectorXi::Zero(B.cols()), whole(pair.size()),
+                      Eigen::VectorXi::Zero(C.rows())};
   for (Index i = 0; i < n; ++i) {
     scaling.states(i) = whole(pair.e(i));
   }
@@ -229,7 +256,14 @@ PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B) {
   for (Index j = 0; j < B.cols(); ++j) {
     scaling.inputs(j) += columns(j) > 0.0 ? whole(std::log2(share / columns(j))) : 0;
   }
+  for (Index i = 0; i < C.rows(); ++i) {
+    scaling.outputs(i) = whole(pair.g(i) - size);
+  }
   return scaling;
+}
+
+PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B) {
+  return pair_scaling_of(A, B, MatrixXd(0, A.cols()));
 }
 
 MatrixXd scaled_A(const MatrixRef& A, const PairScaling& scaling) {
@@ -241,6 +275,12 @@ MatrixXd scaled_A(const MatrixRef& A, const PairScaling& scaling) {
 MatrixXd scaled_B(const MatrixRef& B, const PairScaling& scaling) {
   return MatrixXd::NullaryExpr(B.rows(), B.cols(), [&](Index i, Index j) {
     return std::ldexp(B(i, j), scaling.inputs(j) - scaling.states(i));
+  });
+}
+
+MatrixXd scaled_C(const MatrixRef& C, const PairScaling& scaling) {
+  return MatrixXd::NullaryExpr(C.rows(), C.cols(), [&](Index i, Index j) {
+    return std::ldexp(C(i, j), scaling.outputs(i) + scaling.states(j));
   });
 }
 

@@ -8,12 +8,13 @@
 /// that neither overflow nor rounding can come from them.
 namespace flyball::detail {
 
-/// x = diag(2^states) x', u = diag(2^inputs) u', t = 2^-time t': A = 2^time D A' D⁻¹, and B' has
-/// the size of A'.
+/// x = diag(2^states) x', u = diag(2^inputs) u', y' = diag(2^outputs) y, t = 2^-time t':
+/// A = 2^time D A' D⁻¹, and B' and C' have the size of A'.
 struct PairScaling {
   Eigen::VectorXi states;
   Eigen::VectorXi inputs;
   int time = 0;
+  Eigen::VectorXi outputs{};
 };
 
 /// The binary logarithm of the largest geometric mean of |A|'s entries along a cycle of states,
@@ -22,17 +23,20 @@ struct PairScaling {
 /// 23 (1978).
 [[nodiscard]] double cycle_mean_of(const MatrixRef& A);
 
-/// The units in which row and column of each state in [A B; 0 0] are of like size, without the
+/// The units in which row and column of each state in [A B; C 0] are of like size, without the
 /// diagonal (Osborne's iteration, on logarithms); each input's and time's own unit make the largest
-/// entry of its column and of A' one. A state that
+/// entry of its column and of A' one, and each output's that of its row. A state that
 /// acts on nothing, or on which nothing acts, takes the unit in which what it has is of the size
 /// that A's cycles have in any units.
 /// Cost: O(n³), and O(n (n + m)) a sweep, at most 200.
 /// Source: Osborne, "On pre-conditioning of matrices", J. ACM 7 (1960).
 [[nodiscard]] PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B);
+[[nodiscard]] PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B,
+                                          const MatrixRef& C);
 
-/// A', B' of the above.
+/// A', B', C' of the above.
 [[nodiscard]] Eigen::MatrixXd scaled_A(const MatrixRef& A, const PairScaling& scaling);
 [[nodiscard]] Eigen::MatrixXd scaled_B(const MatrixRef& B, const PairScaling& scaling);
+[[nodiscard]] Eigen::MatrixXd scaled_C(const MatrixRef& C, const PairScaling& scaling);
 
 }  // namespace flyball::detail

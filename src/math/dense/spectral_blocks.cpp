@@ -4,6 +4,7 @@
 #include <numeric>
 #include <optional>
 
+#include "math/dense/balanced.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
 #include "math/dense/spectral_blocks.hpp"
@@ -75,25 +76,6 @@ std::vector<Indices> parts_of(const MatrixRef& A) {
   return parts;
 }
 
-/// In units in which rows and columns are of like size, and the largest entry is near one.
-struct BalancedBlock {
-  MatrixXd M;
-  int unit = 0;
-};
-
-BalancedBlock balanced(const MatrixXd& A) {
-  const Eigen::VectorXd d = balance_of(A);
-  const auto exponent = [](double x) { return std::ilogb(x); };
-  const Eigen::VectorXi units = d.unaryExpr(exponent).cast<int>();
-  const int before = largest(A) > 0.0 ? std::ilogb(largest(A)) : 0;
-  BalancedBlock made{times_powers(A, -units, units, -before), before};
-  const int more = largest(made.M) > 0.0 ? std::ilogb(largest(made.M)) : 0;
-  made.unit += more;
-  // At once from what was given, so that nothing small is lost twice.
-  made.M = times_powers(A, -units, units, -made.unit);
-  return made;
-}
-
 struct Decoupled {
   MatrixXd fast;
   MatrixXd slow;
@@ -148,7 +130,7 @@ std::optional<Decoupled> decoupled(const MatrixXd& M) {
 
 void add_blocks(const MatrixXd& A, int unit, std::vector<MatrixXd>& blocks) {
   if (is_spread(A)) {
-    const BalancedBlock made = balanced(A);
+    const BalancedMatrix made = balanced_of(A);
     if (const auto parts = decoupled(made.M)) {
       add_blocks(parts->fast, unit + made.unit, blocks);
       add_blocks(parts->slow, unit + made.unit, blocks);
@@ -172,7 +154,7 @@ std::vector<MatrixXd> spectral_blocks(const MatrixRef& A) {
     const std::size_t before = blocks.size();
     add_blocks(A(part, part), 0, blocks);
     for (std::size_t k = before; k < blocks.size(); ++k) {
-      const BalancedBlock made = balanced(blocks[k]);
+      const BalancedMatrix made = balanced_of(blocks[k]);
       const double size = std::ldexp(largest(made.M), made.unit);
       most = std::max(most, size);
       least = size > 0.0 ? std::min(least, size) : least;

@@ -42,7 +42,11 @@ class Exponential {
     if (triangular) {
       copy(original_, A_);
     } else {
+      given_norm_ = norm1(A_);
       balance(n_, A_, d_, sums_, next_);
+      for (int i = 0; i < n; ++i) {
+        has_units_ = has_units_ || d_[i] != 1.0;
+      }
     }
     const int squarings = approximate();
     double* result = V_;
@@ -178,6 +182,57 @@ class Exponential {
     return std::max(0, static_cast<int>(std::ceil((log2_alpha + 53.0) / (2.0 * p.order))));
   }
 
+  /// Extra squarings in the units that were given: what the series leaves out is next to nothing
+  /// beside the balanced 2⁻ˢA, but may count beside the given one, where what the balanced units
+  /// made small is not. ‖ |A|ᵏ ‖₁ for k from 2m + 1 on, through paths of any length.
+  [[nodiscard]] int extra_squarings_of_given(const Pade& p, int prescale, int s) {
+    if (!has_units_) {
+      return 0;
+    }
+    const double log2_norm = std::log2(given_norm_) - prescale - s;
+    if (2.0 * p.order * log2_norm - p.log2_inverse_error + 53.0 <= 0.0) {
+      return 0;
+    }
+    double* const T = W_;
+    for (int k = 0; k < size(); ++k) {
+      T[k] = 0.0;
+    }
+    for (int j = 0; j < n_(); ++j) {
+      for (int i = 0; i < n_(); ++i) {
+        T[j + i * ld()] = std::ldexp(std::abs(A_[i + j * ld()]), -s);
+      }
+    }
+    double* sums = sums_;
+    double* next = next_;
+    for (int i = 0; i < ld(); ++i) {
+      sums[i] = i < n_() ? d_[i] : 0.0;
+    }
+    double log2_most = -std::numeric_limits<double>::infinity();
+    double log2_size = 0.0;  // of what the sums were divided by
+    for (int k = 1; k <= 2 * p.order + n_(); ++k) {
+      multiply(n_, next, ld(), T, ld(), sums, ld(), n_(), 1);
+      std::swap(sums, next);
+      double of_sums = 0.0;
+      double largest = 0.0;
+      for (int i = 0; i < n_(); ++i) {
+        of_sums = std::max(of_sums, sums[i]);
+        largest = std::max(largest, sums[i] / d_[i]);
+      }
+      if (!(of_sums > 0.0)) {
+        break;
+      }
+      if (k > 2 * p.order) {
+        log2_most = std::max(log2_most, std::log2(largest) + log2_size);
+      }
+      for (int i = 0; i < n_(); ++i) {
+        sums[i] /= of_sums;
+      }
+      log2_size += std::log2(of_sums);
+    }
+    const double log2_alpha = log2_most - log2_norm - p.log2_inverse_error;
+    return std::max(0, static_cast<int>(std::ceil((log2_alpha + 53.0) / (2.0 * p.order))));
+  }
+
   /// By which ‖Aᵏ‖^(1/k) = eta comes within the reach of the highest order.
   static int squarings_for(double eta) {
     return eta > pade[4].theta ? static_cast<int>(std::ceil(std::log2(eta / pade[4].theta))) : 0;
@@ -205,17 +260,20 @@ class Exponential {
     }
     square(A2_, A_, A_);
     // ‖A‖ bounds every ‖Aᵏ‖^(1/k), and where it serves, no squaring can be called for.
-    if (norm <= pade[0].theta) {
+    const auto serves = [&](const Pade& p) {
+      return extra_squarings_of_given(p, prescale, 0) == 0;
+    };
+    if (norm <= pade[0].theta && serves(pade[0])) {
       quotient(pade[0]);
       return 0;
     }
     square(A4_, A2_, A2_);
-    if (norm <= pade[1].theta) {
+    if (norm <= pade[1].theta && serves(pade[1])) {
       quotient(pade[1]);
       return 0;
     }
     square(A6_, A2_, A4_);
-    if (norm <= pade[2].theta) {
+    if (norm <= pade[2].theta && serves(pade[2])) {
       quotient(pade[2]);
       return 0;
     }
@@ -224,7 +282,8 @@ class Exponential {
     const bool unscaled = prescale == 0;
     const double eta1 = std::max(d4, d6);
     for (int k = 0; k < 2; ++k) {
-      if (unscaled && eta1 <= pade[k].theta && extra_squarings(pade[k], norm, 0) == 0) {
+      if (unscaled && eta1 <= pade[k].theta && extra_squarings(pade[k], norm, 0) == 0 &&
+          serves(pade[k])) {
         quotient(pade[k]);
         return 0;
       }
@@ -237,7 +296,8 @@ class Exponential {
       const double d8 = std::sqrt(std::sqrt(std::sqrt(norm1(A8()))));
       const double eta3 = std::max(d6, d8);
       for (int k = 2; k < 4; ++k) {
-        if (unscaled && eta3 <= pade[k].theta && extra_squarings(pade[k], norm, 0) == 0) {
+        if (unscaled && eta3 <= pade[k].theta && extra_squarings(pade[k], norm, 0) == 0 &&
+            serves(pade[k])) {
           quotient(pade[k]);
           return 0;
         }
@@ -249,6 +309,7 @@ class Exponential {
       }
     }
     s += extra_squarings(pade[4], norm, s);
+    s += extra_squarings_of_given(pade[4], prescale, s);
     scale(A_, std::ldexp(1.0, -s));
     scale(A2_, std::ldexp(1.0, -2 * s));
     scale(A4_, std::ldexp(1.0, -4 * s));
@@ -356,6 +417,8 @@ class Exponential {
   Size<N> n_;
   double *A_, *A2_, *A4_, *A6_, *U_, *V_, *W_, *T_, *original_;
   double *sums_, *next_, *d_;
+  double given_norm_ = 0.0;
+  bool has_units_ = false;
 };
 
 void exponential(int n, const double* A, double* E, double* memory) {

@@ -13,6 +13,7 @@
 
 #include "core/error_rows.hpp"
 #include "core/try.hpp"
+#include "math/dense/balanced.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/ordinary_units.hpp"
 #include "math/exponential/extended_function.hpp"
@@ -354,8 +355,10 @@ ErrorInfo error_info(MatrixFunctionError code) {
   return detail::info_of(code, "matrix_function", rows);
 }
 
-Expected<MatrixXd> logm(const MatrixRef& A) {
-  FLYBALL_CHECK(Checks("logm").square(A, "A").finite(A, "A"));
+namespace {
+
+/// log A of an A in ordinary units of its states.
+Expected<MatrixXd> logarithm_of(const MatrixRef& A) {
   if (detail::unit_of(A) != 0) {
     // Between the largest and the smallest, so that neither is lost.
     const double least =
@@ -371,19 +374,39 @@ Expected<MatrixXd> logm(const MatrixRef& A) {
   return confirmed(A, std::move(L));
 }
 
-Expected<MatrixXd> powm(const MatrixRef& A, double power) {
-  constexpr std::string_view where = "powm";
-  FLYBALL_CHECK(Checks(where).square(A, "A").finite(A, "A").finite(power, "power"));
-  constexpr double largest = 1e9;
-  if (std::abs(power) > largest) {
-    return refusal(ArgumentError::out_of_range, where, "power")
-        .got(format_number(power))
-        .expected("at most 1e9 in magnitude");
+/// f(A) = D f(D⁻¹AD) D⁻¹, in units in which no entry of D⁻¹AD is beyond its cycles, where those of
+/// A are too far apart for doubles to be their units.
+/// @param degree  Of f(cA) = c^degree f(A), which lets the largest entry be near one; 0: it does
+/// not.
+template <class Function>
+Expected<MatrixXd> in_units(const MatrixRef& A, std::string_view where, const Function& f,
+                            double degree = 0.0) {
+  constexpr double cycles_alone = -std::numeric_limits<double>::infinity();
+  const auto units = A.rows() > 1 ? detail::far_units_of(A, cycles_alone) : std::nullopt;
+  if (!units) {
+    return f(A);
   }
-  // Quotients such as L/T of decimal fractions are seldom whole to the last bit.
-  const double nearest = std::round(power);
-  const bool whole = std::abs(power - nearest) <= 1e-12 * std::max(1.0, std::abs(power));
-  const double magnitude = std::abs(whole ? nearest : power);
+  const int unit = degree == 0.0 ? 0 : detail::largest_exponent(A, -units->d, units->d);
+  constexpr double beyond_any = 9999.0;
+  const int back = static_cast<int>(std::clamp(degree * unit, -beyond_any, beyond_any));
+  FLYBALL_TRY(const MatrixXd made, f(units->there(A, -unit)));
+  MatrixXd given = units->back(made, back);
+  if (!given.allFinite()) {
+    return refusal(MatrixFunctionError::overflow, where);
+  }
+  return given;
+}
+
+/// Quotients such as L/T of decimal fractions are seldom whole to the last bit.
+bool is_whole(double power) {
+  return std::abs(power - std::round(power)) <= 1e-12 * std::max(1.0, std::abs(power));
+}
+
+/// A^power, both finite.
+Expected<MatrixXd> power_of(const MatrixRef& A, double power) {
+  constexpr std::string_view where = "powm";
+  const bool whole = is_whole(power);
+  const double magnitude = std::abs(whole ? std::round(power) : power);
   const double integer = std::floor(magnitude);
   MatrixXd base = A;
   if (power < 0.0 && whole && integer > 0.0) {
@@ -405,6 +428,27 @@ Expected<MatrixXd> powm(const MatrixRef& A, double power) {
     return refusal(MatrixFunctionError::overflow, where);
   }
   return result;
+}
+
+}  // namespace
+
+Expected<MatrixXd> logm(const MatrixRef& A) {
+  FLYBALL_CHECK(Checks("logm").square(A, "A").finite(A, "A"));
+  return in_units(A, "logm", [](const MatrixRef& M) { return logarithm_of(M); });
+}
+
+Expected<MatrixXd> powm(const MatrixRef& A, double power) {
+  constexpr std::string_view where = "powm";
+  FLYBALL_CHECK(Checks(where).square(A, "A").finite(A, "A").finite(power, "power"));
+  constexpr double largest = 1e9;
+  if (std::abs(power) > largest) {
+    return refusal(ArgumentError::out_of_range, where, "power")
+        .got(format_number(power))
+        .expected("at most 1e9 in magnitude");
+  }
+  return in_units(
+      A, where, [&](const MatrixRef& M) { return power_of(M, power); },
+      is_whole(power) ? std::round(power) : 0.0);
 }
 
 }  // namespace flyball

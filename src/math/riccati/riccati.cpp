@@ -184,6 +184,12 @@ namespace detail {
 
 namespace {
 
+/// (M + Mᵀ)/2, where the sum has a double.
+Eigen::MatrixXd symmetric_part(const ConstMap& M) {
+  Eigen::MatrixXd mean = symmetrized(M);
+  return mean.allFinite() ? mean : Eigen::MatrixXd(0.5 * M + 0.5 * M.transpose());
+}
+
 Expected<void> solve_riccati_within(const RiccatiData& data, RiccatiAnswer& answer,
                                     CarefulWork* work) {
   constexpr double nearly_nothing = 0x1p-800;
@@ -211,7 +217,8 @@ Expected<void> solve_riccati_within(const RiccatiData& data, RiccatiAnswer& answ
   const ConstMap R(data.R, m, m);
   const Eigen::MatrixXd N = cross_weight(data);
   FLYBALL_CHECK(check_values(A, B, Q, R, N, data.continuous ? "care" : "dare"));
-  const RiccatiProblem problem{A, B, symmetrized(Q), symmetrized(R), N, data.continuous, 0, work};
+  const RiccatiProblem problem{A, B,   symmetric_part(Q), symmetric_part(R), N, data.continuous,
+                               0, work};
   FLYBALL_TRY(auto solution,
               ordinary ? solve_riccati_robustly(problem) : solve_riccati_in_other_units(problem));
   Eigen::Map<Eigen::MatrixXd>(answer.X, n, n) = solution.X;

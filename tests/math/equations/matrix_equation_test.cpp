@@ -347,5 +347,27 @@ TEST(MatrixEquation, AnyFiniteEntries) {
   EXPECT_GT(answers, 1000);
 }
 
+// a² x - x = -q, a x b - x = c where the products of a and b have no double: x = -q/a², c/(a b).
+TEST(MatrixEquation, DiscreteOfLargeEntries) {
+  const auto x = discrete_lyapunov(scalar(1e155), scalar(1e20));
+  ASSERT_TRUE(x.has_value());
+  EXPECT_NEAR(x->X(0, 0) / -1e-290, 1.0, 1e-14);
+  const auto y = discrete_sylvester(scalar(1e170), scalar(1e170), scalar(1e300));
+  ASSERT_TRUE(y.has_value());
+  EXPECT_NEAR(std::abs(y->X(0, 0)) / 1e-40, 1.0, 1e-14);
+  // What is small beside what is large keeps the x of its own: diag(1e160, 1/2), ones as Q.
+  MatrixXd A = MatrixXd::Zero(2, 2);
+  A.diagonal() << 1e150, 0.5;
+  const auto both = discrete_lyapunov(A, MatrixXd::Ones(2, 2));
+  ASSERT_TRUE(both.has_value());
+  EXPECT_NEAR(both->X(1, 1), 4.0 / 3.0, 1e-14);
+  EXPECT_NEAR(both->X(0, 0) / -1e-300, 1.0, 1e-12);
+  EXPECT_NEAR(both->X(0, 1) / (-1.0 / (0.5e150 - 1.0)), 1.0, 1e-12);
+  // Eigenvalues whose product is one are told as they are, not in the units of the computation.
+  const auto none = discrete_sylvester(scalar(1e170), scalar(1e-170), scalar(1.0));
+  ASSERT_FALSE(none.has_value());
+  EXPECT_TRUE(none.error().is(MatrixEquationError::no_unique_solution));
+}
+
 }  // namespace
 }  // namespace flyball::matrix_equation_test

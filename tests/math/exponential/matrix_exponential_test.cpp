@@ -200,6 +200,26 @@ TEST(MatrixExponential, BalanceStaysWithinDoubles) {
   EXPECT_LE((expm(ring).value() - wanted).cwiseAbs().maxCoeff(), 4e-16);
 }
 
+// A chain whose end feeds back weakly: units that balance it make the chain's steps small, but not
+// what the series would leave out there: the path through all of them, 1/(n - 1)!.
+TEST(MatrixExponential, WeakFeedbackLeavesTheChain) {
+  for (const int n : {3, 5, 8, 10, 16}) {
+    for (const double feedback : {1e-6, 1e-12, 1e-20, 1e-40, 1e-80}) {
+      MatrixXd A = MatrixXd::Zero(n, n);
+      A.diagonal(-1).setOnes();
+      A(0, n - 1) = feedback;
+      // Once round the ring at most: feedback² is nothing.
+      const MatrixXd wanted = MatrixXd::NullaryExpr(n, n, [&](Eigen::Index i, Eigen::Index j) {
+        const auto steps = static_cast<double>(i - j);
+        return (i >= j ? 1.0 / std::tgamma(steps + 1.0) : 0.0) +
+               feedback / std::tgamma(n + steps + 1.0);
+      });
+      EXPECT_LE((expm(A).value() - wanted).cwiseAbs().maxCoeff(), 4e-16 + feedback * feedback)
+          << n << " states, feedback " << feedback;
+    }
+  }
+}
+
 // A column of zeros leaves that of the identity to the last bit, and a stiff motor's position its
 // digits for any number of squarings: SciPy 1.15 keeps 7e-15 of this one.
 TEST(MatrixExponential, IntegratorBesideStiffModes) {
@@ -211,6 +231,34 @@ TEST(MatrixExponential, IntegratorBesideStiffModes) {
   EXPECT_EQ(E.col(0), Eigen::Vector4d::UnitX());
   EXPECT_NEAR(E(0, 1) / 0.4975124378109453, 1.0, 5e-14);
   EXPECT_NEAR(E(0, 2) / 0.04975124378109453, 1.0, 5e-14);
+}
+
+// exp(D A D⁻¹) = D exp(A) D⁻¹: units of states, by powers of two, round nothing.
+TEST(MatrixExponential, InOtherUnitsOfStates) {
+  Random random(21);
+  for (int trial = 0; trial < 120; ++trial) {
+    const Eigen::Index n = 2 + trial % 7;
+    const MatrixXd A = random_matrix(random, n);
+    // Neighbours up to 1e±100 apart, or all states up to 1e±250.
+    Eigen::VectorXi d(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      d(i) = static_cast<int>(std::round(random.uniform(-430.0, 430.0)));
+    }
+    const MatrixXd there = MatrixXd::NullaryExpr(
+        n, n, [&](Eigen::Index i, Eigen::Index j) { return std::ldexp(A(i, j), d(i) - d(j)); });
+    const auto found = expm(there);
+    ASSERT_TRUE(found.has_value());
+    const MatrixXd back = MatrixXd::NullaryExpr(n, n, [&](Eigen::Index i, Eigen::Index j) {
+      return std::ldexp((*found)(i, j), d(j) - d(i));
+    });
+    EXPECT_LT(relative_error(back, expm(A).value()), 1e-13) << there;
+  }
+  const MatrixXd A{{1.0, 1e170}, {1e-170, 2.0}};
+  // mpmath: exp of [1 1; 1 2].
+  EXPECT_NEAR(expm(A).value()(0, 0), 4.8489, 1e-3);
+  EXPECT_LT(relative_error(expm(A).value().col(0).head(1),
+                           expm(MatrixXd{{1.0, 1.0}, {1.0, 2.0}}).value().col(0).head(1)),
+            1e-15);
 }
 
 }  // namespace

@@ -303,5 +303,46 @@ TEST(MatrixLogarithm, OfAnySize) {
   EXPECT_TRUE(none.error().is(MatrixFunctionError::no_real_logarithm));
 }
 
+// f(D A D⁻¹) = D f(A) D⁻¹: units of states, by powers of two, round nothing.
+TEST(MatrixFunction, InOtherUnitsOfStates) {
+  Random random(22);
+  const auto in_units = [](const Eigen::MatrixXd& M, const Eigen::VectorXi& d, int sign) {
+    return Eigen::MatrixXd(Eigen::MatrixXd::NullaryExpr(
+        M.rows(), M.cols(),
+        [&](Eigen::Index i, Eigen::Index j) { return std::ldexp(M(i, j), sign * (d(i) - d(j))); }));
+  };
+  const auto expect_same = [&](const Expected<Eigen::MatrixXd>& found, const Eigen::VectorXi& d,
+                               const Eigen::MatrixXd& wanted) {
+    ASSERT_TRUE(found.has_value());
+    EXPECT_LE((in_units(*found, d, -1) - wanted).norm(), 1e-12 * wanted.norm());
+  };
+  for (int trial = 0; trial < 60; ++trial) {
+    const Eigen::Index n = 2 + trial % 4;
+    const Eigen::MatrixXd A = 0.3 * normal(random, n) + 2.0 * Eigen::MatrixXd::Identity(n, n);
+    Eigen::VectorXi d(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      d(i) = static_cast<int>(std::round(random.uniform(-430.0, 430.0)));
+    }
+    const Eigen::MatrixXd there = in_units(A, d, 1);
+    expect_same(logm(there), d, logm(A).value());
+    for (const double p : {0.3, -0.5, 3.0, -2.0}) {
+      expect_same(powm(there, p), d, powm(A, p).value());
+    }
+  }
+  // Cubes of a defective block, 3a²b of which is a subnormal, and A⁻¹ of entries near the largest.
+  const auto cube = powm(Eigen::Matrix2d{{1e-155, 0.25}, {0.0, 1e-155}}, 3.0).value();
+  EXPECT_NEAR(cube(0, 1) / 7.5e-311, 1.0, 1e-11);
+  EXPECT_NEAR(powm(Eigen::Matrix2d{{1.0, 1.7e308}, {0.0, 2.0}}, -1.0).value()(0, 1) / -0.85e308,
+              1.0, 1e-15);
+  // Exactly: the root of [3 1; 1 2] is [a b; b a - b], of which 2ab - b² = 1, a² + b² = 3.
+  const Eigen::MatrixXd root = powm(Eigen::Matrix2d{{3.0, 1e170}, {1e-170, 2.0}}, 0.5).value();
+  const double a = root(0, 0);
+  const double b = root(0, 1) / 1e170;
+  EXPECT_NEAR(a * a + b * b, 3.0, 1e-14);
+  EXPECT_NEAR(2.0 * a * b - b * b, 1.0, 1e-14);
+  EXPECT_NEAR(root(1, 1), a - b, 1e-14);
+  EXPECT_NEAR(root(1, 0) * 1e170, b, 1e-14);
+}
+
 }  // namespace
 }  // namespace flyball::matrix_function_test
