@@ -161,11 +161,11 @@ Error given_up(const std::string& path, const Outcome& outcome, const Bounds& bo
 }
 
 ExpectedAll<LogRows> rows_of(const LogFiles& logs, const study::Shard& shard,
-                             const recording::LogSelection& selection, const Bounds& bounds,
+                             const study::IdentifyJob& said_of_all, const Bounds& bounds,
                              const Journal* journal, const KnownRows& known) {
   LogRows rows{logs.paths.size(), {}};
   std::vector<std::size_t> tasks;
-  const std::string settings = study::settings_of(selection);
+  const std::string settings = study::settings_of(said_of_all);
   for (std::size_t number = 0; number < logs.paths.size(); ++number) {
     const auto found = known.find(logs.paths[number]);
     if (shard.holds(number)) {
@@ -174,11 +174,16 @@ ExpectedAll<LogRows> rows_of(const LogFiles& logs, const study::Shard& shard,
       rows.rows.push_back({number, found->second});  // another part's, in the same folder
     }
   }
+  const auto job_of = [&](std::size_t task) {
+    study::IdentifyJob job = said_of_all;
+    job.log = logs.paths[tasks[task]];
+    return job;
+  };
   const auto work = [&](std::size_t task) {
-    const std::string& path = logs.paths[tasks[task]];
-    const auto found = known.find(path);
-    const bool done = found != known.end() && study::still_holds(found->second, selection);
-    const LogRow row = done ? found->second : study::identify_row(path, selection);
+    const study::IdentifyJob job = job_of(task);
+    const auto found = known.find(job.log);
+    const bool done = found != known.end() && study::still_holds(found->second, job);
+    const LogRow row = done ? found->second : study::identify_row(job);
     // A letter says whether it is new.
     return (done ? "k" : "n") + study::to_json_line({tasks[task], row}, logs.paths.size());
   };
@@ -192,7 +197,7 @@ ExpectedAll<LogRows> rows_of(const LogFiles& logs, const study::Shard& shard,
     NumberedRow row =
         whole ? std::move(answered->rows.front())
               : NumberedRow{tasks[task],
-                            study::refused_row(path, selection, given_up(path, outcome, bounds))};
+                            study::refused_row(job_of(task), given_up(path, outcome, bounds))};
     if (journal != nullptr && whole && outcome.answer.front() == 'n') {
       journal->add(outcome.answer.substr(1));
     }
@@ -209,7 +214,7 @@ ExpectedAll<LogRows> rows_of(const LogFiles& logs, const study::Shard& shard,
 }
 
 /// What the options and a project file say of every log.
-ExpectedAll<recording::LogSelection> selection_of(const JobInput& input) {
+ExpectedAll<study::IdentifyJob> said_of_all_logs(const JobInput& input) {
   if (!input.project.empty()) {
     const auto project = study::read_project_beside_log(input.project, input.given);
     if (!project) {
@@ -225,9 +230,7 @@ ExpectedAll<recording::LogSelection> selection_of(const JobInput& input) {
               .hint("several runs stand in one log: where its time jumps a new one begins")));
     }
   }
-  return study::identify_job(input.path, input.project, input.given).map([](auto job) {
-    return std::move(job.selection);
-  });
+  return study::identify_job(input.path, input.project, input.given);
 }
 
 }  // namespace
@@ -279,9 +282,9 @@ int identify_each(JobInput& input, const EachOptions& options, const CommonOptio
   if (!shard) {
     return refuse(shard.error());
   }
-  const auto selection = selection_of(input);
-  if (!selection) {
-    return refuse(selection.error());
+  const auto said = said_of_all_logs(input);
+  if (!said) {
+    return refuse(said.error());
   }
   const auto logs = logs_of(input, common.out);
   if (!logs) {
@@ -302,8 +305,7 @@ int identify_each(JobInput& input, const EachOptions& options, const CommonOptio
   bounds.processes = options.jobs > 0 ? options.jobs : usable_processors();
   bounds.seconds = options.log_seconds > 0.0 ? options.log_seconds : bounds.seconds;
   bounds.megabytes = options.log_megabytes > 0 ? options.log_megabytes : bounds.megabytes;
-  const auto rows =
-      rows_of(*logs, *shard, *selection, bounds, journal ? &*journal : nullptr, known);
+  const auto rows = rows_of(*logs, *shard, *said, bounds, journal ? &*journal : nullptr, known);
   if (!rows) {
     return refuse(rows.error());
   }

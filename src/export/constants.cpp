@@ -70,10 +70,14 @@ std::string heading(const MechanismConstants& of, std::string_view library, bool
   const std::string late = of.delay > 0.0 ? fmt::format(" and a measurement that is {} ms old",
                                                         format_number(1e3 * of.delay, 3))
                                           : "";
+  const std::string none = of.no_feedback.empty()
+                               ? ""
+                               : fmt::format("// There is no feedback, kP and kD are 0: {}.\n",
+                                             comment_text(of.no_feedback));
   return comments(
-      fmt::format("// {}, for {}.\n// Loop period {} ms{}{}; volts are at the motor.\n", called(of),
-                  library, own ? "1" : format_number(1e3 * of.period, 4),
-                  own ? ", on the controller" : "", late.empty() || !own ? late : "," + late),
+      fmt::format("// {}, for {}.\n// Loop period {} ms{}{}; volts are at the motor.\n{}",
+                  called(of), library, own ? "1" : format_number(1e3 * of.period, 4),
+                  own ? ", on the controller" : "", late.empty() || !own ? late : "," + late, none),
       language);
 }
 

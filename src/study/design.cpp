@@ -69,14 +69,14 @@ void add_margin_warnings(const LoopDesign& loop, const DesignJob& job,
     return;
   }
   warn(diagnostics, "thin_margins",
-       "the tolerances leave a gain margin of {}, a phase margin of {}° and {} over {} with {} ms "
+       "the tolerances leave a gain margin of {}, a phase margin of {}° and {} over {} with {} "
        "of delay; looser tolerances are safer",
        format_number(loop.margins.gain_margin_up, 3), format_number(loop.margins.phase_margin, 3),
        !loop.robust    ? "no stability"
        : loop.predicts ? fmt::format("stability with an overshoot of up to {}",
                                      text::percent(loop.worst_overshoot, 2))
                        : "stability",
-       varied(job), format_number(1e3 * job.controller.delay.value_or(0.0), 3));
+       varied(job), text::seconds(job.controller.delay.value_or(0.0)));
 }
 
 LoopMargins margins_of(const LoopDesign& loop, bool feedback) {
@@ -131,6 +131,16 @@ Eigen::MatrixXd gain_to_paste(const LoopDesign& loop, const LinearModel& model,
   return other ? other->K_delayed : Eigen::MatrixXd::Zero(loop.K.rows(), loop.K.cols());
 }
 
+// A gain that makes no difference is none: rounding does not decide what is said of it. `K` stays,
+// as the tolerances' without delay.
+void leave_out_feedback(LoopDesign& loop) {
+  loop.K_delayed.setZero();
+  loop.regulator.K.setZero();
+  loop.robustness.clear();
+  loop.robust = true;
+  loop.worst_overshoot = 0.0;
+}
+
 Expected<void> simulate_response(DesignResult& result) {
   FLYBALL_TRY(auto simulated,
               simulate_design(result, {.measurement_noise = *result.job.estimator.measurement_std,
@@ -161,7 +171,8 @@ Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
     if (!(job.plant.kA_upper_bound > 0.0)) {
       warn(result.diagnostics, "kA_not_bounded",
            "nothing is known of kA, not even an upper bound: the loop was checked for a mechanism "
-           "without inertia alone, and a heavy one may overshoot or be unstable (set gains.kA)");
+           "without inertia alone, and a heavy one may overshoot or be unstable (set gains.kA or "
+           "gains.kA_upper_bound)");
     }
   }
   const bool chosen = job.controller.state_tolerance.empty();
@@ -169,18 +180,21 @@ Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
   if (!chosen && result.velocity_servo && job.controller.state_tolerance.size() == 2) {
     job.controller.state_tolerance.resize(1);
   }
-  FLYBALL_TRY(const LoopDesign loop,
-              chosen ? search_tolerances(model, job, job.controller.state_tolerance)
-                     : design_loop(model, job, job.controller.state_tolerance));
-  if (!loop.stable) {
+  FLYBALL_TRY(LoopDesign loop, chosen
+                                   ? search_tolerances(model, job, job.controller.state_tolerance)
+                                   : design_loop(model, job, job.controller.state_tolerance));
+  FLYBALL_TRY(result.no_feedback, why_no_feedback(loop, model, job));
+  result.feedback = result.no_feedback.empty();
+  if (!loop.stable && result.feedback) {
     return refusal(DesignError::margins_lost, in_design, "the loop")
-        .got(fmt::format("unstable with its delay of {} ms",
-                         format_number(1e3 * job.controller.delay.value_or(0.0), 3)))
+        .got(fmt::format("unstable with its delay of {}",
+                         text::seconds(job.controller.delay.value_or(0.0))))
         .hint("loosen controller.state_tolerance, or leave it out to have it chosen")
         .with("spectral_radius", loop.margins.spectral_radius);
   }
-  FLYBALL_TRY(result.no_feedback, why_no_feedback(loop, model, job));
-  result.feedback = result.no_feedback.empty();
+  if (!result.feedback) {
+    leave_out_feedback(loop);
+  }
   FLYBALL_TRY(result.loop, behavior_of(loop, model, job));
   if (!result.feedback) {
     warn(result.diagnostics, "no_feedback",
@@ -196,8 +210,9 @@ Expected<void> design_into(DesignResult& result, const DesignJob& requested) {
   if (result.feedback) {
     FLYBALL_TRY(result.proofs, proofs_of(loop, job));
     FLYBALL_TRY(result.frequency_response, frequency_response(loop, model, job));
-    FLYBALL_CHECK(tell_cost_of_delay(loop, result.loop, model, job, chosen, result.diagnostics));
   }
+  FLYBALL_CHECK(tell_cost_of_delay(loop, result.loop, result.feedback, model, job, chosen,
+                                   result.diagnostics));
   if (loop.whole_periods) {
     warn(result.diagnostics, "delay_rounded",
          "the delay was compensated in whole periods: the closed loop has a negative real pole, of "

@@ -15,7 +15,8 @@ exports::MechanismConstants constants_of(const DesignResult& design) {
           .angle_offset = plant.gains.angle_offset,
           .kA_determined = plant.kA_determined,
           .kA_upper_bound = plant.kA_upper_bound,
-          .kA_reason = plant.kA_reason};
+          .kA_reason = plant.kA_reason,
+          .no_feedback = design.no_feedback};
 }
 
 }  // namespace flyball::study

@@ -85,10 +85,12 @@ struct LoopDesign {
                                                                        const LinearModel& model,
                                                                        const DesignJob& job);
 
-/// Warns where the delay costs more than half of the loop's speed, and tells what would be faster.
+/// Warns where the delay costs more than half of the loop's speed, by its slowest eigenvalue or its
+/// step, or all of its feedback, and tells what would be faster.
 [[nodiscard]] Expected<void> tell_cost_of_delay(const LoopDesign& loop, const LoopBehavior& runs,
-                                                const LinearModel& model, const DesignJob& job,
-                                                bool chosen, std::vector<Diagnostic>& diagnostics);
+                                                bool feedback, const LinearModel& model,
+                                                const DesignJob& job, bool chosen,
+                                                std::vector<Diagnostic>& diagnostics);
 
 /// Proofs for all mechanisms that the grid is a sample of and, of identified gains, for their 95 %
 /// set.

@@ -38,12 +38,15 @@ enum class FieldType {
 enum class Range { any, not_zero, not_negative, positive };
 
 /// What a key or a section is about; what is about another kind of file is refused. Motors are
-/// those of a mechanism or of a drivetrain.
-enum class Subject { any, mechanism, model, drive, motors };
+/// those of a mechanism or of a drivetrain; loops those that take a delay, of a mechanism or a
+/// model.
+enum class Subject { any, mechanism, model, drive, motors, loops };
 
 /// Whether what is about one thing has no meaning in a file of another.
 [[nodiscard]] constexpr bool is_about_other(Subject of, Subject file) {
-  return of == Subject::motors ? file == Subject::model : of != Subject::any && of != file;
+  return of == Subject::motors  ? file == Subject::model
+         : of == Subject::loops ? file == Subject::drive
+                                : of != Subject::any && of != file;
 }
 
 /// TOML's largest whole number.

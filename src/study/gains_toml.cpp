@@ -35,6 +35,8 @@ void describe(const PlantDescription& plant, Project& project) {
   project.gains.kV = gains.kV;
   if (plant.kA_determined) {
     project.gains.kA = gains.kA;
+  } else if (plant.kA_upper_bound > 0.0) {
+    project.gains.kA_upper_bound = plant.kA_upper_bound;
   }
   if (has_gravity(plant.kind)) {
     project.gains.kG = gains.kG;
@@ -86,17 +88,20 @@ std::vector<KeyComment> comments(const PlantDescription& plant, const Feedforwar
   const auto of_some = [&](const std::optional<GainEstimate> FeedforwardFit::* gain) {
     return within(fit == nullptr || !(fit->*gain) ? nullptr : &*(fit->*gain));
   };
-  const std::string kA =
-      plant.kA_determined
-          ? fmt::format("{}·s²/{}{}", V, plant.unit, of(&FeedforwardFit::kA))
-          : fmt::format(
-                "is not determined, below {} {}·s²/{}{}", format_number(plant.kA_upper_bound), V,
-                plant.unit,
-                fit != nullptr && !fit->kA.reason.empty() ? ": " + one_line(fit->kA.reason) : "");
+  const std::string unit_of_kA = fmt::format("{}·s²/{}", V, plant.unit);
+  const std::string why =
+      fmt::format("is not determined{}",
+                  fit != nullptr && !fit->kA.reason.empty() ? ": " + one_line(fit->kA.reason) : "");
   std::vector<KeyComment> all{
       {"gains.kS", std::string(V) + of(&FeedforwardFit::kS)},
-      {"gains.kV", fmt::format("{}·s/{}{}", V, plant.unit, of(&FeedforwardFit::kV))},
-      {"gains.kA", kA}};
+      {"gains.kV", fmt::format("{}·s/{}{}", V, plant.unit, of(&FeedforwardFit::kV))}};
+  if (plant.kA_determined) {
+    all.push_back({"gains.kA", unit_of_kA + of(&FeedforwardFit::kA)});
+  } else if (plant.kA_upper_bound > 0.0) {
+    all.push_back({"gains.kA_upper_bound", fmt::format("{}; kA {}", unit_of_kA, why)});
+  } else {
+    all.push_back({"gains.kA", why});
+  }
   if (has_gravity(plant.kind)) {
     all.push_back({"gains.kG", std::string(V) + of_some(&FeedforwardFit::kG)});
   }

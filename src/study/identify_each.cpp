@@ -18,6 +18,7 @@
 
 #include "core/error_rows.hpp"
 #include "study/answer/parts.hpp"
+#include "study/identify_with.hpp"
 
 namespace flyball::study {
 
@@ -131,17 +132,20 @@ void tell(LogRow& row, const IdentifyResult& result) {
   });
 }
 
-ExpectedAll<IdentifyResult> identify_bytes(std::string bytes, const std::string& path,
-                                           const recording::LogSelection& selection) {
-  if (!selection.also.empty()) {
-    return identify({path, selection});
+ExpectedAll<IdentifyResult> identify_bytes(std::string bytes, const IdentifyJob& job) {
+  if (!job.selection.also.empty()) {
+    return identify(job);
   }
-  auto log = parse_log(bytes, path);
+  auto log = parse_log(bytes, job.log);
   if (!log) {
     return tl::unexpected(Errors(std::move(log).error()));
   }
   std::string().swap(bytes);
-  return identify(*log, selection);
+  auto result = identify(*log, job.selection);
+  if (result) {
+    tell_contradictions(result->report, job.said);
+  }
+  return result;
 }
 
 }  // namespace
@@ -159,20 +163,25 @@ ErrorInfo error_info(LogRowsError code) {
   return flyball::detail::info_of(code, "log_rows", rows);
 }
 
-std::string settings_of(const recording::LogSelection& selection) {
-  const recording::LogSelection& s = selection;
-  return digits(checksum(
-      fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}", version,
-                  s.mechanism ? to_string(*s.mechanism) : std::string_view(), s.drivetrain,
-                  s.state_channel, s.voltage_channel, s.position_channel, s.velocity_channel,
-                  s.heading_channel, s.also, s.unit, s.velocity_unit, s.no_velocity, s.scale,
-                  s.voltage_scale, fmt::join(s.runs, ","), fmt::join(s.without_runs, ","))));
+std::string settings_of(const IdentifyJob& job) {
+  const recording::LogSelection& s = job.selection;
+  const PlantDescription& said = job.said;
+  const mechanisms::FeedforwardGains& gains = said.gains;
+  return digits(checksum(fmt::format(
+      "{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{} {} {} {} {} {} {} {}",
+      version, s.mechanism ? to_string(*s.mechanism) : std::string_view(), s.drivetrain,
+      s.state_channel, s.voltage_channel, s.position_channel, s.velocity_channel, s.heading_channel,
+      s.also, s.unit, s.velocity_unit, s.no_velocity, s.scale, s.voltage_scale,
+      fmt::join(s.runs, ","), fmt::join(s.without_runs, ","), to_string(said.kind), gains.kV,
+      gains.kA, gains.kG, said.kA_determined, said.motor ? said.motor->name : std::string(),
+      said.gearing, said.drum_radius)));
 }
 
-LogRow identify_row(const std::string& path, const recording::LogSelection& selection) {
+LogRow identify_row(const IdentifyJob& job) {
+  const std::string& path = job.log;
   LogRow row;
   row.path = path;
-  row.settings = settings_of(selection);
+  row.settings = settings_of(job);
   const auto finish = [&](const ExpectedAll<IdentifyResult>& result) {
     if (!result) {
       refuse(row, result.error());
@@ -184,7 +193,7 @@ LogRow identify_row(const std::string& path, const recording::LogSelection& sele
   if (const auto size = size_of_file(path); size && *size >= recording::streamed_from) {
     row.size = *size;
     row.checksum = checksum_of_file(path);
-    return finish(identify({path, selection}));
+    return finish(identify(job));
   }
   auto bytes = read_file(path);
   if (!bytes) {
@@ -193,21 +202,20 @@ LogRow identify_row(const std::string& path, const recording::LogSelection& sele
   }
   row.size = bytes->size();
   row.checksum = digits(checksum(*bytes));
-  return finish(identify_bytes(*std::move(bytes), path, selection));
+  return finish(identify_bytes(*std::move(bytes), job));
 }
 
-LogRow refused_row(const std::string& path, const recording::LogSelection& selection,
-                   const Error& reason) {
+LogRow refused_row(const IdentifyJob& job, const Error& reason) {
   LogRow row;
-  row.path = path;
-  row.settings = settings_of(selection);
+  row.path = job.log;
+  row.settings = settings_of(job);
   row.lasting = false;
   refuse(row, Errors(reason));
   return row;
 }
 
-bool still_holds(const LogRow& row, const recording::LogSelection& selection) {
-  if (!row.lasting || row.checksum.empty() || row.settings != settings_of(selection)) {
+bool still_holds(const LogRow& row, const IdentifyJob& job) {
+  if (!row.lasting || row.checksum.empty() || row.settings != settings_of(job)) {
     return false;
   }
   return size_of_file(row.path) == row.size && checksum_of_file(row.path) == row.checksum;

@@ -46,6 +46,9 @@ void take_gains(const KnownGains& known, PlantDescription& plant) {
     gains = {.kV = *known.kV};
     plant.kA_determined = known.kA.has_value();
   }
+  if (!plant.kA_determined) {
+    plant.kA_upper_bound = known.kA_upper_bound.value_or(plant.kA_upper_bound);
+  }
   gains.kS = known.kS.value_or(gains.kS);
   gains.kA = known.kA.value_or(gains.kA);
   gains.kG = known.kG.value_or(gains.kG);
@@ -161,6 +164,16 @@ void refuse_other_kinds(TomlDocument& document, const MechanismRow& row) {
   }
   if (row.kind != mechanisms::MechanismKind::arm) {
     refuse("gains", "angle_offset", "it is of an arm");
+  }
+  constexpr std::string_view bound = "kA_upper_bound";
+  if (document.has("gains", bound) &&
+      (document.has("gains", "kA") || !document.has("gains", "kV"))) {
+    document.refuse("gains", bound,
+                    Error(ProjectError::wrong_value)
+                        .about(document.name("gains", bound))
+                        .got("without meaning beside a kA that is known")
+                        .hint("leave one of them out, or give kV without kA"),
+                    TomlDocument::Fault::key);
   }
   if (document.has("gains", "kV") && !document.has(part_section, "motor")) {
     refuse(part_section, "motor_count", "say which motor, or leave it out");

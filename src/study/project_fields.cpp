@@ -23,6 +23,7 @@ using enum Dimension;
 using enum Range;
 using Of = FieldDimension;
 using recording::LogSelection;
+using Subject::loops;
 using Subject::mechanism;
 using Subject::model;
 using Subject::motors;
@@ -148,6 +149,10 @@ constexpr std::array gains_fields{
     quantity("kA", at<&KnownGains::kA>(), dimensionless, positive, "0.15",
              "To hold an acceleration, in V·s² per rad or m")
         .without("not known if kV is given, else of the parts"),
+    quantity(
+        "kA_upper_bound", at<&KnownGains::kA_upper_bound>(), dimensionless, positive, "0.4",
+        "What a kA that is not known is below, in V·s² per rad or m: loops are checked up to it")
+        .without("none"),
     quantity("kG", at<&KnownGains::kG>(), dimensionless, any, "0.65",
              "To hold against gravity, in V (an arm: when horizontal)")
         .without("none if kV is given, else of the parts"),
@@ -236,7 +241,8 @@ constexpr std::array controller_fields{
         .of(motors),
     quantity("delay", at<&ControllerOptions::delay>(), time, not_negative, "\"10 ms\"",
              "Delay from sensing to acting")
-        .without("what the log shows, else none"),
+        .without("what the log shows, else none")
+        .of(loops),
     flag("predict_delay", at<&ControllerOptions::predict_delay>(), "true",
          "Whether the regulator predicts the state over the delay, of 50 periods at most, in place "
          "of a gain that is compensated for it: faster, where the delay is known to within 25 %")

@@ -217,6 +217,7 @@ bool TomlDocument::refuse_other(const Section& section, const Field* field) {
                .about(this->name(within, key))
                .got(of == Subject::model   ? "for a model by formula"
                     : of == Subject::drive ? "for a drivetrain"
+                    : of == Subject::loops ? "for a mechanism or a model by formula"
                                            : "for a mechanism")
                .hint(of == Subject::drive || subject() == Subject::drive
                          ? "a file has one of [drive], [mechanism] and [model]"

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <filesystem>
+#include <fstream>
 #include <numbers>
 
 #include <gtest/gtest.h>
@@ -11,6 +13,7 @@
 #include <flyball/control/margins.hpp>
 #include <flyball/control/response_metrics.hpp>
 #include <flyball/study/answer.hpp>
+#include <flyball/study/project.hpp>
 #include <flyball/study/simulate_design.hpp>
 
 namespace flyball::study::design_truth_test {
@@ -347,6 +350,66 @@ TEST(DesignTruth, SaysThatThereIsNoFeedbackAndWhy) {
   DesignJob with = loose;
   with.controller.state_tolerance.clear();
   EXPECT_TRUE(design(with).value().feedback);
+}
+
+// Compensation of a long delay leaves nothing of a gain: that is the reason, and not the tolerances
+// nor the mechanism, whatever rounding leaves of K. What the delay costs is told, and the gain that
+// makes no difference is none.
+TEST(DesignTruth, ADelayThatLeavesNoFeedbackIsTheReason) {
+  for (const double delay : {1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.9}) {
+    SCOPED_TRACE(delay);
+    const auto result = design(readme_elevator(delay));
+    ASSERT_TRUE(result) << to_string(result.error());
+    EXPECT_FALSE(result->feedback);
+    EXPECT_NE(result->no_feedback.find("compensating a delay"), std::string::npos)
+        << result->no_feedback;
+    EXPECT_TRUE(result->K_delayed.isZero(0.0));
+    EXPECT_TRUE(result->robust);
+    const std::string cost = told(*result, "delay_costs_speed");
+    EXPECT_NE(cost.find("costs all of the feedback"), std::string::npos) << cost;
+    const Document document = answer_of(*result).document;
+    EXPECT_EQ(document.verdict.tone, Tone::caution);
+  }
+  DesignJob wheel;
+  wheel.plant.kind = MechanismKind::flywheel;
+  wheel.plant.gains = {.kS = 0.2, .kV = 0.02, .kA = 0.01};
+  wheel.controller.state_tolerance = {5.0};
+  wheel.controller.delay = 0.2;
+  const auto result = design(wheel).value();
+  EXPECT_FALSE(result.feedback);
+  EXPECT_NE(result.no_feedback.find("compensating a delay"), std::string::npos)
+      << result.no_feedback;
+  const std::string cost = told(result, "delay_costs_speed");
+  EXPECT_NE(cost.find("--predict-delay"), std::string::npos) << cost;
+}
+
+// A slow observer has the slowest eigenvalue with and without the delay: the step tells the cost.
+TEST(DesignTruth, ACostThatOnlyTheStepShowsIsTold) {
+  DesignJob job = readme_elevator(0.2);
+  job.estimator.measurement_std = 0.2;
+  const auto late = design(job).value();
+  job.controller.delay = 0.0;
+  const auto prompt = design(job).value();
+  ASSERT_LT(late.loop.time_constant, 2.0 * prompt.loop.time_constant);
+  ASSERT_GT(*late.loop.rise_time, 10.0 * *prompt.loop.rise_time);
+  const std::string cost = told(late, "delay_costs_speed");
+  EXPECT_NE(cost.find("a small step rises within"), std::string::npos) << cost;
+}
+
+// A design of the gains.toml of a log that does not determine kA is checked up to the log's bound.
+TEST(DesignTruth, TheBoundOfKAGoesWithTheGains) {
+  const auto first = design(unknown_kA_elevator()).value();
+  const std::string path =
+      (std::filesystem::temp_directory_path() / "flyball_design_truth_gains.toml").string();
+  std::ofstream(path) << gains_toml(first, nullptr);
+  const auto project = read_project(path);
+  std::filesystem::remove(path);
+  ASSERT_TRUE(project) << to_string(project.error());
+  EXPECT_FALSE(project->job.plant.kA_determined);
+  EXPECT_EQ(project->job.plant.kA_upper_bound, first.job.plant.kA_upper_bound);
+  const auto again = design(project->job).value();
+  EXPECT_EQ(again.worst_overshoot, first.worst_overshoot);
+  EXPECT_FALSE(says(again, "kA_not_bounded"));
 }
 
 }  // namespace

@@ -106,6 +106,9 @@ Project any_project(mechanisms::MechanismKind kind) {
     project.parts.mass.reset();  // of an arm alone
   }
   // What means something beside others only.
+  if (!project.gains.kV || project.gains.kA) {
+    project.gains.kA_upper_bound.reset();
+  }
   study::SizeSection& size = project.size;
   size.distance.reset();
   size.stop.reset();

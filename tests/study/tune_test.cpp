@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include <flyball/study/answer.hpp>
+#include <flyball/study/identify_each.hpp>
 #include <flyball/study/identify_logs.hpp>
 #include <flyball/study/project.hpp>
 
@@ -114,6 +115,9 @@ TEST(Tune, ALogThatContradictsItsProjectIsWarnedOf) {
     const auto logs = identify_logs(
         {.logs = {file.path(), file.path()}, .selection = alone.selection, .said = alone.said});
     EXPECT_TRUE(logs && told(logs->joint).empty() == told(identified).empty());
+    const LogRow row = identify_row(alone);
+    EXPECT_EQ(row.members.find("project_contradicts_log") == std::string::npos,
+              told(identified).empty());
     std::filesystem::remove(project);
     for (const Diagnostic& diagnostic : result->identification.diagnostics()) {
       if (diagnostic.code == "project_contradicts_log") {

@@ -35,6 +35,7 @@ struct MechanismConstants {
   bool kA_determined = true;
   double kA_upper_bound = 0.0;  ///< V·s²/unit, if not determined.
   std::string kA_reason{};      ///< Why it is not determined, if that is known.
+  std::string no_feedback{};    ///< Why there is none; empty where there is.
 };
 
 /// Constants in the form that a team pastes, for one library in one language.

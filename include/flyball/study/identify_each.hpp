@@ -10,7 +10,7 @@
 
 #include <flyball/core/answer.hpp>
 #include <flyball/core/errors.hpp>
-#include <flyball/recording/load_recording.hpp>
+#include <flyball/study/identify.hpp>
 
 /// Many logs, each by itself: a row a log, which can be kept, compared with its log, shared out
 /// over machines and put together again.
@@ -52,20 +52,19 @@ struct LogRows {
 };
 
 /// A short text that differs where rows of the same log may: version and options.
-[[nodiscard]] std::string settings_of(const recording::LogSelection& selection);
+/// @param job  Its selection and what the project file says; not its log.
+[[nodiscard]] std::string settings_of(const IdentifyJob& job);
 
 /// The row of a log: read once, identified, its gains with intervals, its verdict, what was noticed
 /// or the reason why there are no gains. Everything that can be wrong is in the row.
 /// Cost: that of `identify`; allocates, std::bad_alloc comes through.
-[[nodiscard]] LogRow identify_row(const std::string& path,
-                                  const recording::LogSelection& selection);
+[[nodiscard]] LogRow identify_row(const IdentifyJob& job);
 
 /// The row of a log that had to be given up.
-[[nodiscard]] LogRow refused_row(const std::string& path, const recording::LogSelection& selection,
-                                 const Error& reason);
+[[nodiscard]] LogRow refused_row(const IdentifyJob& job, const Error& reason);
 
-/// Whether the row is of these options and the log's bytes are those that it was made of.
-[[nodiscard]] bool still_holds(const LogRow& row, const recording::LogSelection& selection);
+/// Whether the row is of this job and the log's bytes are those that it was made of.
+[[nodiscard]] bool still_holds(const LogRow& row, const IdentifyJob& job);
 
 /// One object on one line, with the line's end. Schema "flyball.log_row/1".
 [[nodiscard]] std::string to_json_line(const NumberedRow& row, std::size_t logs);

@@ -56,6 +56,7 @@ struct MechanismParts {
 /// [gains]: feedforward gains that stand in place of those of the parts.
 struct KnownGains {
   std::optional<double> kS{}, kV{}, kA{}, kG{};  ///< V, V·s/unit, V·s²/unit, V.
+  std::optional<double> kA_upper_bound{};        ///< V·s²/unit, of a kA that is not known.
   std::optional<Angle> angle_offset{};
 };
 
