@@ -169,6 +169,15 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
   io::WholeText whole(text);
   bool complete = io::JsonWalk(whole, handler).walk() == io::JsonEnd::complete;
   const bool ordinary = complete;
+  // An allocated tail that was never filled is zeros; nlohmann's parser calls the first the end.
+  const std::size_t content_end = text.find_last_not_of(std::string_view(" \t\r\n\0", 5)) + 1;
+  const std::size_t zero = complete ? std::string_view::npos : text.find('\0');
+  if (zero < content_end) {
+    return refusal(LogError::malformed, io::place(source, text, zero), "the JSON")
+        .got("cut by a zero byte, with more behind it")
+        .expected("valid JSON")
+        .hint("copy the file again: what stands behind the zero byte is not read");
+  }
   if (!complete) {  // nlohmann's parser says what is wrong, and where
     handler = SysIdRows();
     complete = nlohmann::json::sax_parse(text.begin(), text.end(), &handler);
@@ -180,8 +189,7 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
       complete = nlohmann::json::sax_parse(replaced.begin(), replaced.end(), &handler);
     }
   }
-  // The parser counts from 1 and calls a NUL the end, which an allocated but unfilled tail is.
-  const std::size_t content_end = text.find_last_not_of(std::string_view(" \t\r\n\0", 5)) + 1;
+  // The parser counts from 1.
   const bool truncated = !complete && handler.error_at > content_end;
   if (!complete && !truncated) {
     const std::size_t detail = handler.error_text.rfind("; ");
@@ -224,6 +232,10 @@ Expected<SysIdJson> parse_sysid_json(std::string_view text, const std::string& s
          "the file ends in the middle, after {} bytes; the complete rows before the cut are used",
          text.size());
     log.diagnostics.back().place = place_of(text, text.size());
+  }
+  if (complete && zero != std::string_view::npos) {
+    note(log.diagnostics, "unfilled_tail", "the file ends in {} zero bytes, which are passed over",
+         text.size() - content_end);
   }
   Dropped dropped;
   dropped.other_width = handler.odd_rows;

@@ -159,6 +159,20 @@ TEST(SysIdJson, ACutAnywhereGivesTheRowsBeforeIt) {
                              "truncated_log"));
 }
 
+// Zeros at the end are a tail that was never filled; what stands behind one is not passed over.
+TEST(SysIdJson, NothingIsBehindAZeroByte) {
+  const std::string text = to_sysid_json(example_sysid(2)).value();
+  for (const std::string& more : {std::string("garbage after"), text, std::string("\0x", 2)}) {
+    const auto log = parse(text + '\0' + more);
+    ASSERT_FALSE(log) << more;
+    EXPECT_TRUE(log.error().is(LogError::malformed));
+    EXPECT_TRUE(contains(to_string(log.error()), "zero byte")) << to_string(log.error());
+  }
+  const auto padded = parse(text + std::string(5, '\0'));
+  ASSERT_TRUE(padded) << to_string(padded.error());
+  EXPECT_TRUE(has_diagnostic(padded->diagnostics, "unfilled_tail"));
+}
+
 TEST(SysIdJson, RubbishAfterTheEndIsNotATruncation) {
   const std::string text = to_sysid_json(example_sysid(2)).value();
   EXPECT_TRUE(parse(text + "}").error().is(LogError::malformed));
