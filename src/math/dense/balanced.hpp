@@ -18,22 +18,23 @@ namespace flyball::detail {
 [[nodiscard]] inline bool is_far(double x) {
   constexpr double bound = 0x1p300;
   const double size = std::abs(x);
-  return size != 0.0 && !(size < bound && size * bound > 1.0) &&
-         size <= std::numeric_limits<double>::max();
+  const bool beyond = size >= bound;
+  const bool below = size <= 1.0 / bound;
+  const bool known = (size != 0.0) & (size <= std::numeric_limits<double>::max());
+  return (beyond | below) & known;
 }
 
 /// Whether an entry is: then products of a few may have no double, nor may the quotients of the
 /// units that balance them.
 template <class Derived>
 [[nodiscard]] bool is_far(const Eigen::DenseBase<Derived>& M) {
+  bool far = false;
   for (Eigen::Index j = 0; j < M.cols(); ++j) {
     for (Eigen::Index i = 0; i < M.rows(); ++i) {
-      if (is_far(M(i, j))) {
-        return true;
-      }
+      far |= is_far(M(i, j));  // without a branch: as a rule none is
     }
   }
-  return false;
+  return far;
 }
 
 /// The exponent of the largest M_ij 2^(row_i + column_j) of an M that is not zero.

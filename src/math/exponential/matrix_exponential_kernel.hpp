@@ -11,7 +11,7 @@ void exponential(int n, const double* A, double* E, double* memory);
 
 inline constexpr int exponential_workspace(int n) {
   const int ld = ((n + 3) / 4) * 4;
-  return 9 * ld * n + 4 * ld;
+  return 9 * ld * n + 6 * ld;
 }
 
 /// Up to this many states the workspace fits the stack.

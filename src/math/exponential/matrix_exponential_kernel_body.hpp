@@ -24,6 +24,9 @@ class Exponential {
     sums_ = work.take(ld());
     next_ = work.take(ld());
     d_ = work.take(ld());
+    paths_ = work.take(ld());
+    paths_next_ = work.take(ld());
+    inverse_d_ = work.take(ld());
   }
 
   void run(const double* data, double* E) {
@@ -42,11 +45,8 @@ class Exponential {
     if (triangular) {
       copy(original_, A_);
     } else {
-      given_norm_ = norm1(A_);
       balance(n_, A_, d_, sums_, next_);
-      for (int i = 0; i < n; ++i) {
-        has_units_ = has_units_ || d_[i] != 1.0;
-      }
+      take_units();
     }
     const int squarings = approximate();
     double* result = V_;
@@ -182,52 +182,89 @@ class Exponential {
     return std::max(0, static_cast<int>(std::ceil((log2_alpha + 53.0) / (2.0 * p.order))));
   }
 
+  /// Where balancing gave units, what the given matrix is in its own.
+  void take_units() {
+    for (int i = 0; i < n_(); ++i) {
+      has_units_ = has_units_ || d_[i] != 1.0;
+    }
+    if (!has_units_) {
+      return;
+    }
+    const auto [least, most] = std::minmax_element(d_, d_ + n_());
+    log2_units_ = std::ilogb(*most) - std::ilogb(*least);
+    for (int j = 0; j < n_(); ++j) {
+      double sum = 0.0;
+      for (int i = 0; i < n_(); ++i) {
+        sum += std::abs(A_[i + j * ld()]) * (d_[i] / d_[j]);
+      }
+      given_norm_ = std::max(given_norm_, sum);
+    }
+  }
+
+  /// log₂ ‖ |A|ᵏ ‖₁ in the given units, of A_ as it is: dᵀ|A|ᵏ beside d. Powers that were asked for
+  /// are kept; `original_` is free, since a triangular A is not balanced.
+  [[nodiscard]] double log2_of_power(int k) {
+    double* const T = original_;
+    if (powers_ == 0) {
+      for (int i = 0; i < size(); ++i) {
+        T[i] = 0.0;
+      }
+      for (int j = 0; j < n_(); ++j) {
+        for (int i = 0; i < n_(); ++i) {
+          T[j + i * ld()] = std::abs(A_[i + j * ld()]);
+        }
+      }
+      for (int i = 0; i < ld(); ++i) {
+        paths_[i] = i < n_() ? d_[i] : 0.0;
+        inverse_d_[i] = i < n_() ? 1.0 / d_[i] : 0.0;
+      }
+    }
+    while (powers_ < k) {
+      multiply(n_, paths_next_, ld(), T, ld(), paths_, ld(), n_(), 1);
+      std::swap(paths_, paths_next_);
+      double of_paths = 0.0;
+      double largest = 0.0;
+      for (int i = 0; i < n_(); ++i) {
+        of_paths = std::max(of_paths, paths_[i]);
+        largest = std::max(largest, paths_[i] * inverse_d_[i]);
+      }
+      ++powers_;
+      power_[powers_] = largest;
+      exponent_[powers_] = exponent_of_paths_;
+      if (of_paths > 1e100 || of_paths < 1e-100) {
+        const int exponent = of_paths > 0.0 ? std::ilogb(of_paths) : 0;
+        scale_paths(exponent);
+      }
+    }
+    return std::log2(power_[k]) + exponent_[k];
+  }
+
+  void scale_paths(int exponent) {
+    const double inverse = std::ldexp(1.0, -exponent);
+    for (int i = 0; i < n_(); ++i) {
+      paths_[i] *= inverse;
+    }
+    exponent_of_paths_ += exponent;
+  }
+
   /// Extra squarings in the units that were given: what the series leaves out is next to nothing
   /// beside the balanced 2⁻ˢA, but may count beside the given one, where what the balanced units
-  /// made small is not. ‖ |A|ᵏ ‖₁ for k from 2m + 1 on, through paths of any length.
-  [[nodiscard]] int extra_squarings_of_given(const Pade& p, int prescale, int s) {
+  /// made small is not. ‖ |A|ᵏ ‖₁ for the first k from 2m + 1 on.
+  /// @param norm  Of A_, which is the balanced one times 2^-prescale.
+  [[nodiscard]] int extra_squarings_of_given(const Pade& p, double norm, int prescale, int s) {
     if (!has_units_) {
       return 0;
     }
     const double log2_norm = std::log2(given_norm_) - prescale - s;
-    if (2.0 * p.order * log2_norm - p.log2_inverse_error + 53.0 <= 0.0) {
-      return 0;
-    }
-    double* const T = W_;
-    for (int k = 0; k < size(); ++k) {
-      T[k] = 0.0;
-    }
-    for (int j = 0; j < n_(); ++j) {
-      for (int i = 0; i < n_(); ++i) {
-        T[j + i * ld()] = std::ldexp(std::abs(A_[i + j * ld()]), -s);
-      }
-    }
-    double* sums = sums_;
-    double* next = next_;
-    for (int i = 0; i < ld(); ++i) {
-      sums[i] = i < n_() ? d_[i] : 0.0;
+    const double log2_balanced = (2.0 * p.order + 1.0) * (std::log2(norm) - s);
+    if (std::min(2.0 * p.order * log2_norm, log2_balanced + log2_units_ - log2_norm) -
+            p.log2_inverse_error + 53.0 <=
+        0.0) {
+      return 0;  // ‖A‖^(2m+1) bounds it, or what the units make of that of the balanced
     }
     double log2_most = -std::numeric_limits<double>::infinity();
-    double log2_size = 0.0;  // of what the sums were divided by
-    for (int k = 1; k <= 2 * p.order + n_(); ++k) {
-      multiply(n_, next, ld(), T, ld(), sums, ld(), n_(), 1);
-      std::swap(sums, next);
-      double of_sums = 0.0;
-      double largest = 0.0;
-      for (int i = 0; i < n_(); ++i) {
-        of_sums = std::max(of_sums, sums[i]);
-        largest = std::max(largest, sums[i] / d_[i]);
-      }
-      if (!(of_sums > 0.0)) {
-        break;
-      }
-      if (k > 2 * p.order) {
-        log2_most = std::max(log2_most, std::log2(largest) + log2_size);
-      }
-      for (int i = 0; i < n_(); ++i) {
-        sums[i] /= of_sums;
-      }
-      log2_size += std::log2(of_sums);
+    for (int k = 2 * p.order + 1; k <= 2 * p.order + terms; ++k) {
+      log2_most = std::max(log2_most, log2_of_power(k) - k * s);
     }
     const double log2_alpha = log2_most - log2_norm - p.log2_inverse_error;
     return std::max(0, static_cast<int>(std::ceil((log2_alpha + 53.0) / (2.0 * p.order))));
@@ -261,7 +298,7 @@ class Exponential {
     square(A2_, A_, A_);
     // ‖A‖ bounds every ‖Aᵏ‖^(1/k), and where it serves, no squaring can be called for.
     const auto serves = [&](const Pade& p) {
-      return extra_squarings_of_given(p, prescale, 0) == 0;
+      return extra_squarings_of_given(p, norm, prescale, 0) == 0;
     };
     if (norm <= pade[0].theta && serves(pade[0])) {
       quotient(pade[0]);
@@ -309,7 +346,7 @@ class Exponential {
       }
     }
     s += extra_squarings(pade[4], norm, s);
-    s += extra_squarings_of_given(pade[4], prescale, s);
+    s += extra_squarings_of_given(pade[4], norm, prescale, s);
     scale(A_, std::ldexp(1.0, -s));
     scale(A2_, std::ldexp(1.0, -2 * s));
     scale(A4_, std::ldexp(1.0, -4 * s));
@@ -416,9 +453,15 @@ class Exponential {
 
   Size<N> n_;
   double *A_, *A2_, *A4_, *A6_, *U_, *V_, *W_, *T_, *original_;
-  double *sums_, *next_, *d_;
+  double *sums_, *next_, *d_, *paths_, *paths_next_, *inverse_d_;
   double given_norm_ = 0.0;
   bool has_units_ = false;
+  int log2_units_ = 0;  ///< Of the largest d beside the smallest.
+  static constexpr int terms = 4;
+  int powers_ = 0;
+  int exponent_of_paths_ = 0;  ///< Of what `paths_` were divided by.
+  double power_[2 * 13 + terms + 1];
+  int exponent_[2 * 13 + terms + 1];
 };
 
 void exponential(int n, const double* A, double* E, double* memory) {
