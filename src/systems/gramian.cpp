@@ -9,11 +9,9 @@
 #include <flyball/math/equations/matrix_equation.hpp>
 
 #include "core/try.hpp"
-#include "math/dense/balanced.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/dense_reduction.hpp"
 #include "math/dense/ordinary_units.hpp"
-#include "math/dense/pair_scaling.hpp"
 #include "systems/balance.hpp"
 #include "systems/gramian_factor.hpp"
 #include "systems/modes.hpp"
@@ -110,25 +108,30 @@ namespace {
 using Eigen::MatrixXd;
 
 Expected<Gramian> gramian(const MatrixRef& A, const MatrixRef& B, TimeDomain domain) {
-  // In units of states, time and inputs in which A and BBᵀ are of doubles, where W is one.
-  const bool far = B.size() > 0 && (detail::is_far(A) || detail::is_far(B));
-  const bool continuous = domain == TimeDomain::continuous;
-  Eigen::VectorXi d = Eigen::VectorXi::Zero(A.rows());
-  int time = 0;
-  if (far) {
-    // The inputs have one unit: their sum of squares is what counts.
-    d = detail::pair_scaling_of(A, B.cwiseAbs().rowwise().maxCoeff()).states;
-    time = continuous && !A.isZero(0.0) ? detail::largest_exponent(A, -d, d) : 0;
+  // In a unit of the inputs, and of states that they hardly move, in which BBᵀ is a double.
+  constexpr int lowest = -400;
+  const Eigen::Index n = A.rows();
+  const int unit = B.size() == 0 || B.isZero(0.0) ? 0 : std::ilogb(B.cwiseAbs().maxCoeff());
+  Eigen::VectorXi d = Eigen::VectorXi::Zero(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (B.cols() > 0 && !B.row(i).isZero(0.0)) {
+      d(i) = std::min(0, std::ilogb(B.row(i).cwiseAbs().maxCoeff()) - unit - lowest);
+    }
   }
-  const Eigen::VectorXi no_inputs = Eigen::VectorXi::Zero(B.cols());
-  const int unit =
-      far ? (B.isZero(0.0) ? 0 : detail::largest_exponent(B, -d, no_inputs)) : detail::unit_of(B);
-  const MatrixXd A_there = far ? detail::times_powers(A, -d, d, -time) : MatrixXd(A);
-  const MatrixXd B_there = detail::times_powers(B, -d, no_inputs, -unit);
+  MatrixXd A_there = A;
+  if (!d.isZero()) {
+    A_there = detail::times_powers(A, -d, d, 0);
+    if (!A_there.allFinite() || ((A_there.array() == 0.0) != (A.array() == 0.0)).any()) {
+      d.setZero();
+      A_there = A;
+    }
+  }
+  const MatrixXd B_there = detail::times_powers(B, -d, Eigen::VectorXi::Zero(B.cols()), -unit);
   const MatrixXd BB = detail::product_transposed(B_there, B_there);
-  FLYBALL_TRY(auto solution, continuous ? lyapunov(A_there, BB) : discrete_lyapunov(A_there, BB));
+  FLYBALL_TRY(auto solution, domain == TimeDomain::continuous ? lyapunov(A_there, BB)
+                                                              : discrete_lyapunov(A_there, BB));
   Gramian found;
-  found.W = detail::times_powers(detail::symmetrized(solution.X), d, d, 2 * unit - time);
+  found.W = detail::times_powers(detail::symmetrized(solution.X), d, d, 2 * unit);
   if (!found.W.allFinite()) {
     return refusal(MatrixEquationError::overflow, "the Gramian")
         .hint("measure states, inputs and outputs in units in which the entries are nearer to 1");
