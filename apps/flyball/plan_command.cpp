@@ -7,6 +7,7 @@
 #include "answer.hpp"
 #include "commands.hpp"
 #include "console.hpp"
+#include "ompl_search.hpp"
 
 namespace flyball::app {
 
@@ -30,7 +31,7 @@ int run_plan(const PlanOptions& options) {
   if (!job) {
     return fail(job.error(), options.common, plan_schema);
   }
-  const auto result = study::plan(*job);
+  const auto result = study::plan(*job, plan_by_ompl);
   if (!result) {
     return fail(result.error(), options.common, plan_schema);
   }
@@ -84,8 +85,8 @@ void add_plan_command(CLI::App& program, Invocation& invocation) {
   command->add_option("--goal", options->given.goal, "Where it is to be")->type_name("PLACE");
   command
       ->add_option("--method", options->given.method,
-                   "automatic, straight, corners, grid, rrt-connect, rrt-star, roadmap or "
-                   "decomposition")
+                   "automatic, straight, corners, grid, rrt-connect, rrt-star, roadmap, "
+                   "decomposition, or ompl where it is built with it")
       ->type_name("METHOD");
   command
       ->add_option("--traversal", options->given.traversal,

@@ -245,7 +245,8 @@ class PlanReader : public SpaceReader {
       return typed || plan.get(key) == nullptr ? toml::source_region{} : plan.get(key)->source();
     };
     const std::string method = given.method.empty() ? text(plan, "method") : given.method;
-    if (!method.empty()) {
+    job.ompl = method == "ompl";
+    if (!method.empty() && !job.ompl) {
       if (const auto parsed = parse_path_method(method)) {
         job.search.method = *parsed;
       } else {

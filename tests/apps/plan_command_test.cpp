@@ -48,6 +48,32 @@ TEST_F(PlanCommand, WritesPicturesAndTables) {
   EXPECT_TRUE(std::filesystem::exists(work() / "plan/index.html"));
 }
 
+// OMPL's trees, our judgement of moves: the same kind of answer, if the command is built with it.
+TEST_F(PlanCommand, AsksOmpl) {
+  const std::string arm = std::string(FLYBALL_EXAMPLES) + "/space_scoring_arm.toml";
+  const Answer told = run("plan " + arm + " --method ompl --json");
+  if (told.status == 2) {
+    ASSERT_TRUE(holds(told.err, "not in this build")) << told.err;
+    GTEST_SKIP() << "built without OMPL";
+  }
+  ASSERT_EQ(told.status, 0) << told.err;
+  const Json json = Json::parse(told.out);
+  const Json own = Json::parse(run("plan " + arm + " --json").out);
+  EXPECT_EQ(json.at("method"), "ompl");
+  EXPECT_GT(json.at("moves").get<double>(), 0.0);
+  EXPECT_EQ(json.at("waypoints").front(), own.at("waypoints").front());
+  EXPECT_EQ(json.at("waypoints").back(), own.at("waypoints").back());
+  EXPECT_GE(json.at("clearance").get<double>(), 0.0);
+  // Where there is none it cannot know, and says so.
+  const Answer none =
+      run("plan " +
+          file("[[region]]\nname = \"post\"\nbox = { arm = [\"0 deg\", \"1 deg\"] }\n"
+               "[plan]\nstart = [\"-10 deg\"]\ngoal = [\"10 deg\"]\n") +
+          " --method ompl --seconds '0.1 s'");
+  EXPECT_EQ(none.status, 1);
+  EXPECT_TRUE(holds(none.err, "without a path after 0.1 s")) << none.err;
+}
+
 TEST_F(PlanCommand, SaysWhyThereIsNoWay) {
   const Answer inside = run("plan " + space() + " --goal '0 deg, 1 m'");
   EXPECT_EQ(inside.status, 1);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@ struct PlanJob {
   std::vector<double> goal{};
   PathSearch search{};
   PathMotionOptions motion{};
+  bool ompl = false;        ///< Whether OMPL is to find it, in place of `search`'s method.
   bool has_limits = false;  ///< Whether every axis has limits, so that the path can be timed.
 };
 
@@ -45,11 +47,18 @@ struct PlanOverrides {
 [[nodiscard]] ExpectedAll<PlanJob> plan_job(const std::string& path,
                                             const PlanOverrides& given = {});
 
+/// A planner of someone else's: from start to goal, an entry an axis, by moves that are free.
+using PathBackEnd = Expected<ConfigurationPath> (*)(const ConfigurationSpace& space,
+                                                    std::span<const double> start,
+                                                    std::span<const double> goal,
+                                                    const PathSearch& search);
+
 /// Plans, times and tabulates it.
+/// @param ompl  What finds the path of a job that asks for OMPL; null: such a job is refused.
 /// @errors ConfigurationError: an end in collision and with what, no path, undecided;
 ///         ArgumentError.
 /// Source: book, chapter 16.
-[[nodiscard]] Expected<PlanResult> plan(const PlanJob& job);
+[[nodiscard]] Expected<PlanResult> plan(const PlanJob& job, PathBackEnd ompl = nullptr);
 
 /// The path and its motion as tables and pictures: the space with the path, the motion in time, the
 /// mechanism as it moves; CSV, a C++ header. Schema "flyball.plan/1".

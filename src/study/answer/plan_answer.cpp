@@ -22,6 +22,10 @@ using text::number;
 
 constexpr const char* plan_schema = "flyball.plan/1";
 
+const char* method_of(const PlanResult& result) {
+  return result.job.ompl ? "ompl" : to_string(result.path.method);
+}
+
 bool is_timed(const PlanResult& result) {
   return result.motion.table.rows() > 0;
 }
@@ -30,7 +34,7 @@ std::string to_json(const PlanResult& result) {
   JsonWriter json;
   json.object([&] {
     json.add("schema", plan_schema);
-    json.add("method", to_string(result.path.method));
+    json.add("method", method_of(result));
     json.list("axes", result.job.space.axes(), [&](const SpaceAxis& axis) {
       json.object([&] {
         json.add("name", axis.name);
@@ -83,7 +87,7 @@ std::string cpp_header(const PlanResult& result) {
   std::string code = fmt::format(
       "// A path of {} waypoints, found by {}: straight moves that are free along their whole "
       "length.\n// Axes, in their order:",
-      result.path.waypoints.size(), to_string(result.path.method));
+      result.path.waypoints.size(), method_of(result));
   for (const SpaceAxis& axis : axes) {
     code += fmt::format(" {} ({})", axis.name, axis.unit.empty() ? "1" : axis.unit);
   }
@@ -133,7 +137,7 @@ Section path_section(const PlanResult& result) {
   const std::vector<SpaceAxis>& axes = result.job.space.axes();
   Section section{"path", "The path", {}};
   Facts facts;
-  facts.add("found by", to_string(result.path.method), Tone::plain);
+  facts.add("found by", method_of(result), Tone::plain);
   facts.add("length", quantity(result.path.length, ""));
   facts.add("moves judged", fmt::format("{}", result.path.moves), Tone::plain);
   section.blocks.emplace_back(std::move(facts));
