@@ -12,6 +12,7 @@
 #include "core/try.hpp"
 #include "planning/configuration/corner_path.hpp"
 #include "planning/configuration/decomposition.hpp"
+#include "planning/configuration/known_moves.hpp"
 #include "planning/configuration/path_search.hpp"
 
 namespace flyball {
@@ -75,6 +76,7 @@ struct PathPlanner::State {
   detail::Tree b;
   detail::Roadmap roadmap{};
   detail::BoxTree boxes{judge};
+  detail::KnownMoves known{};
 };
 
 PathPlanner::PathPlanner(ConfigurationSpace space)
@@ -118,6 +120,13 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
     }
     result.waypoints = std::move(path);
     return result;
+  };
+  // What another query may use is kept before detours are taken out.
+  const auto learnt = [&](detail::ConfigurationPath path, PathMethod method) {
+    if (search.method == PathMethod::automatic) {
+      state_->known.learn(judge, path);
+    }
+    return done(std::move(path), method);
   };
   const PathMethod method = search.method;
   const bool any = method == PathMethod::automatic;
@@ -194,6 +203,12 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
     }
     note(detail::format("RRT* of {} nodes", state_->a.size()));
   }
+  if (any) {
+    if (auto path = state_->known.way(judge, start.data(), goal.data())) {
+      result.nodes = state_->known.size();
+      return done(*std::move(path), PathMethod::roadmap);
+    }
+  }
   const bool trees = any || method == PathMethod::rrt_connect;
   const auto grow = [&](long work) -> std::optional<detail::ConfigurationPath> {
     auto path = detail::rrt_connect(judge, state_->a, state_->b, start.data(), goal.data(), random,
@@ -207,7 +222,7 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
     // Far more than almost all queries need; whatever is left may have no path.
     constexpr long first = 20'000;
     if (auto path = grow(any ? first : search.work)) {
-      return done(*std::move(path), PathMethod::rrt_connect);
+      return learnt(*std::move(path), PathMethod::rrt_connect);
     }
   }
   detail::BoxAnswer boxes;
@@ -224,8 +239,8 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
     boxes = state_->boxes.connect(start.data(), goal.data(), most_boxes, part, along);
     if (boxes.path) {
       result.nodes = boxes.grown ? state_->a.size() + state_->b.size() : boxes.boxes;
-      return done(*std::move(boxes.path),
-                  boxes.grown ? PathMethod::rrt_connect : PathMethod::decomposition);
+      return learnt(*std::move(boxes.path),
+                    boxes.grown ? PathMethod::rrt_connect : PathMethod::decomposition);
     }
     if (boxes.proven) {
       return refusal(ConfigurationError::no_path, in_plan, "the goal")
@@ -238,7 +253,7 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
   if (trees) {
     if (any) {
       if (auto path = grow(search.work)) {
-        return done(*std::move(path), PathMethod::rrt_connect);
+        return learnt(*std::move(path), PathMethod::rrt_connect);
       }
     }
     note(detail::format("random trees of {} and {} nodes", state_->a.size(), state_->b.size()));

@@ -363,5 +363,41 @@ TEST(PathPlanner, KeepsWhatBoxesProve) {
   EXPECT_EQ(proven_at_once, proven);
 }
 
+// Paths that were found lead the next query: valid along their whole length, the same in the same
+// order of queries, and no query loses its path.
+TEST(PathPlanner, LearnsFromThePathsThatItFinds) {
+  const ConfigurationSpace space = test::arm_space(5, true);
+  Random random(9);
+  PathPlanner learns(space);
+  PathPlanner again(space);
+  int by_known_moves = 0;
+  long moves_of_known = 0;
+  for (int i = 0; i < 60; ++i) {
+    std::vector<double> start;
+    std::vector<double> goal;
+    do {
+      start = test::random_configuration(space, random);
+    } while (!space.valid(start));
+    do {
+      goal = test::random_configuration(space, random);
+    } while (!space.valid(goal));
+    PathSearch search;
+    search.seed = static_cast<std::uint64_t>(i);
+    search.seconds = 60.0;
+    search.shorten = i % 2 == 0;
+    const auto path = learns.plan(start, goal, search);
+    ASSERT_TRUE(path) << to_string(path.error());
+    EXPECT_EQ(fault(space, *path, start, goal), "") << i;
+    EXPECT_EQ(again.plan(start, goal, search).value().waypoints, path->waypoints) << i;
+    EXPECT_TRUE(plan_path(space, start, goal, search)) << i;
+    if (path->method == PathMethod::roadmap) {
+      ++by_known_moves;
+      moves_of_known += search.shorten ? 0 : path->moves;
+    }
+  }
+  EXPECT_GE(by_known_moves, 15);
+  EXPECT_LE(moves_of_known, 13 * by_known_moves);  // the straight one, and six from either end
+}
+
 }  // namespace
 }  // namespace flyball::path_planner_test

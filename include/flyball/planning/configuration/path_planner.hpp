@@ -60,7 +60,9 @@ struct ConfigurationPath {
 /// Random trees judge moves eight configurations at a time, in floats with a tolerance on the safe
 /// side, along their whole length. What they do not find within a part of the work is decided by
 /// boxes that are proven free or blocked: they give a path, a channel in which the trees grow on,
-/// or the proof that there is none. Boxes and proofs are kept for later queries. Source: J.
+/// or the proof that there is none. Boxes, proofs and the moves of paths that `automatic` found are
+/// kept for later queries: where both ends reach known moves, no search is needed, and the answer
+/// is told as a roadmap's. So a path may depend on what was asked before. Source: J.
 /// Kuffner, S. LaValle, RRT-Connect, ICRA 2000; S. Karaman, E. Frazzoli, Sampling-based algorithms
 /// for optimal motion planning, IJRR 30 (2011); L. Kavraki et al., Probabilistic roadmaps, IEEE
 /// T-RA 12 (1996); D. Zhu, J.-C. Latombe, New heuristic algorithms for efficient hierarchical path
