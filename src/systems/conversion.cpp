@@ -247,11 +247,11 @@ Expected<ContinuousSystem<>> convert_to_continuous(const DiscreteSystem<>& syste
   switch (method) {
     case ConversionMethod::zoh:
     case ConversionMethod::foh: {
+      FLYBALL_TRY(continuous.A, logarithm(A, T));
       // In balanced units d, because φ₁ is inverted beside I.
       const Eigen::VectorXd d = detail::balance_of(A);
       const Eigen::VectorXd d_inverse = d.cwiseInverse();
-      FLYBALL_TRY(const auto found, logarithm(d_inverse.asDiagonal() * A * d.asDiagonal(), T));
-      continuous.A = d.asDiagonal() * found * d_inverse.asDiagonal();
+      const MatrixXd found = d_inverse.asDiagonal() * continuous.A * d.asDiagonal();
       // B_d = T φ₁(AT) B, or T φ₁(AT)² B: φ₁ - φ₂ + eˣφ₂ = φ₁². The principal logarithm keeps φ₁
       // regular.
       FLYBALL_TRY(const auto parts, holds(found, I, T, where));

@@ -14,14 +14,16 @@ using Eigen::MatrixXd;
 
 Expected<MatrixXd> quadratic_integral(const MatrixRef& F, const MatrixRef& W, double T) {
   // F = 2^unit D G D⁻¹: the integral over t is 2^-unit times that over 2^unit t.
-  const bool far = is_far(F) || is_far(T);
   BalancedMatrix balanced;
+  bool far = is_far(F) || is_far(T);
+  if (!far) {
+    balanced = balanced_of(F);
+    far = balanced.far;
+  }
   if (far) {
     balanced.unit = -std::ilogb(T);
     balanced.d = units_within(F, -balanced.unit, 0.0);
     balanced.M = balanced.there(F, -balanced.unit);
-  } else {
-    balanced = balanced_of(F);
   }
   const MatrixXd& G = balanced.M;
   const Eigen::VectorXi& d = balanced.d;

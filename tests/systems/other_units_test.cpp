@@ -154,6 +154,40 @@ TEST(OtherUnits, WhatIsSmallTakesNoUnits) {
   EXPECT_NEAR(cost.Q(1, 1), expected, 1e-14);
 }
 
+// The logarithm of [.5 0; 1e4 .25] is (ln .5 - ln .25)/(.5 - .25) 1e4 below the diagonal.
+TEST(OtherUnits, CouplingsOfASampledSystem) {
+  const auto found = convert_to_continuous(
+      DiscreteSystem<>{MatrixXd{{0.5, 1e-100}, {1e4, 0.25}}, MatrixXd::Ones(2, 1),
+                       MatrixXd::Ones(1, 2), MatrixXd::Zero(1, 1), Time(1.0)},
+      ConversionMethod::zoh);
+  ASSERT_TRUE(found) << to_string(found.error());
+  EXPECT_NEAR(found->A(1, 0) / 27725.887222397812, 1.0, 1e-13);
+  EXPECT_NEAR(found->A(0, 1) / 2.7725887222397812e-100, 1.0, 1e-13);
+}
+
+// Parts that do not know of each other are judged each beside itself.
+TEST(OtherUnits, SlowPartsBesideFastOnes) {
+  MatrixXd A = MatrixXd::Zero(4, 4);
+  A.topLeftCorner(2, 2) << -1000.0, 1e6, -1e6, -1000.0;
+  A.bottomRightCorner(2, 2) << -1e-9, 1.0, -1.0, -1e-9;
+  EXPECT_EQ(analyze_modes(A, TimeDomain::continuous).value().stability, Stability::stable);
+  A.topLeftCorner(2, 2) << -1.0, 1000.0, -1000.0, -1.0;
+  A.bottomRightCorner(2, 2) << -1e-12, 1.0, -1.0, -1e-12;
+  EXPECT_EQ(analyze_modes(A, TimeDomain::continuous).value().stability, Stability::stable);
+}
+
+// Weak feedback beside an input that moves nothing: ∫ e^{-2t} dt and ∫ (t e^{-t})² + e^{-2t} dt.
+TEST(OtherUnits, CostOfAnInputThatMovesNothing) {
+  const MatrixXd A{{-1.0, 1.0}, {1e-79, -1.0}};
+  const MatrixXd I = MatrixXd::Identity(2, 2);
+  const auto cost = sampled_cost(A, MatrixXd{{0.0, 0.0}, {0.0, 1.0}}, I, I, Time(1.0));
+  ASSERT_TRUE(cost) << to_string(cost.error());
+  EXPECT_NEAR(cost->Q(0, 0), 0.5 * (1.0 - std::exp(-2.0)), 1e-15);
+  EXPECT_NEAR(cost->Q(1, 1), 0.5 * (1.0 - std::exp(-2.0)) + 0.25 * (1.0 - 5.0 * std::exp(-2.0)),
+              1e-15);
+  EXPECT_NEAR(cost->R(0, 0), 1.0, 1e-15);
+}
+
 // ∫ of a chain of n integrators' first state squared, tⁿ⁻¹/(n - 1)!, that feeds back weakly.
 TEST(OtherUnits, WeakFeedbackLeavesTheCost) {
   for (const int n : {4, 12, 20}) {

@@ -150,7 +150,8 @@ std::vector<MatrixXd> spectral_blocks(const MatrixRef& A) {
   }
   double most = 0.0;
   double least = std::numeric_limits<double>::infinity();
-  for (const Indices& part : parts_of(A)) {
+  const std::vector<Indices> parts = parts_of(A);
+  for (const Indices& part : parts) {
     const std::size_t before = blocks.size();
     add_blocks(A(part, part), 0, blocks);
     for (std::size_t k = before; k < blocks.size(); ++k) {
@@ -160,7 +161,8 @@ std::vector<MatrixXd> spectral_blocks(const MatrixRef& A) {
       least = size > 0.0 ? std::min(least, size) : least;
     }
   }
-  if (blocks.size() == 1 || !(most / far_apart > least)) {
+  // What zeros part needs no distance.
+  if (parts.size() == 1 && (blocks.size() == 1 || !(most / far_apart > least))) {
     blocks.clear();
     blocks.emplace_back(A);
   }

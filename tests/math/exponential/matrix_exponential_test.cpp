@@ -200,6 +200,18 @@ TEST(MatrixExponential, BalanceStaysWithinDoubles) {
   EXPECT_LE((expm(ring).value() - wanted).cwiseAbs().maxCoeff(), 4e-16);
 }
 
+// Slow modes beside fast ones keep their digits, coupled or not: squaring in doubles loses 1e-5 of
+// the motor's and 7e-9 of the others.
+TEST(MatrixExponential, StiffSystemsKeepTheirSlowModes) {
+  const MatrixXd motor{{0.0, 1.0, 0.0}, {0.0, -0.1, 2.0}, {0.0, -0.5, -1e12}};
+  EXPECT_NEAR(expm(0.5 * motor).value()(1, 1) / 0.95122942450071400, 1.0, 1e-12);
+  const MatrixXd coupled{{-1e10, 0.0, 0.0}, {1e-12, -1.0, 1.0}, {1e-12, 0.0, -2.0}};
+  const MatrixXd E = expm(coupled).value();
+  EXPECT_NEAR(E(1, 1), std::exp(-1.0), 1e-16);
+  EXPECT_NEAR(E(1, 2), std::exp(-1.0) - std::exp(-2.0), 1e-15);
+  EXPECT_NEAR(E(2, 2), std::exp(-2.0), 1e-16);
+}
+
 // A chain whose end feeds back weakly: units that balance it make the chain's steps small, but not
 // what the series would leave out there: the path through all of them, 1/(n - 1)!.
 TEST(MatrixExponential, WeakFeedbackLeavesTheChain) {
