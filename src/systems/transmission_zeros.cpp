@@ -33,10 +33,17 @@ struct InUnits {
   int time = 0;  ///< Zeros of the given one are those of `system` times 2^time.
 };
 
-/// Entries that doubles may not hold in other units, brought near one by exponents alone.
+/// Whether entries are so far from one that their units decide.
+bool has_units(const MatrixXd& M) {
+  constexpr double far = 0x1p60;
+  const auto size = M.array().abs();
+  return (size > far || (size < 1.0 / far && size > 0.0)).any();
+}
+
+/// Far entries, brought near one by exponents alone.
 InUnits in_ordinary_units(const ContinuousSystem<>& given) {
   const auto& [A, B, C, D] = given;
-  if (!detail::is_far(A) && !detail::is_far(B) && !detail::is_far(C) && !detail::is_far(D)) {
+  if (!has_units(A) && !has_units(B) && !has_units(C) && !has_units(D)) {
     return {given};
   }
   // G(s) = 2^(-outputs - inputs - time) C'(s'I - A')⁻¹B' + D.
