@@ -51,6 +51,9 @@ class PlanReader : public SpaceReader {
       return tl::unexpected(Errors(std::move(errors_)));
     }
     each("region", [&](const toml::table& table) { add_region(*space, table); });
+    if (auto constrained = space->constrain(std::move(regions_)); !constrained) {
+      refuse({}, std::move(constrained).error());
+    }
     add_mechanism(*space);
     PlanJob job{.path = path_, .space = *space};
     job.motion.limits = limits_;

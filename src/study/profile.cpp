@@ -160,6 +160,48 @@ Expected<void> plan(ProfileResult& result, const std::optional<MotorMotionLimits
   return tabulate(TrapezoidProfile(limits, from, to), result);
 }
 
+/// What a kind of profile does not take, and would pass over.
+Expected<void> check_options(const ProfileJob& job, ProfileKind kind) {
+  const bool states = kind == ProfileKind::s_curve || kind == ProfileKind::minimum_jerk;
+  const bool brakes = kind == ProfileKind::trapezoid || kind == ProfileKind::s_curve ||
+                      kind == ProfileKind::minimum_jerk;
+  const struct {
+    bool given;
+    bool taken;
+    const char* name;
+    const char* hint;
+  } options[] = {
+      {job.from.acceleration != 0.0, states, "start_acceleration", "s-curve begins with one"},
+      {job.to.acceleration != 0.0, states, "goal_acceleration", "s-curve ends with one"},
+      {job.ramp.has_value(), states, "ramp", "s-curve has a ramp"},
+      {job.jump > 0.0, kind == ProfileKind::stepper, "jump", "stepper jumps"},
+      {job.deceleration > 0.0, brakes, "deceleration", "trapezoid and s-curve brake by their own"}};
+  for (const auto& option : options) {
+    if (option.given && !option.taken) {
+      return refusal(ArgumentError::out_of_range, in_profile, option.name)
+          .got(fmt::format("given for {}", to_string(kind)))
+          .expected("left out: that kind of profile has none")
+          .hint(option.hint);
+    }
+  }
+  return {};
+}
+
+/// That it ends with the velocity that was asked for: limits stand before goals.
+Expected<void> check_goal_velocity(const ProfileResult& result) {
+  const double wanted = result.job.to.velocity;
+  const double end = result.table.find("velocity")->back();
+  const double size = std::max(std::abs(wanted), result.peak_velocity);
+  if (std::abs(end - wanted) <= 1e-6 * size) {
+    return {};
+  }
+  return refusal(ArgumentError::out_of_range, in_profile, "goal_velocity")
+      .got(fmt::format("{} {}/s, which is not reached: it would arrive with {}",
+                       format_number(wanted), result.unit, format_number(end, 4)))
+      .expected("within the limits of the velocity, and reached on the way there")
+      .hint("raise --velocity, or lower --goal-velocity");
+}
+
 }  // namespace
 
 Expected<ProfileResult> plan_profile(const ProfileJob& job) {
@@ -212,6 +254,12 @@ Expected<ProfileResult> plan_profile(const ProfileJob& job) {
     result.reasons = advice.reasons;
     result.limits.jerk = advice.limits.jerk;
     jump = std::max(jump, advice.jump);
+    const bool smooth = job.ramp || job.from.acceleration != 0.0 || job.to.acceleration != 0.0;
+    if (smooth && result.kind == ProfileKind::trapezoid) {
+      result.kind = ProfileKind::s_curve;
+      result.reasons = {
+          "A ramp, or an acceleration at an end, was asked for: an S-curve has them."};
+    }
   } else {
     FLYBALL_TRY(result.kind, parse_profile_kind(job.kind));
   }
@@ -220,12 +268,14 @@ Expected<ProfileResult> plan_profile(const ProfileJob& job) {
         .got("left out")
         .expected("--kv and --ka of an exponential profile");
   }
+  FLYBALL_CHECK(check_options(job, result.kind));
   if (job.ramp) {
     result.limits.jerk = result.limits.acceleration / job.ramp->si();
   } else if (result.kind == ProfileKind::s_curve && !std::isfinite(result.limits.jerk)) {
     result.limits.jerk = result.limits.acceleration / default_ramp(result.limits);
   }
   FLYBALL_CHECK(plan(result, motor, jump));
+  FLYBALL_CHECK(check_goal_velocity(result));
   const TrapezoidProfile trapezoid(result.limits, from, to);
   result.other_duration = trapezoid.total_time();
   return result;

@@ -24,10 +24,11 @@ class SpaceReader : public TableReader {
   /// @param named  A [[region]], which has a name and a rule; else a part of one.
 
   std::optional<Region> region(const toml::table& table, bool named);
-  /// A [[region]].
-  void add_region(ConfigurationSpace& space, const toml::table& table);
+  /// A [[region]], for `regions_`. @param space  Of which it is to be one.
+  void add_region(const ConfigurationSpace& space, const toml::table& table);
 
   std::vector<SpaceAxis> axes_{};
+  std::vector<ConfigurationSpace::NamedRegion> regions_{};
   std::vector<MotionLimits> limits_{};
   std::vector<double> errors_of_axes_{};
   bool has_limits_ = true;

@@ -52,6 +52,23 @@ TEST_F(ProfileCommand, Kinds) {
   EXPECT_NEAR(turret.at("position").back().get<double>(), 370.0 * std::acos(-1.0) / 180.0, 1e-12);
 }
 
+// What a kind does not take is refused, and a velocity that is not reached: nothing is passed over.
+TEST_F(ProfileCommand, NothingThatIsAskedForIsPassedOver) {
+  for (const auto& [options, named] :
+       {std::pair("--goal-velocity 5m/s", "goal_velocity"),
+        {"--kind trapezoid --start-acceleration 3m/s^2", "start_acceleration"},
+        {"--kind trapezoid --ramp 0.5s", "ramp"},
+        {"--kind trapezoid --jump 0.2m/s", "jump"},
+        {"--kind parabolic --deceleration 3m/s^2", "deceleration"}}) {
+    const Answer told = run(std::string("profile ") + limited + options);
+    EXPECT_EQ(told.status, 2) << options;
+    EXPECT_TRUE(holds(told.err, named)) << options << "\n" << told.err;
+  }
+  EXPECT_EQ(answer(std::string(limited) + "--ramp 0.1s").at("kind"), "s-curve");
+  const Json moving = answer(std::string(limited) + "--goal-velocity 1m/s");
+  EXPECT_NEAR(moving.at("velocity").back().get<double>(), 1.0, 1e-9);
+}
+
 TEST_F(ProfileCommand, WritesPictureAndTables) {
   const Answer told = run(std::string("profile ") + limited + "--kind s-curve --out lift");
   ASSERT_EQ(told.status, 0) << told.err;

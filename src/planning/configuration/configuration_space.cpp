@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <utility>
 
@@ -109,18 +110,23 @@ Expected<ConfigurationSpace> ConfigurationSpace::create(std::vector<SpaceAxis> a
 }
 
 Expected<void> ConfigurationSpace::require(std::string name, const Region& region) {
-  FLYBALL_CHECK(detail::check_region(model_->axes, name, region));
-  auto model = std::make_shared<SpaceModel>(*model_);
-  model->regions.push_back({std::move(name), region, false});
-  detail::complete(*model);
-  model_ = std::move(model);
-  return {};
+  return constrain({{std::move(name), region, false}});
 }
 
 Expected<void> ConfigurationSpace::forbid(std::string name, const Region& region) {
-  FLYBALL_CHECK(detail::check_region(model_->axes, name, region));
+  return constrain({{std::move(name), region, true}});
+}
+
+Expected<void> ConfigurationSpace::takes(const NamedRegion& region) const {
+  return detail::check_region(model_->axes, region.name, region.region);
+}
+
+Expected<void> ConfigurationSpace::constrain(std::vector<NamedRegion> regions) {
+  for (const NamedRegion& region : regions) {
+    FLYBALL_CHECK(takes(region));
+  }
   auto model = std::make_shared<SpaceModel>(*model_);
-  model->regions.push_back({std::move(name), region, true});
+  std::move(regions.begin(), regions.end(), std::back_inserter(model->regions));
   detail::complete(*model);
   model_ = std::move(model);
   return {};

@@ -186,7 +186,9 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
                         search.cells));
   }
   if (method == PathMethod::roadmap) {
-    state_->roadmap.grow(judge, random, search.nodes, bound);
+    // What it has when half of the time is over is searched.
+    detail::WorkBound part(search.work / 2 + 1, 0.5 * search.seconds);
+    state_->roadmap.grow(judge, random, search.nodes, part);
     result.nodes = state_->roadmap.size();
     if (auto path = state_->roadmap.way(judge, start.data(), goal.data(), bound)) {
       return done(*std::move(path), PathMethod::roadmap);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -325,6 +326,35 @@ TEST(ConfigurationSpace, WhatCannotBeASpaceIsRefused) {
   bad = good;
   bad.high = 1e20;
   EXPECT_TRUE(ConfigurationSpace::create({bad}).error().is(ArgumentError::out_of_range));
+}
+
+// Regions all at once are those one by one; one that is none leaves the space as it was.
+TEST(ConfigurationSpace, ManyRegionsAtOnce) {
+  const auto space = [] {
+    return ConfigurationSpace::create(
+               {{.name = "x", .low = 0.0, .high = 4.0}, {.name = "y", .low = 0.0, .high = 4.0}})
+        .value();
+  };
+  ConfigurationSpace together = space();
+  ConfigurationSpace one_by_one = space();
+  std::vector<ConfigurationSpace::NamedRegion> regions;
+  Random random(5);
+  for (int i = 0; i < 40; ++i) {
+    const double x = random.uniform(0.0, 3.8);
+    const double y = random.uniform(0.0, 3.8);
+    regions.push_back({"post", Region::box({x, y}, {x + 0.2, y + 0.2}), true});
+    ASSERT_TRUE(one_by_one.forbid("post", regions.back().region));
+  }
+  ASSERT_TRUE(together.constrain(regions));
+  EXPECT_EQ(together.constraints(), one_by_one.constraints());
+  for (int i = 0; i < 2000; ++i) {
+    const std::vector<double> q{random.uniform(-0.1, 4.1), random.uniform(-0.1, 4.1)};
+    EXPECT_EQ(together.valid(q), one_by_one.valid(q));
+    EXPECT_EQ(together.clearance(q), one_by_one.clearance(q));
+  }
+  regions.push_back({"nowhere", Region::interval(7, 0.0, 1.0), true});
+  EXPECT_FALSE(together.constrain(regions));
+  EXPECT_EQ(together.constraints().size(), one_by_one.constraints().size());
 }
 
 }  // namespace

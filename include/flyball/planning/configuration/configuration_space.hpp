@@ -71,6 +71,13 @@ class ConfigurationSpace {
   /// @errors ArgumentError::empty, not_finite, out_of_range, ambiguous_name.
   [[nodiscard]] static Expected<ConfigurationSpace> create(std::vector<SpaceAxis> axes);
 
+  /// A constraint that is a region.
+  struct NamedRegion {
+    std::string name{};
+    Region region{};
+    bool forbidden = false;
+  };
+
   /// Only configurations in the region are valid. @param name  What errors say.
   /// @errors ArgumentError: a number that is not finite, a coordinate that is not there, a polygon
   ///         of fewer than three vertices, without an area or with crossing edges, low > high.
@@ -78,6 +85,13 @@ class ConfigurationSpace {
 
   /// No configuration inside of the region is valid. @errors As `require`.
   [[nodiscard]] Expected<void> forbid(std::string name, const Region& region);
+
+  /// Whether a region is one of this space. @errors As `require`.
+  [[nodiscard]] Expected<void> takes(const NamedRegion& region) const;
+
+  /// `require` and `forbid` of all regions at once, or of none; one by one each makes the space
+  /// anew. @errors As `require`.
+  [[nodiscard]] Expected<void> constrain(std::vector<NamedRegion> regions);
 
   /// The mechanism that the coordinates move; one a space.
   /// @errors ArgumentError: numbers that are not within 1e9, names and joints not there, a
@@ -98,12 +112,6 @@ class ConfigurationSpace {
   [[nodiscard]] std::vector<std::string> constraints() const;
   /// The mechanism, if there is one.
   [[nodiscard]] const PlanarMechanism* mechanism() const noexcept;
-  /// A constraint that is a region.
-  struct NamedRegion {
-    std::string name{};
-    Region region{};
-    bool forbidden = false;
-  };
   /// All of them, as they were given; for pictures.
   [[nodiscard]] const std::vector<NamedRegion>& regions() const noexcept;
 
