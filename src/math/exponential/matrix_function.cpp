@@ -446,9 +446,18 @@ Expected<MatrixXd> powm(const MatrixRef& A, double power) {
         .got(format_number(power))
         .expected("at most 1e9 in magnitude");
   }
-  return in_units(
+  const bool whole = is_whole(power);
+  auto made = in_units(
       A, where, [&](const MatrixRef& M) { return power_of(M, power); },
-      is_whole(power) ? std::round(power) : 0.0);
+      whole ? std::round(power) : 0.0);
+  if (made && whole && power < 0.0) {
+    // An inverse that undoes A in other units need not in the given ones.
+    const MatrixXd forward = whole_power(A, static_cast<long long>(-std::round(power)));
+    if (forward.allFinite() && !(inverse_error(forward, *made) <= 1e-10)) {
+      return power_of(A, power);
+    }
+  }
+  return made;
 }
 
 }  // namespace flyball
