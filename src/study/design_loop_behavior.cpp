@@ -55,14 +55,19 @@ struct Slowness {
   }
 };
 
+// Whether other designs are looked for: each period of delay is a state, and a search takes its
+// time.
+bool is_searched(const DesignJob& job) {
+  constexpr double most_periods = 25.0;
+  return delay_of(job).si() <= most_periods * job.controller.period;
+}
+
 // What predicting over the delay would give, and how it is switched on; empty where it is not
 // faster than that with comfortable margins.
 Expected<std::string> with_prediction(const LoopDesign& loop, const LinearModel& model,
                                       const DesignJob& job, bool chosen, const Slowness& slowness,
                                       double clearly) {
-  constexpr double most_periods =
-      25.0;  // each is a state of the regulator, and a search takes its time
-  if (loop.predicts || !(delay_of(job).si() <= most_periods * job.controller.period)) {
+  if (loop.predicts || !is_searched(job)) {
     return std::string();
   }
   DesignJob predicted = job;
@@ -192,7 +197,7 @@ Expected<void> tell_cost_of_delay(const LoopDesign& loop, const LoopBehavior& ru
   }
   std::vector<std::string> faster;
   const double clearly = share * slowness.now;
-  if (!chosen) {
+  if (!chosen && is_searched(job)) {
     std::vector<double> tolerances;
     if (const auto other = search_tolerances(model, job, tolerances)) {
       FLYBALL_TRY(const auto behavior, behavior_of(*other, model, job));

@@ -356,7 +356,7 @@ TEST(DesignTruth, SaysThatThereIsNoFeedbackAndWhy) {
 // nor the mechanism, whatever rounding leaves of K. What the delay costs is told, and the gain that
 // makes no difference is none.
 TEST(DesignTruth, ADelayThatLeavesNoFeedbackIsTheReason) {
-  for (const double delay : {1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.9}) {
+  for (const double delay : {1.0, 2.0, 2.5}) {
     SCOPED_TRACE(delay);
     const auto result = design(readme_elevator(delay));
     ASSERT_TRUE(result) << to_string(result.error());
@@ -381,6 +381,16 @@ TEST(DesignTruth, ADelayThatLeavesNoFeedbackIsTheReason) {
       << result.no_feedback;
   const std::string cost = told(result, "delay_costs_speed");
   EXPECT_NE(cost.find("--predict-delay"), std::string::npos) << cost;
+  // What a team pastes says so, too: loops and constants of each language.
+  int files = 0;
+  for (const auto& file : answer_of(result).files) {
+    if (file.name.starts_with("constants/wpilib") || file.name.ends_with("Loop.hpp") ||
+        file.name.ends_with("Loop.java")) {
+      ++files;
+      EXPECT_NE(file.contents.find("There is no feedback"), std::string::npos) << file.name;
+    }
+  }
+  EXPECT_GE(files, 3);
 }
 
 // A slow observer has the slowest eigenvalue with and without the delay: the step tells the cost.
