@@ -22,6 +22,8 @@ constexpr double tolerance = 1e-12;
 /// Of a system without states: those of ten states count as three. Of n > 10 states (n/10)³ times
 /// as many; four more for each sample.
 constexpr double most_steps = 250'000.0;
+/// Instants nearer than this share of the whole time are one.
+constexpr double shortest_share = 1e-9;
 constexpr std::size_t most_breaks = 200'000;
 
 }  // namespace
@@ -45,7 +47,6 @@ Motion::Motion(const DelaySystem& system, Drive drive, double step, Index sample
   form_.B2 = inverse.asDiagonal() * form_.B2;
   form_.C1 = form_.C1 * scaling_.asDiagonal();
   form_.C2 = form_.C2 * scaling_.asDiagonal();
-  B_ = beside(form_.B1, form_.B2);
   shortest_ =
       form_.delays.size() > 0 ? form_.delays.minCoeff() : std::numeric_limits<double>::infinity();
 }
@@ -68,10 +69,10 @@ Expected<DelayResponse> Motion::run(const VectorXd& x0) {
   wanted_ = std::min({shortest_, std::max(end_, step_), rate > 0.0 ? 1.0 / rate : HUGE_VAL});
   const double size = 0.1 * static_cast<double>(x_.size());
   work_ = most_steps * std::max(1.0, size * size * size) + 4.0 * static_cast<double>(samples_);
-  if (end_ > work_ * shortest_) {
+  if (end_ * shortest_share > shortest_) {
     return refusal(ArgumentError::out_of_range, "response", "the shortest delay")
         .got(flyball::detail::format("{} s", shortest_))
-        .expected(flyball::detail::format("at least {} s: no step is longer", end_ / work_))
+        .expected(flyball::detail::format("at least a billionth of the time, {} s", end_))
         .hint("ask for a shorter time, or leave the delay out");
   }
   while (next_sample_ < samples_) {
@@ -234,6 +235,10 @@ double Motion::delayed(Index i, double begin, double t) const {
   return legendre_sum(segment.z.col(i), x);
 }
 
+bool Motion::reaches_into(Index i, Index d, double length) const {
+  return 0.5 * (1.0 + collocation_.nodes(i)) * length > form_.delays(d) * (1.0 + 1e-12);
+}
+
 const Propagator& Motion::propagator(double length) {
   const auto key = std::llround(std::ldexp(std::log2(length), 43));
   if (const auto found = propagators_.find(key); found != propagators_.end()) {
@@ -242,21 +247,49 @@ const Propagator& Motion::propagator(double length) {
   if (propagators_.size() > 256) {
     propagators_.clear();
   }
-  // (I - h/2 a ⊗ A) X = 1 ⊗ x(0) + h/2 a ⊗ B [u; w].
+  // (I - h/2 a ⊗ A) X - h/2 a ⊗ B₂ W = 1 ⊗ x(0) + h/2 a ⊗ B₁ U, and, where a step is longer than a
+  // delay, W = W₀ + E (C₂ X + D₂₁ U + D₂₂ W): E takes the step's own polynomials a delay earlier,
+  // W₀ is what came before the step.
   const Index n = x_.size();
-  const Index q = B_.cols();
-  MatrixXd M = MatrixXd::Identity(points * n, points * n);
-  MatrixXd right = MatrixXd::Zero(points * n, n + points * q);
+  const Index m = form_.B1.cols();
+  const Index k = form_.delays.size();
+  const Index q = m + k;
+  const bool overlaps = length > shortest_;
+  const Index w = points * n;
+  const Index unknowns = w + (overlaps ? points * k : 0);
+  MatrixXd M = MatrixXd::Identity(unknowns, unknowns);
+  MatrixXd right = MatrixXd::Zero(unknowns, n + points * q);
   for (Index i = 0; i < points; ++i) {
     right.block(i * n, 0, n, n).setIdentity();
     for (Index j = 0; j < points; ++j) {
       const double a = 0.5 * length * collocation_.integrals(i, j);
       M.block(i * n, j * n, n, n) -= a * form_.A;
-      right.block(i * n, n + j * q, n, q) = a * B_;
+      right.block(i * n, n + j * q, n, m) = a * form_.B1;
+      if (overlaps) {
+        M.block(i * n, w + j * k, n, k) -= a * form_.B2;
+      } else {
+        right.block(i * n, n + j * q + m, n, k) = a * form_.B2;
+      }
+    }
+  }
+  for (Index i = 0; overlaps && i < points; ++i) {
+    for (Index d = 0; d < k; ++d) {
+      const Index row = w + i * k + d;
+      right(row, n + i * q + m + d) = 1.0;
+      if (!reaches_into(i, d, length)) {
+        continue;
+      }
+      const double place = collocation_.nodes(i) - 2.0 * form_.delays(d) / length;
+      const VectorXd E = collocation_.modes.transpose() * legendre(points, place);
+      for (Index j = 0; j < points; ++j) {
+        M.block(row, j * n, 1, n) -= E(j) * form_.C2.row(d);
+        M.block(row, w + j * k, 1, k) -= E(j) * form_.D22.row(d);
+        right.block(row, n + j * q, 1, m) += E(j) * form_.D21.row(d);
+      }
     }
   }
   // Of ten states one length costs as much as 200 steps.
-  const auto size = static_cast<double>(points * n);
+  const auto size = static_cast<double>(unknowns);
   work_ -= 5e-3 * size * size * (1.0 + 0.01 * (size + static_cast<double>(right.cols())));
   const MatrixXd X = flyball::detail::solve_linear(M, right);
   return propagators_.emplace(key, Propagator{X.leftCols(n), X.rightCols(points * q)})
@@ -266,9 +299,10 @@ const Propagator& Motion::propagator(double length) {
 Expected<void> Motion::cross(double until) {
   while (until - t_ > same() && next_sample_ < samples_) {
     const double distance = until - t_;
-    const double parts = std::ceil(distance / std::min(wanted_, shortest_) * (1.0 - 1e-9));
+    const double parts = std::ceil(distance / wanted_ * (1.0 - 1e-9));
     const double length = distance / std::max(parts, 1.0);
-    work_ -= 1.0 + 3e-3 * static_cast<double>(x_.size() * (x_.size() + points * B_.cols()));
+    work_ -= 1.0 + 3e-3 * static_cast<double>(x_.size() * (x_.size() + points * (form_.B1.cols() +
+                                                                                 form_.B2.cols())));
     if (!(work_ >= 0.0)) {
       return refusal(SystemError::no_convergence, "response", "the motion")
           .got(flyball::detail::format("not followed beyond {} s by as many steps as it may take",
@@ -309,13 +343,16 @@ bool Motion::take_step(double length, double end) {
     const double t = t_ + 0.5 * (1.0 + collocation_.nodes(i)) * length;
     inputs.segment(i * q, m) = input(t_, t);
     for (Index j = 0; j < k; ++j) {
-      inputs(i * q + m + j) = delayed(j, t_, t);
+      inputs(i * q + m + j) = reaches_into(i, j, length) ? 0.0 : delayed(j, t_, t);
     }
   }
   VectorXd X = VectorXd::Zero(0);
-  if (n > 0) {
+  if (n > 0 || length > shortest_) {
     const Propagator& by = propagator(length);
     X = by.P * x_ + by.Q * inputs;
+  }
+  for (Index i = 0; length > shortest_ && i < points; ++i) {
+    inputs.segment(i * q + m, k) = X.segment(points * n + i * k, k);
   }
   const Eigen::Map<const MatrixXd> states(X.data(), n, points);
   const Eigen::Map<const MatrixXd> drive(inputs.data(), q, points);
@@ -344,6 +381,13 @@ bool Motion::take_step(double length, double end) {
   const VectorXd terms = form_.C2.cwiseAbs() * largest_x_;
   if (!resolved(x_modes, at_nodes, largest_x_, all) || !resolved(z_modes, z, largest_z_, terms)) {
     return false;
+  }
+  // What arrives is of two pieces then, of before the step and of the step.
+  if (length > shortest_) {
+    const MatrixXd w = drive.bottomRows(k).transpose();
+    if (!resolved(product(collocation_.modes, w), w, largest_z_, terms)) {
+      return false;
+    }
   }
   for (Index j = 0; j < n; ++j) {
     largest_x_(j) = std::max(largest_x_(j), at_nodes.col(j).cwiseAbs().maxCoeff());

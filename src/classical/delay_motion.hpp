@@ -40,7 +40,7 @@ struct Segment {
 };
 
 /// Values at the nodes of a step: x = P x(0) + Q [u; w], the inputs' values at the nodes below each
-/// other.
+/// other; of one longer than a delay [x; w], with a w of zero where it is of the step itself.
 struct Propagator {
   MatrixXd P;
   MatrixXd Q;
@@ -90,6 +90,9 @@ class Motion {
   /// wᵢ on the step that begins at t₀, at t: zᵢ(t - τᵢ) from the segment that holds the step.
   [[nodiscard]] double delayed(Index i, double begin, double t) const;
 
+  /// Whether at node i of a step what comes out of delay d went in during the step.
+  [[nodiscard]] bool reaches_into(Index i, Index d, double length) const;
+
   const Propagator& propagator(double length);
 
   /// From here to a place, in equal steps of at most the wanted length.
@@ -108,7 +111,6 @@ class Motion {
   Index samples_;
   Collocation collocation_;
   VectorXd scaling_{};
-  MatrixXd B_{};
   double shortest_ = 0.0;
   double work_ = 0.0;    ///< What is left, in steps.
   double wanted_ = 0.0;  ///< Length of a step.

@@ -25,7 +25,7 @@ using detail::Motion;
 
 constexpr Index most_states = 200;
 constexpr Index most_samples = 10'000'000;
-constexpr double most_delays = 1e6;
+constexpr double most_delays = 1e9;
 
 /// A discrete system is stepped.
 Expected<DelayResponse> stepped(const DelaySystem& system, const Drive& drive, const VectorXd& x0) {
@@ -87,7 +87,7 @@ Expected<DelayResponse> respond(const DelaySystem& system, const Drive& drive, c
   if (system.has_delay() && system.delays().minCoeff() * most_delays < end) {
     return refusal(ArgumentError::out_of_range, where, "the shortest delay")
         .got(flyball::detail::format("{} s", system.delays().minCoeff()))
-        .expected(flyball::detail::format("at least a millionth of the time, {} s", end))
+        .expected(flyball::detail::format("at least a billionth of the time, {} s", end))
         .hint("ask for a shorter time, or leave the delay out");
   }
   return Motion(system, drive, step, drive.u.rows()).run(x0);

@@ -250,9 +250,12 @@ TEST(DelayResponse, Errors) {
       forced_response(G, MatrixXd(NAN * u), x0, Time(0.1)).error().is(ArgumentError::not_finite));
   EXPECT_TRUE(step_response(G, 1).error().is(ArgumentError::out_of_range));
   EXPECT_TRUE(step_response(G, 0, every(1.0, 0)).error().is(ArgumentError::out_of_range));
-  EXPECT_EQ(to_string(step_response(G, 0, every(1e4, 1001)).error()),
-            "response: the shortest delay is 0.1 s; it must be at least a millionth of the time, "
-            "10010000 s; ask for a shorter time, or leave the delay out");
+  EXPECT_EQ(to_string(step_response(G, 0, every(1e6, 1001)).error()),
+            "response: the shortest delay is 0.1 s; it must be at least a billionth of the time, "
+            "1001000000 s; ask for a shorter time, or leave the delay out");
+  const auto late = step_response(G, 0, every(1e4, 1001));
+  ASSERT_TRUE(late) << to_string(late.error());
+  EXPECT_NEAR(late->y(1000, 0), 1.0, 1e-12);
   EXPECT_EQ(to_string(step_response(G, 0, every(1e-303, 601)).error()),
             "response: the time between two samples is 1e-303 s; it must be at least 1e-280 s");
   const auto unstable = system_of(transfer({1.0}, {1.0, -1.0}, 0.1));
@@ -262,4 +265,33 @@ TEST(DelayResponse, Errors) {
 }
 
 }  // namespace
+// y' = 1 - y(t - τ) with delays far shorter than the motion: the sum of the test above, in long
+// double, of which terms up to 10² leave 1e-16.
+TEST(DelayResponse, StepsMayBeLongerThanADelay) {
+  for (const double tau : {1e-3, 0.01, 0.03, 0.3}) {
+    const auto loop = feedback(system_of(transfer({1.0}, {1.0, 0.0}, tau))).value();
+    const auto exact = [&](double t) {
+      long double sum = 0.0L;
+      for (int n = 1; n <= 80 && n * tau <= t; ++n) {
+        sum -= std::pow(static_cast<long double>(n * tau - t), n) /
+               std::tgamma(static_cast<long double>(n + 1));
+      }
+      return static_cast<double>(sum);
+    };
+    EXPECT_LE(worst_error(step_response(loop, 0, every(0.05, 121)).value(), exact), 1e-11) << tau;
+  }
+}
+
+// A slow part and a soon one: 20 000 seconds of a delay of 0.1 s.
+TEST(DelayResponse, ASlowPartIsFollowedToItsEnd) {
+  const auto both =
+      parallel(system_of(transfer({1.0}, {1.0, 1.0})), system_of(transfer({1.0}, {1.0, 1e-3}, 0.1)))
+          .value();
+  const auto y = step_response(both, 0, every(100.0, 201)).value();
+  for (Index i = 1; i < y.time.size(); ++i) {
+    const double t = y.time(i);
+    EXPECT_NEAR(y.y(i, 0), 1.0 - std::exp(-t) - 1e3 * std::expm1(-1e-3 * (t - 0.1)), 1e-8) << t;
+  }
+}
+
 }  // namespace flyball::classical::delay_response_test

@@ -101,7 +101,6 @@ TEST(DelayStepMetrics, EachChannelIsItsOwn) {
   EXPECT_TRUE(step_metrics(both, 0, 0, 1.0).error().is(ArgumentError::out_of_range));
 }
 
-// No step is longer than the shortest delay: what takes too many is told before the first of them.
 TEST(DelayStepMetrics, ADelayThatIsNextToNoneIsRefused) {
   const auto late = DelaySystem::create(transfer({1.0}, {1.0}, 1.0)).value();
   const auto soon = DelaySystem::create(transfer({2.0}, {1.0}, 5e-324)).value();
@@ -111,6 +110,16 @@ TEST(DelayStepMetrics, ADelayThatIsNextToNoneIsRefused) {
             "response: the shortest delay is 5e-324 s; it must be at");
   const auto near = DelaySystem::create(transfer({2.0}, {1.0}, 1e-3)).value();
   EXPECT_EQ(step_metrics(parallel(late, near).value(), 0, 0)->final_value, 3.0);
+}
+
+TEST(DelayStepMetrics, ASlowPartBesideAShortDelay) {
+  const auto fast = DelaySystem::create(transfer({1.0}, {1.0, 1.0})).value();
+  const auto slow = DelaySystem::create(transfer({1.0}, {1.0, 1e-3}, 0.1)).value();
+  const auto metrics = step_metrics(parallel(fast, slow).value(), 0, 0).value();
+  // 1 + 1000 (1 - e^{-(t - 0.1) / 1000}) reaches a share p of 1001; 1 - e^{-t} is over by then.
+  const auto reaches = [](double p) { return 0.1 - 1e3 * std::log1p(-(1001.0 * p - 1.0) / 1e3); };
+  EXPECT_NEAR(*metrics.rise_time, reaches(0.9) - reaches(0.1), 1e-6);
+  EXPECT_NEAR(*metrics.settling_time, reaches(0.98), 1e-6);
 }
 
 TEST(DelayStepMetrics, OfADiscreteLoopItsSamples) {
