@@ -184,17 +184,21 @@ Judged judged_in(const MatrixRef& A, const MatrixRef& B, const MatrixRef& K,
   const Eigen::MatrixXd y = left.cwiseAbs();
   const Eigen::MatrixXd y_B = complex_product(left, B.cast<Complex>()).cwiseAbs();
   const Eigen::MatrixXd terms = product(A.cwiseAbs(), x) + product(B.cwiseAbs(), fed);
+  // The inverse is off by its digits times |X⁻¹||X|: of dependent vectors it is no inverse.
+  const Eigen::MatrixXd X_size = X.rounded().cwiseAbs();
+  const Eigen::MatrixXd inverse_size = inverse.rounded().cwiseAbs();
+  const double growth = std::max(
+      1.0, product(inverse_size, X_size).rowwise().sum().maxCoeff() / static_cast<double>(n));
   const Eigen::VectorXd formed =
-      y.transpose().cwiseProduct(terms).colwise().sum().transpose() +
-      y_B.transpose().cwiseProduct(product(K.cwiseAbs(), x)).colwise().sum().transpose();
+      growth * (y.transpose().cwiseProduct(terms).colwise().sum().transpose() +
+                y_B.transpose().cwiseProduct(product(K.cwiseAbs(), x)).colwise().sum().transpose());
   const Eigen::VectorXd scales = pole_scales(
       wanted, units.balanced.asDiagonal() * A * units.balanced.cwiseInverse().asDiagonal());
-  const Spectrum spectrum =
-      spectrum_of(exact,
-                  product(inverse.rounded().cwiseAbs(),
-                          product(A.cwiseAbs(), X.rounded().cwiseAbs()) +
-                              product(B.cwiseAbs(), product(K.cwiseAbs(), X.rounded().cwiseAbs()))),
-                  system, rows, formed, scales);
+  const Spectrum spectrum = spectrum_of(
+      exact,
+      growth * product(inverse_size, product(A.cwiseAbs(), X_size) +
+                                         product(B.cwiseAbs(), product(K.cwiseAbs(), X_size))),
+      system, rows, formed, scales);
   reached.wanted = wanted;
   reached.poles.resize(n);
   reached.left.resize(n, n);

@@ -12,6 +12,7 @@
 #include "math/dense/dense.hpp"
 #include "math/dense/dense_reduction.hpp"
 #include "math/dense/ordinary_units.hpp"
+#include "math/extended/wide_matrix.hpp"
 #include "systems/balance.hpp"
 #include "systems/gramian_factor.hpp"
 #include "systems/modes.hpp"
@@ -107,32 +108,70 @@ namespace {
 
 using Eigen::MatrixXd;
 
-Expected<Gramian> gramian(const MatrixRef& A, const MatrixRef& B, TimeDomain domain) {
-  // In a unit of the inputs, and of states that they hardly move, in which BBᵀ is a double.
+/// Whether the equation still holds where entries of W are below the normal doubles.
+bool holds_as_rounded(const MatrixRef& A, const MatrixRef& B, const MatrixRef& W,
+                      TimeDomain domain) {
+  using detail::WideMatrix;
+  const auto equation = [&](const WideMatrix& a, const WideMatrix& b, const WideMatrix& w,
+                            double sign) {
+    const WideMatrix aw = product(a, w);
+    const WideMatrix bb = product(b, b.transpose());
+    return domain == TimeDomain::continuous ? sum(sum(aw, 1.0, aw.transpose()), 1.0, bb)
+                                            : sum(add_product(bb, 1.0, aw, a.transpose()), sign, w);
+  };
+  const WideMatrix a{MatrixXd(A)};
+  const WideMatrix b{MatrixXd(B)};
+  const WideMatrix w{MatrixXd(W)};
+  constexpr double largest_share = 1e-11;
+  return share_of(equation(a, b, w, -1.0),
+                  equation(a.magnitudes(), b.magnitudes(), w.magnitudes(), 1.0)) <= largest_share;
+}
+
+/// Units of the states, 2^states, and one of the inputs.
+struct GramianUnits {
+  Eigen::VectorXi states;
+  int inputs = 0;
+};
+
+/// Those in which BBᵀ is a double: of the inputs, and of states that they hardly move.
+GramianUnits units_of(const MatrixRef& A, const MatrixRef& B) {
   constexpr int lowest = -400;
   const Eigen::Index n = A.rows();
-  const int unit = B.size() == 0 || B.isZero(0.0) ? 0 : std::ilogb(B.cwiseAbs().maxCoeff());
-  Eigen::VectorXi d = Eigen::VectorXi::Zero(n);
+  GramianUnits units{Eigen::VectorXi::Zero(n),
+                     B.size() == 0 || B.isZero(0.0) ? 0 : std::ilogb(B.cwiseAbs().maxCoeff())};
   for (Eigen::Index i = 0; i < n; ++i) {
     if (B.cols() > 0 && !B.row(i).isZero(0.0)) {
-      d(i) = std::min(0, std::ilogb(B.row(i).cwiseAbs().maxCoeff()) - unit - lowest);
+      units.states(i) =
+          std::min(0, std::ilogb(B.row(i).cwiseAbs().maxCoeff()) - units.inputs - lowest);
     }
   }
-  MatrixXd A_there = A;
-  if (!d.isZero()) {
-    A_there = detail::times_powers(A, -d, d, 0);
-    if (!A_there.allFinite() || ((A_there.array() == 0.0) != (A.array() == 0.0)).any()) {
-      d.setZero();
-      A_there = A;
+  if (!units.states.isZero()) {
+    const MatrixXd there = detail::times_powers(A, -units.states, units.states, 0);
+    if (!there.allFinite() || ((there.array() == 0.0) != (A.array() == 0.0)).any()) {
+      units.states.setZero();
     }
   }
-  const MatrixXd B_there = detail::times_powers(B, -d, Eigen::VectorXi::Zero(B.cols()), -unit);
+  return units;
+}
+
+Expected<Gramian> gramian_in(const GramianUnits& units, const MatrixRef& A, const MatrixRef& B,
+                             TimeDomain domain) {
+  const Eigen::VectorXi& d = units.states;
+  const MatrixXd A_there = detail::times_powers(A, -d, d, 0);
+  const MatrixXd B_there =
+      detail::times_powers(B, -d, Eigen::VectorXi::Zero(B.cols()), -units.inputs);
   const MatrixXd BB = detail::product_transposed(B_there, B_there);
   FLYBALL_TRY(auto solution, domain == TimeDomain::continuous ? lyapunov(A_there, BB)
                                                               : discrete_lyapunov(A_there, BB));
   Gramian found;
-  found.W = detail::times_powers(detail::symmetrized(solution.X), d, d, 2 * unit);
-  if (!found.W.allFinite()) {
+  found.W = detail::times_powers(detail::symmetrized(solution.X), d, d, 2 * units.inputs);
+  // Entries that are no normal doubles, there or here, may be what the equation rests on.
+  constexpr double least = std::numeric_limits<double>::min();
+  constexpr int far = 100;
+  const bool is_far = std::abs(units.inputs) > far || (d.array().abs() > far).any();
+  const bool rounds =
+      is_far && (solution.X.array().abs() < least || found.W.array().abs() < least).any();
+  if (!found.W.allFinite() || (rounds && !holds_as_rounded(A, B, found.W, domain))) {
     return refusal(MatrixEquationError::overflow, "the Gramian")
         .hint("measure states, inputs and outputs in units in which the entries are nearer to 1");
   }
@@ -140,6 +179,18 @@ Expected<Gramian> gramian(const MatrixRef& A, const MatrixRef& B, TimeDomain dom
   found.is_energy = detail::judged_eigenvalues(A, domain).stability == Stability::stable;
   found.residual = solution.residual;
   found.condition = solution.condition;
+  return found;
+}
+
+Expected<Gramian> gramian(const MatrixRef& A, const MatrixRef& B, TimeDomain domain) {
+  const GramianUnits units = units_of(A, B);
+  auto found = gramian_in(units, A, B, domain);
+  if (!found && (units.inputs != 0 || !units.states.isZero())) {
+    auto as_given = gramian_in({Eigen::VectorXi::Zero(A.rows()), 0}, A, B, domain);
+    if (as_given && holds_as_rounded(A, B, as_given->W, domain)) {
+      return as_given;
+    }
+  }
   return found;
 }
 

@@ -132,5 +132,19 @@ TEST(PlaceSmallPoles, StiffPlants) {
   EXPECT_GT(placed_ones, 60);
 }
 
+// A double pole at zero beside one at 1e20: the vectors of the small poles are nearly dependent,
+// and X⁻¹ (A - B K) X of them in 31 digits has others, ±3e14 j.
+TEST(PlaceSmallPoles, OfDependentVectors) {
+  const MatrixXd A{{-1.48883056640625, 1.0, 0.675537109375},
+                   {0.5, 2.2e-16, 2.0},
+                   {1.93048095703125, 1.82867431640625, 1.9901123046875}};
+  const MatrixXd B{{0.0}, {-1e20}, {0.0}};
+  const auto placed = place(A, B, {Complex(1e20), Complex(0.0), Complex(0.0)}).value();
+  // The truth, by mpmath 1.3 at 400 bits, is -1.82 and -0.0047.
+  EXPECT_LT(placed.pole_error, 1e-14);
+  EXPECT_LT(std::abs(placed.poles(1)), 1e6);
+  EXPECT_LT(std::abs(placed.poles(2)), 1e6);
+}
+
 }  // namespace
 }  // namespace flyball::pole_placement_small_poles_test

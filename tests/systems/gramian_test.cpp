@@ -247,4 +247,35 @@ TEST(Norms, OfALoopWhoseInputMovesOneState) {
 }
 
 }  // namespace
+// W₁₂ = 0 and W₂₂ = -1e72: what rounding leaves of W₁₂ in balanced units would be 1e40 in the
+// second equation.
+TEST(Gramian, HoldsInTheGivenUnits) {
+  MatrixXd A(2, 2);
+  A << -3.0, 4.4580078125e-37, 1.6220703125e+36, 0.0;
+  const Gramian found =
+      controllability_gramian(A, Eigen::Vector2d(-1.64605712890625, 0.0), TimeDomain::continuous)
+          .value();
+  const double w = 1.64605712890625 * 1.64605712890625 / 6.0;
+  EXPECT_NEAR(found.W(0, 0), w, 1e-15);
+  EXPECT_LE(std::abs(found.W(0, 1)), 1e-16 * 1e-36);
+  const double last = -1.6220703125e+36 * w / 4.4580078125e-37;
+  EXPECT_NEAR(found.W(1, 1), last, 1e-15 * std::abs(last));
+}
+
+// W₃₃ = -1.7e-308 times 1.7e308² is most of an entry of the equation, and no double in the units in
+// which CᵀC is one: refused rather than answered as zero.
+TEST(Gramian, AnEntryThatIsNoDoubleThere) {
+  MatrixXd A(4, 4);
+  A << -1.66534423828125, -0.8880615234375, 0.0, -1.7095947265625, 2.3e-308, -2.508544921875,
+      1e+154, 1.74542236328125, 1.7e+308, 1e+154, -1.97894287109375, 1e+155, -1.9542236328125,
+      -1e-154, -1.03662109375, 1e+100;
+  MatrixXd C(3, 4);
+  C << -1e+20, -1e+20, -1.3004150390625, 1.42120361328125, -0.131591796875, -1e+154,
+      0.63519287109375, -1e-154, -1e-154, -0.6903076171875, 1e-20, -1e-16;
+  const auto found = observability_gramian(A, C, TimeDomain::discrete);
+  ASSERT_FALSE(found);
+  EXPECT_TRUE(found.error().is(MatrixEquationError::overflow) ||
+              found.error().is(MatrixEquationError::not_accurate));
+}
+
 }  // namespace flyball::gramian_test

@@ -82,7 +82,8 @@ MatrixXcd MemberClimb::matrix_of(const UnitMember& member) const {
 }
 
 std::optional<MemberClimb::Eigenvalue> MemberClimb::eigenvalue_of(const UnitMember& member,
-                                                                  const Complex* near) const {
+                                                                  const Complex* near,
+                                                                  bool real) const {
   const MatrixXcd M = M_.at(member.frequency);
   if (!M.allFinite()) {
     return std::nullopt;
@@ -96,6 +97,9 @@ std::optional<MemberClimb::Eigenvalue> MemberClimb::eigenvalue_of(const UnitMemb
   const Index n = QM.rows();
   const auto merit = [&](const Complex& value) {
     return near != nullptr ? -std::abs(value - *near)
+           : real          ? (std::abs(value.imag()) <= 1e-13 * std::abs(value.real())
+                                  ? std::abs(value.real())
+                                  : -std::abs(value.imag()))
            : complex_      ? std::abs(value)
                            : std::abs(value.real()) - 0.5 * std::abs(value.imag());
   };
@@ -319,6 +323,10 @@ std::optional<MemberClimb::Eigenvalue> MemberClimb::align(UnitMember& member) co
 std::optional<SingularMember> MemberClimb::result(const UnitMember& member,
                                                   const Eigenvalue& pair) const {
   const double rounding = pair.rounding();
+  // Below that neither λ nor what it is off by has digits.
+  if (!(pair.norm >= std::numeric_limits<double>::min() / epsilon)) {
+    return std::nullopt;
+  }
   if (!(pair.value.real() > 0.0) || std::abs(pair.value.imag()) > 1e-12 * pair.value.real()) {
     return std::nullopt;
   }
@@ -326,7 +334,7 @@ std::optional<SingularMember> MemberClimb::result(const UnitMember& member,
 }
 
 std::optional<SingularMember> MemberClimb::look(const UnitMember& member) const {
-  auto pair = eigenvalue_of(member, nullptr);
+  auto pair = eigenvalue_of(member, nullptr, !complex_);
   if (!pair) {
     return std::nullopt;
   }

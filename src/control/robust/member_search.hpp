@@ -57,8 +57,10 @@ class MemberClimb {
 
  private:
   struct Eigenvalue;
+  /// Of the eigenvalues the one nearest to a place; without one the largest, or the largest real.
   [[nodiscard]] std::optional<Eigenvalue> eigenvalue_of(const UnitMember& member,
-                                                        const std::complex<double>* near) const;
+                                                        const std::complex<double>* near,
+                                                        bool real = false) const;
   [[nodiscard]] Eigen::VectorXcd slopes_of(const UnitMember& member, const Eigenvalue& pair) const;
   [[nodiscard]] UnitMember moved(const UnitMember& member, const Eigen::VectorXd& step) const;
   [[nodiscard]] Eigen::VectorXd step_from(const UnitMember& member, const Eigenvalue& pair,

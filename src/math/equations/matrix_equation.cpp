@@ -63,6 +63,13 @@ bool is_ordinary(const MatrixRef& M) {
                             (M.array() == 0.0 || M.array().abs() > 0x1p-400).all());
 }
 
+/// Whether entries are so far apart that an equation which holds in balanced units may not hold in
+/// the given ones.
+bool is_far_apart(const MatrixRef& M) {
+  const auto sizes = M.array().abs();
+  return (sizes > 0.0 && sizes < 0x1p-40 * sizes.maxCoeff()).any();
+}
+
 /// The power of two of a matrix's largest entry; 0 for a matrix of zeros.
 int exponent_of(const MatrixRef& M) {
   const double largest = M.cwiseAbs().maxCoeff();
@@ -254,8 +261,8 @@ Expected<LinearMatrixSolution> solve_carefully(const Problem& given, std::string
   LinearMatrixSolution best;
   detail::BackwardError error;
   bool overflows = false;
-  const auto consider = [&](const LinearMatrixSolution& solution) {
-    const MatrixXd X = units.back(solution.X);
+  const auto consider = [&](const LinearMatrixSolution& solution, const InOtherUnits& of) {
+    const MatrixXd X = of.back(solution.X);
     if (!X.allFinite()) {
       overflows = overflows || solution.X.allFinite();
       return;
@@ -266,12 +273,24 @@ Expected<LinearMatrixSolution> solve_carefully(const Problem& given, std::string
       error = its;
     }
   };
+  const auto by_factors = [&](const SylvesterOperator& of, const InOtherUnits& in) {
+    LinearMatrixSolution solution;
+    solve_by_factors(of, in.problem(), solution);
+    if (solution.X.size() > 0) {
+      consider(solution, in);
+    }
+  };
   const auto unique = equation.check(where);
   if (unique) {
-    LinearMatrixSolution solution;
-    solve_by_factors(equation, p, solution);
-    if (solution.X.size() > 0) {
-      consider(solution);
+    by_factors(equation, units);
+  }
+  if (unique && !(error.strict <= largest_backward_error) && !given.coarse) {
+    const InOtherUnits own(given, false);
+    const Problem& q = own.problem();
+    const SylvesterOperator as_given =
+        q.B ? SylvesterOperator(q.domain, q.A, *q.B) : SylvesterOperator(q.domain, q.A);
+    if (as_given.check(where)) {
+      by_factors(as_given, own);
     }
   }
   // Eigenvalues that cancel within the rounding of A's norm may be apart within that of its
@@ -281,7 +300,8 @@ Expected<LinearMatrixSolution> solve_carefully(const Problem& given, std::string
       if (!(direct->condition < (unique ? infinity : 1e-3 / epsilon))) {
         return tl::unexpected(equation.not_solved(where));
       }
-      consider({p.symmetric ? detail::symmetrized(direct->X) : direct->X, 0.0, direct->condition});
+      consider({p.symmetric ? detail::symmetrized(direct->X) : direct->X, 0.0, direct->condition},
+               units);
     }
   }
   if (error.in_context <= largest_backward_error) {
@@ -297,6 +317,11 @@ Expected<LinearMatrixSolution> solve_carefully(const Problem& given, std::string
     return refusal(MatrixEquationError::overflow, where);
   }
   FLYBALL_CHECK(unique);
+  if (!given.coarse && !wide) {
+    if (auto answer = solve_widely(given, where)) {
+      return std::move(*answer);
+    }
+  }
   return tl::unexpected(too_far_apart(where, error.in_context));
 }
 
@@ -312,6 +337,10 @@ Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A,
   if (!is_ordinary(A) || !is_ordinary(Q)) {
     return solve_carefully({domain, A, std::nullopt, F, symmetric, coarse}, where);
   }
+  const bool far = !coarse && (is_far_apart(A) || is_far_apart(Q));
+  const auto holds_as_given = [&](const MatrixXd& X) {
+    return !far || holds(InOtherUnits({domain, A, std::nullopt, F, symmetric}, false), X);
+  };
   LinearMatrixSolution solution;
   if (is_symmetric_but_for_rounding(Q) && A.outerStride() == A.rows() &&
       Q.outerStride() == Q.rows()) {
@@ -320,13 +349,13 @@ Expected<LinearMatrixSolution> solve_lyapunov(Domain domain, const MatrixRef& A,
     if (detail::solve_stable_lyapunov(
             {static_cast<int>(A.rows()), domain == Domain::continuous, A.data(), Q.data()},
             answer) &&
-        solution.X.allFinite()) {
+        solution.X.allFinite() && holds_as_given(solution.X)) {
       solution.residual = answer.residual;
       solution.condition = answer.condition;
       return solution;
     }
   }
-  if (solve_quickly(domain, A, nullptr, F, symmetric, solution)) {
+  if (solve_quickly(domain, A, nullptr, F, symmetric, solution) && holds_as_given(solution.X)) {
     return solution;
   }
   return solve_carefully({domain, A, std::nullopt, F, symmetric, coarse}, where);
@@ -346,7 +375,9 @@ Expected<LinearMatrixSolution> solve_sylvester(Domain domain, const MatrixRef& A
   const MatrixXd F = sign * C;
   LinearMatrixSolution solution;
   if (is_ordinary(A) && is_ordinary(B) && is_ordinary(C) &&
-      solve_quickly(domain, A, &B, F, false, solution)) {
+      solve_quickly(domain, A, &B, F, false, solution) &&
+      (!(is_far_apart(A) || is_far_apart(B) || is_far_apart(C)) ||
+       holds(InOtherUnits({domain, A, B, F, false}, false), solution.X))) {
     return solution;
   }
   return solve_carefully({domain, A, B, F, false}, where);

@@ -382,4 +382,19 @@ TEST(StructuredPeak, RefusesAnUnstableSystem) {
 }
 
 }  // namespace
+// Of one number µ is the largest real eigenvalue, here beside larger complex ones, which led the
+// search to a δ below the normal doubles.
+TEST(StructuredSingularValue, OfOneNumberTheLargestRealEigenvalue) {
+  Eigen::MatrixXd M(4, 4);
+  M << 1.0, 0.7581787109375, 0.5, 0.0, 0.133056640625, 1.24072265625, -0.15924072265625,
+      0.80999755859375, 0.70379638671875, 1.65179443359375, 1.3021240234375, 0.0, -3.0, 0.5,
+      1.30120849609375, -0.69744873046875;
+  const auto mu =
+      structured_singular_value(M.cast<std::complex<double>>(), {{UncertaintyKind::real, 4, 4}})
+          .value();
+  EXPECT_NEAR(mu.lower, 0.79057173708565731, 1e-13);
+  EXPECT_NEAR(mu.upper, mu.lower, 1e-6);
+  EXPECT_LE(mu.residual, 1e-14);
+}
+
 }  // namespace flyball::structured_singular_value_test
