@@ -34,7 +34,10 @@ struct Point {
 class Contour {
  public:
   Contour(const FrequencyResponse& loop, Factors factors)
-      : loop_(loop), period_(loop.period()), factors_(std::move(factors)) {
+      : loop_(loop),
+        period_(loop.period()),
+        factors_(std::move(factors)),
+        most_points_(points_within_reason(factors_)) {
     find_axis_poles();
   }
 
@@ -64,7 +67,7 @@ class Contour {
         continue;
       }
       const double width = to.frequency - from.frequency;
-      if (!(width > 1e-14 * to.frequency) || points_.size() > most_points) {
+      if (!(width > 1e-14 * to.frequency) || points_.size() > most_points_) {
         passes_through_ = true;
         points_.push_back(to);
         pending.pop_back();
@@ -156,7 +159,12 @@ class Contour {
   }
 
  private:
-  static constexpr std::size_t most_points = 300'000;
+  /// An evaluation of n states costs O(n²); dead time turns L without end.
+  static std::size_t points_within_reason(const Factors& factors) {
+    const auto n = static_cast<double>(factors.poles.size());
+    const double work = factors.delay > 0.0 ? 1e7 : 4e6;
+    return static_cast<std::size_t>(std::max(20'000.0, work / (30.0 + n * n)));
+  }
 
   [[nodiscard]] Complex value(double frequency) const { return loop_.at(frequency)(0, 0); }
 
@@ -265,6 +273,7 @@ class Contour {
   const FrequencyResponse& loop_;
   std::optional<Time> period_;
   Factors factors_;
+  std::size_t most_points_;
   std::vector<AxisPoles> axis_;
   std::vector<Point> points_;
   double turned_ = 0.0;

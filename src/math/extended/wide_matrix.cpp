@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <utility>
 
@@ -21,6 +23,11 @@ double ldexp_of(double x, long exponent) {
   return std::ldexp(x, static_cast<int>(std::clamp(exponent, -9999L, 9999L)));
 }
 
+/// 2^e of a normal double.
+double power_of_two(int e) {
+  return std::bit_cast<double>(static_cast<std::uint64_t>(e + 1023) << 52);
+}
+
 Number normalized(double hi, double lo, long exponent) {
   if (hi == 0.0) {
     return {};
@@ -28,8 +35,14 @@ Number normalized(double hi, double lo, long exponent) {
   if (!std::isfinite(hi)) {
     return {hi - hi, 0.0, 0};
   }
-  const int own = std::ilogb(hi);
-  return {std::ldexp(hi, -own), std::ldexp(lo, -own), exponent + own};
+  // By the bits of a normal number, which nearly all are.
+  const int own = static_cast<int>((std::bit_cast<std::uint64_t>(hi) >> 52) & 0x7ff) - 1023;
+  if (own > -1000 && own < 1000) {
+    const double unit = power_of_two(-own);
+    return {hi * unit, lo * unit, exponent + own};
+  }
+  const int slow = std::ilogb(hi);
+  return {std::ldexp(hi, -slow), std::ldexp(lo, -slow), exponent + slow};
 }
 
 Number from(double x) {
@@ -48,8 +61,9 @@ Number add(Number a, Number b) {
   if (apart > nothing) {
     return std::isfinite(b.hi) ? a : b;
   }
-  const double b_hi = ldexp_of(b.hi, -apart);
-  const double b_lo = ldexp_of(b.lo, -apart);
+  const double unit = power_of_two(-static_cast<int>(apart));
+  const double b_hi = b.hi * unit;
+  const double b_lo = b.lo * unit;
   const double s = a.hi + b_hi;
   const double s_part = s - a.hi;
   double s_rest = (a.hi - (s - s_part)) + (b_hi - s_part);

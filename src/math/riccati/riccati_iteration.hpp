@@ -5,7 +5,9 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <type_traits>
 
+#include "math/extended/wide_matrix.hpp"
 #include "math/riccati/riccati_robust.hpp"
 
 /// Doubling and Newton's method for the matrices of any precision: DoubleDoubleMatrix,
@@ -40,7 +42,11 @@ struct Progress {
     }
     const auto n = static_cast<double>(A.rows());
     constexpr double four_times = 12.0;
-    return work->spend((Matrix::precision < 1e-40 ? four_times : 1.0) * products * n * n * n);
+    constexpr double with_exponents = 4.0;
+    constexpr double cost = std::is_same_v<Matrix, WideMatrix> ? with_exponents
+                            : Matrix::precision < 1e-40        ? four_times
+                                                               : 1.0;
+    return work->spend(cost * products * n * n * n);
   }
 };
 
