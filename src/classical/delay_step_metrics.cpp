@@ -2,13 +2,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include <flyball/classical/delay_poles.hpp>
 #include <flyball/classical/step_metrics.hpp>
+#include <flyball/systems/analysis.hpp>
 
 #include "classical/delay_motion.hpp"
 #include "classical/step_judge.hpp"
+#include "core/constants.hpp"
 #include "core/format.hpp"
 #include "core/try.hpp"
 
@@ -128,6 +133,84 @@ class JudgedPieces : public detail::OutputPieces {
   Judge judge_;
 };
 
+/// What is left where the poles at zero are none of a transfer function.
+struct WithoutOrigin {
+  double rate = 0.0;   ///< Of the slowest other pole, s⁻¹.
+  double value = 0.0;  ///< G(0)
+};
+
+/// The mean of G on a circle around zero, which is G(0) where nothing else is within; nothing where
+/// there is a pole within: then ∮ G sᵏ⁻¹ ds does not vanish for all k.
+std::optional<double> value_within(const DelaySystem& system, double radius, double rounding,
+                                   Index output, Index input) {
+  using Complex = std::complex<double>;
+  constexpr int points = 64;
+  std::array<Complex, 9> moments{};
+  double largest = 0.0;
+  for (int i = 0; i < points; ++i) {
+    const Complex place = std::polar(1.0, 2.0 * pi * (i + 0.5) / points);
+    const auto G = system.at(radius * place);
+    if (!G) {
+      return std::nullopt;
+    }
+    Complex term = (*G)(output, input) / static_cast<double>(points);
+    largest = std::max(largest, std::abs((*G)(output, input)));
+    for (Complex& moment : moments) {
+      moment += term;
+      term *= place;
+    }
+  }
+  const bool clean = std::all_of(moments.begin() + 1, moments.end(), [&](const Complex& moment) {
+    return std::abs(moment) <= rounding * largest;
+  });
+  return clean ? std::optional(moments[0].real()) : std::nullopt;
+}
+
+/// Of a hold, (1 - e^{-Ts})/s, whose integrator is emptied again, alone, in series and in loops.
+std::optional<WithoutOrigin> without_origin(const DelaySystem& system, const DelayPoles& found,
+                                            Index output, Index input) {
+  const double late = system.has_delay() ? system.delays().sum() : 0.0;
+  if (system.period() || !(late > 0.0) || !(found.high_frequency_abscissa < 0.0) ||
+      found.poles.size() == 0) {
+    return std::nullopt;
+  }
+  constexpr double at_zero = 1e-3;
+  // The delays turn by a radian at most; the next pole may be nearer.
+  double radius = 1.0 / late;
+  std::optional<double> value;
+  for (int tries = 0; tries < 12 && !value; ++tries, radius *= 0.25) {
+    const auto count = static_cast<int>((found.poles.array().abs() <= at_zero * radius).count());
+    if (count == 0 || found.unstable > count) {
+      return std::nullopt;
+    }
+    // What cancels at a pole of order k leaves rounding (r τ)⁻ᵏ times as large.
+    const double rounding = 1e-14 * std::pow(1.0 / (radius * late), count);
+    if (!(rounding < 1e-8)) {
+      return std::nullopt;
+    }
+    value = value_within(system, radius, rounding, output, input);
+    if (value) {
+      break;
+    }
+  }
+  if (!value) {
+    return std::nullopt;
+  }
+  // The other poles of a loop need not be listed; e⁻³⁶ is far more than Padé is off.
+  const auto rational = system.pade(5);
+  const auto modes = rational ? analyze_modes(*rational) : tl::unexpected(rational.error());
+  if (!modes) {
+    return std::nullopt;
+  }
+  WithoutOrigin rest{HUGE_VAL, *value};
+  for (const Mode& mode : modes->modes) {
+    if (std::abs(mode.s) > at_zero * radius) {
+      rest.rate = std::min(rest.rate, -mode.s.real());
+    }
+  }
+  return rest.rate > 0.0 ? std::optional(rest) : std::nullopt;
+}
+
 /// The samples are the solution.
 Expected<StepMetrics> of_samples(const DelaySystem& system, Index output, Index input, double end,
                                  double final_value, double band) {
@@ -175,8 +258,9 @@ Expected<StepMetrics> step_metrics(const DelaySystem& system, Index output, Inde
         .expected("a share between 0 and 1, such as 0.02");
   }
   FLYBALL_TRY(const DelayPoles found, rightmost_poles(system));
-  const double final_value = system.dc_gain()(output, input);
-  if (!found.stable) {
+  const auto held = without_origin(system, found, output, input);
+  const double final_value = held ? held->value : system.dc_gain()(output, input);
+  if (!found.stable && !held) {
     return StepMetrics{.final_value = std::isfinite(final_value)
                                           ? std::numeric_limits<double>::quiet_NaN()
                                           : final_value};
@@ -193,6 +277,9 @@ Expected<StepMetrics> step_metrics(const DelaySystem& system, Index output, Inde
   double rate = -found.high_frequency_abscissa;
   for (const auto& pole : found.poles) {
     rate = std::min(rate, -pole.real());
+  }
+  if (held) {
+    rate = held->rate;
   }
   const double moving = std::isfinite(rate) ? time_constants / rate : 0.0;
   const double end = 1.01 * (moving + late) + (moving + late == 0.0 ? 1.0 : 0.0);

@@ -122,6 +122,40 @@ TEST(DelayStepMetrics, ASlowPartBesideAShortDelay) {
   EXPECT_NEAR(*metrics.settling_time, reaches(0.98), 1e-6);
 }
 
+// (1 - e^{-Ts})/s G(s) is G behind a hold: of an impulse it makes a pulse, and a step becomes a
+// ramp of T seconds. The pole at zero is none of it.
+TEST(DelayStepMetrics, BehindAHold) {
+  const double T = 0.2;
+  const auto hold = series(parallel(DelaySystem::create(transfer({1.0}, {1.0})).value(),
+                                    DelaySystem::create(transfer({-1.0}, {1.0}, T)).value())
+                               .value(),
+                           DelaySystem::create(transfer({1.0}, {1.0, 0.0})).value())
+                        .value();
+  const auto ramp = step_metrics(hold, 0, 0).value();
+  EXPECT_NEAR(ramp.final_value, T, 1e-13);
+  EXPECT_NEAR(*ramp.rise_time, 0.8 * T, 1e-9);
+  EXPECT_NEAR(*ramp.settling_time, 0.98 * T, 1e-9);
+  // y = t - 1 + e^{-t} until T, T - (e^{T} - 1) e^{-t} after it.
+  const auto lag = series(hold, DelaySystem::create(transfer({1.0}, {1.0, 1.0})).value()).value();
+  const auto held = step_metrics(lag, 0, 0).value();
+  EXPECT_NEAR(held.final_value, T, 1e-13);
+  EXPECT_NEAR(*held.settling_time, std::log(std::expm1(T) / (0.02 * T)), 1e-9);
+  // In a loop: y' = -y + v, v the mean of r - y over the last T; it ends at T/(1 + T).
+  const auto loop = step_metrics(feedback(lag).value(), 0, 0).value();
+  EXPECT_NEAR(loop.final_value, T / (1.0 + T), 1e-13);
+  EXPECT_TRUE(loop.settling_time);
+  // A second hold: a pole of order two.
+  const auto twice = step_metrics(series(hold, lag).value(), 0, 0).value();
+  EXPECT_NEAR(twice.final_value, T * T, 1e-12);
+  // One that is not emptied stays an integrator.
+  const auto rest = series(parallel(DelaySystem::create(transfer({1.0}, {1.0})).value(),
+                                    DelaySystem::create(transfer({-0.999}, {1.0}, T)).value())
+                               .value(),
+                           DelaySystem::create(transfer({1.0}, {1.0, 0.0})).value())
+                        .value();
+  EXPECT_FALSE(step_metrics(rest, 0, 0)->rise_time);
+}
+
 TEST(DelayStepMetrics, OfADiscreteLoopItsSamples) {
   const auto G = TransferFunction::create(Eigen::Vector2d(0.1, 0.08),
                                           Eigen::Vector3d(1.0, -1.5, 0.6), Time(0.02), Time(0.06))
