@@ -23,6 +23,13 @@ double relative_difference(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return largest > 0.0 ? change / largest : change;
 }
 
+bool loses_by_squares(const Eigen::MatrixXd& exponent) {
+  constexpr Eigen::Index most_states_in_twice = 20;
+  constexpr double reach = 64.0;
+  return exponent.rows() > most_states_in_twice &&
+         exponent.cwiseAbs().colwise().sum().maxCoeff() > reach;
+}
+
 Expected<double> check_determined(double error) {
   constexpr double largest = 1e-4;
   if (!(error <= largest)) {

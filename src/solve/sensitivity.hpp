@@ -18,6 +18,11 @@ namespace flyball::solve {
 /// The largest entry of a - b beside that of a, where a is not zero.
 [[nodiscard]] double relative_difference(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
+/// Whether an exponential's repeated squares may have lost digits that the data's last ones do not
+/// show: those of a slow mode beside fast ones. Smaller matrices are squared in twice the
+/// precision.
+[[nodiscard]] bool loses_by_squares(const Eigen::MatrixXd& exponent);
+
 /// The error, where it is small enough for an answer.
 /// @errors SolveError::not_determined beyond 1e-4.
 [[nodiscard]] Expected<double> check_determined(double error);

@@ -38,7 +38,7 @@ Outcome solve_c2d(const Problem& problem, JsonWriter& answer) {
   FLYBALL_TRY(const auto conversion, conversion_of(problem));
   FLYBALL_TRY(const auto discrete,
               convert_to_discrete(plant, period, conversion.method, conversion.prewarp));
-  FLYBALL_TRY(const double error, error_of([&](int draw) {
+  FLYBALL_TRY(double error, error_of([&](int draw) {
                 const ContinuousSystem<> other{in_its_last_digits(plant.A, draw),
                                                in_its_last_digits(plant.B, draw), plant.C, plant.D};
                 return convert_to_discrete(other, period, conversion.method, conversion.prewarp)
@@ -47,6 +47,16 @@ Outcome solve_c2d(const Problem& problem, JsonWriter& answer) {
                                       relative_difference(discrete.B, moved.B));
                     });
               }));
+  if (conversion.method == ConversionMethod::zoh && loses_by_squares(plant.A * period.si())) {
+    // Three steps of a third, whose exponential is squared otherwise.
+    FLYBALL_TRY(
+        const DiscreteSystem<> third,
+        convert_to_discrete(plant, Time(period.si() / 3.0), conversion.method, conversion.prewarp));
+    const MatrixXd two = third.A * third.B + third.B;
+    error = std::max({error, relative_difference(discrete.A, MatrixXd(third.A * third.A * third.A)),
+                      relative_difference(discrete.B, MatrixXd(third.A * two + third.B))});
+    FLYBALL_CHECK(check_determined(error));
+  }
   write_system(discrete, answer);
   answer.add("relative_error", error);
   if (problem.has("Q")) {

@@ -1,6 +1,10 @@
 #include <cmath>
+#include <vector>
+
+#include <flyball/core/random.hpp>
 
 #include "answers.hpp"
+#include "math/exponential/extended_function.hpp"
 
 namespace flyball::solve::systems_test {
 namespace {
@@ -307,6 +311,46 @@ TEST(SolveSystems, AnswersTellTheirError) {
   EXPECT_LT(number(motor, "relative_error"), 1e-14);
   EXPECT_NEAR(entry(motor, "B") / 4975121902.9227, 1.0, 1e-13);
   EXPECT_EQ(entry(motor, "A"), 1.0);
+}
+
+// 24 states with rates from 1 to 1e9: squares in doubles lose digits of the slow ones that the last
+// digits of the data do not. The truth by 31 digits.
+TEST(SolveSystems, SquaresOfALargeStiffMatrixTellWhatTheyLose) {
+  constexpr Eigen::Index n = 24;
+  Random random(4);
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    A(i, i) = -std::pow(10.0, random.uniform(0.0, 9.0));
+    if (i + 1 < n) {
+      A(i, i + 1) = random.uniform(-1.0, 1.0);
+      A(i + 1, i) = 1e-3 * random.uniform(-1.0, 1.0);
+    }
+  }
+  Json problem{{"A", Json::array()}};
+  Json plant{{"B", Json::array()}, {"T", 1.0}};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::VectorXd row = A.row(i);
+    problem["A"].push_back(std::vector<double>(row.begin(), row.end()));
+    plant["B"].push_back(std::vector<double>{1.0});
+  }
+  plant["A"] = problem["A"];
+  const Eigen::MatrixXd truth =
+      detail::extended_exponential(detail::DoubleDoubleMatrix(A)).rounded();
+  for (const char* kind : {"expm", "c2d"}) {
+    const bool bare = kind == std::string("expm");
+    const Json found = answer(kind, (bare ? problem : plant).dump());
+    ASSERT_FALSE(found.contains("error")) << found;
+    double off = 0.0;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index j = 0; j < n; ++j) {
+        const double x = entry(found, bare ? "X" : "A", static_cast<std::size_t>(i),
+                               static_cast<std::size_t>(j));
+        off = std::max(off, std::abs(x - truth(i, j)) / truth.cwiseAbs().maxCoeff());
+      }
+    }
+    EXPECT_GT(off, 1e-12) << kind;
+    EXPECT_LE(off, number(found, "relative_error")) << kind;
+  }
 }
 
 // A guess of a delay margin that is 1e290 periods away is not walked to.
