@@ -408,5 +408,31 @@ TEST(OtherUnits, CompanionForm) {
   expect_close(form->C, MatrixXd{{1.0, 0.0}}, 1e-14);
 }
 
+// Weights in units 2^500 apart of states that hardly move each other: what one adds to the other's
+// cost is a product of numbers that no unit of the plant's brings together.
+TEST(OtherUnits, SampledCostOfFarWeights) {
+  const MatrixXd A{{-1.7963063319811878, 0.0}, {-0.47357939640179164, 0.7}};
+  const MatrixXd B{{-0.44822982018299806}, {0.7555614299066744}};
+  const MatrixXd Q{{1.0, 0.1}, {0.1, 1.0}};
+  const MatrixXd R = MatrixXd::Ones(1, 1);
+  const auto known = sampled_cost(A, B, Q, R, Time(0.7)).value();
+  const Eigen::Vector2d d(std::ldexp(1.0, 287), std::ldexp(1.0, -240));
+  const double u = std::ldexp(1.0, -90);
+  const auto far = sampled_cost(d.asDiagonal() * A * d.cwiseInverse().asDiagonal(),
+                                MatrixXd(d.asDiagonal() * B / u),
+                                d.cwiseInverse().asDiagonal() * Q * d.cwiseInverse().asDiagonal(),
+                                R / (u * u), Time(0.7))
+                       .value();
+  EXPECT_LE((MatrixXd(d.asDiagonal() * far.Q * d.asDiagonal()) - known.Q)
+                .cwiseQuotient(known.Q)
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-14);
+  EXPECT_LE(
+      (MatrixXd(d.asDiagonal() * far.N * u) - known.N).cwiseQuotient(known.N).cwiseAbs().maxCoeff(),
+      1e-14);
+  EXPECT_NEAR(far.R(0, 0) * u * u, known.R(0, 0), 1e-14 * known.R(0, 0));
+}
+
 }  // namespace
 }  // namespace flyball::other_units_test
