@@ -108,7 +108,8 @@ namespace {
 
 using Eigen::MatrixXd;
 
-/// Whether the equation still holds where entries of W are below the normal doubles.
+/// Whether the equation still holds where entries of W are below the normal doubles, each known to
+/// within the smallest of all.
 bool holds_as_rounded(const MatrixRef& A, const MatrixRef& B, const MatrixRef& W,
                       TimeDomain domain) {
   using detail::WideMatrix;
@@ -123,8 +124,10 @@ bool holds_as_rounded(const MatrixRef& A, const MatrixRef& B, const MatrixRef& W
   const WideMatrix b{MatrixXd(B)};
   const WideMatrix w{MatrixXd(W)};
   constexpr double largest_share = 1e-11;
-  return share_of(equation(a, b, w, -1.0),
-                  equation(a.magnitudes(), b.magnitudes(), w.magnitudes(), 1.0)) <= largest_share;
+  const WideMatrix known{
+      MatrixXd(W.cwiseAbs().array() + std::numeric_limits<double>::denorm_min() / largest_share)};
+  return share_of(equation(a, b, w, -1.0), equation(a.magnitudes(), b.magnitudes(), known, 1.0)) <=
+         largest_share;
 }
 
 /// Units of the states, 2^states, and one of the inputs.
@@ -134,7 +137,7 @@ struct GramianUnits {
 };
 
 /// Those in which BBᵀ is a double: of the inputs, and of states that they hardly move.
-GramianUnits units_of(const MatrixRef& A, const MatrixRef& B) {
+GramianUnits units_of(const MatrixRef& A, const MatrixRef& B, TimeDomain domain) {
   constexpr int lowest = -400;
   const Eigen::Index n = A.rows();
   GramianUnits units{Eigen::VectorXi::Zero(n),
@@ -144,6 +147,14 @@ GramianUnits units_of(const MatrixRef& A, const MatrixRef& B) {
       units.states(i) =
           std::min(0, std::ilogb(B.row(i).cwiseAbs().maxCoeff()) - units.inputs - lowest);
     }
+  }
+  // Where entries are far apart, W's largest entry is brought up, its smallest below the doubles no
+  // sooner than they must: it is of the size of B²/A.
+  constexpr int far = 100;
+  const int of_A = A.isZero(0.0) ? 0 : std::ilogb(A.cwiseAbs().maxCoeff());
+  if (!units.states.isZero() || std::abs(of_A) > far) {
+    const int grows = domain == TimeDomain::continuous ? std::clamp(of_A, lowest, 500) : 0;
+    units.inputs -= (grows - lowest) / 2;
   }
   if (!units.states.isZero()) {
     const MatrixXd there = detail::times_powers(A, -units.states, units.states, 0);
@@ -183,7 +194,7 @@ Expected<Gramian> gramian_in(const GramianUnits& units, const MatrixRef& A, cons
 }
 
 Expected<Gramian> gramian(const MatrixRef& A, const MatrixRef& B, TimeDomain domain) {
-  const GramianUnits units = units_of(A, B);
+  const GramianUnits units = units_of(A, B, domain);
   auto found = gramian_in(units, A, B, domain);
   if (!found && (units.inputs != 0 || !units.states.isZero())) {
     auto as_given = gramian_in({Eigen::VectorXi::Zero(A.rows()), 0}, A, B, domain);
