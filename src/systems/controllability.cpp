@@ -13,6 +13,7 @@
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/dense_reduction.hpp"
+#include "math/dense/ordinary_units.hpp"
 #include "math/dense/pair_scaling.hpp"
 #include "systems/mode_distance.hpp"
 #include "systems/modes.hpp"
@@ -190,27 +191,42 @@ double condition_of(MatrixXd krylov_matrix) {
   return smallest > 0.0 ? sizes(0) / smallest : infinity;
 }
 
-/// In units in which A and B are of one size; of an A of 2^exponent, far from one, only where the
-/// equation lets that size be taken out.
-Eigen::VectorXd gramian_eigenvalues(const MatrixXd& A, const MatrixXd& B, int exponent,
+/// In the pair's units, with inputs in theirs: of the given states' units where that has an answer,
+/// since units in which hundreds of states in a row move each other alike are far apart; then of the
+/// pair's own, of an A of 2^time far from one only where the equation lets that size be taken out.
+Eigen::VectorXd gramian_eigenvalues(const MatrixRef& A_given, const ScaledPair& pair,
                                     TimeDomain domain) {
   constexpr int far = 200;
+  const int exponent = pair.units.time;
   const bool near = std::abs(exponent) <= far;
-  if (!near && domain == TimeDomain::discrete) {
+  const auto solve = [&](const MatrixXd& A, const MatrixXd& B) {
+    const MatrixXd BB = detail::product_transposed(B, B);
+    return domain == TimeDomain::continuous ? lyapunov(A, BB) : discrete_lyapunov(A, BB);
+  };
+  const auto values_of = [](const MatrixXd& W) {
+    return detail::symmetric_eigensystem_of(detail::symmetrized(W)).values;
+  };
+  const double unit = near ? std::ldexp(1.0, exponent) : 1.0;
+  if (near) {
+    const Eigen::VectorXi& x = pair.units.states;
+    MatrixXd B = detail::times_powers(pair.B, x, Eigen::VectorXi::Zero(pair.B.cols()), exponent);
+    const int of_B = B.isZero(0.0) ? 0 : std::ilogb(B.cwiseAbs().maxCoeff());
+    B *= std::ldexp(1.0, -of_B);
+    if (const auto given = solve(A_given, B)) {
+      const MatrixXd W = detail::times_powers(given->X, -x, -x, 2 * of_B);
+      return W.allFinite() ? values_of(W) : Eigen::VectorXd();
+    }
+  } else if (domain == TimeDomain::discrete) {
     return {};
   }
-  const double unit = near ? std::ldexp(1.0, exponent) : 1.0;
-  const MatrixXd BB = unit * unit * detail::product_transposed(B, B);
-  const auto gramian =
-      domain == TimeDomain::continuous ? lyapunov(unit * A, BB) : discrete_lyapunov(unit * A, BB);
+  const auto gramian = solve(unit * pair.A, unit * pair.B);
   if (!gramian) {
     return {};
   }
-  const Eigen::VectorXd values =
-      detail::symmetric_eigensystem_of(detail::symmetrized(gramian->X)).values;
-  return near
-             ? values
-             : Eigen::VectorXd(values.unaryExpr([&](double x) { return std::ldexp(x, exponent); }));
+  const Eigen::VectorXd values = values_of(gramian->X);
+  return near ? values
+              : Eigen::VectorXd(
+                    values.unaryExpr([&](double x) { return std::ldexp(x, exponent); }));
 }
 
 Error no_eigenvalues(std::string_view where) {
@@ -352,7 +368,7 @@ Expected<Verdict> analyze(const MatrixRef& A_given, const MatrixRef& B_given, Ti
     reach.matrix_rank = numerical_rank(sizes, static_cast<double>(n) * epsilon);
   }
   reach.matrix_condition = condition_of(krylov_factor(A_given, B_given));
-  reach.gramian_eigenvalues = gramian_eigenvalues(pair.A, pair.B, exponent, domain);
+  reach.gramian_eigenvalues = gramian_eigenvalues(A_given, pair, domain);
   return verdict;
 }
 

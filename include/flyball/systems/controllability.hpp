@@ -37,7 +37,7 @@ struct ReachAnalysis {
   /// 1e16, where σ_min is rounding and only this much is known.
   double matrix_condition = 0.0;
   /// n, increasing: the Gramian's eigenvalues in balanced units, larger is easier; negative ones
-  /// belong to unstable modes. Empty where the Gramian does not exist.
+  /// belong to unstable modes. Empty where the Gramian does not exist, or has no doubles there.
   Eigen::VectorXd gramian_eigenvalues;
   double tolerance = 0.0;  ///< Below it a distance counts as zero.
 };
