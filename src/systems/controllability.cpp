@@ -192,8 +192,9 @@ double condition_of(MatrixXd krylov_matrix) {
 }
 
 /// In the pair's units, with inputs in theirs: of the given states' units where that has an answer,
-/// since units in which hundreds of states in a row move each other alike are far apart; then of the
-/// pair's own, of an A of 2^time far from one only where the equation lets that size be taken out.
+/// since units in which hundreds of states in a row move each other alike are far apart; then of
+/// the pair's own, of an A of 2^time far from one only where the equation lets that size be taken
+/// out.
 Eigen::VectorXd gramian_eigenvalues(const MatrixRef& A_given, const ScaledPair& pair,
                                     TimeDomain domain) {
   constexpr int far = 200;
@@ -224,9 +225,9 @@ Eigen::VectorXd gramian_eigenvalues(const MatrixRef& A_given, const ScaledPair& 
     return {};
   }
   const Eigen::VectorXd values = values_of(gramian->X);
-  return near ? values
-              : Eigen::VectorXd(
-                    values.unaryExpr([&](double x) { return std::ldexp(x, exponent); }));
+  return near
+             ? values
+             : Eigen::VectorXd(values.unaryExpr([&](double x) { return std::ldexp(x, exponent); }));
 }
 
 Error no_eigenvalues(std::string_view where) {

@@ -222,11 +222,12 @@ Expected<BalancedRealization<Continuous>> truncate(const System& given, TimeDoma
   }
   found.hankel = detail::times_power(svd.values, b + c);
   found.error_bound = 2.0 * found.hankel.tail(n - r).sum();
-  const MatrixXd A = D_inverse.asDiagonal() * system.A * D.asDiagonal();
+  const int of_A = detail::unit_of(system.A);
+  const MatrixXd A = D_inverse.asDiagonal() * detail::times_power(system.A, -of_A) * D.asDiagonal();
   const int a = detail::unit_of(A);
   found.system = {
       detail::times_power(product(found.T_inverse, product(detail::times_power(A, -a), found.T)),
-                          a),
+                          a + of_A),
       detail::times_power(product(found.T_inverse, MatrixXd(D_inverse.asDiagonal() * system.B)),
                           (b + c) / 2),
       detail::times_power(product(MatrixXd(system.C * D.asDiagonal()), found.T), (b + c) / 2),

@@ -255,5 +255,14 @@ TEST(Realization, SimilarityTransformOfLargeInputs) {
   EXPECT_NEAR(x(0) / -0.51e154, 1.0, 1e-14);
 }
 
+// A pole of 2.3e-308 keeps its digits on the way through units of 2^33.
+TEST(Realization, APoleAtTheEndOfTheDoubles) {
+  const DiscreteSystem<> system{MatrixXd::Constant(1, 1, 2.3e-308), MatrixXd{{-1e20, 0.0, 0.0}},
+                                MatrixXd{{-1.02197265625}, {-1.326904296875}, {-0.077392578125}},
+                                MatrixXd::Zero(3, 3), Time(1e6)};
+  const auto found = balanced_realization(system).value();
+  EXPECT_NEAR(found.system.A(0, 0) / 2.3e-308, 1.0, 1e-15);
+}
+
 }  // namespace
 }  // namespace flyball::realization_test

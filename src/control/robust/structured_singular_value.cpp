@@ -71,7 +71,16 @@ ScaledPoint scaled_point(const MatrixXcd& M, const UncertaintyStructure& structu
   point.F_in_inverse = in.cwiseInverse().asDiagonal() * inverse_of_lower(L_in).adjoint();
   point.scaling.D_out = out.asDiagonal() * s.D_out * out.asDiagonal();
   point.scaling.D_in = in.asDiagonal() * s.D_in * in.asDiagonal();
-  point.scaling.G = in.asDiagonal() * s.G * out.asDiagonal();
+  // D and G have one factor that is free: of a tiny M it keeps G among the normal numbers.
+  double factor = 1.0;
+  if (constexpr int tiny = -400; balance.size < tiny) {
+    const double largest = std::max(point.scaling.D_out.cwiseAbs().maxCoeff(),
+                                    point.scaling.D_in.cwiseAbs().maxCoeff());
+    factor = std::ldexp(1.0, std::max(0, std::min(-balance.size, 500 - std::ilogb(largest))));
+    point.scaling.D_out *= factor;
+    point.scaling.D_in *= factor;
+  }
+  point.scaling.G = in.asDiagonal() * (factor * s.G) * out.asDiagonal();
   point.scaling.G *= point.scale;
   return point;
 }

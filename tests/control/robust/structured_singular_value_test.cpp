@@ -381,6 +381,27 @@ TEST(StructuredPeak, RefusesAnUnstableSystem) {
   EXPECT_FALSE(structured_peak(s, {complex()}));
 }
 
+// Of a tiny M the proof's G has its digits, since D and G have one factor that is free.
+TEST(StructuredSingularValue, ScalingsOfATinyMatrix) {
+  Eigen::MatrixXcd M = Eigen::MatrixXcd::Zero(2, 2);
+  M(0, 1) = 5e-300;
+  M(0, 0) = {0.0, 5e-300};
+  const auto mu = structured_singular_value(M, {{UncertaintyKind::real, 2, 2}}).value();
+  const double unit = std::ldexp(1.0, 990);
+  const Eigen::MatrixXcd m = M * unit;
+  const double size = 1.0 / mu.scaling.D_in.cwiseAbs().maxCoeff();
+  const Eigen::MatrixXcd D_in = mu.scaling.D_in * size;
+  const Eigen::MatrixXcd D_out = mu.scaling.D_out * size;
+  const Eigen::MatrixXcd GM = (mu.scaling.G * (size * unit)) * m;
+  const double beta = mu.upper * unit;
+  const std::complex<double> j(0.0, 1.0);
+  const Eigen::MatrixXcd form =
+      beta * beta * D_in - m.adjoint() * D_out * m - j * (GM - GM.adjoint());
+  const Eigen::VectorXd values =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd>(form).eigenvalues();
+  EXPECT_GE(values(0), -1e-14 * values(1));
+}
+
 }  // namespace
 // Of one number µ is the largest real eigenvalue, here beside larger complex ones, which led the
 // search to a δ below the normal doubles.
