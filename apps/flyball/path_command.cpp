@@ -39,17 +39,20 @@ int run_path(const PathOptions& options) {
     return fail(result.error(), options.common, path_schema);
   }
   if (writes) {
-    if (out.empty()) {
-      print(result->written);
-      return success;
-    }
     for (const Diagnostic& diagnostic : result->diagnostics) {
       if (diagnostic.severity != Severity::info) {
         warn(diagnostic.message);
       }
     }
+    if (out.empty()) {
+      print(result->written);
+      return success;
+    }
     if (const auto done = write_file_atomically(out, result->written); !done) {
       return fail(done.error(), options.common, path_schema);
+    }
+    if (result->trajectory.samples.empty()) {  // a project has no motion to be told of
+      return success;
     }
     CommonOptions told = options.common;
     told.out.clear();

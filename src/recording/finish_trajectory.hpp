@@ -13,4 +13,7 @@ namespace flyball::recording {
 /// the poses. @param trajectory  Checked.
 void settle(RobotTrajectory& trajectory);
 
+/// Accelerations are what the velocities change by, half from each side.
+void differentiate_velocities(RobotTrajectory& trajectory);
+
 }  // namespace flyball::recording

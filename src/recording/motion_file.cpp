@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include <fmt/format.h>
 
@@ -17,6 +16,7 @@
 #include "core/diagnose.hpp"
 #include "core/try.hpp"
 #include "recording/finish_trajectory.hpp"
+#include "recording/slopes.hpp"
 #include "recording/table_fault.hpp"
 
 namespace flyball {
@@ -29,33 +29,8 @@ std::string at(const std::string& source, const Place& place) {
   return fmt::format("{}:{}:{}", source, place.line, place.column);
 }
 
-/// Differences, half from each side, of what samples say at their times.
-template <class Get, class Difference>
-auto slopes(const std::vector<MotionSample>& samples, const Get& get,
-            const Difference& difference) {
-  using Value = decltype(get(samples.front()));
-  std::vector<Value> result;
-  const std::size_t n = samples.size();
-  for (std::size_t i = 0; i < n; ++i) {
-    const std::size_t a = i == 0 ? 0 : i - 1;
-    const std::size_t b = i + 1 < n ? i + 1 : i;
-    const double dt = samples[b].time - samples[a].time;
-    result.push_back(Value(difference(get(samples[b]), get(samples[a])) / dt));
-  }
-  return result;
-}
-
-void differentiate_velocities(RobotTrajectory& trajectory) {
-  const auto slope = slopes(
-      trajectory.samples, [](const MotionSample& s) { return s.velocity; },
-      [](const Vector2d& b, const Vector2d& a) { return Vector2d(b - a); });
-  for (std::size_t i = 0; i < slope.size(); ++i) {
-    trajectory.samples[i].acceleration = slope[i];
-  }
-}
-
 void differentiate_places(RobotTrajectory& trajectory) {
-  const auto slope = slopes(
+  const auto slope = recording::slopes(
       trajectory.samples, [](const MotionSample& s) { return s.pose.translation(); },
       [](const Vector2d& b, const Vector2d& a) { return Vector2d(b - a); });
   for (std::size_t i = 0; i < slope.size(); ++i) {
@@ -64,7 +39,7 @@ void differentiate_places(RobotTrajectory& trajectory) {
 }
 
 void differentiate_headings(RobotTrajectory& trajectory) {
-  const auto slope = slopes(
+  const auto slope = recording::slopes(
       trajectory.samples, [](const MotionSample& s) { return s.pose.angle(); },
       [](double b, double a) { return std::remainder(b - a, full_turn); });
   for (std::size_t i = 0; i < slope.size(); ++i) {
@@ -130,7 +105,7 @@ Expected<RobotTrajectory> of_choreo(const std::vector<ChoreoSample>& samples,
     differentiate_headings(result);
   }
   if (!has_accelerations) {
-    differentiate_velocities(result);
+    recording::differentiate_velocities(result);
   }
   result.holonomic = is_holonomic(result.samples);
   recording::settle(result);
@@ -301,7 +276,7 @@ Expected<RobotTrajectory> trajectory_of(const Log& table) {
     differentiate_headings(result);
   }
   if (!ax || !ay) {
-    differentiate_velocities(result);
+    recording::differentiate_velocities(result);
   }
   result.holonomic = is_holonomic(result.samples);
   recording::settle(result);
@@ -366,166 +341,6 @@ ExpectedAll<RobotTrajectory> read_motion(const std::string& file, const std::str
                                    .about("the file")
                                    .got(std::string(to_string(format)))
                                    .expected("a trajectory: samples with their times")));
-}
-
-std::vector<double> angular_accelerations(const RobotTrajectory& trajectory) {
-  return slopes(
-      trajectory.samples, [](const MotionSample& s) { return s.omega; },
-      [](double b, double a) { return b - a; });
-}
-
-WpilibTrajectory to_wpilib_trajectory(const RobotTrajectory& trajectory) {
-  constexpr double moving = 1e-6;  // m/s
-  constexpr double per_degree = std::numbers::pi / 180.0;
-  WpilibTrajectory file;
-  double way = trajectory.samples.front().pose.angle();
-  // Of a robot that starts from rest the way is that of the first sample that moves.
-  for (const MotionSample& sample : trajectory.samples) {
-    if (trajectory.holonomic && sample.velocity.norm() > moving) {
-      way = std::atan2(sample.velocity(1), sample.velocity(0));
-      break;
-    }
-  }
-  for (const MotionSample& sample : trajectory.samples) {
-    WpilibState state{.time = sample.time, .x = sample.pose.x(), .y = sample.pose.y()};
-    if (!trajectory.holonomic) {
-      const Vector2d forward(sample.pose.rotation().cos(), sample.pose.rotation().sin());
-      state.angle = sample.pose.angle();
-      state.velocity = sample.velocity.dot(forward);
-      state.acceleration = sample.acceleration.dot(forward);
-      state.curvature = std::abs(state.velocity) > moving ? sample.omega / state.velocity : 0.0;
-    } else {
-      const double speed = sample.velocity.norm();
-      way = speed > moving ? std::atan2(sample.velocity(1), sample.velocity(0)) : way;
-      const Vector2d along(std::cos(way), std::sin(way));
-      const Vector2d across(-along(1), along(0));
-      state.angle = way;
-      state.velocity = speed;
-      state.acceleration = sample.acceleration.dot(along);
-      state.curvature = speed > moving ? sample.acceleration.dot(across) / (speed * speed) : 0.0;
-      state.holonomic_rotation = sample.pose.angle() / per_degree;
-      state.holonomic_angular_velocity = sample.omega / per_degree;
-    }
-    file.states.push_back(state);
-  }
-  return file;
-}
-
-namespace {
-
-/// Headings that go on beyond π.
-std::vector<double> continuous_headings(const RobotTrajectory& trajectory) {
-  std::vector<double> headings;
-  for (const MotionSample& sample : trajectory.samples) {
-    const double angle = sample.pose.angle();
-    headings.push_back(headings.empty()
-                           ? angle
-                           : headings.back() + std::remainder(angle - headings.back(), full_turn));
-  }
-  return headings;
-}
-
-ExpressedNumber expressed(double value, std::string_view unit) {
-  return {value, fmt::format("{} {}", value, unit), {}};
-}
-
-}  // namespace
-
-ChoreoTrajectory to_choreo_trajectory(const RobotTrajectory& trajectory, const std::string& name,
-                                      const std::optional<ChoreoSides>& sides,
-                                      const std::optional<ChoreoConfig>& config) {
-  ChoreoTrajectory file;
-  file.name = name;
-  file.version = std::to_string(ChoreoTrajectory::newest);
-  file.params.target_dt = {0.05, "0.05 s", {}};
-  const std::vector<double> headings = continuous_headings(trajectory);
-  for (const std::size_t i : {std::size_t{0}, trajectory.samples.size() - 1}) {
-    ChoreoWaypoint waypoint;
-    waypoint.x = expressed(trajectory.samples[i].pose.x(), "m");
-    waypoint.y = expressed(trajectory.samples[i].pose.y(), "m");
-    waypoint.heading = expressed(headings[i], "rad");
-    waypoint.intervals = static_cast<int>(trajectory.samples.size()) - 1;
-    file.params.waypoints.push_back(waypoint);
-    file.trajectory.waypoints.push_back(trajectory.samples[i].time);
-  }
-  file.trajectory.config = config;
-  file.trajectory.sample_type = sides ? "Differential" : "Swerve";
-  file.trajectory.splits = {0};
-  const std::vector<double> alpha = angular_accelerations(trajectory);
-  const double half = sides ? 0.5 * sides->trackwidth : 0.0;
-  for (std::size_t i = 0; i < trajectory.samples.size(); ++i) {
-    const MotionSample& from = trajectory.samples[i];
-    ChoreoSample sample{.time = from.time,
-                        .x = from.pose.x(),
-                        .y = from.pose.y(),
-                        .heading = headings[i],
-                        .omega = from.omega,
-                        .alpha = alpha[i]};
-    if (sides) {
-      const Vector2d forward(from.pose.rotation().cos(), from.pose.rotation().sin());
-      const double v = from.velocity.dot(forward);
-      const double a = from.acceleration.dot(forward);
-      sample.vl = v - half * from.omega;
-      sample.vr = v + half * from.omega;
-      sample.al = a - half * alpha[i];
-      sample.ar = a + half * alpha[i];
-      sample.fl = 0.0;
-      sample.fr = 0.0;
-    } else {
-      sample.vx = from.velocity(0);
-      sample.vy = from.velocity(1);
-      sample.ax = from.acceleration(0);
-      sample.ay = from.acceleration(1);
-      sample.fx = std::array<double, 4>{};
-      sample.fy = std::array<double, 4>{};
-    }
-    file.trajectory.samples.push_back(sample);
-  }
-  return file;
-}
-
-Expected<TimeSeries> to_table(const RobotTrajectory& trajectory) {
-  std::vector<double> time;
-  std::array<std::vector<double>, 10> columns;
-  const std::vector<double> headings = continuous_headings(trajectory);
-  const std::vector<double> alpha = angular_accelerations(trajectory);
-  for (std::size_t i = 0; i < trajectory.samples.size(); ++i) {
-    const MotionSample& sample = trajectory.samples[i];
-    time.push_back(sample.time);
-    const double speed = sample.velocity.norm();
-    const double bend = speed > 1e-6 ? (sample.velocity(0) * sample.acceleration(1) -
-                                        sample.velocity(1) * sample.acceleration(0)) /
-                                           (speed * speed * speed)
-                                     : 0.0;
-    const double row[] = {sample.pose.x(),
-                          sample.pose.y(),
-                          headings[i],
-                          sample.velocity(0),
-                          sample.velocity(1),
-                          sample.omega,
-                          sample.acceleration(0),
-                          sample.acceleration(1),
-                          alpha[i],
-                          bend};
-    for (std::size_t k = 0; k < columns.size(); ++k) {
-      columns[k].push_back(row[k]);
-    }
-  }
-  TimeSeries table(std::move(time));
-  constexpr std::array<std::pair<const char*, const char*>, 10> names{{{"x", "m"},
-                                                                       {"y", "m"},
-                                                                       {"heading", "rad"},
-                                                                       {"vx", "m/s"},
-                                                                       {"vy", "m/s"},
-                                                                       {"omega", "rad/s"},
-                                                                       {"ax", "m/s²"},
-                                                                       {"ay", "m/s²"},
-                                                                       {"alpha", "rad/s²"},
-                                                                       {"curvature", "1/m"}}};
-  for (std::size_t k = 0; k < columns.size(); ++k) {
-    FLYBALL_CHECK(table.add(names[k].first, names[k].second, std::move(columns[k])));
-  }
-  return table;
 }
 
 }  // namespace flyball

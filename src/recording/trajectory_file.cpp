@@ -35,6 +35,7 @@ struct Read {
   std::optional<double> holonomic{};       ///< rad, the way the robot looks.
   std::optional<double> holonomic_rate{};  ///< rad/s
   std::optional<Vector2d> velocity{};      ///< As written, of the newer layout.
+  std::optional<Vector2d> acceleration{};  ///< The same, in the velocity's frame.
 };
 
 /// "trajectory.json:3:17".
@@ -84,6 +85,12 @@ Expected<Read> sample_of(const json& sample, const std::string& where) {
     FLYBALL_TRY(const double vy, number_of(*velocity, "vy", "velocity.vy", where));
     FLYBALL_TRY(read.sample.omega, number_of(*velocity, "omega", "velocity.omega", where));
     read.velocity = Vector2d(vx, vy);
+    const auto acceleration = sample.find("acceleration");
+    if (acceleration != sample.end() && acceleration->is_object()) {
+      FLYBALL_TRY(const double ax, number_of(*acceleration, "ax", "acceleration.ax", where));
+      FLYBALL_TRY(const double ay, number_of(*acceleration, "ay", "acceleration.ay", where));
+      read.acceleration = Vector2d(ax, ay);
+    }
     return read;
   }
   FLYBALL_TRY(read.speed, number_of(sample, "velocity", "velocity", where));
@@ -91,7 +98,8 @@ Expected<Read> sample_of(const json& sample, const std::string& where) {
   FLYBALL_TRY(const double along, number_of(sample, "acceleration", "acceleration", where, 0.0));
   const Vector2d forward(read.sample.pose.rotation().cos(), read.sample.pose.rotation().sin());
   read.sample.velocity = read.speed * forward;
-  read.sample.acceleration = along * forward;
+  const Vector2d left(-forward(1), forward(0));
+  read.sample.acceleration = along * forward + read.speed * read.speed * read.curvature * left;
   read.sample.omega = read.speed * read.curvature;
   if (sample.contains("holonomicRotation")) {
     FLYBALL_TRY(const double looks,
@@ -122,8 +130,13 @@ void take_frame(const std::vector<Read>& all, RobotTrajectory& result) {
   const bool is_robot = robot <= field;
   for (std::size_t i = 0; i < all.size(); ++i) {
     MotionSample& sample = result.samples[i];
-    sample.velocity =
-        is_robot ? Vector2d(sample.pose.rotation() * *all[i].velocity) : *all[i].velocity;
+    const auto in_field = [&](const Vector2d& v) {
+      return is_robot ? Vector2d(sample.pose.rotation() * v) : v;
+    };
+    sample.velocity = in_field(*all[i].velocity);
+    if (all[i].acceleration) {
+      sample.acceleration = in_field(*all[i].acceleration);
+    }
     result.holonomic =
         result.holonomic || std::abs(sample.velocity(1) * sample.pose.rotation().cos() -
                                      sample.velocity(0) * sample.pose.rotation().sin()) > 0.05;
@@ -336,6 +349,9 @@ Expected<RobotTrajectory> parse_trajectory(std::string_view text, const std::str
   FLYBALL_CHECK(recording::check_samples(result));
   if (all.front().velocity) {
     take_frame(all, result);
+    if (!std::all_of(all.begin(), all.end(), [](const Read& read) { return read.acceleration; })) {
+      recording::differentiate_velocities(result);
+    }
   } else if (std::all_of(all.begin(), all.end(), [](const Read& read) { return read.holonomic; })) {
     take_headings(all, result);
   }

@@ -68,12 +68,27 @@ tl::unexpected<Errors> cannot_write(const PathJob& job, std::string got, std::st
                                    .expected(std::move(expected))));
 }
 
-std::optional<ChoreoSides> sides_of(const PathResult& result) {
-  const bool differential =
-      result.robot ? result.robot->kind == DriveKind::differential : result.job.differential;
-  constexpr double usual = 0.6;  // m
-  return differential ? std::optional(ChoreoSides{result.robot ? result.robot->trackwidth : usual})
-                      : std::nullopt;
+bool is_differential(const PathResult& result) {
+  return result.robot ? result.robot->kind == DriveKind::differential : result.job.differential;
+}
+
+/// What a format has no place for is told, not passed over.
+void tell_left_out(PathResult& result, std::string_view what) {
+  if (!result.events.empty()) {
+    std::string names;
+    for (const PathEvent& event : result.events) {
+      names += (names.empty() ? "" : ", ") + cut(printable(event.name), 30);
+    }
+    const std::size_t count = result.events.size();
+    warn(result.diagnostics, "events_left_out", "{} holds no events: {} ({}) {} left out", what,
+         count == 1 ? "one" : std::to_string(count), cut(names, 100), count == 1 ? "is" : "are");
+  }
+  if (result.plan && !result.plan->params.constraints.empty()) {
+    const std::size_t count = result.plan->params.constraints.size();
+    warn(result.diagnostics, "constraints_left_out",
+         "{} holds no constraints: {} of the trajectory {} left out; its samples keep to them",
+         what, count == 1 ? "one" : std::to_string(count), count == 1 ? "is" : "are");
+  }
 }
 
 /// Of what was read, without folder and ending.
@@ -86,34 +101,54 @@ ExpectedAll<std::string> written(PathResult& result) {
   const PathJob& job = result.job;
   const FieldChange change = FieldChange::of(job);
   const bool one = job.files.size() == 1;
+  if (job.to == "pathplanner" && (!one || result.format == MotionFormat::pathplanner_auto)) {
+    return written_routine(job);
+  }
   if (job.to == "pathplanner") {
     if (!one || result.format != MotionFormat::pathplanner_path) {
       return cannot_write(job, "asked of what is no single .path file",
-                          "choreo, wpilib, csv or c++ of a trajectory");
+                          "a .path or .auto, or several of one kind as a routine; else choreo, "
+                          "wpilib, csv or c++");
     }
     FLYBALL_TRY(const PathPlannerPath path, read_pathplanner_path(job.files.front()));
+    std::size_t linked = 0;
+    for (const PathPlannerWaypoint& waypoint : path.waypoints) {
+      linked += !change.none() && waypoint.linked_name.has_value() ? 1 : 0;
+    }
+    if (linked > 0) {
+      warn(result.diagnostics, "links_left_out",
+           "{} of the waypoints {} linked to those of other paths, which are elsewhere now: the {} "
+           "left out (linkedName null)",
+           linked, linked == 1 ? "is" : "are", linked == 1 ? "link is" : "links are");
+    }
     return to_pathplanner(changed(path, change, job.reverse));
   }
   if (job.to == "choreo") {
-    if (one && result.format == MotionFormat::choreo_trajectory && !result.timed && !job.reverse) {
-      FLYBALL_TRY(const ChoreoTrajectory file, read_choreo_trajectory(job.files.front()));
+    if (one && result.format == MotionFormat::choreo_trajectory && !result.timed) {
+      FLYBALL_TRY(ChoreoTrajectory file, read_choreo_trajectory(result.parts.front()));
+      if (job.reverse) {
+        file = reversed(std::move(file));
+      }
       return to_choreo(change.none() ? file : changed(file, change));
     }
-    const std::optional<ChoreoSides> sides = sides_of(result);
-    if (sides && result.trajectory.holonomic) {
+    if (is_differential(result) && result.trajectory.holonomic) {
       return cannot_write(job, "of a robot that moves sideways", "one that looks where it goes");
     }
-    return to_choreo(to_choreo_trajectory(result.trajectory, job_name(job), sides));
+    return to_choreo(choreo_trajectory(result, job_name(job), result.diagnostics));
   }
   if (job.to == "wpilib") {
-    if (one && result.format == MotionFormat::wpilib_trajectory && !result.timed && !job.reverse &&
-        change.none()) {
+    tell_left_out(result, "WPILib's trajectory");
+    if (one && result.format == MotionFormat::wpilib_trajectory && !result.timed) {
       FLYBALL_TRY(const std::string text, read_file(job.files.front()));
-      FLYBALL_TRY(const WpilibTrajectory file, parse_wpilib_trajectory(text, job.files.front()));
-      return to_wpilib(file);
+      FLYBALL_TRY(WpilibTrajectory file, parse_wpilib_trajectory(text, job.files.front()));
+      if (job.reverse) {
+        file = reversed(std::move(file));
+      }
+      return to_wpilib(change.none() ? file : changed(file, change));
     }
     return to_wpilib(to_wpilib_trajectory(result.trajectory));
   }
+  tell_left_out(result, job.to == "csv" ? "A table" : "The table of a header");
   FLYBALL_TRY(const TimeSeries table, to_table(result.trajectory));
   if (job.to == "csv") {
     return to_csv(table);
@@ -140,6 +175,10 @@ Expected<void> check_job(const PathJob& job) {
 ExpectedAll<PathResult> plan_path(const PathJob& job) {
   FLYBALL_CHECK(check_job(job));
   PathResult result{.job = job};
+  if (job.to == "choreo-project") {
+    FLYBALL_TRY(result.written, written_project(job));
+    return result;
+  }
   double voltage = 12.0;
   bool names_count = false;  // whether a file has several paths
   LoadedMotion motion;
@@ -178,7 +217,8 @@ ExpectedAll<PathResult> plan_path(const PathJob& job) {
       one.end_velocity.reset();
     }
     FLYBALL_TRY(const LoadedMotion next, load_motion(job.files[i], one, result.robot, voltage));
-    names_count = names_count || next.format == MotionFormat::choreo_project;
+    names_count = names_count || next.format == MotionFormat::choreo_project ||
+                  next.parts.front() != job.files[i];
     const MotionFormat format = i == 0 ? next.format : motion.format;
     FLYBALL_CHECK(append(motion, next, 0.0));
     motion.format = format;
@@ -195,6 +235,8 @@ ExpectedAll<PathResult> plan_path(const PathJob& job) {
   result.binding = std::move(motion.binding);
   result.parts = std::move(motion.parts);
   result.trajectory = std::move(motion.trajectory);
+  result.events = std::move(motion.events);
+  result.plan = std::move(motion.plan);
   if (job.reverse) {
     const double end = result.trajectory.duration();
     result.trajectory = reversed(result.trajectory);
@@ -202,9 +244,28 @@ ExpectedAll<PathResult> plan_path(const PathJob& job) {
     for (PathBinding& binding : result.binding) {
       binding.from = end - std::exchange(binding.to, end - binding.from);
     }
+    for (PathEvent& event : result.events) {
+      event.time = end - event.time;
+      if (event.end) {
+        event.time = end - std::exchange(*event.end, event.time);
+      }
+    }
+    if (result.plan) {
+      result.plan->params = reversed(std::move(result.plan->params));
+      std::reverse(result.plan->times.begin(), result.plan->times.end());
+      for (double& time : result.plan->times) {
+        time = end - time;
+      }
+    }
   }
+  std::stable_sort(result.events.begin(), result.events.end(),
+                   [](const PathEvent& a, const PathEvent& b) { return a.time < b.time; });
   if (const FieldChange change = FieldChange::of(job); !change.none()) {
     result.trajectory = changed(std::move(result.trajectory), change);
+    if (result.plan && !result.plan->params.waypoints.empty()) {
+      const double first = result.plan->params.waypoints.front().heading.value;
+      result.plan->params = changed(std::move(result.plan->params), change.facing(first));
+    }
   }
   result.diagnostics.insert(result.diagnostics.end(), result.trajectory.diagnostics.begin(),
                             result.trajectory.diagnostics.end());

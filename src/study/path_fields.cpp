@@ -18,21 +18,22 @@ using enum Dimension;
 using enum Range;
 
 Expected<void> check_format(const std::string& text) {
-  constexpr std::array<std::string_view, 5> known{"choreo", "wpilib", "csv", "c++", "pathplanner"};
+  constexpr std::array<std::string_view, 6> known{"choreo", "wpilib",      "csv",
+                                                  "c++",    "pathplanner", "choreo-project"};
   if (std::find(known.begin(), known.end(), text) != known.end()) {
     return {};
   }
   const std::string near = nearest_name(text, known);
   return refusal(ArgumentError::unknown_name, {}, "the format")
       .got("\"" + cut(printable(text), 40) + "\"")
-      .expected("choreo, wpilib, csv, c++ or pathplanner")
+      .expected("choreo, wpilib, csv, c++, pathplanner or choreo-project")
       .hint(near.empty() ? "" : "did you mean \"" + near + "\"?");
 }
 
 const std::array path_rows{
     text("to", at<&PathJob::to>(), "\"choreo\"",
          "Write it in this format, to --out or the terminal")
-        .one_of("choreo, wpilib, csv, c++, pathplanner")
+        .one_of("choreo, wpilib, csv, c++, pathplanner, choreo-project")
         .checked(check_format)
         .takes("FORMAT")
         .without("told and drawn"),

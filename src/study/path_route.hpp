@@ -8,6 +8,7 @@
 
 #include <flyball/io/motion/choreo.hpp>
 #include <flyball/io/motion/pathplanner.hpp>
+#include <flyball/io/motion/wpilib_trajectory.hpp>
 #include <flyball/planning/splines/spline.hpp>
 #include <flyball/recording/trajectory_file.hpp>
 #include <flyball/study/path.hpp>
@@ -55,6 +56,7 @@ struct RouteShape {
   std::vector<RouteZone> zones{};
   std::vector<RoutePointing> pointing{};
   std::vector<double> stops{};  ///< Places at which it stops.
+  std::vector<double> marks{};  ///< Places whose times are asked for.
   RouteLimits limits{};
   bool reversed = false;                            ///< Of one that looks where it goes: it backs.
   double start_velocity = 0.0, end_velocity = 0.0;  ///< m/s
@@ -73,6 +75,7 @@ struct RouteShape {
 struct TimedRoute {
   RobotTrajectory trajectory{};
   std::vector<PathBinding> binding{};
+  std::vector<double> mark_times{};  ///< s, of the shape's marks.
 };
 
 /// The fastest motion along a shape under its limits and those of a robot's wheels, motors and grip
@@ -92,6 +95,8 @@ struct LoadedMotion {
   RobotTrajectory trajectory{};
   std::vector<PathBinding> binding{};
   std::vector<std::string> parts{};
+  std::vector<PathEvent> events{};
+  std::optional<ChoreoPlan> plan{};  ///< Of one made of Choreo's files alone.
 };
 
 /// Reads a file and times it, if it is a path or the job says so; a routine's paths are those
@@ -110,7 +115,7 @@ struct LoadedMotion {
 
 /// The field turned or mirrored: x' = sx x + ox, y' = sy y + oy, θ' = sx sy θ + turn.
 struct FieldChange {
-  double sx = 1.0, ox = 0.0, sy = 1.0, oy = 0.0;
+  double sx = 1.0, ox = 0.0, sy = 1.0, oy = 0.0, turn = 0.0;
 
   [[nodiscard]] static FieldChange of(const PathJob& job);
   [[nodiscard]] bool none() const noexcept { return sx > 0.0 && sy > 0.0; }
@@ -123,10 +128,41 @@ struct FieldChange {
   }
   /// rad
   [[nodiscard]] double heading(double theta) const;
+  /// The same with the turn by π to the side that a first heading does not leave its turn by:
+  /// twice is none, of headings that are not wrapped, too.
+  [[nodiscard]] FieldChange facing(double first) const;
 };
 [[nodiscard]] RobotTrajectory changed(RobotTrajectory trajectory, const FieldChange& change);
 [[nodiscard]] ChoreoTrajectory changed(ChoreoTrajectory file, const FieldChange& change);
 [[nodiscard]] PathPlannerPath changed(PathPlannerPath path, const FieldChange& change,
                                       bool reverse);
+[[nodiscard]] ChoreoParameters changed(ChoreoParameters parameters, const FieldChange& change);
+[[nodiscard]] WpilibTrajectory changed(WpilibTrajectory file, const FieldChange& change);
+
+[[nodiscard]] ChoreoPath2024 changed(ChoreoPath2024 path, const FieldChange& change);
+
+/// A routine as PathPlanner's .auto: itself, or one that drives a job's .path or .traj files one
+/// after the other. @errors ArgumentError::out_of_range for what the format cannot hold.
+[[nodiscard]] ExpectedAll<std::string> written_routine(const PathJob& job);
+/// A project as Choreo's .chor: itself, one of 2024 with its paths turned, or that of the robot of
+/// a [drive]. @errors ArgumentError::out_of_range for what the format cannot hold.
+[[nodiscard]] ExpectedAll<std::string> written_project(const PathJob& job);
+
+/// Files driven from their end to their start, the same side in front. Waypoints, what holds
+/// between them, and events keep the places where they are: an event at t is at the end less t.
+[[nodiscard]] ChoreoTrajectory reversed(ChoreoTrajectory file);
+[[nodiscard]] ChoreoParameters reversed(ChoreoParameters parameters);
+[[nodiscard]] WpilibTrajectory reversed(WpilibTrajectory file);
+
+// ---- what happens along a motion ----------------------------------------------------------------
+
+/// What a Choreo file has happen, and when; what it has waypoints for, and when they are reached.
+void take_choreo(LoadedMotion& motion, const ChoreoTrajectory& file);
+/// The same of a path of a project of 2024: its events.
+void take_choreo(LoadedMotion& motion, const ChoreoPath2024& path);
+
+/// Times of one timing of a way as those of another: where the same share of its length is done.
+[[nodiscard]] double time_at_share(const RobotTrajectory& from, const RobotTrajectory& to,
+                                   double time);
 
 }  // namespace flyball::study

@@ -94,6 +94,16 @@ Expected<void> check_limits(const RouteShape& shape) {
   };
   FLYBALL_CHECK(check(shape.limits, ""));
   for (const RouteZone& zone : shape.zones) {
+    if (!(zone.from <= zone.to)) {
+      const Place& place = zone.limits.place;
+      return refusal(ArgumentError::out_of_range,
+                     place.line > 0
+                         ? fmt::format("{}:{}:{}", shape.source, place.line, place.column)
+                         : shape.source,
+                     fmt::format("the zone \"{}\"", zone.name))
+          .got(fmt::format("from {} to {}", format_number(zone.from), format_number(zone.to)))
+          .expected("from a place of the path to one that is not before it");
+    }
     FLYBALL_CHECK(check(zone.limits, fmt::format(" of the zone \"{}\"", zone.name)));
   }
   return {};
@@ -156,6 +166,32 @@ void sample_part(const PathTrajectory& motion, double start, double step,
   }
 }
 
+/// When a place of the shape is reached: s(t) does not fall, so that halves find it.
+double time_at(const std::vector<PathTrajectory>& motions, const RoutePath& route, double place) {
+  const double parameter = route.parameter(place);
+  double start = 0.0;
+  for (std::size_t p = 0; p < motions.size(); ++p) {
+    const auto& part = route.parts[p];
+    if (parameter > part.second && p + 1 < motions.size()) {
+      start += motions[p].total_time();
+      continue;
+    }
+    double low = 0.0;
+    double high = motions[p].total_time();
+    // At rest the place says little of the time.
+    if (parameter <= part.first || parameter >= part.second) {
+      return start + (parameter <= part.first ? low : high);
+    }
+    constexpr int halves = 60;
+    for (int i = 0; i < halves && low < high; ++i) {
+      const double middle = 0.5 * (low + high);
+      (part.first + motions[p].sample(middle).parameter < parameter ? low : high) = middle;
+    }
+    return start + high;
+  }
+  return start;
+}
+
 }  // namespace
 
 Expected<TimedRoute> time_route(const RouteShape& shape, const std::optional<DriveRobot>& robot,
@@ -209,6 +245,9 @@ Expected<TimedRoute> time_route(const RouteShape& shape, const std::optional<Dri
       }
     }
     start += motion.total_time();
+  }
+  for (const double mark : shape.marks) {
+    result.mark_times.push_back(time_at(motions, route, mark));
   }
   return result;
 }

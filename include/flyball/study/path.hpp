@@ -37,7 +37,8 @@ struct PathJob {
   bool mirror_sides = false;  ///< Mirrored at the line along the field's middle.
   bool reverse = false;       ///< Driven from its end to its start, backing.
   Length field_length{17.548}, field_width{8.052};
-  std::string to{};  ///< "choreo", "wpilib", "csv", "c++", "pathplanner": what is written.
+  /// "choreo", "wpilib", "csv", "c++", "pathplanner", "choreo-project": what is written.
+  std::string to{};
 };
 
 /// A stretch of a trajectory along which one limit holds it back.
@@ -46,18 +47,34 @@ struct PathBinding {
   std::string limit{};          ///< "velocity", "centripetal acceleration", "wheel speed", …
 };
 
+/// Something that files have happen along their paths.
+struct PathEvent {
+  std::string name{};
+  double time = 0.0;                     ///< s
+  std::optional<double> end{};           ///< s, of one that lasts.
+  std::optional<AutoCommand> command{};  ///< What is run then, if its file says it.
+};
+
+/// What Choreo generates a trajectory from, and when its waypoints are reached.
+struct ChoreoPlan {
+  ChoreoParameters params{};
+  std::vector<double> times{};  ///< s, one a waypoint.
+};
+
 /// What became of it.
 struct PathResult {
   PathJob job{};
   MotionFormat format = MotionFormat::choreo_trajectory;  ///< Of the first file.
   bool timed = false;                                     ///< Whether the times were made here.
-  RobotTrajectory trajectory{};                           ///< The whole.
+  RobotTrajectory trajectory{};                           ///< The whole; empty of a project.
   double length = 0.0;                                    ///< m
   std::vector<PathBinding> binding{};                     ///< Empty of what came with its times.
   std::optional<DriveRobot> robot{};
   std::vector<double> fastest_wheel{};  ///< m/s at each sample, of a robot.
   double wheel_limit = 0.0;             ///< m/s, of its wheels without load.
   std::vector<std::string> parts{};     ///< What it was joined of.
+  std::vector<PathEvent> events{};      ///< In the order of their times.
+  std::optional<ChoreoPlan> plan{};     ///< Of a motion made of Choreo's files alone.
   std::vector<Diagnostic> diagnostics{};
   std::string written{};  ///< The file that `to` asks for.
 };
@@ -78,6 +95,12 @@ struct PathResult {
 /// @errors FileError, MotionFileError, TrajectoryFileError, ArgumentError, those of the project.
 /// Cost: some milliseconds a path; allocates.
 [[nodiscard]] ExpectedAll<PathResult> plan_path(const PathJob& job);
+
+/// The motion as a Choreo trajectory: its samples, its events at their times, and, where they are
+/// known, the waypoints and constraints that it was generated from.
+/// @param name  Of the trajectory. @param left_out  What the format cannot hold is told there.
+[[nodiscard]] ChoreoTrajectory choreo_trajectory(const PathResult& result, const std::string& name,
+                                                 std::vector<Diagnostic>& left_out);
 
 /// Numbers, pictures over time and on the field, an animation, and the motion as CSV, WPILib's
 /// JSON, Choreo's and a C++ table. Schema "flyball.path/1".

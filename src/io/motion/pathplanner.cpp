@@ -165,7 +165,7 @@ struct DescribeAuto {
     a("command", r.command);
     a("resetOdom", r.reset_odometry);
     a.nullable("folder", r.folder);
-    a.maybe("choreoAuto", r.choreo_auto);
+    a.usual("choreoAuto", r.choreo_auto);
   }
 };
 

@@ -75,6 +75,7 @@ struct DescribeState {
     a.usual("curvature", s.curvature);
     a("holonomicRotation", s.holonomic_rotation);
     a("holonomicAngularVelocity", s.holonomic_angular_velocity);
+    a("angularVelocity", s.angular_velocity);
   }
 };
 

@@ -62,6 +62,15 @@ std::string to_json(const PathResult& result) {
         json.add("limit", binding.limit);
       });
     });
+    json.list("events", result.events, [&](const PathEvent& event) {
+      json.object([&] {
+        json.add("name", event.name);
+        json.add({{"time", event.time}});
+        if (event.end) {
+          json.add({{"end", *event.end}});
+        }
+      });
+    });
     json.list("samples", result.trajectory.samples, [&](const MotionSample& sample) {
       json.object([&] {
         json.add({{"time", sample.time},
@@ -174,6 +183,16 @@ Answer answer_of(const PathResult& result) {
          quantity(sample.omega, "rad/s", 4, false)});
   }
   motion.blocks.emplace_back(std::move(table));
+  if (!result.events.empty()) {
+    Table events{.caption = "What happens along it",
+                 .header = {"event", "time (s)", "until (s)"},
+                 .words = {0}};
+    for (const PathEvent& event : result.events) {
+      events.rows.push_back({event.name, quantity(event.time, "s", 4, false),
+                             event.end ? quantity(*event.end, "s", 4, false) : ""});
+    }
+    motion.blocks.emplace_back(std::move(events));
+  }
   document.sections.push_back(std::move(motion));
   if (!result.diagnostics.empty()) {
     document.sections.push_back(diagnostics_section(result.diagnostics));
@@ -200,10 +219,8 @@ Answer answer_of(const PathResult& result) {
   const bool differential =
       result.robot ? result.robot->kind == DriveKind::differential : result.job.differential;
   if (!differential || !result.trajectory.holonomic) {
-    const std::optional<ChoreoSides> sides =
-        differential ? std::optional(ChoreoSides{result.robot ? result.robot->trackwidth : 0.6})
-                     : std::nullopt;
-    if (const auto file = to_choreo(to_choreo_trajectory(result.trajectory, "path", sides))) {
+    std::vector<Diagnostic> left_out;
+    if (const auto file = to_choreo(choreo_trajectory(result, "path", left_out))) {
       answer.files.push_back({"path.traj", *file});
     }
   }

@@ -40,6 +40,7 @@ struct WpilibState {
   double curvature = 0.0;     ///< rad/m
   std::optional<double> holonomic_rotation{};  ///< °, of PathPlanner 2023: the way that it looks.
   std::optional<double> holonomic_angular_velocity{};  ///< °/s
+  std::optional<double> angular_velocity{};  ///< rad/s, of PathPlanner 2023: the path's turning.
   WpilibSpeeds speeds{};
   std::optional<WpilibAccelerations> accelerations{};
   std::optional<double> left_velocity{}, right_velocity{};  ///< m/s, of a differential drive.
