@@ -7,7 +7,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <flyball/core/argument.hpp>
 #include <flyball/core/quantity.hpp>
+#include <flyball/core/text.hpp>
 #include <flyball/io/file.hpp>
 #include <flyball/study/plan.hpp>
 #include <flyball/study/project.hpp>
@@ -31,30 +33,40 @@ class PlanReader : public SpaceReader {
     known(root_, "the file",
           {"plan", "axis", "region", "mechanism", "joint", "body", "obstacle", "mass", "holding"});
     std::vector<SpaceAxis> axes;
-    each("axis", [&](const toml::table& table) { axes.push_back(axis(table)); });
+    each("axis", [&](const toml::table& table) {
+      axes.push_back(axis(table));
+      check_axis(axes, table);
+    });
     if (axes.empty()) {
-      refuse(root_.source(), Error(ProjectError::missing_key)
-                                 .about("[[axis]]")
-                                 .got("missing")
-                                 .hint("name what moves: [[axis]] name = \"arm\", low = \"-90 "
-                                       "deg\", high = \"90 deg\""));
+      refuse({}, Error(ProjectError::missing_key)
+                     .about("[[axis]]")
+                     .got("missing")
+                     .hint("name what moves: [[axis]] name = \"arm\", low = \"-90 deg\", high = "
+                           "\"90 deg\""));
     }
     axes_ = axes;
     if (axes.empty()) {
       return tl::unexpected(Errors(std::move(errors_)));
     }
-    auto space = ConfigurationSpace::create(std::move(axes));
-    if (!space) {
-      if (errors_.empty()) {
-        refuse({}, std::move(space).error());
+    auto space = ConfigurationSpace::create(axes);
+    if (!space && errors_.empty()) {
+      refuse({}, std::move(space).error());
+    }
+    // What else is wrong is told with what is wrong with the axes.
+    const bool whole = space.has_value();
+    if (!whole) {
+      space = ConfigurationSpace::create({SpaceAxis{.low = 0.0, .high = 1.0}});
+    }
+    each("region", [&](const toml::table& table) { add_region(whole ? &*space : nullptr, table); });
+    if (whole) {
+      if (auto constrained = space->constrain(std::move(regions_)); !constrained) {
+        refuse({}, std::move(constrained).error());
       }
-      return tl::unexpected(Errors(std::move(errors_)));
     }
-    each("region", [&](const toml::table& table) { add_region(*space, table); });
-    if (auto constrained = space->constrain(std::move(regions_)); !constrained) {
-      refuse({}, std::move(constrained).error());
+    read_mechanism();
+    if (whole) {
+      add_mechanism(*space);
     }
-    add_mechanism(*space);
     PlanJob job{.path = path_, .space = *space};
     job.motion.limits = limits_;
     job.motion.error = errors_of_axes_;
@@ -67,6 +79,36 @@ class PlanReader : public SpaceReader {
   }
 
  private:
+  /// An axis that cannot be one is told at its place, so that others are, too.
+  void check_axis(const std::vector<SpaceAxis>& axes, const toml::table& table) {
+    const SpaceAxis& axis = axes.back();
+    const auto at = [&](const char* key) {
+      const toml::node* const node = table.get(key);
+      return node == nullptr ? table.source() : node->source();
+    };
+    const bool told = std::any_of(errors_.begin(), errors_.end(), [&](const QuotedError& error) {
+      return error.place && error.place->line >= table.source().begin.line;
+    });
+    const auto alone = ConfigurationSpace::create({axis});
+    if (!alone) {
+      if (!told) {
+        refuse(at("low"), alone.error());
+      }
+    } else if (const double error = errors_of_axes_.back(); table.contains("error")) {
+      if (const auto buffered = alone->with_buffer({&error, 1}); !buffered) {
+        refuse(at("error"), buffered.error());
+      }
+    }
+    if (table.contains("name") &&
+        std::any_of(axes.begin(), axes.end() - 1,
+                    [&](const SpaceAxis& other) { return other.name == axis.name; })) {
+      refuse(at("name"), Error(ArgumentError::ambiguous_name)
+                             .about("name")
+                             .got('"' + axis.name + "\", which another axis has")
+                             .expected("different names"));
+    }
+  }
+
   // The mechanism.
   int joint_index(const toml::table& table, std::string_view key, const std::string& name) {
     NameList names;
@@ -119,15 +161,18 @@ class PlanReader : public SpaceReader {
     }
     to.spares = texts(table.get("spares"), "spares");
     mechanism_.obstacles.push_back(std::move(to));
+    obstacles_at_.push_back(table.source());
   }
-  void add_mechanism(ConfigurationSpace& space) {
+  void read_mechanism() {
     each("joint", [&](const toml::table& table) {
       known(table, "[[joint]]", {"name", "axis", "parent", "slides", "x", "y", "angle"});
       PlanarJoint joint;
       joint.name = text(table, "name");
       joint.coordinate = axis_index(table, "axis", text(table, "axis", joint.name));
       const std::string parent = text(table, "parent");
+      const std::size_t before = errors_.size();
       joint.parent = parent.empty() ? -1 : joint_index(table, "parent", parent);
+      joint.parent = errors_.size() > before ? -1 : joint.parent;  // it is told: go on
       joint.slides = table.contains("slides")
                          ? flag(table, "slides")
                          : axes_[static_cast<std::size_t>(joint.coordinate)].unit == "m";
@@ -135,6 +180,7 @@ class PlanReader : public SpaceReader {
       joint.y = optional_quantity(table, "y", Dimension::length).value_or(0.0);
       joint.angle = optional_quantity(table, "angle", Dimension::angle).value_or(0.0);
       mechanism_.joints.push_back(std::move(joint));
+      joints_at_.push_back(table.source());
     });
     each("body", [&](const toml::table& table) {
       known(table, "[[body]]", {"name", "joint", "from", "to", "radius"});
@@ -145,6 +191,7 @@ class PlanReader : public SpaceReader {
       body.to = table.contains("to") ? point(table.get("to"), "to") : body.from;
       body.radius = optional_quantity(table, "radius", Dimension::length).value_or(0.0);
       mechanism_.bodies.push_back(std::move(body));
+      bodies_at_.push_back(table.source());
     });
     each("obstacle", [&](const toml::table& table) { add_obstacle(table); });
     each("mass", [&](const toml::table& table) {
@@ -152,6 +199,7 @@ class PlanReader : public SpaceReader {
       mechanism_.masses.push_back({joint_index(table, "joint", text(table, "joint")),
                                    point(table.get("at"), "at"),
                                    needed(table, "mass", Dimension::mass, "[[mass]]")});
+      masses_at_.push_back(table.source());
     });
     each("holding", [&](const toml::table& table) {
       known(table, "[[holding]]", {"joint", "most"});
@@ -161,6 +209,7 @@ class PlanReader : public SpaceReader {
       mechanism_.holding.push_back(
           {joint,
            needed(table, "most", slides ? Dimension::force : Dimension::torque, "[[holding]]")});
+      holding_at_.push_back(table.source());
     });
     if (const toml::node* node = root_.get("mechanism")) {
       const toml::table* table = node->as_table();
@@ -181,17 +230,64 @@ class PlanReader : public SpaceReader {
         }
       }
     }
+  }
+  void add_mechanism(ConfigurationSpace& space) {
     if (mechanism_.joints.empty() && mechanism_.bodies.empty() && mechanism_.obstacles.empty()) {
       return;
     }
-    if (errors_.empty()) {
-      if (const auto added = space.attach(mechanism_); !added) {
-        refuse(root_.source(), added.error());
+    const std::size_t before = errors_.size();
+    const auto added = space.attach(mechanism_);
+    if (added) {
+      return;
+    }
+    // Each part beside the joints alone: what is wrong with several is told of all, where they are.
+    PlanarMechanism joints;
+    joints.joints = mechanism_.joints;
+    const auto attempt = [&](const PlanarMechanism& part, const toml::source_region& source) {
+      ConfigurationSpace with = space;
+      if (const auto taken = with.attach(part); !taken) {
+        refuse(source, taken.error());
       }
+    };
+    const auto each_alone = [&](auto PlanarMechanism::* list,
+                                const std::vector<toml::source_region>& places) {
+      for (std::size_t i = 0; i < places.size(); ++i) {
+        PlanarMechanism part = joints;
+        (part.*list).push_back((mechanism_.*list)[i]);
+        attempt(part, places[i]);
+      }
+    };
+    if (!joints.joints.empty()) {
+      attempt(joints, joints_at_.front());
+    }
+    if (errors_.size() == before && !joints.joints.empty()) {
+      each_alone(&PlanarMechanism::bodies, bodies_at_);
+      joints.bodies = mechanism_.bodies;  // an obstacle may spare them
+      for (LinkBody& body : joints.bodies) {
+        body.radius = 0.0;
+        body.from = body.to = {};
+      }
+      each_alone(&PlanarMechanism::obstacles, obstacles_at_);
+      each_alone(&PlanarMechanism::masses, masses_at_);
+      each_alone(&PlanarMechanism::holding, holding_at_);
+    }
+    if (errors_.size() == before) {
+      refuse({}, added.error());
     }
   }
 
   // What is asked.
+  void wrong_count(const toml::source_region& source, std::string name, std::size_t count) {
+    std::string all;
+    for (const SpaceAxis& axis : axes_) {
+      all += (all.empty() ? "" : ", ") + axis.name;
+    }
+    refuse(source, Error(ArgumentError::wrong_shape)
+                       .about(std::move(name))
+                       .got(fmt::format("of {} value{}", count, count == 1 ? "" : "s"))
+                       .expected(fmt::format("of {}, one an axis in their order: {}", axes_.size(),
+                                             cut(all, 100))));
+  }
   std::vector<double> place(const toml::table* table, std::string_view key,
                             const std::string& typed) {
     std::vector<double> to;
@@ -203,9 +299,12 @@ class PlanReader : public SpaceReader {
         parts.push_back(typed.substr(from, comma - from));
         from = comma + 1;
       }
+      if (parts.size() != axes_.size()) {
+        wrong_count({}, fmt::format("--{}", key), parts.size());
+        return to;
+      }
       for (std::size_t k = 0; k < parts.size(); ++k) {
-        const Dimension d =
-            k < axes_.size() ? dimension_of(axes_[k].unit) : Dimension::dimensionless;
+        const Dimension d = dimension_of(axes_[k].unit);
         const auto value = parse_quantity(parts[k], d, fmt::format("--{}", key));
         if (!value) {
           refuse({}, value.error());
@@ -223,10 +322,12 @@ class PlanReader : public SpaceReader {
                    .expected("a value an axis, in their order: [\"-57 deg\", \"0.5 m\"]"));
         return to;
       }
+      if (list->size() != axes_.size()) {
+        wrong_count(node->source(), fmt::format("plan.{}", key), list->size());
+        return to;
+      }
       for (std::size_t k = 0; k < list->size(); ++k) {
-        to.push_back(quantity(
-            (*list)[k], k < axes_.size() ? dimension_of(axes_[k].unit) : Dimension::dimensionless,
-            std::string(key)));
+        to.push_back(quantity((*list)[k], dimension_of(axes_[k].unit), std::string(key)));
       }
     }
     return to;
@@ -253,7 +354,14 @@ class PlanReader : public SpaceReader {
       if (const auto parsed = parse_path_method(method)) {
         job.search.method = *parsed;
       } else {
-        refuse(source("method", !given.method.empty()), parsed.error());
+        Error error = parsed.error();
+        std::string methods;
+        for (int i = 0; i <= static_cast<int>(PathMethod::decomposition); ++i) {
+          methods += std::string(to_string(static_cast<PathMethod>(i))) + ", ";
+        }
+        refuse(
+            source("method", !given.method.empty()),
+            std::move(error).expected("one of " + methods + "or ompl where it is built with it"));
       }
     }
     const std::string traversal =
@@ -306,10 +414,34 @@ class PlanReader : public SpaceReader {
     number("nodes", "", Dimension::dimensionless, count(job.search.nodes));
     number("clearance", "", Dimension::dimensionless,
            [&](double value) { job.search.clearance = value; });
-    number("period", "", Dimension::time, [&](double value) { job.motion.period = value; });
+    number("period", "", Dimension::time, [&](double value) {
+      if (!(value > 0.0)) {
+        refuse(source("period", false), Error(ArgumentError::not_positive)
+                                            .about("plan.period")
+                                            .got(format_number(value) + " s")
+                                            .expected("positive"));
+      } else {
+        job.motion.period = value;
+      }
+    });
+    // Each bound of the search at its place.
+    const auto bound = [&](const char* key, auto PathSearch::* member, bool typed) {
+      PathSearch one;
+      one.*member = job.search.*member;
+      if (const auto checked = check(one); !checked) {
+        refuse(source(key, typed), checked.error());
+      }
+    };
+    bound("seconds", &PathSearch::seconds, !given.seconds.empty());
+    bound("work", &PathSearch::work, false);
+    bound("cells", &PathSearch::cells, false);
+    bound("nodes", &PathSearch::nodes, false);
+    bound("clearance", &PathSearch::clearance, false);
   }
 
   PlanarMechanism mechanism_{};
+  std::vector<toml::source_region> joints_at_{}, bodies_at_{}, obstacles_at_{}, masses_at_{},
+      holding_at_{};
 };
 
 }  // namespace

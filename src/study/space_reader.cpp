@@ -194,7 +194,7 @@ std::optional<Region> SpaceReader::region(const toml::table& table, bool named) 
   return all;
 }
 
-void SpaceReader::add_region(const ConfigurationSpace& space, const toml::table& table) {
+void SpaceReader::add_region(const ConfigurationSpace* space, const toml::table& table) {
   const std::string name = text(table, "name", "region");
   const std::string rule = text(table, "rule", "forbid");
   const std::size_t before = errors_.size();
@@ -206,7 +206,7 @@ void SpaceReader::add_region(const ConfigurationSpace& space, const toml::table&
                                             .expected("forbid or require"));
   } else if (one && errors_.size() == before) {
     ConfigurationSpace::NamedRegion added{name, *one, rule == "forbid"};
-    if (const auto taken = space.takes(added); !taken) {
+    if (const auto taken = space != nullptr ? space->takes(added) : Expected<void>(); !taken) {
       refuse(table.source(), taken.error());
     } else {
       regions_.push_back(std::move(added));

@@ -22,10 +22,9 @@ class SpaceReader : public TableReader {
   /// The number of an axis of this name; refused where there is none, at `key`.
   int axis_index(const toml::table& table, std::string_view key, std::string_view name);
   /// @param named  A [[region]], which has a name and a rule; else a part of one.
-
   std::optional<Region> region(const toml::table& table, bool named);
-  /// A [[region]], for `regions_`. @param space  Of which it is to be one.
-  void add_region(const ConfigurationSpace& space, const toml::table& table);
+  /// A [[region]], for `regions_`. @param space  Of which it is to be one; null: not judged.
+  void add_region(const ConfigurationSpace* space, const toml::table& table);
 
   std::vector<SpaceAxis> axes_{};
   std::vector<ConfigurationSpace::NamedRegion> regions_{};

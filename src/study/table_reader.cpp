@@ -32,6 +32,7 @@ void TableReader::refuse(const toml::source_region& source, Error error) {
       {},
       {}};
   if (source.begin.line != 0) {
+    quoted.place = Place{source.begin.line, source.begin.column};
     std::size_t from = 0;
     for (toml::source_index i = 1; i < source.begin.line && from != std::string_view::npos; ++i) {
       from = text_.find('\n', from);

@@ -12,7 +12,7 @@ using Json = nlohmann::json;
 class PlanCommand : public Command {
  protected:
   [[nodiscard]] std::string space() const {
-    return std::string(FLYBALL_EXAMPLES) + "/space_elevator_arm.toml";
+    return FLYBALL_EXAMPLES "/space_elevator_arm.toml";
   }
   /// A file of one axis and whatever else.
   [[nodiscard]] std::string file(const std::string& rest) const {
@@ -98,6 +98,65 @@ TEST_F(PlanCommand, TellsWhatIsWrongWithAFile) {
                            "disc, box, polygon, half_plane or frame", "did you mean \"start\"?"}) {
     EXPECT_TRUE(holds(wrong.err, part)) << part << "\n" << wrong.err;
   }
+  // All at once, each at its place: of axes, bodies, obstacles, holding limits and bounds of the
+  // search.
+  std::ofstream(work() / "all.toml") << R"([[axis]]
+name = "a"
+kind = "length"
+low = "5 m"
+high = "4 m"
+[[axis]]
+name = "a"
+kind = "length"
+low = "0 m"
+high = "4 m"
+error = "3 m"
+[plan]
+start = ["1 m"]
+cells = 100000000
+nodes = 1000000000
+)";
+  const Answer all = run("plan " + (work() / "all.toml").string() + " --method nonsense");
+  for (const char* part :
+       {"all.toml:4:7: a is from 5 to 4", "all.toml:7:8: name is \"a\", which another axis has",
+        "all.toml:11:9: buffer of a is 3 m", "all.toml:13:9: plan.start is of 1 value",
+        "plan.goal is missing", "all.toml:14:9: cells is 100000000",
+        "all.toml:15:9: nodes is 1000000000", "or ompl where it is built with it"}) {
+    EXPECT_TRUE(holds(all.err, part)) << part << "\n" << all.err;
+  }
+  const Answer parts =
+      run("plan " + file("[[joint]]\nname = \"j\"\naxis = \"arm\"\n"
+                         "[[body]]\nname = \"b\"\njoint = \"j\"\nradius = \"-1 m\"\n"
+                         "[[obstacle]]\nname = \"o\"\nshape = \"frame\"\n"
+                         "points = [[\"0 m\", \"0 m\"], [\"1 m\", \"0 m\"], [\"0.5 m\", "
+                         "\"0.1 m\"], [\"1 m\", \"1 m\"]]\n"
+                         "[[holding]]\njoint = \"j\"\nmost = \"-3 N m\"\n"
+                         "[plan]\nstart = [\"0 deg\"]\ngoal = [\"1 deg\"]\n"));
+  EXPECT_EQ(parts.status, 2);
+  for (const char* part : {"space.toml:8:1: b.radius is -1 m", "space.toml:12:1: o is a frame",
+                           "space.toml:16:1: holding limit is -3"}) {
+    EXPECT_TRUE(holds(parts.err, part)) << part << "\n" << parts.err;
+  }
+  std::ofstream(work() / "bow.toml") << R"([[axis]]
+name = "a"
+kind = "length"
+low = "0 m"
+high = "4 m"
+[[axis]]
+name = "b"
+kind = "length"
+low = "0 m"
+high = "4 m"
+[[region]]
+name = "wall"
+polygon = { axes=["a","b"], points=[["1 m","0 m"],["2 m","1 m"],["1 m","1 m"],["2 m","0 m"]] }
+[plan]
+start = ["0 m", "0 m"]
+goal = ["3 m", "3 m"]
+)";
+  EXPECT_TRUE(holds(run("plan " + (work() / "bow.toml").string()).err, "cross or touch"));
+  EXPECT_TRUE(holds(run("plan " + space() + " --start '1 rad, 1 m, 2 m'").err,
+                    "--start is of 3 values; it must be of 2"));
   EXPECT_EQ(run("plan nothing.toml").status, 2);
   EXPECT_EQ(run("plan " + space() + " --method teleport").status, 2);
   EXPECT_EQ(run("plan " + space() + " --start '1 rad'").status, 2);

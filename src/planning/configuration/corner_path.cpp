@@ -286,18 +286,9 @@ std::optional<ConfigurationPath> space_grid_path(Judge& judge, const double* sta
 std::vector<Roadmap::Link> Roadmap::links_from(const Judge& judge, const Configuration& q) const {
   constexpr std::size_t neighbours = 12;
   std::vector<Link> all;
-  all.reserve(nodes_.size());
-  Configuration by{};
-  for (std::size_t i = 0; i < nodes_.size(); ++i) {
-    judge.difference(q.data(), nodes_[i].data(), by.data());
-    all.push_back({static_cast<int>(i), judge.length(by.data()), 0});
+  for (const auto& [place, length] : nearest_places(judge, nodes_, q, neighbours)) {
+    all.push_back({place, length, 0});
   }
-  const std::size_t kept = std::min(neighbours, all.size());
-  std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(kept), all.end(),
-                    [](const Link& a, const Link& b) {
-                      return a.length < b.length || (a.length == b.length && a.to < b.to);
-                    });
-  all.resize(kept);
   return all;
 }
 

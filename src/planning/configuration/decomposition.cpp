@@ -257,7 +257,7 @@ class BoxTree::Boxes {
       return true;
     };
     stack_.assign(1, 0);
-    while (!stack_.empty()) {
+    while (!stack_.empty() && !bound_->look()) {
       const int i = stack_.back();
       stack_.pop_back();
       const Box& other = boxes_[static_cast<std::size_t>(i)];
@@ -304,6 +304,9 @@ class BoxTree::Boxes {
     int met = -1;
     int met_from = -1;
     for (std::size_t side = 0; met < 0; side = 1 - side) {
+      if (bound_->look()) {  // what the last box touches may not all be found
+        return FloodEnd::full;
+      }
       if (heads[side] == queues[side].size()) {
         close(queues[side]);
         return FloodEnd::closed;

@@ -23,23 +23,6 @@ Configuration rounded(const double* q, int dimension) {
 
 }  // namespace
 
-std::vector<KnownMoves::Link> KnownMoves::nearest(const Judge& judge,
-                                                  const Configuration& q) const {
-  std::vector<Link> all(places_.size());
-  Configuration by{};
-  for (std::size_t i = 0; i < places_.size(); ++i) {
-    judge.difference(q.data(), places_[i].data(), by.data());
-    all[i] = {static_cast<int>(i), judge.length(by.data())};
-  }
-  const std::size_t kept = std::min(most_exits, all.size());
-  std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(kept), all.end(),
-                    [](const Link& a, const Link& b) {
-                      return a.length < b.length || (a.length == b.length && a.to < b.to);
-                    });
-  all.resize(kept);
-  return all;
-}
-
 int KnownMoves::part_of(int place) noexcept {
   int name = place;
   while (parts_[static_cast<std::size_t>(name)] != name) {
@@ -63,7 +46,7 @@ void KnownMoves::learn(Judge& judge, const ConfigurationPath& path) {
       return;
     }
     const Configuration q = rounded(waypoint.data(), judge.dimension());
-    const std::vector<Link> near = nearest(judge, q);
+    const std::vector<NearPlace> near = nearest_places(judge, places_, q, most_exits);
     const int here = size();
     places_.push_back(q);
     links_.emplace_back();
@@ -76,13 +59,13 @@ void KnownMoves::learn(Judge& judge, const ConfigurationPath& path) {
       }
     }
     // One move to another part, or to a place that only a detour leads to.
-    for (const Link& link : near) {
-      if (part_of(link.to) == part_of(here)) {
+    for (const auto& [place, length] : near) {
+      if (part_of(place) == part_of(here)) {
         continue;
       }
-      judge.difference(q.data(), places_[static_cast<std::size_t>(link.to)].data(), by.data());
+      judge.difference(q.data(), places_[static_cast<std::size_t>(place)].data(), by.data());
       if (judge.free(q, by)) {
-        join(here, link.to, link.length);
+        join(here, place, length);
       }
       break;
     }
@@ -140,7 +123,9 @@ std::optional<ConfigurationPath> KnownMoves::way(Judge& judge, const double* sta
   }
   const int n = judge.dimension();
   const std::array<Configuration, 2> ends{rounded(start, n), rounded(goal, n)};
-  const std::array<std::vector<Link>, 2> exits{nearest(judge, ends[0]), nearest(judge, ends[1])};
+  const std::array<std::vector<NearPlace>, 2> exits{
+      nearest_places(judge, places_, ends[0], most_exits),
+      nearest_places(judge, places_, ends[1], most_exits)};
   std::array<std::vector<int>, 2> reached;
   Configuration by{};
   // In turns, the nearest first, until both reach one part.
@@ -149,7 +134,7 @@ std::optional<ConfigurationPath> KnownMoves::way(Judge& judge, const double* sta
       if (k >= exits[end].size()) {
         continue;
       }
-      const int place = exits[end][k].to;
+      const int place = exits[end][k].place;
       const auto is_of_part = [&](int other) { return part_of(other) == part_of(place); };
       if (std::any_of(reached[end].begin(), reached[end].end(), is_of_part)) {
         continue;  // a nearer place of that part is reached

@@ -29,8 +29,6 @@ class KnownMoves {
     int to;
     float length;
   };
-  /// Places in the order of their distance, the nearest few.
-  [[nodiscard]] std::vector<Link> nearest(const Judge& judge, const Configuration& q) const;
   [[nodiscard]] int part_of(int place) noexcept;
   void join(int a, int b, float length);
   [[nodiscard]] std::optional<std::vector<int>> shortest(const Judge& judge, int from,

@@ -24,7 +24,9 @@ constexpr std::string_view in_plan = "plan";
 constexpr std::array<const char*, 8> names{"automatic",   "straight", "corners", "grid",
                                            "rrt-connect", "rrt-star", "roadmap", "decomposition"};
 
-Expected<void> check_search(const PathSearch& search) {
+}  // namespace
+
+Expected<void> check(const PathSearch& search) {
   FLYBALL_CHECK(Checks(in_plan)
                     .positive(search.seconds, "seconds", "s")
                     .not_negative(search.clearance, "clearance"));
@@ -43,8 +45,6 @@ Expected<void> check_search(const PathSearch& search) {
   }
   return {};
 }
-
-}  // namespace
 
 const char* to_string(PathMethod method) noexcept {
   const auto i = static_cast<std::size_t>(method);
@@ -92,7 +92,7 @@ const ConfigurationSpace& PathPlanner::space() const noexcept {
 Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
                                               std::span<const double> goal,
                                               const PathSearch& search) {
-  FLYBALL_CHECK(check_search(search));
+  FLYBALL_CHECK(check(search));
   const ConfigurationSpace& space = state_->space;
   FLYBALL_CHECK(space.check(start, in_plan, "the start"));
   FLYBALL_CHECK(space.check(goal, in_plan, "the goal"));
@@ -107,7 +107,7 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
     const bool is_random = method == PathMethod::rrt_connect || method == PathMethod::rrt_star ||
                            method == PathMethod::roadmap || method == PathMethod::decomposition;
     if (search.shorten && (is_random || method == PathMethod::grid)) {
-      detail::shorten(judge, path, random, is_random ? 100 : 0);
+      detail::shorten(judge, path, random, is_random ? 100 : 0, bound);
     }
     result.method = method;
     result.moves = judge.moves;
@@ -187,7 +187,7 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
   }
   if (method == PathMethod::roadmap) {
     // What it has when half of the time is over is searched.
-    detail::WorkBound part(search.work / 2 + 1, 0.5 * search.seconds);
+    detail::WorkBound part(search.work / 2 + 1, 0.5 * search.seconds, bound);
     state_->roadmap.grow(judge, random, search.nodes, part);
     result.nodes = state_->roadmap.size();
     if (auto path = state_->roadmap.way(judge, start.data(), goal.data(), bound)) {
@@ -230,7 +230,7 @@ Expected<ConfigurationPath> PathPlanner::plan(std::span<const double> start,
   detail::BoxAnswer boxes;
   if (any || method == PathMethod::decomposition) {
     constexpr long most_boxes = 3'000'000;
-    detail::WorkBound part(search.work, any ? 0.6 * search.seconds : search.seconds);
+    detail::WorkBound part(search.work, any ? 0.6 * search.seconds : search.seconds, bound);
     detail::GrowAlong along;
     if (any) {
       along = [&](const detail::Channel& channel, long work) {

@@ -373,7 +373,24 @@ void lift(const SpaceModel& model, ConfigurationPath& path) {
   }
 }
 
-void shorten(Judge& judge, ConfigurationPath& path, Random& random, int rounds) {
+std::vector<NearPlace> nearest_places(const Judge& judge, const std::vector<Configuration>& places,
+                                      const Configuration& q, std::size_t most) {
+  std::vector<NearPlace> all(places.size());
+  Configuration by{};
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    judge.difference(q.data(), places[i].data(), by.data());
+    all[i] = {static_cast<int>(i), judge.length(by.data())};
+  }
+  const std::size_t kept = std::min(most, all.size());
+  std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(kept), all.end(),
+                    [](const NearPlace& a, const NearPlace& b) {
+                      return a.length < b.length || (a.length == b.length && a.place < b.place);
+                    });
+  all.resize(kept);
+  return all;
+}
+
+void shorten(Judge& judge, ConfigurationPath& path, Random& random, int rounds, WorkBound& bound) {
   const int n = judge.dimension();
   Configuration from{};
   Configuration by{};
@@ -394,6 +411,9 @@ void shorten(Judge& judge, ConfigurationPath& path, Random& random, int rounds) 
   };
   for (std::size_t i = 0; i + 2 < path.size(); ++i) {
     for (std::size_t j = path.size() - 1; j > i + 1; --j) {
+      if (bound.look()) {
+        return;
+      }
       if (free(path[i], path[j])) {
         path.erase(path.begin() + static_cast<std::ptrdiff_t>(i + 1),
                    path.begin() + static_cast<std::ptrdiff_t>(j));
@@ -408,7 +428,7 @@ void shorten(Judge& judge, ConfigurationPath& path, Random& random, int rounds) 
     }
     return q;
   };
-  for (int round = 0; round < rounds && path.size() > 2; ++round) {
+  for (int round = 0; round < rounds && path.size() > 2 && !bound.look(); ++round) {
     const auto moves = static_cast<double>(path.size() - 1);
     const double u = random.uniform(0.0, moves);
     const double v = random.uniform(0.0, moves);
@@ -431,7 +451,7 @@ void shorten(Judge& judge, ConfigurationPath& path, Random& random, int rounds) 
       path.insert(path.begin() + static_cast<std::ptrdiff_t>(i + 1), {std::move(a), std::move(b)});
     }
   }
-  for (std::size_t i = 0; i + 2 < path.size();) {
+  for (std::size_t i = 0; i + 2 < path.size() && !bound.look();) {
     if (free(path[i], path[i + 2])) {
       path.erase(path.begin() + static_cast<std::ptrdiff_t>(i + 1));
     } else {

@@ -26,17 +26,39 @@ class WorkBound {
       : left_(work),
         end_(std::chrono::steady_clock::now() +
              std::chrono::duration_cast<std::chrono::steady_clock::duration>(
-                 std::chrono::duration<double>(std::min(seconds, 1e7)))) {}
+                 std::chrono::duration<double>(std::min(seconds, 1e7)))),
+        looked_(std::chrono::steady_clock::now()) {}
+  /// A part of another: it ends with that, too.
+  WorkBound(long work, double seconds, const WorkBound& whole) : WorkBound(work, seconds) {
+    end_ = std::min(end_, whole.end_);
+    over_ = whole.over_;
+  }
 
   /// Does one piece of work. @return Whether there was one left.
   bool spend() noexcept {
     if (--left_ < 0 || over_) {
       return false;
     }
-    if ((++done_ & 1023) == 0) {
-      over_ = std::chrono::steady_clock::now() > end_;
+    ++done_;
+    return !look();
+  }
+  /// Whether the time is over: the clock is read again after so many pieces of work as take a
+  /// fraction of a millisecond, for a piece among a million nodes takes as long as thousands of
+  /// others.
+  bool look() noexcept {
+    if (over_ || --until_ > 0) {
+      return over_;
     }
-    return !over_;
+    const auto now = std::chrono::steady_clock::now();
+    const auto passed = now - looked_;
+    constexpr int most = 256;
+    interval_ = passed > std::chrono::milliseconds(1)     ? std::max(interval_ / 8, 1)
+                : passed < std::chrono::microseconds(100) ? std::min(2 * interval_, most)
+                                                          : interval_;
+    until_ = interval_;
+    looked_ = now;
+    over_ = now > end_;
+    return over_;
   }
   [[nodiscard]] long done() const noexcept { return done_; }
   [[nodiscard]] bool late() const noexcept { return over_; }
@@ -46,7 +68,10 @@ class WorkBound {
   long left_;
   long done_ = 0;
   bool over_ = false;
+  int interval_ = 16;
+  int until_ = 16;
   std::chrono::steady_clock::time_point end_;
+  std::chrono::steady_clock::time_point looked_;
 };
 
 /// Judges moves and boxes of a space in lanes.
@@ -170,7 +195,17 @@ std::optional<ConfigurationPath> rrt_star(Judge& judge, Tree& tree, const double
 /// Makes angles that wrap go on from waypoint to waypoint.
 void lift(const SpaceModel& model, ConfigurationPath& path);
 
-/// Takes detours out: moves over waypoints, then over parts of moves.
-void shorten(Judge& judge, ConfigurationPath& path, Random& random, int rounds);
+/// Takes detours out: moves over waypoints, then over parts of moves, as long as there is time.
+void shorten(Judge& judge, ConfigurationPath& path, Random& random, int rounds, WorkBound& bound);
+
+/// A place and how far it is.
+struct NearPlace {
+  int place;
+  float length;
+};
+/// The nearest places of a graph, in the order of their distance. Cost: O(places).
+[[nodiscard]] std::vector<NearPlace> nearest_places(const Judge& judge,
+                                                    const std::vector<Configuration>& places,
+                                                    const Configuration& q, std::size_t most);
 
 }  // namespace flyball::detail

@@ -70,21 +70,35 @@ Expected<void> check_polygon(const std::vector<Point>& vertices, std::string_vie
   for (const Point& vertex : all) {
     extent = std::max({extent, std::abs(vertex[0] - all[0][0]), std::abs(vertex[1] - all[0][1])});
   }
-  if (!(std::abs(signed_area(all)) > 1e-12 * extent * extent)) {
+  const std::size_t n = all.size();
+  const double least = 1e-12 * extent * extent;
+  const Point& far = *std::max_element(all.begin(), all.end(), [&](const Point& a, const Point& b) {
+    return std::hypot(a[0] - all[0][0], a[1] - all[0][1]) <
+           std::hypot(b[0] - all[0][0], b[1] - all[0][1]);
+  });
+  if (std::all_of(all.begin(), all.end(), [&](const Point& vertex) {
+        return !(std::abs(cross(all[0], far, vertex)) > least);
+      })) {
     return refusal(ArgumentError::out_of_range, where, name)
         .got("without an area")
         .expected("a polygon whose vertices are not all on a line");
   }
-  const std::size_t n = all.size();
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = i + 2; j < n; ++j) {
       if ((i != 0 || j + 1 != n) && meet(all[i], all[i + 1], all[j], all[(j + 1) % n])) {
         return refusal(ArgumentError::out_of_range, where, name)
-            .got(format("its edges {} and {} cross", i + 1, j + 1))
-            .expected("vertices in order around it")
+            .got(format("a polygon whose edges from ({}, {}) and from ({}, {}) cross or touch",
+                        format_number(all[i][0]), format_number(all[i][1]),
+                        format_number(all[j][0]), format_number(all[j][1])))
+            .expected("its vertices in their order around it")
             .with("vertex", {all[i][0], all[i][1]});
       }
     }
+  }
+  if (!(std::abs(signed_area(all)) > least)) {
+    return refusal(ArgumentError::out_of_range, where, name)
+        .got("without an area")
+        .expected("a polygon that encloses one");
   }
   return {};
 }

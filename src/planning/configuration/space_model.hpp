@@ -44,6 +44,12 @@ struct SpaceModel {
 /// Makes what follows from axes, buffer, regions and mechanism, which have been checked.
 void complete(SpaceModel& model);
 
+/// A program in floats, each margin less by what their rounding may be. @param signs  Of each leaf
+/// of the regions: 1, or -1 where what is outside of it is allowed.
+[[nodiscard]] SpaceProgram<float> in_floats(const SpaceModel& model,
+                                            const SpaceProgram<double>& exact,
+                                            const std::vector<int>& signs);
+
 /// The first place of a move that a region does not allow; > 1 if it allows all of it. Exact but
 /// for rounding; along the boundary is allowed.
 [[nodiscard]] double first_exit(const SpaceModel& model, const SpaceConstraint& constraint,

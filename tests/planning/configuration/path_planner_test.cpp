@@ -95,14 +95,8 @@ TEST(PathPlanner, PathsOfArmsAreValid) {
       PathPlanner planner(space);
       Random random(seed);
       for (int trial = 0; trial < 30; ++trial) {
-        std::vector<double> start;
-        std::vector<double> goal;
-        do {
-          start = test::random_configuration(space, random);
-        } while (!space.valid(start));
-        do {
-          goal = test::random_configuration(space, random);
-        } while (!space.valid(goal));
+        const std::vector<double> start = test::valid_configuration(space, random);
+        const std::vector<double> goal = test::valid_configuration(space, random);
         const PathSearch search{.method = PathMethod::rrt_connect,
                                 .seed = static_cast<std::uint64_t>(trial),
                                 .work = 300,
@@ -291,16 +285,9 @@ TEST(PathPlanner, ProvesThatDiscsPartTheSpaceOfAnArm) {
     const ConfigurationSpace space = test::arm_space(seed, true);
     PathPlanner planner(space);
     Random random(seed);
-    const auto valid = [&] {
-      std::vector<double> q;
-      do {
-        q = test::random_configuration(space, random);
-      } while (!space.valid(q));
-      return q;
-    };
     for (int i = 0; i < 8; ++i) {
-      const std::vector<double> start = valid();
-      const std::vector<double> goal = valid();
+      const std::vector<double> start = test::valid_configuration(space, random);
+      const std::vector<double> goal = test::valid_configuration(space, random);
       PathSearch trees;
       trees.method = PathMethod::rrt_connect;
       trees.work = 2000;
@@ -333,14 +320,8 @@ TEST(PathPlanner, KeepsWhatBoxesProve) {
   int proven = 0;
   int proven_at_once = 0;
   for (int i = 0; i < 30; ++i) {
-    std::vector<double> start;
-    std::vector<double> goal;
-    do {
-      start = test::random_configuration(space, random);
-    } while (!space.valid(start));
-    do {
-      goal = test::random_configuration(space, random);
-    } while (!space.valid(goal));
+    const std::vector<double> start = test::valid_configuration(space, random);
+    const std::vector<double> goal = test::valid_configuration(space, random);
     PathSearch search;
     search.seed = static_cast<std::uint64_t>(i);
     search.seconds = 60.0;
@@ -373,14 +354,8 @@ TEST(PathPlanner, LearnsFromThePathsThatItFinds) {
   int by_known_moves = 0;
   long moves_of_known = 0;
   for (int i = 0; i < 60; ++i) {
-    std::vector<double> start;
-    std::vector<double> goal;
-    do {
-      start = test::random_configuration(space, random);
-    } while (!space.valid(start));
-    do {
-      goal = test::random_configuration(space, random);
-    } while (!space.valid(goal));
+    const std::vector<double> start = test::valid_configuration(space, random);
+    const std::vector<double> goal = test::valid_configuration(space, random);
     PathSearch search;
     search.seed = static_cast<std::uint64_t>(i);
     search.seconds = 60.0;

@@ -95,4 +95,13 @@ inline std::vector<double> random_configuration(const ConfigurationSpace& space,
   return q;
 }
 
+/// One that breaks no constraint.
+inline std::vector<double> valid_configuration(const ConfigurationSpace& space, Random& random) {
+  std::vector<double> q;
+  do {
+    q = random_configuration(space, random);
+  } while (!space.valid(q));
+  return q;
+}
+
 }  // namespace flyball::test

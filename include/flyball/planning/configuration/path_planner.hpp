@@ -44,6 +44,10 @@ struct PathSearch {
   bool wide = true;  ///< Whether 256-bit vectors are used where the processor has them.
 };
 
+/// Whether a search can be asked for. @errors ArgumentError::not_positive (seconds), out_of_range
+/// (a clearance below zero, counts beyond what `PathSearch` says).
+[[nodiscard]] Expected<void> check(const PathSearch& search);
+
 /// A path of straight moves that are valid along their whole length.
 struct ConfigurationPath {
   /// From the start to the goal, an entry an axis. Angles that wrap go on: their values may leave
