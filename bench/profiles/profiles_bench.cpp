@@ -21,6 +21,7 @@
 
 #include "plain_trapezoid.hpp"
 #include "planning/profiles/fastest_duration.hpp"
+#include "planning/profiles/more_profile_laws.hpp"
 #include "planning/profiles/profile_laws.hpp"
 
 namespace {
@@ -238,6 +239,19 @@ std::string try_parabolic(Random& random, bool outside) {
                      : law;
 }
 
+std::string try_stepper(Random& random, bool outside) {
+  const test::ProfileDemand demand = test::random_demand(random, 2, outside);
+  const double jump = random.uniform() < 0.2 ? 0.0 : demand.limits.velocity * random.uniform();
+  return test::broken_law_of_jumps(StepperProfile(demand.limits, jump, demand.start, demand.goal),
+                                   demand);
+}
+
+/// The change of a velocity by each profile.
+std::string try_velocities(Random& random, bool outside) {
+  const test::ProfileDemand demand = test::random_demand(random, 2, outside);
+  return test::broken_law_of_velocity_targets(demand);
+}
+
 std::string try_exponential(Random& random, bool outside) {
   test::ProfileDemand demand = test::random_demand(random, 2, outside);
   MotorMotionLimits motor{.kV = 12.0 / demand.limits.velocity,
@@ -341,6 +355,8 @@ void run_campaigns(long count) {
     run("s-curve", "s-curve, from outside", try_s_curve);
     run("parabolic", "parabolic, from outside", try_parabolic);
     run("exponential", "exponential, from outside", try_exponential);
+    run("stepper", "stepper, from outside", try_stepper);
+    run("velocities", "velocities, from outside", try_velocities);
   }
   for (const bool rest : {true, false}) {
     long kept = 0;

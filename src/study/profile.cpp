@@ -135,15 +135,24 @@ Expected<void> plan(ProfileResult& result, const std::optional<MotorMotionLimits
   const MotionState& from = result.job.from;
   const MotionState& to = result.job.to;
   const MotionLimits& limits = result.limits;
+  const std::optional<double>& rate = result.job.to_velocity;
   switch (result.kind) {
     case ProfileKind::s_curve:
-      return tabulate(SCurveProfile(limits, from, to), result);
+      return tabulate(rate ? SCurveProfile::to_velocity(limits, from, *rate, to.acceleration)
+                           : SCurveProfile(limits, from, to),
+                      result);
     case ProfileKind::exponential:
-      return tabulate(ExponentialProfile(*motor, from, to), result);
+      return tabulate(rate ? ExponentialProfile::to_velocity(*motor, from, *rate)
+                           : ExponentialProfile(*motor, from, to),
+                      result);
     case ProfileKind::parabolic:
-      return tabulate(ParabolicProfile(limits, from, to), result);
+      return tabulate(rate ? ParabolicProfile::to_velocity(limits, from, *rate)
+                           : ParabolicProfile(limits, from, to),
+                      result);
     case ProfileKind::stepper:
-      return tabulate(StepperProfile(limits, jump, from, to), result);
+      return tabulate(rate ? StepperProfile::to_velocity(limits, jump, from, *rate)
+                           : StepperProfile(limits, jump, from, to),
+                      result);
     case ProfileKind::minimum_jerk: {
       const MinimumJerkProfile profile(limits, from, to);
       if (!profile.keeps_limits()) {
@@ -157,7 +166,9 @@ Expected<void> plan(ProfileResult& result, const std::optional<MotorMotionLimits
     case ProfileKind::trapezoid:
       break;
   }
-  return tabulate(TrapezoidProfile(limits, from, to), result);
+  return tabulate(rate ? TrapezoidProfile::to_velocity(limits, from, *rate)
+                       : TrapezoidProfile(limits, from, to),
+                  result);
 }
 
 /// What a kind of profile does not take, and would pass over.
@@ -174,6 +185,8 @@ Expected<void> check_options(const ProfileJob& job, ProfileKind kind) {
       {job.from.acceleration != 0.0, states, "start_acceleration", "s-curve begins with one"},
       {job.to.acceleration != 0.0, states, "goal_acceleration", "s-curve ends with one"},
       {job.ramp.has_value(), states, "ramp", "s-curve has a ramp"},
+      {job.to_velocity.has_value(), kind != ProfileKind::minimum_jerk, "to_velocity",
+       "the other kinds change a velocity"},
       {job.jump > 0.0, kind == ProfileKind::stepper, "jump", "stepper jumps"},
       {job.deceleration > 0.0, brakes, "deceleration", "trapezoid and s-curve brake by their own"}};
   for (const auto& option : options) {
@@ -189,13 +202,14 @@ Expected<void> check_options(const ProfileJob& job, ProfileKind kind) {
 
 /// That it ends with the velocity that was asked for: limits stand before goals.
 Expected<void> check_goal_velocity(const ProfileResult& result) {
-  const double wanted = result.job.to.velocity;
+  const double wanted = result.job.to_velocity.value_or(result.job.to.velocity);
   const double end = result.table.find("velocity")->back();
   const double size = std::max(std::abs(wanted), result.peak_velocity);
   if (std::abs(end - wanted) <= 1e-6 * size) {
     return {};
   }
-  return refusal(ArgumentError::out_of_range, in_profile, "goal_velocity")
+  return refusal(ArgumentError::out_of_range, in_profile,
+                 result.job.to_velocity ? "to_velocity" : "goal_velocity")
       .got(fmt::format("{} {}/s, which is not reached: it would arrive with {}",
                        format_number(wanted), result.unit, format_number(end, 4)))
       .expected("within the limits of the velocity, and reached on the way there")
@@ -206,6 +220,11 @@ Expected<void> check_goal_velocity(const ProfileResult& result) {
 
 Expected<ProfileResult> plan_profile(const ProfileJob& job) {
   ProfileResult result{.job = job, .unit = job.angle ? "rad" : "m"};
+  if (job.to_velocity && (job.to.position != 0.0 || job.to.velocity != 0.0 || job.continuous)) {
+    return refusal(ArgumentError::ambiguous_name, in_profile, "to_velocity")
+        .got("given with a position, a goal's velocity or continuous")
+        .expected("alone: it says how fast it is to be, wherever that is");
+  }
   FLYBALL_TRY(const std::optional<MotorMotionLimits> motor, motor_of(job));
   FLYBALL_TRY(result.limits, limits_of(job, motor));
   const MotionState& from = job.from;
@@ -218,6 +237,7 @@ Expected<ProfileResult> plan_profile(const ProfileJob& job) {
                                     {to.position, "to"},
                                     {from.velocity, "start_velocity"},
                                     {to.velocity, "goal_velocity"},
+                                    {job.to_velocity.value_or(0.0), "to_velocity"},
                                     {from.acceleration, "start_acceleration"},
                                     {to.acceleration, "goal_acceleration"},
                                     {result.limits.velocity, "velocity"},
@@ -245,6 +265,11 @@ Expected<ProfileResult> plan_profile(const ProfileJob& job) {
         .delicate = job.delicate};
     if (job.resonance) {
       needs.resonance = job.resonance->si();
+    }
+    if (job.to_velocity) {
+      const double change = *job.to_velocity - from.velocity;
+      needs.distance =
+          0.5 * (*job.to_velocity + from.velocity) * std::abs(change) / result.limits.acceleration;
     }
     if (needs.distance == 0.0) {
       needs.distance = result.limits.velocity * result.limits.velocity / result.limits.acceleration;
@@ -276,8 +301,14 @@ Expected<ProfileResult> plan_profile(const ProfileJob& job) {
   }
   FLYBALL_CHECK(plan(result, motor, jump));
   FLYBALL_CHECK(check_goal_velocity(result));
-  const TrapezoidProfile trapezoid(result.limits, from, to);
-  result.other_duration = trapezoid.total_time();
+  result.other_duration =
+      job.to_velocity
+          ? TrapezoidProfile::to_velocity(result.limits, from, *job.to_velocity).total_time()
+          : TrapezoidProfile(result.limits, from, to).total_time();
+  if (job.to_velocity) {
+    result.job.to.position = result.table.find("position")->back();
+    result.job.to.velocity = *job.to_velocity;
+  }
   return result;
 }
 

@@ -41,6 +41,10 @@ const std::array profile_rows{
              "Where it is to be")
         .takes("POSITION")
         .without("0"),
+    quantity("to_velocity", at<&ProfileJob::to_velocity>(), rate, any, "\"2 m/s\"",
+             "In place of a position: how fast it is to be, wherever that is")
+        .takes("VELOCITY")
+        .without("it goes to a position"),
     quantity("start_velocity", at<&ProfileJob::from, &MotionState::velocity>(), rate, any,
              "\"0.5 m/s\"", "How fast it is there")
         .takes("VELOCITY")

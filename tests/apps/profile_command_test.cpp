@@ -37,6 +37,27 @@ TEST_F(ProfileCommand, TellsTheMotionAndWhy) {
   EXPECT_EQ(json.at("position").back().get<double>(), 1.2);
 }
 
+// From 0.5 m/s to -1 m/s with 3 m/s²: half a second.
+TEST_F(ProfileCommand, ChangesAVelocity) {
+  const std::string change =
+      "--start-velocity 0.5m/s --to-velocity -1m/s --velocity 1.5m/s --acceleration 3m/s^2 ";
+  for (const char* kind : {"trapezoid", "s-curve", "parabolic", "stepper"}) {
+    const Json json = answer(change + "--kind " + kind);
+    EXPECT_EQ(json.at("velocity").back().get<double>(), -1.0) << kind;
+    EXPECT_GE(json.at("duration").get<double>(), 0.5 * (1.0 - 1e-12)) << kind;
+    if (std::string(kind) == "trapezoid") {
+      EXPECT_NEAR(json.at("duration").get<double>(), 0.5, 1e-12);
+      EXPECT_NEAR(json.at("position").back().get<double>(), -0.125, 1e-12);
+    }
+  }
+  const Json motor = answer("--to-velocity 1m/s --kv 4 --ka 0.4");
+  EXPECT_EQ(motor.at("kind"), "exponential");
+  EXPECT_NEAR(motor.at("duration").get<double>(), 0.1 * std::log(1.5), 1e-12);
+  EXPECT_EQ(run("profile " + change + "--kind minimum-jerk").status, 2);
+  EXPECT_EQ(run("profile " + change + "--to 1m").status, 2);
+  EXPECT_EQ(run("profile --to-velocity 2m/s --velocity 1m/s --acceleration 1m/s^2").status, 2);
+}
+
 TEST_F(ProfileCommand, Kinds) {
   const std::string limits = limited;
   const Json s_curve = answer(limits + "--kind s-curve --ramp 0.1s");

@@ -22,7 +22,8 @@ struct ProfileJob {
   bool continuous = false;  ///< The angle goes the short way.
   MotionState from{};
   MotionState to{};
-  double velocity = 0.0;  ///< 0: the motor's.
+  std::optional<double> to_velocity{};  ///< Of a change of the velocity, wherever it ends.
+  double velocity = 0.0;                ///< 0: the motor's.
   double acceleration = 0.0;
   double deceleration = 0.0;      ///< 0: as `acceleration`.
   double reverse_velocity = 0.0;  ///< 0: as `velocity`.

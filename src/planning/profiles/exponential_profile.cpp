@@ -201,6 +201,37 @@ ExponentialProfile::ExponentialProfile(const MotorMotionLimits& motor, const Mot
   }
 }
 
+ExponentialProfile ExponentialProfile::to_velocity(const MotorMotionLimits& motor,
+                                                   const MotionState& start,
+                                                   double velocity) noexcept {
+  const MotionState goal{start.position, velocity, 0.0};
+  ExponentialProfile profile(motor, start, {start.position, start.velocity, 0.0});
+  profile.end_ = 0.0;
+  profile.count_ = 0;
+  if (!is_usable(motor, start, goal)) {
+    const double place = std::isfinite(start.position) ? start.position : 0.0;
+    profile.goal_ = {place, 0.0, 0.0};
+    profile.pieces_[0] = {0.0, place, 0.0, 0.0, 0.0};
+    return profile;
+  }
+  constexpr double nearly = 1.0 - 1e-9;
+  const double high = std::min(motor.velocity, nearly * top_speed(motor, 1.0));
+  const double low = std::min(motor.velocity, nearly * top_speed(motor, -1.0));
+  const double end = std::clamp(velocity, -low, high);
+  profile.position_ = start.position;
+  profile.velocity_ = start.velocity;
+  profile.pieces_[0] = {0.0, start.position, start.velocity, 0.0, 0.0};
+  profile.add_change(start.velocity, end);
+  profile.goal_ = {profile.position_, end, 0.0};
+  if (!std::isfinite(profile.end_) || !std::isfinite(profile.position_)) {
+    profile.goal_ = {start.position, 0.0, 0.0};
+    profile.count_ = 0;
+    profile.end_ = 0.0;
+    profile.pieces_[0] = {0.0, start.position, 0.0, 0.0, 0.0};
+  }
+  return profile;
+}
+
 MotionState ExponentialProfile::sample(double t) const noexcept {
   if (t >= end_) {
     const double past = std::isfinite(t) ? t - end_ : 0.0;

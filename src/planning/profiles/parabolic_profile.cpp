@@ -53,6 +53,34 @@ void ParabolicProfile::add_ramp(double from, double to) noexcept {
   goal_.velocity = to;
 }
 
+double ParabolicProfile::come_within(double velocity) noexcept {
+  const double V = limits_.velocity;
+  if (!(std::abs(velocity) > V)) {
+    return velocity;
+  }
+  goal_.acceleration = velocity > 0.0 ? -limits_.acceleration : limits_.acceleration;
+  const double end = std::copysign(V, velocity);
+  add((end - velocity) / goal_.acceleration, 0.0);
+  return end;
+}
+
+ParabolicProfile ParabolicProfile::to_velocity(const MotionLimits& limits, const MotionState& start,
+                                               double velocity) noexcept {
+  const MotionState still{start.position, 0.0, 0.0};
+  ParabolicProfile profile(limits, still, still);
+  const MotionLimits& all = profile.limits_;
+  if (!detail::is_usable(all, start, {start.position, velocity, 0.0}) ||
+      all.velocity > detail::largest_motion || all.acceleration > detail::largest_motion) {
+    return profile;
+  }
+  profile.begin({start.position, start.velocity, 0.0});
+  const double end = std::clamp(velocity, -all.velocity, all.velocity);
+  const double from = profile.come_within(start.velocity);
+  profile.add_ramp(from, end);
+  profile.finish({profile.goal_.position, end, 0.0});
+  return profile;
+}
+
 ParabolicProfile::ParabolicProfile(const MotionLimits& limits, const MotionState& start,
                                    const MotionState& goal) noexcept
     : limits_{limits.velocity, limits.acceleration, limits.acceleration, limits.velocity} {
@@ -65,13 +93,7 @@ ParabolicProfile::ParabolicProfile(const MotionLimits& limits, const MotionState
   }
   begin({start.position, start.velocity, 0.0});
   const Parabola p{V, 2.0 * V / A};
-  double v_0 = start.velocity;
-  if (std::abs(v_0) > V) {
-    goal_.acceleration = v_0 > 0.0 ? -A : A;
-    const double end = std::copysign(V, v_0);
-    add((end - v_0) / goal_.acceleration, 0.0);
-    v_0 = end;
-  }
+  const double v_0 = come_within(start.velocity);
   const MotionState end{goal.position, std::clamp(goal.velocity, -V, V), 0.0};
   const double d = end.position - goal_.position;
   const double straight = change(p, v_0, end.velocity);
@@ -123,13 +145,44 @@ ParabolicProfile::ParabolicProfile(const MotionLimits& limits, const MotionState
 
 namespace {
 
-/// The velocity at an end, with a jump in the direction of the motion if it is slower than that.
-MotionState jumped(const MotionState& end, double jump, double direction) {
-  MotionState moving = end;
-  if (std::abs(end.velocity) < jump && direction != 0.0) {
-    moving.velocity = std::copysign(jump, direction);
+/// The velocities that an end may have after a jump: both sides, or its own if it is faster.
+struct JumpedEnd {
+  double velocities[2];
+  int count;
+};
+
+JumpedEnd jumped(double velocity, double jump, double direction) {
+  if (!(std::abs(velocity) < jump)) {
+    return {{velocity, velocity}, 1};
   }
-  return moving;
+  const double first = std::copysign(jump, direction);
+  return {{first, -first}, 2};
+}
+
+/// The fastest of the trapezoids between ends that jump.
+TrapezoidProfile fastest_jumps(const MotionLimits& limits, double jump, const MotionState& start,
+                               const MotionState& goal) {
+  const double d = goal.position - start.position;
+  const JumpedEnd from = jumped(start.velocity, jump, d);
+  const JumpedEnd to = jumped(goal.velocity, jump, d);
+  TrapezoidProfile best(limits, {start.position, from.velocities[0]},
+                        {goal.position, to.velocities[0]});
+  if (d == 0.0 && from.count == 2 && to.count == 2) {
+    return {limits, goal, goal};  // nowhere to go is no jump
+  }
+  for (int i = 0; i < from.count; ++i) {
+    for (int k = 0; k < to.count; ++k) {
+      const TrapezoidProfile other(limits, {start.position, from.velocities[i]},
+                                   {goal.position, to.velocities[k]});
+      // One that cannot be, of more than 1e300 s or of a way that drowns in the rounding of its
+      // velocities' squares, is at the goal at once.
+      const bool stands = other.total_time() == 0.0 && (d != 0.0 || other.goal().velocity == 0.0);
+      if (!stands && other.total_time() < best.total_time()) {
+        best = other;
+      }
+    }
+  }
+  return best;
 }
 
 double usable_jump(const MotionLimits& limits, double jump) {
@@ -142,15 +195,33 @@ double usable_jump(const MotionLimits& limits, double jump) {
 StepperProfile::StepperProfile(const MotionLimits& limits, double jump, const MotionState& start,
                                const MotionState& goal) noexcept
     : jump_(usable_jump(limits, jump)),
-      start_(start),
+      start_{start.position, start.velocity, 0.0},
       goal_(goal),
-      profile_(limits, jumped(start, jump_, goal.position - start.position),
-               jumped(goal, jump_, goal.position - start.position)) {
-  start_.acceleration = 0.0;
+      profile_(fastest_jumps(limits, jump_, start, goal)) {
   goal_ = profile_.sample(profile_.total_time());
   if (std::abs(goal.velocity) < jump_) {
     goal_.velocity = goal.velocity;
   }
+}
+
+StepperProfile StepperProfile::to_velocity(const MotionLimits& limits, double jump,
+                                           const MotionState& start, double velocity) noexcept {
+  const MotionState still{start.position, 0.0, 0.0};
+  StepperProfile profile(limits, jump, still, still);
+  const double least = profile.jump_;
+  profile.start_ = {start.position, start.velocity, 0.0};
+  // Both sides of what is jumped over are next to each other.
+  const bool slow_start = std::abs(start.velocity) < least;
+  const bool slow_end = std::abs(velocity) < least;
+  const double toward = std::copysign(least, slow_end ? start.velocity : velocity);
+  const double from = slow_start ? (slow_end ? velocity : toward) : start.velocity;
+  const double to = slow_end ? (slow_start ? velocity : toward) : velocity;
+  profile.profile_ = TrapezoidProfile::to_velocity(limits, {start.position, from}, to);
+  profile.goal_ = profile.profile_.goal();
+  if (slow_end) {
+    profile.goal_.velocity = velocity;
+  }
+  return profile;
 }
 
 MotionState StepperProfile::sample(double t) const noexcept {

@@ -43,6 +43,14 @@ class ExponentialProfile {
   ExponentialProfile(const MotorMotionLimits& motor, const MotionState& start,
                      const MotionState& goal) noexcept;
 
+  /// The fastest change to a velocity, wherever it ends (`goal`): at full effort. A velocity beyond
+  /// the limits is cut to them.
+  [[nodiscard]] static ExponentialProfile to_velocity(const MotorMotionLimits& motor,
+                                                      const MotionState& start,
+                                                      double velocity) noexcept;
+  /// Where it ends, and how fast.
+  [[nodiscard]] const MotionState& goal() const noexcept { return goal_; }
+
   [[nodiscard]] double total_time() const noexcept { return end_; }
   /// s, from t to the end.
   [[nodiscard]] double remaining_time(double t) const noexcept {

@@ -18,6 +18,12 @@ class ParabolicProfile : public JerkMotion {
   ParabolicProfile(const MotionLimits& limits, const MotionState& start,
                    const MotionState& goal) noexcept;
 
+  /// The fastest change to a velocity, wherever it ends (`goal`). A velocity beyond the limit is
+  /// cut to it.
+  [[nodiscard]] static ParabolicProfile to_velocity(const MotionLimits& limits,
+                                                    const MotionState& start,
+                                                    double velocity) noexcept;
+
   [[nodiscard]] MotionLimits limits() const noexcept { return limits_; }
   [[nodiscard]] bool reversible() const noexcept { return true; }
   /// The motion from another state on, within the same limits.
@@ -28,6 +34,8 @@ class ParabolicProfile : public JerkMotion {
 
  private:
   void add_ramp(double from, double to) noexcept;
+  /// Brakes a start above the velocity limit down to it. @return  The velocity then.
+  double come_within(double velocity) noexcept;
 
   MotionLimits limits_;
 };
@@ -36,12 +44,22 @@ static_assert(MotionProfile<ParabolicProfile>);
 
 /// A trapezoid that jumps to a velocity when it starts and from it when it ends, over the speeds at
 /// which a step motor's own resonance would take its torque (mid-range instability). Ends that move
-/// faster keep their velocity. Run-time object as TrapezoidProfile. Source: book, section 15.1.4.
+/// faster keep their velocity; slower ones jump to the side with which the whole is fastest: of a
+/// start that passes its goal before it has braked, backwards at the end. Run-time object as
+/// TrapezoidProfile. Source: book, section 15.1.4.
 class StepperProfile {
  public:
   /// @param jump  Velocity, >= 0; at most the velocity limit is taken.
   StepperProfile(const MotionLimits& limits, double jump, const MotionState& start,
                  const MotionState& goal) noexcept;
+  /// The fastest change to a velocity, wherever it ends: over what is slower than the jump at once.
+  [[nodiscard]] static StepperProfile to_velocity(const MotionLimits& limits, double jump,
+                                                  const MotionState& start,
+                                                  double velocity) noexcept;
+  /// Where it ends, and how fast.
+  [[nodiscard]] const MotionState& goal() const noexcept { return goal_; }
+  /// Its motion between the jumps.
+  [[nodiscard]] const TrapezoidProfile& between() const noexcept { return profile_; }
 
   [[nodiscard]] double total_time() const noexcept { return profile_.total_time(); }
   [[nodiscard]] double remaining_time(double t) const noexcept {

@@ -20,6 +20,14 @@ class TrapezoidProfile {
   TrapezoidProfile(const MotionLimits& limits, const MotionState& start,
                    const MotionState& goal) noexcept;
 
+  /// The fastest change to a velocity, wherever it ends (`goal`): straight at the limit of its
+  /// direction. A velocity beyond the limits is cut to them.
+  [[nodiscard]] static TrapezoidProfile to_velocity(const MotionLimits& limits,
+                                                    const MotionState& start,
+                                                    double velocity) noexcept;
+  /// Where it ends, and how fast.
+  [[nodiscard]] const MotionState& goal() const noexcept { return goal_; }
+
   /// How long it takes, s.
   [[nodiscard]] double total_time() const noexcept { return time_[2]; }
   /// What is left of it t s after the start; all of it before.
@@ -157,6 +165,28 @@ inline bool TrapezoidProfile::reversible() const noexcept {
     start_ = goal_;
     time_[0] = time_[1] = time_[2] = cruise_ = 0.0;
   }
+}
+
+inline TrapezoidProfile TrapezoidProfile::to_velocity(const MotionLimits& limits,
+                                                      const MotionState& start,
+                                                      double velocity) noexcept {
+  // What cannot be planned from place to place cannot be here: it stands.
+  TrapezoidProfile profile(limits, start, {start.position, velocity});
+  const double end = profile.goal_.velocity;
+  const double change = end - start.velocity;
+  if (profile.start_.velocity != start.velocity || change == 0.0) {
+    profile =
+        TrapezoidProfile(limits, {profile.goal_.position, end}, {profile.goal_.position, end});
+    return profile;
+  }
+  const MotionLimits all = limits.both_ways();
+  const double a = change > 0.0 ? all.acceleration : -all.deceleration;
+  const double t = change / a;
+  profile.first_acceleration_ = profile.last_acceleration_ = a;
+  profile.cruise_ = end;
+  profile.time_[0] = profile.time_[1] = profile.time_[2] = t;
+  profile.goal_.position = start.position + 0.5 * (start.velocity + end) * t;
+  return profile;
 }
 
 [[gnu::always_inline]] inline MotionState TrapezoidProfile::sample(double t) const noexcept {
