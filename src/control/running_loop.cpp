@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include <flyball/systems/discretize.hpp>
 #include <flyball/systems/input_delay.hpp>
@@ -61,7 +62,47 @@ Expected<void> check_regulator(const ContinuousSystem<>& plant, const DiscreteSy
   return {};
 }
 
-/// The eigenvalues of the loop, those that are zero exactly so.
+/// The states in sets of those that act on each other, there and back: by one such set after the
+/// other A is block triangular. Cost: O(n³).
+std::vector<std::vector<Eigen::Index>> loops_of(const MatrixRef& A) {
+  const Eigen::Index n = A.rows();
+  const auto reached = [&](Eigen::Index from, bool forwards) {
+    std::vector<bool> found(static_cast<std::size_t>(n), false);
+    std::vector<Eigen::Index> open{from};
+    found[static_cast<std::size_t>(from)] = true;
+    while (!open.empty()) {
+      const Eigen::Index at = open.back();
+      open.pop_back();
+      for (Eigen::Index to = 0; to < n; ++to) {
+        if (!found[static_cast<std::size_t>(to)] && (forwards ? A(to, at) : A(at, to)) != 0.0) {
+          found[static_cast<std::size_t>(to)] = true;
+          open.push_back(to);
+        }
+      }
+    }
+    return found;
+  };
+  std::vector<std::vector<Eigen::Index>> loops;
+  std::vector<bool> placed(static_cast<std::size_t>(n), false);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (placed[static_cast<std::size_t>(i)]) {
+      continue;
+    }
+    const std::vector<bool> after = reached(i, true);
+    const std::vector<bool> before = reached(i, false);
+    loops.emplace_back();
+    for (Eigen::Index k = i; k < n; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      if (after[at] && before[at]) {
+        placed[at] = true;
+        loops.back().push_back(k);
+      }
+    }
+  }
+  return loops;
+}
+
+/// The eigenvalues of a loop that does not fall apart, those that are zero exactly so.
 ///
 /// What a delay remembers is a chain of d states, an eigenvalue 0 of which rounding would make a
 /// ring of radius eps^(1/d). W spans what the range of A leaves out: W'A = 0, and with Z its
@@ -69,7 +110,7 @@ Expected<void> check_regulator(const ContinuousSystem<>& plant, const DiscreteSy
 /// rounding leaves of a zero grows tenfold in ten steps; poles of 1e-11 count as 0.
 /// Source: Van Dooren, "The computation of Kronecker's canonical form of a singular pencil",
 /// Linear Algebra and its Applications 27 (1979).
-Eigen::VectorXcd poles_of(const MatrixRef& A) {
+Eigen::VectorXcd poles_of_one(const MatrixRef& A) {
   const Eigen::VectorXd d = detail::balance_of(A);
   Eigen::MatrixXd M = d.cwiseInverse().asDiagonal() * A * d.asDiagonal();
   Eigen::VectorXcd poles = Eigen::VectorXcd::Zero(A.rows());
@@ -86,6 +127,19 @@ Eigen::VectorXcd poles_of(const MatrixRef& A) {
     M = Eigen::MatrixXd(detail::product(Z.transpose(), detail::product(M, Z)));
   }
   poles.head(M.rows()) = detail::eigenvalues_of(M);
+  return poles;
+}
+
+/// Of a loop whose feedback is zero the plant's, the observer's and the delay's zeros, each exact.
+Eigen::VectorXcd poles_of(const MatrixRef& A) {
+  Eigen::VectorXcd poles(A.rows());
+  Eigen::Index at = 0;
+  for (const std::vector<Eigen::Index>& loop : loops_of(A)) {
+    const auto size = static_cast<Eigen::Index>(loop.size());
+    poles.segment(at, size) = size == 1 ? Eigen::VectorXcd::Constant(1, A(loop[0], loop[0]))
+                                        : poles_of_one(A(loop, loop));
+    at += size;
+  }
   return poles;
 }
 

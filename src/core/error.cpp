@@ -1,5 +1,6 @@
 #include <flyball/core/error.hpp>
 
+#include <cmath>
 #include <new>
 #include <utility>
 
@@ -107,7 +108,10 @@ std::string to_string(const Error& error) {
       const Evidence& evidence = error.evidence_[i];
       text += i == 0 ? "" : ", ";
       if (evidence.values.size() == 1) {
-        text += detail::format("{} = {:.6g}", evidence.name, evidence.values.front());
+        const double value = evidence.values.front();
+        const bool whole = std::abs(value) < 1e15 && value == std::floor(value);
+        text += whole ? detail::format("{} = {:.0f}", evidence.name, value)
+                      : detail::format("{} = {:.6g}", evidence.name, value);
       } else if (!evidence.values.empty()) {
         text += detail::format("{} = [{}]", evidence.name,
                                detail::comma_separated("{:.6g}", evidence.values));

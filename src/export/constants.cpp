@@ -67,9 +67,12 @@ std::string called(const MechanismConstants& of) {
 std::string heading(const MechanismConstants& of, std::string_view library, bool board,
                     Language language) {
   const bool own = board && !of.on_board.empty();
-  const std::string late = of.delay > 0.0 ? fmt::format(" and a measurement that is {} ms old",
-                                                        format_number(1e3 * of.delay, 3))
-                                          : "";
+  const double late_ms = 1e3 * of.delay;
+  const std::string late = of.delay > 0.0
+                               ? fmt::format(" and a measurement that is {} ms old",
+                                             late_ms < 100.0 ? format_number(late_ms, 3)
+                                                             : fmt::format("{:.0f}", late_ms))
+                               : "";
   const std::string none = of.no_feedback.empty()
                                ? ""
                                : fmt::format("// There is no feedback, kP and kD are 0: {}.\n",

@@ -147,8 +147,9 @@ echo '{"A": [[0, 1, 0, 0], [0, -0.1, 3, 0], [0, 0, 0, 1], [0, -0.5, 30, 0]], "B"
 `K` is 1 x 4, `poles` are those of A − BK, sampled. To pass a solution on to another program, use
 for example `jq .K`.
 
-`residual` is what is left of the equation over the sum of its terms' norms; `condition` times it estimates the relative
-error of the answer. A field in brackets may be left out. Letters are sizes, equal letters of one kind are equal sizes:
+`residual` is what is left of the equation over the sum of its terms' norms, of a Riccati equation with the K that is
+answered in it, which is not R⁻¹BᵀX to the last digit where R is nearly singular; `condition` times it estimates the
+relative error of the answer. A field in brackets may be left out. Letters are sizes, equal letters of one kind are equal sizes:
 
 )";
 

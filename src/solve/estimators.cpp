@@ -119,7 +119,7 @@ std::vector<Kind> estimator_kinds() {
         matrix("P", "n", "n", "error covariance before an update", "state²"),
         complex_list("poles", "n", "eigenvalues of A - LC"),
         matrix("P_posterior", "n", "n", "error covariance after an update", "state²"),
-        matrix("L", "n", "p", "the predictor's gain, AK"), residual, condition},
+        matrix("L", "n", "p", "the predictor's gain, AK"), riccati_residual, condition},
        R"({"A": [[1, 0.02], [0, 1]], "C": [[1, 0]], "Q": [[0, 0], [0, 0.01]], "R": [[0.0001]]})",
        &solve_kalman},
       {"place_observer",

@@ -114,7 +114,8 @@ std::vector<Kind> matrix_equation_kinds() {
   const std::vector<Field> riccati_answer{
       matrix("X", "n", "n", "the stabilizing solution, symmetric"),
       matrix("K", "m", "n", "the gain of u = -Kx that belongs to it"),
-      complex_list("poles", "n", "eigenvalues of A - BK"), field::residual, field::condition};
+      complex_list("poles", "n", "eigenvalues of A - BK"), field::riccati_residual,
+      field::condition};
   const std::vector<Field> lyapunov_fields{matrix("A", "n", "n", "square"),
                                            matrix("Q", "n", "n", "symmetric")};
   const std::vector<Field> sylvester_fields{matrix("A", "i", "i", "square"),

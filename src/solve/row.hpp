@@ -146,6 +146,10 @@ inline constexpr Field period = number("T", "s", "sample period of a discrete sy
 /// The period where it only scales time and frequency.
 inline constexpr Field any_period = or_number(period, 1.0);
 
+inline constexpr Field riccati_residual = number(
+    "residual", "",
+    "what is left of the equation with K as answered, or of K's own, over the sum of its terms' "
+    "norms, the larger");
 inline constexpr Field residual =
     number("residual", "", "what is left of the equation over the sum of its terms' norms");
 inline constexpr Field error = number(

@@ -11,9 +11,7 @@ using Json = nlohmann::json;
 
 class PlanCommand : public Command {
  protected:
-  [[nodiscard]] std::string space() const {
-    return FLYBALL_EXAMPLES "/space_elevator_arm.toml";
-  }
+  [[nodiscard]] std::string space() const { return FLYBALL_EXAMPLES "/space_elevator_arm.toml"; }
   /// A file of one axis and whatever else.
   [[nodiscard]] std::string file(const std::string& rest) const {
     const auto path = work() / "space.toml";

@@ -156,5 +156,28 @@ TEST(RunningLoop, Errors) {
   EXPECT_TRUE(step_of(loop, Eigen::Vector2d::Zero()).error().is(ArgumentError::wrong_shape));
 }
 
+// Without feedback the loop falls apart: the plant's poles, the observer's and a chain of fifty
+// zeros, which rounding would make a ring of radius 0.5.
+TEST(RunningLoop, WithoutFeedbackPolesAreExact) {
+  const Regulated d = regulated_elevator();
+  const Eigen::RowVector2d none = Eigen::RowVector2d::Zero();
+  const RunningLoop loop = running_loop(d.truth, d.model, none, d.K_e, Time(1.0)).value();
+  const Eigen::VectorXcd plant = d.model.A.eigenvalues();
+  const Eigen::VectorXcd observer =
+      ((Eigen::MatrixXd::Identity(2, 2) - d.K_e * d.model.C) * d.model.A).eigenvalues();
+  int zeros = 0;
+  for (const auto& pole : loop.poles) {
+    double nearest = std::abs(pole);
+    zeros += nearest == 0.0 ? 1 : 0;
+    for (const Eigen::VectorXcd* known : {&plant, &observer}) {
+      nearest = std::min(nearest, (known->array() - pole).abs().minCoeff());
+    }
+    EXPECT_LT(nearest, 1e-12) << pole;
+  }
+  EXPECT_GE(zeros, 48);
+  EXPECT_EQ(loop.poles(0), 1.0);
+  EXPECT_TRUE(std::isinf(loop.time_constant));
+}
+
 }  // namespace
 }  // namespace flyball::running_loop_test

@@ -15,7 +15,7 @@ struct Battery {
 
   /// @param duty  In [-1, 1]. @param back_emf  V, at the motor. @param motor_resistance  Ω, all
   /// motors in parallel; infinite for a motor that draws nothing.
-  /// @return V_rail, V, not negative.
+  /// @return V_rail, V, not negative, at most the largest double.
   [[nodiscard]] double rail_voltage(
       double duty, double back_emf,
       double motor_resistance = std::numeric_limits<double>::infinity()) const noexcept {
@@ -23,7 +23,8 @@ struct Battery {
     const double rail =
         (open_circuit_voltage - resistance * other_current + share * duty * back_emf) /
         (1.0 + share * duty * duty);
-    return rail > 0.0 ? rail : 0.0;
+    constexpr double largest = std::numeric_limits<double>::max();
+    return rail > 0.0 ? (rail < largest ? rail : largest) : 0.0;
   }
 };
 

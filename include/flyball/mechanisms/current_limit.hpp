@@ -75,10 +75,14 @@ class PeakCurrentLimit {
         duration_(duration),
         period_(period) {}
 
-  /// @param current  A, measured now; its sign does not matter, and what is no number counts as
-  /// zero. @return The limit for the next period, A.
+  /// @param current  A, measured now; its sign does not matter, and what is no number changes
+  /// nothing: one lost sample does not give the peak back.
+  /// @return The limit for the next period, A.
   double update(double current) noexcept {
-    const double size = std::abs(flyball::detail::signal_or_zero(current));
+    if (!is_signal(current)) {
+      return limit();
+    }
+    const double size = std::abs(current);
     if (size > sustained_) {
       above_ += period_;
     } else if (size < 0.95 * sustained_) {

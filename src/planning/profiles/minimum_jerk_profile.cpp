@@ -262,10 +262,15 @@ MinimumJerkProfile MinimumJerkProfile::with_duration(double duration, const Moti
                                                      const MotionState& goal) noexcept {
   MinimumJerkProfile profile;
   profile.limits_ = {infinity, infinity, infinity, infinity, infinity};
+  if (!detail::is_usable(profile.limits_, start, goal)) {
+    profile.goal_ = {std::isfinite(goal.position) ? goal.position : 0.0, 0.0, 0.0};
+    profile.c_[0] = profile.goal_.position;
+    return profile;
+  }
   profile.goal_ = goal;
   profile.c_[0] = goal.position;
-  if (duration > 0.0 && detail::is_usable(profile.limits_, start, goal) &&
-      duration <= detail::largest_motion && duration >= 1.0 / detail::largest_motion) {
+  if (duration > 0.0 && duration <= detail::largest_motion &&
+      duration >= 1.0 / detail::largest_motion) {
     profile.set(duration, start, goal);
   }
   return profile;

@@ -86,6 +86,20 @@ TEST(SupplyCurrentLimit, Predicted) {
 }
 
 // 100 ms above 40 A pass at up to 80 A, then 40 A until the current is below 38 A.
+// A lost sample is no current of zero: what has been counted stays, and a limit that holds goes on.
+TEST(PeakCurrentLimit, ALostSampleChangesNothing) {
+  for (const double lost : {std::nan(""), HUGE_VAL, -HUGE_VAL, 1.7e308}) {
+    PeakCurrentLimit limit(40.0, 60.0, 0.5, 0.02);
+    for (int k = 0; k < 30; ++k) {
+      limit.update(55.0);
+      limit.update(lost);
+    }
+    EXPECT_EQ(limit.limit(), 40.0) << lost;
+    EXPECT_EQ(limit.update(lost), 40.0) << lost;
+    EXPECT_EQ(limit.update(0.0), 60.0) << lost;
+  }
+}
+
 TEST(PeakCurrentLimit, LetsAPeakPass) {
   PeakCurrentLimit limit(40.0, 80.0, 0.1, 0.02);
   EXPECT_EQ(limit.limit(), 80.0);

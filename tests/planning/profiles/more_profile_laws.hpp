@@ -83,8 +83,8 @@ inline std::string broken_law_of_jumps(const StepperProfile& profile, const Prof
           effort, all.velocity, all.reverse_velocity,
           static_cast<long double>(goal.position) - static_cast<long double>(start.position),
           start.velocity, goal.velocity));
-      // A way that is just missed is known as the rounding of its ends lets it be, and no way at all
-      // takes the oracle's own rounding.
+      // A way that is just missed is known as the rounding of its ends lets it be, and no way at
+      // all takes the oracle's own rounding.
       const double least_effort = std::min(all.acceleration, all.deceleration);
       const double slack =
           1e-9 * end + 1e-17 * all.velocity / least_effort +

@@ -252,6 +252,21 @@ TEST(MinimumJerkProfile, IsTheShortest) {
   EXPECT_GT(round.total_time(), 0.1);
 }
 
+TEST(MinimumJerkProfile, OfUnusableGoalsIsAtTheGoal) {
+  for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+    for (const MotionState& goal :
+         {MotionState{bad, 0.0, 0.0}, MotionState{1.5, bad, 0.0}, MotionState{1.5, 0.0, bad}}) {
+      const auto profile = MinimumJerkProfile::with_duration(1.0, {0.5, 0.0, 0.0}, goal);
+      for (const double t : {-1.0, 0.0, 0.5, 1.0, 1e300}) {
+        const MotionState at = profile.sample(t);
+        EXPECT_EQ(at.position, std::isfinite(goal.position) ? goal.position : 0.0);
+        EXPECT_EQ(at.velocity, 0.0);
+        EXPECT_EQ(at.acceleration, 0.0);
+      }
+    }
+  }
+}
+
 // Of all motions that take its time it has the least ∫ jerk²: adding s³(1-s)³ times anything, which
 // changes no end, makes it more.
 TEST(MinimumJerkProfile, HasTheLeastJerk) {
