@@ -16,6 +16,7 @@
 #include <flyball/mechanisms/gravity.hpp>
 
 #include "core/diagnose.hpp"
+#include "core/error_rows.hpp"
 #include "core/try.hpp"
 #include "core/wording.hpp"
 #include "study/drive_law.hpp"
@@ -365,6 +366,14 @@ std::string_view to_string(DriveFollower follower) {
       return "pure pursuit";
   }
   return "";
+}
+
+ErrorInfo error_info(DriveError code) {
+  static constexpr detail::ErrorRow rows[] = {
+      {"lost", "the robot lost its trajectory", ErrorKind::no_answer},
+      {"not_arrived", "the robot did not arrive", ErrorKind::no_answer},
+  };
+  return detail::info_of(code, "drive", rows);
 }
 
 double DriveRobot::free_speed(double voltage) const noexcept {

@@ -60,8 +60,9 @@ Expected<DriveKind> kind_of(const Project& project, const PathPlannerSettings& s
 /// Everything that is missing at once.
 class Parts {
  public:
+  /// @param settings  Path of PathPlanner's, or empty.
   Parts(const Project& project, std::string_view settings)
-      : project_(project), settings_(settings) {}
+      : project_(project), settings_path_(settings) {}
 
   template <class Said>
   double number(std::string_view key, const std::optional<Said>& said,
@@ -87,9 +88,9 @@ class Parts {
              .about(fmt::format("drive.{}", key))
              .got("missing")
              .hint(fmt::format("a drivetrain needs it, for example {} = {}{}", key, example,
-                               settings_.empty() ? "; PathPlanner's settings.json may say it: "
-                                                   "settings = \"settings.json\""
-                                                 : "; the settings do not say it")),
+                               settings_path_.empty() ? "; PathPlanner's settings.json may say it: "
+                                                        "settings = \"settings.json\""
+                                                      : "; the settings do not say it")),
          {},
          {}});
   }
@@ -99,8 +100,7 @@ class Parts {
 
  private:
   const Project& project_;
-  std::string_view settings_;
-  std::string settings_path_ = beside(project_.path, std::string(settings_));
+  std::string settings_path_;
   std::vector<QuotedError> missing_;
 };
 
@@ -137,12 +137,13 @@ Expected<void> take_modules(const Project& project, const PathPlannerSettings& s
   return {};
 }
 
-ExpectedAll<DriveRobot> robot_of(const Project& project, const PathPlannerSettings& settings) {
+ExpectedAll<DriveRobot> robot_of(const Project& project, const PathPlannerSettings& settings,
+                                 const std::string& settings_path) {
   const DriveSection& said = project.drive;
   DriveRobot robot;
   FLYBALL_TRY(robot.kind, kind_of(project, settings));
   const bool sides = robot.kind == DriveKind::differential;
-  Parts parts(project, said.settings);
+  Parts parts(project, settings_path);
   robot.mass = parts.number("mass", said.mass, settings.mass, "\"54 kg\"");
   robot.moment_of_inertia = parts.number("moment_of_inertia", said.moment_of_inertia,
                                          settings.moment_of_inertia, "\"6 kg m^2\"");
@@ -394,8 +395,21 @@ Expected<void> take_velocity_tolerance(const DriveSection& said, DriveJob& job) 
   return {};
 }
 
+/// What was typed for a key, if anything was. @param option  "--trajectory".
+bool is_typed(std::span<const Override> overrides, std::string_view option) {
+  return std::any_of(overrides.begin(), overrides.end(),
+                     [&](const Override& o) { return o.option == option; });
+}
+
+/// Files that the project names stand beside it, those that are typed where they are typed.
+std::string file_of(const Project& project, std::span<const Override> overrides,
+                    std::string_view option, const std::string& file) {
+  return is_typed(overrides, option) ? file : beside(project.path, file);
+}
+
 /// All but the trajectory. @param settings  Set to what the project file refers to.
-ExpectedAll<DriveJob> drive_job_of(const Project& project, PathPlannerSettings& settings) {
+ExpectedAll<DriveJob> drive_job_of(const Project& project, std::span<const Override> overrides,
+                                   PathPlannerSettings& settings) {
   const DriveSection& said = project.drive;
   if (said.type.empty()) {
     return tl::unexpected(Errors(Error(ProjectError::missing_key)
@@ -405,11 +419,13 @@ ExpectedAll<DriveJob> drive_job_of(const Project& project, PathPlannerSettings& 
                                      .hint("say what the drivetrain is: [drive] and type = "
                                            "\"differential\", \"swerve\" or \"mecanum\"")));
   }
+  std::string settings_path;
   if (!said.settings.empty()) {
-    FLYBALL_TRY(settings, read_pathplanner_settings(beside(project.path, said.settings)));
+    settings_path = file_of(project, overrides, "--settings", said.settings);
+    FLYBALL_TRY(settings, read_pathplanner_settings(settings_path));
   }
   DriveJob job{.path = project.path};
-  FLYBALL_TRY(job.robot, robot_of(project, settings));
+  FLYBALL_TRY(job.robot, robot_of(project, settings, settings_path));
   FLYBALL_TRY(job.follower, follower_of(project, job.robot.kind));
   job.diagnostics = settings.diagnostics;
   job.b = said.b;
@@ -440,15 +456,16 @@ ExpectedAll<DriveJob> drive_design_job(const std::string& path,
                                        std::span<const Override> overrides) {
   FLYBALL_TRY(const auto project, read_project(path, overrides));
   PathPlannerSettings settings;
-  return drive_job_of(project, settings);
+  return drive_job_of(project, overrides, settings);
 }
 
 ExpectedAll<DriveJob> drive_job(const std::string& path, std::span<const Override> overrides) {
   FLYBALL_TRY(const auto project, read_project(path, overrides));
   PathPlannerSettings settings;
-  FLYBALL_TRY(auto job, drive_job_of(project, settings));
+  FLYBALL_TRY(auto job, drive_job_of(project, overrides, settings));
   const DriveSection& said = project.drive;
-  if (said.trajectory.empty() == said.waypoints.empty()) {
+  const bool typed = is_typed(overrides, "--trajectory");  // in place of the file's waypoints
+  if (!typed && said.trajectory.empty() == said.waypoints.empty()) {
     return tl::unexpected(
         Errors(Error(ProjectError::missing_key)
                    .in(project.path)
@@ -460,7 +477,9 @@ ExpectedAll<DriveJob> drive_job(const std::string& path, std::span<const Overrid
                          "WPILib, Choreo or PathPlanner: trajectory = \"path.wpilib.json\"")));
   }
   if (!said.trajectory.empty()) {
-    FLYBALL_TRY(job.trajectory, followed_file(project, job, beside(path, said.trajectory)));
+    FLYBALL_TRY(
+        job.trajectory,
+        followed_file(project, job, file_of(project, overrides, "--trajectory", said.trajectory)));
   } else {
     FLYBALL_TRY(job.trajectory, trajectory_of(project, job, settings));
   }

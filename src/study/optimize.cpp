@@ -1,5 +1,7 @@
 #include <flyball/study/optimize.hpp>
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include <flyball/core/progress.hpp>
@@ -38,6 +40,17 @@ Expected<OptimizeResult> optimize(const OptimizeJob& job) {
     }
     if (solution->solved && !solution->message.empty()) {
       warn(result.diagnostics, "between_points", "{}: {}", task.name, solution->message);
+    }
+    const auto& constraints = task.problem.constraints;
+    const bool polygons =
+        std::any_of(constraints.begin(), constraints.end(), [](const DriveConstraint& c) {
+          return c.kind == DriveConstraintKind::keep_in_polygon ||
+                 c.kind == DriveConstraintKind::keep_out_polygon;
+        });
+    if (solution->solved && polygons) {
+      note(result.diagnostics, "not_in_choreo",
+           "Choreo has no polygons: {}'s .traj is as they ask for, but they do not stand in it",
+           task.name);
     }
     result.solutions.push_back(*std::move(solution));
   }

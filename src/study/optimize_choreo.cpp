@@ -49,21 +49,7 @@ Expected<int> waypoint_of(const std::string& text, std::size_t count, const std:
   return value;
 }
 
-struct KindName {
-  std::string_view name;
-  DriveConstraintKind kind;
-};
-constexpr std::array kinds{
-    KindName{"StopPoint", DriveConstraintKind::stop_point},
-    KindName{"MaxVelocity", DriveConstraintKind::max_velocity},
-    KindName{"MaxAcceleration", DriveConstraintKind::max_acceleration},
-    KindName{"MaxAngularVelocity", DriveConstraintKind::max_angular_velocity},
-    KindName{"PointAt", DriveConstraintKind::point_at},
-    KindName{"KeepInCircle", DriveConstraintKind::keep_in_circle},
-    KindName{"KeepInRectangle", DriveConstraintKind::keep_in_rectangle},
-    KindName{"KeepInLane", DriveConstraintKind::keep_in_lane},
-    KindName{"KeepOutCircle", DriveConstraintKind::keep_out_circle}};
-
+using KindName = ChoreoKind;
 constexpr std::array kinds_of_2024{
     KindName{"StopPoint", DriveConstraintKind::stop_point},
     KindName{"MaxVelocity", DriveConstraintKind::max_velocity},
@@ -76,9 +62,9 @@ constexpr std::array kinds_of_2024{
 
 Expected<DriveConstraint> constraint_of(const ChoreoConstraint& from, std::size_t waypoints,
                                         const std::string& path) {
-  const auto* const row = std::find_if(kinds.begin(), kinds.end(),
-                                       [&](const KindName& k) { return k.name == from.type; });
-  if (row == kinds.end()) {
+  const auto* const row = std::find_if(choreo_kinds.begin(), choreo_kinds.end(),
+                                       [&](const ChoreoKind& k) { return k.name == from.type; });
+  if (row == choreo_kinds.end()) {
     return tl::unexpected(refusal_of(OptimizeError::unknown_kind, path, "a constraint")
                               .got(fmt::format("\"{}\"", from.type))
                               .expected("StopPoint, MaxVelocity, MaxAcceleration, "
@@ -98,6 +84,7 @@ Expected<DriveConstraint> constraint_of(const ChoreoConstraint& from, std::size_
   c.height = from.prop("h").value_or(0.0);
   c.radius = from.prop("r").value_or(0.0);
   c.tolerance = from.prop("tolerance").value_or(0.0);
+  c.flip = from.flip.value_or(false);
   return c;
 }
 
@@ -105,26 +92,6 @@ Expected<DriveConstraint> constraint_of(const ChoreoConstraint& from, std::size_
 Json tree_of(const std::string& path) {
   const auto text = read_file(path);
   return text ? Json::parse(*text, nullptr, false) : Json(Json::value_t::discarded);
-}
-
-/// Whether a PointAt constraint looks back, each of a file's.
-std::vector<bool> flips_of(const std::string& path, std::size_t count) {
-  std::vector<bool> flips(count, false);
-  const Json tree = tree_of(path);
-  const Json* at = &tree;
-  for (const char* key : {"params", "constraints"}) {
-    if (!at->is_object() || !at->contains(key)) {
-      return flips;
-    }
-    at = &(*at)[key];
-  }
-  for (std::size_t i = 0; at->is_array() && i < std::min(count, at->size()); ++i) {
-    const Json::json_pointer place("/data/props/flip");
-    if ((*at)[i].is_object() && (*at)[i].contains(place) && (*at)[i][place].is_boolean()) {
-      flips[i] = (*at)[i][place].get<bool>();
-    }
-  }
-  return flips;
 }
 
 /// A number of an object of 2024.
@@ -212,12 +179,9 @@ Expected<void> take_parameters(const ChoreoParameters& params, const std::string
                                  .fix_translation = w.fix_translation && !guess,
                                  .fix_heading = w.fix_heading && !guess});
   }
-  const std::vector<bool> flips = flips_of(path, params.constraints.size());
-  for (std::size_t i = 0; i < params.constraints.size(); ++i) {
-    const ChoreoConstraint& c = params.constraints[i];
+  for (const ChoreoConstraint& c : params.constraints) {
     if (c.enabled) {
       FLYBALL_TRY(DriveConstraint constraint, constraint_of(c, params.waypoints.size(), path));
-      constraint.flip = flips[i];
       problem.constraints.push_back(std::move(constraint));
     }
   }
@@ -402,6 +366,7 @@ ExpectedAll<OptimizeJob> of_project(const std::string& path) {
       job.tasks.push_back(std::move(task));
     }
   }
+  job.project = std::move(project);
   if (job.tasks.empty()) {
     return tl::unexpected(refusal_of(OptimizeError::no_waypoints, path, "the project")
                               .got("without trajectories")
@@ -419,162 +384,6 @@ bool is_choreo(const std::string& path) {
 
 ExpectedAll<OptimizeJob> choreo_job(const std::string& path) {
   return path.ends_with(".traj") ? of_trajectory(path) : of_project(path);
-}
-
-ChoreoConfig config_of(const DriveModel& model, double gearing, double radius) {
-  ChoreoConfig config;
-  config.front_left = {.x = {model.wheels[0](0)}, .y = {model.wheels[0](1)}};
-  config.back_left = {.x = {model.wheels[2](0)}, .y = {model.wheels[2](1)}};
-  config.mass.value = model.mass;
-  config.inertia.value = model.moment_of_inertia;
-  config.gearing.value = gearing;
-  config.radius.value = radius;
-  config.vmax.value = model.max_speed * gearing / radius;
-  config.tmax.value = model.max_force * radius / gearing;
-  if (model.friction > 0.0) {
-    config.cof = ExpressedNumber{model.friction * model.wheel_count() / (model.mass * gravity)};
-  }
-  double front = 0.0, side = 0.0, back = 0.0;
-  for (const Vector2d& corner : model.corners) {
-    front = std::max(front, corner(0));
-    back = std::max(back, -corner(0));
-    side = std::max(side, std::abs(corner(1)));
-  }
-  config.bumper = {.front = {front}, .side = {side}, .back = {back}};
-  if (model.trackwidth > 0.0) {
-    config.differential_track_width = ExpressedNumber{model.trackwidth};
-  }
-  return config;
-}
-
-ChoreoTrajectory choreo_of(const OptimizeTask& task, const DriveSolution& solution) {
-  const DriveProblem& problem = task.problem;
-  const bool sides = problem.model.drivetrain == Drivetrain::differential;
-  ChoreoTrajectory file;
-  if (task.file) {
-    file = *task.file;
-  } else {
-    file.name = task.name;
-    for (const DriveWaypoint& w : problem.waypoints) {
-      ChoreoWaypoint waypoint;
-      waypoint.x.value = w.x;
-      waypoint.y.value = w.y;
-      waypoint.heading.value = w.heading;
-      waypoint.fix_translation = w.fix_translation;
-      waypoint.fix_heading = w.fix_heading;
-      file.params.waypoints.push_back(std::move(waypoint));
-    }
-    // What a project's trajectory does without saying so: it is at rest at both ends.
-    for (const char* const end : {"first", "last"}) {
-      ChoreoConstraint rest;
-      rest.type = "StopPoint";
-      rest.from = end;
-      file.params.constraints.push_back(std::move(rest));
-    }
-    for (const DriveConstraint& c : problem.constraints) {
-      const auto* const row = std::find_if(kinds.begin(), kinds.end(),
-                                           [&](const KindName& k) { return k.kind == c.kind; });
-      if (row == kinds.end()) {
-        continue;  // polygons, which Choreo does not have
-      }
-      ChoreoConstraint constraint;
-      constraint.type = row->name;
-      const auto name = [&](int waypoint) {
-        return waypoint == -1 ? std::string("last") : fmt::to_string(waypoint);
-      };
-      constraint.from = name(c.from);
-      if (c.to) {
-        constraint.to = name(*c.to);
-      }
-      const auto add = [&](const char* key, double value) {
-        constraint.props.push_back({key, {value}});
-      };
-      switch (c.kind) {
-        case DriveConstraintKind::max_velocity:
-        case DriveConstraintKind::max_acceleration:
-        case DriveConstraintKind::max_angular_velocity:
-          add("max", c.limit);
-          break;
-        case DriveConstraintKind::point_at:
-          add("x", c.x);
-          add("y", c.y);
-          add("tolerance", c.tolerance);
-          break;
-        case DriveConstraintKind::keep_in_rectangle:
-          add("x", c.x);
-          add("y", c.y);
-          add("w", c.width);
-          add("h", c.height);
-          break;
-        case DriveConstraintKind::keep_in_circle:
-        case DriveConstraintKind::keep_out_circle:
-          add("x", c.x);
-          add("y", c.y);
-          add("r", c.radius);
-          break;
-        case DriveConstraintKind::keep_in_lane:
-          add("tolerance", c.tolerance);
-          break;
-        default:
-          break;
-      }
-      file.params.constraints.push_back(std::move(constraint));
-    }
-    file.params.target_dt.value = problem.target_interval;
-  }
-  for (std::size_t i = 0; i < file.params.waypoints.size(); ++i) {
-    ChoreoWaypoint& w = file.params.waypoints[i];
-    const std::size_t next = i + 1;
-    w.intervals = next < solution.waypoint_samples.size()
-                      ? solution.waypoint_samples[next] - solution.waypoint_samples[i]
-                  : w.intervals > 0 ? w.intervals
-                                    : 40;
-  }
-  file.snapshot = file.params;
-  file.version = fmt::to_string(ChoreoTrajectory::newest);
-  ChoreoGenerated& generated = file.trajectory;
-  generated.config = task.config;
-  generated.sample_type = sides ? "Differential" : "Swerve";
-  generated.waypoints = solution.waypoint_times;
-  generated.samples.clear();
-  generated.splits = {0};
-  for (std::size_t i = 1; i + 1 < file.params.waypoints.size(); ++i) {
-    if (file.params.waypoints[i].split) {
-      generated.splits.push_back(solution.waypoint_samples[i]);
-    }
-  }
-  for (const DriveSample& s : solution.samples) {
-    ChoreoSample sample;
-    sample.time = s.time;
-    sample.x = s.x;
-    sample.y = s.y;
-    sample.heading = s.heading;
-    sample.omega = s.omega;
-    sample.alpha = s.alpha;
-    if (sides) {
-      sample.vl = s.left;
-      sample.vr = s.right;
-      const double forward = s.ax * std::cos(s.heading) + s.ay * std::sin(s.heading);
-      sample.al = forward - 0.5 * problem.model.trackwidth * s.alpha;
-      sample.ar = forward + 0.5 * problem.model.trackwidth * s.alpha;
-      sample.fl = s.forces[0](0);
-      sample.fr = s.forces[1](0);
-    } else {
-      sample.vx = s.vx;
-      sample.vy = s.vy;
-      sample.ax = s.ax;
-      sample.ay = s.ay;
-      std::array<double, 4> fx{}, fy{};
-      for (std::size_t i = 0; i < 4; ++i) {
-        fx[i] = s.forces[i](0);
-        fy[i] = s.forces[i](1);
-      }
-      sample.fx = fx;
-      sample.fy = fy;
-    }
-    generated.samples.push_back(std::move(sample));
-  }
-  return file;
 }
 
 }  // namespace flyball::study

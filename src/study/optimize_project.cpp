@@ -213,6 +213,11 @@ DriveModel model_of(const DriveJob& job) {
   model.max_force = std::min(model.stall_force, limited);
   model.friction =
       robot.grip * robot.mass * standard_gravity / static_cast<double>(model.wheel_count());
+  if (std::isfinite(robot.supply_limit)) {
+    // V I_supply = ω τ + R I², with I = τ/K_t.
+    model.supply_power = job.max_voltage * robot.supply_limit;
+    model.copper_loss = motor.R / std::pow(motor.Kt * arm, 2);
+  }
   const double x = 0.5 * robot.length;
   const double y = 0.5 * robot.width;
   model.corners = {Vector2d(x, y), Vector2d(-x, y), Vector2d(-x, -y), Vector2d(x, -y)};
@@ -251,10 +256,6 @@ ExpectedAll<OptimizeJob> optimize_job(const std::string& path,
   task.problem.target_interval = project.optimize.interval.si();
   task.config = config_of(task.problem.model, drive.robot.gearing, drive.robot.wheel_radius);
   job.options.max_attempts = project.optimize.attempts;
-  if (std::isfinite(drive.robot.supply_limit)) {
-    warn(job.diagnostics, "supply_limit",
-         "drive.supply_limit is not looked at: what the battery gives is not part of the model");
-  }
   job.tasks.push_back(std::move(task));
   return job;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <numbers>
 #include <string>
@@ -93,6 +94,48 @@ TEST(Drive, DisturbancesTogether) {
     EXPECT_FALSE(result.lost);
     EXPECT_LT(std::abs(result.errors.final_across), 0.1) << factor;
   }
+}
+
+// Who loses the way says so, with an answer that is there all the same.
+TEST(Drive, ALostRobotIsNoSuccess) {
+  const DriveResult calm = driven(robot("differential") + bend);
+  EXPECT_FALSE(answer_of(calm).refusal);
+  const DriveResult lost = driven(robot("differential") + bend +
+                                  "[disturbance]\nleft = \"1.2 m\"\nlatency = \"200 ms\"\n");
+  ASSERT_TRUE(lost.lost);
+  const Answer answer = answer_of(lost);
+  ASSERT_TRUE(answer.refusal);
+  EXPECT_TRUE(answer.refusal->is(DriveError::lost));
+  EXPECT_FALSE(answer.figures.empty());
+  // Pure pursuit with a lookahead of the way's length cuts the bend and circles.
+  const DriveResult circling = driven(robot("differential") + bend +
+                                      "follower = \"pure pursuit\"\nleast_lookahead = \"4 m\"\n"
+                                      "[disturbance]\nstrength_factor = 0.05\n");
+  ASSERT_FALSE(circling.arrival);
+  ASSERT_TRUE(answer_of(circling).refusal);
+}
+
+// A trajectory that is typed is taken from the working folder, in place of the file's waypoints.
+TEST(Drive, TypedTrajectoriesReplaceTheProjects) {
+  const std::string table = testing::TempDir() + "typed_trajectory.csv";
+  std::ofstream(table) << "time,x,y,heading,vx,vy,omega\n0,0,0,0,0,0,0\n1,0.5,0,0,1,0,0\n"
+                          "2,1,0,0,0,0,0\n";
+  const std::string folder = testing::TempDir() + "typed_project/";
+  std::filesystem::create_directories(folder);
+  const std::string path = folder + "robot.toml";
+  std::ofstream(path) << robot("differential") + bend;
+  const std::string relative = std::filesystem::relative(table).string();
+  const std::vector<Override> typed{{"--trajectory", relative}};
+  const auto job = drive_job(path, typed);
+  ASSERT_TRUE(job) << to_string(job.error());
+  EXPECT_EQ(job->trajectory.source, relative);
+  EXPECT_NEAR(job->trajectory.duration(), 2.0, 1e-9);
+  // Named by the project it stands beside it.
+  std::ofstream(path) << robot("differential") + "trajectory = \"typed_trajectory.csv\"\n";
+  EXPECT_FALSE(drive_job(path));
+  std::filesystem::copy_file(table, folder + "typed_trajectory.csv",
+                             std::filesystem::copy_options::overwrite_existing);
+  EXPECT_TRUE(drive_job(path));
 }
 
 /// The drive of two wheels written out anew, in the field's frame and with the wheels' positions as

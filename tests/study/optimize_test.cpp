@@ -1,5 +1,6 @@
 #include <flyball/study/optimize.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -60,13 +61,77 @@ TEST(Optimize, AProjectGivesATrajectory) {
   EXPECT_EQ(json["trajectories"][0]["duration"].get<double>(), s.duration);
   EXPECT_EQ(json["trajectories"][0]["samples"]["time"].size(), s.samples.size());
   // The trajectory as Choreo's file reads back, and again as a task that takes as long.
-  ASSERT_EQ(answer.files.size(), 2U);
+  ASSERT_EQ(answer.files.size(), 3U);
   EXPECT_EQ(answer.files[1].name, "data/optimize.traj");
+  EXPECT_EQ(answer.files[2].name, "data/optimize.chor");
   const std::string again = written("optimize_again.traj", answer.files[1].contents);
   const OptimizeResult second = optimized(again);
   ASSERT_EQ(second.solutions.size(), 1U);
   ASSERT_TRUE(second.job.tasks[0].given_duration);
   EXPECT_NEAR(*second.job.tasks[0].given_duration, s.duration, 1e-9);
+}
+
+// Choreo's own types: numbers with what was typed in params, bare ones in what was generated.
+void expect_numbers(const nlohmann::json& from, bool expressed, const std::string& where) {
+  for (const auto& [key, value] : from.items()) {
+    const bool number = value.is_number_float();
+    EXPECT_FALSE(expressed && number) << where << key;
+    EXPECT_FALSE(!expressed && value.is_object() && value.contains("exp")) << where << key;
+    if (value.is_structured() && !(value.is_object() && value.contains("exp"))) {
+      expect_numbers(value, expressed, where + key + ".");
+    }
+  }
+}
+
+TEST(Optimize, ChoreoOpensWhatIsWritten) {
+  for (const std::string type : {"swerve", "mecanum", "differential"}) {
+    std::string text = robot;
+    text.replace(text.find("swerve"), 6, type);
+    const OptimizeResult result = optimized(written(
+        "choreo_" + type + ".toml",
+        text + "waypoints = [\"1 m, 1 m, 0 deg\", \"2 m, 1.2 m, 0 deg, stop\", \"4 m, 1.5 m\"]\n"
+               "point_at = [\"1, 1, 9 m, 1.2 m, 20 deg\"]\nmax_velocity = \"3 m/s\"\n"
+               "keep_in = [\"0 m, 0 m, 10 m, 8 m\"]\n"));
+    const Answer answer = answer_of(result);
+    ASSERT_EQ(answer.files.size(), 3U) << type;
+    const auto file = nlohmann::json::parse(answer.files[1].contents);
+    expect_numbers(file["params"], true, type + ": params.");
+    expect_numbers(file["snapshot"], false, type + ": snapshot.");
+    expect_numbers(file["trajectory"]["config"], false, type + ": config.");
+    EXPECT_EQ(file["params"]["waypoints"][0]["x"]["exp"], "1 m");
+    EXPECT_EQ(file["trajectory"]["sampleType"], type == "differential" ? "Differential" : "Swerve");
+    int stops = 0;
+    for (const auto& c : file["params"]["constraints"]) {
+      stops += c["data"]["type"] == "StopPoint" ? 1 : 0;
+      if (c["data"]["type"] == "PointAt") {
+        EXPECT_EQ(c["data"]["props"]["flip"], false);
+      }
+    }
+    EXPECT_EQ(stops, 3);
+    const auto project = nlohmann::json::parse(answer.files[2].contents);
+    expect_numbers(project["config"], true, type + ": project.");
+    EXPECT_EQ(project["version"], 2);
+    EXPECT_TRUE(parse_choreo_project(answer.files[2].contents, "what was written"));
+    // The forces of a sample add up to m a.
+    if (type != "differential") {
+      const auto& sample = file["trajectory"]["samples"][3];
+      double fx = 0.0;
+      for (const double f : sample["fx"]) {
+        fx += f;
+      }
+      EXPECT_NEAR(fx, 54.0 * sample["ax"].get<double>(), 1e-6 * std::abs(fx) + 1e-6) << type;
+    }
+  }
+}
+
+TEST(Optimize, SupplyLimitsSlowIt) {
+  const std::string way = "waypoints = [\"1 m, 1 m, 0 deg\", \"5 m, 1 m\"]\n";
+  const double free = optimized(written("free.toml", robot + way)).solutions[0].duration;
+  std::string text = robot;
+  text.replace(text.find("[optimize]"), 10, "supply_limit = \"20 A\"\n[optimize]");
+  const OptimizeResult held = optimized(written("held.toml", text + way));
+  EXPECT_TRUE(held.solutions[0].solved) << held.solutions[0].message;
+  EXPECT_GT(held.solutions[0].duration, 1.02 * free);
 }
 
 TEST(Optimize, ContradictionsAreRefusedByName) {
@@ -153,6 +218,33 @@ TEST(Optimize, MistakesOfChoreosFilesAreNamed) {
 }
 
 #ifdef FLYBALL_TEST_DATA
+// A project of 2024 is written back with its new trajectories, all else as it stood.
+TEST(Optimize, ProjectsOf2024AreWrittenBack) {
+  const std::string path = FLYBALL_TEST_DATA "/choreo/choreo2024_example.chor";
+  if (!std::filesystem::exists(path)) {
+    GTEST_SKIP() << "no such data here";
+  }
+  const Answer answer = answer_of(optimized(path));
+  const auto file = std::find_if(answer.files.begin(), answer.files.end(), [](const auto& f) {
+    return f.name == "data/choreo2024_example.chor";
+  });
+  ASSERT_NE(file, answer.files.end());
+  std::ifstream in(path);
+  const auto before = nlohmann::json::parse(in);
+  auto after = nlohmann::json::parse(file->contents);
+  EXPECT_EQ(after["paths"]["c2sub"]["trajectory"].empty(), false);
+  EXPECT_EQ(after["paths"]["c2sub"]["trajectoryWaypoints"].size(),
+            after["paths"]["c2sub"]["waypoints"].size());
+  for (auto& [name, of] : after["paths"].items()) {
+    EXPECT_EQ(of["constraints"], before["paths"][name]["constraints"]) << name;
+    EXPECT_EQ(of["waypoints"], before["paths"][name]["waypoints"]) << name;
+    EXPECT_EQ(of["usesControlIntervalGuessing"],
+              before["paths"][name]["usesControlIntervalGuessing"])
+        << name;
+  }
+  EXPECT_EQ(after["robotConfiguration"], before["robotConfiguration"]);
+}
+
 TEST(Optimize, RealFilesOfChoreoAreNotSlower) {
   const std::string folder = FLYBALL_TEST_DATA "/choreo/";
   if (!std::filesystem::exists(folder)) {

@@ -23,6 +23,13 @@ namespace flyball::study {
 
 struct Override;
 
+/// Why a drive is none.
+enum class DriveError {
+  lost,         ///< It was more than a metre from its reference.
+  not_arrived,  ///< Pure pursuit is not at the path's end in twice the trajectory's time.
+};
+[[nodiscard]] ErrorInfo error_info(DriveError code);
+
 /// What a drivetrain moves by.
 enum class DriveKind { differential, swerve, mecanum };
 /// "differential", "swerve", "mecanum".
@@ -130,7 +137,8 @@ struct DriveResult {
 [[nodiscard]] Expected<DriveResult> drive(const DriveJob& job);
 
 /// Numbers, pictures over time and on the field, an animation, CSV and a WPILOG that AdvantageScope
-/// replays. Schema "flyball.drive/1".
+/// replays. The refusal is there where the robot lost its way or did not arrive. Schema
+/// "flyball.drive/1".
 [[nodiscard]] Answer answer_of(const DriveResult& result);
 [[nodiscard]] std::string to_json(const DriveResult& result);
 

@@ -41,6 +41,7 @@ struct OptimizeJob {
   std::string path{};
   std::vector<OptimizeTask> tasks{};
   DriveOptions options{};
+  std::optional<ChoreoProject> project{};  ///< Choreo's, where the job is one.
   std::vector<Diagnostic> diagnostics{};
 };
 
@@ -63,7 +64,8 @@ struct OptimizeResult {
 /// Cost: some ten milliseconds a second of motion.
 [[nodiscard]] Expected<OptimizeResult> optimize(const OptimizeJob& job);
 
-/// Durations, what an independent simulation says, pictures, an animation, CSV and .traj files.
+/// Durations, what an independent simulation says, pictures, an animation, CSV, .traj files and
+/// the .chor beside which Choreo opens them.
 /// The refusal is there where a trajectory was not found. Schema "flyball.optimize/1".
 [[nodiscard]] Answer answer_of(const OptimizeResult& result);
 [[nodiscard]] std::string to_json(const OptimizeResult& result);

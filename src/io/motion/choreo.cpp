@@ -94,7 +94,7 @@ struct DescribeConstraintData {
   template <class A, class C>
   void operator()(A& a, C& c) const {
     a("type", c.type);
-    a.numbers("props", c.props);
+    a.numbers("props", c.props, "flip", c.flip);
   }
 };
 

@@ -222,7 +222,8 @@ void JsonMembersIn::id(std::string_view key, std::optional<std::string>& value) 
   }
 }
 
-void JsonMembersIn::numbers(std::string_view key, std::vector<NamedNumber>& values) {
+void JsonMembersIn::numbers(std::string_view key, std::vector<NamedNumber>& values,
+                            std::string_view flag_name, std::optional<bool>& flag) {
   const JsonNode* node = find(key, true);
   if (node == nullptr || node->kind == JsonKind::null) {
     return;
@@ -234,6 +235,10 @@ void JsonMembersIn::numbers(std::string_view key, std::vector<NamedNumber>& valu
     }
     values.clear();
     for (const JsonNode& child : node->children) {
+      if (child.key == flag_name && child.kind == JsonKind::boolean) {
+        static_cast<void>(read_value(reading_, child, flag.emplace()));
+        continue;
+      }
       const bool expressed = child.kind == JsonKind::object && child.find("exp") != nullptr &&
                              child.find("val") != nullptr;
       if (child.kind != JsonKind::number && !expressed) {
@@ -493,9 +498,10 @@ void JsonMembersOut::id(std::string_view key, const std::optional<std::string>& 
   value ? id(key, *value) : nothing(key);
 }
 
-void JsonMembersOut::numbers(std::string_view key, const std::vector<NamedNumber>& values) {
+void JsonMembersOut::numbers(std::string_view key, const std::vector<NamedNumber>& values,
+                             std::string_view flag_name, const std::optional<bool>& flag) {
   const JsonSpot spot = spot_.member(key);
-  if (values.empty() && (spot.old == nullptr || spot.old->kind != JsonKind::object)) {
+  if (values.empty() && !flag && (spot.old == nullptr || spot.old->kind != JsonKind::object)) {
     spot.old == nullptr&& spot_.old == nullptr ? add(key, "{}") : absent(key);
     return;
   }
@@ -503,6 +509,9 @@ void JsonMembersOut::numbers(std::string_view key, const std::vector<NamedNumber
   for (const NamedNumber& value : values) {
     pieces.push_back(
         {value.name, written(spot.member(value.name).of(value.number.origin), value.number)});
+  }
+  if (flag) {
+    pieces.push_back({std::string(flag_name), written(spot.member(flag_name), *flag)});
   }
   add(key, compose_object(spot, std::move(pieces)));
 }

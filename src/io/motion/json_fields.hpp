@@ -200,8 +200,10 @@ class JsonMembersIn {
   /// A name or a number, such as a version or a waypoint, as text.
   void id(std::string_view key, std::string& value);
   void id(std::string_view key, std::optional<std::string>& value);
-  /// An object's members that are numbers; the others stay in the origin.
-  void numbers(std::string_view key, std::vector<NamedNumber>& values);
+  /// An object's members that are numbers, and one that is yes or no; the others stay in the
+  /// origin.
+  void numbers(std::string_view key, std::vector<NamedNumber>& values, std::string_view flag_name,
+               std::optional<bool>& flag);
 
   template <class T, class Describe>
   static bool read(JsonReading& reading, const JsonNode& node, T& value, Describe describe) {
@@ -412,7 +414,8 @@ class JsonMembersOut {
   }
   void id(std::string_view key, const std::string& value);
   void id(std::string_view key, const std::optional<std::string>& value);
-  void numbers(std::string_view key, const std::vector<NamedNumber>& values);
+  void numbers(std::string_view key, const std::vector<NamedNumber>& values,
+               std::string_view flag_name, const std::optional<bool>& flag);
 
   template <class T, class Describe>
   static std::string text(const JsonSpot& spot, const T& value, Describe describe) {

@@ -244,6 +244,26 @@ Answer answer_of(const DriveResult& result) {
   answer.figures = figures_of(result);
   answer.animations = animations_of(result);
   answer.files = {{"data/drive.csv", to_csv(result.series)}, driven_log_file(result)};
+  const TrackingErrors& e = result.errors;
+  const bool pursues = result.job.follower == DriveFollower::pure_pursuit;
+  if (result.lost) {
+    answer.refusal =
+        Error(DriveError::lost)
+            .in(result.job.path)
+            .about(std::string(to_string(result.job.follower)))
+            .got(fmt::format("{} across and {} along at most", centimetres(e.largest_across),
+                             centimetres(e.largest_along)))
+            .expected("within a metre of the trajectory")
+            .hint(
+                "a slower trajectory, tighter tolerances or less of a disturbance "
+                "keep it");
+  } else if (pursues && !result.arrival) {
+    answer.refusal = Error(DriveError::not_arrived)
+                         .in(result.job.path)
+                         .about("pure pursuit")
+                         .got("not at the path's end in twice the trajectory's time")
+                         .hint("a shorter lookahead follows tighter bends");
+  }
   return answer;
 }
 

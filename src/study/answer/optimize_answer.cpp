@@ -42,6 +42,14 @@ std::string file_name(const OptimizeResult& result, std::size_t task) {
   return name;
 }
 
+/// The job's file without folder and ending.
+std::string project_name(const OptimizeResult& result) {
+  const std::string& path = result.job.path;
+  const std::size_t slash = path.find_last_of('/');
+  const std::string name = slash == std::string::npos ? path : path.substr(slash + 1);
+  return name.substr(0, name.find_last_of('.'));
+}
+
 std::string csv_of(const OptimizeTask& task, const DriveSolution& solution) {
   std::vector<double> time;
   for (const DriveSample& s : solution.samples) {
@@ -265,10 +273,19 @@ Answer answer_of(const OptimizeResult& result) {
     answer.animations.push_back(optimize_animation(task, solution, i));
     const std::string name = file_name(result, i);
     answer.files.push_back({fmt::format("data/{}.csv", name), csv_of(task, solution)});
-    if (solution.solved && task.problem.model.drivetrain != Drivetrain::mecanum) {
+    if (solution.solved) {
       if (auto text = to_choreo(choreo_of(task, solution))) {
         answer.files.push_back({fmt::format("data/{}.traj", name), *std::move(text)});
       }
+    }
+  }
+  const bool any_solved = std::any_of(result.solutions.begin(), result.solutions.end(),
+                                      [](const DriveSolution& s) { return s.solved; });
+  if (any_solved && !result.job.path.ends_with(".traj")) {
+    const auto project = choreo_project_of(result);
+    if (const auto text = project ? to_choreo(*project) : Expected<std::string>(std::string());
+        text && !text->empty()) {
+      answer.files.push_back({fmt::format("data/{}.chor", project_name(result)), *text});
     }
   }
   if (!result.diagnostics.empty()) {

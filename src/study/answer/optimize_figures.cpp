@@ -139,7 +139,10 @@ Figure field_figure(const OptimizeTask& task, const DriveSolution& solution, std
   }
   Outline in = areas_of(task.problem, true);
   if (!in.x.empty()) {
-    panel.lines.push_back({.x = std::move(in.x), .y = std::move(in.y), .style = LineStyle::guide});
+    panel.lines.push_back({.label = "keep in",
+                           .x = std::move(in.x),
+                           .y = std::move(in.y),
+                           .style = LineStyle::guide});
   }
   Outline robots;
   const Outline robot = robot_of(task.problem.model);
@@ -154,7 +157,8 @@ Figure field_figure(const OptimizeTask& task, const DriveSolution& solution, std
     }
     robots.lift();
   }
-  panel.lines.push_back({.x = std::move(robots.x),
+  panel.lines.push_back({.label = "robot",
+                         .x = std::move(robots.x),
                          .y = std::move(robots.y),
                          .style = LineStyle::dotted,
                          .color = unused_color});

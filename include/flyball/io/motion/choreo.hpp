@@ -56,6 +56,7 @@ struct ChoreoConstraint {
                                      ///< "MaxAcceleration", "PointAt", "KeepInCircle",
                                      ///< "KeepInRectangle", "KeepInLane", "KeepOutCircle".
   std::vector<NamedNumber> props{};  ///< "max", "x", "y", "r", "w", "h", "tolerance".
+  std::optional<bool> flip{};        ///< Of "PointAt": whether the back looks there.
   bool enabled = true;
   JsonOrigin origin{};
 
