@@ -123,6 +123,11 @@ inline constexpr std::array drive_fields{
         "table (CSV), beside the project file")
         .takes("FILE")
         .without("the waypoints"),
+    text("path", at<&DriveSection::path>(), "\"c1sub\"",
+         "Which of its paths, where the trajectory is a project of Choreo's 2024 with several")
+        .takes("NAME")
+        .called("trajectory-path")
+        .without("its only one"),
     names("waypoints", at<&DriveSection::waypoints>(),
           "[\"1 m, 1 m, 0 deg\", \"3 m, 2 m, 45 deg\", \"5 m, 2 m, 0 deg\"]",
           "Poses that the path goes through, each with the direction in which it does; of what "

@@ -48,6 +48,10 @@ inline constexpr std::array optimize_fields{
     quantity("interval", at<&OptimizeSection::interval>(), Dimension::time, Range::positive,
              "\"40 ms\"", "About how long forces are held"),
     whole("attempts", at<&OptimizeSection::attempts>(), 1, 100, "4",
-          "Starts that are tried: sides of obstacles, ways round")};
+          "Starts that are tried: sides of obstacles, ways round"),
+    quantity("longest", at<&OptimizeSection::longest>(), Dimension::time, Range::positive,
+             "\"120 s\"", "That the way from a waypoint to the next may take"),
+    quantity("time_limit", at<&OptimizeSection::time_limit>(), Dimension::time, Range::positive,
+             "\"60 s\"", "Of the search: what was found until then is answered")};
 
 }  // namespace flyball::study

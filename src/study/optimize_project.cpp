@@ -256,6 +256,8 @@ ExpectedAll<OptimizeJob> optimize_job(const std::string& path,
   task.problem.target_interval = project.optimize.interval.si();
   task.config = config_of(task.problem.model, drive.robot.gearing, drive.robot.wheel_radius);
   job.options.max_attempts = project.optimize.attempts;
+  job.options.longest_segment = project.optimize.longest.si();
+  job.options.time_limit = project.optimize.time_limit.si();
   job.tasks.push_back(std::move(task));
   return job;
 }

@@ -124,6 +124,20 @@ TEST(Optimize, ChoreoOpensWhatIsWritten) {
   }
 }
 
+TEST(Optimize, LimitsOfTheSearchAreKept) {
+  const std::string way = "waypoints = [\"1 m, 1 m, 0 deg\", \"9 m, 1 m\"]\n";
+  const OptimizeResult hurried =
+      optimized(written("hurried.toml", robot + way + "longest = \"0.5 s\"\n"));
+  EXPECT_EQ(hurried.job.options.longest_segment, 0.5);
+  EXPECT_FALSE(hurried.solutions[0].solved);
+  EXPECT_NE(hurried.solutions[0].message.find("the longest segment"), std::string::npos)
+      << hurried.solutions[0].message;
+  const OptimizeResult cut =
+      optimized(written("cut.toml", robot + way + "time_limit = \"1 us\"\n"));
+  EXPECT_FALSE(cut.solutions[0].solved);
+  EXPECT_EQ(cut.solutions[0].message, "the time limit is over");
+}
+
 TEST(Optimize, SupplyLimitsSlowIt) {
   const std::string way = "waypoints = [\"1 m, 1 m, 0 deg\", \"5 m, 1 m\"]\n";
   const double free = optimized(written("free.toml", robot + way)).solutions[0].duration;

@@ -29,6 +29,7 @@ struct DriveSection {
   MomentOfInertia steer_inertia{0.02};
   std::optional<Length> bumper_length{}, bumper_width{};
   std::string trajectory{};              ///< WPILib's JSON,
+  std::string path{};                    ///< Of it, where it holds several,
   std::vector<std::string> waypoints{};  ///< or "x, y, heading" and, of what moves sideways, the
                                          ///< way it looks.
   bool reversed = false;

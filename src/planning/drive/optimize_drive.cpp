@@ -37,6 +37,7 @@ constexpr double bar = 1e-3;  // m, rad and shares of limits that a simulation m
 struct Attempt {
   Layout layout;
   OptimalControlSolver solver;
+  std::vector<double> headings{};  ///< rad, of the waypoints.
   OptimalControlSolution found{};
 };
 
@@ -49,28 +50,36 @@ class Search {
 
   Expected<DriveSolution> run() {
     const auto choices = drive_guess::choices(problem_, std::max(1, options_.max_attempts));
+    choose_mesh(choices.front());
     std::optional<Attempt> best;
     std::optional<Attempt> nearest;
-    Guess best_guess;
+    std::size_t chosen = 0;
     double least = 0.0;
-    std::vector<int> intervals;
     for (std::size_t i = 0; i < choices.size() && !over(); ++i) {
-      const Guess guess = drive_guess::guess(problem_, choices[i], intervals);
-      FLYBALL_TRY(Attempt attempt, attempt_of(guess, intervals));
-      attempt.found = solve(attempt.solver, guess.name);
+      const Guess guess = drive_guess::guess(problem_, choices[i], coarse_mesh_);
+      FLYBALL_TRY(Attempt attempt, attempt_of(guess, coarse_mesh_));
+      for (const double barrier : {first_barrier, far_barrier}) {
+        attempt.found = solve(attempt.solver, attempt.layout, guess.name, barrier);
+        if (attempt.found.solved() || over()) {
+          break;
+        }
+      }
       const DriveAttempt& told = result_.attempts.back();
       if (told.solved && (!best || told.duration < least - 1e-6)) {
         least = told.duration;
         result_.best = told.name;
         best = std::move(attempt);
-        best_guess = guess;
+        chosen = i;
       } else if (!nearest || attempt.found.infeasibility < nearest->found.infeasibility) {
         nearest = std::move(attempt);
       }
     }
+    if (best && parts_ > 1) {
+      to_full_mesh(best, choices[chosen]);
+    }
     if (best) {
       if (!tighten(*best)) {
-        refine(*best, best_guess);
+        refine(*best);
       }
       judge();
       return finish();
@@ -82,12 +91,19 @@ class Search {
       }
       return finish();
     }
-    return elastic(choices.front(), intervals);
+    return elastic(choices.front());
   }
 
  private:
-  /// Of the barrier, where the start is a guess.
-  static constexpr double first_barrier = 0.1;
+  /// Of the barrier, where the start is a guess, and where it is a solution on a coarser mesh.
+  /// Of both, about what the time weighs against the bounds: a larger one would first lead to the
+  /// middle of them all, at several times the duration.
+  static constexpr double first_barrier = 1e-4;
+  static constexpr double finer_barrier = 1e-5;
+  /// Where a start is far from any trajectory: by way of that middle.
+  static constexpr double far_barrier = 0.1;
+  /// What an interval of the coarse mesh, on which starts are compared, is cut into.
+  static constexpr int usual_parts = 3;
 
   [[nodiscard]] double elapsed() const {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
@@ -102,17 +118,65 @@ class Search {
     return options;
   }
 
-  void note(const std::string& name, const OptimalControlSolution& found) {
+  void note(const std::string& name, const Layout& layout, const OptimalControlSolution& found) {
+    double duration = 0.0;  // without the price of forces
+    for (std::size_t s = 0; s + 1 < layout.first.size(); ++s) {
+      duration += found.states(layout.duration(), layout.begin(s));
+    }
     result_.attempts.push_back({.name = name,
                                 .solved = found.solved(),
-                                .duration = found.cost,
+                                .duration = duration,
                                 .iterations = found.counts.iterations,
                                 .seconds = found.seconds});
   }
 
-  OptimalControlSolution solve(OptimalControlSolver& solver, const std::string& name) {
+  /// Starts are compared on a mesh with a third of the intervals, where these are free to choose.
+  void choose_mesh(const drive_guess::Choice& choice) {
+    std::vector<int> mesh;
+    static_cast<void>(drive_guess::guess(problem_, choice, mesh, usual_parts));
+    const bool divisible =
+        std::all_of(mesh.begin(), mesh.end(),
+                    [](int n) { return n % usual_parts == 0 && n >= 4 * usual_parts; });
+    parts_ = divisible ? usual_parts : 1;
+    coarse_mesh_.clear();
+    if (parts_ > 1) {
+      for (const int n : mesh) {
+        coarse_mesh_.push_back(n / parts_);
+      }
+    } else {
+      static_cast<void>(drive_guess::guess(problem_, choice, coarse_mesh_));
+    }
+  }
+
+  /// Solves on the full mesh, from the solution on the coarse one, or else from its start.
+  /// @param best  Empty where neither is solved.
+  void to_full_mesh(std::optional<Attempt>& best, const drive_guess::Choice& choice) {
+    std::vector<int> mesh;
+    const std::string name = result_.best;
+    Guess guess = drive_guess::finer(problem_, best->layout, best->found, parts_, mesh);
+    guess.headings = best->headings;
+    for (const bool from_coarse : {true, false}) {
+      if (!from_coarse) {
+        guess = drive_guess::guess(problem_, choice, mesh);
+      }
+      auto attempt = attempt_of(guess, mesh);
+      best.reset();
+      if (!attempt || over()) {
+        return;
+      }
+      attempt->found = solve(attempt->solver, attempt->layout, name + ", full mesh",
+                             from_coarse ? finer_barrier : first_barrier);
+      if (attempt->found.solved()) {
+        best = *std::move(attempt);
+        return;
+      }
+    }
+  }
+
+  OptimalControlSolution solve(OptimalControlSolver& solver, const Layout& layout,
+                               const std::string& name, double barrier) {
     SolverOptions options = solver_options();
-    options.first_barrier = first_barrier;
+    options.first_barrier = barrier;
     options.regularization_growth = 8.0;  // a swerve drive's takes a quarter of the time
     OptimalControlSolution found =
         solver.solve(options, [&](const optimization::Iteration& iteration) {
@@ -122,7 +186,7 @@ class Search {
                                          .infeasibility = iteration.infeasibility});
           return stopped_;
         });
-    note(name, found);
+    note(name, layout, found);
     return found;
   }
 
@@ -152,7 +216,7 @@ class Search {
         break;
       }
       OptimalControlSolution again = best.solver.resolve(solver_options());
-      note(result_.best + ", limits drawn tighter", again);
+      note(result_.best + ", limits drawn tighter", best.layout, again);
       if (!again.solved()) {
         break;
       }
@@ -163,38 +227,24 @@ class Search {
   }
 
   /// The same with intervals half as long, from the trajectory that was found.
-  void refine(Attempt& best, const Guess& headings) {
+  void refine(Attempt& best) {
     if (over()) {
       return;
     }
-    Guess guess{.name = result_.best + ", intervals halved", .headings = headings.headings};
-    const auto n = static_cast<Eigen::Index>(best.layout.n);
-    const auto segments = static_cast<std::size_t>(best.layout.first.size()) - 1;
-    std::vector<int> intervals;
-    int nodes = 1;
-    for (std::size_t s = 0; s < segments; ++s) {
-      intervals.push_back(2 * (best.layout.first[s + 1] - best.layout.begin(s)));
-      nodes += intervals.back();
-    }
-    guess.states = Eigen::MatrixXd(n, nodes);
-    guess.durations = Eigen::VectorXd(static_cast<Eigen::Index>(segments));
-    Eigen::Index k = 0;
-    for (std::size_t s = 0; s < segments; ++s) {
-      guess.durations(static_cast<Eigen::Index>(s)) =
-          best.found.states(best.layout.duration(), best.layout.begin(s));
-      for (int j = best.layout.begin(s); j < best.layout.first[s + 1]; ++j) {
-        const auto here = best.found.states.col(j).head(n);
-        const auto next = best.found.states.col(j + 1).head(n);
-        guess.states.col(k++) = here;
-        guess.states.col(k++) = 0.5 * (here + next);
-      }
-    }
-    guess.states.col(k) = best.found.states.col(best.found.states.cols() - 1).head(n);
-    auto finer = attempt_of(guess, intervals);
+    std::vector<int> mesh;
+    Guess guess = drive_guess::finer(problem_, best.layout, best.found, 2, mesh);
+    guess.name = result_.best + ", intervals halved";
+    guess.headings = best.headings;
+    auto finer = attempt_of(guess, mesh);
     if (!finer) {
       return;
     }
-    finer->found = solve(finer->solver, guess.name);
+    for (const double barrier : {finer_barrier, far_barrier}) {
+      finer->found = solve(finer->solver, finer->layout, guess.name, barrier);
+      if (finer->found.solved() || over()) {
+        break;
+      }
+    }
     if (!finer->found.solved()) {
       return;
     }
@@ -266,20 +316,20 @@ class Search {
     const auto start = drive_transcription::start_of(problem_, layout, guess);
     ocp.set_start(start.states, start.inputs);
     FLYBALL_TRY_IN(in_optimize_drive, OptimalControlSolver solver, OptimalControlSolver::make(ocp));
-    return Attempt{std::move(layout), std::move(solver)};
+    return Attempt{std::move(layout), std::move(solver), guess.headings};
   }
 
   /// What cannot be kept gives way, at a price, so that as little as possible does.
-  Expected<DriveSolution> elastic(const drive_guess::Choice& choice, std::vector<int> intervals) {
-    const Guess guess = drive_guess::guess(problem_, choice, intervals);
-    Layout layout(problem_, intervals, true);
+  Expected<DriveSolution> elastic(const drive_guess::Choice& choice) {
+    const Guess guess = drive_guess::guess(problem_, choice, coarse_mesh_);
+    Layout layout(problem_, coarse_mesh_, true);
     layout.longest = options_.longest_segment;
     FLYBALL_TRY_IN(
         in_optimize_drive, OptimalControlSolver solver,
         OptimalControlSolver::make(drive_transcription::transcribe(problem_, layout, guess)));
     const auto start = drive_transcription::start_of(problem_, layout, guess);
     FLYBALL_CHECK(solver.set_start(start.states, start.inputs));
-    const OptimalControlSolution found = solve(solver, "constraints give way");
+    const OptimalControlSolution found = solve(solver, layout, "constraints give way", far_barrier);
     result_.elastic = true;
     result_.best = result_.attempts.back().name;
     take(layout, found, coarse);
@@ -361,6 +411,8 @@ class Search {
   DriveSolution result_{};
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   bool stopped_ = false;
+  int parts_ = 1;
+  std::vector<int> coarse_mesh_{};  ///< Intervals of each segment.
 };
 
 }  // namespace
