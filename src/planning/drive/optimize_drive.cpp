@@ -30,7 +30,7 @@ namespace {
 
 constexpr std::string_view in_optimize_drive = "drive trajectory";
 constexpr int most_tightenings = 5;
-constexpr int coarse = 10;    // instants of an interval that are looked at while solving
+constexpr int coarse = 40;    // instants of an interval that are looked at while solving
 constexpr double bar = 1e-3;  // m, rad and shares of limits that a simulation may be off by
 
 /// A start that led to a trajectory.
