@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double gravity = 9.80665;
+constexpr double free_fall = 9.80665;  // m/s²
 
 /// As Choreo's settings have numbers: with what a person typed.
 void express(ExpressedNumber& number, std::string_view unit) {
@@ -201,7 +201,7 @@ ChoreoConfig config_of(const DriveModel& model, double gearing, double radius) {
   config.vmax.value = model.max_speed * gearing / radius;
   config.tmax.value = model.max_force * radius / gearing;
   if (model.friction > 0.0) {
-    config.cof = ExpressedNumber{model.friction * model.wheel_count() / (model.mass * gravity)};
+    config.cof = ExpressedNumber{model.friction * model.wheel_count() / (model.mass * free_fall)};
   }
   double front = 0.0, side = 0.0, back = 0.0;
   for (const Vector2d& corner : model.corners) {
