@@ -165,11 +165,13 @@ bool InteriorPoint::direction() {
   rw_ = ((rd_ + zl_ - zu_).array() - mu_ / sl_.array() + mu_ / su_.array()).matrix();
   rw_.array() *= free_.array();
   D_.setZero();
-  regularization_ = 0.0;
+  diagonal_.array() += damping_;
+  regularization_ = damping_;
   ++counts_.factorizations;
   bool good = program_.factor(diagonal_, D_, true);
   if (!good) {
     double added = last_regularization_ > 0.0 ? std::max(1e-20, last_regularization_ / 3.0) : 1e-4;
+    added = std::max(added, 2.0 * damping_);
     while (!good) {
       if (added > 1e40) {
         return false;
@@ -188,6 +190,29 @@ bool InteriorPoint::direction() {
   dzl_ = ((mu_ - zl_.array() * dw_.array()) / sl_.array() - zl_.array()).matrix();
   dzu_ = ((mu_ + zu_.array() * dw_.array()) / su_.array() - zu_.array()).matrix();
   return std::isfinite(dw_.sum()) && std::isfinite(dl_.sum());
+}
+
+/// Where the line search cuts steps short time and again, the Hessian says little of the way that
+/// they take: a larger one holds them where the linearised constraints hold. It is as large as it
+/// takes for a whole step to leave a part of the violation that it found, as of a trust region,
+/// and smaller again where the gradient is farther from zero than the constraints.
+/// @param theta  The violation before the step.
+void InteriorPoint::damp(double theta, const Errors& error) {
+  constexpr int patience = 10;  // the first time
+  constexpr double most = 1e-2;
+  constexpr double first = 1e-6;
+  cut_steps_ = is_cut_ ? cut_steps_ + 1 : 0;
+  if (cut_steps_ >= (was_damped_ ? 1 : patience)) {
+    damping_ = std::min(most, std::max(4.0 * damping_, first));
+    was_damped_ = true;
+  } else if (damping_ > 0.0 && !is_cut_) {
+    const double left = c_.lpNorm<1>() / theta;
+    if (error.dual > error.primal || left < 0.1) {
+      damping_ = damping_ > 1e-3 * first ? 0.5 * damping_ : 0.0;
+    } else if (left > 0.5) {
+      damping_ = std::min(most, 2.0 * damping_);
+    }
+  }
 }
 
 /// @return solved where the filter's method can go on from the point that was found; infeasible
@@ -274,6 +299,9 @@ SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
   counts_ = {};
   last_ = {};
   last_regularization_ = 0.0;
+  damping_ = 0.0;
+  cut_steps_ = 0;
+  was_damped_ = false;
   derivatives_fresh_ = false;
   bool warm = is_warm_;
   if (is_warm_) {
@@ -298,6 +326,7 @@ SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
   begin_filter();
   const double mu_min = options.tolerance / 11.0;
   int blocked = 0;  // steps in a row that were short
+  double theta_before = -1.0;
   for (int k = 0, since = 0;; ++k, ++since) {
     blocked = k > 0 && last_.step < 0.1 ? blocked + 1 : 0;
     if (warm && ((since == 1 && blocked > 0) || blocked >= 3)) {
@@ -315,6 +344,10 @@ SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
     derivatives_fresh_ = false;
     dual_residual();
     const Errors error = errors(0.0);
+    if (theta_before >= 0.0) {
+      damp(theta_before, error);
+      theta_before = -1.0;
+    }
     last_.cost = f_;
     last_.infeasibility = error.primal;
     last_.optimality = error.dual;
@@ -354,9 +387,13 @@ SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
     tau_ = std::max(0.99, 1.0 - mu_);
     ++last_.number;
     const bool has_direction = direction();
+    const double theta = c_.lpNorm<1>();
     if (has_direction && search()) {
+      theta_before = theta;
       continue;
     }
+    damping_ = 0.0;
+    cut_steps_ = 0;
     if (!std::isfinite(gradient_.sum())) {
       return SolveStatus::not_finite;
     }

@@ -76,6 +76,7 @@ class InteriorPoint {
   [[nodiscard]] double dual_step(double tau) const;
   [[nodiscard]] bool search();
   void accept(double alpha, double alpha_dual);
+  void damp(double theta, const Errors& error);
   [[nodiscard]] SolveStatus restore(const SolverOptions& options, double seconds_left, Watch watch);
   void begin_filter();
   void reset_filter();
@@ -89,6 +90,10 @@ class InteriorPoint {
   double f_ = 0.0, trial_f_ = 0.0, mu_ = 0.1, theta_max_ = 0.0, theta_min_ = 0.0;
   double regularization_ = 0.0, last_regularization_ = 0.0, tau_ = 0.99;
   double regularization_growth_ = 4.0;
+  double damping_ = 0.0;  // of the Hessian, where steps are cut short
+  int cut_steps_ = 0;     // in a row
+  bool was_damped_ = false;
+  bool is_cut_ = false;  // whether the line search took less than half of what the bounds allow
   double first_primal_ = 0.0, first_mu_ = 0.0;
   bool derivatives_fresh_ = false;
   bool is_restoration_ = false;

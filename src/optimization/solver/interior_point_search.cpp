@@ -135,6 +135,7 @@ bool InteriorPoint::search() {
     }
   };
   double alpha = alpha_max;
+  is_cut_ = false;
   for (int round = 0; alpha > alpha_min; ++round, alpha *= 0.5) {
     double t = 0.0;
     double p = 0.0;
@@ -142,6 +143,7 @@ bool InteriorPoint::search() {
     if (defined && acceptable(t, p, alpha)) {
       keep_out(p, alpha);
       accept(alpha, alpha_dual);
+      is_cut_ = round > 1;
       return true;
     }
     if (round > 0) {

@@ -250,19 +250,19 @@ Guess guess(const DriveProblem& problem, const Choice& choice, std::vector<int>&
     const double turns = std::round((way.headings[at] - w.heading) / (2.0 * std::numbers::pi));
     result.headings.push_back(w.heading + 2.0 * std::numbers::pi * turns);
   }
-  result.durations = (times.tail(static_cast<Index>(segments)) -
-                      times.head(static_cast<Index>(segments)))
-                         .cwiseMax(2e-3);
+  result.durations =
+      (times.tail(static_cast<Index>(segments)) - times.head(static_cast<Index>(segments)))
+          .cwiseMax(2e-3);
   if (intervals.empty()) {
     for (std::size_t i = 0; i < segments; ++i) {
       const int told = problem.waypoints[i].intervals;
       const double wanted =
           result.durations(static_cast<Index>(i)) / problem.target_interval / parts;
       // An even number: full ahead and full astern meet at a point of the mesh.
-      intervals.push_back(
-          told > 0 ? told
-                   : parts * 2 * std::clamp(static_cast<int>(std::ceil(0.5 * wanted)),
-                                            parts > 1 ? 2 : 4, 100));
+      intervals.push_back(told > 0 ? told
+                                   : parts * 2 *
+                                         std::clamp(static_cast<int>(std::ceil(0.5 * wanted)),
+                                                    parts > 1 ? 2 : 4, 100));
     }
   }
   int N = 0;
@@ -314,9 +314,8 @@ Guess guess(const DriveProblem& problem, const Choice& choice, std::vector<int>&
       const double heading = 0.5 * (result.states(2, k) + result.states(2, k + 1));
       if (steers(problem)) {
         const Vector2d ahead(std::cos(heading), std::sin(heading));
-        result.inputs.col(k) =
-            pusher.forces(heading, 0.5 * (change(3) + change(4)) * ahead,
-                          (change(4) - change(3)) / model.trackwidth);
+        result.inputs.col(k) = pusher.forces(heading, 0.5 * (change(3) + change(4)) * ahead,
+                                             (change(4) - change(3)) / model.trackwidth);
       } else {
         result.inputs.col(k) = pusher.forces(heading, change.segment<2>(3), change(5));
       }

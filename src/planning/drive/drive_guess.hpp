@@ -25,8 +25,9 @@ using drive_way::Choice;
 
 /// A trajectory that was found, its intervals cut into `parts` each: a start that nearly keeps
 /// its dynamics. @param intervals  Of the new one, written.
-[[nodiscard]] drive_transcription::Guess finer(
-    const DriveProblem& problem, const drive_transcription::Layout& layout,
-    const optimization::OptimalControlSolution& found, int parts, std::vector<int>& intervals);
+[[nodiscard]] drive_transcription::Guess finer(const DriveProblem& problem,
+                                               const drive_transcription::Layout& layout,
+                                               const optimization::OptimalControlSolution& found,
+                                               int parts, std::vector<int>& intervals);
 
 }  // namespace flyball::drive_guess

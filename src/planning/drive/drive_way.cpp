@@ -173,8 +173,7 @@ std::vector<std::pair<std::size_t, std::size_t>> runs_of(const DriveProblem& pro
   std::vector<std::pair<std::size_t, std::size_t>> runs;
   std::size_t begin = 0;
   for (std::size_t i = 1; i < problem.waypoints.size(); ++i) {
-    if (i + 1 == problem.waypoints.size() ||
-        drive_rules::stops_at(problem, static_cast<int>(i))) {
+    if (i + 1 == problem.waypoints.size() || drive_rules::stops_at(problem, static_cast<int>(i))) {
       runs.emplace_back(begin, i);
       begin = i;
     }
@@ -316,8 +315,7 @@ Approach nearest(const Vector2d& p, const Vector2d& a, const Vector2d& b) {
 }
 
 double berth(const DriveProblem& problem, const DriveConstraint& obstacle) {
-  return clearance *
-         (drive_rules::disc_of(obstacle).radius + drive_rules::reach_of(problem.model));
+  return clearance * (drive_rules::disc_of(obstacle).radius + drive_rules::reach_of(problem.model));
 }
 
 Way way_of(const DriveProblem& problem, const Choice& choice) {
@@ -377,8 +375,8 @@ Way way_of(const DriveProblem& problem, const Choice& choice) {
 }
 
 Timing time_way(const DriveProblem& problem, const Way& way) {
-  constexpr double share = 0.9;    // of speeds
-  constexpr double effort = 0.8;   // of forces
+  constexpr double share = 0.9;   // of speeds
+  constexpr double effort = 0.8;  // of forces
   constexpr double gravity = 9.80665;
   const DriveModel& model = problem.model;
   const std::size_t n = way.points.size();
@@ -405,9 +403,9 @@ Timing time_way(const DriveProblem& problem, const Way& way) {
     s.moved = (way.points[k + 1] - way.points[k]).norm() / s.length;
     s.turned = std::abs(way.headings[k + 1] - way.headings[k]) / s.length;
     s.cap = share * model.max_speed / std::max(0.1, s.moved + reach * s.turned);
-    s.acceleration = force * std::hypot(s.moved, reach * s.turned) /
-                     (model.mass * s.moved * s.moved +
-                      model.moment_of_inertia * s.turned * s.turned + 1e-9);
+    s.acceleration =
+        force * std::hypot(s.moved, reach * s.turned) /
+        (model.mass * s.moved * s.moved + model.moment_of_inertia * s.turned * s.turned + 1e-9);
     s.acceleration = std::max(s.acceleration, 0.1 * force / model.mass);
     for (const DriveConstraint& c : problem.constraints) {
       if (!c.to || !applies(problem, c, segment) || c.limit < 1e-3) {
@@ -466,12 +464,12 @@ Timing time_way(const DriveProblem& problem, const Way& way) {
     return std::sqrt(speed * speed + 2.0 * a * s.length);
   };
   for (std::size_t k = 0; k + 1 < n; ++k) {
-    timing.speeds[k + 1] = std::min(timing.speeds[k + 1],
-                                    reached(timing.speeds[k], stretches[k], bends[k], true));
+    timing.speeds[k + 1] =
+        std::min(timing.speeds[k + 1], reached(timing.speeds[k], stretches[k], bends[k], true));
   }
   for (std::size_t k = n - 1; k-- > 0;) {
-    timing.speeds[k] = std::min(timing.speeds[k], reached(timing.speeds[k + 1], stretches[k],
-                                                          bends[k + 1], false));
+    timing.speeds[k] = std::min(timing.speeds[k],
+                                reached(timing.speeds[k + 1], stretches[k], bends[k + 1], false));
   }
   timing.times.push_back(0.0);
   for (std::size_t k = 0; k + 1 < n; ++k) {

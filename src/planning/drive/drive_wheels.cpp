@@ -45,24 +45,24 @@ class Writer {
         static_cast<double>(layout_.stages()));
     // Where wheels pull against each other or need not push, any forces would do, and the Hessian
     // is singular: the least ones count.
-    ocp_.set_stage_cost([&](const Vector& x, const Vector& u, const Vector& /*p*/,
-                            const Vector& d) {
-      Expression square = 0.0;
-      for (int i = 0; i < layout_.m; ++i) {
-        square += u(i) * u(i);
-      }
-      Expression cost = d(0) * (x(n) + force_price * square);
-      for (const std::size_t number : layout_.obstacles) {
-        // An obstacle's line is across the way from its middle, where any would do.
-        const drive_rules::Disc disc = drive_rules::disc_of(problem_.constraints[number]);
-        const Expression a = x(0) - disc.center(0);
-        const Expression b = x(1) - disc.center(1);
-        const Expression length = sqrt(a * a + b * b + 1e-2);
-        const Expression angle = u(layout_.angle(number));
-        cost += d(0) * angle_price * (1.0 - (a * cos(angle) + b * sin(angle)) / length);
-      }
-      return cost;
-    });
+    ocp_.set_stage_cost(
+        [&](const Vector& x, const Vector& u, const Vector& /*p*/, const Vector& d) {
+          Expression square = 0.0;
+          for (int i = 0; i < layout_.m; ++i) {
+            square += u(i) * u(i);
+          }
+          Expression cost = d(0) * (x(n) + force_price * square);
+          for (const std::size_t number : layout_.obstacles) {
+            // An obstacle's line is across the way from its middle, where any would do.
+            const drive_rules::Disc disc = drive_rules::disc_of(problem_.constraints[number]);
+            const Expression a = x(0) - disc.center(0);
+            const Expression b = x(1) - disc.center(1);
+            const Expression length = sqrt(a * a + b * b + 1e-2);
+            const Expression angle = u(layout_.angle(number));
+            cost += d(0) * angle_price * (1.0 - (a * cos(angle) + b * sin(angle)) / length);
+          }
+          return cost;
+        });
     if (layout_.elastic) {
       ocp_.set_terminal_cost([&](const Vector& /*x*/, const Vector& /*u*/, const Vector& p) {
         Expression sum = 0.0;

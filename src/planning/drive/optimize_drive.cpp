@@ -75,7 +75,7 @@ class Search {
       }
     }
     if (best && parts_ > 1) {
-      to_full_mesh(best, choices[chosen]);
+      to_full_mesh(*best, choices[chosen]);
     }
     if (best) {
       if (!tighten(*best)) {
@@ -134,9 +134,9 @@ class Search {
   void choose_mesh(const drive_guess::Choice& choice) {
     std::vector<int> mesh;
     static_cast<void>(drive_guess::guess(problem_, choice, mesh, usual_parts));
-    const bool divisible =
-        std::all_of(mesh.begin(), mesh.end(),
-                    [](int n) { return n % usual_parts == 0 && n >= 4 * usual_parts; });
+    const bool divisible = std::all_of(mesh.begin(), mesh.end(), [](int n) {
+      return n % usual_parts == 0 && n >= 4 * usual_parts;
+    });
     parts_ = divisible ? usual_parts : 1;
     coarse_mesh_.clear();
     if (parts_ > 1) {
@@ -148,19 +148,18 @@ class Search {
     }
   }
 
-  /// Solves on the full mesh, from the solution on the coarse one, or else from its start.
-  /// @param best  Empty where neither is solved.
-  void to_full_mesh(std::optional<Attempt>& best, const drive_guess::Choice& choice) {
+  /// Solves on the full mesh, from the solution on the coarse one, or else from its start. Where
+  /// neither is solved, that on the coarse mesh stays.
+  void to_full_mesh(Attempt& best, const drive_guess::Choice& choice) {
     std::vector<int> mesh;
     const std::string name = result_.best;
-    Guess guess = drive_guess::finer(problem_, best->layout, best->found, parts_, mesh);
-    guess.headings = best->headings;
+    Guess guess = drive_guess::finer(problem_, best.layout, best.found, parts_, mesh);
+    guess.headings = best.headings;
     for (const bool from_coarse : {true, false}) {
       if (!from_coarse) {
         guess = drive_guess::guess(problem_, choice, mesh);
       }
       auto attempt = attempt_of(guess, mesh);
-      best.reset();
       if (!attempt || over()) {
         return;
       }
@@ -210,7 +209,7 @@ class Search {
     for (int round = 0; round < most_tightenings && !over(); ++round) {
       if (!drive_margins::tighten(problem_, best.layout, result_.samples, excesses,
                                   options_.keep_limits_to, margins)) {
-        return true;
+        break;
       }
       if (!best.solver.set_data(drive_transcription::data_of(best.layout, margins))) {
         break;
@@ -260,8 +259,10 @@ class Search {
     }
   }
 
+  /// The largest share of a limit, m of a waypoint and rad of a heading that it is off by.
   [[nodiscard]] static double worst_of(const DriveSolution& s) {
-    return s.violations.empty() ? 0.0 : s.violations.front().share;
+    const double share = s.violations.empty() ? 0.0 : s.violations.front().share;
+    return std::max({share, s.waypoint_error, s.heading_error});
   }
   [[nodiscard]] double worst() const { return worst_of(result_); }
 
@@ -279,7 +280,7 @@ class Search {
     } else if (!(result_.heading_error <= bar)) {
       result_.message = flyball::detail::format("a simulation misses a heading by {} rad",
                                                 format_number(result_.heading_error, 3));
-    } else if (!(worst() <= bar)) {
+    } else if (!result_.violations.empty() && !(result_.violations.front().share <= bar)) {
       const DriveViolation& v = result_.violations.front();
       result_.message = flyball::detail::format(
           "the trajectory exceeds {} by {} {} {}, at {} s, between points of its mesh: shorter "
@@ -378,6 +379,7 @@ class Search {
     } else if (result_.relaxed.empty()) {
       // What gives way by nothing holds: a start that the others did not have.
       result_.elastic = false;
+      from_elastic(layout, found, guess);
       judge();
     } else {
       const DriveViolation& v = result_.relaxed.front();
@@ -398,6 +400,26 @@ class Search {
       }
     }
     return finish();
+  }
+
+  /// Goes on from a trajectory that was found where constraints could give way and did not.
+  void from_elastic(const Layout& layout, const OptimalControlSolution& found,
+                    const Guess& elastic_guess) {
+    std::vector<int> mesh;
+    Guess guess = drive_guess::finer(problem_, layout, found, 1, mesh);
+    guess.headings = elastic_guess.headings;
+    auto attempt = attempt_of(guess, mesh);
+    if (!attempt || over()) {
+      return;
+    }
+    attempt->found = solve(attempt->solver, attempt->layout,
+                           result_.best + ", from where none had to", finer_barrier);
+    if (attempt->found.solved()) {
+      result_.best = result_.attempts.back().name;
+      if (!tighten(*attempt)) {
+        refine(*attempt);
+      }
+    }
   }
 
   DriveSolution finish() {
