@@ -89,8 +89,8 @@ class Parts {
              .got("missing")
              .hint(fmt::format("a drivetrain needs it, for example {} = {}{}", key, example,
                                settings_path_.empty() ? "; PathPlanner's settings.json may say it: "
-                                                   "settings = \"settings.json\""
-                                                 : "; the settings do not say it")),
+                                                        "settings = \"settings.json\""
+                                                      : "; the settings do not say it")),
          {},
          {}});
   }
@@ -477,9 +477,9 @@ ExpectedAll<DriveJob> drive_job(const std::string& path, std::span<const Overrid
                          "WPILib, Choreo or PathPlanner: trajectory = \"path.wpilib.json\"")));
   }
   if (!said.trajectory.empty()) {
-    FLYBALL_TRY(job.trajectory, followed_file(project, job,
-                                               file_of(project, overrides, "--trajectory",
-                                                       said.trajectory)));
+    FLYBALL_TRY(
+        job.trajectory,
+        followed_file(project, job, file_of(project, overrides, "--trajectory", said.trajectory)));
   } else {
     FLYBALL_TRY(job.trajectory, trajectory_of(project, job, settings));
   }

@@ -19,8 +19,8 @@ struct OptimizeSection {
   std::optional<Velocity> max_velocity{};
   std::optional<Acceleration> max_acceleration{};
   std::optional<AngularVelocity> max_angular_velocity{};
-  Time interval{0.04};  ///< Of the mesh.
-  int attempts = 4;     ///< Starts that are tried.
+  Time interval{0.04};    ///< Of the mesh.
+  int attempts = 4;       ///< Starts that are tried.
   Time longest{120.0};    ///< That the way from a waypoint to the next may take.
   Time time_limit{60.0};  ///< Of the search for a trajectory.
 };

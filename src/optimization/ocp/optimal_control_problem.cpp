@@ -7,6 +7,7 @@
 #include "core/constants.hpp"
 #include "core/format.hpp"
 #include "optimization/ocp/optimal_control_data.hpp"
+#include "optimization/solver/kept_memory.hpp"
 
 namespace flyball::optimization {
 
@@ -125,6 +126,7 @@ void take_piece(OptimalControlData& data, std::optional<Lagrangian>& recorded,
 OptimalControlProblem::OptimalControlProblem(int states, int inputs, int intervals, int parameters,
                                              int data)
     : data_(std::make_unique<OptimalControlData>()) {
+  detail::keep_freed_memory();
   OptimalControlData& d = *data_;
   for (const auto& [value, name, least, most] :
        {std::tuple{states, "states", 1, most_entries},

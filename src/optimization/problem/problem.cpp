@@ -12,6 +12,7 @@
 #include "optimization/problem/flat_problem.hpp"
 #include "optimization/problem/sparse_program.hpp"
 #include "optimization/solver/interior_point.hpp"
+#include "optimization/solver/kept_memory.hpp"
 #include "optimization/solver/quadratic_method.hpp"
 
 namespace flyball::optimization {
@@ -82,7 +83,10 @@ struct Problem::Parts {
                                     FunctionRef<bool(const Iteration&)> watch);
 };
 
-Problem::Problem() : parts_(std::make_unique<Parts>()) {}
+Problem::Problem() {
+  detail::keep_freed_memory();
+  parts_ = std::make_unique<Parts>();
+}
 Problem::Problem(Problem&&) noexcept = default;
 Problem& Problem::operator=(Problem&&) noexcept = default;
 Problem::~Problem() = default;
