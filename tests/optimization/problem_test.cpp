@@ -330,8 +330,8 @@ TEST(Problem, ParametersChangeBetweenSolves) {
 // A quadratic program whose numbers change a little begins with the bounds that were active: fewer
 // steps, and the solution that it has from nothing.
 TEST(Problem, SolvedAgainFromItsActiveBounds) {
-  const int N = 100;
-  const auto state = [N](Problem& problem, const Expression& r, const Expression& x_0) {
+  const int usual = 100;
+  const auto state = [](Problem& problem, const Expression& r, const Expression& x_0, int N) {
     const ExpressionMatrix X = problem.decision_variable(1, N + 1);
     const ExpressionMatrix U = problem.decision_variable(1, N);
     const double a = std::exp(-5.0 / N);
@@ -350,7 +350,7 @@ TEST(Problem, SolvedAgainFromItsActiveBounds) {
   Problem problem;
   Expression r = problem.parameter(10.0);
   Expression x_0 = problem.parameter(0.0);
-  state(problem, r, x_0);
+  state(problem, r, x_0, usual);
   const int first = problem.solve().value().counts.iterations;
   for (const auto& [to, from] : {std::pair{10.1, 0.1}, {10.2, 0.3}, {9.0, -2.0}, {3.0, 5.0}}) {
     r.set_value(to);
@@ -358,11 +358,24 @@ TEST(Problem, SolvedAgainFromItsActiveBounds) {
     const ProblemSolution again = problem.solve().value();
     ASSERT_EQ(again.status, SolveStatus::solved) << to;
     Problem fresh;
-    state(fresh, fresh.parameter(to), fresh.parameter(from));
+    state(fresh, fresh.parameter(to), fresh.parameter(from), usual);
     EXPECT_NEAR(again.cost, fresh.solve().value().cost, 1e-7 * again.cost) << to;
     if (to > 10.0) {
       EXPECT_LE(again.counts.iterations, first / 2) << to;
     }
+  }
+  // Where the bounds that change halve from round to round, they settle before an interior point is
+  // near: by a fifth, in no more iterations than from nothing.
+  for (const int n : {300, 1000}) {
+    SCOPED_TRACE(n);
+    Problem longer;
+    Expression goal = longer.parameter(10.0);
+    state(longer, goal, longer.parameter(0.0), n);
+    const int anew = longer.solve().value().counts.iterations;
+    goal.set_value(8.0);
+    const ProblemSolution again = longer.solve().value();
+    EXPECT_EQ(again.status, SolveStatus::solved);
+    EXPECT_LE(again.counts.iterations, anew);
   }
 }
 
@@ -392,6 +405,36 @@ TEST(Problem, NotFiniteIsNamed) {
   const auto solution = problem.solve().value();
   EXPECT_EQ(solution.status, SolveStatus::not_finite);
   EXPECT_EQ(solution.message, "the logarithm is not finite");
+}
+
+// The slope of |y| jumps at the minimum: no step is a descent, and the expression is named.
+TEST(Problem, KinksAreNamed) {
+  for (const double from : {1.0, 0.0}) {
+    SCOPED_TRACE(from);
+    Problem problem;
+    Expression x = problem.decision_variable();
+    Expression y = problem.decision_variable();
+    x.set_value(1.0);
+    y.set_value(from);
+    problem.minimize(abs(y) + x * x);
+    const auto solution = problem.solve().value();
+    EXPECT_EQ(solution.status, SolveStatus::no_progress);
+    EXPECT_NE(solution.message.find("the cost has a kink"), std::string::npos) << solution.message;
+    EXPECT_LT(solution.cost, 1e-6);
+  }
+  // As it says, with a variable in place of |y|.
+  Problem problem;
+  Expression x = problem.decision_variable();
+  Expression y = problem.decision_variable();
+  Expression t = problem.decision_variable();
+  x.set_value(1.0);
+  y.set_value(1.0);
+  problem.minimize(t + x * x);
+  problem.subject_to(-t <= y);
+  problem.subject_to(y <= t);
+  const auto solution = problem.solve().value();
+  EXPECT_EQ(solution.status, SolveStatus::solved);
+  EXPECT_NEAR(solution.cost, 0.0, 1e-7);
 }
 
 /// Rows, bounds, a linear and a quadratic cost and what is neither, all of parameters: after a

@@ -205,7 +205,9 @@ void Problem::Parts::report(ProblemSolution& solution, const FlatProblem& flat) 
   if (solution.violations.size() > most_violations) {
     solution.violations.resize(most_violations);
   }
-  solution.message = std::string(to_string(solution.status));
+  if (solution.message.empty()) {  // else it says why already
+    solution.message = std::string(to_string(solution.status));
+  }
   if (!solution.violations.empty()) {
     solution.message +=
         flyball::detail::format(": {} is violated by {:.3g}", solution.violations.front().name,
@@ -351,6 +353,18 @@ ProblemSolution Problem::Parts::run(FlatProblem* flat, const SolverOptions& opti
                                  : name_of(static_cast<std::size_t>(
                                        stated.constraint[static_cast<std::size_t>(fault.row)]));
     solution.message = (fault.derivative ? "a derivative of " : "") + what + " is not finite";
+  }
+  if (status == SolveStatus::no_progress && general) {
+    const int kink = p.find_kink(*w);
+    if (kink > -2) {
+      const std::string what = kink < 0 ? std::string("the cost")
+                                        : name_of(static_cast<std::size_t>(
+                                              stated.constraint[static_cast<std::size_t>(kink)]));
+      solution.message = flyball::detail::format(
+          "no progress: {} has a kink where this ended; a variable t with -t <= y and y <= t is "
+          "smooth where |y| and sqrt(y^2) are not",
+          what);
+    }
   }
   std::copy_n(w->data(), graph.inputs(), graph.values.begin());
   is_warm = status == SolveStatus::solved;

@@ -399,4 +399,40 @@ SparseProgram::Fault SparseProgram::find_fault(const VectorXd& w) {
   return {};
 }
 
+int SparseProgram::find_kink(const VectorXd& w) {
+  constexpr double distance = 1e-6;
+  constexpr double jump = 0.1;
+  const VectorXd along = (1.0 + w.array().abs()).matrix();
+  VectorXd gradient[2];
+  VectorXd slope[2];  // of the constraints along it
+  const VectorXd none = VectorXd::Zero(m_);
+  VectorXd ignored = VectorXd::Zero(w.size());
+  for (const int side : {0, 1}) {
+    gradient[side].setZero(w.size());
+    slope[side].setZero(m_);
+    const VectorXd at = w + (side == 0 ? -distance : distance) * along;
+    if (!derivatives(at, none, 1.0, gradient[side])) {
+      return -2;
+    }
+    multiply(along, none, ignored, slope[side]);
+  }
+  int worst = -2;
+  double most = jump;
+  const auto look = [&](int row, double before, double behind) {
+    const double size =
+        std::abs(behind - before) / std::max({1e-3, std::abs(before), std::abs(behind)});
+    if (size > most) {
+      most = size;
+      worst = row;
+    }
+  };
+  for (Index i = 0; i < w.size(); ++i) {
+    look(-1, gradient[0](i), gradient[1](i));
+  }
+  for (Index r = 0; r < m_; ++r) {
+    look(static_cast<int>(r), slope[0](r), slope[1](r));
+  }
+  return worst;
+}
+
 }  // namespace flyball::optimization::detail

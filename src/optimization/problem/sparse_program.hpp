@@ -61,6 +61,10 @@ class SparseProgram final : public Program {
     bool derivative = false;
   };
   [[nodiscard]] Fault find_fault(const Eigen::VectorXd& w);
+  /// What has another slope a millionth before a point than behind it, as |y| has at zero, looked
+  /// at along the direction in which all variables grow.
+  /// @return the row, -1 for the cost, -2 where nothing has.
+  [[nodiscard]] int find_kink(const Eigen::VectorXd& w);
 
  private:
   struct Compiled {

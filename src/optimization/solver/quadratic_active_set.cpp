@@ -25,12 +25,14 @@ bool QuadraticMethod::settle(const SolverOptions& options) {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   // Farther away an interior point goes faster: where many bounds change, or one after the other,
-  // unless what variables are kept at their bounds along the stages shows which.
+  // unless what variables are kept at their bounds along the stages shows which. What halves from
+  // round to round ends soon.
   constexpr int most_rounds = 4;
   constexpr int most_rolls = 4;
   constexpr int most_changes = 8;
   int rolls = 0;
   int before = static_cast<int>(w_.size());  // changes of the last round
+  bool halved = false;
   const VectorXd& lower = program_.lower;
   const VectorXd& upper = program_.upper;
   if (!has_curvature_) {
@@ -47,7 +49,8 @@ bool QuadraticMethod::settle(const SolverOptions& options) {
   zu_.setZero();
   D_.setZero();
   const double held = 1e12 * size_;
-  for (int round = 0; round < most_rounds + rolls && round < options.max_iterations; ++round) {
+  for (int round = 0; (round < most_rounds + rolls || halved) && round < options.max_iterations;
+       ++round) {
     for (Index i = 0; i < w_.size(); ++i) {
       diagonal_(i) = side(i) != 0.0 ? held : 1e-12 * size_;
     }
@@ -111,6 +114,7 @@ bool QuadraticMethod::settle(const SolverOptions& options) {
     if (changes > most_changes && (rolls == 0 || 2 * changes > before)) {
       return false;
     }
+    halved = 2 * changes <= before;
     before = changes;
     if (changes == 0) {
       for (Index i = 0; i < w_.size(); ++i) {
