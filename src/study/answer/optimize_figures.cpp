@@ -260,7 +260,7 @@ Figure forces_figure(const OptimizeTask& task, const DriveSolution& solution, st
       panel({"Acceleration", "m/s²"},
             {line("", t,
                   column(solution, [](const DriveSample& s) { return std::hypot(s.ax, s.ay); }),
-                  voltage_color, LineStyle::steps)},
+                  unused_color, LineStyle::steps)},
             true)};
   mark(task, solution, figure.plot);
   return figure;
