@@ -231,7 +231,7 @@ SolveStatus InteriorPoint::restore(const SolverOptions& options, double seconds_
   ++counts_.restorations;
   // Where the filter's method leaves again and again what restorations reach, a violation cannot
   // fall to zero nearby, or only by going all the way: the next ones end at its minimum.
-  constexpr int patience = 8;
+  constexpr int patience = 10;
   const bool to_the_end = counts_.restorations > patience;
   filter_.add((1.0 - 1e-5) * theta, barrier(w_, f_) - 1e-5 * theta);
   RestorationProgram& restoring = restoration_->restoring;
@@ -344,10 +344,13 @@ SolveStatus InteriorPoint::run(const SolverOptions& options, Watch watch) {
     derivatives_fresh_ = false;
     dual_residual();
     const Errors error = errors(0.0);
-    if (theta_before >= 0.0) {
+    // Short steps are also how some motions find a good valley: those that have lasted are damped,
+    // and those of problems without equations, where nothing is restored.
+    constexpr double lasted = 0.6;
+    if (theta_before >= 0.0 && (c_.size() == 0 || last_.number > lasted * options.max_iterations)) {
       damp(theta_before, error);
-      theta_before = -1.0;
     }
+    theta_before = -1.0;
     last_.cost = f_;
     last_.infeasibility = error.primal;
     last_.optimality = error.dual;
