@@ -53,7 +53,9 @@ class Check {
     if (said_.zeta > 1.0 && document_.has("drive", "zeta")) {
       refuse("zeta", format_number(said_.zeta), "it is above 0 and at most 1, in 1/rad");
     }
-    if (!said_.trajectory.empty() && !said_.waypoints.empty()) {
+    // A file that was typed takes the place of the project's waypoints.
+    const bool typed = document_.name("drive", "trajectory").starts_with("--");
+    if (!typed && !said_.trajectory.empty() && !said_.waypoints.empty()) {
       refuse("trajectory", "there beside waypoints", "leave one of them out");
     }
   }
