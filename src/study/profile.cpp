@@ -188,6 +188,8 @@ Expected<void> check_options(const ProfileJob& job, ProfileKind kind) {
       {job.to_velocity.has_value(), kind != ProfileKind::minimum_jerk, "to_velocity",
        "the other kinds change a velocity"},
       {job.jump > 0.0, kind == ProfileKind::stepper, "jump", "stepper jumps"},
+      {job.acceleration > 0.0, kind != ProfileKind::exponential || job.kind.empty(), "acceleration",
+       "only the motor limits it; trapezoid and s-curve keep both"},
       {job.deceleration > 0.0, brakes, "deceleration", "trapezoid and s-curve brake by their own"}};
   for (const auto& option : options) {
     if (option.given && !option.taken) {

@@ -226,6 +226,7 @@ TEST_F(ProfileCommand, SaysWhatIsWrong) {
   refused("--to 1m --velocity 0m/s --acceleration 1m/s^2", "velocity");
   refused(std::string(limited) + "--kind s-kurve", "s-curve");
   refused(std::string(limited) + "--kind exponential", "--kv");
+  refused("--to 2m --kv 4 --ka 0.4 --kind exponential --acceleration 3m/s^2", "acceleration");
   refused("--to 1m --kv 4", "kA");
   refused("--to 1m --kv 4 --ka 0.4 --kg 13", "gravity");
   refused("--to 90deg --velocity 1.5m/s --acceleration 3m/s^2", "deg");

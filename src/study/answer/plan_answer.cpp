@@ -157,7 +157,9 @@ Section path_section(const PlanResult& result) {
     for (std::size_t k = 0; k < axes.size(); ++k) {
       row.push_back(quantity(waypoint[k], axes[k].unit, 4, false));
     }
-    row.push_back(quantity(result.job.space.clearance(waypoint), "", 3, false));
+    // What rounding leaves of a waypoint on an edge is none.
+    const double clearance = result.job.space.clearance(waypoint);
+    row.push_back(quantity(clearance > 1e-12 ? clearance : 0.0, "", 3, false));
     if (is_timed(result)) {
       row.push_back(quantity(i == 0 ? 0.0 : result.motion.arrivals[i - 1], "s", 4, false));
     }

@@ -57,7 +57,8 @@ struct MotionLimits {
 ///   the limits too.
 /// - `replanned(state, goal)`: the profile of its kind and limits from another state, such as the
 ///   one that it is in, to another goal. Asked each period with the state that it gave it stays on
-///   its way.
+///   its way; but on the last arc of an S-curve to a goal of no velocity and some acceleration,
+///   which a state that is rounded the wrong way reaches by another turn alone.
 template <class P>
 concept MotionProfile =
     std::copyable<P> && requires(const P profile, double t, const MotionState& state) {
