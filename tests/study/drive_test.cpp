@@ -121,6 +121,7 @@ TEST(Drive, TypedTrajectoriesReplaceTheProjects) {
   std::ofstream(table) << "time,x,y,heading,vx,vy,omega\n0,0,0,0,0,0,0\n1,0.5,0,0,1,0,0\n"
                           "2,1,0,0,0,0,0\n";
   const std::string folder = testing::TempDir() + "typed_project/";
+  std::filesystem::remove_all(folder);  // of an earlier run
   std::filesystem::create_directories(folder);
   const std::string path = folder + "robot.toml";
   std::ofstream(path) << robot("differential") + bend;
