@@ -141,7 +141,7 @@ struct WithoutOrigin {
 
 /// The mean of G on a circle around zero, which is G(0) where nothing else is within; nothing where
 /// there is a pole within: then ∮ G sᵏ⁻¹ ds does not vanish for all k.
-std::optional<double> value_within(const DelaySystem& system, double radius, double rounding,
+std::optional<double> value_within(const DelaySystem& system, double radius, double noise,
                                    Index output, Index input) {
   using Complex = std::complex<double>;
   constexpr int points = 64;
@@ -161,7 +161,7 @@ std::optional<double> value_within(const DelaySystem& system, double radius, dou
     }
   }
   const bool clean = std::all_of(moments.begin() + 1, moments.end(), [&](const Complex& moment) {
-    return std::abs(moment) <= rounding * largest;
+    return std::abs(moment) <= noise * largest;
   });
   return clean ? std::optional(moments[0].real()) : std::nullopt;
 }
@@ -184,11 +184,11 @@ std::optional<WithoutOrigin> without_origin(const DelaySystem& system, const Del
       return std::nullopt;
     }
     // What cancels at a pole of order k leaves rounding (r τ)⁻ᵏ times as large.
-    const double rounding = 1e-14 * std::pow(1.0 / (radius * late), count);
-    if (!(rounding < 1e-8)) {
+    const double noise = 1e-14 * std::pow(1.0 / (radius * late), count);
+    if (!(noise < 1e-8)) {
       return std::nullopt;
     }
-    value = value_within(system, radius, rounding, output, input);
+    value = value_within(system, radius, noise, output, input);
     if (value) {
       break;
     }

@@ -97,8 +97,7 @@ namespace {
 /// Members at the corners of the real blocks' intervals.
 class CornerSearch {
  public:
-  CornerSearch(const UncertaintyStructure& structure, const MemberClimb& climb)
-      : climb_(climb), real_(0) {
+  explicit CornerSearch(const UncertaintyStructure& structure) : real_(0) {
     for (const BlockSpan& block : structure.blocks) {
       real_ += block.is_real() ? 1 : 0;
     }
@@ -118,7 +117,6 @@ class CornerSearch {
   }
 
  private:
-  const MemberClimb& climb_;
   int real_;
   std::vector<std::size_t> at_;
 };
@@ -139,7 +137,7 @@ std::optional<SingularMember> worst_member(const MatrixXcd& M,
                                     [](const BlockSpan& block) { return block.is_real(); });
   const bool has_real = structure.has_real();
   if (has_real && !done()) {
-    const CornerSearch corners(structure, climb);
+    const CornerSearch corners(structure);
     constexpr unsigned most_looks = 1024;
     constexpr unsigned most_climbs = 16;
     // Opposite corners have opposite eigenvalues.
