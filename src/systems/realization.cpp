@@ -222,12 +222,14 @@ Expected<BalancedRealization<Continuous>> truncate(const System& given, TimeDoma
   }
   found.hankel = detail::times_power(svd.values, b + c);
   found.error_bound = 2.0 * found.hankel.tail(n - r).sum();
-  const int of_A = detail::unit_of(system.A);
-  const MatrixXd A = D_inverse.asDiagonal() * detail::times_power(system.A, -of_A) * D.asDiagonal();
+  // By exponents: what stands between D⁻¹A and D⁻¹AD need be no double.
+  const Eigen::VectorXi d =
+      D.unaryExpr([](double x) { return static_cast<double>(std::ilogb(x)); }).template cast<int>();
+  const MatrixXd A = detail::times_powers(system.A, -d, d, 0);
   const int a = detail::unit_of(A);
   found.system = {
       detail::times_power(product(found.T_inverse, product(detail::times_power(A, -a), found.T)),
-                          a + of_A),
+                          a),
       detail::times_power(product(found.T_inverse, MatrixXd(D_inverse.asDiagonal() * system.B)),
                           (b + c) / 2),
       detail::times_power(product(MatrixXd(system.C * D.asDiagonal()), found.T), (b + c) / 2),

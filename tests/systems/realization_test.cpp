@@ -255,6 +255,16 @@ TEST(Realization, SimilarityTransformOfLargeInputs) {
   EXPECT_NEAR(x(0) / -0.51e154, 1.0, 1e-14);
 }
 
+// States in units 1e169 apart, whose couplings a unit for all of A would lose.
+TEST(Realization, StatesFarApart) {
+  const MatrixXd A{{-1.35614013671875, 1.0104980468749999e+169}, {-1.695556640625e-170, -1.0}};
+  const ContinuousSystem<> system{A, MatrixXd{{-0.41131591796875}, {0.0}}, MatrixXd{{1.0, 1e169}},
+                                  MatrixXd::Zero(1, 1)};
+  const auto found = balanced_realization(system).value();
+  EXPECT_NEAR(found.system.A.determinant(), A.determinant(), 1e-13);
+  EXPECT_NEAR(found.system.A.trace(), A.trace(), 1e-13);
+}
+
 // A pole of 2.3e-308 keeps its digits on the way through units of 2^33.
 TEST(Realization, APoleAtTheEndOfTheDoubles) {
   const DiscreteSystem<> system{MatrixXd::Constant(1, 1, 2.3e-308), MatrixXd{{-1e20, 0.0, 0.0}},

@@ -142,7 +142,7 @@ BalancedMatrix balanced(const Eigen::MatrixXcd& M, const UncertaintyStructure& s
       sizes(i, j) = size > 0.0 ? std::log2(size) : nothing;
     }
   }
-  constexpr int most = 400;     // D's entries are squares of these powers.
+  constexpr int most = 200;
   constexpr double far = 60.0;  // Below the largest: what is there no longer counts.
   Eigen::VectorXi d = Eigen::VectorXi::Zero(count);
   const auto top = [&] {
