@@ -19,9 +19,9 @@ namespace {
 
 constexpr int points = 12;
 constexpr double tolerance = 1e-12;
-/// Of a system without states: those of ten states count as three. Of n > 10 states (n/10)³ times
-/// as many; four more for each sample.
-constexpr double most_steps = 250'000.0;
+/// Of a system without states and delays: a delay counts as half a step more, ten states as two. Of
+/// n > 10 states (n/10)³ times as many; four more for each sample.
+constexpr double most_steps = 375'000.0;
 /// Instants nearer than this share of the whole time are one.
 constexpr double shortest_share = 1e-9;
 constexpr std::size_t most_breaks = 200'000;
@@ -301,8 +301,10 @@ Expected<void> Motion::cross(double until) {
     const double distance = until - t_;
     const double parts = std::ceil(distance / wanted_ * (1.0 - 1e-9));
     const double length = distance / std::max(parts, 1.0);
-    work_ -= 1.0 + 3e-3 * static_cast<double>(x_.size() * (x_.size() + points * (form_.B1.cols() +
-                                                                                 form_.B2.cols())));
+    const auto delays = static_cast<double>(form_.delays.size());
+    work_ -= 1.0 + 0.5 * delays +
+             3e-3 * static_cast<double>(x_.size() *
+                                        (x_.size() + points * (form_.B1.cols() + form_.B2.cols())));
     if (!(work_ >= 0.0)) {
       return refusal(SystemError::no_convergence, "response", "the motion")
           .got(flyball::detail::format("not followed beyond {} s by as many steps as it may take",
