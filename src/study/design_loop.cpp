@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -237,8 +238,17 @@ Expected<LoopDesign> feedback_of(const LinearModel& model, const DesignJob& job,
 
 namespace {
 
+bool has_comfortable_margins(const StabilityMargins& margins) {
+  return margins.stable && margins.gain_margin_up >= 2.0 && margins.phase_margin >= 45.0 &&
+         margins.disk_margin >= 0.5;
+}
+
+// How far a loop is judged: one without comfortable margins needs no grid where it is then dropped.
+enum class Judged { whole, while_comfortable };
+
 /// Margins of the loop with its delay, the worst over what the plant may be, and the grid.
-Expected<void> judge(LoopDesign& loop, const LinearModel& model, const DesignJob& job) {
+Expected<void> judge(LoopDesign& loop, const LinearModel& model, const DesignJob& job,
+                     Judged judged) {
   const auto& [believed, K, K_e] = loop.regulator;
   const Time delay(job.controller.delay.value_or(0.0));
   FLYBALL_TRY(const auto plants, possible_plants(model, job.plant));
@@ -251,6 +261,9 @@ Expected<void> judge(LoopDesign& loop, const LinearModel& model, const DesignJob
     const bool first = &plant == &plants.front();
     loop.stable = first ? margins.stable : loop.stable;
     loop.margins = first ? std::move(margins) : worse(loop.margins, margins);
+    if (judged == Judged::while_comfortable && !has_comfortable_margins(loop.margins)) {
+      return {};
+    }
     const auto add_grid = [&](double delay_factor, const RobustnessOptions& options) {
       return robustness_grid(truth.A, truth.B, truth.C, believed, K, K_e,
                              Time(delay_factor * delay.si()), options)
@@ -288,7 +301,7 @@ Expected<void> judge(LoopDesign& loop, const LinearModel& model, const DesignJob
 Expected<LoopDesign> design_loop(const LinearModel& model, const DesignJob& job,
                                  const std::vector<double>& tolerances) {
   FLYBALL_TRY(auto loop, feedback_of(model, job, tolerances));
-  FLYBALL_CHECK(judge(loop, model, job));
+  FLYBALL_CHECK(judge(loop, model, job, Judged::whole));
   return loop;
 }
 
@@ -302,48 +315,49 @@ std::string tolerances_text(const LinearModel& model, const std::vector<double>&
 }
 
 // The tightest comfortable ones may not be the best: the compensation of a long delay (B.12) turns
-// an aggressive gain into nearly none.
+// an aggressive gain into nearly none. So the largest gain that is left is tried first; where the
+// delay is predicted, that is the tightest tolerances'.
 Expected<LoopDesign> search_tolerances(const LinearModel& model, const DesignJob& job,
                                        std::vector<double>& tolerances) {
   const std::vector<double> start =
       default_tolerances(job.plant, static_cast<std::size_t>(model.A.rows()));
   constexpr int steps = 40;
   constexpr double step = 1.25;
-  std::optional<LoopDesign> best;
+  std::vector<LoopDesign> tried;
   std::optional<Error> last;
   double factor = 1.0;
   for (int i = 0; i < steps; ++i, factor *= step) {
-    std::vector<double> tried = start;
-    for (double& tolerance : tried) {
+    std::vector<double> looser = start;
+    for (double& tolerance : looser) {
       tolerance *= factor;
     }
-    auto loop = design_loop(model, job, tried);
-    if (!loop) {
+    if (auto loop = feedback_of(model, job, looser)) {
+      tried.push_back(*std::move(loop));
+    } else {
       last = std::move(loop).error();
-    } else if (is_comfortable(*loop) && (!best || loop->K_delayed(0, 0) > best->K_delayed(0, 0))) {
-      best = *std::move(loop);
-      if (best->predicts) {
-        break;  // its gain is that of the tolerances, so looser ones are slower
-      }
     }
   }
-  if (!best && last) {
+  std::ranges::stable_sort(tried, std::ranges::greater{},
+                           [](const LoopDesign& loop) { return loop.K_delayed(0, 0); });
+  for (LoopDesign& loop : tried) {
+    if (auto done = judge(loop, model, job, Judged::while_comfortable); !done) {
+      last = std::move(done).error();
+    } else if (is_comfortable(loop)) {
+      tolerances = loop.tolerances;
+      return std::move(loop);
+    }
+  }
+  if (last) {
     return tl::unexpected(*std::move(last));
   }
-  if (!best) {
-    return refusal(DesignError::margins_lost, "design", "the loop")
-        .got(fmt::format("without margins at any tolerance with a delay of {} ms",
-                         format_number(1e3 * job.controller.delay.value_or(0.0), 3)))
-        .hint("shorten the delay or the period");
-  }
-  tolerances = best->tolerances;
-  return *std::move(best);
+  return refusal(DesignError::margins_lost, "design", "the loop")
+      .got(fmt::format("without margins at any tolerance with a delay of {} ms",
+                       format_number(1e3 * job.controller.delay.value_or(0.0), 3)))
+      .hint("shorten the delay or the period");
 }
 
 bool is_comfortable(const LoopDesign& loop) {
-  const StabilityMargins& margins = loop.margins;
-  return margins.stable && margins.gain_margin_up >= 2.0 && margins.phase_margin >= 45.0 &&
-         margins.disk_margin >= 0.5 && loop.robust &&
+  return has_comfortable_margins(loop.margins) && loop.robust &&
          (!loop.predicts || loop.worst_overshoot <= 0.25);
 }
 

@@ -57,8 +57,8 @@ struct Slowness {
 
 // Whether other designs are looked for: each period of delay is a state, and a search takes its
 // time.
+constexpr double most_periods = 40.0;
 bool is_searched(const DesignJob& job) {
-  constexpr double most_periods = 25.0;
   return delay_of(job).si() <= most_periods * job.controller.period;
 }
 
@@ -212,6 +212,13 @@ Expected<void> tell_cost_of_delay(const LoopDesign& loop, const LoopBehavior& ru
   if (auto offer = with_prediction(loop, model, job, chosen, slowness, clearly);
       offer && !offer->empty()) {
     faster.push_back(*std::move(offer));
+  }
+  if (!is_searched(job)) {
+    faster.push_back(fmt::format(
+        "looser tolerances and a prediction over the delay are tried up to {} periods: set "
+        "controller.period to {} or more",
+        format_number(most_periods, 2),
+        text::seconds(std::ceil(1e3 * delay_of(job).si() / most_periods) * 1e-3)));
   }
   const std::string offers =
       fmt::format("{}{}", faster.empty() ? "" : "; ", fmt::join(faster, "; "));

@@ -367,6 +367,8 @@ TEST(DesignTruth, ADelayThatLeavesNoFeedbackIsTheReason) {
     EXPECT_TRUE(result->robust);
     const std::string cost = told(*result, "delay_costs_speed");
     EXPECT_NE(cost.find("costs all of the feedback"), std::string::npos) << cost;
+    // Longer than forty periods, the way to an offer is told.
+    EXPECT_NE(cost.find("set controller.period to"), std::string::npos) << cost;
     const Document document = answer_of(*result).document;
     EXPECT_EQ(document.verdict.tone, Tone::caution);
   }
@@ -391,6 +393,14 @@ TEST(DesignTruth, ADelayThatLeavesNoFeedbackIsTheReason) {
     }
   }
   EXPECT_GE(files, 3);
+}
+
+// A delay of many periods of a fast loop is predicted over as well as one of few.
+TEST(DesignTruth, ADelayOfManyPeriodsIsOfferedAPrediction) {
+  DesignJob job = readme_elevator(0.2);
+  job.controller.period = 0.006;
+  const std::string cost = told(design(job).value(), "delay_costs_speed");
+  EXPECT_NE(cost.find("--predict-delay"), std::string::npos) << cost;
 }
 
 // A slow observer has the slowest eigenvalue with and without the delay: the step tells the cost.

@@ -8,9 +8,12 @@
 namespace flyball::detail {
 
 /// A matrix with its bound, and the coordinates in which the bound is a largest singular value,
-/// near enough: 2^-size F_out M F_in⁻¹.
+/// near enough: 2^-size F_out 2^out M 2^-in F_in⁻¹. The powers of two are M's balance, and a number
+/// between them and M is never formed.
 struct ScaledPoint {
   Eigen::MatrixXcd F_out, F_in_inverse;
+  Eigen::VectorXi out, in;  ///< Exponents.
+  int size = 0;
   double scale = 1.0;         ///< 2^size
   double beta = 0.0;          ///< Proven, of M.
   StructuredScaling scaling;  ///< Of M itself.

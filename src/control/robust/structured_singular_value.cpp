@@ -27,8 +27,15 @@ Eigen::VectorXd powers_of_two(const Eigen::VectorXi& exponents) {
 }  // namespace
 
 MatrixXcd ScaledPoint::coordinates_of(const MatrixXcd& M) const {
-  const MatrixXcd FM = F_out.lazyProduct(M);
-  return FM.lazyProduct(F_in_inverse) / scale;
+  MatrixXcd balanced(M.rows(), M.cols());
+  for (Index j = 0; j < M.cols(); ++j) {
+    for (Index i = 0; i < M.rows(); ++i) {
+      const int power = out(i) - in(j)-size;
+      balanced(i, j) = {std::ldexp(M(i, j).real(), power), std::ldexp(M(i, j).imag(), power)};
+    }
+  }
+  const MatrixXcd FM = F_out.lazyProduct(balanced);
+  return FM.lazyProduct(F_in_inverse);
 }
 
 UnitMember ScaledPoint::first_member(const MatrixXcd& M, const MemberClimb& climb,
@@ -67,8 +74,11 @@ ScaledPoint scaled_point(const MatrixXcd& M, const UncertaintyStructure& structu
     L_out.setIdentity();
     L_in.setIdentity();
   }
-  point.F_out = L_out.adjoint() * out.asDiagonal();
-  point.F_in_inverse = in.cwiseInverse().asDiagonal() * inverse_of_lower(L_in).adjoint();
+  point.F_out = L_out.adjoint();
+  point.F_in_inverse = inverse_of_lower(L_in).adjoint();
+  point.out = balance.out;
+  point.in = balance.in;
+  point.size = balance.size;
   point.scaling.D_out = out.asDiagonal() * s.D_out * out.asDiagonal();
   point.scaling.D_in = in.asDiagonal() * s.D_in * in.asDiagonal();
   // D and G have one factor that is free: of a tiny M it keeps G among the normal numbers.

@@ -381,6 +381,19 @@ TEST(StructuredPeak, RefusesAnUnstableSystem) {
   EXPECT_FALSE(structured_peak(s, {complex()}));
 }
 
+// A cycle through entries whose products with their scaling, one side alone, are no doubles.
+TEST(StructuredSingularValue, OfACycleAtTheEdgeOfTheDoubles) {
+  Eigen::MatrixXcd M = Eigen::MatrixXcd::Zero(3, 3);
+  M(0, 2) = -1e-154;
+  M(1, 0) = 2.3e-308;
+  M(2, 1) = 2.3e-308;
+  const double exact = std::cbrt(1e-154) * std::pow(std::cbrt(2.3e-308), 2);
+  const auto mu = structured_singular_value(M, {{UncertaintyKind::complex, 3, 3}}).value();
+  EXPECT_NEAR(mu.lower / exact, 1.0, 1e-13);
+  EXPECT_GE(mu.upper / exact, 1.0 - 1e-14);
+  EXPECT_LE(mu.upper / exact, 1.0 + 1e-6);
+}
+
 // Of a tiny M the proof's G has its digits, since D and G have one factor that is free.
 TEST(StructuredSingularValue, ScalingsOfATinyMatrix) {
   Eigen::MatrixXcd M = Eigen::MatrixXcd::Zero(2, 2);
