@@ -265,13 +265,23 @@ std::string fullest_channels(const Log& log, const FoundTests& tests) {
     return first != second ? first : a.first > b.first;
   });
   std::vector<std::string> names;
-  for (std::size_t i = 0; i < std::min(shown, all.size()); ++i) {
-    names.push_back("\"" + all[i].second->name + "\"");
+  bool more = false;
+  for (const auto& [samples, signal] : all) {
+    std::string name = "\"" + signal->name + "\"";
+    // A log can start an entry anew under the same name.
+    if (std::ranges::find(names, name) != names.end()) {
+      continue;
+    }
+    if (names.size() == shown) {
+      more = true;
+      break;
+    }
+    names.push_back(std::move(name));
   }
   if (names.empty()) {
     return ", none of which has two samples in the tests";
   }
-  return fmt::format(", such as {}{}", fmt::join(names, ", "), all.size() > shown ? ", …" : "");
+  return fmt::format(", such as {}{}", fmt::join(names, ", "), more ? ", …" : "");
 }
 
 std::string drivetrain_reason(const Log& log, const FoundTests& tests,

@@ -1,4 +1,5 @@
 // Other people's recordings: registered only where they are.
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <set>
@@ -124,6 +125,12 @@ TEST(RealLogDefects, AreNamed) {
       codes.insert(diagnostic.code);
     }
     EXPECT_TRUE(codes.contains(bad.defect)) << bad.file;
+    if (result->drive && result->drive->fit) {
+      const Verdict verdict = answer_of(*result).document.verdict;
+      EXPECT_TRUE(std::ranges::any_of(verdict.reasons, [](const std::string& reason) {
+        return reason.find("left side's encoder") != std::string::npos;
+      })) << bad.file;
+    }
   }
 }
 

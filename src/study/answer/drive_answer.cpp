@@ -167,6 +167,7 @@ Verdict drive_verdict(const IdentifyResult& result) {
       assumed = true;
     }
   }
+  add_wiring(verdict, result.diagnostics());
   const auto judge = [&](const char* mode, const std::optional<FeedforwardFit>& of) {
     if (!of) {
       verdict.add(Tone::caution, fmt::format("no gains of the {} motion", mode));

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -167,6 +168,16 @@ std::string to_json(const IdentifyResult& result) {
   return std::move(json).text();
 }
 
+void add_wiring(Verdict& verdict, const std::vector<Diagnostic>& diagnostics) {
+  constexpr std::array codes{"inverted_encoder", "sign_mismatch", "swapped_sides", "gyro_clockwise",
+                             "gyro_rate"};
+  for (const Diagnostic& found : diagnostics) {
+    if (std::ranges::find(codes, found.code) != codes.end()) {
+      verdict.add(Tone::caution, found.message.substr(0, found.message.find(". ")));
+    }
+  }
+}
+
 void add_warnings(Verdict& verdict, const std::vector<Diagnostic>& diagnostics,
                   std::string_view about) {
   const auto warnings =
@@ -239,6 +250,7 @@ Verdict verdict_of(const IdentifyResult& result) {
                             "compare them before you trust the gains",
                             text::percent(std::max(0.0, fit.r_squared))));
   }
+  add_wiring(verdict, result.diagnostics());
   add_warnings(verdict, result.diagnostics(), "about the data");
   verdict.line = verdict.tone == Tone::good
                      ? fmt::format(

@@ -73,6 +73,8 @@ void add_proofs(Verdict& verdict, const DesignResult& result);
 
 [[nodiscard]] Verdict verdict_of(const IdentifyResult& result);
 [[nodiscard]] Verdict verdict_of(const DesignResult& result);
+/// What the data say is connected or counted the wrong way: to be mended before the gains are used.
+void add_wiring(Verdict& verdict, const std::vector<Diagnostic>& diagnostics);
 /// "2 warnings about the data, listed below", if there are any.
 void add_warnings(Verdict& verdict, const std::vector<Diagnostic>& diagnostics,
                   std::string_view about);
