@@ -321,7 +321,7 @@ void analysis_law(Laws& laws) {
 }
 
 /// Pieces follow each other from the first point to the last, as nearly as places can be told: to
-/// 1e-14 of a coordinate's extent.
+/// 1e-14 of a coordinate's extent, and to what coefficients below 2.3e-308 add over a piece.
 void spline_law(Laws& laws) {
   const json& coefficients = laws.of_answer("coefficients");
   const json& breaks = laws.of_answer("breaks");
@@ -333,6 +333,7 @@ void spline_law(Laws& laws) {
   for (std::size_t j = 0; j < n; ++j) {
     Quad at = points[0][j].get<double>();
     Quad terms = at < 0 ? -at : at;
+    Quad unknown = 0;
     Quad extent = 0;
     for (const json& point : points) {
       extent = std::max(extent, Quad(std::abs(point[j].get<double>())));
@@ -342,15 +343,17 @@ void spline_law(Laws& laws) {
       const Quad begin = row[0].get<double>();
       const Quad gap = at - begin;
       const Quad size = terms + (begin < 0 ? -begin : begin);
-      if (size > smallest) {
+      if (size > smallest + unknown / tolerance) {
         worst = std::max(worst, static_cast<double>((gap < 0 ? -gap : gap) / size));
       }
       const Quad span = Quad(breaks[i + 1].get<double>()) - Quad(breaks[i].get<double>());
       at = 0;
       terms = 0;
+      unknown = 0;
       for (std::size_t k = row.size(); k-- > 0;) {
         const Quad c = row[k].get<double>();
         at = at * span + c;
+        unknown = unknown * span + Quad(std::numeric_limits<double>::min());
         terms = terms * span + (c < 0 ? -c : c);
       }
     }
@@ -358,7 +361,7 @@ void spline_law(Laws& laws) {
     const Quad off = at - end;
     const Quad gap = (off < 0 ? -off : off) <= Quad(1e-14) * extent ? Quad(0) : off;
     const Quad size = terms + (end < 0 ? -end : end);
-    if (size > smallest) {
+    if (size > smallest + unknown / tolerance) {
       worst = std::max(worst, static_cast<double>((gap < 0 ? -gap : gap) / size));
     }
   }

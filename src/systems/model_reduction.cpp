@@ -15,6 +15,7 @@
 #include "core/format.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/riccati/riccati_work.hpp"
 #include "systems/balance.hpp"
 #include "systems/modes.hpp"
 #include "systems/timed.hpp"
@@ -225,9 +226,10 @@ Expected<ReducedModel<Continuous>> by_factors(const Continuous& s, Index order, 
   const MatrixXd N = detail::transposed_product(s.C, s.D);
   const MatrixXd R =
       detail::symmetrized(MatrixXd::Identity(m, m) + detail::transposed_product(s.D, s.D));
-  FLYBALL_TRY_IN(
-      where, const auto X,
-      domain == TimeDomain::continuous ? care(s.A, s.B, Q, R, N) : dare(s.A, s.B, Q, R, N));
+  auto work = detail::CarefulWork::of_a_second(s.A.rows());
+  FLYBALL_TRY_IN(where, const auto X,
+                 domain == TimeDomain::continuous ? detail::care_within(s.A, s.B, Q, R, N, work)
+                                                  : detail::dare_within(s.A, s.B, Q, R, N, work));
   // M = W⁻¹ at infinity, WᵀW = R (+ BᵀXB): the factors are then inner, MᴴM + NᴴN = I.
   MatrixXd weight = R;
   if (domain == TimeDomain::discrete) {

@@ -420,12 +420,15 @@ Expected<RobustDesign<Continuous>> h2_synthesis(const GeneralizedPlant<Continuou
   const Partition& P = N.P;
   const Index m2 = P.B2.cols();
   const Index p2 = P.C2.rows();
-  FLYBALL_TRY_IN(where, const auto X,
-                 care(P.A, P.B2, transposed_product(P.C1, P.C1), MatrixXd::Identity(m2, m2),
-                      transposed_product(P.C1, P.D12)));
-  FLYBALL_TRY_IN(where, const auto Y,
-                 care(P.A.transpose(), P.C2.transpose(), product_transposed(P.B1, P.B1),
-                      MatrixXd::Identity(p2, p2), product_transposed(P.B1, P.D21)));
+  auto work = CarefulWork::of_a_second(P.n);
+  FLYBALL_TRY_IN(
+      where, const auto X,
+      detail::care_within(P.A, P.B2, transposed_product(P.C1, P.C1), MatrixXd::Identity(m2, m2),
+                          transposed_product(P.C1, P.D12), work));
+  FLYBALL_TRY_IN(
+      where, const auto Y,
+      detail::care_within(P.A.transpose(), P.C2.transpose(), product_transposed(P.B1, P.B1),
+                          MatrixXd::Identity(p2, p2), product_transposed(P.B1, P.D21), work));
   const MatrixXd L = Y.K.transpose();
   // dx̂/dt = A x̂ + B₂u + L (y - C₂x̂), u = -K x̂.
   const Continuous inner{P.A - product(P.B2, X.K) - product(L, P.C2), L, -X.K,

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <flyball/math/riccati/riccati.hpp>
 #include <flyball/systems/controllability.hpp>
 #include <flyball/systems/conversion.hpp>
 #include <flyball/systems/interconnection.hpp>
@@ -12,6 +11,7 @@
 #include "control/robust/partition.hpp"
 #include "core/try.hpp"
 #include "math/dense/dense.hpp"
+#include "math/riccati/riccati_work.hpp"
 
 namespace flyball {
 
@@ -139,12 +139,14 @@ Expected<LoopShapingDesign<Continuous>> stabilized(const Continuous& G, double f
       check_modes(sight, sight.detectable, SynthesisError::not_detectable, "the shaped plant"));
   const MatrixXd S = MatrixXd::Identity(D.cols(), D.cols()) + detail::transposed_product(D, D);
   const MatrixXd R = MatrixXd::Identity(D.rows(), D.rows()) + detail::product_transposed(D, D);
+  auto work = detail::CarefulWork::of_a_second(n);
   FLYBALL_TRY_IN(where, const auto X,
-                 care(A, B, detail::transposed_product(C, C), detail::symmetrized(S),
-                      detail::transposed_product(C, D)));
-  FLYBALL_TRY_IN(where, const auto Z,
-                 care(A.transpose(), C.transpose(), detail::product_transposed(B, B),
-                      detail::symmetrized(R), detail::product_transposed(B, D)));
+                 detail::care_within(A, B, detail::transposed_product(C, C), detail::symmetrized(S),
+                                     detail::transposed_product(C, D), work));
+  FLYBALL_TRY_IN(
+      where, const auto Z,
+      detail::care_within(A.transpose(), C.transpose(), detail::product_transposed(B, B),
+                          detail::symmetrized(R), detail::product_transposed(B, D), work));
   const MatrixXd XZ = product(X.X, Z.X);
   const double coupling = detail::eigenvalues_of(XZ).cwiseAbs().maxCoeff();
   const double least = std::sqrt(1.0 + coupling);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <limits>
 
 #include <flyball/math/riccati/riccati.hpp>
@@ -18,6 +19,12 @@ struct CarefulWork {
     return left >= 0.0;
   }
   [[nodiscard]] bool is_done() const noexcept { return left < 0.0; }
+
+  /// About a second's; of more than 90 states 500 products.
+  [[nodiscard]] static CarefulWork of_a_second(Eigen::Index states) noexcept {
+    const auto n = static_cast<double>(states);
+    return {std::max(4e8, 500.0 * n * n * n)};
+  }
 };
 
 /// `dare` and `care` within what is left; RiccatiError::no_convergence once that is done.
