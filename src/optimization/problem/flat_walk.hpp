@@ -40,56 +40,69 @@ void take_apart(const ExpressionGraph& graph, const std::vector<double>& numbers
                 std::vector<Part>& stack, Part root, double& offset, Linear&& linear, Leaf&& leaf) {
   using expression::Operation;
   const expression::Node* const nodes = graph.nodes().data();
-  stack.assign(1, root);
-  while (!stack.empty()) {
-    const auto [i, c] = stack.back();
-    stack.pop_back();
+  stack.clear();
+  // What a node leads to first is gone to at once, only what comes after waits.
+  for (Part at = root;;) {
+    const auto [i, c] = at;
     const expression::Node& node = nodes[i];
+    bool goes_on = false;
+    const auto go = [&](std::uint32_t to, double factor) {
+      at = {to, factor};
+      goes_on = true;
+    };
     if (graph.degree(i) == Degree::constant) {
       offset += c * numbers[i];
-      continue;
+    } else {
+      switch (node.operation) {
+        case Operation::input:
+          linear(static_cast<int>(node.a), c);
+          break;
+        case Operation::add:
+          stack.push_back({node.b, c});
+          go(node.a, c);
+          break;
+        case Operation::subtract:
+          stack.push_back({node.b, -c});
+          go(node.a, c);
+          break;
+        case Operation::negate:
+          go(node.a, -c);
+          break;
+        case Operation::multiply:
+          if (graph.degree(node.a) == Degree::constant) {
+            go(node.b, c * numbers[node.a]);
+          } else if (graph.degree(node.b) == Degree::constant) {
+            go(node.a, c * numbers[node.b]);
+          } else {
+            leaf(at);
+          }
+          break;
+        case Operation::divide:
+          if (graph.degree(node.b) == Degree::constant) {
+            go(node.a, c / numbers[node.b]);
+          } else {
+            leaf(at);
+          }
+          break;
+        case Operation::power:
+          if (graph.degree(i) == Degree::linear) {  // x¹
+            go(node.a, c);
+          } else {
+            leaf(at);
+          }
+          break;
+        default:
+          leaf(at);
+          break;
+      }
     }
-    switch (node.operation) {
-      case Operation::input:
-        linear(static_cast<int>(node.a), c);
-        continue;
-      case Operation::add:
-        stack.push_back({node.b, c});
-        stack.push_back({node.a, c});
-        continue;
-      case Operation::subtract:
-        stack.push_back({node.b, -c});
-        stack.push_back({node.a, c});
-        continue;
-      case Operation::negate:
-        stack.push_back({node.a, -c});
-        continue;
-      case Operation::multiply:
-        if (graph.degree(node.a) == Degree::constant) {
-          stack.push_back({node.b, c * numbers[node.a]});
-          continue;
-        }
-        if (graph.degree(node.b) == Degree::constant) {
-          stack.push_back({node.a, c * numbers[node.b]});
-          continue;
-        }
-        break;
-      case Operation::divide:
-        if (graph.degree(node.b) == Degree::constant) {
-          stack.push_back({node.a, c / numbers[node.b]});
-          continue;
-        }
-        break;
-      case Operation::power:
-        if (graph.degree(i) == Degree::linear) {  // x¹
-          stack.push_back({node.a, c});
-          continue;
-        }
-        break;
-      default:
-        break;
+    if (!goes_on) {
+      if (stack.empty()) {
+        return;
+      }
+      at = stack.back();
+      stack.pop_back();
     }
-    leaf(Part{i, c});
   }
 }
 

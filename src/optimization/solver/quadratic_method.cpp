@@ -11,6 +11,7 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
+using flyball::detail::has_wide_vectors;
 
 /// How far the complementarity falls before a run keeps where the next one may begin.
 constexpr double middle = 1e-2;
@@ -24,9 +25,11 @@ double largest(const VectorXd& v) {
 QuadraticMethod::QuadraticMethod(Program& program) : program_(program) {
   const Index n = program.variables();
   const Index m = program.constraints();
-  for (VectorXd* v : {&w_,          &zl_,       &zu_, &sl_, &su_,  &free_,       &g_,
-                      &rd_,         &diagonal_, &rw_, &dw_, &dzl_, &dzu_,        &affine_w_,
-                      &residual_w_, &fix_w_,    &hw_, &il_, &iu_,  &low_target_, &high_target_}) {
+  for (VectorXd* v :
+       {&w_,          &zl_,       &zu_,      &sl_,      &su_,  &free_,       &g_,
+        &rd_,         &diagonal_, &rw_,      &dw_,      &dzl_, &dzu_,        &affine_w_,
+        &residual_w_, &fix_w_,    &hw_,      &il_,      &iu_,  &low_target_, &high_target_,
+        &low_,        &high_,     &has_low_, &has_high_}) {
     v->setZero(n);
   }
   for (VectorXd* v : {&lambda_, &c0_, &c_, &D_, &dl_, &affine_l_, &residual_c_, &fix_c_, &hc_}) {
@@ -39,16 +42,40 @@ QuadraticMethod::QuadraticMethod(Program& program) : program_(program) {
   middle_lambda_.resize(m);
 }
 
+BoundArrays QuadraticMethod::bound_arrays() {
+  return {.count = static_cast<std::size_t>(w_.size()),
+          .low = low_.data(),
+          .high = high_.data(),
+          .has_low = has_low_.data(),
+          .has_high = has_high_.data(),
+          .free = free_.data(),
+          .hw = hw_.data(),
+          .g = g_.data(),
+          .affine = affine_w_.data(),
+          .dw = dw_.data(),
+          .w = w_.data(),
+          .zl = zl_.data(),
+          .zu = zu_.data(),
+          .sl = sl_.data(),
+          .su = su_.data(),
+          .il = il_.data(),
+          .iu = iu_.data(),
+          .diagonal = diagonal_.data(),
+          .rw = rw_.data(),
+          .rd = rd_.data(),
+          .dzl = dzl_.data(),
+          .dzu = dzu_.data(),
+          .low_target = low_target_.data(),
+          .high_target = high_target_.data()};
+}
+
 void QuadraticMethod::distances() {
-  for (Index i = 0; i < w_.size(); ++i) {
-    sl_(i) = free_(i) > 0.0 ? w_(i) - program_.lower(i) : infinity;
-    su_(i) = free_(i) > 0.0 ? program_.upper(i) - w_(i) : infinity;
-  }
+  FLYBALL_RUN_KERNEL(measure_bounds, bound_arrays());
 }
 
 void QuadraticMethod::residuals() {
   program_.multiply(w_, lambda_, hw_, hc_);  // H w + Aᵀ λ, A w
-  rd_ = ((hw_ + g_ - zl_ + zu_).array() * free_.array()).matrix();
+  errors_ = FLYBALL_RUN_KERNEL(judge_bounds, bound_arrays());
   c_ = hc_ + c0_;
 }
 
@@ -81,8 +108,14 @@ bool QuadraticMethod::take_constants() {
   pairs_ = 0;
   for (Index i = 0; i < w_.size(); ++i) {
     free_(i) = lower(i) == upper(i) ? 0.0 : 1.0;
-    pairs_ += free_(i) > 0.0 && lower(i) > -infinity ? 1 : 0;
-    pairs_ += free_(i) > 0.0 && upper(i) < infinity ? 1 : 0;
+    constexpr double none = 1e300;
+    const bool low = free_(i) > 0.0 && lower(i) > -infinity;
+    const bool high = free_(i) > 0.0 && upper(i) < infinity;
+    has_low_(i) = low ? 1.0 : 0.0;
+    has_high_(i) = high ? 1.0 : 0.0;
+    low_(i) = low ? lower(i) : -none;
+    high_(i) = high ? upper(i) : none;
+    pairs_ += (low ? 1 : 0) + (high ? 1 : 0);
   }
   // The constant parts, where all variables are zero but for those that are fixed.
   fix_w_.setZero();
@@ -171,30 +204,22 @@ bool QuadraticMethod::begin(bool warm) {
 
 bool QuadraticMethod::converged(double tolerance) {
   residuals();
-  double gap = 0.0;
-  double most = 0.0;
-  for (Index i = 0; i < w_.size(); ++i) {
-    const double low = zl_(i) > 0.0 ? sl_(i) * zl_(i) : 0.0;
-    const double high = zu_(i) > 0.0 ? su_(i) * zu_(i) : 0.0;
-    gap += low + high;
-    most = std::max(most, std::max(low, high));
-  }
-  mu_ = pairs_ > 0 ? gap / pairs_ : 0.0;
+  mu_ = pairs_ > 0 ? errors_.gap / pairs_ : 0.0;
   const auto n = static_cast<double>(w_.size() + 1);
   const auto m = static_cast<double>(lambda_.size() + 1);
-  const double bounds = zl_.lpNorm<1>() + zu_.lpNorm<1>();
+  const double bounds = errors_.multipliers;
   const double dual_scale = std::max(100.0, (lambda_.lpNorm<1>() + bounds) / (m + n)) / 100.0;
   last_.infeasibility = largest(c_);
-  last_.optimality = largest(rd_) / dual_scale;
-  last_.complementarity = most / (std::max(100.0, bounds / n) / 100.0);
+  last_.optimality = errors_.dual / dual_scale;
+  last_.complementarity = errors_.most / (std::max(100.0, bounds / n) / 100.0);
   last_.barrier = mu_;
   // f = f₀ + gᵀw + ½ wᵀHw, of hw = Hw + Aᵀλ and hc = Aw.
-  f_ = f0_ + g_.dot(w_) + 0.5 * (w_.dot(hw_) - lambda_.dot(hc_));
+  f_ = f0_ + errors_.slope + 0.5 * (errors_.moment - lambda_.dot(hc_));
   last_.cost = f_;
   // The last digits of inputs that the cost hardly feels are worth a step more.
   const double worst =
       std::max(std::max(last_.infeasibility, last_.optimality), 10.0 * last_.complementarity);
-  return worst <= tolerance && std::isfinite(f_ + rd_.sum() + c_.sum());
+  return worst <= tolerance && std::isfinite(f_ + errors_.dual_sum + c_.sum());
 }
 
 SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool warm) {
@@ -238,7 +263,7 @@ SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool
     // A step along a line takes its share off the residuals; where it did not, the system was not
     // solved well, and is solved again for what it leaves from now on.
     refined_ = refined_ || largest(c_) > expected_primal + 0.05 * options.tolerance ||
-               largest(rd_) > expected_dual + 0.05 * options.tolerance;
+               errors_.dual > expected_dual + 0.05 * options.tolerance;
     if (last_.number > 0 && watch(last_)) {
       return SolveStatus::stopped;
     }
@@ -263,68 +288,36 @@ SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool
       return is_good ? SolveStatus::acceptable : SolveStatus::no_progress;
     }
 
-    il_ = sl_.cwiseInverse();
-    iu_ = su_.cwiseInverse();
-    diagonal_ = zl_.cwiseProduct(il_) + zu_.cwiseProduct(iu_);
-    diagonal_.array() += 1e-12 * size_;
+    const BoundArrays bounds = bound_arrays();
+    FLYBALL_RUN_KERNEL(weigh_bounds, bounds, 1e-12 * size_);
     ++counts_.factorizations;
     if (!program_.factor(diagonal_, D_, true)) {
       return is_good ? SolveStatus::acceptable : SolveStatus::no_progress;
     }
-    // Predictor: straight for complementarity zero.
-    rw_ = ((hw_ + g_).array() * free_.array()).matrix();
+    // Predictor: straight for complementarity zero. Steps end where the first distance or
+    // multiplier would vanish.
     solve(affine_w_, affine_l_, false);
-    // Steps end where the first distance or multiplier would vanish; of the predictor
-    // Δz/z = -1 - Δs/s.
-    double most_primal = 1.0;
-    double most_dual = 1.0;
-    for (Index i = 0; i < w_.size(); ++i) {
-      const double low = affine_w_(i) * il_(i);
-      const double high = affine_w_(i) * iu_(i);
-      most_primal = std::max(most_primal, std::max(-low, high));
-      most_dual = std::max(
-          most_dual, std::max(zl_(i) > 0.0 ? 1.0 + low : 0.0, zu_(i) > 0.0 ? 1.0 - high : 0.0));
-      dzl_(i) = -zl_(i) - zl_(i) * low;
-      dzu_(i) = -zu_(i) + zu_(i) * high;
-    }
-    double primal = 1.0 / most_primal;
-    double dual = 1.0 / most_dual;
-    double gap = 0.0;
-    for (Index i = 0; i < w_.size(); ++i) {
-      gap += zl_(i) > 0.0 ? (sl_(i) + primal * affine_w_(i)) * (zl_(i) + dual * dzl_(i)) : 0.0;
-      gap += zu_(i) > 0.0 ? (su_(i) - primal * affine_w_(i)) * (zu_(i) + dual * dzu_(i)) : 0.0;
-    }
-    const double reached = pairs_ > 0 ? gap / pairs_ : 0.0;
+    const BoundSteps straight = FLYBALL_RUN_KERNEL(predict_bounds, bounds);
+    double primal = 1.0 / straight.primal;
+    double dual = 1.0 / straight.dual;
+    const double reached =
+        pairs_ > 0 ? std::max(0.0, (1.0 - dual) * mu_ + ((primal - dual) * straight.along +
+                                                         primal * dual * straight.across) /
+                                                            pairs_)
+                   : 0.0;
     const double ratio = mu_ > 0.0 ? reached / mu_ : 0.0;
     double centering = std::min(1.0, ratio * ratio * ratio);
     // After a short step: to the middle first.
     if (last_.number > 0 && last_.step < 0.1) {
       centering = std::max(centering, 0.5);
     }
-    const double target = centering * mu_;
     // Corrector: for the products of the predictor, and to the center.
-    for (Index i = 0; i < w_.size(); ++i) {
-      const double low = zl_(i) > 0.0 ? (target - affine_w_(i) * dzl_(i)) * il_(i) : 0.0;
-      const double high = zu_(i) > 0.0 ? (target + affine_w_(i) * dzu_(i)) * iu_(i) : 0.0;
-      rw_(i) = (hw_(i) + g_(i) - low + high) * free_(i);
-      low_target_(i) = low;
-      high_target_(i) = high;
-    }
+    FLYBALL_RUN_KERNEL(aim_bounds, bounds, centering * mu_);
     solve(dw_, dl_, refined_);
     const double keep = std::max(0.995, 1.0 - mu_);
-    most_primal = keep;
-    most_dual = keep;
-    for (Index i = 0; i < w_.size(); ++i) {
-      const double low = dw_(i) * il_(i);
-      const double high = dw_(i) * iu_(i);
-      most_primal = std::max(most_primal, std::max(-low, high));
-      dzl_(i) = low_target_(i) - zl_(i) - zl_(i) * low;
-      dzu_(i) = high_target_(i) - zu_(i) + zu_(i) * high;
-      most_dual = zl_(i) > 0.0 ? std::max(most_dual, -dzl_(i) / zl_(i)) : most_dual;
-      most_dual = zu_(i) > 0.0 ? std::max(most_dual, -dzu_(i) / zu_(i)) : most_dual;
-    }
-    primal = keep / most_primal;
-    dual = keep / most_dual;
+    const BoundSteps longest = FLYBALL_RUN_KERNEL(correct_bounds, bounds, keep);
+    primal = keep / longest.primal;
+    dual = keep / longest.dual;
     if (pairs_ == 0) {
       primal = dual = 1.0;
     }
@@ -332,12 +325,9 @@ SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool
       primal = dual = std::min(primal, dual);
     }
     expected_primal = (1.0 - primal) * largest(c_);
-    expected_dual = has_curvature_ ? (1.0 - dual) * largest(rd_) : infinity;
-    w_ += primal * dw_;
+    expected_dual = has_curvature_ ? (1.0 - dual) * errors_.dual : infinity;
+    FLYBALL_RUN_KERNEL(advance_bounds, bounds, primal, dual);
     lambda_ += dual * dl_;
-    zl_ += dual * dzl_;
-    zu_ += dual * dzu_;
-    distances();
     last_.step = primal;
     last_.dual_step = dual;
     last_.trials = 1;

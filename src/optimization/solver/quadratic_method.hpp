@@ -5,6 +5,7 @@
 #include <flyball/core/function_ref.hpp>
 #include <flyball/optimization/solver/solution.hpp>
 
+#include "optimization/solver/bound_kernel.hpp"
 #include "optimization/solver/program.hpp"
 
 namespace flyball::optimization::detail {
@@ -48,12 +49,16 @@ class QuadraticMethod {
   [[nodiscard]] bool proves_unbounded();
 
   Program& program_;
+  [[nodiscard]] BoundArrays bound_arrays();
+
   Eigen::VectorXd w_, lambda_, zl_, zu_, sl_, su_, free_;
+  Eigen::VectorXd low_, high_, has_low_, has_high_;  // as the sweeps over bounds take them
   Eigen::VectorXd g_, c0_, c_, rd_, diagonal_, D_, rw_, dw_, dl_, dzl_, dzu_, affine_w_, affine_l_;
   Eigen::VectorXd residual_w_, residual_c_, fix_w_, fix_c_, hw_, hc_, certificate_, low_target_,
       high_target_, il_, iu_;
   Eigen::VectorXd middle_w_, middle_lambda_, middle_zl_, middle_zu_;  // where the next run begins
   bool has_middle_ = false;
+  BoundErrors errors_;
   double f_ = 0.0, f0_ = 0.0, mu_ = 0.0, size_ = 1.0;
   int pairs_ = 0;
   bool has_curvature_ = false;
