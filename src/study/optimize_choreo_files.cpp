@@ -156,6 +156,27 @@ std::array<Vector2d, 4> forces_of(const DriveModel& model, const DriveSample& sa
   return forces;
 }
 
+/// Time, pose and the rate of turning; the rest depends on the drive.
+ChoreoSample pose_sample(const DriveSample& from) {
+  ChoreoSample sample;
+  sample.time = from.time;
+  sample.x = from.x;
+  sample.y = from.y;
+  sample.heading = from.heading;
+  sample.omega = from.omega;
+  return sample;
+}
+
+/// Events' times count from a waypoint's.
+void time_events(std::vector<ChoreoEvent>& events, const DriveSolution& solution) {
+  for (ChoreoEvent& event : events) {
+    if (event.target && *event.target >= 0 &&
+        *event.target < static_cast<int>(solution.waypoint_times.size())) {
+      event.target_timestamp = solution.waypoint_times[static_cast<std::size_t>(*event.target)];
+    }
+  }
+}
+
 /// A project as Choreo makes it, without trajectories.
 constexpr std::string_view new_project = R"({
  "name":"",
@@ -258,19 +279,9 @@ ChoreoTrajectory choreo_of(const OptimizeTask& task, const DriveSolution& soluti
       generated.splits.push_back(solution.waypoint_samples[i]);
     }
   }
-  for (ChoreoEvent& event : file.events) {  // whose times count from a waypoint's
-    if (event.target && *event.target >= 0 &&
-        *event.target < static_cast<int>(solution.waypoint_times.size())) {
-      event.target_timestamp = solution.waypoint_times[static_cast<std::size_t>(*event.target)];
-    }
-  }
+  time_events(file.events, solution);
   for (const DriveSample& s : solution.samples) {
-    ChoreoSample sample;
-    sample.time = s.time;
-    sample.x = s.x;
-    sample.y = s.y;
-    sample.heading = s.heading;
-    sample.omega = s.omega;
+    ChoreoSample sample = pose_sample(s);
     sample.alpha = s.alpha;
     if (sides) {
       sample.vl = s.left;
@@ -323,14 +334,9 @@ Expected<ChoreoProject> choreo_project_of(const OptimizeResult& result) {
     }
     path.trajectory.clear();
     for (const DriveSample& s : solution.samples) {
-      ChoreoSample sample;
-      sample.time = s.time;
-      sample.x = s.x;
-      sample.y = s.y;
-      sample.heading = s.heading;
+      ChoreoSample sample = pose_sample(s);
       sample.vx = s.vx;
       sample.vy = s.vy;
-      sample.omega = s.omega;
       path.trajectory.push_back(std::move(sample));
     }
     path.trajectory_waypoints.clear();
@@ -344,12 +350,7 @@ Expected<ChoreoProject> choreo_project_of(const OptimizeResult& result) {
       waypoint.heading.value = at.heading;
       path.trajectory_waypoints.push_back(std::move(waypoint));
     }
-    for (ChoreoEvent& event : path.events) {
-      if (event.target && *event.target >= 0 &&
-          *event.target < static_cast<int>(solution.waypoint_times.size())) {
-        event.target_timestamp = solution.waypoint_times[static_cast<std::size_t>(*event.target)];
-      }
-    }
+    time_events(path.events, solution);
   }
   return project;
 }

@@ -44,6 +44,7 @@ std::uint32_t ExpressionGraph::parameter(double value) {
 
 std::uint32_t ExpressionGraph::unary(Operation operation, std::uint32_t a) {
   const Degree degree = degrees_[a];
+  has_kinks_ = has_kinks_ || operation == Operation::abs || operation == Operation::sqrt;
   nodes_.push_back({operation, a, 0, 0});
   degrees_.push_back(
       operation == Operation::negate || degree == Degree::constant ? degree : Degree::nonlinear);
@@ -53,6 +54,7 @@ std::uint32_t ExpressionGraph::unary(Operation operation, std::uint32_t a) {
 std::uint32_t ExpressionGraph::binary(Operation operation, std::uint32_t a, std::uint32_t b) {
   const Degree of_a = degrees_[a];
   const Degree of_b = degrees_[b];
+  has_kinks_ = has_kinks_ || operation == Operation::minimum || operation == Operation::maximum;
   Degree degree = Degree::nonlinear;
   if (of_a == Degree::constant && of_b == Degree::constant) {
     degree = Degree::constant;

@@ -10,6 +10,7 @@
 #include "core/error_rows.hpp"
 #include "core/format.hpp"
 #include "optimization/problem/flat_problem.hpp"
+#include "optimization/problem/kinks.hpp"
 #include "optimization/problem/sparse_program.hpp"
 #include "optimization/solver/interior_point.hpp"
 #include "optimization/solver/kept_memory.hpp"
@@ -59,6 +60,13 @@ struct Problem::Parts {
   };
   std::vector<Named> names{};
   std::optional<Error> error{};
+  detail::KinkFree kink_free{};
+  bool is_lifted = false;  // whether it is that which is solved
+
+  [[nodiscard]] const Expression& stated_cost() const { return is_lifted ? kink_free.cost : cost; }
+  [[nodiscard]] const Constraints& stated_constraints() const {
+    return is_lifted ? kink_free.constraints : constraints;
+  }
 
   std::unique_ptr<SparseProgram> program{};
   std::unique_ptr<InteriorPoint> general{};
@@ -160,6 +168,9 @@ void Problem::subject_to(const Constraints& constraints, std::string_view name) 
 }
 
 std::string Problem::Parts::name_of(std::size_t constraint) const {
+  if (constraint >= constraints.size() && is_lifted) {
+    return "an absolute value, minimum or maximum";
+  }
   const auto after =
       std::upper_bound(names.begin(), names.end(), constraint,
                        [](std::size_t c, const Named& named) { return c < named.first; });
@@ -297,6 +308,12 @@ ProblemSolution Problem::Parts::run(FlatProblem* flat, const SolverOptions& opti
     solution.complementarity = method.last().complementarity;
     solution.cost = direction * method.objective() / p.objective_scale();
   };
+  if (is_lifted && !is_warm) {
+    kink_free.start(graph);
+  }
+  const auto is_users = [&](int number) {
+    return static_cast<std::size_t>(number) < constraints.size();
+  };
   const VectorXd begin = is_warm ? VectorXd() : p.start(graph.values);
   if (p.is_quadratic()) {
     if (!quadratic) {
@@ -314,11 +331,19 @@ ProblemSolution Problem::Parts::run(FlatProblem* flat, const SolverOptions& opti
     if (status == SolveStatus::infeasible) {
       solution.certificate.setZero(static_cast<Index>(constraints.size()));
       for (int r = 0; r < p.constraints(); ++r) {
-        solution.certificate(stated.constraint[static_cast<std::size_t>(r)]) =
-            quadratic->certificate()(r) * p.row_scale(r);
+        if (const auto number = stated.constraint[static_cast<std::size_t>(r)]; is_users(number)) {
+          solution.certificate(number) = quadratic->certificate()(r) * p.row_scale(r);
+        }
       }
     } else if (status == SolveStatus::unbounded) {
       solution.certificate = quadratic->certificate().head(static_cast<Index>(graph.inputs()));
+      Index kept = 0;
+      for (std::size_t i = 0; is_lifted && i < graph.inputs(); ++i) {
+        if (!kink_free.is_own(graph, i)) {
+          solution.certificate(kept++) = solution.certificate(static_cast<Index>(i));
+        }
+      }
+      solution.certificate.conservativeResize(is_lifted ? kept : solution.certificate.size());
     }
   }
   if (status == SolveStatus::no_progress) {  // not quadratic, or not convex
@@ -361,7 +386,8 @@ ProblemSolution Problem::Parts::run(FlatProblem* flat, const SolverOptions& opti
                                         : name_of(static_cast<std::size_t>(
                                               stated.constraint[static_cast<std::size_t>(kink)]));
       solution.message = flyball::detail::format(
-          "no progress: {} has a kink where this ended; a variable t with -t <= y and y <= t is "
+          "no progress: {} has a kink near where this ended; a variable t with -t <= y and y <= t "
+          "is "
           "smooth where |y| and sqrt(y^2) are not",
           what);
     }
@@ -371,19 +397,20 @@ ProblemSolution Problem::Parts::run(FlatProblem* flat, const SolverOptions& opti
   // Multipliers: L = f - Σ λᵢ cᵢ, those of inequalities not negative.
   solution.multipliers.setZero(static_cast<Index>(constraints.size()));
   for (int r = 0; r < p.constraints(); ++r) {
-    solution.multipliers(stated.constraint[static_cast<std::size_t>(r)]) =
-        -(*lambda)(r)*p.row_scale(r) / p.objective_scale();
+    if (const auto number = stated.constraint[static_cast<std::size_t>(r)]; is_users(number)) {
+      solution.multipliers(number) = -(*lambda)(r)*p.row_scale(r) / p.objective_scale();
+    }
   }
   for (std::size_t i = 0; i < graph.inputs(); ++i) {
     const auto k = static_cast<Index>(i);
     if (stated.lower[i] == stated.upper[i]) {
       continue;
     }
-    if (stated.lower_from[i] >= 0) {
+    if (stated.lower_from[i] >= 0 && is_users(stated.lower_from[i])) {
       solution.multipliers(stated.lower_from[i]) =
           (*zl)(k) / stated.lower_slope[i] / p.objective_scale();
     }
-    if (stated.upper_from[i] >= 0) {
+    if (stated.upper_from[i] >= 0 && is_users(stated.upper_from[i])) {
       solution.multipliers(stated.upper_from[i]) =
           -(*zu)(k) / stated.upper_slope[i] / p.objective_scale();
     }
@@ -417,10 +444,16 @@ Expected<ProblemSolution> Problem::solve(const SolverOptions& options,
   FlatProblem flat;
   const bool same = parts.solved_parameters == parts.graph.parameter_values;
   parts.solved_parameters.clear();  // until the program has the numbers
-  const bool is_new = !parts.program ||
-                      (!same && !parts.program->renew(parts.graph, parts.cost, parts.constraints));
+  if (!parts.program) {
+    parts.is_lifted = parts.graph.has_kinks() &&
+                      parts.kink_free.state(parts.graph, parts.cost, parts.sign, parts.constraints);
+  }
+  const Expression& cost = parts.stated_cost();
+  const Constraints& constraints = parts.stated_constraints();
+  const bool is_new =
+      !parts.program || (!same && !parts.program->renew(parts.graph, cost, constraints));
   if (is_new) {
-    flat = detail::flatten(parts.graph, parts.cost, parts.sign, parts.constraints);
+    flat = detail::flatten(parts.graph, cost, parts.sign, constraints);
     if (flat.not_finite != -1) {
       return tl::unexpected(
           Error(ProblemError::not_finite)

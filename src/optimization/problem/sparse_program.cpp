@@ -400,39 +400,60 @@ SparseProgram::Fault SparseProgram::find_fault(const VectorXd& w) {
 }
 
 int SparseProgram::find_kink(const VectorXd& w) {
-  constexpr double distance = 1e-6;
   constexpr double jump = 0.1;
+  constexpr int halvings = 20;
   const VectorXd along = (1.0 + w.array().abs()).matrix();
-  VectorXd gradient[2];
-  VectorXd slope[2];  // of the constraints along it
   const VectorXd none = VectorXd::Zero(m_);
   VectorXd ignored = VectorXd::Zero(w.size());
-  for (const int side : {0, 1}) {
-    gradient[side].setZero(w.size());
-    slope[side].setZero(m_);
-    const VectorXd at = w + (side == 0 ? -distance : distance) * along;
-    if (!derivatives(at, none, 1.0, gradient[side])) {
+  /// The cost's slopes, then those of the constraints along the way.
+  const auto slopes = [&](double place, VectorXd& all) {
+    VectorXd gradient = VectorXd::Zero(w.size());
+    VectorXd slope = VectorXd::Zero(m_);
+    if (!derivatives(w + place * along, none, 1.0, gradient)) {
+      return false;
+    }
+    multiply(along, none, ignored, slope);
+    all.resize(w.size() + m_);
+    all << gradient, slope;
+    return true;
+  };
+  const auto change = [](double before, double behind) {
+    return std::abs(behind - before) / std::max({1e-3, std::abs(before), std::abs(behind)});
+  };
+  for (const double distance : {1e-6, 1e-4, 1e-2}) {
+    VectorXd before, behind, middle;
+    if (!slopes(-distance, before) || !slopes(distance, behind)) {
       return -2;
     }
-    multiply(along, none, ignored, slope[side]);
-  }
-  int worst = -2;
-  double most = jump;
-  const auto look = [&](int row, double before, double behind) {
-    const double size =
-        std::abs(behind - before) / std::max({1e-3, std::abs(before), std::abs(behind)});
-    if (size > most) {
-      most = size;
-      worst = row;
+    Index worst = -1;
+    double most = jump;
+    for (Index i = 0; i < before.size(); ++i) {
+      if (const double size = change(before(i), behind(i)); size > most) {
+        most = size;
+        worst = i;
+      }
     }
-  };
-  for (Index i = 0; i < w.size(); ++i) {
-    look(-1, gradient[0](i), gradient[1](i));
+    if (worst < 0) {
+      continue;
+    }
+    // What is curved changes less over less of the way, a kink by the same.
+    double low = -distance;
+    double high = distance;
+    for (int k = 0; k < halvings; ++k) {
+      const double place = 0.5 * (low + high);
+      if (!slopes(place, middle)) {
+        return -2;
+      }
+      const bool first =
+          change(before(worst), middle(worst)) > change(middle(worst), behind(worst));
+      (first ? high : low) = place;
+      (first ? behind : before).swap(middle);
+    }
+    if (change(before(worst), behind(worst)) > 0.5 * most) {
+      return worst < w.size() ? -1 : static_cast<int>(worst - w.size());
+    }
   }
-  for (Index r = 0; r < m_; ++r) {
-    look(static_cast<int>(r), slope[0](r), slope[1](r));
-  }
-  return worst;
+  return -2;
 }
 
 }  // namespace flyball::optimization::detail

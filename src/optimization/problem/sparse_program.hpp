@@ -61,8 +61,8 @@ class SparseProgram final : public Program {
     bool derivative = false;
   };
   [[nodiscard]] Fault find_fault(const Eigen::VectorXd& w);
-  /// What has another slope a millionth before a point than behind it, as |y| has at zero, looked
-  /// at along the direction in which all variables grow.
+  /// What has another slope before a point than behind it, as |y| has at zero: from a millionth to
+  /// a hundredth away, along the direction in which all variables grow.
   /// @return the row, -1 for the cost, -2 where nothing has.
   [[nodiscard]] int find_kink(const Eigen::VectorXd& w);
 

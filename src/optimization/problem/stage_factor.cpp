@@ -62,7 +62,7 @@ bool StageFactor::find_levels(const SparsePattern& p) {
     const auto i = static_cast<std::size_t>(queue[at]);
     for (int q = start[i]; q < start[i + 1]; ++q) {
       const auto r = static_cast<std::size_t>(rows_of[static_cast<std::size_t>(q)]);
-      if (row_seen[r] != 0) {
+      if (row_seen[r] != 0 || p.equality[r] == 0) {
         continue;
       }
       row_seen[r] = 1;
@@ -75,7 +75,44 @@ bool StageFactor::find_levels(const SparsePattern& p) {
       }
     }
   }
-  return queue.size() == n;
+  return queue.size() == n || join_by_inequalities(p, queue.size());
+}
+
+/// What only inequalities reach (bounds of what a cost adds up, what a limit may be missed by) is
+/// an input of the stage whose states and inputs they hold it to.
+/// @param known  How many variables have levels.
+bool StageFactor::join_by_inequalities(const SparsePattern& p, std::size_t known) {
+  std::vector<unsigned char> is_state(level_.size(), 0);
+  const auto each_of = [&](std::size_t row, auto&& see) {
+    for (int e = p.row_start[row]; e < p.row_start[row + 1]; ++e) {
+      see(static_cast<std::size_t>(p.columns[static_cast<std::size_t>(e)]));
+    }
+  };
+  const auto rows = static_cast<std::size_t>(p.rows);
+  for (std::size_t r = 0; r < rows; ++r) {
+    int high = -1;
+    each_of(r, [&](std::size_t j) { high = std::max(high, level_[j]); });
+    each_of(r, [&](std::size_t j) {
+      is_state[j] = p.equality[r] != 0 && level_[j] == high - 1 ? 1 : is_state[j];
+    });
+  }
+  for (bool moved = true; moved && known < level_.size();) {
+    moved = false;
+    for (std::size_t r = 0; r < rows; ++r) {
+      int level = -1;
+      each_of(r, [&](std::size_t j) {
+        level = std::max(level, level_[j] < 0 ? -1 : level_[j] + (is_state[j] != 0 ? 1 : 0));
+      });
+      each_of(r, [&](std::size_t j) {
+        if (level >= 0 && level_[j] < 0) {
+          level_[j] = level;
+          ++known;
+          moved = true;
+        }
+      });
+    }
+  }
+  return known == level_.size();
 }
 
 /// A variable that rows to the level after its own need is a state, others are inputs of the stage

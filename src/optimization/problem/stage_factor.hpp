@@ -59,6 +59,7 @@ class StageFactor {
   };
 
   [[nodiscard]] bool find_levels(const SparsePattern& pattern);
+  [[nodiscard]] bool join_by_inequalities(const SparsePattern& p, std::size_t known);
   [[nodiscard]] bool find_roles(const SparsePattern& pattern);
   [[nodiscard]] bool lay_out(const SparsePattern& pattern);
 

@@ -101,6 +101,25 @@ void QuadraticMethod::solve(VectorXd& dw, VectorXd& dl, bool refined) {
   }
 }
 
+/// Where pivots cancel, as at a vertex that more bounds meet at than it takes, steps are held to
+/// where they begin, the shorter the less is left to solve.
+/// @param is_convex  Whether it is known that nothing else spoils a factorisation.
+bool QuadraticMethod::factor(bool is_convex) {
+  double added = 0.0;
+  for (const double held : {0.0, 1e-10, 1e-8, 1e-6}) {
+    if (held > 0.0 && !is_convex) {
+      return false;
+    }
+    diagonal_.array() += held * size_ - added;
+    added = held * size_;
+    ++counts_.factorizations;
+    if (program_.factor(diagonal_, D_, true)) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /// What does not change from step to step.
 bool QuadraticMethod::take_constants() {
   const VectorXd& lower = program_.lower;
@@ -290,8 +309,7 @@ SolveStatus QuadraticMethod::run(const SolverOptions& options, Watch watch, bool
 
     const BoundArrays bounds = bound_arrays();
     FLYBALL_RUN_KERNEL(weigh_bounds, bounds, 1e-12 * size_);
-    ++counts_.factorizations;
-    if (!program_.factor(diagonal_, D_, true)) {
+    if (!factor(is_good || !has_curvature_)) {
       return is_good ? SolveStatus::acceptable : SolveStatus::no_progress;
     }
     // Predictor: straight for complementarity zero. Steps end where the first distance or

@@ -38,6 +38,7 @@ class QuadraticMethod {
 
  private:
   [[nodiscard]] bool take_constants();
+  [[nodiscard]] bool factor(bool is_convex);
   [[nodiscard]] bool settle(const SolverOptions& options);
   [[nodiscard]] bool begin(bool warm);
   void residuals();

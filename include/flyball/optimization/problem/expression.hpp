@@ -47,6 +47,8 @@ class ExpressionGraph {
   [[nodiscard]] const std::vector<Node>& nodes() const noexcept { return nodes_; }
   [[nodiscard]] Degree degree(std::uint32_t node) const noexcept { return degrees_[node]; }
   [[nodiscard]] std::size_t inputs() const noexcept { return values.size(); }
+  /// Whether there are absolute values, roots, minima or maxima.
+  [[nodiscard]] bool has_kinks() const noexcept { return has_kinks_; }
   [[nodiscard]] std::size_t parameters() const noexcept { return parameter_values.size(); }
   /// The value of a node at `values` and `parameter_values`.
   [[nodiscard]] double value(std::uint32_t node) const;
@@ -59,6 +61,7 @@ class ExpressionGraph {
  private:
   std::vector<Node> nodes_;
   std::vector<Degree> degrees_;
+  bool has_kinks_ = false;
 };
 
 }  // namespace detail
