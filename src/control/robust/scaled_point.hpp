@@ -16,6 +16,7 @@ struct ScaledPoint {
   int size = 0;
   double scale = 1.0;         ///< 2^size
   double beta = 0.0;          ///< Proven, of M.
+  double work = 0.0;          ///< That it took to find, in multiplications.
   StructuredScaling scaling;  ///< Of M itself.
 
   [[nodiscard]] Eigen::MatrixXcd coordinates_of(const Eigen::MatrixXcd& M) const;

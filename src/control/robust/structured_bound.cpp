@@ -139,7 +139,7 @@ class ScalingSearch {
     constexpr int most_levels = 80;
     constexpr double share = 0.1;
     const double scale = M_.squaredNorm();
-    StructuredBound best{scaling_at(x_), largest_at(x_)};
+    StructuredBound best{.scaling = scaling_at(x_), .squared = largest_at(x_)};
     double level = best.squared + 0.1 * std::abs(best.squared) + 1e-14 * scale;
     int idle = 0;
     for (int k = 0; k < most_levels && best.squared > enough; ++k) {
@@ -152,7 +152,8 @@ class ScalingSearch {
       }
       idle = squared > best.squared - 10.0 * accuracy * std::abs(best.squared) ? idle + 1 : 0;
       if (squared < best.squared) {
-        best = {scaling_at(x_), squared};
+        best.scaling = scaling_at(x_);
+        best.squared = squared;
       }
       // Beyond zero a form that is definite by more than rounding proves that nothing is singular.
       if (best.squared < -1e-6 * scale || idle >= 3 ||
@@ -161,6 +162,7 @@ class ScalingSearch {
       }
       level = squared + share * (level - squared);
     }
+    best.work = work_;
     return best;
   }
 
@@ -248,6 +250,9 @@ class ScalingSearch {
     constexpr int most_steps = 12;
     for (int k = 0; k < most_steps; ++k) {
       const auto count = static_cast<Index>(unknowns_.size());
+      const auto size = static_cast<double>(count);
+      const auto entries = static_cast<double>(form_.constant.size());
+      work_ += size * size * (size / 3.0 + 2.0 * entries);
       MatrixXd H = MatrixXd::Zero(count, count);
       VectorXd g = VectorXd::Zero(count);
       bool within = add_terms(form_, H, g);
@@ -322,6 +327,7 @@ class ScalingSearch {
   const UncertaintyStructure& structure_;
   std::vector<Unknown> unknowns_;
   VectorXd x_;
+  double work_ = 0.0;
   Inequality form_;
   std::vector<MatrixXcd> at_zero_, growth_;
   std::vector<Inequality> bounds_;

@@ -9,6 +9,7 @@ namespace flyball::detail {
 struct StructuredBound {
   StructuredScaling scaling;
   double squared = 0.0;  ///< β², negative where the form is definite with none.
+  double work = 0.0;     ///< What the search took, in multiplications.
 };
 
 /// The smallest bound there is; `scaling` is that of the best point of the way.

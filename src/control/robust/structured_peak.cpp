@@ -89,8 +89,16 @@ class PeakSearch {
   void visit(double frequency) {
     Visit made{frequency, detail::response_at(system_, frequency), {}, {frequency, frequency}};
     made.point = detail::scaled_point(made.M, structure_, well_below * level_, accuracy);
+    work_ += made.point.work;
     level_ = std::max(level_, above_all * made.point.beta);
     visits_.push_back(std::move(made));
+  }
+
+  /// Whether scalings took about a second: large repeated blocks have thousands of unknowns. A
+  /// level above the least is then as good.
+  [[nodiscard]] bool is_spent() const noexcept {
+    constexpr double most = 5e9;
+    return work_ > most;
   }
 
   [[nodiscard]] std::size_t highest() const {
@@ -123,7 +131,7 @@ class PeakSearch {
         visit(between(at, high));
       }
       const double now = visits_[highest()].point.beta;
-      if (round >= 3 && now <= before * (1.0 + 1e-4)) {
+      if ((round >= 3 && now <= before * (1.0 + 1e-4)) || is_spent()) {
         return;
       }
     }
@@ -174,7 +182,7 @@ class PeakSearch {
     const auto gain = h_infinity_norm(system_);
     const double norm = gain ? gain->upper_bound : 1e6 * level_;
     while (auto open = gap()) {
-      if (++since > most_visits) {
+      if (++since > most_visits || is_spent()) {
         // Whatever resists is given a higher level, at which all that holds still does.
         level_ *= raise;
         raise *= raise;
@@ -363,6 +371,7 @@ class PeakSearch {
   double slowest_ = 0.0;
   double fastest_ = 0.0;
   double level_ = 0.0;
+  double work_ = 0.0;  // of the scalings, in multiplications
   std::vector<double> first_;
   std::vector<Visit> visits_;
   std::optional<SingularMember> best_;

@@ -79,6 +79,7 @@ ScaledPoint scaled_point(const MatrixXcd& M, const UncertaintyStructure& structu
   point.out = balance.out;
   point.in = balance.in;
   point.size = balance.size;
+  point.work = bound.work;
   point.scaling.D_out = out.asDiagonal() * s.D_out * out.asDiagonal();
   point.scaling.D_in = in.asDiagonal() * s.D_in * in.asDiagonal();
   // D and G have one factor that is free: of a tiny M it keeps G among the normal numbers.
