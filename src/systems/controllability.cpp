@@ -49,14 +49,6 @@ std::vector<Eigen::VectorXd> participations(const MatrixXd& A, Eigen::VectorXcd&
   return shares;
 }
 
-Index numerical_rank(const Eigen::VectorXd& singular_values, double tolerance) {
-  Index rank = 0;
-  for (Index k = 0; k < singular_values.size(); ++k) {
-    rank += singular_values(k) > tolerance * singular_values(0) ? 1 : 0;
-  }
-  return rank;
-}
-
 MatrixXd krylov(const MatrixXd& A, const MatrixXd& B) {
   const Index n = A.rows();
   const Index m = B.cols();
@@ -183,12 +175,12 @@ double condition_of(MatrixXd krylov_matrix) {
   }
   krylov_matrix /= largest;
   constexpr double graded = 1e-100;
-  Eigen::VectorXd sizes = detail::coarse_singular_values_of(krylov_matrix);
-  if (sizes(sizes.size() - 1) <= graded * sizes(0)) {
-    sizes = graded_singular_values(krylov_matrix);
+  detail::SingularExtent extent = detail::singular_extent_of(krylov_matrix, epsilon);
+  if (extent.smallest <= graded * extent.largest) {
+    const Eigen::VectorXd sizes = graded_singular_values(krylov_matrix);
+    extent = {sizes(0), sizes(sizes.size() - 1), 0};
   }
-  const double smallest = sizes(sizes.size() - 1);
-  return smallest > 0.0 ? sizes(0) / smallest : infinity;
+  return extent.smallest > 0.0 ? extent.largest / extent.smallest : infinity;
 }
 
 /// In the pair's units, with inputs in theirs: of the given states' units where that has an answer,
@@ -364,9 +356,9 @@ Expected<Verdict> analyze(const MatrixRef& A_given, const MatrixRef& B_given, Ti
 
   if (B.cols() > 0) {
     const double unit = pair.A.norm() > 0.0 ? pair.A.norm() : 1.0;
-    const Eigen::VectorXd sizes =
-        detail::coarse_singular_values_of(krylov_factor(pair.A / unit, pair.B));
-    reach.matrix_rank = numerical_rank(sizes, static_cast<double>(n) * epsilon);
+    reach.matrix_rank = detail::singular_extent_of(krylov_factor(pair.A / unit, pair.B),
+                                                   static_cast<double>(n) * epsilon)
+                            .rank;
   }
   reach.matrix_condition = condition_of(krylov_factor(A_given, B_given));
   reach.gramian_eigenvalues = gramian_eigenvalues(A_given, pair, domain);

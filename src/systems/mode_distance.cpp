@@ -75,6 +75,59 @@ Vector<Scalar> solve_twice(const Matrix<Scalar>& R, Vector<Scalar> u, double flo
   return u;
 }
 
+/// The largest eigenvalue of a symmetric tridiagonal matrix, by bisection of its negative pivots,
+/// and its vector by inverse iteration. Cost: O(k), where a whole decomposition is O(k³).
+struct LargestPair {
+  double value = 0.0;
+  Eigen::VectorXd vector;
+};
+LargestPair largest_pair(const Eigen::VectorXd& diagonal, const Eigen::VectorXd& beside, Index k) {
+  double high = diagonal(0);
+  double low = diagonal.head(k).maxCoeff();  // no more than the eigenvalue
+  for (Index i = 0; i < k; ++i) {
+    const double before = i > 0 ? std::abs(beside(i - 1)) : 0.0;
+    const double behind = i + 1 < k ? std::abs(beside(i)) : 0.0;
+    high = std::max(high, diagonal(i) + before + behind);
+  }
+  // Whether μ - T has positive pivots alone, which are kept.
+  Eigen::VectorXd pivots(k);
+  const auto is_above = [&](double mu) {
+    for (Index i = 0; i < k; ++i) {
+      pivots(i) = mu - diagonal(i);
+      if (i > 0) {
+        pivots(i) -= beside(i - 1) * beside(i - 1) / pivots(i - 1);
+      }
+      if (!(pivots(i) > 0.0)) {
+        return false;
+      }
+    }
+    return true;
+  };
+  high += 2.0 * epsilon * std::abs(high);
+  for (int halving = 0; halving < 60 && high - low > 2.0 * epsilon * std::abs(high); ++halving) {
+    const double middle = 0.5 * low + 0.5 * high;
+    (is_above(middle) ? high : low) = middle;
+  }
+  LargestPair found{high, Eigen::VectorXd::Ones(k)};
+  // Rounding can take the last pivot; it needs them all.
+  double step = 4.0 * epsilon * std::abs(high);
+  for (int more = 0; more < 40 && !is_above(high); ++more, step *= 2.0) {
+    high += step;
+  }
+  for (int pass = 0; pass < 3; ++pass) {
+    Eigen::VectorXd& v = found.vector;
+    for (Index i = 1; i < k; ++i) {
+      v(i) += beside(i - 1) / pivots(i - 1) * v(i - 1);
+    }
+    v(k - 1) /= pivots(k - 1);
+    for (Index i = k - 1; i-- > 0;) {
+      v(i) = (v(i) + beside(i) * v(i + 1)) / pivots(i);
+    }
+    v.normalize();
+  }
+  return found;
+}
+
 /// The largest eigenvalue of (R Rᴴ)⁻¹ by Lanczos's iteration, all vectors kept orthogonal; ended by
 /// the residual of its eigenvector.
 template <class Scalar>
@@ -88,18 +141,18 @@ PencilMinimum smallest_of(const Matrix<Scalar>& R) {
   const double floor = 1e-3 * epsilon * size;
   const Index most = std::min<Index>(n, 60);
   Matrix<Scalar> basis(n, most);
-  MatrixXd tridiagonal = MatrixXd::Zero(most, most);
+  Eigen::VectorXd diagonal(most);
+  Eigen::VectorXd beside(most);
   // Any vector will do that is not orthogonal to the one sought.
   Vector<Scalar> q(n);
   for (Index k = 0; k < n; ++k) {
     q(k) = Scalar(1.0 + 0.5 * std::cos(2.4 * static_cast<double>(k + 1)));
   }
   q.normalize();
-  Index next_look = 2;
   for (Index k = 0; k < most; ++k) {
     basis.col(k) = q;
     Vector<Scalar> w = solve_twice<Scalar>(R, q, floor);
-    tridiagonal(k, k) = std::real(q.dot(w));
+    diagonal(k) = std::real(q.dot(w));
     const auto known = basis.leftCols(k + 1);
     const double before = w.norm();
     for (int pass = 0; pass < 2; ++pass) {
@@ -109,17 +162,15 @@ PencilMinimum smallest_of(const Matrix<Scalar>& R) {
     }
     const double rest = w.norm();
     const bool last = k + 1 == most || !(rest > 10.0 * epsilon * before);
-    if (k + 1 >= next_look || last) {
-      next_look = std::max(k + 3, (k + 1) * 5 / 4 + 1);
-      const SymmetricEigensystem ritz =
-          symmetric_eigensystem_of(tridiagonal.topLeftCorner(k + 1, k + 1));
-      const double largest = ritz.values(k);
+    if (k > 0 || last) {
+      const LargestPair ritz = largest_pair(diagonal, beside, k + 1);
+      const double largest = ritz.value;
       // The error of an eigenvalue is the square of its vector's.
       constexpr double accuracy = 1e-7;
-      if (last || rest * std::abs(ritz.vectors(k, k)) <= accuracy * largest) {
+      if (last || rest * std::abs(ritz.vector(k)) <= accuracy * largest) {
         Vector<Scalar> u = Vector<Scalar>::Zero(n);
         for (Index j = 0; j <= k; ++j) {
-          u += known.col(j) * ritz.vectors(j, k);
+          u += known.col(j) * ritz.vector(j);
         }
         // Where the other singular values are far larger, what is left of their vectors in u would
         // count in ‖Rᴴu‖; one solve more removes it. Nothing is lost there to the pivots' floor.
@@ -135,7 +186,7 @@ PencilMinimum smallest_of(const Matrix<Scalar>& R) {
       }
     }
     q = w / rest;
-    tridiagonal(k, k + 1) = tridiagonal(k + 1, k) = rest;
+    beside(k) = rest;
   }
   return found;
 }

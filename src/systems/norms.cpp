@@ -72,6 +72,7 @@ class Gain {
     U_ = -H_.cast<Complex>();
     U_.diagonal().array() += Complex(0.0, omega);
     X_ = B_.cast<Complex>();
+    // Rows stand one behind the other in U.
     for (Index k = 0; k + 1 < n; ++k) {
       if (std::abs(U_(k + 1, k)) > std::abs(U_(k, k))) {
         U_.row(k).tail(n - k).swap(U_.row(k + 1).tail(n - k));
@@ -85,8 +86,10 @@ class Gain {
     }
     for (Index j = 0; j < X_.cols(); ++j) {
       for (Index k = n - 1; k >= 0; --k) {
-        X_(k, j) /= U_(k, k);
-        X_.col(j).head(k) -= U_.col(k).head(k) * X_(k, j);
+        const Index behind = n - k - 1;
+        const Complex known =
+            U_.row(k).tail(behind).transpose().cwiseProduct(X_.col(j).tail(behind)).sum();
+        X_(k, j) = (X_(k, j) - known) / U_(k, k);
       }
     }
   }
@@ -111,7 +114,8 @@ class Gain {
   }
 
   MatrixXd H_, B_, C_, D_;
-  mutable Eigen::MatrixXcd U_, X_, G_;  // Memory for `at`.
+  mutable Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> U_;
+  mutable Eigen::MatrixXcd X_, G_;  // Memory for `at`.
 };
 
 /// The frequencies at which a singular value of G may be γ: those of the eigenvalues of the

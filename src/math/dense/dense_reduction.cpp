@@ -1,8 +1,11 @@
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 
+#include "core/constants.hpp"
 #include "math/dense/dense.hpp"
 #include "math/dense/dense_reduction.hpp"
 #include "math/dense/ordinary_units.hpp"
@@ -45,6 +48,23 @@ Eigen::VectorXd bidiagonal_of(MatrixXd M) {
   return entries;
 }
 
+/// How many singular values of a bidiagonal matrix are below x > 0: of the tridiagonal [0 J; Jᵀ 0]
+/// in shuffled rows, as many eigenvalues as it has rows, and these.
+Index count_below(const Eigen::VectorXd& entries, double x) {
+  Index negative = 0;
+  double pivot = -x;
+  for (Index i = 0;; ++i) {
+    negative += pivot < 0.0 ? 1 : 0;
+    if (i == entries.size()) {
+      break;
+    }
+    constexpr double least = std::numeric_limits<double>::min();
+    const double divisor = std::abs(pivot) < least ? -least : pivot;
+    pivot = -x - entries(i) / divisor * entries(i);
+  }
+  return negative - (entries.size() + 1) / 2;
+}
+
 }  // namespace
 
 MatrixXd triangle_of(const MatrixRef& A) {
@@ -82,6 +102,43 @@ Eigen::VectorXd coarse_singular_values_of(const MatrixRef& A) {
   Eigen::SelfAdjointEigenSolver<MatrixXd> solver;
   solver.computeFromTridiagonal(Eigen::VectorXd::Zero(2 * n), beside, Eigen::EigenvaluesOnly);
   return solver.eigenvalues().tail(n).reverse().cwiseMax(0.0) * size;
+}
+
+SingularExtent singular_extent_of(const MatrixRef& A, double share) {
+  const Index n = std::min(A.rows(), A.cols());
+  constexpr Index few = 40;
+  const auto extent_of = [share](const Eigen::VectorXd& values) {
+    return SingularExtent{values(0), values(values.size() - 1),
+                          (values.array() > share * values(0)).count()};
+  };
+  if (n < few) {
+    return extent_of(singular_values_of(A));
+  }
+  const MatrixXd R = A.rows() >= A.cols() ? triangle_of(A) : triangle_of(A.transpose());
+  const double size = R.cwiseAbs().maxCoeff();
+  if (!(size > 0.0) || !R.allFinite()) {
+    return extent_of(Eigen::VectorXd::Constant(n, size));
+  }
+  const Eigen::VectorXd entries = bidiagonal_of(R / size);
+  double high = 1.01 * entries.norm();
+  double low = 0.0;
+  for (int k = 0; k < 60 && high - low > epsilon * high; ++k) {
+    const double middle = 0.5 * (low + high);
+    (count_below(entries, middle) == n ? high : low) = middle;
+  }
+  SingularExtent extent{high * size, 0.0, n - count_below(entries, share * high)};
+  // By exponents first; what is below 1e-300 of the largest is zero.
+  double bottom = -1000.0;
+  double top = std::log2(high);
+  if (count_below(entries, std::exp2(bottom)) > 0) {
+    return extent;
+  }
+  for (int k = 0; k < 50; ++k) {
+    const double middle = 0.5 * (bottom + top);
+    (count_below(entries, std::exp2(middle)) > 0 ? top : bottom) = middle;
+  }
+  extent.smallest = std::exp2(top) * size;
+  return extent;
 }
 
 }  // namespace flyball::detail

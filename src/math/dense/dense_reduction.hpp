@@ -25,4 +25,14 @@ struct Hessenberg {
 /// Numerical Analysis 2 (1965).
 [[nodiscard]] Eigen::VectorXd coarse_singular_values_of(const MatrixRef& A);
 
+/// The largest and the smallest of them, and how many are more than `share` of the largest.
+struct SingularExtent {
+  double largest = 0.0;
+  double smallest = 0.0;
+  Eigen::Index rank = 0;
+};
+/// As `coarse_singular_values_of`, by bisection: where values fall off over many decades, as of
+/// powers of a matrix, the iteration for all of them takes most of the time.
+[[nodiscard]] SingularExtent singular_extent_of(const MatrixRef& A, double share);
+
 }  // namespace flyball::detail
