@@ -74,7 +74,8 @@ class Gain {
     X_ = B_.cast<Complex>();
     // Rows stand one behind the other in U.
     for (Index k = 0; k + 1 < n; ++k) {
-      if (std::abs(U_(k + 1, k)) > std::abs(U_(k, k))) {
+      const Complex pivot = U_(k, k);
+      if (std::abs(U_(k + 1, k).real()) > std::abs(pivot.real()) + std::abs(pivot.imag())) {
         U_.row(k).tail(n - k).swap(U_.row(k + 1).tail(n - k));
         X_.row(k).swap(X_.row(k + 1));
       }
