@@ -178,13 +178,15 @@ double DelayBounds::largest_at_infinity() const {
     }
     double here = size(angles);
     for (double step = 1.0; step > 1e-5; step *= 0.5) {
-      for (bool better = true; better;) {
+      constexpr int most_rounds = 20;  // along a ridge steps can go on for ever
+      bool better = true;
+      for (int round = 0; better && round < most_rounds; ++round) {
         better = false;
         for (Index i = 0; i < k; ++i) {
           for (const double sign : {1.0, -1.0}) {
             VectorXd other = angles;
             other(i) += sign * step;
-            if (const double there = size(other); there > here * (1.0 + 1e-12)) {
+            if (const double there = size(other); there > here * (1.0 + 1e-10)) {
               here = there;
               angles = other;
               better = std::isfinite(there);
