@@ -101,6 +101,8 @@ class Problem {
   /// is not `solved`. What the expressions' degrees allow is used: linear and convex quadratic
   /// programs by Mehrotra's predictor-corrector method, all else by a filter interior-point method;
   /// problems along stages by recursion over these. Solved again, it starts where it ended.
+  /// |e|, √(e²), max(a, b) and min(a, b) in sums that are minimised or bounded are solved as
+  /// variables t with t ≥ ±e, t ≥ a and b, or t ≤ a and b.
   /// @errors ProblemError, with the constraint.
   /// Source: book, section 17.1.2; Mehrotra, "On the implementation of a primal-dual interior point
   /// method" (1992); Wächter, Biegler (2006).
