@@ -1,10 +1,9 @@
 // The laws of a Lie group, of its exponential and logarithm, and of what follows from them; one
 // suite for every group and for bundles, in doubles and floats.
 
-#include <rapidcheck.h>
-
 #include "geometry/groups.hpp"
 #include "support/allocation_count.hpp"
+#include "support/property.hpp"
 
 namespace flyball::test {
 namespace {
@@ -13,26 +12,25 @@ template <class G>
 class GroupLaws : public testing::Test {
  protected:
   /// A law for random elements.
-  template <class Law>
-  static void holds(const char* name, Law law) {
-    EXPECT_TRUE(rc::check(name, [&] { law(Random(*rc::gen::arbitrary<std::uint64_t>())); }));
+  static void holds(const char* name, const std::function<void(Random&)>& law) {
+    EXPECT_TRUE(holds_for_random(name, law));
   }
 };
 TYPED_TEST_SUITE(GroupLaws, Groups);
 
 TYPED_TEST(GroupLaws, ProductIdentityInverse) {
   using G = TypeParam;
-  this->holds("group axioms", [](Random random) {
+  this->holds("group axioms", [](Random& random) {
     const G a = random_element<G>(random);
     const G b = random_element<G>(random);
     const G c = random_element<G>(random);
-    RC_ASSERT(distance((a * b) * c, a * (b * c)) <= roundings<G>(100));
-    RC_ASSERT(distance(a * G::identity(), a) <= roundings<G>(40));
-    RC_ASSERT(distance(G::identity() * a, a) <= roundings<G>(40));
-    RC_ASSERT(distance(a * a.inverse(), G::identity()) <= roundings<G>(40));
-    RC_ASSERT(distance(a.inverse() * a, G::identity()) <= roundings<G>(40));
-    RC_ASSERT(distance((a * b).inverse(), b.inverse() * a.inverse()) <= roundings<G>(100));
-    RC_ASSERT(distance(a * a.between(b), b) <= roundings<G>(100));
+    require(distance((a * b) * c, a * (b * c)) <= roundings<G>(100));
+    require(distance(a * G::identity(), a) <= roundings<G>(40));
+    require(distance(G::identity() * a, a) <= roundings<G>(40));
+    require(distance(a * a.inverse(), G::identity()) <= roundings<G>(40));
+    require(distance(a.inverse() * a, G::identity()) <= roundings<G>(40));
+    require(distance((a * b).inverse(), b.inverse() * a.inverse()) <= roundings<G>(100));
+    require(distance(a * a.between(b), b) <= roundings<G>(100));
   });
 }
 
@@ -56,9 +54,9 @@ TYPED_TEST(GroupLaws, Closure) {
 // Down to the least angles: Log(Exp(τ)) is τ, to a few roundings of each part of it.
 TYPED_TEST(GroupLaws, LogOfExp) {
   using G = TypeParam;
-  this->holds("in the ball of π", [](Random random) {
+  this->holds("in the ball of π", [](Random& random) {
     const auto tau = random_tangent<G>(random);
-    RC_ASSERT((G::exp(tau).log() - tau).norm() <= roundings<G>(60));
+    require((G::exp(tau).log() - tau).norm() <= roundings<G>(60));
   });
   Random random(2);
   for (const double size : small_sizes) {
@@ -106,9 +104,9 @@ TYPED_TEST(GroupLaws, NearHalfTurns) {
 
 TYPED_TEST(GroupLaws, ExpOfLog) {
   using G = TypeParam;
-  this->holds("for whole turns too", [](Random random) {
+  this->holds("for whole turns too", [](Random& random) {
     const G x = G::exp(random_tangent<G>(random, 5.0, random.uniform(0.0, 20.0)));
-    RC_ASSERT(distance(G::exp(x.log()), x) <= roundings<G>(100));
+    require(distance(G::exp(x.log()), x) <= roundings<G>(100));
   });
 }
 
@@ -116,46 +114,46 @@ TYPED_TEST(GroupLaws, ExpOfLog) {
 TYPED_TEST(GroupLaws, OneParameterSubgroups) {
   using G = TypeParam;
   using Scalar = typename G::Scalar;
-  this->holds("sum of multiples", [](Random random) {
+  this->holds("sum of multiples", [](Random& random) {
     const auto tau = random_tangent<G>(random, 5.0, 1.0);
     const auto s = static_cast<Scalar>(random.uniform(-2.0, 2.0));
     const auto t = static_cast<Scalar>(random.uniform(-2.0, 2.0));
-    RC_ASSERT(distance(G::exp(s * tau) * G::exp(t * tau), G::exp((s + t) * tau)) <=
-              roundings<G>(200));
-    RC_ASSERT(distance(G::exp(-tau), G::exp(tau).inverse()) <= roundings<G>(60));
+    require(distance(G::exp(s * tau) * G::exp(t * tau), G::exp((s + t) * tau)) <=
+            roundings<G>(200));
+    require(distance(G::exp(-tau), G::exp(tau).inverse()) <= roundings<G>(60));
   });
 }
 
 TYPED_TEST(GroupLaws, PlusAndMinus) {
   using G = TypeParam;
   static_assert(Manifold<G> && tangent_size<G> == G::tangent_size);
-  this->holds("x ⊕ δ and y ⊖ x", [](Random random) {
+  this->holds("x ⊕ δ and y ⊖ x", [](Random& random) {
     const G x = random_element<G>(random);
     const G y = x.plus(random_tangent<G>(random));
     const auto delta = random_tangent<G>(random);
-    RC_ASSERT(distance(x.plus(G::Tangent::Zero()), x) <= roundings<G>(40));
-    RC_ASSERT(x.minus(x).norm() <= roundings<G>(40));
-    RC_ASSERT(distance(x.plus(y.minus(x)), y) <= roundings<G>(200));
-    RC_ASSERT((x.plus(delta).minus(x) - delta).norm() <= roundings<G>(200));
+    require(distance(x.plus(G::Tangent::Zero()), x) <= roundings<G>(40));
+    require(x.minus(x).norm() <= roundings<G>(40));
+    require(distance(x.plus(y.minus(x)), y) <= roundings<G>(200));
+    require((x.plus(delta).minus(x) - delta).norm() <= roundings<G>(200));
     // In the frame of x: what x is seen from does not matter.
     const G frame = random_element<G>(random);
-    RC_ASSERT(((frame * y).minus(frame * x) - y.minus(x)).norm() <= roundings<G>(400));
-    RC_ASSERT(distance(plus(x, delta), x.plus(delta)) == 0.0);
-    RC_ASSERT(minus(y, x) == y.minus(x));
+    require(((frame * y).minus(frame * x) - y.minus(x)).norm() <= roundings<G>(400));
+    require(distance(plus(x, delta), x.plus(delta)) == 0.0);
+    require(minus(y, x) == y.minus(x));
   });
 }
 
 TYPED_TEST(GroupLaws, Adjoint) {
   using G = TypeParam;
-  this->holds("x Exp(τ) x⁻¹ = Exp(Ad τ)", [](Random random) {
+  this->holds("x Exp(τ) x⁻¹ = Exp(Ad τ)", [](Random& random) {
     const G x = random_element<G>(random);
     const G y = random_element<G>(random);
     const auto tau = random_tangent<G>(random);
-    RC_ASSERT(distance(x * G::exp(tau) * x.inverse(), G::exp(x.adjoint() * tau)) <=
-              roundings<G>(1000));
-    RC_ASSERT(((x * y).adjoint() - x.adjoint() * y.adjoint()).norm() <= roundings<G>(400));
-    RC_ASSERT((x.inverse().adjoint() * x.adjoint() - G::Jacobian::Identity()).norm() <=
-              roundings<G>(400));
+    require(distance(x * G::exp(tau) * x.inverse(), G::exp(x.adjoint() * tau)) <=
+            roundings<G>(1000));
+    require(((x * y).adjoint() - x.adjoint() * y.adjoint()).norm() <= roundings<G>(400));
+    require((x.inverse().adjoint() * x.adjoint() - G::Jacobian::Identity()).norm() <=
+            roundings<G>(400));
   });
 }
 
@@ -163,22 +161,22 @@ TYPED_TEST(GroupLaws, Action) {
   using G = TypeParam;
   if constexpr (requires { typename G::Point; }) {
     using Point = typename G::Point;
-    this->holds("of a product, of the inverse, and by the matrix", [](Random random) {
+    this->holds("of a product, of the inverse, and by the matrix", [](Random& random) {
       const G x = random_element<G>(random);
       const G y = random_element<G>(random);
       Point p;
       for (auto& entry : p.reshaped()) {
         entry = static_cast<typename G::Scalar>(random.normal());
       }
-      RC_ASSERT(((x * y) * p - x * (y * p)).norm() <= roundings<G>(100));
-      RC_ASSERT((x.inverse() * (x * p) - p).norm() <= roundings<G>(60));
+      require(((x * y) * p - x * (y * p)).norm() <= roundings<G>(100));
+      require((x.inverse() * (x * p) - p).norm() <= roundings<G>(60));
       constexpr int n = Point::RowsAtCompileTime;
       constexpr int m = G::Matrix::RowsAtCompileTime;
       Eigen::Matrix<typename G::Scalar, m, 1> homogeneous;
       homogeneous.setOnes();
       homogeneous.template head<n>() = p;
-      RC_ASSERT(((x.matrix() * homogeneous).template head<n>() - x * p).norm() <= roundings<G>(40));
-      RC_ASSERT((x.matrix() * y.matrix() - (x * y).matrix()).norm() <= roundings<G>(100));
+      require(((x.matrix() * homogeneous).template head<n>() - x * p).norm() <= roundings<G>(40));
+      require((x.matrix() * y.matrix() - (x * y).matrix()).norm() <= roundings<G>(100));
     });
   }
 }
@@ -186,23 +184,23 @@ TYPED_TEST(GroupLaws, Action) {
 TYPED_TEST(GroupLaws, Interpolation) {
   using G = TypeParam;
   using Scalar = typename G::Scalar;
-  this->holds("from one end to the other", [](Random random) {
+  this->holds("from one end to the other", [](Random& random) {
     const G a = random_element<G>(random);
     const G b = a.plus(random_tangent<G>(random, 5.0, random.uniform(0.0, 3.0)));
     const auto t = static_cast<Scalar>(random.uniform());
     const double bound = roundings<G>(400);
-    RC_ASSERT(distance(a.interpolate(b, Scalar(0)), a) <= bound);
-    RC_ASSERT(distance(a.interpolate(b, Scalar(1)), b) <= bound);
-    RC_ASSERT(distance(a.interpolate(b, t), b.interpolate(a, 1 - t)) <= bound);
+    require(distance(a.interpolate(b, Scalar(0)), a) <= bound);
+    require(distance(a.interpolate(b, Scalar(1)), b) <= bound);
+    require(distance(a.interpolate(b, t), b.interpolate(a, 1 - t)) <= bound);
     // Half way of half way is a quarter.
     const Scalar half(0.5);
-    RC_ASSERT(distance(a.interpolate(a.interpolate(b, half), half), a.interpolate(b, half / 2)) <=
-              bound);
+    require(distance(a.interpolate(a.interpolate(b, half), half), a.interpolate(b, half / 2)) <=
+            bound);
     // Equal steps are equal motions.
-    RC_ASSERT((a.interpolate(b, t).minus(a) - t * b.minus(a)).norm() <= bound);
+    require((a.interpolate(b, t).minus(a) - t * b.minus(a)).norm() <= bound);
     const G frame = random_element<G>(random);
-    RC_ASSERT(distance((frame * a).interpolate(frame * b, t), frame * a.interpolate(b, t)) <=
-              3 * bound);
+    require(distance((frame * a).interpolate(frame * b, t), frame * a.interpolate(b, t)) <=
+            3 * bound);
   });
 }
 

@@ -1,12 +1,11 @@
 // Closed-form Jacobians against dual numbers, and exponentials against the series of matrices in
 // extended precision.
 
-#include <rapidcheck.h>
-
 #include <flyball/math/derivatives/differentiation.hpp>
 
 #include "geometry/groups.hpp"
 #include "support/laws.hpp"
+#include "support/property.hpp"
 
 namespace flyball::test {
 namespace {
@@ -78,8 +77,7 @@ TYPED_TEST(JacobianLaws, OfPlusAndMinus) {
   using D = OverDuals<G>;
   using S = typename D::Scalar;
   {
-    const bool holds = rc::check("of a ⊖ b", [] {
-      Random random(*rc::gen::arbitrary<std::uint64_t>());
+    const bool holds = holds_for_random("of a ⊖ b", [](Random& random) {
       const G b = random_element<G>(random);
       const G a = b.plus(random_tangent<G>(random, 3.0, random.uniform(0.0, 3.0)));
       const auto difference = a.minus(b);
@@ -88,13 +86,13 @@ TYPED_TEST(JacobianLaws, OfPlusAndMinus) {
             return a.template cast<S>().plus(delta).minus(b.template cast<S>());
           },
           G::Tangent::Zero());
-      RC_ASSERT((by_a - right_jacobian_inverse<G>(difference)).norm() <= 1e4 * epsilon);
+      require((by_a - right_jacobian_inverse<G>(difference)).norm() <= 1e4 * epsilon);
       const auto by_b = jacobian(
           [&](const auto& delta) {
             return a.template cast<S>().minus(b.template cast<S>().plus(delta));
           },
           G::Tangent::Zero());
-      RC_ASSERT((by_b + G::left_jacobian_inverse(difference)).norm() <= 1e4 * epsilon);
+      require((by_b + G::left_jacobian_inverse(difference)).norm() <= 1e4 * epsilon);
     });
     EXPECT_TRUE(holds);
   }
@@ -106,8 +104,7 @@ TYPED_TEST(JacobianLaws, OfProductAndInverse) {
   using G = TypeParam;
   using S = typename OverDuals<G>::Scalar;
   {
-    const bool holds = rc::check("Ad", [] {
-      Random random(*rc::gen::arbitrary<std::uint64_t>());
+    const bool holds = holds_for_random("Ad", [](Random& random) {
       const G x = random_element<G>(random);
       const G y = random_element<G>(random);
       const auto X = x.template cast<S>();
@@ -124,15 +121,15 @@ TYPED_TEST(JacobianLaws, OfProductAndInverse) {
       const Matrix Q = Matrix::Identity();
       const double bound = 1e4 * epsilon * (1.0 + P.norm());
       const auto product = compose(Uncertain<G>{x, P}, Uncertain<G>{y, Q});
-      RC_ASSERT(
+      require(
           (product.covariance - by_x * P * by_x.transpose() - by_y * Q * by_y.transpose()).norm() <=
           bound * 10);
-      RC_ASSERT(distance(product.mean, x * y) <= 10 * epsilon);
+      require(distance(product.mean, x * y) <= 10 * epsilon);
       const auto back = inverse(Uncertain<G>{x, P});
-      RC_ASSERT((back.covariance - of_inverse * P * of_inverse.transpose()).norm() <= bound * 10);
-      RC_ASSERT((inverse(back).covariance - P).norm() <= bound * 100);
+      require((back.covariance - of_inverse * P * of_inverse.transpose()).norm() <= bound * 10);
+      require((inverse(back).covariance - P).norm() <= bound * 100);
       const auto seen = between(Uncertain<G>{x, P}, Uncertain<G>{y, Q});
-      RC_ASSERT(distance(seen.mean, x.between(y)) <= 100 * epsilon);
+      require(distance(seen.mean, x.between(y)) <= 100 * epsilon);
     });
     EXPECT_TRUE(holds);
   }

@@ -3,10 +3,9 @@
 #include <array>
 #include <span>
 
-#include <rapidcheck.h>
-
 #include "geometry/groups.hpp"
 #include "support/allocation_count.hpp"
+#include "support/property.hpp"
 
 namespace flyball::test::mean_test {
 namespace {
@@ -18,8 +17,7 @@ TYPED_TEST_SUITE(MeanLaws, Groups);
 TYPED_TEST(MeanLaws, DifferencesVanish) {
   using G = TypeParam;
   using Scalar = typename G::Scalar;
-  EXPECT_TRUE(rc::check("Σ w (x ⊖ mean) = 0, seen from anywhere", [] {
-    Random random(*rc::gen::arbitrary<std::uint64_t>());
+  EXPECT_TRUE(holds_for_random("Σ w (x ⊖ mean) = 0, seen from anywhere", [](Random& random) {
     const G centre = random_element<G>(random);
     const double least = std::is_same_v<Scalar, float> ? -2.0 : -6.0;
     const double spread = std::pow(10.0, random.uniform(least, 0.0));
@@ -30,18 +28,18 @@ TYPED_TEST(MeanLaws, DifferencesVanish) {
       weights[i] = static_cast<Scalar>(random.uniform(0.1, 2.0));
     }
     const auto mean = weighted_mean(std::span<const G>(points), weights, points[0]);
-    RC_ASSERT(mean.converged);
+    require(mean.converged);
     typename G::Tangent sum = G::Tangent::Zero();
     for (std::size_t i = 0; i < points.size(); ++i) {
       sum += weights[i] * points[i].minus(mean.value);
     }
-    RC_ASSERT(sum.norm() <= roundings<G>(1000));
+    require(sum.norm() <= roundings<G>(1000));
     const G frame = random_element<G>(random);
     for (G& point : points) {
       point = frame * point;
     }
     const auto seen = weighted_mean(std::span<const G>(points), weights, points[3]);
-    RC_ASSERT(distance(seen.value, frame * mean.value) <= roundings<G>(1000));
+    require(distance(seen.value, frame * mean.value) <= roundings<G>(1000));
   }));
 }
 
