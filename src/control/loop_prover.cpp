@@ -78,7 +78,8 @@ double work_of(std::size_t vertices, Index size, Index fixed) {
 double work_of_enclosure(const UncertainLoop& loop, const std::vector<TaylorForm>& parameters) {
   const auto n = static_cast<double>(loop.C.cols() + loop.A_c.rows() + 1);
   const auto branches = branches_over(parameters.back(), loop.period.si());
-  const double late = branches.empty() ? 0.0 : static_cast<double>(branches.back().whole_periods);
+  const double late =
+      !branches || branches->empty() ? 0.0 : static_cast<double>(branches->back().whole_periods);
   return 2400.0 * n * n * n + 300.0 * late * late + 50'000.0;
 }
 
@@ -222,10 +223,11 @@ ClaimOutcome LoopProver::show(LoopClaim& claim) {
     ++pieces_;
     const auto parameters = parameters_over(loop_.set, piece);
     const auto branches = branches_over(parameters.back(), loop_.period.si());
-    const bool shown = std::all_of(branches.begin(), branches.end(),
-                                   [&, &part = piece, &near = T](const DelayBranch& branch) {
-                                     return show_on(part, branch, parameters, claim, near);
-                                   });
+    const bool shown =
+        branches && std::all_of(branches->begin(), branches->end(),
+                                [&, &part = piece, &near = T](const DelayBranch& branch) {
+                                  return show_on(part, branch, parameters, claim, near);
+                                });
     if (shown) {
       continue;
     }

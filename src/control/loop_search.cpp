@@ -13,10 +13,10 @@ using Eigen::VectorXd;
 std::optional<FormMatrix> member_loop(const UncertainLoop& loop, const VectorXd& z, double disk) {
   const auto parameters = parameters_over(loop.set, {z, VectorXd::Zero(z.size())});
   const auto branches = branches_over(parameters.back(), loop.period.si());
-  if (branches.empty()) {
+  if (!branches || branches->empty()) {
     return std::nullopt;
   }
-  return closed_loop_over(loop, parameters, branches.front(), disk, 1.0);
+  return closed_loop_over(loop, parameters, branches->front(), disk, 1.0);
 }
 
 bool surely_unstable_member(const UncertainLoop& loop, const FoundMember& found) {

@@ -209,7 +209,7 @@ std::vector<TaylorForm> parameters_over(const ParameterSet& set, const SetPiece&
   return parameters;
 }
 
-std::vector<DelayBranch> branches_over(const TaylorForm& delay, double period) {
+std::optional<std::vector<DelayBranch>> branches_over(const TaylorForm& delay, double period) {
   std::vector<DelayBranch> branches;
   const Interval range = delay.range();
   if (range.high < 0.0) {
@@ -227,6 +227,9 @@ std::vector<DelayBranch> branches_over(const TaylorForm& delay, double period) {
       whole_within_rounding(low) >= 0.0 ? whole_within_rounding(low) : std::floor(low);
   const double last =
       whole_within_rounding(high) >= 0.0 ? whole_within_rounding(high) : std::ceil(high);
+  if (!(last - first <= most_delay_periods + 2.0)) {
+    return std::nullopt;
+  }
   for (double d = first; d < last; d += 1.0) {
     branches.push_back({static_cast<int>(d), false});
   }

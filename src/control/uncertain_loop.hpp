@@ -27,7 +27,10 @@ struct SetPiece {
                                                       const SetPiece& piece);
 
 /// The structures that occur over a piece, of delays that are not negative; none where all are.
-[[nodiscard]] std::vector<DelayBranch> branches_over(const TaylorForm& delay, double period);
+/// Nothing where rounding leaves open more of them than a loop may have, as beside a period of next
+/// to nothing.
+[[nodiscard]] std::optional<std::vector<DelayBranch>> branches_over(const TaylorForm& delay,
+                                                                    double period);
 
 /// The closed loop over a piece with the structure of a branch: [x; stored; controller], and where
 /// `disk` is positive one more row and column, the channel w -> z that a factor

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <complex>
 #include <vector>
 
@@ -114,10 +115,11 @@ Outcome solve_multisine(const Problem& problem, JsonWriter& answer) {
 }
 
 Outcome solve_prbs(const Problem& problem, JsonWriter& answer) {
+  const double periods = std::exp2(static_cast<double>(problem.integer("bits"))) - 1.0;
+  FLYBALL_CHECK(check_size(periods * static_cast<double>(problem.integer("hold")), "prbs", "bits"));
   FLYBALL_TRY(const Eigen::VectorXd u,
               prbs(problem.integer("bits"), problem.integer("hold"), problem.number("amplitude"),
                    static_cast<std::uint64_t>(problem.integer("seed"))));
-  FLYBALL_CHECK(check_size(static_cast<double>(u.size()), "prbs", "bits"));
   answer.add("u", u);
   return {};
 }

@@ -123,6 +123,9 @@ SystemScaling scaling_of(const MatrixRef& A, const MatrixRef& B, const MatrixRef
       break;
     }
   }
+  VectorXi states = scaling.states.unaryExpr(&exponent_of).cast<int>();
+  balance_parts(A, states);
+  scaling.states = states.unaryExpr([](int e) { return std::ldexp(1.0, e); }).cast<double>();
   const MatrixXd scaled = scaled_state_matrix(A, scaling);
   const double size_a = scaled.norm();
   const double size_b = (scaling.states.cwiseInverse().asDiagonal() * B).norm();

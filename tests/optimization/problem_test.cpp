@@ -487,6 +487,52 @@ TEST(Problem, AbsoluteValuesMinimaAndMaxima) {
   EXPECT_NE(none.message.find("the reach"), std::string::npos) << none.message;
 }
 
+// Multipliers that do not cancel prove nothing where variables may be large: pascals, counts.
+TEST(Problem, LargeNumbersAreNotInfeasible) {
+  Problem first;
+  Expression x = first.decision_variable();
+  Expression y = first.decision_variable();
+  first.minimize(x + 2.0 * y);
+  first.subject_to(x + y >= 3e7);
+  first.subject_to(x - y <= 3e7);
+  first.subject_to(x >= 0.0);
+  first.subject_to(y >= 0.0);
+  EXPECT_NE(first.solve().value().status, SolveStatus::infeasible);
+  EXPECT_NEAR(x.value(), 3e7, 1.0);
+  Problem second;
+  Expression a = second.decision_variable();
+  Expression b = second.decision_variable();
+  second.minimize(pow(a - 2e7, 2) + pow(b - 2e7, 2));
+  second.subject_to(a + b == 5e7);
+  second.subject_to(a >= 0.0);
+  second.subject_to(a <= 3e7);
+  second.subject_to(b >= 0.0);
+  EXPECT_NE(second.solve().value().status, SolveStatus::infeasible);
+  EXPECT_NEAR(a.value(), 2.5e7, 10.0);
+  Problem third;
+  Expression c = third.decision_variable();
+  Expression d = third.decision_variable();
+  third.minimize(c + 2.0 * d);
+  third.subject_to(1e-7 * c + 1e-7 * d >= 3.0);
+  third.subject_to(c >= 0.0);
+  third.subject_to(d >= 0.0);
+  EXPECT_NE(third.solve().value().status, SolveStatus::infeasible);
+  EXPECT_NEAR(c.value(), 3e7, 10.0);
+}
+
+// A start at which a magnitude is no number is the variable's, and can be moved.
+TEST(Problem, AStartBeyondAKinkCanBeMoved) {
+  Problem problem;
+  Expression x = problem.decision_variable();
+  problem.minimize(abs(log(x)));
+  EXPECT_EQ(problem.solve().value().status, SolveStatus::not_finite);
+  x.set_value(3.0);
+  const auto solution = problem.solve();
+  ASSERT_TRUE(solution) << to_string(solution.error());
+  EXPECT_EQ(solution->status, SolveStatus::solved);
+  EXPECT_NEAR(x.value(), 1.0, 1e-6);
+}
+
 // The least fuel Σ|u| h of a double integrator: along its stages, and all of it at both ends.
 TEST(Problem, LeastFuelAlongStages) {
   constexpr int N = 200;

@@ -1,6 +1,7 @@
 #include <flyball/systems/analysis.hpp>
 
 #include <cmath>
+#include <complex>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -8,7 +9,9 @@
 #include <gtest/gtest.h>
 
 #include <flyball/math/equations/matrix_equation.hpp>
+#include <flyball/systems/controllability.hpp>
 #include <flyball/systems/discretize.hpp>
+#include <flyball/systems/norms.hpp>
 
 #include "support/oracle.hpp"
 #include "systems/random_systems.hpp"
@@ -218,6 +221,62 @@ TEST(Analysis, Errors) {
   EXPECT_TRUE(lyapunov_certificate(scalar(-1.0), TimeDomain::discrete)
                   .error()
                   .is(MatrixEquationError::no_unique_solution));
+}
+
+/// Masses in a row between springs, one end fixed; a force on the first, the place of the last.
+ContinuousSystem<> masses(Eigen::Index m) {
+  constexpr double stiffness = 100.0;
+  constexpr double damping = 0.1;
+  ContinuousSystem<> s{MatrixXd::Zero(2 * m, 2 * m), MatrixXd::Zero(2 * m, 1),
+                       MatrixXd::Zero(1, 2 * m), MatrixXd::Zero(1, 1)};
+  s.A.topRightCorner(m, m).setIdentity();
+  for (Eigen::Index k = 0; k < m; ++k) {
+    for (const auto& [column, by] :
+         {std::pair{Eigen::Index{0}, stiffness}, std::pair{m, damping}}) {
+      s.A(m + k, column + k) -= k + 1 < m ? 2.0 * by : by;
+      if (k > 0) {
+        s.A(m + k, column + k - 1) = by;
+      }
+      if (k + 1 < m) {
+        s.A(m + k, column + k + 1) = by;
+      }
+    }
+  }
+  s.B(m, 0) = 1.0;
+  s.C(0, m - 1) = 1.0;
+  return s;
+}
+
+// Between an input and an output tens of states apart, units in which both are large rose from each
+// state to the next by a little, to 2^60, and nothing was left of the gains between.
+TEST(LongChains, GainsAndModesAreThoseOfThePlant) {
+  for (const Eigen::Index m : {10, 24, 32}) {
+    SCOPED_TRACE(m);
+    const ContinuousSystem<> s = masses(m);
+    const Eigen::VectorXcd poles = s.A.eigenvalues();
+    const auto gain = [&](double omega) {
+      Eigen::MatrixXcd M = -s.A.cast<std::complex<double>>();
+      M.diagonal().array() += std::complex<double>(0.0, omega);
+      return std::abs((s.C.cast<std::complex<double>>() *
+                       M.partialPivLu().solve(s.B.cast<std::complex<double>>()))(0, 0));
+    };
+    double largest = gain(0.0);
+    for (const auto& pole : poles) {
+      largest = std::max(largest, gain(std::abs(pole.imag())));
+    }
+    const auto norm = h_infinity_norm(s);
+    ASSERT_TRUE(norm) << to_string(norm.error());
+    EXPECT_GE(norm->norm, largest * (1.0 - 1e-9));
+    EXPECT_NEAR(norm->norm / gain(norm->frequency), 1.0, 1e-7);
+    const auto reach = analyze_controllability(s.A, s.B, TimeDomain::continuous).value();
+    const auto sight = analyze_observability(s.A, s.C, TimeDomain::continuous).value();
+    for (const auto* modes : {&reach.modes, &sight.modes}) {
+      for (const ModeReach& mode : *modes) {
+        EXPECT_LE((poles.array() - mode.eigenvalue).abs().minCoeff(), 1e-8);
+        EXPECT_EQ(mode.stability, Stability::stable);
+      }
+    }
+  }
 }
 
 }  // namespace

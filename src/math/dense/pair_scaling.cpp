@@ -3,7 +3,10 @@
 #include <limits>
 #include <vector>
 
+#include "math/dense/dense.hpp"
+#include "math/dense/ordinary_units.hpp"
 #include "math/dense/pair_scaling.hpp"
+#include "math/dense/spectral_blocks.hpp"
 
 namespace flyball::detail {
 
@@ -208,6 +211,18 @@ double cycle_mean_of(const MatrixRef& A) {
   return most;
 }
 
+void balance_parts(const MatrixRef& A, Eigen::VectorXi& states) {
+  for (const std::vector<Index>& part : parts_of(A)) {
+    if (part.size() < 2) {
+      continue;
+    }
+    const Eigen::VectorXi own =
+        balance_of(MatrixXd(A(part, part))).unaryExpr([](double d) { return std::ilogb(d); });
+    const double apart = (states(part) - own).cast<double>().mean();
+    states(part) = own.array() + static_cast<int>(std::lround(apart));
+  }
+}
+
 PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B, const MatrixRef& C) {
   constexpr int sweeps = 200;
   const Index n = A.rows();
@@ -239,6 +254,13 @@ PairScaling pair_scaling_of(const MatrixRef& A, const MatrixRef& B, const Matrix
     if ((sweep & (sweep + 1)) == 0) {
       before = pair.e;
     }
+  }
+  if (!is_far(A)) {
+    Eigen::VectorXi states = pair.e.unaryExpr(&whole);
+    balance_parts(A, states);
+    pair.e = states.cast<double>();
+    pair.scale_inputs(size);
+    pair.scale_outputs(size);
   }
   PairScaling scaling{Eigen::VectorXi(n), Eigen::VectorXi::Zero(B.cols()), whole(pair.size()),
                       Eigen::VectorXi::Zero(C.rows())};

@@ -23,6 +23,12 @@ struct PairScaling {
 /// 23 (1978).
 [[nodiscard]] double cycle_mean_of(const MatrixRef& A);
 
+/// Gives the states of each part of A, of those that drive each other, the units of A's own
+/// balance, and keeps only how the parts stand to each other. Where many states stand in a row
+/// between an input and an output, units in which both are large may rise by a little from each
+/// state to the next, to 2^60 along thirty masses, though no row or column shows it.
+void balance_parts(const MatrixRef& A, Eigen::VectorXi& states);
+
 /// The units in which row and column of each state in [A B; C 0] are of like size, without the
 /// diagonal (Osborne's iteration, on logarithms); each input's and time's own unit make the largest
 /// entry of its column and of A' one, and each output's that of its row. A state that

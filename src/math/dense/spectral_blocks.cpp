@@ -56,6 +56,8 @@ std::vector<bool> reached(const MatrixRef& A, Index from, bool back) {
   return seen;
 }
 
+}  // namespace
+
 std::vector<Indices> parts_of(const MatrixRef& A) {
   std::vector<Indices> parts;
   std::vector<bool> done(static_cast<std::size_t>(A.rows()), false);
@@ -75,6 +77,8 @@ std::vector<Indices> parts_of(const MatrixRef& A) {
   }
   return parts;
 }
+
+namespace {
 
 struct Decoupled {
   MatrixXd fast;

@@ -8,6 +8,9 @@
 
 namespace flyball::detail {
 
+/// The states of A in parts, each of those that drive each other.
+[[nodiscard]] std::vector<std::vector<Eigen::Index>> parts_of(const MatrixRef& A);
+
 /// Square matrices whose eigenvalues together are those of A, where parts of A are so far apart
 /// that the QR iteration would lose the small ones in rounding of the large ones; else A alone.
 ///

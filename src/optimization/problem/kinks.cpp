@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include <flyball/math/expression/tape.hpp>
 
@@ -185,7 +186,8 @@ void KinkFree::start(ExpressionGraph& graph) const {
   tape.prepare<double>(graph.parameter_values, work);
   tape.evaluate<double>(graph.values, values, work);
   for (std::size_t k = 0; k < kinks_.size(); ++k) {
-    graph.values[graph.nodes()[variable_of_.at(kinks_[k])].a] = values[k];
+    graph.values[graph.nodes()[variable_of_.at(kinks_[k])].a] =
+        std::isfinite(values[k]) ? values[k] : 0.0;
   }
 }
 

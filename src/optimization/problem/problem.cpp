@@ -147,6 +147,7 @@ void Problem::maximize(const Expression& gain) {
 
 void Problem::subject_to(const Constraints& constraints, std::string_view name) {
   Parts& parts = *parts_;
+  parts.is_lifted = false;  // until it is solved again
   if (!name.empty()) {
     parts.names.push_back({parts.constraints.size(), std::string(name)});
   } else if (!parts.names.empty() && !parts.names.back().name.empty()) {
@@ -433,8 +434,8 @@ Expected<ProblemSolution> Problem::solve(const SolverOptions& options,
     return tl::unexpected(
         Error(ProblemError::no_variables).in("problem").hint("make some with decision_variable"));
   }
-  for (const double value : parts.graph.values) {
-    if (!std::isfinite(value)) {
+  for (std::size_t i = 0; i < parts.graph.inputs(); ++i) {
+    if (!std::isfinite(parts.graph.values[i]) && !parts.kink_free.is_own(parts.graph, i)) {
       return tl::unexpected(
           Error(ProblemError::not_finite).in("problem").about("a variable's start"));
     }

@@ -24,23 +24,39 @@ bool QuadraticMethod::proves_infeasible() {
     return false;
   }
   program_.transpose_multiply(lambda_, residual_w_);
+  // What is left of terms that cancel is rounding's; of others it is no proof where a variable may
+  // be as large as the gap over it. The terms' size, from weights with other signs.
+  VectorXd& terms = fix_w_;
+  terms = residual_w_.cwiseAbs();
+  for (const Index stride : {2, 3, 5, 7}) {
+    for (Index r = 0; r < lambda_.size(); ++r) {
+      fix_c_(r) = r / stride % 2 == 0 ? lambda_(r) : -lambda_(r);
+    }
+    program_.transpose_multiply(fix_c_, rw_);
+    terms = terms.cwiseMax(rw_.cwiseAbs());
+  }
+  constexpr double cancelled = 1e-6;
   double gap = c0_.dot(lambda_);
   double left = 0.0;
+  const auto leave = [&](Index i, double v) {
+    left = v > cancelled * terms(i) ? std::max(left, v) : left;
+  };
   for (Index i = 0; i < w_.size(); ++i) {
     const double v = residual_w_(i);
     if (v > 0.0) {
       if (program_.lower(i) > -infinity) {
         gap += program_.lower(i) * v;
       } else {
-        left = std::max(left, v);
+        leave(i, v);
       }
     } else if (program_.upper(i) < infinity) {
       gap += program_.upper(i) * v;
     } else {
-      left = std::max(left, -v);
+      leave(i, -v);
     }
   }
-  if (gap > 1e-7 * size && left <= 1e-7 * gap) {
+  constexpr double farthest = 1e10;  // that a variable is taken to be from zero
+  if (gap > 1e-7 * size && left * farthest <= gap) {
     certificate_.head(lambda_.size()) = lambda_ / size;
     return true;
   }
