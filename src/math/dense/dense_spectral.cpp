@@ -71,7 +71,7 @@ void substitute_up(const Eigen::Ref<const MatrixXd, 0, Eigen::OuterStride<>>& T,
     y.col(1).head(rows) -= value.imag() * T.col(i).head(rows);
   };
   const auto at = [&](Index i) { return Complex(y(i, 0), y(i, 1)); };
-  const auto pivot = [least](Complex d, double size) { return std::abs(d) > size ? d : size; };
+  const auto pivot = [](Complex d, double size) { return std::abs(d) > size ? d : size; };
   for (Index i = top; i >= 0; --i) {
     if (i == 0 || T(i, i - 1) == 0.0) {
       take(i, at(i) / pivot(T(i, i) - lambda, least), i);

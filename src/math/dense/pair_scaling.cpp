@@ -3,8 +3,8 @@
 #include <limits>
 #include <vector>
 
+#include "math/dense/balanced.hpp"
 #include "math/dense/dense.hpp"
-#include "math/dense/ordinary_units.hpp"
 #include "math/dense/pair_scaling.hpp"
 #include "math/dense/spectral_blocks.hpp"
 
