@@ -56,6 +56,14 @@ void sweep(std::size_t count, Sweep<4>& packs, Sweep<1>& rest) {
   }
 }
 
+/// A sweep that finds nothing but what it writes.
+template <template <int> class Sweep, class... Numbers>
+void sweep_all(const BoundArrays& a, Numbers... numbers) {
+  Sweep<4> packs{a, numbers...};
+  Sweep<1> rest{a, numbers...};
+  sweep<Sweep>(a.count, packs, rest);
+}
+
 template <int Lanes>
 struct Measure {
   using T = typename Number<Lanes>::Type;
@@ -189,9 +197,7 @@ struct Advance {
 }  // namespace
 
 void measure_bounds(const BoundArrays& a) noexcept {
-  Measure<4> packs{a};
-  Measure<1> rest{a};
-  sweep<Measure>(a.count, packs, rest);
+  sweep_all<Measure>(a);
 }
 
 BoundErrors judge_bounds(const BoundArrays& a) noexcept {
@@ -212,9 +218,7 @@ BoundErrors judge_bounds(const BoundArrays& a) noexcept {
 }
 
 void weigh_bounds(const BoundArrays& a, double least) noexcept {
-  Weigh<4> packs{a, least};
-  Weigh<1> rest{a, least};
-  sweep<Weigh>(a.count, packs, rest);
+  sweep_all<Weigh>(a, least);
 }
 
 BoundSteps predict_bounds(const BoundArrays& a) noexcept {
@@ -232,9 +236,7 @@ BoundSteps predict_bounds(const BoundArrays& a) noexcept {
 }
 
 void aim_bounds(const BoundArrays& a, double target) noexcept {
-  Aim<4> packs{a, target};
-  Aim<1> rest{a, target};
-  sweep<Aim>(a.count, packs, rest);
+  sweep_all<Aim>(a, target);
 }
 
 BoundSteps correct_bounds(const BoundArrays& a, double keep) noexcept {
@@ -250,9 +252,7 @@ BoundSteps correct_bounds(const BoundArrays& a, double keep) noexcept {
 }
 
 void advance_bounds(const BoundArrays& a, double primal, double dual) noexcept {
-  Advance<4> packs{a, primal, dual};
-  Advance<1> rest{a, primal, dual};
-  sweep<Advance>(a.count, packs, rest);
+  sweep_all<Advance>(a, primal, dual);
 }
 
 }  // namespace flyball::optimization::detail::FLYBALL_VARIANT
